@@ -1,0 +1,43 @@
+"""Identify what a robot is made of, and name the physics its model lacks.
+
+    experiment = sysid.load("experiment.yaml")
+    fit = sysid.fit(experiment)
+    fit.rms("test"), fit.x, fit.uncertainty.std
+    sysid.predict(fit, "another_log.csv").residual
+    sysid.compare(fit, another_fit)
+    sysid.write(fit, "runs/mine")
+
+Names are imported when they are first used, so that `import sysid` costs nothing.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from .comparison import Difference, differences
+    from .config import Experiment
+    from .errors import SysidError, SysidWarning
+    from .estimate import Fit, Prediction
+    from .pipeline import fit, load
+    from .pipeline import predict_log as predict
+    from .results import write
+
+_WHERE = {
+    "load": ("pipeline", "load"), "fit": ("pipeline", "fit"), "predict": ("pipeline", "predict_log"),
+    "write": ("results", "write"), "compare": ("comparison", "compare"), "Difference": ("comparison", "Difference"),
+    "Experiment": ("config", "Experiment"), "Fit": ("estimate", "Fit"), "Prediction": ("estimate", "Prediction"),
+    "SysidError": ("errors", "SysidError"), "SysidWarning": ("errors", "SysidWarning"),
+}  # fmt: skip
+
+
+def __getattr__(name: str):
+    if name not in _WHERE:
+        raise AttributeError(f"module 'sysid' has no attribute {name!r}")
+    module, attribute = _WHERE[name]
+    return getattr(import_module(f".{module}", __name__), attribute)
+
+
+__all__ = [
+    "Difference", "Experiment", "Fit", "Prediction", "SysidError", "SysidWarning", "compare", "fit", "load", "predict",
+    "write",
+]

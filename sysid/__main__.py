@@ -1,0 +1,5 @@
+"""`python -m sysid`."""
+
+from .cli import main
+
+main()

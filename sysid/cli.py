@@ -1,0 +1,154 @@
+"""The commands: they parse, call, print. Nothing is computed here."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, Optional
+
+import typer
+
+from .errors import SysidError
+
+# The matrices here are small: threads in the linear algebra cost more than they give, much more on a busy machine.
+# It must be said before NumPy is loaded; a user's own setting wins.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+app = typer.Typer(add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False, rich_markup_mode=None, help="Identify what a robot is made of, and name the physics its model lacks.")
+
+Json = Annotated[bool, typer.Option("--json", help="One JSON document on standard output, nothing else there.")]
+Out = Annotated[Optional[Path], typer.Option("--out", help="Run folder (default runs/<experiment name>).")]  # noqa: UP045 - typer reads it
+Quiet = Annotated[bool, typer.Option("--quiet", help="No progress, no table.")]
+ExperimentPath = Annotated[Path, typer.Argument(metavar="EXPERIMENT", help="A YAML file, or a folder with config.yaml.")]
+
+
+@app.callback()
+def _root() -> None:
+    """Keeps `sysid fit` a command of its own however many there are."""
+
+
+@app.command()
+def fit(experiment: ExperimentPath, as_json: Json = False, out: Out = None, quiet: Quiet = False) -> None:
+    """Identify an experiment and write its run folder."""
+    from . import pipeline, results
+
+    spec = pipeline.load(experiment)
+    run = results.folder(out or Path("runs") / spec.name)
+    with _progress(quiet or as_json) as progress:
+        found = pipeline.fit(spec, progress=progress)
+    document = results.write(found, run)
+    if as_json:
+        print(json.dumps(document, allow_nan=False))
+    elif not quiet:
+        from .terminal import show_fit
+
+        show_fit(found, document)
+    if not found.solution.converged:
+        raise typer.Exit(1)
+
+
+@app.command()
+def compare(
+    experiments: Annotated[list[Path], typer.Argument(metavar="EXPERIMENT...", help="One or more experiments with the same test logs.")],
+    as_json: Json = False, out: Out = None, quiet: Quiet = False,
+) -> None:  # fmt: skip
+    """Model against measurement on held-out data, and models against each other with standard errors."""
+    from . import pipeline, results
+    from .comparison import document
+
+    specs = [pipeline.load(path) for path in experiments]
+    run = results.folder(out or Path("runs") / "-".join(["compare", *(spec.name for spec in specs)]))
+    with _progress(quiet or as_json) as progress:
+        fits = [pipeline.fit(spec, progress=progress) for spec in specs]
+    found = document(fits, [spec.name for spec in specs])
+    results.write_json(run / "compare.json", found)
+    if as_json:
+        print(json.dumps(found, allow_nan=False))
+    elif not quiet:
+        from .terminal import show_comparison
+
+        show_comparison(found)
+    if not all(found.solution.converged for found in fits):
+        raise typer.Exit(1)
+
+
+@app.command()
+def effects(name: Annotated[Optional[str], typer.Argument(help="One effect; without it, all.")] = None, as_json: Json = False, out: Out = None, quiet: Quiet = False) -> None:  # noqa: UP045
+    """The catalogue of physical effects: equation, parameters, units, what it looks like, what it is confused with."""
+    from .effect import describe, find, vocabulary
+
+    found = [describe(find(word)) for word in ([name] if name else vocabulary())]
+    if out:
+        from . import results
+
+        results.write_json(results.folder(out) / "effects.json", {"effects": found})
+    if as_json:
+        print(json.dumps({"effects": found}))
+    elif not quiet:
+        from .terminal import show_effects
+
+        show_effects(found)
+
+
+@app.command()
+def fetch(dataset: Annotated[Optional[str], typer.Argument(help="One data set; without it, all.")] = None, as_json: Json = False, out: Out = None, quiet: Quiet = False) -> None:  # noqa: UP045
+    """Bring public logs into the data folder (SYSID_DATA_DIR), checked by SHA-256."""
+    from .datasets import DATASETS
+
+    if dataset is not None and dataset not in DATASETS:
+        raise SysidError(f"there is no data set {dataset!r}", allowed=", ".join(DATASETS))
+    if out:
+        os.environ["SYSID_DATA_DIR"] = str(out)
+    found = []
+    for name in [dataset] if dataset else DATASETS:
+        files = DATASETS[name].fetch(progress=not (quiet or as_json))
+        found.append({"dataset": name, "licence": DATASETS[name].licence, "citation": DATASETS[name].citation, "files": [str(f) for f in files]})
+        if not (quiet or as_json):
+            print(f"{name}: {len(files)} files in {files[0].parent}\n  {DATASETS[name].citation}\n  licence: {DATASETS[name].licence}")
+    if as_json:
+        print(json.dumps({"datasets": found}))
+
+
+@contextmanager
+def _progress(silent: bool):
+    """A progress bar on standard error; nothing where silent or where nobody watches."""
+    if silent or not sys.stderr.isatty():
+        yield None
+        return
+    from .terminal import progress_bar
+
+    with progress_bar() as report:
+        yield report
+
+
+def main() -> None:
+    """The `sysid` command: bad input is one line on standard error and exit status 2."""
+    try:
+        status = app(standalone_mode=False)
+    except SysidError as error:
+        _fail(str(error), 2)
+    except typer.Exit as stop:
+        status = stop.exit_code
+    except (KeyboardInterrupt, typer.Abort):
+        _fail("interrupted", 130)
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        status = 1
+    except MemoryError:
+        _fail("out of memory", 1)
+    except Exception as error:
+        # what click raises for a mistyped command carries its own status and message
+        if hasattr(error, "format_message"):
+            _fail(error.format_message(), getattr(error, "exit_code", 2))
+        if os.environ.get("SYSID_DEBUG"):
+            raise
+        _fail(f"internal error, {type(error).__name__}: {error}; SYSID_DEBUG=1 shows where", 1)
+    sys.exit(status if isinstance(status, int) else 0)
+
+
+def _fail(message: str, status: int) -> None:
+    print("sysid: " + " ".join(str(message).split()), file=sys.stderr)
+    sys.exit(status)

@@ -1,0 +1,105 @@
+"""Model against measurement, and models against each other, on held-out data, with standard errors.
+
+Residuals are correlated over time, so a difference is judged over blocks of time: both models' squared residuals
+are summed block by block over the same blocks, and the standard error of the difference of their RMS is that of
+leaving one block out (jackknife).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .errors import SysidError
+from .estimate import Fit, Prediction
+
+_BLOCKS, _SHORTEST = 40, 0.5  # blocks over the held-out data; s
+
+
+@dataclass(frozen=True)
+class Difference:
+    """RMS of `to` minus RMS of `from_` on a joint, negative where `to` is better; se NaN where blocks are too few."""
+
+    from_: str
+    to: str
+    joint: str
+    delta_rms: float
+    se: float
+
+
+def compare(first: Fit, second: Fit, names: tuple[str, str] | None = None) -> list[Difference]:
+    """Compare two fits joint by joint on their test logs.
+
+    Args:
+        names: what to call them; by default their experiments' names.
+
+    Raises:
+        SysidError: they were tested on different logs, or share no joint.
+    """
+    names = names or (first.experiment.name, second.experiment.name)
+    logs = [[(log["log"], log["sha256"]) for log in fit.logs if log["part"] == "test"] for fit in (first, second)]
+    if logs[0] != logs[1]:
+        raise SysidError(
+            f"{names[0]} and {names[1]} have different test logs", where="compare",
+            allowed="experiments with the same data.test", do="give them the same held-out logs",
+        )  # fmt: skip
+    joints = [joint for joint in first.joints if joint in second.joints]
+    if not joints:
+        raise SysidError(f"{names[0]} and {names[1]} share no joint", where="compare")
+    blocks = _block_width(first.predictions["test"], second.predictions["test"])
+    sums = [_block_sums(fit.predictions["test"], blocks, [fit.joints.index(j) for j in joints]) for fit in (first, second)]
+    both = (sums[0][1] > 0) & (sums[1][1] > 0)  # a block counts where both models have rows in it
+    return [
+        Difference(*names, joint, *_jackknife(*((s[both[:, k], k], n[both[:, k], k]) for s, n in sums)))
+        for k, joint in enumerate(joints)
+    ]
+
+
+def _block_width(first: Prediction, second: Prediction) -> float:
+    duration = min(sum(np.ptp(p.t[p.log == log]) for log in np.unique(p.log)) for p in (first, second))
+    return max(duration / _BLOCKS, _SHORTEST)
+
+
+def _block_sums(prediction: Prediction, width: float, columns):
+    """Sums of squares and counts (blocks, joints) over blocks of `width` seconds of each log's own clock."""
+    block = np.floor(prediction.t / width).astype(np.int64)
+    lowest = block.min()
+    span = int(block.max() - lowest) + 1
+    index = prediction.log.astype(np.int64) * span + block - lowest
+    size = (int(prediction.log.max()) + 1) * span
+    residual = prediction.residual[:, columns]
+    use = np.ones_like(residual) if prediction.use is None else prediction.use[:, columns].astype(float)
+    total = lambda values: np.stack([np.bincount(index, v, minlength=size) for v in values.T], 1)  # noqa: E731
+    return total(residual**2), total(use)
+
+
+def _jackknife(first, second) -> tuple[float, float]:
+    (s1, n1), (s2, n2) = first, second
+    rms = lambda s, n: np.sqrt(s / np.maximum(n, 1))  # noqa: E731
+    delta = float(rms(s2.sum(), n2.sum()) - rms(s1.sum(), n1.sum()))
+    blocks = len(s1)
+    if blocks < 3:
+        return delta, float("nan")
+    without = rms(s2.sum() - s2, n2.sum() - n2) - rms(s1.sum() - s1, n1.sum() - n1)
+    return delta, float(np.sqrt((blocks - 1) / blocks * np.sum((without - without.mean()) ** 2)))
+
+
+def document(fits: list[Fit], names: list[str]) -> dict:
+    """The JSON document of `sysid compare`: every experiment, then every pair in the order given."""
+    experiments, notices = [], []
+    for fit, name in zip(fits, names):
+        errors = fit.predictions["test"].errors()
+        by_joint = lambda key: dict(zip(fit.joints, errors[key].tolist()))  # noqa: E731, B023
+        experiments.append({
+            "name": name, "rms_test": by_joint("rms"), "relative_error": {**by_joint("relative_error"), "*": float(errors["total"][1])},
+            "r2": by_joint("r2"), "converged": fit.solution.converged, "globally_optimal": fit.certificate.globally_optimal,
+        })  # fmt: skip
+        notices += [f"{name}: {notice}" for notice in fit.notices]
+    if len({(fit.filters["torque"], fit.filters["standstill"]) for fit in fits}) > 1:
+        notices.append("the experiments filter torque or leave out standstill differently: their RMS measure different things")
+    pairs = []
+    for k in range(len(fits)):
+        for other in range(k + 1, len(fits)):
+            for found in compare(fits[k], fits[other], (names[k], names[other])):
+                se = found.se if np.isfinite(found.se) else None
+                pairs.append({"from": found.from_, "to": found.to, "joint": found.joint, "delta_rms": found.delta_rms, "se": se})
+    return {"experiments": experiments, "differences": pairs, "notices": notices}

@@ -1,0 +1,146 @@
+"""Any number of samples -> small triangles that hold all the data say.
+
+The rows of one joint over one stretch of time, [A | tau], are reduced by QR to a triangle R with
+||A x - tau|| = ||R [x; -1]|| for every x. Triangles stack: over time, logs, machines, joints (with a weight), and
+leaving one out is leaving it out of the stack. Every solve, restart, fold, score and certificate works on them.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from .model import Model, chunks
+from .preprocess import Motion
+
+# Blocks are the unit of correlation-robust statistics: long against the filter's memory, many enough to count.
+_MOST_BLOCKS, _FEWEST_SAMPLES = 60, 200
+
+
+def triangle(rows: np.ndarray) -> np.ndarray:
+    """The R factor (min(n, k), k) of rows (n, k); overwrites a Fortran-ordered argument."""
+    from scipy.linalg.lapack import dgeqrf
+
+    if rows.shape[0] == 0:
+        return np.zeros((0, rows.shape[1]))
+    factor = dgeqrf(np.asfortranarray(rows), overwrite_a=1)[0]
+    return np.triu(factor[: min(rows.shape)])
+
+
+@dataclass(frozen=True)
+class Factor:
+    """The triangle of one joint over one block: R (r, k + 1) for the k parameters `columns`, then torque."""
+
+    joint: int
+    block: int
+    columns: np.ndarray
+    triangle: np.ndarray
+    rows: int
+
+    def misfit(self, x) -> np.ndarray:
+        """R [x; -1]: as long as the residual over the block, for all parameters x."""
+        return self.triangle[:, :-1] @ np.asarray(x)[self.columns] - self.triangle[:, -1]
+
+
+@dataclass(frozen=True)
+class Compressed:
+    """A log's, or several logs', triangles by joint and block. `size` is the number of parameters."""
+
+    size: int
+    joints: int
+    factors: tuple[Factor, ...]
+    samples: int
+
+    @cached_property
+    def blocks(self) -> int:
+        """Number of blocks of time."""
+        return 1 + max((factor.block for factor in self.factors), default=-1)
+
+    @cached_property
+    def rows(self) -> np.ndarray:
+        """(joints,) rows counted for each joint."""
+        out = np.zeros(self.joints, dtype=int)
+        for factor in self.factors:
+            out[factor.joint] += factor.rows
+        return out
+
+    @cached_property
+    def by_joint(self) -> tuple[Factor, ...]:
+        """One factor for each joint, all blocks merged."""
+        return tuple(_merged(self.factors, joint) for joint in range(self.joints))
+
+    def total(self, weights=None) -> np.ndarray:
+        """The triangle (size + 1, size + 1) of all joints; rows of a joint scaled by its weight."""
+        stack = []
+        for factor in self.by_joint:
+            rows = np.zeros((len(factor.triangle), self.size + 1))
+            rows[:, np.append(factor.columns, self.size)] = factor.triangle
+            stack.append(rows if weights is None else rows * weights[factor.joint])
+        merged = triangle(np.concatenate(stack))
+        out = np.zeros((self.size + 1, self.size + 1))
+        out[: len(merged)] = merged
+        return out
+
+    def squares(self, x) -> np.ndarray:
+        """(joints,) sum of squared residuals [N^2 m^2]."""
+        return np.array([np.sum(factor.misfit(x) ** 2) for factor in self.by_joint])
+
+    def scores(self, x, weights=None) -> np.ndarray:
+        """(blocks, size) gradient of each block's share of the sum of squares at x."""
+        out = np.zeros((self.blocks, self.size))
+        for factor in self.factors:
+            scale = 2.0 if weights is None else 2.0 * weights[factor.joint] ** 2
+            out[factor.block, factor.columns] += scale * factor.triangle[:, :-1].T @ factor.misfit(x)
+        return out
+
+    def without(self, blocks) -> "Compressed":
+        """The same data with some blocks left out."""
+        leave = set(blocks)
+        kept = tuple(factor for factor in self.factors if factor.block not in leave)
+        return Compressed(self.size, self.joints, kept, self.samples)
+
+
+def _merged(factors: Sequence[Factor], joint: int) -> Factor:
+    own = [factor for factor in factors if factor.joint == joint]
+    merged = triangle(np.concatenate([factor.triangle for factor in own]))
+    return Factor(joint, 0, own[0].columns, merged, sum(factor.rows for factor in own))
+
+
+def merge(parts: Sequence[Compressed]) -> Compressed:
+    """Several compressed logs of one model as one; their blocks stay apart."""
+    factors, first = [], 0
+    for part in parts:
+        factors += [Factor(f.joint, f.block + first, f.columns, f.triangle, f.rows) for f in part.factors]
+        first += part.blocks
+    return Compressed(parts[0].size, parts[0].joints, tuple(factors), sum(part.samples for part in parts))
+
+
+def block_length(motion: Motion) -> int:
+    """Samples in a block: at least 200, at most 60 blocks over the motion."""
+    return max(_FEWEST_SAMPLES, -(-motion.samples // _MOST_BLOCKS))
+
+
+def compress(model: Model, motion: Motion, *, thin: int = 1, progress: Callable[[float], None] | None = None) -> Compressed:
+    """Reduce a motion under a model to triangles.
+
+    Args:
+        thin: use every `thin`-th row only (for quick comparisons).
+        progress: called with the share done, from 0 to 1.
+    """
+    size = 10 * model.bodies + len(model.coefficients)
+    supports = [model.support(joint) for joint in range(model.robot.dof)]
+    factors, block, done, length = [], 0, 0, block_length(motion)
+    for piece in motion.pieces:
+        for rows in chunks(piece, length):
+            columns = model.columns(piece, rows)
+            for joint, (values, support) in enumerate(zip(columns, supports)):
+                stacked = np.concatenate([values, piece.tau[None, rows, joint]])[:, ::thin]
+                if piece.use is not None:
+                    stacked = stacked[:, piece.use[rows, joint][::thin]]
+                factors.append(Factor(joint, block, support, triangle(stacked.T), stacked.shape[1]))
+            block += 1
+            done += rows.stop - rows.start
+            if progress:
+                progress(done / motion.samples)
+    return Compressed(size, model.robot.dof, tuple(factors), motion.samples)

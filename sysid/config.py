@@ -1,0 +1,400 @@
+"""YAML -> Experiment: every key typed, every mistake named with its line.
+
+YAML is loaded without tags: a file that carries one, or aliases that multiply, is refused. The file on disk
+stays the truth; nothing here writes it.
+"""
+
+from __future__ import annotations
+
+import difflib
+import math
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+
+from .errors import ConfigError
+
+_LARGEST_FILE = 1_000_000  # bytes
+_MOST_ALIASED_NODES = 10_000
+
+
+def _finite(value: float) -> float:
+    if not math.isfinite(value):
+        raise ValueError("must be a finite number")
+    return value
+
+
+def _column(value: Any) -> Any:
+    if isinstance(value, bool) or not isinstance(value, (str, int)):
+        raise ValueError("must be a column's name or its number, counted from 0")
+    return value
+
+
+def _columns(value: Any) -> Any:
+    if isinstance(value, str):
+        return value
+    if isinstance(value, list) and value:
+        return [_column(item) for item in value]
+    raise ValueError('must be a pattern such as "q_{joint}", a list of names, or a list of numbers counted from 0')
+
+
+def _auto_or_positive(value: Any) -> Any:
+    if value == "auto":
+        return value
+    if isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value) and value > 0:
+        return float(value)
+    raise ValueError("must be a positive number or auto")
+
+
+def _standstill(value: Any) -> Any:
+    if value in ("keep", "mask"):
+        return value
+    if isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value) and value >= 0:
+        return float(value)
+    raise ValueError("must be keep, mask, or a speed [rad/s or m/s]")
+
+
+Number = Annotated[float, AfterValidator(_finite)]
+Vector = Annotated[list[Number], Field(min_length=3, max_length=3)]
+Positive = Annotated[float, AfterValidator(_finite), Field(gt=0)]
+Columns = Annotated[Any, BeforeValidator(_columns)]
+
+
+class _Spec(BaseModel):
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+
+
+class CylinderSpec(_Spec):
+    """A cylinder along its frame's z axis [m]."""
+
+    radius: Positive
+    length: Positive
+
+
+class InertiaSpec(_Spec):
+    """A body: a uniform box or cylinder of a mass [kg] and centre of mass [m], or its ten parameters."""
+
+    mass: Positive | None = None
+    com: Vector = [0.0, 0.0, 0.0]
+    box: Annotated[list[Positive], Field(min_length=3, max_length=3)] | None = None
+    cylinder: CylinderSpec | None = None
+    parameters: Annotated[list[Number], Field(min_length=10, max_length=10)] | None = None
+
+    def model_post_init(self, _context: Any) -> None:
+        shapes = [key for key in ("box", "cylinder", "parameters") if getattr(self, key) is not None]
+        if len(shapes) != 1:
+            raise ValueError("give exactly one of box, cylinder, parameters")
+        if (self.mass is None) != (self.parameters is not None):
+            raise ValueError("mass goes with box or cylinder; parameters holds its own")
+
+
+def _ratio(value: float) -> float:
+    if value == 0:
+        raise ValueError("a gear ratio of 0 drives nothing; give motor turns per joint turn")
+    return value
+
+
+Ratio = Annotated[float, AfterValidator(_finite), AfterValidator(_ratio)]
+
+
+def _direction(value: list[float]) -> list[float]:
+    if not any(value):
+        raise ValueError("must be a direction, not 0 0 0")
+    return value
+
+
+class RotorSpec(_Spec):
+    """A motor's rotor: a rigid body on a link, spinning `ratio` times as fast as its joint."""
+
+    joint: str
+    ratio: Ratio
+    on: str
+    xyz: Vector = [0.0, 0.0, 0.0]
+    rpy: Vector = [0.0, 0.0, 0.0]
+    axis: Annotated[Vector, AfterValidator(_direction)] = [0.0, 0.0, 1.0]
+    inertia: InertiaSpec
+
+
+class RobotSpec(_Spec):
+    urdf: str = "robot.urdf"
+    joints: list[str] | None = None
+    lock: dict[str, Number] = {}
+    gravity: Vector = [0.0, 0.0, -9.81]
+    rotors: list[RotorSpec] = []
+    transmission: dict[str, dict[str, Ratio]] = {}
+
+
+class LogSpec(_Spec):
+    """A log: a path or a public dataset, or a piece of one by time [s]."""
+
+    file: str
+    start: Number | None = None
+    stop: Number | None = None
+
+
+def _log(value: Any) -> Any:
+    return {"file": value} if isinstance(value, str) else value
+
+
+Logs = Annotated[list[Annotated[LogSpec, BeforeValidator(_log)]], Field(min_length=1)]
+
+
+class ColumnsSpec(_Spec):
+    time: Annotated[Any, BeforeValidator(_column)] = "t"
+    position: Columns = "q_{joint}"
+    torque: Columns = "tau_{joint}"
+    velocity: Columns | None = None
+    acceleration: Columns | None = None
+    signals: dict[str, Annotated[Any, BeforeValidator(_column)]] = {}
+
+
+def _constants(value: Any) -> Any:
+    if value is None or isinstance(value, dict):
+        return value
+    raise ValueError("must map each joint to its constant, {joint: N m per A}")
+
+
+class UnitsSpec(_Spec):
+    time: Literal["s", "ms", "us", "ns"] = "s"
+    position: Literal["rad", "deg", "m", "mm"] = "rad"
+    torque: Literal["N m", "N", "A"] = "N m"
+    torque_constant: Annotated[dict[str, Ratio] | None, BeforeValidator(_constants)] = None
+
+
+class DataSpec(_Spec):
+    train: Logs = Field(default_factory=lambda: [LogSpec(file="train.csv")])
+    test: Logs = Field(default_factory=lambda: [LogSpec(file="test.csv")])
+    columns: ColumnsSpec = ColumnsSpec()
+    signals: dict[str, Annotated[Any, BeforeValidator(_column)]] = {}
+    units: UnitsSpec = UnitsSpec()
+    rate: Positive | None = None
+
+
+class PreprocessSpec(_Spec):
+    filter: Literal["savitzky-golay", "butterworth", "none"] = "savitzky-golay"
+    order: Annotated[int, Field(ge=1, le=12)] = 4
+    window: Annotated[Any, BeforeValidator(_auto_or_positive)] = 0.1
+    cutoff: Annotated[Any, BeforeValidator(_auto_or_positive)] = 10.0
+    torque: Literal["raw", "same"] = "raw"
+    standstill: Annotated[Any, BeforeValidator(_standstill)] = "keep"
+
+
+class EffectSpec(_Spec):
+    """An effect of the vocabulary and the joints that have it (None: every joint)."""
+
+    name: str
+    joints: list[str] | None = None
+
+
+def _effect(value: Any) -> Any:
+    if isinstance(value, str):
+        return {"name": value}
+    if isinstance(value, dict) and len(value) == 1:
+        (name, options), = value.items()
+        if isinstance(name, str) and isinstance(options, dict):
+            return {"name": name, **options}
+    raise ValueError("must be an effect's name, or {name: {joints: [...]}}")
+
+
+class ModelSpec(_Spec):
+    inertia: Literal["log-cholesky", "exponential", "eigenvalue", "linear"] = "log-cholesky"
+    effects: list[Annotated[EffectSpec, BeforeValidator(_effect)]] = [EffectSpec(name="viscous"), EffectSpec(name="coulomb")]
+
+
+class PriorSpec(_Spec):
+    divergence: Literal["log-det", "pullback", "euclidean"] = "log-det"
+    weight: Annotated[float, AfterValidator(_finite), Field(ge=0)] = 1.0e-2
+    source: str = "urdf"
+
+
+class SolverSpec(_Spec):
+    tolerance: Annotated[float, AfterValidator(_finite), Field(gt=0, lt=1)] = 1.0e-8
+    max_iterations: Annotated[int, Field(ge=1)] = 200
+    weighting: Literal["none", "noise"] = "none"
+
+
+class Experiment(_Spec):
+    """An experiment file, every default filled in. `path` is the file; paths inside are relative to its folder."""
+
+    robot: RobotSpec = RobotSpec()
+    data: DataSpec = Field(default_factory=DataSpec)
+    preprocess: PreprocessSpec = PreprocessSpec()
+    model: ModelSpec = ModelSpec()
+    prior: PriorSpec = PriorSpec()
+    solver: SolverSpec = SolverSpec()
+    path: Path = Field(default=Path("experiment.yaml"), exclude=True)
+
+    @property
+    def folder(self) -> Path:
+        """The folder that the experiment's paths are relative to."""
+        return self.path.parent
+
+    @property
+    def name(self) -> str:
+        """The file's name without its ending; for a folder with config.yaml, the folder's."""
+        return self.path.resolve().parent.name if self.path.stem == "config" else self.path.stem
+
+
+def load(path: str | Path) -> Experiment:
+    """Read an experiment file, or the config.yaml of a folder.
+
+    Raises:
+        ConfigError: with the line, the key, and what is allowed there.
+    """
+    path = Path(path)
+    if path.is_dir():
+        path = path / "config.yaml"
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise ConfigError(f"the experiment file cannot be read ({error.strerror})", where=str(path), do="check its name") from None
+    if len(data) > _LARGEST_FILE:
+        raise ConfigError(f"an experiment file of {len(data)} bytes", where=str(path), allowed=f"at most {_LARGEST_FILE}")
+    try:
+        text = data.decode("utf-8")
+    except UnicodeDecodeError:
+        raise ConfigError("not UTF-8 text", where=str(path), do="give an experiment in YAML") from None
+    tree = parse_yaml(text, where=str(path))
+    if tree is None:
+        tree = {}
+    if not isinstance(tree, dict):
+        raise ConfigError("the file holds no mapping", where=str(path), allowed=", ".join(_keys(Experiment)))
+    plain = _plain(tree)
+    if "path" in plain:
+        raise _unknown_key(tree, ("path",), path)
+    try:
+        return Experiment.model_validate({**plain, "path": path})
+    except ValidationError as error:
+        raise _named(error, tree, path) from None
+
+
+def parse_yaml(text: str, *, where: str):
+    """A YAML document with line numbers and comments kept; no tags, no multiplying aliases."""
+    from ruamel.yaml import YAML
+    from ruamel.yaml.error import MarkedYAMLError, YAMLError
+
+    try:
+        _check_events(YAML(typ="rt", pure=True).parse(text), where)
+        return YAML(typ="rt", pure=True).load(text)
+    except ConfigError:
+        raise
+    except MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        line = f" line {mark.line + 1}" if mark else ""
+        raise ConfigError(f"not YAML ({error.problem or error.context})", where=f"{where}{line}", do="correct the line") from None
+    except (YAMLError, ValueError, RecursionError) as error:
+        raise ConfigError(f"not YAML ({str(error).splitlines()[0]})", where=where) from None
+
+
+def _check_events(events, where: str) -> None:
+    """Refuse tags, and aliases whose expansion would be large."""
+    from ruamel.yaml.events import AliasEvent, CollectionEndEvent, CollectionStartEvent, NodeEvent, ScalarEvent
+
+    sizes: dict[str, int] = {}
+    open_anchors: list[tuple[str | None, int]] = []
+    total = 0
+    for event in events:
+        if isinstance(event, CollectionEndEvent):
+            anchor, before = open_anchors.pop()
+            if anchor:
+                sizes[anchor] = total - before
+            continue
+        if not isinstance(event, NodeEvent):
+            continue
+        tag = getattr(event, "tag", None)
+        if tag and not str(tag).startswith("tag:yaml.org,2002:") or (tag and "python" in str(tag)):
+            raise ConfigError(f"the YAML tag {tag}", where=f"{where} line {event.start_mark.line + 1}", allowed="plain values", do="remove the tag")
+        if isinstance(event, AliasEvent):
+            if event.anchor not in sizes:
+                raise ConfigError(f"the alias *{event.anchor} refers to itself or to nothing", where=f"{where} line {event.start_mark.line + 1}")
+            total += sizes[event.anchor]
+        else:
+            total += 1
+            if isinstance(event, CollectionStartEvent):
+                open_anchors.append((event.anchor, total))
+            elif isinstance(event, ScalarEvent) and event.anchor:
+                sizes[event.anchor] = 1
+        if total > _MOST_ALIASED_NODES:
+            raise ConfigError(f"more than {_MOST_ALIASED_NODES} values, aliases counted", where=f"{where} line {event.start_mark.line + 1}", do="write the values out")
+
+
+def _plain(node):
+    """ruamel's round-trip nodes as plain Python values."""
+    if isinstance(node, dict):
+        return {_plain(key): _plain(value) for key, value in node.items()}
+    if isinstance(node, list):
+        return [_plain(item) for item in node]
+    if isinstance(node, bool) or node is None:
+        return node
+    for kind in (int, float, str):
+        if isinstance(node, kind):
+            return kind(node)
+    return node
+
+
+def _line(tree, location: tuple) -> int | None:
+    """The line (from 1) of the deepest part of a location that the file itself holds."""
+    line, node = None, tree
+    for step in location:
+        try:
+            line = (node.lc.key(step) if isinstance(node, dict) else node.lc.item(step))[0] + 1
+            node = node[step]
+        except (AttributeError, KeyError, IndexError, TypeError):
+            break
+    return line
+
+
+def _keys(model) -> list[str]:
+    return [name for name in model.model_fields if not (model is Experiment and name == "path")]
+
+
+def _model_at(location: tuple):
+    """The model whose keys are allowed at the parent of a location."""
+    model: Any = Experiment
+    for step in location[:-1]:
+        if isinstance(step, int) or not isinstance(model, type):
+            continue
+        field = model.model_fields.get(step)
+        if field is None:
+            continue
+        found = _inner_model(field.annotation)
+        model = found or model
+    return model
+
+
+def _inner_model(annotation):
+    from typing import get_args
+
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    for argument in get_args(annotation):
+        if (found := _inner_model(argument)) is not None:
+            return found
+    return None
+
+
+def _unknown_key(tree, location: tuple, path: Path) -> ConfigError:
+    key = str(location[-1])
+    keys = _keys(_model_at(location))
+    parent = ".".join(str(step) for step in location[:-1])
+    close = difflib.get_close_matches(key, keys, n=3, cutoff=0.4) or keys
+    line = _line(tree, location)
+    return ConfigError(
+        f"unknown key {key!r}" + (f" in {parent}" if parent else ""),
+        where=f"{path} line {line}" if line else str(path), allowed=", ".join(close), do="correct or remove the key",
+    )
+
+
+def _named(error: ValidationError, tree, path: Path) -> ConfigError:
+    """The first mistake of pydantic's list, as one line with the file's line number."""
+    found = sorted(error.errors(), key=lambda e: (e["type"] != "extra_forbidden", _line(tree, e["loc"]) or 0))[0]
+    location = tuple(step for step in found["loc"])
+    if found["type"] == "extra_forbidden":
+        return _unknown_key(tree, location, path)
+    key = "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in location).lstrip(".")
+    given = found.get("input")
+    shown = f" (given: {given!r})" if isinstance(given, (str, int, float, bool, type(None))) else ""
+    message = found["msg"].removeprefix("Value error, ").replace("Input should be", "must be").replace("Field required", "is missing")
+    line = _line(tree, location)
+    return ConfigError(f"{key}: {message}{shown}", where=f"{path} line {line}" if line else str(path))

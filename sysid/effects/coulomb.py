@@ -1,0 +1,21 @@
+"""Coulomb friction."""
+
+import numpy as np
+
+from ..effect import Linear, TorqueEffect
+
+
+class Coulomb(TorqueEffect):
+    """Dry contact slides: friction of constant size against the motion."""
+
+    name = "coulomb"
+    equation = "tau = Fc sign(qd)"
+    looks_like = "a step wherever the speed changes sign"
+    tied_with = ("torque_bias", "asymmetric_coulomb")
+    separate_by = "slow sweeps both ways"
+    source = "Rucker & Wensing 2022, eq. 14"
+
+    Fc = Linear("N m", lower=0, says="friction torque while sliding")
+
+    def columns(self, motion, joint):
+        return np.sign(motion.qd[None, :, joint])

@@ -1,0 +1,21 @@
+"""A constant error of the torque signal."""
+
+import numpy as np
+
+from ..effect import Linear, TorqueEffect
+
+
+class TorqueBias(TorqueEffect):
+    """The torque sensor or the current sensor reads a constant where there is nothing."""
+
+    name = "torque_bias"
+    equation = "tau = b"
+    looks_like = "a constant residual"
+    tied_with = ("asymmetric_coulomb", "gravity on a joint that always holds the same load")
+    separate_by = "torque at rest, and slow sweeps both ways"
+    source = "Janot, Gautier & Brunot 2019 (the offset of EMPS)"
+
+    b = Linear("N m", says="offset")
+
+    def columns(self, motion, joint):
+        return np.ones((1, len(motion.t)))

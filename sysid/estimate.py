@@ -1,0 +1,210 @@
+"""Model x compressed data -> Fit: the estimate with its certificate, its uncertainty and its errors."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from . import uncertainty
+from .certificate import Certificate, certify
+from .compress import Compressed
+from .config import Experiment
+from .inertia import DIVERGENCES, PARAMETERIZATIONS
+from .inertia.consistency import is_consistent
+from .model import Model, moving_coefficients
+from .objective import Objective
+from .preprocess import Motion
+from .solve import Coordinates, Solution, solve
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """Measured and predicted torque over the pieces of one set of logs.
+
+    log (n,) number of the log; t (n,) [s]; measured (n, dof) as logged, filtered where the fit filtered torque;
+    predicted (n, dof); use (n, dof) bool, None where every row counts.
+    """
+
+    log: np.ndarray
+    t: np.ndarray
+    measured: np.ndarray
+    predicted: np.ndarray
+    use: np.ndarray | None
+
+    @property
+    def residual(self) -> np.ndarray:
+        """measured - predicted (n, dof), zero on rows that do not count."""
+        residual = self.measured - self.predicted
+        return residual if self.use is None else np.where(self.use, residual, 0.0)
+
+    @property
+    def counts(self) -> np.ndarray:
+        """(dof,) rows that count."""
+        n, dof = self.measured.shape
+        return np.full(dof, n) if self.use is None else self.use.sum(0)
+
+    def errors(self) -> dict[str, np.ndarray]:
+        """`rms` [N m], `relative_error` (norm of the residual over that of the torque), `r2`, each (dof,), and their
+        totals over all joints under `total`."""
+        squares = _sum(self.residual**2)
+        kept = self.measured if self.use is None else np.where(self.use, self.measured, 0.0)
+        counts = np.maximum(self.counts, 1)
+        size = _sum(kept**2)
+        spread = size - _sum(kept) ** 2 / counts
+        tiny = np.finfo(float).tiny
+        return {
+            "rms": np.sqrt(squares / counts),
+            "relative_error": np.sqrt(squares / np.maximum(size, tiny)),
+            "r2": 1.0 - squares / np.maximum(spread, tiny),
+            "total": np.array([
+                np.sqrt(squares.sum() / counts.sum()), np.sqrt(squares.sum() / max(size.sum(), tiny)),
+                1.0 - squares.sum() / max(spread.sum(), tiny),
+            ]),
+        }  # fmt: skip
+
+
+def _sum(values):
+    return values.sum(axis=0)
+
+
+@dataclass(frozen=True)
+class Fit:
+    """What identification found.
+
+    pi (bodies, 10) about the joints' frames; coefficients of the effects in `model.coefficients`' order;
+    x both in one vector. `predictions` by "train" and "test". `notices`: what was decided on the way.
+    """
+
+    experiment: Experiment
+    model: Model
+    x: np.ndarray
+    objective: float
+    solution: Solution
+    certificate: Certificate
+    uncertainty: uncertainty.Uncertainty
+    held: np.ndarray
+    weights: np.ndarray | None
+    compressed: Compressed
+    physically_consistent: bool
+    predictions: dict[str, Prediction] = field(default_factory=dict)
+    samples: dict[str, int] = field(default_factory=dict)
+    seconds: dict[str, float] = field(default_factory=dict)
+    filters: dict = field(default_factory=dict)
+    logs: tuple[dict, ...] = ()
+    notices: tuple[str, ...] = ()
+
+    @property
+    def pi(self) -> np.ndarray:
+        """Inertial parameters (bodies, 10)."""
+        return self.x[: 10 * self.model.bodies].reshape(-1, 10)
+
+    @property
+    def coefficients(self) -> np.ndarray:
+        """Coefficients of the effects."""
+        return self.x[10 * self.model.bodies :]
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Joint names."""
+        return self.model.robot.joints
+
+    def rms(self, part: str) -> dict[str, float]:
+        """RMS residual of each joint on "train" or "test" [N m or N]."""
+        return dict(zip(self.joints, self.predictions[part].errors()["rms"].tolist()))
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Everything a solve needs: objective, coordinates, the default start."""
+
+    objective: Objective
+    coordinates: Coordinates
+    start: np.ndarray
+    weights: np.ndarray | None
+
+    def solve(self, experiment: Experiment, start=None, callback=None) -> Solution:
+        """Solve from `start` (default: the prior) with the experiment's settings."""
+        settings = experiment.solver
+        return solve(
+            self.objective, self.coordinates, self.start if start is None else start,
+            tolerance=settings.tolerance, max_iterations=settings.max_iterations, callback=callback,
+        )  # fmt: skip
+
+
+def pose(experiment: Experiment, model: Model, compressed: Compressed, moving: np.ndarray, prior: np.ndarray, weights=None) -> Problem:
+    """The compressed optimisation problem of an experiment.
+
+    Args:
+        moving: (coefficients,) bool, False for coefficients to hold at their prior.
+        prior: (bodies, 10).
+        weights: (joints,) that multiply the rows of each joint, or None.
+    """
+    spec = experiment
+    objective = Objective(compressed.total(weights), DIVERGENCES[spec.prior.divergence](prior), spec.prior.weight)
+    positive = np.array([c.positive for c in model.coefficients], dtype=bool)
+    held = ~moving
+    coordinates = Coordinates(PARAMETERIZATIONS[spec.model.inertia](), model.bodies, positive, held)
+    x = np.concatenate([prior.ravel(), _starting_coefficients(model, objective, prior, positive, held)])
+    return Problem(objective, coordinates, coordinates.theta(x), weights)
+
+
+def _starting_coefficients(model: Model, objective: Objective, prior, positive, held) -> np.ndarray:
+    """Held: what the URDF states (viscous, coulomb), else zero. The rest: the size that the data alone suggest."""
+    count = prior.size
+    robot = model.robot
+    stated = {"viscous": robot.damping, "coulomb": robot.friction}
+    urdf = np.array([stated[c.effect][c.joint] if c.effect in stated else 0.0 for c in model.coefficients])
+    columns = objective.triangle[:, count:-1]
+    rest = objective.triangle[:, -1] - objective.triangle[:, :count] @ prior.ravel()
+    squares = np.sum(columns**2, axis=0)
+    alone = columns.T @ rest / np.where(squares > 0, squares, 1.0)
+    size = np.linalg.norm(objective.triangle[:, -1]) / np.sqrt(np.where(squares > 0, squares, np.inf))
+    guess = np.where(positive, np.maximum(alone, 1e-3 * size), 0.0)
+    return np.where(held, urdf, guess)
+
+
+def noise_weights(compressed: Compressed, x) -> np.ndarray:
+    """(joints,) inverse residual RMS, scaled so that their mean square is one and the prior keeps its meaning."""
+    rms = np.sqrt(compressed.squares(x) / np.maximum(compressed.rows, 1))
+    weights = 1.0 / np.maximum(rms, 1e-9 * rms.max())
+    return weights / np.sqrt(np.mean(weights**2))
+
+
+def identify(experiment: Experiment, model: Model, motion: Motion, compressed: Compressed, prior: np.ndarray, callback=None) -> Fit:
+    """Solve, certify and say how sure; the predictions are added by the pipeline."""
+    moving = moving_coefficients(model, motion)
+    problem = pose(experiment, model, compressed, moving, prior)
+    solution = problem.solve(experiment, callback=callback)
+    if experiment.solver.weighting == "noise":
+        problem = pose(experiment, model, compressed, moving, prior, noise_weights(compressed, solution.x))
+        solution = problem.solve(experiment, callback=callback)
+    positive, held = problem.coordinates.positive, problem.coordinates.held
+    barrier = problem.objective.divergence.barrier and problem.objective.weight > 0.0
+    constrained = barrier or experiment.model.inertia != "linear"
+    certificate = certify(problem.objective, solution.x, positive, held, constrained=constrained)
+    count = 10 * model.bodies
+    fixed = np.zeros(len(solution.x), dtype=bool)
+    fixed[count:] = held
+    fixed[[count + k for k in certificate.at_zero]] = True
+    return Fit(
+        experiment=experiment, model=model, x=solution.x, objective=solution.objective, solution=solution,
+        certificate=certificate, held=held, weights=problem.weights, compressed=compressed,
+        uncertainty=uncertainty.estimate(problem.objective, compressed, solution.x, fixed, problem.weights),
+        physically_consistent=bool(is_consistent(solution.x[:count].reshape(-1, 10)).all()),
+    )  # fmt: skip
+
+
+def predict(model: Model, x, motion: Motion) -> Prediction:
+    """Torque that a model with parameters x (size,) predicts over a motion."""
+    count = 10 * model.bodies
+    pi, c = np.asarray(x)[:count].reshape(-1, 10), np.asarray(x)[count:]
+    pieces = motion.pieces
+    joined = lambda parts: parts[0] if len(parts) == 1 else np.concatenate(parts)  # noqa: E731 - no copy of a long log
+    return Prediction(
+        log=joined([np.full(piece.samples, piece.log, dtype=np.int16) for piece in pieces]),
+        t=joined([piece.t[piece.core] for piece in pieces]),
+        measured=joined([piece.tau[piece.core] for piece in pieces]),
+        predicted=joined([model.torque(piece, pi, c) for piece in pieces]),
+        use=None if pieces[0].use is None else joined([piece.use[piece.core] for piece in pieces]),
+    )

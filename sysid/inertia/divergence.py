@@ -1,0 +1,117 @@
+"""How far a body is from its prior: the term d(pi || prior) of eq. 14.
+
+Each class gives value, gradient and Hessian in the inertial parameters, with leading axes for bodies.
+All are zero at the prior.
+
+Source: Lee, Wensing & Park 2020, "Geometric robot dynamic identification".
+"""
+
+from abc import ABC, abstractmethod
+
+import numpy as np
+
+from .pseudo import PSEUDO_BASIS, to_pseudo
+
+
+def pseudo_gradient(matrix) -> np.ndarray:
+    """Gradient (..., 10) in pi of <matrix, J(pi)> for symmetric matrices (..., 4, 4)."""
+    return np.einsum("...ab,kab->...k", matrix, PSEUDO_BASIS)
+
+
+def affine_metric(inverse) -> np.ndarray:
+    """tr(J^-1 E_i J^-1 E_j) (..., 10, 10): the affine-invariant metric on bodies, from J^-1 (..., 4, 4)."""
+    turned = np.einsum("...ab,kbc->...kac", inverse, PSEUDO_BASIS)
+    return np.einsum("...iab,...jba->...ij", turned, turned, optimize=True)
+
+
+class Divergence(ABC):
+    """d(pi || prior) for bodies pi (..., 10); prior (..., 10) must be physically possible."""
+
+    name: str
+    #: True where d/gamma is a self-concordant barrier of the possible bodies
+    barrier = False
+
+    def __init__(self, prior):
+        self.prior = np.array(prior, dtype=float)
+        self.prior.setflags(write=False)
+
+    @abstractmethod
+    def value(self, pi) -> np.ndarray:
+        """d (...), infinite where the body is impossible and the divergence is a barrier."""
+
+    @abstractmethod
+    def gradient(self, pi) -> np.ndarray:
+        """d d / d pi (..., 10)."""
+
+    @abstractmethod
+    def hessian(self, pi) -> np.ndarray:
+        """d^2 d / d pi^2 (..., 10, 10)."""
+
+
+class LogDet(Divergence):
+    """Bregman divergence of -log det: d = -log det(J J0^-1) + tr(J0^-1 J) - 4. No units, no frame."""
+
+    name = "log-det"
+    barrier = True
+
+    def __init__(self, prior):
+        super().__init__(prior)
+        self._prior_inverse = np.linalg.inv(to_pseudo(self.prior))
+        self.linear = pseudo_gradient(self._prior_inverse)
+        self._log_determinant = np.linalg.slogdet(to_pseudo(self.prior))[1]
+
+    def value(self, pi):
+        pseudo = to_pseudo(pi)
+        try:
+            diagonal = np.diagonal(np.linalg.cholesky(pseudo), axis1=-2, axis2=-1)
+            log_determinant = 2.0 * np.log(diagonal).sum(-1)
+        except np.linalg.LinAlgError:
+            possible = np.linalg.eigvalsh(pseudo)[..., 0] > 0.0
+            log_determinant = np.where(possible, np.linalg.slogdet(pseudo)[1], -np.inf)
+        return self._log_determinant - log_determinant + np.sum(self.linear * pi, -1) - 4.0
+
+    def gradient(self, pi):
+        return self.linear - pseudo_gradient(np.linalg.inv(to_pseudo(pi)))
+
+    def hessian(self, pi):
+        return affine_metric(np.linalg.inv(to_pseudo(pi)))
+
+
+class _Quadratic(Divergence):
+    def __init__(self, prior):
+        super().__init__(prior)
+        self._metric = self._constant_metric()
+
+    @abstractmethod
+    def _constant_metric(self) -> np.ndarray: ...
+
+    def value(self, pi):
+        step = pi - self.prior
+        return 0.5 * np.einsum("...i,...ij,...j->...", step, self._metric, step)
+
+    def gradient(self, pi):
+        return np.einsum("...ij,...j->...i", self._metric, pi - self.prior)
+
+    def hessian(self, pi):
+        return np.broadcast_to(self._metric, np.shape(pi)[:-1] + (10, 10))
+
+
+class Pullback(_Quadratic):
+    """The constant pullback metric at the prior: the second-order part of log-det, 1/2 ||J0^-1/2 (J - J0) J0^-1/2||^2."""
+
+    name = "pullback"
+
+    def _constant_metric(self):
+        return affine_metric(np.linalg.inv(to_pseudo(self.prior)))
+
+
+class Euclidean(_Quadratic):
+    """1/2 ||pi - prior||^2 of the ten numbers, units ignored: depends on frame and units; for comparison."""
+
+    name = "euclidean"
+
+    def _constant_metric(self):
+        return np.broadcast_to(np.eye(10), self.prior.shape[:-1] + (10, 10)).copy()
+
+
+DIVERGENCES = {kind.name: kind for kind in (LogDet, Pullback, Euclidean)}

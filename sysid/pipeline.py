@@ -1,0 +1,157 @@
+"""The whole loop on one page; read this first.
+
+    experiment -> robot, model
+    logs -> motion (filtered) -> columns -> triangles
+    triangles + prior -> fit, certificate, uncertainty
+    fit + held-out logs -> predictions and errors
+"""
+
+from __future__ import annotations
+
+import time
+import warnings
+from collections.abc import Callable
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+
+from . import config, filters, model, robot
+from . import log as logs
+from .compress import Compressed, compress
+from .config import Experiment, LogSpec
+from .errors import ConfigError, SysidError, SysidWarning
+from .estimate import Fit, Prediction, identify, predict
+from .model import Model
+from .preprocess import Motion, prepare
+from .robot import Robot
+
+#: called with the stage's name and the share of it done, 0 to 1
+Progress = Callable[[str, float], None]
+
+
+def load(path: str | Path) -> Experiment:
+    """The experiment in a YAML file, or in a folder's config.yaml. Raises ConfigError."""
+    return config.load(path)
+
+
+def build(experiment: Experiment) -> tuple[Robot, Model, np.ndarray]:
+    """The robot, the model and the prior (bodies, 10) of an experiment. Raises RobotError, ConfigError."""
+    machine = robot.load(experiment.robot, experiment.folder)
+    structure = model.build(machine, experiment.model.effects)
+    return machine, structure, _prior(experiment, structure)
+
+
+def read(experiment: Experiment, machine: Robot, specs: list[LogSpec]) -> list[logs.Log]:
+    """The logs of an experiment's `data.train` or `data.test`. Raises LogError."""
+    return [logs.read(spec, experiment.data, machine.joints, machine.prismatic, experiment.folder) for spec in specs]
+
+
+def fit(experiment: Experiment, *, progress: Progress | None = None) -> Fit:
+    """Identify an experiment: everything from its logs to its errors on held-out data.
+
+    Raises:
+        SysidError: bad input, with the one line that says so. A search that does not converge does not raise; it
+            is `fit.solution.converged`.
+    """
+    tell = progress or (lambda stage, share: None)
+    seconds: dict[str, float] = {}
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", SysidWarning)
+        with _timed(seconds, "robot"):
+            machine, structure, prior = build(experiment)
+        with _timed(seconds, "read"):
+            train = read(experiment, machine, experiment.data.train)
+        provenance = [_provenance("train", log) for log in train]
+        with _timed(seconds, "filters"):
+            chosen = filters.compare(experiment, structure, train, prior)
+            preprocess = filters.settled(experiment.preprocess, chosen)
+        with _timed(seconds, "preprocess"):
+            motion = prepare(train, preprocess, machine.joints)
+            del train  # the filtered motion holds all that is needed from here on
+        _tell_still(motion)
+        with _timed(seconds, "compress"):  # the regressor is built and reduced chunk by chunk, never whole
+            compressed = compress(structure, motion, progress=lambda share: tell("compress", share))
+        with _timed(seconds, "solve"):
+            found = identify(experiment, structure, motion, compressed, prior)
+        with _timed(seconds, "predict"):
+            predictions = {"train": predict(structure, found.x, motion)}
+            samples = {"train": motion.samples}
+            del motion
+        with _timed(seconds, "test"):
+            held_out = read(experiment, machine, experiment.data.test)
+            provenance += [_provenance("test", log) for log in held_out]
+            motion = prepare(held_out, preprocess, machine.joints)
+            del held_out
+            predictions["test"] = predict(structure, found.x, motion)
+            samples["test"] = motion.samples
+    return _with(
+        found, predictions=predictions, samples=samples, seconds=seconds, filters=chosen, logs=tuple(provenance),
+        notices=tuple(dict.fromkeys(str(w.message) for w in _split(caught))),
+    )  # fmt: skip
+
+
+def predict_log(found: Fit, log: str | LogSpec) -> Prediction:
+    """What a fitted model predicts on another log, read and filtered as the experiment says. Raises LogError."""
+    spec = LogSpec(file=str(log)) if isinstance(log, (str, Path)) else log
+    machine = found.model.robot
+    motion = prepare(read(found.experiment, machine, [spec]), filters.settled(found.experiment.preprocess, found.filters), machine.joints)
+    return predict(found.model, found.x, motion)
+
+
+def compressed(experiment: Experiment, part: str = "train") -> tuple[Model, Motion, Compressed, np.ndarray]:
+    """The model, the motion and the triangles of "train" or "test", and the prior: what studies work on."""
+    machine, structure, prior = build(experiment)
+    train = read(experiment, machine, experiment.data.train)
+    preprocess = filters.settled(experiment.preprocess, filters.compare(experiment, structure, train, prior)) if _automatic(experiment) else experiment.preprocess
+    chosen = train if part == "train" else read(experiment, machine, experiment.data.test)
+    motion = prepare(chosen, preprocess, machine.joints)
+    return structure, motion, compress(structure, motion), prior
+
+
+def _automatic(experiment: Experiment) -> bool:
+    return "auto" in (experiment.preprocess.window, experiment.preprocess.cutoff)
+
+
+def _prior(experiment: Experiment, structure: Model) -> np.ndarray:
+    """The prior bodies: the URDF's, or those of a previous fit where it has them."""
+    source = experiment.prior.source
+    if source == "urdf":
+        return np.array(structure.robot.prior)
+    from .results import read_inertias
+
+    return read_inertias((experiment.folder / source).resolve(), structure)
+
+
+def _tell_still(motion: Motion) -> None:
+    for joint in motion.still:
+        warnings.warn(SysidWarning(f"joint {joint!r} never moves in the training logs; its friction is held at its prior, and its bodies are where the other joints' torque leaves them"), stacklevel=2)
+
+
+def _provenance(part: str, log: logs.Log) -> dict:
+    return {"part": part, "log": log.name, "sha256": log.sha256, "samples": log.samples, "segments": len(log.segments)}
+
+
+def _split(caught):
+    """Our notices; anything else goes on as the warning it is."""
+    for warning in caught:
+        if issubclass(warning.category, SysidWarning):
+            yield warning
+        else:
+            warnings.warn_explicit(warning.message, warning.category, warning.filename, warning.lineno)
+
+
+def _with(found: Fit, **changes) -> Fit:
+    from dataclasses import replace
+
+    return replace(found, **changes)
+
+
+@contextmanager
+def _timed(seconds: dict[str, float], stage: str):
+    start = time.perf_counter()
+    yield
+    seconds[stage] = time.perf_counter() - start
+
+
+__all__ = ["ConfigError", "SysidError", "build", "compressed", "fit", "load", "predict_log", "read"]

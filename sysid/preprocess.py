@@ -1,0 +1,200 @@
+"""Log -> Motion: position, velocity, acceleration and torque, in contiguous pieces.
+
+Savitzky-Golay takes q, qd and qdd from one and the same fitted polynomial and leaves torque alone, as the paper
+does. A zero-phase Butterworth filters the angle once and takes central differences of it. With `torque: same`
+the filter that the angles saw also goes over torque and over every column that is not a smooth function of
+the filtered motion, so that both sides of the equation of motion see one filter.
+"""
+
+import math
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .config import PreprocessSpec
+from .errors import ConfigError, LogError, SysidWarning
+from .log import Log, Segment
+
+# `standstill: mask` leaves a joint's rows out below this share of its own rms speed, at most 0.03 rad/s or m/s:
+# there friction is whatever balances the rest.
+_STANDSTILL_SHARE, _STANDSTILL_MOST = 0.05, 0.03
+_NEVER_MOVES = 1e-3  # rad or m, peak to peak
+
+
+class Smoother:
+    """A linear, zero-phase filter over samples, with the reach [samples] of its memory."""
+
+    def __init__(self, spec: PreprocessSpec, step: float):
+        self.kind, self.order, self.step = spec.filter, spec.order, step
+        if self.kind == "savitzky-golay":
+            self.length = 2 * round(spec.window / (2.0 * step)) + 1
+            if self.length <= self.order:
+                raise ConfigError(
+                    f"preprocess.window of {spec.window:g} s is {self.length} samples at {1 / step:.4g} Hz",
+                    allowed=f"more than order = {self.order} samples, {(self.order + 1) * step:.3g} s", do="widen the window",
+                )  # fmt: skip
+            self.reach = self.length // 2
+        elif self.kind == "butterworth":
+            if spec.cutoff >= 0.5 / step:
+                raise ConfigError(f"preprocess.cutoff of {spec.cutoff:g} Hz at {1 / step:.4g} Hz sampling", allowed=f"below {0.5 / step:.4g} Hz")
+            from scipy.signal import butter
+
+            self.sections = butter(self.order, spec.cutoff, fs=1.0 / step, output="sos")
+            # five time constants of the slowest pole: what is left of an edge is below one per cent
+            slowest = 2.0 * math.pi * spec.cutoff * math.sin(math.pi / (2 * self.order))
+            self.reach = max(1, math.ceil(5.0 / (slowest * step)))
+        else:
+            self.reach = 0
+
+    def differentiate(self, q) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """q, qd, qdd (n, dof) of measured angles (n, dof); the first and last `reach` rows are not to be used."""
+        if self.kind == "savitzky-golay":
+            from scipy.signal import savgol_filter
+
+            return tuple(
+                savgol_filter(q, self.length, self.order, deriv=d, delta=self.step, axis=0) for d in range(3)
+            )  # type: ignore[return-value]
+        smooth = self(q)
+        qd = np.gradient(smooth, self.step, axis=0)
+        qdd = np.zeros_like(smooth)
+        qdd[1:-1] = (smooth[2:] - 2.0 * smooth[1:-1] + smooth[:-2]) / self.step**2
+        return smooth, qd, qdd
+
+    def __call__(self, values, axis: int = 0) -> np.ndarray:
+        """The filtered values, same shape; samples along `axis`."""
+        if self.kind == "savitzky-golay":
+            from scipy.signal import savgol_filter
+
+            return savgol_filter(values, self.length, self.order, axis=axis)
+        if self.kind == "butterworth":
+            from scipy.signal import sosfiltfilt
+
+            return sosfiltfilt(self.sections, values, axis=axis)
+        return values
+
+
+@dataclass(frozen=True)
+class Piece:
+    """A contiguous stretch of motion, every row usable.
+
+    t (n,) [s]; q, qd, qdd (n, dof); tau (n, dof) as the fit sees it, `measured` as logged; signals {name: (n,)}; `use` (n, dof) bool, None where every row counts.
+    `smoother` filters columns where torque was filtered, else None; then `margin` extra rows stand before and
+    after `core`, whose filtered values the filter needs but which are not used.
+    """
+
+    log: int
+    step: float
+    t: np.ndarray
+    q: np.ndarray
+    qd: np.ndarray
+    qdd: np.ndarray
+    tau: np.ndarray
+    measured: np.ndarray
+    signals: dict[str, np.ndarray]
+    use: np.ndarray | None
+    smoother: Smoother | None
+    core: slice
+
+    def part(self, rows: slice) -> "Piece":
+        """The rows `rows`, without margins."""
+        return replace(
+            self, t=self.t[rows], q=self.q[rows], qd=self.qd[rows], qdd=self.qdd[rows], tau=self.tau[rows],
+            measured=self.measured[rows], signals={name: values[rows] for name, values in self.signals.items()},
+            use=None if self.use is None else self.use[rows], core=slice(0, len(self.t[rows])),
+        )  # fmt: skip
+
+    @property
+    def samples(self) -> int:
+        """Number of usable rows."""
+        return self.core.stop - self.core.start
+
+
+@dataclass(frozen=True)
+class Motion:
+    """What identification works on: pieces of motion of the same joints."""
+
+    joints: tuple[str, ...]
+    pieces: tuple[Piece, ...]
+    still: tuple[str, ...]
+
+    @property
+    def samples(self) -> int:
+        """Number of usable rows over all pieces."""
+        return sum(piece.samples for piece in self.pieces)
+
+    @property
+    def duration(self) -> float:
+        """Seconds of motion over all pieces."""
+        return sum(piece.samples * piece.step for piece in self.pieces)
+
+
+def prepare(logs: Sequence[Log], spec: PreprocessSpec, joints: tuple[str, ...]) -> Motion:
+    """Filter logs into a Motion. `spec.window` and `spec.cutoff` must be numbers here, not `auto`.
+
+    Raises:
+        LogError: a log is shorter than its filter. ConfigError: the filter cannot be.
+    """
+    pieces = []
+    for number, log in enumerate(logs):
+        before = len(pieces)
+        for segment in log.segments:
+            if (piece := _piece(number, segment, spec)) is not None:
+                pieces.append(piece)
+        if len(pieces) == before:
+            shortest = _needs(spec, log.segments[0].step) if log.segments else 2
+            raise LogError(f"{log.samples} samples are fewer than the filter's window of {shortest}", where=str(log.path), do="give a longer log or narrow preprocess.window")
+        if dropped := len(log.segments) - (len(pieces) - before):
+            warnings.warn(SysidWarning(f"{log.path}: {dropped} segment(s) shorter than the filter's window were left out"), stacklevel=2)
+    travel = np.ptp(np.concatenate([[p.q[p.core].min(0), p.q[p.core].max(0)] for p in pieces]), axis=0)
+    pieces = [_masked(piece, spec, pieces) for piece in pieces]
+    return Motion(joints, tuple(pieces), tuple(j for j, d in zip(joints, travel) if d < _NEVER_MOVES))
+
+
+def _needs(spec: PreprocessSpec, step: float) -> int:
+    smoother = Smoother(spec, step)
+    return (4 if spec.torque == "same" else 2) * smoother.reach + 1
+
+
+def _piece(number: int, segment: Segment, spec: PreprocessSpec) -> Piece | None:
+    smoother = Smoother(spec, segment.step)
+    if len(segment.t) < _needs(spec, segment.step):
+        return None
+    if spec.filter == "none":
+        if segment.qd is None or segment.qdd is None:
+            raise ConfigError("preprocess.filter is none and velocity or acceleration was not logged", allowed="savitzky-golay, butterworth, or data.columns.velocity and .acceleration", do="choose a filter")
+        q, qd, qdd = segment.q, segment.qd, segment.qdd
+    else:
+        q, qd, qdd = smoother.differentiate(segment.q)
+    edge = smoother.reach
+    rows = slice(edge, len(segment.t) - edge)
+    both = spec.torque == "same" and spec.filter != "none"
+    tau = smoother(segment.tau) if both else segment.tau
+    n = rows.stop - rows.start
+    margin = edge if both else 0
+    return Piece(
+        log=number, step=segment.step, t=segment.t[rows], q=q[rows], qd=qd[rows], qdd=qdd[rows], tau=tau[rows],
+        measured=segment.tau[rows], signals={name: values[rows] for name, values in segment.signals.items()}, use=None,
+        smoother=smoother if both else None, core=slice(margin, n - margin),
+    )  # fmt: skip
+
+
+def _masked(piece: Piece, spec: PreprocessSpec, pieces: list[Piece]) -> Piece:
+    """The piece with the rows of a standing joint left out, widened by the filter's reach."""
+    if spec.standstill == "keep":
+        return piece
+    if spec.standstill == "mask":
+        square = np.mean(np.concatenate([p.qd[p.core] ** 2 for p in pieces]), axis=0)
+        threshold = np.minimum(_STANDSTILL_SHARE * np.sqrt(square), _STANDSTILL_MOST)
+    else:
+        threshold = np.full(piece.q.shape[1], spec.standstill)
+    still = np.abs(piece.qd) < threshold
+    reach = Smoother(spec, piece.step).reach if piece.smoother is not None else 0
+    if reach:
+        # a sample is touched when any standing sample lies within the filter's reach
+        count = np.cumsum(np.concatenate([np.zeros((1, still.shape[1])), still]), axis=0)
+        rows = np.arange(len(still))
+        low, high = np.maximum(rows - reach, 0), np.minimum(rows + reach + 1, len(still))
+        still = count[high] - count[low] > 0
+    return replace(piece, use=~still)

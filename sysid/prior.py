@@ -1,0 +1,65 @@
+"""What a body is believed to be before any data: the URDF's inertia, made usable where it is not.
+
+The prior must be physically possible, or no divergence from it exists. A URDF that states nothing, zero or
+the impossible gets the nearest usable thing, in this order, and a warning that says which:
+the same mass and centre of mass with its second moments raised to be positive; the uniform solid of its
+primitive shapes; a default ball.
+"""
+
+import warnings
+
+import numpy as np
+
+from .errors import SysidWarning
+from .inertia import pseudo
+from .inertia.consistency import is_consistent
+
+# A second moment below this share of the body's mean one is no thickness that a link has (a 1 : 30 sheet).
+_THINNEST = 1e-3
+_DEFAULT_MASS = 1.0  # kg, where no other body of the robot states one
+
+
+def usable(name: str, stated: np.ndarray | None, geometry: np.ndarray | None, reach: np.ndarray, typical_mass: float | None):
+    """A possible prior body (10,) about its joint frame.
+
+    Args:
+        name: the body's name, for the warning.
+        stated: what the URDF's inertials add up to (10,), or None where it states none.
+        geometry: uniform solid of its primitive shapes (10,), or None.
+        reach: (3,) [m], from its joint's frame to the farthest next joint; zero for a last link.
+        typical_mass: median mass [kg] of the robot's usable bodies, or None.
+    """
+    if stated is not None and is_consistent(stated) and _well_conditioned(stated):
+        return stated
+    problem = "states no inertia" if stated is None or not np.any(stated) else "has an impossible inertia"
+    if stated is not None and stated[0] > 0.0 and (raised := _raised(stated)) is not None:
+        _tell(name, problem, "its mass and centre of mass are kept and its second moments raised to be positive")
+        return raised
+    if geometry is not None and is_consistent(geometry):
+        _tell(name, problem, f"the prior is the uniform solid of its shapes at 1000 kg/m^3, {geometry[0]:.3g} kg")
+        return geometry
+    radius = max(0.5 * float(np.linalg.norm(reach)), 0.05)
+    mass = typical_mass or _DEFAULT_MASS
+    _tell(name, problem, f"the prior is a ball of {mass:.3g} kg and radius {radius:.3g} m midway to the next joint")
+    return pseudo.sphere(mass, 0.5 * np.asarray(reach), radius)
+
+
+def _well_conditioned(pi) -> bool:
+    _, _, central = pseudo.to_central(pi)
+    moments = 0.5 * np.trace(central) - np.linalg.eigvalsh(central)
+    return bool(moments.min() > 1e-9 * moments.max())
+
+
+def _raised(pi) -> np.ndarray | None:
+    mass, com, central = pseudo.to_central(pi)
+    values, axes = np.linalg.eigh(0.5 * np.trace(central) * np.eye(3) - central)
+    mean = np.clip(values, 0.0, None).mean()
+    if not mean > 0.0:
+        return None
+    values = np.maximum(values, _THINNEST * mean)
+    sigma = (axes * values) @ axes.T
+    return pseudo.from_central(mass, com, np.trace(sigma) * np.eye(3) - sigma)
+
+
+def _tell(name: str, problem: str, remedy: str) -> None:
+    warnings.warn(SysidWarning(f"body {name!r} {problem} in the URDF; {remedy}"), stacklevel=3)

@@ -1,0 +1,80 @@
+"""What a reader gives: named columns, loaded when asked for."""
+
+from abc import ABC, abstractmethod
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import LogError
+
+
+class Table(ABC):
+    """Named columns of a file. Matrices (n, k) go by their name, and column by column as `name[0]` …"""
+
+    path: Path
+    names: list[str]
+
+    @abstractmethod
+    def load(self, names: list[str]) -> dict[str, np.ndarray]:
+        """The named columns as float arrays: (n,), or (n, k) for the name of a matrix."""
+
+    def width(self, name: str) -> int:
+        """How many columns stand behind a name: more than one for a matrix."""
+        return 1
+
+    def resolve(self, column: str | int) -> str:
+        """The name of a column given by its name, or by its number from 0.
+
+        Raises:
+            LogError: no such column.
+        """
+        if isinstance(column, int):
+            if not 0 <= column < len(self.names):
+                raise LogError(f"there is no column {column}", where=str(self.path), allowed=f"0 to {len(self.names) - 1}")
+            return self.names[column]
+        if column not in self.names:
+            raise LogError(f"there is no column {column!r}", where=str(self.path), allowed=", ".join(self.names[:20]) + (" …" if len(self.names) > 20 else ""), do="correct data.columns")
+        return column
+
+
+class ArrayTable(Table):
+    """A table of arrays that are in memory, or come from `fetch` one at a time."""
+
+    def __init__(self, path: Path, shapes: dict[str, tuple[int, ...]]):
+        self.path = path
+        self._widths = {}
+        self.names = []
+        for name, shape in shapes.items():
+            if len(shape) > 2 or not shape:
+                continue
+            width = 1 if len(shape) == 1 or 1 in shape else min(shape)
+            self._widths[name] = width
+            self.names.append(name)
+            if width > 1:
+                self.names += [f"{name}[{k}]" for k in range(width)]
+
+    @abstractmethod
+    def fetch(self, name: str) -> np.ndarray:
+        """The array behind a variable's name."""
+
+    def width(self, name):
+        return self._widths.get(name, 1)
+
+    def load(self, names):
+        out, held = {}, {}
+        for name in names:
+            variable, _, index = name.partition("[") if name not in self._widths else (name, "", "")
+            if variable not in held:
+                held[variable] = self._oriented(variable)
+            out[name] = held[variable][:, int(index[:-1])] if index else held[variable]
+        return out
+
+    def _oriented(self, name) -> np.ndarray:
+        try:
+            array = np.asarray(self.fetch(name), dtype=float)
+        except (TypeError, ValueError):
+            raise LogError(f"variable {name!r} holds no plain numbers", where=str(self.path), allowed="real arrays") from None
+        if array.ndim == 2 and 1 in array.shape:
+            return array.ravel()
+        # samples run along the longer side
+        return array.T if array.ndim == 2 and array.shape[0] < array.shape[1] else array

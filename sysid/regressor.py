@@ -1,0 +1,162 @@
+"""Robot x motion -> the columns that multiply inertial parameters, exact, for any number of samples at once.
+
+One pass over the tree, parents first, carries for each body its angular velocity w and acceleration alpha, the
+acceleration a of its frame's origin (gravity included), and the columns J of its body Jacobian with respect to the joint
+speeds (which already hold the transmission: J_i = X J_parent + S_i G_i). A body's force and moment about its
+origin are linear in its ten parameters,
+
+    f = m a + alpha x h + w x (w x h)
+    n = h x a + I alpha + w x (I w)
+
+and its share of the torque of joint j is J_j . (f, n). Arrays keep samples last, so that each column is one
+contiguous run of memory, as LAPACK wants them.
+
+Source: Atkeson, An & Hollerbach 1986; Featherstone 2008, ch. 5 (recursion).
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from .robot import Robot
+
+_CHUNK = 4096  # samples: the arrays of one body stay in cache
+
+
+@dataclass(frozen=True)
+class BodyMotion:
+    """Motion of one body's frame: w, alpha, a (3, n) in its own axes; jacobian {joint: (linear, angular)}."""
+
+    angular: np.ndarray
+    angular_acceleration: np.ndarray
+    acceleration: np.ndarray
+    jacobian: dict[int, tuple[np.ndarray, np.ndarray]]
+
+
+def body_motions(robot: Robot, q, qd, qdd) -> list[BodyMotion]:
+    """Motion of every body, in the order of `robot.bodies`. q, qd, qdd: (n, dof)."""
+    q, qd, qdd = (np.ascontiguousarray(np.asarray(x, dtype=float).T) for x in (q, qd, qdd))
+    n = q.shape[1]
+    full_q, full_qd, full_qdd = (robot.transmission @ x for x in (q, qd, qdd))
+    zero = np.zeros((3, n))
+    # the base accelerates upward at -g: gravity enters every body at no cost
+    base = (zero, zero, np.repeat(-robot.gravity[:, None], n, 1), {})
+    rows: list[tuple] = []
+    for i, parent in enumerate(robot.parents):
+        w, alpha, a, jacobian = rows[parent] if parent >= 0 else base
+        linear, angular = robot.subspaces[i, :3, None], robot.subspaces[i, 3:, None]
+        speed, push = full_qd[i], full_qdd[i]
+        revolute = bool(np.any(angular))
+        to_child = _rotation_to_child(robot.rotations[i], robot.subspaces[i], full_q[i]) if revolute else robot.rotations[i].T
+        # origin of the child's frame in the parent's axes; a prismatic joint moves it along its axis
+        p = robot.translations[i][:, None] + (0.0 if revolute else robot.rotations[i] @ (linear * full_q[i]))
+        turn = _Turn(to_child)
+        carried = {
+            j: (turn(jl + _cross(ja, p)), turn(ja)) for j, (jl, ja) in jacobian.items()
+        }
+        for j in np.flatnonzero(robot.transmission[i]):
+            gain = robot.transmission[i, j]
+            jl, ja = carried.get(j, (0.0, 0.0))
+            carried[j] = (jl + gain * linear + zero, ja + gain * angular + zero)
+        new_w, new_alpha = turn(w), turn(alpha)
+        # classical acceleration of the child's origin
+        new_a = turn(a + _cross(alpha, p) + _cross(w, _cross(w, p)))
+        if revolute:
+            new_alpha = new_alpha + angular * push + _cross(new_w, angular * speed)
+            new_w = new_w + angular * speed
+        else:
+            new_a = new_a + linear * push + 2.0 * _cross(new_w, linear * speed)
+        rows.append((new_w, new_alpha, new_a, carried))
+    return [BodyMotion(*rows[body.row]) for body in robot.bodies]
+
+
+class _Turn:
+    """Turn vectors (3, n) by one matrix (3, 3) or by a matrix for each sample (3, 3, n)."""
+
+    def __init__(self, matrix):
+        self.matrix = matrix
+
+    def __call__(self, vector):
+        m = self.matrix
+        if m.ndim == 2:
+            return m @ vector
+        x, y, z = vector
+        return np.stack([m[r, 0] * x + m[r, 1] * y + m[r, 2] * z for r in range(3)])
+
+
+def _rotation_to_child(placement, subspace, angle) -> np.ndarray:
+    """(R_placement exp(S(axis) angle))' for every sample: (3, 3, n), by Rodrigues' formula."""
+    x, y, z = subspace[3:]
+    skew = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    constant, sine, cosine = placement, placement @ skew, placement @ skew @ skew
+    out = np.empty((3, 3, angle.size))
+    s, c = np.sin(angle), 1.0 - np.cos(angle)
+    for r in range(3):
+        for k in range(3):
+            out[k, r] = constant[r, k] + sine[r, k] * s + cosine[r, k] * c
+    return out
+
+
+def _cross(a, b) -> np.ndarray:
+    return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+
+
+def _columns(motion: BodyMotion, linear, angular, out) -> None:
+    """Write the ten columns of one body in one joint's torque into out (10, n)."""
+    w, alpha, a = motion.angular, motion.angular_acceleration, motion.acceleration
+    out[0] = np.einsum("in,in->n", linear, a)
+    along, square = np.einsum("in,in->n", linear, w), np.einsum("in,in->n", w, w)
+    out[1:4] = _cross(linear, alpha) + w * along - linear * square + _cross(a, angular)
+    u = _cross(angular, w)  # angular . (w x I w) = (angular x w) . I w
+    out[4:7] = angular * alpha + u * w
+    for k, (i, j) in zip((7, 8, 9), ((0, 1), (1, 2), (0, 2))):
+        out[k] = angular[i] * alpha[j] + angular[j] * alpha[i] + u[i] * w[j] + u[j] * w[i]
+
+
+def columns(robot: Robot, q, qd, qdd) -> np.ndarray:
+    """The regressor with samples last, (dof, 10 bodies, n); the layout that compression works on."""
+    motions = body_motions(robot, q, qd, qdd)
+    out = np.zeros((robot.dof, 10 * len(motions), np.shape(q)[0]))
+    for b, motion in enumerate(motions):
+        for j, (linear, angular) in motion.jacobian.items():
+            _columns(motion, linear, angular, out[j, 10 * b : 10 * b + 10])
+    return out
+
+
+def regressor(robot: Robot, q, qd, qdd) -> np.ndarray:
+    """Y (n, dof, 10 bodies) with torque = Y @ pi.ravel(), pi (bodies, 10) about the joints' frames.
+
+    Args:
+        q, qd, qdd: (n, dof) positions [rad or m], velocities, accelerations.
+    """
+    return np.moveaxis(columns(robot, q, qd, qdd), -1, 0)
+
+
+def regressor_chunks(robot: Robot, q, qd, qdd, *, chunk: int = _CHUNK) -> Iterator[np.ndarray]:
+    """`regressor` in pieces of at most `chunk` samples, so that memory does not grow with the log."""
+    for start in range(0, len(q), chunk):
+        part = slice(start, start + chunk)
+        yield regressor(robot, q[part], qd[part], qdd[part])
+
+
+def torque(robot: Robot, pi, q, qd, qdd) -> np.ndarray:
+    """Inverse dynamics (n, dof) [N m] of bodies pi (bodies, 10), rotors included, friction not."""
+    q, qd, qdd = (np.asarray(x, dtype=float) for x in (q, qd, qdd))
+    out = np.zeros((len(q), robot.dof))
+    for start in range(0, len(q), _CHUNK):
+        part = slice(start, start + _CHUNK)
+        for parameters, motion in zip(np.asarray(pi), body_motions(robot, q[part], qd[part], qdd[part])):
+            force, moment = _wrench(parameters, motion)
+            for j, (linear, angular) in motion.jacobian.items():
+                out[part, j] += np.einsum("in,in->n", linear, force) + np.einsum("in,in->n", angular, moment)
+    return out
+
+
+def _wrench(parameters, motion: BodyMotion):
+    mass, h = parameters[0], parameters[1:4, None]
+    xx, yy, zz, xy, yz, xz = parameters[4:]
+    inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    w, alpha, a = motion.angular, motion.angular_acceleration, motion.acceleration
+    force = mass * a + _cross(alpha, h) + _cross(w, _cross(w, h))
+    return force, _cross(h, a) + inertia @ alpha + _cross(w, inertia @ w)

@@ -1,0 +1,228 @@
+"""The run folder: everything a fit found, and everything needed to find it again.
+
+    fit.json               the document that `sysid fit --json` prints
+    predictions.parquet    part, log, t, and measured_ and predicted_ torque of each joint
+    experiment.yaml        the experiment with every default filled in
+    identified.urdf        the links' inertias, viscous and Coulomb friction
+    identified.yaml        the experiment on that URDF, with the identified rotors
+
+Each file is written under a temporary name and renamed, so that a run folder never holds half a file.
+"""
+
+import io
+import json
+import math
+import os
+import platform
+import uuid
+from collections.abc import Callable
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+import numpy as np
+
+from .config import Experiment
+from .errors import ConfigError, SysidError
+from .filters import settled
+from .estimate import Fit
+from .inertia import PARAMETERS
+from .inertia.consistency import is_consistent
+from .model import Model
+
+_PACKAGES = ("sysid", "pin", "numpy", "scipy", "yourdfpy", "polars")
+
+
+def document(fit: Fit, run: str | Path = "") -> dict:
+    """The JSON document of a fit, as the contract has it and more. NaN is None."""
+    errors = {part: prediction.errors() for part, prediction in fit.predictions.items()}
+    by_joint = lambda part, key: dict(zip(fit.joints, errors[part][key].tolist()))  # noqa: E731
+    names, coefficients = fit.model.names, fit.model.coefficients
+    certificate = fit.certificate
+    held = np.append(np.zeros(10 * fit.model.bodies, dtype=bool), fit.held)
+    parameters = [
+        {"name": name, "value": value, "unit": unit, "std": _number(std), "from_data": share, **({"held": True} if fixed else {})}
+        for name, value, unit, std, share, fixed in zip(
+            names, fit.x.tolist(), fit.model.units, fit.uncertainty.std.tolist(), fit.uncertainty.from_data.tolist(), held
+        )
+    ]
+    return {
+        "rms": {part: by_joint(part, "rms") for part in errors},
+        "relative_error": {part: {**by_joint(part, "relative_error"), "*": float(errors[part]["total"][1])} for part in errors},
+        "r2": {part: by_joint(part, "r2") for part in errors},
+        "objective": fit.objective,
+        "iterations": fit.solution.iterations,
+        "newton_iterations": fit.solution.newton_iterations,
+        "converged": fit.solution.converged,
+        "physically_consistent": fit.physically_consistent,
+        "certificate": {
+            "globally_optimal": certificate.globally_optimal, "stationarity": _number(certificate.stationarity),
+            "gap": _number(certificate.gap), "at_zero": {coefficients[k].name: slope for k, slope in certificate.at_zero.items()},
+        },
+        "samples": fit.samples,
+        "parameters": parameters,
+        "weights": None if fit.weights is None else dict(zip(fit.joints, fit.weights.tolist())),
+        "filter": fit.filters,
+        "notices": list(fit.notices),
+        "logs": list(fit.logs),
+        "versions": versions(),
+        "seeds": {},  # nothing in a fit is random
+        "seconds": fit.seconds,
+        "run": str(run),
+    }  # fmt: skip
+
+
+def _number(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None
+
+
+def versions() -> dict[str, str]:
+    """Versions of Python and of the packages that the numbers depend on."""
+    found = {"python": platform.python_version()}
+    for package in _PACKAGES:
+        try:
+            found[package] = version(package)
+        except PackageNotFoundError:
+            found[package] = "not installed"
+    return found
+
+
+def folder(out: str | Path) -> Path:
+    """Create a run folder, and make sure that it can be written before any work is done.
+
+    Raises:
+        SysidError: it cannot.
+    """
+    path = Path(out)
+    probe = path / f".{uuid.uuid4().hex}"
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+        probe.touch()
+        probe.unlink()
+    except OSError as error:
+        raise SysidError(f"the run folder cannot be written ({error.strerror})", where=str(path), do="give another with --out") from None
+    return path
+
+
+def write_atomically(path: Path, write: Callable[[Path], object]) -> None:
+    """Let `write` fill a temporary file beside `path`, then rename it. Raises SysidError where the disk refuses."""
+    temporary = path.with_name(f".{path.name}.{uuid.uuid4().hex}")
+    try:
+        write(temporary)
+        os.replace(temporary, path)
+    except OSError as error:
+        raise SysidError(f"cannot be written ({error.strerror})", where=str(path), do="free the disk or give another --out") from None
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def write_json(path: Path, value) -> None:
+    """Write a JSON document, strictly (no NaN)."""
+    text = json.dumps(value, indent=1, allow_nan=False) + "\n"
+    write_atomically(path, lambda p: p.write_text(text, encoding="utf-8"))
+
+
+def write(fit: Fit, out: str | Path) -> dict:
+    """Write the run folder; returns the document of fit.json."""
+    from .urdf_export import identified_urdf
+
+    path = folder(out)
+    found = document(fit, path)
+    write_atomically(path / "predictions.parquet", lambda p: _predictions(fit).write_parquet(p))
+    resolved = fit.experiment.model_copy(update={"preprocess": settled(fit.experiment.preprocess, fit.filters)})
+    write_atomically(path / "experiment.yaml", lambda p: p.write_text(_yaml(_relocated(resolved, path)), encoding="utf-8"))
+    urdf = identified_urdf(fit)
+    write_atomically(path / "identified.urdf", lambda p: p.write_bytes(urdf))
+    write_atomically(path / "identified.yaml", lambda p: p.write_text(_yaml(_identified(fit, _relocated(resolved, path))), encoding="utf-8"))
+    write_json(path / "fit.json", found)
+    return found
+
+
+def _predictions(fit: Fit):
+    import polars as pl
+
+    frames = []
+    for part, prediction in fit.predictions.items():
+        columns = {"log": prediction.log, "t": prediction.t}
+        for k, joint in enumerate(fit.joints):
+            columns[f"measured_{joint}"] = prediction.measured[:, k]
+            columns[f"predicted_{joint}"] = prediction.predicted[:, k]
+            if prediction.use is not None:
+                columns[f"used_{joint}"] = prediction.use[:, k]
+        frames.append(pl.DataFrame(columns).select(pl.lit(part).alias("part"), pl.all()))
+    return pl.concat(frames, rechunk=False)
+
+
+def _relocated(experiment: Experiment, run: Path) -> dict:
+    """The experiment as plain values, its paths relative to the run folder."""
+    from . import datasets
+
+    tree = experiment.model_dump(exclude_none=True)
+
+    def moved(path: str) -> str:
+        if "://" in path or datasets.reference(path) is not None:
+            return path
+        return Path(os.path.relpath((experiment.folder / path).resolve(), run.resolve())).as_posix()
+
+    tree["robot"]["urdf"] = moved(tree["robot"]["urdf"])
+    for part in ("train", "test"):
+        for log in tree["data"][part]:
+            log["file"] = moved(log["file"])
+    if tree["prior"]["source"] != "urdf":
+        tree["prior"]["source"] = moved(tree["prior"]["source"])
+    if experiment.robot.joints is None:
+        tree["robot"].pop("joints", None)
+    tree["model"]["effects"] = [
+        effect["name"] if effect.get("joints") is None else {effect["name"]: {"joints": effect["joints"]}}
+        for effect in tree["model"]["effects"]
+    ]
+    return tree
+
+
+def _identified(fit: Fit, tree: dict) -> dict:
+    tree["robot"]["urdf"] = "identified.urdf"
+    tree["robot"].pop("lock", None)  # locked joints are fixed in the identified URDF
+    tree["robot"]["joints"] = list(fit.joints)
+    tree["prior"]["source"] = "urdf"
+    bodies = {body.joint: pi for body, pi in zip(fit.model.robot.bodies, fit.pi) if body.kind == "rotor"}
+    for rotor in tree["robot"]["rotors"]:
+        rotor["inertia"] = {"parameters": bodies[rotor["joint"]].tolist()}
+    return tree
+
+
+def _yaml(tree: dict) -> str:
+    from ruamel.yaml import YAML
+
+    stream = io.StringIO()
+    writer = YAML()
+    writer.width = 200
+    writer.dump(tree, stream)
+    return stream.getvalue()
+
+
+def read_inertias(source: Path, model: Model) -> np.ndarray:
+    """Bodies (bodies, 10) of a previous run for a model; bodies that it lacks stay at the URDF's prior.
+
+    Args:
+        source: a run folder, or its fit.json.
+
+    Raises:
+        ConfigError: there is no such run, or none of its bodies is the model's, or one is impossible.
+    """
+    path = source / "fit.json" if source.is_dir() else source
+    try:
+        values = {entry["name"]: float(entry["value"]) for entry in json.loads(path.read_text(encoding="utf-8"))["parameters"]}
+    except OSError as error:
+        raise ConfigError(f"prior.source cannot be read ({error.strerror})", where=str(path), allowed="urdf, or a run folder of `sysid fit`") from None
+    except (ValueError, KeyError, TypeError):
+        raise ConfigError("prior.source is no fit.json", where=str(path), allowed="urdf, or a run folder of `sysid fit`") from None
+    out, known = np.array(model.robot.prior), 0
+    for b, body in enumerate(model.robot.bodies):
+        names = [f"{body.name}.{p}" for p in PARAMETERS]
+        if all(name in values for name in names):
+            out[b] = [values[name] for name in names]
+            known += 1
+            if not is_consistent(out[b]):
+                raise ConfigError(f"body {body.name!r} of the previous run is impossible", where=str(path), do="fit it with a parameterization that keeps it possible")
+    if not known:
+        raise ConfigError("the previous run has none of this robot's bodies", where=str(path), do="check prior.source")
+    return out

@@ -1,0 +1,282 @@
+"""URDF, chosen joints and rotors -> Robot: a tree of bodies driven by the joint coordinates.
+
+Links and rotors are all Pinocchio bodies. A rotor is a joint of its own, a leaf on the link that carries it,
+and the transmission matrix G turns joint speeds into the speeds of every joint of this larger tree:
+
+    q_full = G q,   qd_full = G qd,   tau = G' tau_full,
+
+so gyroscopic terms are exact, and a belt or a differential is another row of G.
+"""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pinocchio as pin
+
+from . import prior, urdf
+from .config import InertiaSpec, RobotSpec
+from .errors import RobotError, SysidWarning
+from .inertia import pseudo
+from .inertia.consistency import is_consistent
+
+
+@dataclass(frozen=True)
+class Body:
+    """A moving rigid body: its name, `link` or `rotor`, the joint that moves it, its row in the full tree."""
+
+    name: str
+    kind: str
+    joint: str
+    row: int
+
+
+@dataclass(frozen=True)
+class Robot:
+    """A robot as identification sees it. Arrays are read-only.
+
+    joints: names, in the user's order; every (n, dof) array has this order.
+    prismatic: (dof,) bool.
+    bodies: links in joint order, then rotors; every (bodies, 10) array has this order.
+    parents, rotations, translations, subspaces: the full tree, parents first: parent row (-1 is the base),
+        placement of each joint's frame in its parent's (R (3, 3), p (3,)), motion axis [linear, angular].
+    transmission: G (rows, dof). gravity: (3,) [m/s^2] in the base frame.
+    prior: (bodies, 10) about the joints' frames, physically possible.
+    damping, friction: (dof,) what the URDF states.
+    limits: (dof, 2) [rad or m] position limits of the URDF, infinite where it states none.
+    model: the full tree as a Pinocchio model with the prior inertias.
+    """
+
+    name: str
+    path: Path
+    joints: tuple[str, ...]
+    prismatic: np.ndarray
+    bodies: tuple[Body, ...]
+    parents: np.ndarray
+    rotations: np.ndarray
+    translations: np.ndarray
+    subspaces: np.ndarray
+    transmission: np.ndarray
+    gravity: np.ndarray
+    prior: np.ndarray
+    damping: np.ndarray
+    friction: np.ndarray
+    limits: np.ndarray
+    model: pin.Model
+    source: urdf.Urdf
+    locked: dict[str, float]
+
+    @property
+    def dof(self) -> int:
+        """Number of joints that move."""
+        return len(self.joints)
+
+    def with_inertias(self, pi) -> pin.Model:
+        """The full tree as a Pinocchio model with the inertias pi (bodies, 10)."""
+        model = self.model.copy()
+        for body, parameters in zip(self.bodies, np.asarray(pi)):
+            model.inertias[body.row + 1] = pin.Inertia.FromDynamicParameters(pseudo.to_pinocchio(parameters))
+        return model
+
+
+def load(spec: RobotSpec, folder: Path = Path()) -> Robot:
+    """Build the robot of an experiment; paths in `spec` are relative to `folder`.
+
+    Raises:
+        RobotError: see `urdf.read`; a joint that is not there or not supported; a rotor that cannot be.
+    """
+    source = urdf.read(urdf.locate(spec.urdf, folder))
+    model = _pinocchio_model(source)
+    moving = [name for name in model.names[1:]]
+    joints = tuple(_chosen(spec, source, moving))
+    locked = {name: float(spec.lock.get(name, 0.0)) for name in moving if name not in joints}
+    if locked:
+        reference = pin.neutral(model)
+        for name, angle in locked.items():
+            reference[model.joints[model.getJointId(name)].idx_q] = angle
+        model = pin.buildReducedModel(model, [model.getJointId(name) for name in locked], reference)
+    model.gravity.linear = np.array(spec.gravity)
+    links = [Body(source.joints[name].child, "link", name, model.getJointId(name) - 1) for name in joints]
+    priors = _link_priors(source, model, links)
+    for body, pi in zip(links, priors):
+        model.inertias[body.row + 1] = pin.Inertia.FromDynamicParameters(pseudo.to_pinocchio(pi))
+    rotors = _rotors(spec, source, model, joints)
+    limits = [
+        [model.lowerPositionLimit[body.row], model.upperPositionLimit[body.row]]
+        if source.joints[body.joint].type != "continuous" else [-np.inf, np.inf] for body in links
+    ]  # fmt: skip
+    model = _tree(model, rotors)
+    at = lambda name: model.getJointId(name) - 1  # noqa: E731
+    bodies = tuple(replace(body, row=at(body.joint)) for body in links)
+    bodies += tuple(Body(f"{r.joint}_rotor", "rotor", r.joint, at(f"{r.joint}_rotor")) for r in rotors)
+    priors = np.array([*priors, *(rotor.inertia for rotor in rotors)])
+    transmission = np.zeros((model.nv, len(joints)))
+    transmission[[body.row for body in bodies]] = [*np.eye(len(joints)), *(rotor.speeds for rotor in rotors)]
+    stated = [source.joints[name] for name in joints]
+    return Robot(
+        name=model.name, path=source.path, joints=joints,
+        prismatic=_frozen([joint.type == "prismatic" for joint in stated]), bodies=bodies,
+        parents=_frozen([model.parents[row + 1] - 1 for row in range(model.nv)]),
+        rotations=_frozen([model.jointPlacements[row + 1].rotation for row in range(model.nv)]),
+        translations=_frozen([model.jointPlacements[row + 1].translation for row in range(model.nv)]),
+        subspaces=_frozen([model.joints[row + 1].createData().S.ravel() for row in range(model.nv)]),
+        transmission=_frozen(transmission), gravity=_frozen(spec.gravity), prior=_frozen(priors),
+        damping=_frozen([joint.damping for joint in stated]), friction=_frozen([joint.friction for joint in stated]),
+        limits=_frozen(limits), model=model, source=source, locked=locked,
+    )  # fmt: skip
+
+
+def _frozen(values) -> np.ndarray:
+    array = np.array(values)
+    array.setflags(write=False)
+    return array
+
+
+def _pinocchio_model(source: urdf.Urdf) -> pin.Model:
+    """The whole URDF as a Pinocchio model in which every moving joint has one coordinate."""
+    root = ElementTree.fromstring(source.text.encode())
+    for element in root.findall("joint"):
+        kind = element.get("type")
+        if kind in ("floating", "planar"):
+            raise RobotError(
+                f"joint {element.get('name')!r} is {kind}", where=str(source.path),
+                allowed="revolute, continuous, prismatic, fixed", do="fix the base to the world",
+            )
+        if kind == "continuous":
+            # Pinocchio would give it two coordinates (cos, sin); an unlimited angle serves here
+            element.set("type", "revolute")
+            for limit in element.findall("limit"):
+                element.remove(limit)
+        if kind in urdf.MOVING and element.find("limit") is None:
+            ElementTree.SubElement(element, "limit", lower="-1e9", upper="1e9", effort="1e9", velocity="1e9")
+    try:
+        return pin.buildModelFromXML(ElementTree.tostring(root, encoding="unicode"))
+    except (ValueError, RuntimeError) as error:
+        raise RobotError(f"Pinocchio cannot build it ({error})", where=str(source.path)) from None
+
+
+def _chosen(spec: RobotSpec, source: urdf.Urdf, moving: list[str]):
+    import warnings
+
+    where = str(source.path)
+    for name in [*(spec.joints or []), *spec.lock]:
+        if name not in source.joints:
+            raise RobotError(f"the URDF has no joint {name!r}", where=where, allowed=", ".join(moving), do="correct robot.joints or robot.lock")
+        if name not in moving:
+            raise RobotError(f"joint {name!r} is {source.joints[name].type} and cannot move", where=where, allowed=", ".join(moving), do="correct robot.joints or robot.lock")
+    if spec.joints is not None:
+        if twice := sorted({name for name in spec.joints if spec.joints.count(name) > 1}):
+            raise RobotError(f"robot.joints names {twice[0]!r} twice", where=where, do="name each joint once")
+        if both := sorted(set(spec.joints) & set(spec.lock)):
+            raise RobotError(f"joint {both[0]!r} is in robot.joints and in robot.lock", where=where, do="keep it in one of them")
+        if not spec.joints:
+            raise RobotError("robot.joints is empty", where=where, allowed=", ".join(moving), do="name at least one joint")
+        return spec.joints
+    if mimics := [name for name in moving if _mimics(source, name) and name not in spec.lock]:
+        warnings.warn(
+            SysidWarning(f"joints {', '.join(mimics)} mimic others in the URDF and are locked; name them in robot.joints to move them"),
+            stacklevel=4,
+        )
+    chosen = [name for name in moving if name not in spec.lock and name not in mimics]
+    if not chosen:
+        raise RobotError("no joint is left to move", where=where, allowed="at least one revolute, continuous or prismatic joint")
+    return chosen
+
+
+def _mimics(source: urdf.Urdf, name: str) -> bool:
+    root = ElementTree.fromstring(source.text.encode())
+    return any(e.get("name") == name and e.find("mimic") is not None for e in root.findall("joint"))
+
+
+def _link_priors(source: urdf.Urdf, model: pin.Model, bodies: list[Body]) -> np.ndarray:
+    stated, shapes = [], []
+    for body in bodies:
+        members = [f for f in model.frames if f.type == pin.FrameType.BODY and f.parentJoint == body.row + 1]
+        moved = lambda pi, f: pseudo.displaced(pi, f.placement.rotation, f.placement.translation)  # noqa: E731
+        links = [(source.links[f.name], f) for f in members if f.name in source.links]
+        inertials = [moved(link.inertial, f) for link, f in links if link.inertial is not None]
+        solids = [moved(link.geometry, f) for link, f in links if link.geometry is not None]
+        stated.append(np.sum(inertials, 0) if inertials else None)
+        shapes.append(np.sum(solids, 0) if solids else None)
+    masses = [pi[0] for pi in stated if pi is not None and is_consistent(pi)]
+    typical = float(np.median(masses)) if masses else None
+    out = []
+    for body, pi, solid in zip(bodies, stated, shapes):
+        children = [model.jointPlacements[i].translation for i in range(1, model.njoints) if model.parents[i] == body.row + 1]
+        reach = max(children, key=np.linalg.norm, default=np.zeros(3))
+        out.append(prior.usable(body.name, pi, solid, reach, typical))
+    return np.array(out)
+
+
+def body_from(inertia: InertiaSpec) -> np.ndarray:
+    """Parameters (10,) about the body's frame of an inertia written in an experiment file."""
+    if inertia.parameters is not None:
+        return np.array(inertia.parameters, dtype=float)
+    if inertia.box is not None:
+        return pseudo.box(inertia.mass, inertia.com, inertia.box)
+    return pseudo.cylinder(inertia.mass, inertia.com, inertia.cylinder.radius, inertia.cylinder.length)
+
+
+@dataclass(frozen=True)
+class _Rotor:
+    """A rotor placed in the tree of links: its joint, the joint id that carries it, pose, axis, inertia, row of G."""
+
+    joint: str
+    carrier: int
+    placement: pin.SE3
+    axis: np.ndarray
+    inertia: np.ndarray
+    speeds: np.ndarray
+
+
+def _rotors(spec: RobotSpec, source: urdf.Urdf, model: pin.Model, joints: tuple[str, ...]) -> list[_Rotor]:
+    for name in spec.transmission:
+        if name not in [rotor.joint for rotor in spec.rotors]:
+            raise RobotError(f"robot.transmission has a row for {name!r}, which has no rotor", allowed=", ".join(r.joint for r in spec.rotors) or "nothing: robot.rotors is empty", do="name the joint of a rotor")
+    out: list[_Rotor] = []
+    for rotor in spec.rotors:
+        where = f"rotor of {rotor.joint!r}"
+        if rotor.joint not in joints:
+            raise RobotError("no such joint moves", where=where, allowed=", ".join(joints), do="correct robot.rotors")
+        if rotor.joint in [other.joint for other in out]:
+            raise RobotError("the joint has two rotors", where=where, allowed="one rotor a joint")
+        if rotor.on not in source.links:
+            raise RobotError(f"on: {rotor.on!r} is no link of the URDF", where=where, allowed=", ".join(source.links), do="name the link that carries the motor")
+        inertia = body_from(rotor.inertia)
+        if not is_consistent(inertia):
+            raise RobotError("its prior inertia is impossible", where=where, allowed="mass > 0 and edges > 0")
+        if model.existJointName(f"{rotor.joint}_rotor"):
+            raise RobotError(f"the URDF has a joint {rotor.joint}_rotor of its own", where=where, do="rename it, or leave the rotor out")
+        row = np.zeros(len(joints))
+        for joint, ratio in (spec.transmission.get(rotor.joint) or {rotor.joint: rotor.ratio}).items():
+            if joint not in joints:
+                raise RobotError(f"robot.transmission names the joint {joint!r}", where=where, allowed=", ".join(joints))
+            row[joints.index(joint)] = ratio
+        frame = model.frames[model.getFrameId(rotor.on, pin.FrameType.BODY)]
+        placement = frame.placement * pin.SE3(urdf.rotation_rpy(rotor.rpy), np.array(rotor.xyz))
+        axis = np.array(rotor.axis) / np.linalg.norm(rotor.axis)
+        out.append(_Rotor(rotor.joint, frame.parentJoint, placement, axis, inertia, row))
+    return out
+
+
+def _tree(model: pin.Model, rotors: list[_Rotor]) -> pin.Model:
+    """The model with each rotor a leaf right behind its carrier: Pinocchio's mass-matrix algorithms need every
+    subtree to be one run of joints, and appending at the end would break that without a word."""
+    tree = pin.Model()
+    tree.name, tree.gravity = model.name, model.gravity
+    identity = pin.SE3.Identity()
+
+    def mount(carrier: int, parent: int) -> None:
+        for rotor in rotors:
+            if rotor.carrier == carrier:
+                joint = tree.addJoint(parent, pin.JointModelRevoluteUnaligned(rotor.axis), rotor.placement, f"{rotor.joint}_rotor")
+                tree.appendBodyToJoint(joint, pin.Inertia.FromDynamicParameters(pseudo.to_pinocchio(rotor.inertia)), identity)
+
+    mount(0, 0)
+    for old in range(1, model.njoints):
+        parent = tree.getJointId(model.names[model.parents[old]]) if model.parents[old] else 0
+        joint = tree.addJoint(parent, model.joints[old], model.jointPlacements[old], model.names[old])
+        tree.appendBodyToJoint(joint, model.inertias[old], identity)
+        mount(old, joint)
+    return tree

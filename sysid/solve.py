@@ -1,0 +1,242 @@
+"""Trust-region Newton on the compressed problem, with the exact gradient and Hessian.
+
+The unknowns are theta: ten coordinates of a parameterization for each body, the logarithm of every coefficient
+that must not be negative, the rest themselves. With Gamma = dx/dtheta the Hessian is
+
+    Gamma' (d2F/dx2) Gamma + sum_k (dF/dx_k) d2x_k/dtheta2.
+
+In theta the data bend a long, narrow valley: stiff directions that are straight in x are curved in theta, and a
+trust region that follows the curve crawls. When that begins, far from any doubt about the basin (there is only one),
+the interior-point method of `interior` finishes from where Newton stands; and always where the prior is no barrier,
+so that the optimum may lie on the boundary of the possible bodies. Both minimise the same objective, and the
+certificate does not ask how its point was found.
+
+The trust region is a ball of the affine-invariant metric on bodies, pulled back to theta, so that a step counts
+the same for a heavy link and a small rotor, in any frame and unit. Each step is the exact minimiser of the
+quadratic model in that ball (More & Sorensen 1983).
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg.lapack import dpotrf, dpotrs
+
+from . import interior
+from .inertia.divergence import affine_metric
+from .inertia.parameterization import Parameterization
+from .inertia.pseudo import to_pseudo
+from .objective import Objective, add_blocks
+
+_LARGEST_RADIUS = 1e6
+# Objective differences below this share of the objective are rounding, not progress.
+_ROUNDING = 1e-14
+# Newton hands over when the trust region, not the model, ends a step that promises less than this share of the
+# objective, or after this many iterations.
+_CRAWLING, _PATIENCE = 0.1, 25
+# A coefficient below this share of its natural size, pushed down further, has gone to zero.
+_ZERO = 1e-10
+
+
+@dataclass(frozen=True)
+class Coordinates:
+    """theta <-> x for a model: `positive` (coefficients,) solved as exponentials, `held` (coefficients,) not at all."""
+
+    parameterization: Parameterization
+    bodies: int
+    positive: np.ndarray
+    held: np.ndarray
+
+    def physical(self, theta) -> np.ndarray:
+        """x (size,) of theta (size,)."""
+        count = 10 * self.bodies
+        pi = self.parameterization.parameters(theta[:count].reshape(self.bodies, 10))
+        with np.errstate(over="ignore"):  # an infinite coefficient has an infinite objective and is stepped back from
+            c = np.where(self.positive, np.exp(np.where(self.positive, theta[count:], 0.0)), theta[count:])
+        return np.concatenate([pi.ravel(), c])
+
+    def theta(self, x) -> np.ndarray:
+        """theta (size,) of a possible x (size,); a positive coefficient of zero becomes a very small one."""
+        count = 10 * self.bodies
+        c = np.asarray(x[count:], dtype=float)
+        logs = np.log(np.where(self.positive, np.maximum(c, 1e-300), 1.0))
+        inner = self.parameterization.inverse(x[:count].reshape(self.bodies, 10)).ravel()
+        return np.concatenate([inner, np.where(self.positive, logs, c)])
+
+
+@dataclass(frozen=True)
+class Solution:
+    """Where the search ended.
+
+    trace: x at every iterate, the start included; the first `newton_iterations` are Newton's, the rest the
+    interior-point method's.
+    """
+
+    x: np.ndarray
+    objective: float
+    iterations: int
+    converged: bool
+    trace: tuple[np.ndarray, ...]
+    objectives: tuple[float, ...]
+    newton_iterations: int
+
+
+def solve(
+    objective: Objective, coordinates: Coordinates, start: np.ndarray, *, tolerance: float, max_iterations: int,
+    callback: Callable[[int, float], None] | None = None,
+) -> Solution:  # fmt: skip
+    """Minimise from theta = start (size,).
+
+    Converged means: the quadratic model promises a relative decrease below tolerance squared, or below what
+    double precision can resolve.
+    """
+    problem = _Problem(objective, coordinates)
+    theta = np.array(start, dtype=float)
+    x = coordinates.physical(theta)
+    value = objective.value(x)
+    trace, values = [x], [value]
+    barrier = objective.divergence.barrier and objective.weight > 0.0
+    constrained = barrier or coordinates.parameterization.name != "linear"
+    radius, converged, iteration = 1.0 if constrained else _LARGEST_RADIUS, False, 0
+    while iteration < max_iterations:
+        gradient, hessian, metric = problem.expand(theta, x)
+        step, promise, length = _step(gradient, hessian, metric, radius)
+        trial = theta + step
+        trial_x = coordinates.physical(trial)
+        with np.errstate(all="ignore"):
+            trial_value = objective.value(trial_x) if np.isfinite(trial_x).all() else np.inf
+        converged = promise <= max(tolerance**2, _ROUNDING) * abs(value) and length < radius
+        before = radius
+        ratio = (value - trial_value) / promise if np.isfinite(trial_value) and promise > 0.0 else -1.0
+        if ratio < 0.25:
+            radius = 0.25 * min(length, radius)
+        elif ratio > 0.75 and length > 0.8 * radius:
+            radius = min(3.0 * radius, _LARGEST_RADIUS)
+        if ratio > 1e-4 or (converged and trial_value <= value):
+            theta, x, value = trial, trial_x, trial_value
+        iteration += 1
+        trace.append(x)
+        values.append(value)
+        if callback:
+            callback(iteration, value)
+        crawling = promise < _CRAWLING * abs(value) and (length > 0.99 * before or ratio < 0.25)
+        if converged or (constrained and (crawling or iteration >= _PATIENCE)):
+            break
+    newton = iteration
+    if constrained and iteration < max_iterations and not (barrier and converged):
+        iterates, converged = interior.minimise(
+            objective, coordinates.positive, coordinates.held, x, tolerance=tolerance, max_iterations=max_iterations - iteration
+        )
+        for x in iterates[1:]:
+            trace.append(x)
+            values.append(objective.value(x))
+            iteration += 1
+            if callback:
+                callback(iteration, values[-1])
+        x, value = trace[-1], values[-1]
+    return Solution(x, value, iteration, converged, tuple(trace), tuple(values), newton)
+
+
+class _Problem:
+    """Derivatives of the objective in theta, and the trust region's metric."""
+
+    def __init__(self, objective: Objective, coordinates: Coordinates):
+        self.objective, self.coordinates = objective, coordinates
+        self.count = 10 * coordinates.bodies
+        self.root = objective.triangle[:, :-1]
+        # natural size of a coefficient: what alone would explain the data's norm
+        norms = np.linalg.norm(self.root[:, self.count :], axis=0)
+        self.natural = np.linalg.norm(objective.triangle[:, -1]) / np.where(norms > 0, norms, np.inf)
+        prior = np.linalg.inv(to_pseudo(objective.divergence.prior))
+        self.prior_metric = affine_metric(prior)
+
+    def expand(self, theta, x):
+        """Gradient, Hessian and metric (factors of its body blocks, scales of the coefficients)."""
+        coordinates, objective, count = self.coordinates, self.objective, self.count
+        blocks = theta[:count].reshape(-1, 10)
+        gamma = coordinates.parameterization.jacobian(blocks)
+        slope = objective.gradient(x)
+        c, positive = x[count:], coordinates.positive
+        chain = np.where(positive, c, 1.0)
+        # (R Gamma)'(R Gamma), built from the triangle so that weak directions keep their digits
+        image = np.empty_like(self.root)
+        image[:, :count] = np.einsum("rbk,bkl->rbl", self.root[:, :count].reshape(len(self.root), -1, 10), gamma).reshape(len(self.root), count)
+        image[:, count:] = self.root[:, count:] * chain
+        hessian = 2.0 * image.T @ image
+        pulled = coordinates.parameterization.hessian(blocks, slope[:count].reshape(-1, 10))
+        if objective.weight:
+            pulled = pulled + np.swapaxes(gamma, -1, -2) @ objective.prior_hessian(x) @ gamma
+        add_blocks(hessian, pulled)
+        own = np.arange(count, len(theta))
+        hessian[own, own] += np.where(positive, slope[count:] * c, 0.0)
+        gradient = np.concatenate([
+            np.einsum("bkl,bk->bl", gamma, slope[:count].reshape(-1, 10)).ravel(), slope[count:] * chain,
+        ])  # fmt: skip
+        at_zero = positive & (c < _ZERO * self.natural) & (slope[count:] > 0.0)
+        frozen = own[at_zero | coordinates.held]
+        gradient[frozen] = 0.0
+        hessian[frozen, :] = hessian[:, frozen] = 0.0
+        hessian[frozen, frozen] = 1.0
+        scales = np.where(positive, 1.0, np.where(np.isfinite(self.natural), self.natural, 1.0))
+        return gradient, hessian, (self._body_metric(x, gamma), scales)
+
+    def _body_metric(self, x, gamma):
+        """Cholesky factors L (bodies, 10, 10) of the affine-invariant metric in theta."""
+        if self.coordinates.parameterization.name == "linear":
+            return np.linalg.cholesky(self.prior_metric)  # the ten numbers may leave the possible bodies
+        # J^-1/2 dJ J^-1/2 for every coordinate; the triangle of its QR is the metric's factor at half the digits' cost
+        inverse = np.linalg.inv(np.linalg.cholesky(to_pseudo(x[: self.count].reshape(-1, 10))))[:, None]
+        changes = inverse @ to_pseudo(np.swapaxes(gamma, -1, -2)) @ np.swapaxes(inverse, -1, -2)
+        moved = np.swapaxes(interior.coordinates(changes), -1, -2)
+        # a singular Jacobian (eigenvalue parameterization) must not make a direction free of charge
+        size = np.linalg.norm(moved, axis=(1, 2))
+        padded = np.concatenate([moved, 1e-4 * size[:, None, None] * np.eye(10)], axis=1)
+        upper = np.linalg.qr(padded, mode="r")
+        return np.swapaxes(upper, -1, -2)
+
+
+def _step(gradient, hessian, metric, radius):
+    """The minimiser of the quadratic model within the ball; its promised decrease and its length."""
+    factors, scales = metric
+    count = 10 * len(factors)
+    inverse = np.linalg.inv(factors)  # L^-1, block by block
+    g = np.concatenate([np.einsum("bij,bj->bi", inverse, gradient[:count].reshape(-1, 10)).ravel(), gradient[count:] * scales])
+    h = hessian.copy()
+    shape = (len(factors), 10, -1)
+    h[:count] = (inverse @ h[:count].reshape(shape)).reshape(count, -1)
+    h[count:] *= scales[:, None]
+    h = h.T.copy()
+    h[:count] = (inverse @ h[:count].reshape(shape)).reshape(count, -1)
+    h[count:] *= scales[:, None]
+    y = _ball(g, 0.5 * (h + h.T), radius)
+    promise = -(g @ y + 0.5 * y @ h @ y)
+    step = np.concatenate([np.einsum("bji,bj->bi", inverse, y[:count].reshape(-1, 10)).ravel(), y[count:] * scales])
+    return step, float(promise), float(np.linalg.norm(y))
+
+
+def _ball(g, h, radius):
+    """argmin g.y + y'hy/2 over |y| <= radius."""
+    factor, fault = dpotrf(h, lower=1)
+    if fault == 0:
+        y = dpotrs(factor, -g, lower=1)[0]
+        if np.linalg.norm(y) <= radius:
+            return y
+    values, vectors = np.linalg.eigh(h)
+    along = vectors.T @ g
+    floor = max(0.0, -values[0])
+    norm = lambda shift: np.linalg.norm(along / (values + shift))  # noqa: E731
+    low = floor + 1e-14 * max(1.0, abs(values[-1]))
+    if norm(low) < radius:
+        # the hard case: the shift alone cannot reach the boundary, the flattest direction does
+        y = -vectors @ (along / (values + low))
+        return y + vectors[:, 0] * np.sqrt(max(radius**2 - y @ y, 0.0)) if floor > 0 else y
+    # Newton on 1/radius - 1/norm, which is nearly linear in the shift, kept above the floor
+    shift = max(low, floor + np.linalg.norm(g) / radius * 1e-3)
+    for _ in range(60):
+        scaled = along / (values + shift)
+        size = np.linalg.norm(scaled)
+        if abs(size - radius) < 1e-8 * radius:
+            break
+        slope = np.sum(scaled**2 / (values + shift)) / size
+        shift = max(shift + (size - radius) / radius * size / slope, 0.5 * (low + shift) if size < radius else shift, low)
+    return -vectors @ (along / (values + shift))

@@ -1,0 +1,101 @@
+"""What the commands print for a person: tables, notices, a progress bar. Computes nothing."""
+
+from contextlib import contextmanager
+
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from .estimate import Fit
+
+_LOW = 0.1  # below this share the prior, not the data, gave a parameter
+
+
+@contextmanager
+def progress_bar():
+    """A bar for each stage; yields the function that pipelines call with (stage, share done)."""
+    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        tasks: dict[str, object] = {}
+
+        def report(stage: str, share: float) -> None:
+            if stage not in tasks:
+                tasks[stage] = bar.add_task(stage, total=1.0)
+            bar.update(tasks[stage], completed=share)
+
+        yield report
+
+
+def show_fit(fit: Fit, document: dict) -> None:
+    """The errors of each joint, what the solver proved, and what was decided on the way."""
+    console = Console()
+    robot = fit.model.robot
+    table = Table(title=f"{escape(fit.experiment.name)}: residual by joint", title_justify="left")
+    for heading in ("joint", "", "RMS train", "RMS test", "relative test", "R2 test"):
+        table.add_column(heading, justify="left" if heading == "joint" else "right")
+    for joint, prismatic in zip(fit.joints, robot.prismatic):
+        table.add_row(
+            escape(joint), "N" if prismatic else "N m", f"{document['rms']['train'][joint]:.4g}", f"{document['rms']['test'][joint]:.4g}",
+            f"{100 * document['relative_error']['test'][joint]:.2f} %", f"{document['r2']['test'][joint]:.4f}",
+        )  # fmt: skip
+    console.print(table)
+    certificate = document["certificate"]
+    print(f"relative error, all joints: train {100 * document['relative_error']['train']['*']:.2f} %, test {100 * document['relative_error']['test']['*']:.2f} %")
+    print(f"objective {document['objective']:.8g} after {document['iterations']} iterations, {'converged' if document['converged'] else 'NOT CONVERGED'}")
+    gap = "no bound" if certificate["gap"] is None else f"at most {certificate['gap']:.1e} of it can be gained"
+    print(f"global optimum: {'proven' if certificate['globally_optimal'] else 'not proven'} ({gap})")
+    for name, slope in certificate["at_zero"].items():
+        print(f"  {name} went to zero and is held there (gradient {slope:+.3g})")
+    print(f"every body physically possible: {'yes' if document['physically_consistent'] else 'NO'}")
+    weak = sum(entry["from_data"] < _LOW for entry in document["parameters"])
+    print(f"{len(document['parameters'])} parameters, {weak} of them given by the prior rather than the data (from_data below {_LOW:g})")
+    _show_filter(document["filter"])
+    for notice in document["notices"]:
+        console.print(f"[yellow]note[/yellow] {escape(notice)}", soft_wrap=True, highlight=False)
+    print(f"run folder: {document['run']}")
+
+
+def _show_filter(chosen: dict) -> None:
+    key = "window" if "window" in chosen else "cutoff"
+    unit = "s" if key == "window" else "Hz"
+    if not chosen["held_out"]:
+        print(f"filter: {chosen['filter']}")
+        return
+    shown = ", ".join(f"{entry[key]:g} {unit}: {100 * entry['relative_error']:.2f} %" for entry in chosen["held_out"])
+    print(f"filter: {chosen['filter']}, {key} {chosen[key]:g} {unit} ({chosen['chosen']}); held-out error within the training logs, {shown}")
+
+
+def show_comparison(document: dict) -> None:
+    """RMS of every experiment and the differences with their standard errors."""
+    console = Console()
+    joints = list(dict.fromkeys(joint for entry in document["experiments"] for joint in entry["rms_test"]))
+    table = Table(title="held-out RMS [N m, or N on a prismatic joint]", title_justify="left")
+    table.add_column("experiment")
+    for joint in joints:
+        table.add_column(escape(joint), justify="right")
+    table.add_column("relative", justify="right")
+    for entry in document["experiments"]:
+        cells = [f"{entry['rms_test'][joint]:.4g}" if joint in entry["rms_test"] else "" for joint in joints]
+        table.add_row(escape(entry["name"]), *cells, f"{100 * entry['relative_error']['*']:.2f} %")
+    console.print(table)
+    for entry in document["differences"]:
+        se = "unknown: too few blocks" if entry["se"] is None else f"{entry['se']:.2g}"
+        print(f"{entry['joint']}: {entry['from']} -> {entry['to']} {entry['delta_rms']:+.4g} (standard error {se})")
+    for notice in document["notices"]:
+        console.print(f"[yellow]note[/yellow] {escape(notice)}", soft_wrap=True, highlight=False)
+
+
+def show_effects(found: list[dict]) -> None:
+    """The catalogue, one block an effect."""
+    for effect in found:
+        print(f"{effect['name']}: {effect['summary']}")
+        print(f"  equation     {effect['equation']}")
+        for parameter in effect["parameters"]:
+            bound = ", not negative" if parameter["lower"] == 0 else ""
+            print(f"  {parameter['name']:<12} {parameter['unit']}{bound}: {parameter['says']}")
+        print(f"  looks like   {effect['looks_like']}")
+        print(f"  tied with    {', '.join(effect['tied_with']) or 'nothing known'}")
+        print(f"  separate by  {effect['separate_by']}")
+        print(f"  source       {effect['source']}")

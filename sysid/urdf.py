@@ -1,0 +1,257 @@
+"""URDF text, checked before anything is built on it: a tree of links with the inertias it states.
+
+XML with a document type or entities is refused (a billion laughs, or a file read through one); meshes are
+never opened. What Pinocchio would report as a C++ exception is found here first, with the name of the link.
+"""
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from xml.etree import ElementTree
+from xml.parsers import expat
+
+import numpy as np
+
+from .errors import RobotError
+from .inertia import pseudo
+
+MOVING = ("revolute", "continuous", "prismatic")
+TYPES = MOVING + ("fixed", "floating", "planar")
+_EXAMPLES = "example-robot-data://"
+
+
+@dataclass(frozen=True)
+class Link:
+    """A link as the URDF states it; `inertial` is (10,) about the link's frame, None where it states none."""
+
+    name: str
+    inertial: np.ndarray | None
+    geometry: np.ndarray | None  # (10,) of a uniform solid of its primitive shapes at water's density
+    has_geometry: bool
+
+
+@dataclass(frozen=True)
+class Joint:
+    """A joint as the URDF states it; `damping` [N m s/rad] and `friction` [N m] from `<dynamics>`."""
+
+    name: str
+    type: str
+    parent: str
+    child: str
+    damping: float
+    friction: float
+
+
+@dataclass(frozen=True)
+class Urdf:
+    """The checked file: its text and its tree."""
+
+    path: Path
+    text: str
+    links: dict[str, Link]
+    joints: dict[str, Joint]
+
+
+def locate(reference: str, folder: Path) -> Path:
+    """The file that `robot.urdf` names: a path relative to `folder`, example-robot-data://, or a dataset's file."""
+    from . import datasets
+
+    if reference.startswith(_EXAMPLES):
+        return _example_root() / reference.removeprefix(_EXAMPLES)
+    if reference.startswith("package://"):
+        raise RobotError(
+            f"robot.urdf is {reference!r}; package:// needs a workspace that is not known here",
+            allowed="a path, example-robot-data://…, dataset:file", do="give the path of the file",
+        )
+    if (dataset := datasets.reference(reference)) is not None:
+        return dataset.locate()
+    return (folder / reference).resolve()
+
+
+def _example_root() -> Path:
+    # the package installs its models beside Pinocchio's, under the same cmeel prefix
+    from importlib.metadata import PackageNotFoundError, files
+
+    try:
+        listed = files("example_robot_data") or []
+    except PackageNotFoundError:
+        raise RobotError("example-robot-data is not installed", do="pip install example-robot-data") from None
+    for file in listed:
+        parts = file.parts
+        if "robots" in parts and file.suffix == ".urdf":
+            return Path(str(file.locate())).parents[len(parts) - parts.index("robots") - 2]
+    raise RobotError("example-robot-data holds no robots", do="reinstall example-robot-data")
+
+
+def read(path: Path) -> Urdf:
+    """Read and check a URDF.
+
+    Raises:
+        RobotError: not there, not XML, entities, a loop, a missing link, numbers that are no numbers.
+    """
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise RobotError(f"no URDF can be read there ({error.strerror})", where=str(path), do="check robot.urdf") from None
+    return parse(data, path)
+
+
+def parse(data: bytes, path: Path) -> Urdf:
+    """`read` for bytes already in memory; `path` only names them in messages."""
+    root = _safe_xml(data, path)
+    if root.tag != "robot":
+        raise RobotError(f"the root element is <{root.tag}>", where=str(path), allowed="<robot>", do="give a URDF, not a xacro or SDF")
+    links: dict[str, Link] = {}
+    for element in root.findall("link"):
+        link = _link(element, path)
+        if link.name in links:
+            raise RobotError(f"link {link.name!r} appears twice", where=str(path), do="rename one")
+        links[link.name] = link
+    joints: dict[str, Joint] = {}
+    for element in root.findall("joint"):
+        joint = _joint(element, path)
+        if joint.name in joints:
+            raise RobotError(f"joint {joint.name!r} appears twice", where=str(path), do="rename one")
+        joints[joint.name] = joint
+    _check_tree(links, joints, path)
+    return Urdf(path=path, text=data.decode("utf-8", errors="replace"), links=links, joints=joints)
+
+
+def _safe_xml(data: bytes, path: Path) -> ElementTree.Element:
+    def refuse(*_):
+        raise RobotError("the XML declares a document type or entities", where=str(path), allowed="plain elements", do="remove <!DOCTYPE …>")
+
+    checker = expat.ParserCreate()
+    checker.StartDoctypeDeclHandler = refuse
+    checker.EntityDeclHandler = refuse
+    try:
+        checker.Parse(data, True)
+        return ElementTree.fromstring(data)
+    except (expat.ExpatError, ElementTree.ParseError, ValueError, LookupError) as error:
+        raise RobotError(f"not XML ({error})", where=str(path), do="give a URDF file") from None
+
+
+def _numbers(element, attribute: str, count: int, default: str, path: Path, owner: str) -> np.ndarray:
+    text = (element.get(attribute) if element is not None else None) or default
+    try:
+        values = np.array([float(word) for word in text.split()])
+    except ValueError:
+        values = np.array([])
+    if values.shape != (count,) or not np.isfinite(values).all():
+        raise RobotError(f"{owner}: {attribute}={text!r}", where=str(path), allowed=f"{count} finite numbers")
+    return values
+
+
+def rotation_rpy(rpy) -> np.ndarray:
+    """Rotation matrix of URDF's fixed-axis roll, pitch, yaw [rad]."""
+    (sr, cr), (sp, cp), (sy, cy) = ((math.sin(a), math.cos(a)) for a in rpy)
+    return np.array([
+        [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+        [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+        [-sp, cp * sr, cp * cr],
+    ])  # fmt: skip
+
+
+def _pose(element, path: Path, owner: str):
+    origin = element.find("origin")
+    xyz = _numbers(origin, "xyz", 3, "0 0 0", path, owner)
+    return rotation_rpy(_numbers(origin, "rpy", 3, "0 0 0", path, owner)), xyz
+
+
+def _link(element, path: Path) -> Link:
+    name = element.get("name")
+    if not name:
+        raise RobotError("a <link> has no name", where=str(path))
+    owner = f"link {name!r}"
+    inertial = None
+    if (stated := element.find("inertial")) is not None:
+        turn, com = _pose(stated, path, owner)
+        mass = _numbers(stated.find("mass"), "value", 1, "0", path, owner)[0]
+        xx, xy, xz, yy, yz, zz = (
+            _numbers(stated.find("inertia"), key, 1, "0", path, owner)[0]
+            for key in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+        )
+        central = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        inertial = pseudo.from_central(mass, com, turn @ central @ turn.T)
+    shapes = element.findall("collision") or element.findall("visual")
+    solids = [solid for shape in shapes if (solid := _solid(shape, path, owner)) is not None]
+    return Link(name, inertial, np.sum(solids, 0) if solids else None, bool(shapes))
+
+
+def _solid(shape, path: Path, owner: str) -> np.ndarray | None:
+    """A uniform solid of 1000 kg/m^3 for a primitive shape; None for a mesh."""
+    turn, xyz = _pose(shape, path, owner)
+    geometry = shape.find("geometry")
+    if geometry is None:
+        return None
+    origin = np.zeros(3)
+    if (box := geometry.find("box")) is not None:
+        edges = np.abs(_numbers(box, "size", 3, "", path, owner))
+        solid = pseudo.box(1000.0 * edges.prod(), origin, edges)
+    elif (cylinder := geometry.find("cylinder")) is not None:
+        radius, length = (abs(_numbers(cylinder, key, 1, "", path, owner)[0]) for key in ("radius", "length"))
+        solid = pseudo.cylinder(1000.0 * math.pi * radius**2 * length, origin, radius, length)
+    elif (sphere := geometry.find("sphere")) is not None:
+        radius = abs(_numbers(sphere, "radius", 1, "", path, owner)[0])
+        solid = pseudo.sphere(1000.0 * 4.0 / 3.0 * math.pi * radius**3, origin, radius)
+    else:
+        return None
+    return pseudo.displaced(solid, turn, xyz) if solid[0] > 0 else None
+
+
+def _joint(element, path: Path) -> Joint:
+    name, kind = element.get("name"), element.get("type")
+    if not name:
+        raise RobotError("a <joint> has no name", where=str(path))
+    if kind not in TYPES:
+        raise RobotError(f"joint {name!r} is of type {kind!r}", where=str(path), allowed=", ".join(TYPES))
+    ends = []
+    for end in ("parent", "child"):
+        found = element.find(end)
+        if found is None or not found.get("link"):
+            raise RobotError(f"joint {name!r} names no {end} link", where=str(path))
+        ends.append(found.get("link"))
+    dynamics = element.find("dynamics")
+    damping, friction = (
+        _numbers(dynamics, key, 1, "0", path, f"joint {name!r}")[0] for key in ("damping", "friction")
+    )
+    _pose(element, path, f"joint {name!r}")
+    if kind in MOVING:
+        axis = _numbers(element.find("axis"), "xyz", 3, "1 0 0", path, f"joint {name!r}")
+        if not np.linalg.norm(axis) > 0:
+            raise RobotError(f"joint {name!r} has the axis 0 0 0", where=str(path), allowed="a direction")
+    return Joint(name, kind, ends[0], ends[1], damping, friction)
+
+
+def _check_tree(links, joints, path: Path) -> None:
+    if not links:
+        raise RobotError("there is no link in it", where=str(path), do="give a URDF of a robot")
+    parent_joint: dict[str, Joint] = {}
+    for joint in joints.values():
+        for end, link in (("parent", joint.parent), ("child", joint.child)):
+            if link not in links:
+                raise RobotError(
+                    f"joint {joint.name!r} has the {end} link {link!r}, which is missing", where=str(path),
+                    allowed=_some(links), do="add the link or correct the name",
+                )
+        if joint.child in parent_joint:
+            raise RobotError(
+                f"link {joint.child!r} hangs on two joints, {parent_joint[joint.child].name!r} and {joint.name!r} (a loop)",
+                where=str(path), allowed="a tree", do="cut the loop at one joint",
+            )
+        parent_joint[joint.child] = joint
+    roots = [name for name in links if name not in parent_joint]
+    for name in links:
+        seen, here = set(), name
+        while here in parent_joint:
+            if here in seen:
+                raise RobotError(f"link {name!r} is part of a loop", where=str(path), allowed="a tree", do="cut the loop at one joint")
+            seen.add(here)
+            here = parent_joint[here].parent
+    if len(roots) != 1:
+        raise RobotError(f"the links {_some(roots)} hang on nothing", where=str(path), allowed="one root", do="connect them")
+
+
+def _some(names, most: int = 12) -> str:
+    names = list(names)
+    return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")
