@@ -36,7 +36,7 @@ def compare(first: Fit, second: Fit, names: tuple[str, str] | None = None) -> li
         SysidError: they were tested on different logs, or share no joint.
     """
     names = names or (first.experiment.name, second.experiment.name)
-    logs = [[(log["log"], log["sha256"]) for log in fit.logs if log["part"] == "test"] for fit in (first, second)]
+    logs = [[(log["sha256"], log["start"], log["stop"]) for log in fit.logs if log["part"] == "test"] for fit in (first, second)]
     if logs[0] != logs[1]:
         raise SysidError(
             f"{names[0]} and {names[1]} have different test logs", where="compare",

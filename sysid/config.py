@@ -39,10 +39,14 @@ def _columns(value: Any) -> Any:
     raise ValueError('must be a pattern such as "q_{joint}", a list of names, or a list of numbers counted from 0')
 
 
+def _is_number(value: Any) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) < 1e300
+
+
 def _auto_or_positive(value: Any) -> Any:
     if value == "auto":
         return value
-    if isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value) and value > 0:
+    if _is_number(value) and value > 0:
         return float(value)
     raise ValueError("must be a positive number or auto")
 
@@ -50,11 +54,24 @@ def _auto_or_positive(value: Any) -> Any:
 def _standstill(value: Any) -> Any:
     if value in ("keep", "mask"):
         return value
-    if isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value) and value >= 0:
+    if _is_number(value) and value >= 0:
         return float(value)
     raise ValueError("must be keep, mask, or a speed [rad/s or m/s]")
 
 
+def _nonzero(value: float) -> float:
+    if value == 0:
+        raise ValueError("must not be 0")
+    return value
+
+
+def _reference(value: str) -> str:
+    if not value or "\0" in value:
+        raise ValueError("must be the path of a file")
+    return value
+
+
+Text = Annotated[str, AfterValidator(_reference)]
 Number = Annotated[float, AfterValidator(_finite)]
 Vector = Annotated[list[Number], Field(min_length=3, max_length=3)]
 Positive = Annotated[float, AfterValidator(_finite), Field(gt=0)]
@@ -96,6 +113,7 @@ def _ratio(value: float) -> float:
 
 
 Ratio = Annotated[float, AfterValidator(_finite), AfterValidator(_ratio)]
+NonZero = Annotated[float, AfterValidator(_finite), AfterValidator(_nonzero)]
 
 
 def _direction(value: list[float]) -> list[float]:
@@ -117,30 +135,42 @@ class RotorSpec(_Spec):
 
 
 class RobotSpec(_Spec):
-    urdf: str = "robot.urdf"
+    """The URDF, the joints that move, and the rotors that they drive."""
+
+    urdf: Text = "robot.urdf"
     joints: list[str] | None = None
     lock: dict[str, Number] = {}
     gravity: Vector = [0.0, 0.0, -9.81]
     rotors: list[RotorSpec] = []
-    transmission: dict[str, dict[str, Ratio]] = {}
+    transmission: dict[str, Annotated[dict[str, NonZero], Field(min_length=1)]] = {}
 
 
 class LogSpec(_Spec):
-    """A log: a path or a public dataset, or a piece of one by time [s]."""
+    """A log: a path or a public dataset, or a piece of one: start <= t - t[0] < stop [s]."""
 
-    file: str
-    start: Number | None = None
-    stop: Number | None = None
+    file: Text
+    start: Annotated[float, AfterValidator(_finite), Field(ge=0)] | None = None
+    stop: Positive | None = None
+
+    def model_post_init(self, _context: Any) -> None:
+        if self.start is not None and self.stop is not None and not self.start < self.stop:
+            raise ValueError(f"start {self.start:g} must be before stop {self.stop:g}")
 
 
 def _log(value: Any) -> Any:
-    return {"file": value} if isinstance(value, str) else value
+    if isinstance(value, str):
+        return {"file": value}
+    if isinstance(value, (dict, LogSpec)):
+        return value
+    raise ValueError("must be a path, or {file: path, start: seconds, stop: seconds}")
 
 
 Logs = Annotated[list[Annotated[LogSpec, BeforeValidator(_log)]], Field(min_length=1)]
 
 
 class ColumnsSpec(_Spec):
+    """Which column of a log holds what; `{joint}` stands for each joint's name."""
+
     time: Annotated[Any, BeforeValidator(_column)] = "t"
     position: Columns = "q_{joint}"
     torque: Columns = "tau_{joint}"
@@ -156,13 +186,21 @@ def _constants(value: Any) -> Any:
 
 
 class UnitsSpec(_Spec):
+    """The units of a log; everything behind the reader is SI."""
+
     time: Literal["s", "ms", "us", "ns"] = "s"
     position: Literal["rad", "deg", "m", "mm"] = "rad"
     torque: Literal["N m", "N", "A"] = "N m"
-    torque_constant: Annotated[dict[str, Ratio] | None, BeforeValidator(_constants)] = None
+    torque_constant: Annotated[dict[str, NonZero] | None, BeforeValidator(_constants)] = None
+
+    def model_post_init(self, _context: Any) -> None:
+        if self.torque_constant is not None and self.torque != "A":
+            raise ValueError(f"torque_constant turns current into torque, and torque is in {self.torque}: write torque: A, or leave the constants out")
 
 
 class DataSpec(_Spec):
+    """The logs: what to fit, what to hold out, how to read them."""
+
     train: Logs = Field(default_factory=lambda: [LogSpec(file="train.csv")])
     test: Logs = Field(default_factory=lambda: [LogSpec(file="test.csv")])
     columns: ColumnsSpec = ColumnsSpec()
@@ -172,6 +210,8 @@ class DataSpec(_Spec):
 
 
 class PreprocessSpec(_Spec):
+    """The filter from logged angles to position, velocity and acceleration."""
+
     filter: Literal["savitzky-golay", "butterworth", "none"] = "savitzky-golay"
     order: Annotated[int, Field(ge=1, le=12)] = 4
     window: Annotated[Any, BeforeValidator(_auto_or_positive)] = 0.1
@@ -179,36 +219,48 @@ class PreprocessSpec(_Spec):
     torque: Literal["raw", "same"] = "raw"
     standstill: Annotated[Any, BeforeValidator(_standstill)] = "keep"
 
+    def model_post_init(self, _context: Any) -> None:
+        if self.filter == "savitzky-golay" and self.order < 2:
+            raise ValueError(f"order {self.order} has no acceleration: savitzky-golay needs 2 to 12")
+
 
 class EffectSpec(_Spec):
     """An effect of the vocabulary and the joints that have it (None: every joint)."""
 
     name: str
-    joints: list[str] | None = None
+    joints: Annotated[list[str], Field(min_length=1)] | None = None
 
 
 def _effect(value: Any) -> Any:
+    if isinstance(value, EffectSpec):
+        return value
     if isinstance(value, str):
         return {"name": value}
     if isinstance(value, dict) and len(value) == 1:
         (name, options), = value.items()
-        if isinstance(name, str) and isinstance(options, dict):
+        if isinstance(name, str) and isinstance(options, dict) and "name" not in options:
             return {"name": name, **options}
     raise ValueError("must be an effect's name, or {name: {joints: [...]}}")
 
 
 class ModelSpec(_Spec):
+    """How bodies are parameterized, and the effects on the joints."""
+
     inertia: Literal["log-cholesky", "exponential", "eigenvalue", "linear"] = "log-cholesky"
     effects: list[Annotated[EffectSpec, BeforeValidator(_effect)]] = [EffectSpec(name="viscous"), EffectSpec(name="coulomb")]
 
 
 class PriorSpec(_Spec):
+    """What the bodies are believed to be before any data, and how strongly."""
+
     divergence: Literal["log-det", "pullback", "euclidean"] = "log-det"
     weight: Annotated[float, AfterValidator(_finite), Field(ge=0)] = 1.0e-2
-    source: str = "urdf"
+    source: Text = "urdf"
 
 
 class SolverSpec(_Spec):
+    """When to stop, and whether each joint counts by its noise."""
+
     tolerance: Annotated[float, AfterValidator(_finite), Field(gt=0, lt=1)] = 1.0e-8
     max_iterations: Annotated[int, Field(ge=1)] = 200
     weighting: Literal["none", "noise"] = "none"
@@ -252,7 +304,7 @@ def load(path: str | Path) -> Experiment:
     if len(data) > _LARGEST_FILE:
         raise ConfigError(f"an experiment file of {len(data)} bytes", where=str(path), allowed=f"at most {_LARGEST_FILE}")
     try:
-        text = data.decode("utf-8")
+        text = data.decode("utf-8-sig")
     except UnicodeDecodeError:
         raise ConfigError("not UTF-8 text", where=str(path), do="give an experiment in YAML") from None
     tree = parse_yaml(text, where=str(path))
@@ -338,15 +390,17 @@ def _line(tree, location: tuple) -> int | None:
     line, node = None, tree
     for step in location:
         try:
+            if isinstance(node, dict) and step not in node:
+                (node,) = node.values()  # an effect's options stand under its name
             line = (node.lc.key(step) if isinstance(node, dict) else node.lc.item(step))[0] + 1
             node = node[step]
-        except (AttributeError, KeyError, IndexError, TypeError):
+        except (AttributeError, KeyError, IndexError, TypeError, ValueError):
             break
     return line
 
 
 def _keys(model) -> list[str]:
-    return [name for name in model.model_fields if not (model is Experiment and name == "path")]
+    return [name for name in model.model_fields if (model, name) not in ((Experiment, "path"), (EffectSpec, "name"))]
 
 
 def _model_at(location: tuple):
@@ -374,10 +428,13 @@ def _inner_model(annotation):
     return None
 
 
+def _spelled(location: tuple) -> str:
+    return "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in location).lstrip(".")
+
+
 def _unknown_key(tree, location: tuple, path: Path) -> ConfigError:
-    key = str(location[-1])
+    key, parent = str(location[-1]), _spelled(location[:-1])
     keys = _keys(_model_at(location))
-    parent = ".".join(str(step) for step in location[:-1])
     close = difflib.get_close_matches(key, keys, n=3, cutoff=0.4) or keys
     line = _line(tree, location)
     return ConfigError(
@@ -386,15 +443,25 @@ def _unknown_key(tree, location: tuple, path: Path) -> ConfigError:
     )
 
 
+_SAID = {
+    "model_type": "must be a mapping of keys to values", "dict_type": "must be a mapping of names to values", "list_type": "must be a list",
+    "float_type": "must be a number", "int_type": "must be a whole number", "string_type": "must be text", "missing": "is missing",
+    "finite_number": "must be a finite number",
+}  # fmt: skip
+
+
 def _named(error: ValidationError, tree, path: Path) -> ConfigError:
     """The first mistake of pydantic's list, as one line with the file's line number."""
     found = sorted(error.errors(), key=lambda e: (e["type"] != "extra_forbidden", _line(tree, e["loc"]) or 0))[0]
-    location = tuple(step for step in found["loc"])
-    if found["type"] == "extra_forbidden":
+    location, kind, context = found["loc"], found["type"], found.get("ctx", {})
+    if kind == "extra_forbidden":
         return _unknown_key(tree, location, path)
-    key = "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in location).lstrip(".")
+    if kind in ("too_short", "too_long"):
+        needed = context.get("min_length") if kind == "too_short" else context.get("max_length")
+        said = f"must have {'at least' if kind == 'too_short' else 'at most'} {needed} entries, not {context.get('actual_length')}"
+    else:
+        said = _SAID.get(kind, found["msg"].removeprefix("Value error, ").replace("Input should be", "must be"))
     given = found.get("input")
-    shown = f" (given: {given!r})" if isinstance(given, (str, int, float, bool, type(None))) else ""
-    message = found["msg"].removeprefix("Value error, ").replace("Input should be", "must be").replace("Field required", "is missing")
+    shown = f" (given: {str(given)[:60]!r})" if isinstance(given, str) else f" (given: {str(given)[:60]})" if isinstance(given, (int, float, type(None))) else ""
     line = _line(tree, location)
-    return ConfigError(f"{key}: {message}{shown}", where=f"{path} line {line}" if line else str(path))
+    return ConfigError(f"{_spelled(location)}: {said}{shown}", where=f"{path} line {line}" if line else str(path))

@@ -21,6 +21,7 @@ from .readers.table import Table
 _GAP_STEPS = 10.0
 # Steps that all stay this close to the median are uniform sampling with rounded time stamps.
 _UNIFORM = 0.02
+_EPOCH = 1e6  # s: a clock that reads more counts from 1970, not from the log's start
 _DEGREES = 4.0 * np.pi  # rad: no robot joint turns so far from zero, but its angle in degrees does
 
 
@@ -53,7 +54,7 @@ class Log:
 
 
 def read(log: LogSpec, data: DataSpec, joints: tuple[str, ...], prismatic, folder: Path = Path()) -> Log:
-    """Read one log of an experiment.
+    """Read one log of an experiment. A piece holds the samples from `start` up to, not including, `stop`: pieces that meet share none.
 
     Args:
         log: the file and the piece of it. data: columns, units, rate. joints: names, in order.
@@ -71,11 +72,12 @@ def read(log: LogSpec, data: DataSpec, joints: tuple[str, ...], prismatic, folde
     t, signals = _load(table, data, joints)
     where = str(path)
     t = _clock(t, data, where, len(signals["q"]))
-    if log.start is not None or log.stop is not None:
-        t, signals = _piece(t, signals, log, where)
     _check_time(t, where)
+    first = 0
+    if log.start is not None or log.stop is not None:
+        first, t, signals = _piece(t, signals, log, where)
     for name, values in signals.items():
-        _check_finite(values, name, t, joints, where)
+        _check_finite(values, name, t, joints, where, first)
     _convert(signals, data, joints, prismatic, where)
     segments = tuple(_segments(t, signals, where))
     return Log(name=log.file, path=path, sha256=_sha256(path), segments=segments)
@@ -88,28 +90,25 @@ def _load(table: Table, data: DataSpec, joints):
     for name, pattern in (("q", spec.position), ("tau", spec.torque), ("qd", spec.velocity), ("qdd", spec.acceleration)):
         if pattern is not None:
             wanted[name] = _names(table, pattern, joints, name)
-    others = {**spec.signals, **data.signals}
-    for name, column in others.items():
-        wanted[f"signals.{name}"] = [table.resolve(column)]
-    time = [] if data.rate else [table.resolve(spec.time)]
+    for name, column in {**spec.signals, **data.signals}.items():
+        wanted[f"signals.{name}"] = [_single(table, column, f"signal {name!r}")]
+    time = [] if data.rate else [_single(table, spec.time, "time")]
     columns = table.load(list(dict.fromkeys(time + [c for names in wanted.values() for c in names])))
+    lengths = {name: len(values) for name, values in columns.items()}
+    if len(set(lengths.values())) > 1:
+        shown = ", ".join(f"{name!r} {length}" for name, length in lengths.items())
+        raise LogError(f"columns differ in length: {shown}", where=str(table.path), allowed="a value in every column for each sample", do="correct data.columns or the log")
+    if not min(lengths.values()):
+        raise LogError("the log has no samples", where=str(table.path), do="give a log with samples")
     signals = {}
     for name, names in wanted.items():
-        if len(names) == 1 and columns[names[0]].ndim == 2:
-            signals[name] = np.array(columns[names[0]])
+        if len(names) == 1:
+            values = np.array(columns[names[0]], dtype=float)
+            signals[name] = values if values.ndim == 2 or name.startswith("signals.") else values[:, None]
         else:
-            if lengths := sorted({len(columns[c]) for c in names}):
-                if len(lengths) > 1:
-                    raise LogError(f"columns of {name} have {lengths[0]} and {lengths[-1]} samples", where=str(table.path))
-            out = np.empty((len(columns[names[0]]), len(names)))
+            signals[name] = np.empty((lengths[names[0]], len(names)))
             for k, c in enumerate(names):
-                out[:, k] = columns[c]
-            signals[name] = out if not name.startswith("signals.") else out[:, 0]
-    lengths = {name: len(values) for name, values in signals.items()}
-    if len(set(lengths.values())) > 1:
-        raise LogError(f"signals differ in length: {lengths}", where=str(table.path))
-    if not lengths["q"]:
-        raise LogError("the log has no samples", where=str(table.path))
+                signals[name][:, k] = columns[c]
     return (columns[time[0]] if time else None), signals
 
 
@@ -119,7 +118,7 @@ def _names(table: Table, pattern, joints, signal: str) -> list[str]:
         if table.width(name) != len(joints):
             raise LogError(
                 f"{signal}: column {name!r} is {table.width(name)} wide for {len(joints)} joints", where=str(table.path),
-                allowed='a pattern with {joint}, a list with a column for each joint, or a matrix that wide',
+                allowed="a pattern with {joint}, a list with a column for each joint, or a matrix that wide", do="correct data.columns",
             )  # fmt: skip
         return [name]
     if isinstance(pattern, str):
@@ -128,39 +127,49 @@ def _names(table: Table, pattern, joints, signal: str) -> list[str]:
             if name not in table.names:
                 raise LogError(
                     f"joint {joint!r} has no column: {name!r} is not there", where=str(table.path),
-                    allowed=", ".join(table.names[:20]) + (" …" if len(table.names) > 20 else ""),
+                    allowed=table.some_names(),
                     do="correct data.columns or robot.joints",
                 )  # fmt: skip
     if len(pattern) != len(joints):
         raise LogError(f"{signal}: {len(pattern)} columns for {len(joints)} joints", where=str(table.path), allowed=f"one for each of {', '.join(joints)}", do="correct data.columns")
-    return [table.resolve(column) for column in pattern]
+    return [_single(table, column, signal) for column in pattern]
+
+
+def _single(table: Table, column, signal: str) -> str:
+    name = table.resolve(column)
+    if (width := table.width(name)) > 1:
+        raise LogError(f"{signal}: {name!r} is {width} columns", where=str(table.path), allowed=f"one of {name}[0] to {name}[{width - 1}]", do="correct data.columns")
+    return name
 
 
 def _clock(t, data: DataSpec, where: str, samples: int) -> np.ndarray:
     if t is None:
         return np.arange(samples) / data.rate
-    if t.ndim != 1 or len(t) != samples:
-        raise LogError(f"time has {t.shape} values for {samples} samples", where=where)
     scale = units.TIME[data.units.time]
     # large stamps (ns since 1970) lose nothing if the start is taken off before the unit is converted
-    start = t[0] if np.isfinite(t[0]) else 0.0
-    return (t - start) * scale + (start * scale if abs(start * scale) < 1e6 else 0.0)
+    t = t.astype(np.int64, copy=False) if t.dtype.kind in "iu" else t
+    start = t[0] if _EPOCH <= abs(t[0] * scale) < np.inf else 0
+    return (t - start) * scale
 
 
 def _piece(t, signals, log: LogSpec, where: str):
+    """The number of the piece's first sample, and its time and signals."""
     since = t - t[0]
-    keep = (since >= (log.start if log.start is not None else -np.inf)) & (since <= (log.stop if log.stop is not None else np.inf))
-    if not keep.any():
-        raise LogError(f"no sample between start {log.start} and stop {log.stop}", where=where, allowed=f"0 to {since[-1]:.6g} s from the log's first sample")
-    part = slice(int(np.argmax(keep)), len(keep) - int(np.argmax(keep[::-1])))
-    return t[part], {name: values[part] for name, values in signals.items()}
+    first, last = np.searchsorted(since, [log.start or 0.0, np.inf if log.stop is None else log.stop])
+    if last - first < 2:
+        raise LogError(
+            f"{max(last - first, 0)} samples between start {log.start} and stop {log.stop}", where=where,
+            allowed=f"start < stop within 0 to {since[-1]:.6g} s, counted from the log's first sample", do="correct start and stop",
+        )  # fmt: skip
+    part = slice(int(first), int(last))
+    return part.start, t[part], {name: values[part] for name, values in signals.items()}
 
 
 def _check_time(t, where: str) -> None:
     if not np.isfinite(t).all():
         raise LogError("time is not a finite number", where=f"{where} row {int(np.argmin(np.isfinite(t)))}", do="leave the row out")
     if len(t) < 2:
-        raise LogError("fewer than two samples", where=where)
+        raise LogError("the log has one sample", where=where, allowed="two or more", do="give a longer log")
     backwards = np.diff(t) <= 0.0
     if backwards.any():
         row = int(np.argmax(backwards)) + 1
@@ -168,14 +177,14 @@ def _check_time(t, where: str) -> None:
         raise LogError(f"time {verb}: {t[row - 1]:.9g} s, then {t[row]:.9g} s", where=f"{where} row {row}", allowed="increasing time", do="sort the rows or leave doubles out")
 
 
-def _check_finite(values, name: str, t, joints, where: str) -> None:
+def _check_finite(values, name: str, t, joints, where: str, first: int) -> None:
     # a sum is finite when all its terms are; only a bad log pays for the search
     if np.isfinite(values.sum()) or np.isfinite(values).all():
         return
     row, *column = (int(k) for k in np.argwhere(~np.isfinite(values))[0])
     joint = f" of joint {joints[column[0]]!r}" if column else ""
     value = values[row, column[0]] if column else values[row]
-    raise LogError(f"{name.removeprefix('signals.')}{joint} is {value}", where=f"{where} row {row} (t = {t[row]:.6g} s)", allowed="finite numbers", do="leave the row out; a gap is split there")
+    raise LogError(f"{name.removeprefix('signals.')}{joint} is {value}", where=f"{where} row {first + row} (t = {t[row]:.6g} s)", allowed="finite numbers", do="leave the row out; a gap is split there")
 
 
 def _convert(signals, data: DataSpec, joints, prismatic, where: str) -> None:

@@ -62,7 +62,7 @@ def fit(experiment: Experiment, *, progress: Progress | None = None) -> Fit:
             machine, structure, prior = build(experiment)
         with _timed(seconds, "read"):
             train = read(experiment, machine, experiment.data.train)
-        provenance = [_provenance("train", log) for log in train]
+        provenance = [_provenance("train", log, spec) for log, spec in zip(train, experiment.data.train)]
         with _timed(seconds, "filters"):
             chosen = filters.compare(experiment, structure, train, prior)
             preprocess = filters.settled(experiment.preprocess, chosen)
@@ -80,7 +80,7 @@ def fit(experiment: Experiment, *, progress: Progress | None = None) -> Fit:
             del motion
         with _timed(seconds, "test"):
             held_out = read(experiment, machine, experiment.data.test)
-            provenance += [_provenance("test", log) for log in held_out]
+            provenance += [_provenance("test", log, spec) for log, spec in zip(held_out, experiment.data.test)]
             motion = prepare(held_out, preprocess, machine.joints)
             del held_out
             predictions["test"] = predict(structure, found.x, motion)
@@ -128,8 +128,11 @@ def _tell_still(motion: Motion) -> None:
         warnings.warn(SysidWarning(f"joint {joint!r} never moves in the training logs; its friction is held at its prior, and its bodies are where the other joints' torque leaves them"), stacklevel=2)
 
 
-def _provenance(part: str, log: logs.Log) -> dict:
-    return {"part": part, "log": log.name, "sha256": log.sha256, "samples": log.samples, "segments": len(log.segments)}
+def _provenance(part: str, log: logs.Log, spec: LogSpec) -> dict:
+    return {
+        "part": part, "log": log.name, "sha256": log.sha256, "start": spec.start, "stop": spec.stop,
+        "samples": log.samples, "segments": len(log.segments),
+    }  # fmt: skip
 
 
 def _split(caught):

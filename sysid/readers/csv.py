@@ -23,12 +23,19 @@ class CsvTable(Table):
                 raise LogError("not text", where=str(path), do="give a CSV file") from None
         if not first.strip():
             raise LogError("the file is empty, or its first line is", where=str(path))
-        self._separator = max(",;\t ", key=first.count) if any(s in first for s in ",;\t ") else ","
-        cells = [cell.strip().strip('"') for cell in first.split(self._separator)]
-        self._header = not all(_NUMBER.fullmatch(cell) or not cell for cell in cells)
+        # a comma between semicolons or tabs is a decimal one, a space beside any of them is nothing
+        self._separator = next((mark for mark in ";\t, " if mark in first.strip()), ",")
+        cells = self._cells(first)
+        self._header = not all(_NUMBER.fullmatch(self._point(cell)) or not cell for cell in cells)
         self.names = cells if self._header else [str(k) for k in range(len(cells))]
         if self._header and (twice := sorted({c for c in cells if cells.count(c) > 1})):
             raise LogError(f"two columns are named {twice[0]!r}", where=str(path), do="rename one")
+
+    def _cells(self, line: str) -> list[str]:
+        return [cell.strip().strip('"') for cell in line.split(self._separator)]
+
+    def _point(self, cell: str) -> str:
+        return cell if self._separator == "," else cell.replace(",", ".")
 
     def load(self, names):
         positions = [self.names.index(name) for name in names]
@@ -37,21 +44,24 @@ class CsvTable(Table):
         try:
             try:
                 frame = self._frame(wanted, {f"column_{k + 1}": pl.Float64 for k in range(len(self.names))})
+            except pl.exceptions.NoDataError:
+                raise LogError("there is a header and no row below it", where=str(self.path), do="give a log with samples") from None
             except pl.exceptions.PolarsError:
                 frame = self._frame(wanted, None)  # as text, to find the cell that is no number
         except (pl.exceptions.PolarsError, OSError) as error:
             raise LogError(f"cannot be read as CSV ({str(error).splitlines()[0]})", where=str(self.path)) from None
-        if self._last_row_is_short() and frame.height:
+        if self._truncated() and frame.height:
             warnings.warn(SysidWarning(f"{self.path.name}: the last row is truncated and was dropped"), stacklevel=2)
             frame = frame.head(frame.height - 1)
         out = {}
         for position, column in zip(wanted, list(frame.columns)):
             name, cells = self.names[position], frame.drop_in_place(column)
-            values = cells if cells.dtype == pl.Float64 else cells.str.strip_chars().cast(pl.Float64, strict=False)
+            values = cells if cells.dtype == pl.Float64 else self._parsed(cells)
             bad = values.is_null()
             if bad.any():
                 row = int(bad.arg_max())
-                raise LogError(f"{cells[row]!r} is no number", where=f"{self.path} line {row + 1 + self._header} column {name!r}", do="correct the row or leave it out")
+                said = "the cell is empty" if cells[row] is None else f"{cells[row]!r} is no number"
+                raise LogError(said, where=f"{self.path} line {row + 1 + self._header} column {name!r}", do="correct the row or leave it out")
             out[name] = values.to_numpy()
         return {name: out[name] for name in names}
 
@@ -61,12 +71,16 @@ class CsvTable(Table):
             infer_schema=False, schema_overrides=schema,
         )  # fmt: skip
 
-    def _last_row_is_short(self) -> bool:
+    def _parsed(self, cells: pl.Series) -> pl.Series:
+        cells = cells.str.strip_chars()
+        return (cells if self._separator == "," else cells.str.replace(",", ".", literal=True)).cast(pl.Float64, strict=False)
+
+    def _truncated(self) -> bool:
+        """The last row lacks cells, or its last cell is broken off."""
         with self.path.open("rb") as file:
             file.seek(0, 2)
-            size = file.tell()
-            file.seek(max(0, size - 1_000_000))
-            lines = [line for line in file.read().decode("utf-8", errors="replace").splitlines() if line.strip()]
-        return bool(lines) and len(lines[-1].split(self._separator)) < len(self.names)
-
-
+            file.seek(max(0, file.tell() - 1_000_000))
+            text = file.read().decode("utf-8", errors="replace")
+        lines = [line for line in text.splitlines() if line.strip()]
+        cells = self._cells(lines[-1]) if lines else self.names
+        return len(cells) < len(self.names) or (not text.endswith(("\n", "\r")) and not _NUMBER.fullmatch(self._point(cells[-1])))

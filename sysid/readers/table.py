@@ -16,25 +16,30 @@ class Table(ABC):
 
     @abstractmethod
     def load(self, names: list[str]) -> dict[str, np.ndarray]:
-        """The named columns as float arrays: (n,), or (n, k) for the name of a matrix."""
+        """The named columns as arrays of floats or whole numbers: (n,), or (n, k) for the name of a matrix."""
 
     def width(self, name: str) -> int:
         """How many columns stand behind a name: more than one for a matrix."""
         return 1
 
     def resolve(self, column: str | int) -> str:
-        """The name of a column given by its name, or by its number from 0.
+        """The name of a column given by its name, or by its number from 0 (the columns of a matrix count one by one).
 
         Raises:
             LogError: no such column.
         """
         if isinstance(column, int):
-            if not 0 <= column < len(self.names):
-                raise LogError(f"there is no column {column}", where=str(self.path), allowed=f"0 to {len(self.names) - 1}")
-            return self.names[column]
+            single = [name for name in self.names if self.width(name) == 1]
+            if not 0 <= column < len(single):
+                raise LogError(f"there is no column {column}", where=str(self.path), allowed=f"0 to {len(single) - 1}", do="correct data.columns")
+            return single[column]
         if column not in self.names:
-            raise LogError(f"there is no column {column!r}", where=str(self.path), allowed=", ".join(self.names[:20]) + (" …" if len(self.names) > 20 else ""), do="correct data.columns")
+            raise LogError(f"there is no column {column!r}", where=str(self.path), allowed=self.some_names(), do="correct data.columns")
         return column
+
+    def some_names(self) -> str:
+        """The names to show in a message, the first twenty."""
+        return ", ".join(self.names[:20]) + (" …" if len(self.names) > 20 else "") or "nothing: the file holds no column of numbers"
 
 
 class ArrayTable(Table):
@@ -70,11 +75,23 @@ class ArrayTable(Table):
         return out
 
     def _oriented(self, name) -> np.ndarray:
-        try:
-            array = np.asarray(self.fetch(name), dtype=float)
-        except (TypeError, ValueError):
-            raise LogError(f"variable {name!r} holds no plain numbers", where=str(self.path), allowed="real arrays") from None
+        array = np.asarray(self.fetch(name))
+        if array.dtype.kind not in "biuf":
+            raise LogError(f"variable {name!r} holds {array.dtype}", where=str(self.path), allowed="real numbers")
+        # whole numbers stay whole: a clock in ns since 1970 has more digits than a float
+        array = array if array.dtype.kind in "iu" else array.astype(float, copy=False)
         if array.ndim == 2 and 1 in array.shape:
             return array.ravel()
         # samples run along the longer side
         return array.T if array.ndim == 2 and array.shape[0] < array.shape[1] else array
+
+
+def stacked(cells) -> np.ndarray | None:
+    """Cells of one sample each as a matrix (n, k); None where they hold anything else."""
+    try:
+        arrays = [np.asarray(cell, dtype=float).ravel(order="F") for cell in cells]
+    except (TypeError, ValueError):
+        return None
+    if not arrays or len({array.size for array in arrays}) != 1:
+        return None
+    return np.stack(arrays)

@@ -1,0 +1,141 @@
+"""How fast, against what nobody can avoid; and how memory grows with the log. Ratios of one run, on this machine.
+
+    python scripts/benchmark.py            # everything, about two minutes
+    python scripts/benchmark.py --repeats 9 --only time
+
+time    The whole `sysid fit configs/cheetah3.yaml` process over a floor: a process that only imports pinocchio, numpy
+        and scipy.signal, reads the training log, differentiates it, builds the regressors of links and rotors in a plain
+        Pinocchio loop and takes one QR. The floor reads no test log and solves nothing. The two take turns, and each
+        counts with its median.
+memory  Peak memory of `sysid fit` on the leg's log and on one 50 times as long, per joint and sample that it grew by.
+        The regressor kept whole would take 1440 bytes.
+"""
+
+import argparse
+import json
+import os
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+CONFIG = ROOT / "configs" / "cheetah3.yaml"
+LOG = ROOT / "data" / "cheetah3" / "train.parquet"
+TIMES = 50
+
+FLOOR = '''
+import sys
+import numpy as np
+import pinocchio as pin
+import scipy.signal
+
+def read(path):
+    import polars
+    table = polars.read_parquet(path)
+    columns = lambda kind: np.column_stack([table[f"{kind}_{j}"].to_numpy() for j in ("abad", "hip", "knee")])
+    return columns("q"), columns("tau")
+
+ratio = 10.604
+model = pin.buildModelFromUrdf(sys.argv[1])
+poses = {"abad": (0, pin.SE3(np.eye(3), np.array([0, -0.128, 0])), np.array([1.0, 0, 0])),
+         "hip": (1, pin.SE3(pin.utils.rotate("z", np.pi), np.array([0, 0.045, 0])), np.array([0, 1.0, 0])),
+         "knee": (2, pin.SE3.Identity(), np.array([0, 1.0, 0]))}
+for name, (carrier, pose, axis) in poses.items():
+    joint = model.addJoint(carrier, pin.JointModelRevoluteUnaligned(axis), pose, name + "_rotor")
+    model.appendBodyToJoint(joint, pin.Inertia.FromBox(0.5, 0.09, 0.09, 0.09), pin.SE3.Identity())
+drive = np.vstack([np.eye(3), ratio * np.eye(3)])
+q, tau = read(sys.argv[2])
+q, qd, qdd = (scipy.signal.savgol_filter(q, 101, 4, deriv=d, delta=1e-3, axis=0) @ drive.T for d in range(3))
+data = model.createData()
+rows = np.zeros((len(q), 3, 67))
+for k in range(len(q)):
+    rows[k, :, :60] = drive.T @ pin.computeJointTorqueRegressor(model, data, q[k], qd[k], qdd[k])
+for j in range(3):
+    rows[:, j, 60 + j], rows[:, j, 63 + j] = qd[:, j], np.sign(qd[:, j])
+rows[:, :, 66] = tau
+print(np.linalg.qr(rows.reshape(-1, 67), mode="r").shape)
+'''
+
+
+def main() -> None:
+    """Run the benchmarks and print them; with --json as one document."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--repeats", type=int, default=7, help="runs of each process; the median counts")
+    parser.add_argument("--only", choices=["time", "memory"])
+    parser.add_argument("--json", action="store_true")
+    options = parser.parse_args()
+    found = {}
+    if options.only != "memory":
+        found["fit_over_floor"] = fit_over_floor(options.repeats)
+    if options.only != "time":
+        found["memory"] = memory()
+    if options.json:
+        print(json.dumps(found))
+        return
+    if "fit_over_floor" in found:
+        entry = found["fit_over_floor"]
+        print(f"sysid fit {entry['fit_seconds']:.2f} s / floor {entry['floor_seconds']:.2f} s = {entry['ratio']:.2f} (medians of {options.repeats})")
+    if "memory" in found:
+        entry = found["memory"]
+        print(
+            f"peak memory {entry['megabytes'][0]:.0f} MB on {entry['samples'][0]} samples, {entry['megabytes'][1]:.0f} MB on {entry['samples'][1]}: "
+            f"{entry['bytes_per_joint_sample']:.0f} bytes per joint and sample"
+        )
+
+
+def _run(command: list[str]) -> tuple[float, int]:
+    """Wall time [s] and peak memory [bytes] of a process."""
+    start = time.perf_counter()
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, env=_environment())
+    said = process.stderr.read()
+    _, status, usage = os.wait4(process.pid, 0)
+    process.returncode = os.waitstatus_to_exitcode(status)
+    if process.returncode:
+        sys.exit(f"{command} failed: {said.decode()[-500:]}")
+    scale = 1 if sys.platform == "darwin" else 1024
+    return time.perf_counter() - start, usage.ru_maxrss * scale
+
+
+def _environment() -> dict[str, str]:
+    return {**os.environ, "PYTHONPATH": str(ROOT)}
+
+
+def fit_over_floor(repeats: int) -> dict:
+    """Medians of alternating runs, after one warm-up of each."""
+    with tempfile.TemporaryDirectory() as out:
+        fit = [sys.executable, "-m", "sysid", "fit", str(CONFIG), "--quiet", "--out", out]
+        floor = [sys.executable, "-c", FLOOR, str(ROOT / "data" / "cheetah3" / "leg.urdf"), str(LOG)]
+        times: dict[str, list[float]] = {"fit": [], "floor": []}
+        for _ in range(repeats + 1):
+            times["floor"].append(_run(floor)[0])
+            times["fit"].append(_run(fit)[0])
+    medians = {name: statistics.median(values[1:]) for name, values in times.items()}
+    return {"ratio": medians["fit"] / medians["floor"], "fit_seconds": medians["fit"], "floor_seconds": medians["floor"]}
+
+
+def memory() -> dict:
+    """Peak memory of a fit on the log once and on its copies end to end, each run backwards after the other."""
+    import polars as pl
+
+    table = pl.read_parquet(LOG)
+    peaks, samples = [], []
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder)
+        text = CONFIG.read_text().replace("../data/cheetah3/", f"{ROOT}/data/cheetah3/")
+        for times in (1, TIMES):
+            # a mirrored copy joins on smoothly in position, so that the long log is one segment
+            parts = [table if k % 2 == 0 else table.reverse() for k in range(times)]
+            long = pl.concat(parts).with_columns(pl.int_range(pl.len()).mul(1e-3).alias("t"))
+            long.write_parquet(path / "train.parquet")
+            (path / "long.yaml").write_text(text.replace(f"{ROOT}/data/cheetah3/train.parquet", "train.parquet"))
+            samples.append(long.height)
+            peaks.append(_run([sys.executable, "-m", "sysid", "fit", str(path / "long.yaml"), "--quiet", "--out", str(path / "run")])[1])
+    growth = (peaks[1] - peaks[0]) / (3 * (samples[1] - samples[0]))
+    return {"bytes_per_joint_sample": growth, "samples": samples, "megabytes": [peak / 1e6 for peak in peaks]}
+
+
+if __name__ == "__main__":
+    main()

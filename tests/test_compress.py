@@ -1,0 +1,92 @@
+"""Triangles hold what the samples hold, in any order and grouping."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sysid import estimate
+from sysid.compress import compress, merge
+from sysid.model import chunks
+from tests.problems import arm, leg
+
+
+def dense(structure, motion):
+    """Rows (joint, n, size) and torque of a motion, nothing compressed."""
+    size = 10 * structure.bodies + len(structure.coefficients)
+    rows, torque = [], []
+    for piece in motion.pieces:
+        for part in chunks(piece, 5000):
+            columns = structure.columns(piece, part)
+            full = np.zeros((structure.robot.dof, columns[0].shape[1], size))
+            for joint, values in enumerate(columns):
+                full[joint][:, structure.support(joint)] = values.T
+            rows.append(full)
+            torque.append(piece.tau[part].T)
+    return np.concatenate(rows, 1), np.concatenate(torque, 1)
+
+
+def test_residuals_of_any_parameters():
+    _, structure, motion, data, _ = arm()
+    rows, torque = dense(structure, motion)
+    rng = np.random.default_rng(0)
+    for _ in range(3):
+        x = rng.normal(size=rows.shape[2])
+        residual = rows @ x - torque
+        np.testing.assert_allclose(data.squares(x), np.sum(residual**2, 1), rtol=1e-10)
+        total = data.total()
+        np.testing.assert_allclose(np.sum((total @ np.append(x, -1)) ** 2), np.sum(residual**2), rtol=1e-10)
+        weights = rng.uniform(0.5, 2, len(torque))
+        np.testing.assert_allclose(np.sum((data.total(weights) @ np.append(x, -1)) ** 2), weights**2 @ np.sum(residual**2, 1), rtol=1e-10)
+        scores = data.scores(x)
+        gradient = 2 * np.einsum("jnk,jn->k", rows, residual)
+        np.testing.assert_allclose(scores.sum(0), gradient, rtol=1e-9, atol=1e-9 * np.abs(gradient).max())
+
+
+def test_parts_merge_to_the_whole_and_blocks_leave_out():
+    _, structure, motion, data, _ = arm()
+    (piece,) = motion.pieces
+    half = piece.samples // 2
+    parts = [replace(motion, pieces=(piece.part(rows),)) for rows in (slice(0, half), slice(half, piece.samples))]
+    merged = merge([compress(structure, part) for part in parts])
+    assert merged.samples == data.samples
+    x = np.random.default_rng(1).normal(size=data.size)
+    np.testing.assert_allclose(merged.squares(x), data.squares(x), rtol=1e-10)
+    left = data.without([0, 3]).squares(x)
+    only = data.without(set(range(data.blocks)) - {0, 3}).squares(x)
+    np.testing.assert_allclose(left + only, data.squares(x), rtol=1e-10)
+
+
+def test_size_does_not_grow_with_the_log():
+    _, structure, motion, data, _ = leg()
+    assert data.total().shape == (67, 67)
+    assert data.blocks <= 61
+    assert sum(factor.triangle.nbytes for factor in data.factors) < 10e6
+
+
+def test_prediction_is_the_columns_times_the_parameters():
+    _, structure, motion, data, prior = arm()
+    rows, torque = dense(structure, motion)
+    x = np.append(prior.ravel(), np.random.default_rng(2).normal(size=len(structure.coefficients)))
+    predicted = estimate.predict(structure, x, motion)
+    np.testing.assert_allclose(predicted.predicted, (rows @ x).T, atol=1e-10 * np.abs(predicted.predicted).max())
+    np.testing.assert_allclose(predicted.errors()["rms"], np.sqrt(data.squares(x) / data.rows), rtol=1e-9)
+
+
+@pytest.mark.parametrize("filter", [{"filter": "savitzky-golay", "window": 0.1}, {"filter": "butterworth", "cutoff": 8.0}], ids=lambda f: f["filter"])
+def test_the_same_filter_on_both_sides_chunk_by_chunk(filter):
+    """Columns filtered in chunks with margins are those filtered whole, and explain a filtered torque exactly."""
+    from sysid.preprocess import prepare
+    from tests.problems import arm_log
+
+    experiment, structure, _, _, _ = arm()
+    spec = experiment.preprocess.model_copy(update={**filter, "torque": "same"})
+    log = arm_log(structure.robot, np.random.default_rng(3), seconds=30)
+    motion = prepare([log], spec, structure.robot.joints)
+    (piece,) = motion.pieces
+    whole = structure.columns(piece, piece.core)
+    start = piece.core.start + 1000
+    part = structure.columns(piece, slice(start, start + 200))
+    for a, b in zip(whole, part):
+        expected = a[:, 1000:1200]
+        np.testing.assert_allclose(b, expected, atol=1e-9 * np.abs(a).max())

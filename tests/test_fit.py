@@ -1,0 +1,212 @@
+"""From a URDF and a log to a run folder: the leg, and what is written about it."""
+
+import json
+import math
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import polars as pl
+import pytest
+
+import sysid
+from sysid import config, regressor, results, robot
+from sysid.inertia import PARAMETERS, pseudo
+
+ROOT = Path(__file__).resolve().parent.parent
+
+
+@pytest.fixture(scope="module")
+def leg():
+    return sysid.fit(sysid.load(ROOT / "configs" / "cheetah3.yaml"))
+
+
+@pytest.fixture(scope="module")
+def run(leg, tmp_path_factory):
+    out = tmp_path_factory.mktemp("runs") / "cheetah3"
+    return out, sysid.write(leg, out)
+
+
+def test_leg_reaches_its_noise(leg, run):
+    truth = json.loads((ROOT / "data" / "cheetah3" / "truth.json").read_text())
+    _, document = run
+    noise = truth["torque_noise_std"]
+    for joint, rms in document["rms"]["test"].items():
+        assert abs(rms / noise - 1) < 0.02, joint
+    assert document["physically_consistent"] and document["converged"]
+    assert document["certificate"]["globally_optimal"]
+    assert len(document["parameters"]) == 66
+    assert document["samples"] == {"train": 27901, "test": 9901}
+    assert [entry["name"] for entry in document["parameters"][:3]] == ["abad.m", "abad.hx", "abad.hy"]
+    assert document["parameters"][-1]["name"] == "coulomb.knee.Fc"
+
+
+def test_objective_is_equation_14(leg, run):
+    _, document = run
+    prediction = leg.predictions["train"]
+    prior = leg.model.robot.prior
+    divergence = 0.0
+    for pi, reference in zip(leg.pi, prior):
+        j, j0 = pseudo.to_pseudo(pi), pseudo.to_pseudo(reference)
+        divergence += -math.log(np.linalg.det(j) / np.linalg.det(j0)) + np.trace(np.linalg.solve(j0, j)) - 4
+    expected = np.sum((prediction.measured - prediction.predicted) ** 2) + 1e-2 * divergence
+    np.testing.assert_allclose(document["objective"], expected, rtol=1e-10)
+
+
+def test_run_folder_is_complete_and_readable(leg, run):
+    out, document = run
+    assert sorted(p.name for p in out.iterdir()) == ["experiment.yaml", "fit.json", "identified.urdf", "identified.yaml", "predictions.parquet"]
+    assert json.loads((out / "fit.json").read_text()) == json.loads(json.dumps(document))
+    table = pl.read_parquet(out / "predictions.parquet")
+    test = table.filter(pl.col("part") == "test")
+    rms = float(np.sqrt(np.mean((test["measured_hip"] - test["predicted_hip"]).to_numpy() ** 2)))
+    np.testing.assert_allclose(rms, document["rms"]["test"]["hip"], rtol=1e-12)
+    again = sysid.fit(sysid.load(out / "experiment.yaml"))
+    np.testing.assert_allclose(again.x, leg.x, rtol=1e-12)
+    for log in document["logs"]:
+        assert len(log["sha256"]) == 64
+    assert document["versions"]["pin"] == pin.__version__
+
+
+def test_identified_urdf_gives_the_fit_s_torque(leg, run):
+    out, document = run
+    spec = config.load(out / "identified.yaml")
+    machine = robot.load(spec.robot, spec.folder)
+    prediction = leg.predictions["test"]
+    motion = _test_motion(leg)
+    torque = regressor.torque(machine, machine.prior, motion.q, motion.qd, motion.qdd)
+    torque += machine.damping * motion.qd + machine.friction * np.sign(motion.qd)
+    np.testing.assert_allclose(torque, prediction.predicted, atol=1e-9)
+    # and with Pinocchio alone, on the links; the rotors come from the fit
+    model = pin.buildModelFromUrdf(str(out / "identified.urdf"))
+    assert [model.names[1:][k] for k in range(3)] == ["abad", "hip", "knee"]
+    values = {entry["name"]: entry["value"] for entry in document["parameters"]}
+    pi = leg.pi.copy()
+    for b, body in enumerate(leg.model.robot.bodies[:3]):
+        theirs = pseudo.from_pinocchio(model.inertias[b + 1].toDynamicParameters())
+        np.testing.assert_allclose(theirs, [values[f"{body.name}.{p}"] for p in PARAMETERS], rtol=1e-10, atol=1e-14)
+        pi[b] = theirs
+    rotors_only = np.concatenate([np.zeros((3, 10)), pi[3:]])
+    data = model.createData()
+    links = np.array([pin.rnea(model, data, *row) for row in zip(motion.q, motion.qd, motion.qdd)])
+    total = links + regressor.torque(leg.model.robot, rotors_only, motion.q, motion.qd, motion.qdd)
+    total += model.damping * motion.qd + model.lowerDryFrictionLimit * 0 + machine.friction * np.sign(motion.qd)
+    np.testing.assert_allclose(total, prediction.predicted, atol=1e-9)
+
+
+def _test_motion(fit):
+    from sysid import filters, pipeline
+    from sysid.preprocess import prepare
+
+    experiment, machine = fit.experiment, fit.model.robot
+    logs = pipeline.read(experiment, machine, experiment.data.test)
+    (piece,) = prepare(logs, filters.settled(experiment.preprocess, fit.filters), machine.joints).pieces
+    return piece
+
+
+def test_locked_joints_and_welded_links_are_exported_as_one_body(tmp_path):
+    """A Panda with fingers locked open: its URDF must give the torque of the composite bodies."""
+    from dataclasses import replace
+
+    from sysid.urdf_export import identified_urdf
+    from tests.problems import arm_log, compress, prepare
+    from tests.test_inertia import random_bodies
+
+    names = [f"panda_joint{k}" for k in range(1, 8)]
+    spec = config.Experiment.model_validate({
+        "robot": {"urdf": "example-robot-data://panda_description/urdf/panda.urdf", "joints": names, "lock": {"panda_finger_joint1": 0.03}},
+    })  # fmt: skip
+    from sysid.estimate import identify
+    from sysid.model import build
+
+    machine = robot.load(spec.robot)
+    structure = build(machine, spec.model.effects)
+    motion = prepare([arm_log(machine, np.random.default_rng(0), seconds=5)], spec.preprocess, machine.joints)
+    fit = identify(spec, structure, motion, compress(structure, motion), np.array(machine.prior))
+    x = np.append(random_bodies(7, seed=5).ravel(), np.arange(1.0, 15.0))
+    fit = replace(fit, x=x)
+    path = tmp_path / "identified.urdf"
+    path.write_bytes(identified_urdf(fit))
+    model = pin.buildModelFromUrdf(str(path))
+    assert list(model.names[1:]) == names
+    q, qd, qdd = np.random.default_rng(1).normal(size=(3, 20, 7))
+    data = model.createData()
+    expected = np.array([pin.rnea(model, data, *row) for row in zip(q, qd, qdd)])
+    np.testing.assert_allclose(regressor.torque(machine, fit.pi, q, qd, qdd), expected, atol=1e-9)
+    np.testing.assert_allclose(model.damping, np.arange(1.0, 8.0))
+
+
+def test_a_previous_run_is_a_prior(leg, run, tmp_path):
+    out, _ = run
+    text = (ROOT / "configs" / "cheetah3.yaml").read_text().replace("../data/", f"{ROOT}/data/").replace("source: urdf", f"source: {out}")
+    (tmp_path / "again.yaml").write_text(text)
+    from sysid import pipeline
+
+    _, _, prior = pipeline.build(sysid.load(tmp_path / "again.yaml"))
+    np.testing.assert_allclose(prior, leg.pi, rtol=1e-14)
+
+
+def test_compare_says_what_a_richer_model_gains(leg, tmp_path):
+    text = (ROOT / "configs" / "cheetah3.yaml").read_text().replace("../data/", f"{ROOT}/data/")
+    assert "effects: [viscous, coulomb]" in text
+    (tmp_path / "frictionless.yaml").write_text(text.replace("effects: [viscous, coulomb]", "effects: []"))
+    poor = sysid.fit(sysid.load(tmp_path / "frictionless.yaml"))
+    for difference in sysid.compare(poor, leg):
+        assert difference.from_ == "frictionless" and difference.to == "cheetah3"
+        assert difference.delta_rms < -5 * difference.se < 0
+    assert all(d.delta_rms == 0 and d.se == 0 for d in sysid.compare(leg, leg))
+
+
+def test_standard_error_of_a_difference_is_its_scatter():
+    """Two models whose residuals differ by known noise: the jackknife against the scatter over repeats."""
+    from sysid.comparison import _block_sums, _jackknife
+    from sysid.estimate import Prediction
+
+    rng = np.random.default_rng(0)
+    deltas, errors = [], []
+    t = np.arange(4000) * 0.01
+    for _ in range(200):
+        shared, extra = rng.normal(size=(2, 4000, 1))
+        sums = []
+        for residual in (shared, shared + 0.3 * extra):
+            prediction = Prediction(np.zeros(4000, np.int16), t, residual, np.zeros_like(residual), None)
+            s, n = _block_sums(prediction, 1.0, [0])
+            sums.append((s[:, 0], n[:, 0]))
+        delta, se = _jackknife(*sums)
+        deltas.append(delta)
+        errors.append(se)
+    np.testing.assert_allclose(np.median(errors), np.std(deltas), rtol=0.15)
+
+
+def test_predict_on_any_log(leg):
+    prediction = sysid.predict(leg, "../data/cheetah3/test.parquet")
+    np.testing.assert_allclose(prediction.predicted, leg.predictions["test"].predicted, rtol=1e-12)
+
+
+def test_results_are_never_half_written(leg, tmp_path, monkeypatch):
+    out = tmp_path / "run"
+    monkeypatch.setattr(results, "_yaml", lambda tree: (_ for _ in ()).throw(OSError(28, "No space left on device")))
+    with pytest.raises(sysid.SysidError, match="No space left"):
+        results.write(leg, out)
+    assert [p.name for p in out.iterdir()] == ["predictions.parquet"]  # whole, and nothing temporary beside it
+
+
+def test_the_command_prints_one_json_document(tmp_path):
+    command = [sys.executable, "-m", "sysid", "fit", str(ROOT / "configs" / "cheetah3.yaml"), "--json", "--out", str(tmp_path / "run")]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, cwd=ROOT)
+    document = json.loads(done.stdout)
+    assert document["run"] == str(tmp_path / "run") and done.stderr == ""
+    assert set(document) >= {"rms", "objective", "iterations", "converged", "physically_consistent", "certificate", "samples", "parameters", "seconds", "run"}
+    assert set(document["seconds"]) >= {"read", "compress", "solve"}
+
+
+def test_a_search_that_is_cut_short_ends_with_status_one(tmp_path):
+    text = (ROOT / "configs" / "cheetah3.yaml").read_text().replace("../data/", f"{ROOT}/data/").replace("max_iterations: 200", "max_iterations: 2")
+    (tmp_path / "short.yaml").write_text(text)
+    command = [sys.executable, "-m", "sysid", "fit", str(tmp_path / "short.yaml"), "--json", "--out", str(tmp_path / "run")]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=ROOT)
+    assert done.returncode == 1
+    document = json.loads(done.stdout)
+    assert document["converged"] is False and document["certificate"]["globally_optimal"] is False

@@ -1,0 +1,144 @@
+"""Filters against closed forms."""
+
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sysid import filters
+from sysid.config import PreprocessSpec
+from sysid.errors import ConfigError, LogError, SysidWarning
+from sysid.log import Log, Segment
+from sysid.preprocess import Smoother, prepare
+from tests.problems import arm, arm_log
+
+STEP = 1e-3
+
+
+def log(q, tau=None, step=STEP) -> Log:
+    q = np.asarray(q, dtype=float).reshape(len(q), -1)
+    t = step * np.arange(len(q))
+    return Log("made", Path("made"), "", (Segment(t, step, q, q.copy() if tau is None else tau.reshape(q.shape), None, None, {}),))
+
+
+def test_savitzky_golay_is_exact_on_quartics_and_drops_the_edges():
+    t = STEP * np.arange(600) - 0.3
+    q = 1 + 2 * t - 3 * t**2 + 4 * t**3 - 5 * t**4
+    motion = prepare([log(q)], PreprocessSpec(), ("a",))
+    (piece,) = motion.pieces
+    assert motion.samples == 600 - 100  # a window of 100 ms at 1 kHz is 101 samples, 50 at each end
+    inner = slice(50, 550)
+    x = t[inner, None]
+    np.testing.assert_allclose(piece.q, q[inner, None], atol=1e-12)
+    np.testing.assert_allclose(piece.qd, 2 - 6 * x + 12 * x**2 - 20 * x**3, atol=1e-9)
+    np.testing.assert_allclose(piece.qdd, -6 + 24 * x - 60 * x**2, atol=1e-6)
+    np.testing.assert_array_equal(piece.tau, q[inner, None])  # torque untouched
+
+
+def test_savitzky_golay_is_least_squares_in_its_window():
+    rng = np.random.default_rng(0)
+    q = rng.normal(size=201)
+    (piece,) = prepare([log(q)], PreprocessSpec(), ("a",)).pieces
+    u = STEP * np.arange(-50, 51)
+    for middle in (50, 100, 150):
+        fit = np.polynomial.polynomial.polyfit(u, q[middle - 50 : middle + 51], 4)
+        row = middle - 50
+        np.testing.assert_allclose([piece.q[row, 0], piece.qd[row, 0], piece.qdd[row, 0] / 2], fit[:3], rtol=1e-6)
+
+
+@pytest.mark.parametrize("cutoff", [5.0, 20.0])
+def test_butterworth_is_zero_phase_with_its_squared_gain(cutoff):
+    t = STEP * np.arange(20000)
+    for f in (1.0, 4.0, 12.0):
+        q = np.sin(2 * np.pi * f * t)
+        (piece,) = prepare([log(q)], PreprocessSpec(filter="butterworth", cutoff=cutoff), ("a",)).pieces
+        # forward and backward: the gain of one pass, squared; the bilinear transform warps frequency
+        warp = lambda x: np.tan(np.pi * x * STEP)  # noqa: E731
+        gain = 1 / (1 + (warp(f) / warp(cutoff)) ** 8)
+        middle = slice(5000, -5000)
+        x, y = piece.t[middle], piece.q[middle, 0]
+        np.testing.assert_allclose(y, gain * np.sin(2 * np.pi * f * x), atol=1e-5)
+        central = gain * np.cos(2 * np.pi * f * x) * np.sin(2 * np.pi * f * STEP) / STEP
+        np.testing.assert_allclose(piece.qd[middle, 0], central, atol=1e-4 * 2 * np.pi * f)
+        second = -gain * np.sin(2 * np.pi * f * x) * 4 * np.sin(np.pi * f * STEP) ** 2 / STEP**2
+        np.testing.assert_allclose(piece.qdd[middle, 0], second, atol=1e-3 * (2 * np.pi * f) ** 2)
+
+
+@pytest.mark.parametrize("spec", [PreprocessSpec(torque="same"), PreprocessSpec(filter="butterworth", torque="same")], ids=lambda s: s.filter)
+def test_torque_sees_the_filter_that_the_angle_saw(spec):
+    rng = np.random.default_rng(1)
+    q = rng.normal(size=5000).cumsum() * 1e-3
+    (piece,) = prepare([log(q)], spec, ("a",)).pieces
+    np.testing.assert_allclose(piece.tau, piece.q, atol=1e-12)  # torque was a copy of the angle
+    edge = piece.core.start
+    assert edge == Smoother(spec, STEP).reach and len(piece.t) - piece.core.stop == edge
+
+
+def test_standstill_leaves_out_rows_of_the_joint_that_stands():
+    t = STEP * np.arange(8000)
+    moving = np.sin(2 * np.pi * t)
+    stopping = np.where((t > 2) & (t < 4), np.sin(4 * np.pi), np.sin(2 * np.pi * t))
+    both = log(np.column_stack([moving, stopping]))
+    (piece,) = prepare([both], PreprocessSpec(standstill=0.1), ("a", "b")).pieces
+    still = (piece.t > 2.1) & (piece.t < 3.9)
+    assert not piece.use[still, 1].any()
+    assert 0.95 < piece.use[:, 0].mean() < 1.0  # only its own reversals
+    assert prepare([both], PreprocessSpec(standstill="keep"), ("a", "b")).pieces[0].use is None
+    (masked,) = prepare([both], PreprocessSpec(standstill="mask"), ("a", "b")).pieces
+    assert not masked.use[still, 1].any() and masked.use[:, 0].mean() > 0.95
+    # a filtered torque is touched as far as the filter reaches
+    (wide,) = prepare([both], PreprocessSpec(standstill=0.1, torque="same"), ("a", "b")).pieces
+    near = (wide.t > 1.975) & (wide.t < 2.0)
+    assert not wide.use[near, 1].any()
+
+
+def test_a_joint_that_never_moves_is_named():
+    t = STEP * np.arange(1000)
+    motion = prepare([log(np.column_stack([np.sin(6 * t), np.full(1000, 0.3)]))], PreprocessSpec(), ("a", "b"))
+    assert motion.still == ("b",)
+
+
+def test_what_cannot_be_filtered_is_said():
+    with pytest.raises(LogError, match="window of 101"):
+        prepare([log(np.zeros(60))], PreprocessSpec(), ("a",))
+    with pytest.raises(ConfigError, match="samples at 1000 Hz"):
+        prepare([log(np.zeros(600))], PreprocessSpec(window=0.002), ("a",))
+    with pytest.raises(ConfigError, match="cutoff"):
+        prepare([log(np.zeros(600))], PreprocessSpec(filter="butterworth", cutoff=600.0), ("a",))
+    with pytest.raises(ConfigError, match="not logged"):
+        prepare([log(np.zeros(600))], PreprocessSpec(filter="none"), ("a",))
+    whole = log(np.zeros(600))
+    short = Log("made", Path("made"), "", whole.segments + (Segment(np.arange(50) * STEP, STEP, np.zeros((50, 1)), np.zeros((50, 1)), None, None, {}),))
+    with pytest.warns(SysidWarning, match="1 segment"):
+        assert len(prepare([short], PreprocessSpec(), ("a",)).pieces) == 1
+
+
+def test_auto_window_follows_the_noise_and_the_motion():
+    """More encoder noise wants a wider window, and the choice is made on held-out stretches of the training log."""
+    from dataclasses import replace
+
+    experiment, structure, _, _, prior = arm()
+    rng = np.random.default_rng(2)
+    chosen = {}
+    for noise in (1e-6, 2e-3):
+        made = arm_log(structure.robot, rng, seconds=20)
+        (segment,) = made.segments
+        noisy = replace(made, segments=(replace(segment, q=segment.q + noise * rng.normal(size=segment.q.shape)),))
+        auto = experiment.model_copy(update={"preprocess": experiment.preprocess.model_copy(update={"window": "auto"})})
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", SysidWarning)
+            found = filters.compare(auto, structure, [noisy], prior)
+        best = min(found["held_out"], key=lambda entry: entry["relative_error"])
+        assert found["window"] == best["window"] and found["chosen"] == "held-out error" and len(found["held_out"]) > 5
+        chosen[noise] = found["window"]
+    assert chosen[2e-3] > 2 * chosen[1e-6]
+
+
+def test_a_given_filter_is_shown_beside_half_and_double():
+    experiment, structure, _, _, prior = arm()
+    made = arm_log(structure.robot, np.random.default_rng(3), seconds=10)
+    found = filters.compare(experiment, structure, [made], prior)
+    assert found["window"] == 0.1 and found["chosen"] == "given"
+    assert [entry["window"] for entry in found["held_out"]] == [0.05, 0.1, 0.2]
+    assert all(0 < entry["relative_error"] < 1 for entry in found["held_out"])

@@ -1,0 +1,119 @@
+"""Logs that other people measured, where they are: `sysid fetch`, or SYSID_DATA_DIR."""
+
+import functools
+import hashlib
+import http.server
+import threading
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import sysid
+from sysid.datasets import DATASETS
+
+CONFIGS = Path(__file__).resolve().parent.parent / "configs"
+
+
+def fitted(name: str):
+    missing = DATASETS[name].missing()
+    if missing:
+        pytest.skip(f"{name}: {missing[0]} is not in the data folder; `sysid fetch {name}` brings it, or SYSID_DATA_DIR names where it is")
+    return sysid.fit(sysid.load(CONFIGS / f"{name}.yaml"))
+
+
+def values(fit) -> dict[str, float]:
+    return dict(zip(fit.model.names, fit.x))
+
+
+def relative_error(fit, part: str) -> float:
+    return fit.predictions[part].errors()["total"][1]
+
+
+def proven(fit) -> None:
+    assert fit.solution.converged and fit.certificate.globally_optimal and fit.physically_consistent
+
+
+def test_emps_agrees_with_its_published_reference():
+    fit = fitted("emps")
+    proven(fit)
+    found = values(fit)
+    np.testing.assert_allclose(found["carriage.m"], 95.1089, rtol=0.01)
+    np.testing.assert_allclose(found["viscous.slider.Fv"], 203.5034, rtol=0.01)
+    np.testing.assert_allclose(found["coulomb.slider.Fc"], 20.3935, rtol=0.01)
+    np.testing.assert_allclose(found["torque_bias.slider.b"], -3.1648, atol=0.1)
+    assert fit.model.units[-3:] == ["N s/m", "N", "N"]
+
+
+def test_panda_is_within_its_published_error():
+    fit = fitted("panda")
+    proven(fit)
+    # published for this trajectory: 1.41 % by classical least squares, fitted and judged on all of it
+    whole = fit.experiment.data.model_copy(update={"train": [log("panda:exciting_trajectory_1")], "test": [log("panda:exciting_trajectory_1")]})
+    everything = sysid.fit(fit.experiment.model_copy(update={"data": whole}))
+    proven(everything)
+    assert relative_error(everything, "train") <= 0.0141
+    assert relative_error(fit, "train") <= 0.0141
+    # a half that the fit never saw
+    assert relative_error(fit, "test") <= 0.0141
+
+
+def log(name: str):
+    from sysid.config import LogSpec
+
+    return LogSpec(file=name)
+
+
+def test_ur10e_on_another_motion():
+    fit = fitted("ur10e")
+    proven(fit)
+    assert fit.experiment.data.units.torque_constant["shoulder_pan_joint"] == 14.87
+    assert fit.experiment.preprocess.torque == "raw"
+    assert relative_error(fit, "test") <= 0.059
+    assert any("resampled" in notice for notice in fit.notices)
+
+
+def test_a_changed_file_is_refused(tmp_path, monkeypatch):
+    if DATASETS["emps"].missing():
+        pytest.skip("emps is not in the data folder; `sysid fetch emps` brings it")
+    from sysid.datasets import data_folder, reference
+
+    content = bytearray((data_folder() / "emps" / "DATA_EMPS.mat").read_bytes())
+    content[len(content) // 2] ^= 1
+    (tmp_path / "emps").mkdir()
+    (tmp_path / "emps" / "DATA_EMPS.mat").write_bytes(content)
+    monkeypatch.setenv("SYSID_DATA_DIR", str(tmp_path))
+    with pytest.raises(sysid.SysidError, match="SHA-256"):
+        reference("emps:DATA_EMPS").locate()
+    with pytest.raises(sysid.SysidError, match="sysid fetch panda"):
+        reference("panda:exciting_trajectory_1").locate()
+
+
+def test_fetch_downloads_checks_and_keeps(tmp_path, monkeypatch):
+    """Against a server of our own on localhost: what is wrong is refused, what is there is not fetched again."""
+    (tmp_path / "source").mkdir()
+    (tmp_path / "source" / "a.mat").write_bytes(b"measured")
+    handler = functools.partial(_Quiet, directory=str(tmp_path / "source"))
+    server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler)
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    monkeypatch.setenv("SYSID_DATA_DIR", str(tmp_path / "data"))
+    try:
+        good = hashlib.sha256(b"measured").hexdigest()
+        made = replace(DATASETS["emps"], source=f"http://127.0.0.1:{server.server_port}", files={"a.mat": ("a.mat", good)})
+        (path,) = made.fetch()
+        assert path.read_bytes() == b"measured" and not made.missing()
+        (tmp_path / "source" / "a.mat").write_bytes(b"tampered")
+        assert made.fetch() == [path] and path.read_bytes() == b"measured"
+        path.unlink()
+        with pytest.raises(sysid.SysidError, match="could not be fetched"):
+            made.fetch()
+        assert not path.exists()
+    finally:
+        server.shutdown()
+        server.server_close()
+
+
+class _Quiet(http.server.SimpleHTTPRequestHandler):
+    def log_message(self, *_):
+        """Say nothing."""
