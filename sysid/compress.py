@@ -16,6 +16,7 @@ from .preprocess import Motion
 
 # Blocks are the unit of correlation-robust statistics: long against the filter's memory, many enough to count.
 _MOST_BLOCKS, _FEWEST_SAMPLES = 60, 200
+_FILTERED_STRETCH = 16384  # samples
 
 
 def triangle(rows: np.ndarray) -> np.ndarray:
@@ -132,14 +133,19 @@ def compress(model: Model, motion: Motion, *, thin: int = 1, progress: Callable[
     supports = [model.support(joint) for joint in range(model.robot.dof)]
     factors, block, done, length = [], 0, 0, block_length(motion)
     for piece in motion.pieces:
-        for rows in chunks(piece, length):
+        # a filter needs margins on each stretch, so a filtered stretch holds many blocks
+        stretch = length if piece.smoother is None else length * max(1, _FILTERED_STRETCH // length)
+        for rows in chunks(piece, stretch):
             columns = model.columns(piece, rows)
-            for joint, (values, support) in enumerate(zip(columns, supports)):
-                stacked = np.concatenate([values, piece.tau[None, rows, joint]])[:, ::thin]
-                if piece.use is not None:
-                    stacked = stacked[:, piece.use[rows, joint][::thin]]
-                factors.append(Factor(joint, block, support, triangle(stacked.T), stacked.shape[1]))
-            block += 1
+            for start in range(0, rows.stop - rows.start, length):
+                part = slice(start, min(start + length, rows.stop - rows.start))
+                own = slice(rows.start + part.start, rows.start + part.stop)
+                for joint, (values, support) in enumerate(zip(columns, supports)):
+                    stacked = np.concatenate([values[:, part], piece.tau[None, own, joint]])[:, ::thin]
+                    if piece.use is not None:
+                        stacked = stacked[:, piece.use[own, joint][::thin]]
+                    factors.append(Factor(joint, block, support, triangle(stacked.T), stacked.shape[1]))
+                block += 1
             done += rows.stop - rows.start
             if progress:
                 progress(done / motion.samples)

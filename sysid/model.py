@@ -99,7 +99,7 @@ class Model:
     def torque(self, piece: Piece, pi, c) -> np.ndarray:
         """Predicted torque (samples, dof) over a piece's core, of bodies pi (bodies, 10) and coefficients c."""
         out = np.empty((piece.samples, self.robot.dof))
-        for rows in chunks(piece, _CHUNK):
+        for rows in chunks(piece, _CHUNK if piece.smoother is None else 4 * _CHUNK):
             part = piece.part(_widened(piece, rows))
             predicted = regressor.torque(self.robot, pi, part.q, part.qd, part.qdd).T
             k = 0
