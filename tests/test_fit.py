@@ -38,7 +38,7 @@ def test_leg_reaches_its_noise(leg, run):
     assert document["physically_consistent"] and document["converged"]
     assert document["certificate"]["globally_optimal"]
     assert len(document["parameters"]) == 66
-    assert document["samples"] == {"train": 27901, "test": 9901}
+    assert document["samples"] == {"train": 27901, "test": 27901}
     assert [entry["name"] for entry in document["parameters"][:3]] == ["abad.m", "abad.hx", "abad.hy"]
     assert document["parameters"][-1]["name"] == "coulomb.knee.Fc"
 
