@@ -112,6 +112,93 @@ def fetch(dataset: Annotated[Optional[str], typer.Argument(help="One data set; w
         print(json.dumps({"datasets": found}))
 
 
+study = typer.Typer(no_args_is_help=True, help="The paper's two studies, and the choice of the prior's weight. Interrupted studies go on where they were.")
+app.add_typer(study, name="study")
+Jobs = Annotated[int, typer.Option("--jobs", min=1, help="Processes.")]
+Seed = Annotated[int, typer.Option("--seed", min=0, help="Seed of everything random.")]
+
+
+@study.command("bodies")
+def study_bodies(
+    count: Annotated[int, typer.Option("--bodies", min=1, help="How many random bodies.")] = 1000,
+    seed: Seed = 0, jobs: Jobs = os.cpu_count() or 1,
+    about: Annotated[str, typer.Option(help="Second moments of Table I: com | origin.")] = "com",
+    wrench: Annotated[str, typer.Option(help='Applied wrench: "moment and force" | "force only".')] = "moment and force",
+    jacobian: Annotated[str, typer.Option(help="analytic | differences.")] = "analytic",
+    as_json: Json = False, out: Out = None, quiet: Quiet = False,
+) -> None:  # fmt: skip
+    """Section VI: random bodies, linear least squares and three parameterizations."""
+    from . import results
+    from .studies.bodies import Reading
+    from .studies.commands import study_bodies as work
+
+    reading = Reading(*(_one_of(*choice) for choice in (
+        (about, "--about", ("com", "origin")), (wrench, "--wrench", ("moment and force", "force only")),
+        (jacobian, "--jacobian", ("analytic", "differences")),
+    )))  # fmt: skip
+    run = results.folder(out or Path("runs") / "study-bodies")
+    with _progress(quiet or as_json) as progress:
+        found = work(run, count=count, seed=seed, jobs=jobs, reading=reading, progress=progress or _silent)
+    _finish(found, as_json, quiet, "show_bodies", run)
+
+
+@study.command("restarts")
+def study_restarts(
+    experiment: ExperimentPath,
+    count: Annotated[int, typer.Option("--restarts", min=1, help="How many random starts.")] = 20,
+    seed: Seed = 0, jobs: Jobs = 1,
+    inertia: Annotated[Optional[str], typer.Option(help="Another parameterization than the experiment's.")] = None,  # noqa: UP045
+    as_json: Json = False, out: Out = None, quiet: Quiet = False,
+) -> None:  # fmt: skip
+    """Section VII: random starts of one experiment, each certified."""
+    from . import pipeline, results
+    from .inertia import PARAMETERIZATIONS
+    from .studies.commands import study_restarts as work
+
+    spec = pipeline.load(experiment)
+    if inertia is not None:
+        kind = _one_of(inertia, "--inertia", tuple(PARAMETERIZATIONS))
+        spec = spec.model_copy(update={"model": spec.model.model_copy(update={"inertia": kind})})
+    run = results.folder(out or Path("runs") / f"{spec.name}-restarts")
+    with _progress(quiet or as_json) as progress:
+        found = work(spec, run, count=count, seed=seed, jobs=jobs, progress=progress or _silent)
+    _finish(found, as_json, quiet, "show_restarts", run)
+    if found["converged"] < found["restarts"]:
+        raise typer.Exit(1)
+
+
+@study.command("prior")
+def study_prior(experiment: ExperimentPath, jobs: Jobs = 1, as_json: Json = False, out: Out = None, quiet: Quiet = False) -> None:
+    """The prior's weight by cross-validation within the training logs."""
+    from . import pipeline, results
+    from .studies.commands import study_prior as work
+
+    spec = pipeline.load(experiment)
+    run = results.folder(out or Path("runs") / f"{spec.name}-prior")
+    with _progress(quiet or as_json) as progress:
+        found = work(spec, run, jobs=jobs, progress=progress or _silent)
+    _finish(found, as_json, quiet, "show_prior", run)
+
+
+def _silent(stage: str, share: float) -> None:
+    """Progress that nobody watches."""
+
+
+def _one_of(value: str, option: str, allowed: tuple[str, ...]) -> str:
+    if value not in allowed:
+        raise SysidError(f"{option} {value!r}", allowed=", ".join(allowed))
+    return value
+
+
+def _finish(found: dict, as_json: bool, quiet: bool, show: str, run: Path) -> None:
+    if as_json:
+        print(json.dumps(found, allow_nan=False))
+    elif not quiet:
+        from . import terminal
+
+        getattr(terminal, show)(found, run)
+
+
 @contextmanager
 def _progress(silent: bool):
     """A progress bar on standard error; nothing where silent or where nobody watches."""

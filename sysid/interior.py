@@ -72,7 +72,11 @@ def minimise(objective: Objective, positive: np.ndarray, held: np.ndarray, start
         value = max(abs(objective.value(state.x)), np.finfo(float).tiny)
         floor_c = _NOTHING * value / len(x)
         floor_j = barrier or floor_c
-        factors, weights, spread, root_c = _scaled(state, count, bound)
+        try:
+            factors, weights, spread, root_c = _scaled(state, count, bound)
+        except np.linalg.LinAlgError:
+            # the last step left what double precision can tell from the boundary
+            return iterates[:-1] or iterates, False
         turn = scaling(factors, spread)
         image = root @ turn
         system = 2.0 * image.T @ image

@@ -167,14 +167,14 @@ def _piece(t, signals, log: LogSpec, where: str):
 
 def _check_time(t, where: str) -> None:
     if not np.isfinite(t).all():
-        raise LogError("time is not a finite number", where=f"{where} row {int(np.argmin(np.isfinite(t)))}", do="leave the row out")
+        raise LogError("time is not a finite number", where=f"{where} row {int(np.argmin(np.isfinite(t)))} counted from 0", do="leave the row out")
     if len(t) < 2:
         raise LogError("the log has one sample", where=where, allowed="two or more", do="give a longer log")
     backwards = np.diff(t) <= 0.0
     if backwards.any():
         row = int(np.argmax(backwards)) + 1
         verb = "stands still" if t[row] == t[row - 1] else "runs backwards"
-        raise LogError(f"time {verb}: {t[row - 1]:.9g} s, then {t[row]:.9g} s", where=f"{where} row {row}", allowed="increasing time", do="sort the rows or leave doubles out")
+        raise LogError(f"time {verb}: {t[row - 1]:.9g} s, then {t[row]:.9g} s", where=f"{where} row {row} counted from 0", allowed="increasing time", do="sort the rows or leave doubles out")
 
 
 def _check_finite(values, name: str, t, joints, where: str, first: int) -> None:
@@ -184,7 +184,7 @@ def _check_finite(values, name: str, t, joints, where: str, first: int) -> None:
     row, *column = (int(k) for k in np.argwhere(~np.isfinite(values))[0])
     joint = f" of joint {joints[column[0]]!r}" if column else ""
     value = values[row, column[0]] if column else values[row]
-    raise LogError(f"{name.removeprefix('signals.')}{joint} is {value}", where=f"{where} row {first + row} (t = {t[row]:.6g} s)", allowed="finite numbers", do="leave the row out; a gap is split there")
+    raise LogError(f"{name.removeprefix('signals.')}{joint} is {value}", where=f"{where} row {first + row} counted from 0, t = {t[row]:.6g} s", allowed="finite numbers", do="leave the row out; a gap is split there")
 
 
 def _convert(signals, data: DataSpec, joints, prismatic, where: str) -> None:

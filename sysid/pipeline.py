@@ -12,6 +12,7 @@ import time
 import warnings
 from collections.abc import Callable
 from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -22,7 +23,7 @@ from .compress import Compressed, compress
 from .config import Experiment, LogSpec
 from .errors import ConfigError, SysidError, SysidWarning
 from .estimate import Fit, Prediction, identify, predict
-from .model import Model
+from .model import Model, moving_coefficients
 from .preprocess import Motion, prepare
 from .robot import Robot
 
@@ -56,8 +57,7 @@ def fit(experiment: Experiment, *, progress: Progress | None = None) -> Fit:
     """
     tell = progress or (lambda stage, share: None)
     seconds: dict[str, float] = {}
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always", SysidWarning)
+    with _noticed() as notices:
         with _timed(seconds, "robot"):
             machine, structure, prior = build(experiment)
         with _timed(seconds, "read"):
@@ -85,9 +85,9 @@ def fit(experiment: Experiment, *, progress: Progress | None = None) -> Fit:
             del held_out
             predictions["test"] = predict(structure, found.x, motion)
             samples["test"] = motion.samples
-    return _with(
+    return replace(
         found, predictions=predictions, samples=samples, seconds=seconds, filters=chosen, logs=tuple(provenance),
-        notices=tuple(dict.fromkeys(str(w.message) for w in _split(caught))),
+        notices=tuple(notices),
     )  # fmt: skip
 
 
@@ -99,14 +99,33 @@ def predict_log(found: Fit, log: str | LogSpec) -> Prediction:
     return predict(found.model, found.x, motion)
 
 
-def compressed(experiment: Experiment, part: str = "train") -> tuple[Model, Motion, Compressed, np.ndarray]:
-    """The model, the motion and the triangles of "train" or "test", and the prior: what studies work on."""
-    machine, structure, prior = build(experiment)
-    train = read(experiment, machine, experiment.data.train)
-    preprocess = filters.settled(experiment.preprocess, filters.compare(experiment, structure, train, prior)) if _automatic(experiment) else experiment.preprocess
-    chosen = train if part == "train" else read(experiment, machine, experiment.data.test)
-    motion = prepare(chosen, preprocess, machine.joints)
-    return structure, motion, compress(structure, motion), prior
+@dataclass(frozen=True)
+class Prepared:
+    """What studies work on: an experiment's logs as triangles, with the model, the prior (bodies, 10), and which
+    coefficients (coefficients,) belong to joints that move."""
+
+    model: Model
+    motion: Motion
+    train: Compressed
+    test: Compressed
+    prior: np.ndarray
+    moving: np.ndarray
+    notices: tuple[str, ...]
+
+
+def prepared(experiment: Experiment) -> Prepared:
+    """Read, filter and compress the training and the test logs of an experiment. Raises SysidError."""
+    with _noticed() as notices:
+        machine, structure, prior = build(experiment)
+        train = read(experiment, machine, experiment.data.train)
+        preprocess = experiment.preprocess
+        if _automatic(experiment):
+            preprocess = filters.settled(preprocess, filters.compare(experiment, structure, train, prior))
+        motion = prepare(train, preprocess, machine.joints)
+        _tell_still(motion)
+        held_out = prepare(read(experiment, machine, experiment.data.test), preprocess, machine.joints)
+        train_data, test_data = compress(structure, motion), compress(structure, held_out)
+    return Prepared(structure, motion, train_data, test_data, prior, moving_coefficients(structure, motion), tuple(notices))
 
 
 def _automatic(experiment: Experiment) -> bool:
@@ -135,19 +154,18 @@ def _provenance(part: str, log: logs.Log, spec: LogSpec) -> dict:
     }  # fmt: skip
 
 
-def _split(caught):
-    """Our notices; anything else goes on as the warning it is."""
+@contextmanager
+def _noticed():
+    """Collect what was decided for the user, each once, as text; other warnings go on as what they are."""
+    notices: list[str] = []
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", SysidWarning)
+        yield notices
     for warning in caught:
-        if issubclass(warning.category, SysidWarning):
-            yield warning
-        else:
+        if not issubclass(warning.category, SysidWarning):
             warnings.warn_explicit(warning.message, warning.category, warning.filename, warning.lineno)
-
-
-def _with(found: Fit, **changes) -> Fit:
-    from dataclasses import replace
-
-    return replace(found, **changes)
+        elif str(warning.message) not in notices:
+            notices.append(str(warning.message))
 
 
 @contextmanager
@@ -157,4 +175,4 @@ def _timed(seconds: dict[str, float], stage: str):
     seconds[stage] = time.perf_counter() - start
 
 
-__all__ = ["ConfigError", "SysidError", "build", "compressed", "fit", "load", "predict_log", "read"]
+__all__ = ["ConfigError", "SysidError", "build", "fit", "load", "predict_log", "prepared", "read"]

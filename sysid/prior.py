@@ -3,7 +3,7 @@
 The prior must be physically possible, or no divergence from it exists. A URDF that states nothing, zero or
 the impossible gets the nearest usable thing, in this order, and a warning that says which:
 the same mass and centre of mass with its second moments raised to be positive; the uniform solid of its
-primitive shapes; a default ball.
+primitive shapes; a ball. A stated mass is kept in all of them.
 """
 
 import warnings
@@ -31,14 +31,19 @@ def usable(name: str, stated: np.ndarray | None, geometry: np.ndarray | None, re
     """
     if stated is not None and is_consistent(stated) and _well_conditioned(stated):
         return stated
+    mass = float(stated[0]) if stated is not None and stated[0] > 0.0 else None
     problem = "states no inertia" if stated is None or not np.any(stated) else "has an impossible inertia"
-    if stated is not None and stated[0] > 0.0 and (raised := _raised(stated)) is not None:
+    if mass is not None and (raised := _raised(stated)) is not None:
         _tell(name, problem, "its mass and centre of mass are kept and its second moments raised to be positive")
         return raised
     if geometry is not None and is_consistent(geometry):
-        _tell(name, problem, f"the prior is the uniform solid of its shapes at 1000 kg/m^3, {geometry[0]:.3g} kg")
-        return geometry
+        solid = geometry if mass is None else geometry * (mass / geometry[0])
+        _tell(name, problem, f"the prior is the uniform solid of its shapes, {solid[0]:.3g} kg ({'at 1000 kg/m^3' if mass is None else 'its mass is kept'})")
+        return solid
     radius = max(0.5 * float(np.linalg.norm(reach)), 0.05)
+    if mass is not None:
+        _tell(name, problem, f"the prior is a ball of {mass:.3g} kg and radius {radius:.3g} m at its centre of mass")
+        return pseudo.sphere(mass, stated[1:4] / mass, radius)
     mass = typical_mass or _DEFAULT_MASS
     _tell(name, problem, f"the prior is a ball of {mass:.3g} kg and radius {radius:.3g} m midway to the next joint")
     return pseudo.sphere(mass, 0.5 * np.asarray(reach), radius)

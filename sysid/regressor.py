@@ -102,7 +102,7 @@ def _cross(a, b) -> np.ndarray:
     return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
 
 
-def _columns(motion: BodyMotion, linear, angular, out) -> None:
+def wrench_columns(motion: BodyMotion, linear, angular, out) -> None:
     """Write the ten columns of one body in one joint's torque into out (10, n)."""
     w, alpha, a = motion.angular, motion.angular_acceleration, motion.acceleration
     out[0] = np.einsum("in,in->n", linear, a)
@@ -120,7 +120,7 @@ def columns(robot: Robot, q, qd, qdd) -> np.ndarray:
     out = np.zeros((robot.dof, 10 * len(motions), np.shape(q)[0]))
     for b, motion in enumerate(motions):
         for j, (linear, angular) in motion.jacobian.items():
-            _columns(motion, linear, angular, out[j, 10 * b : 10 * b + 10])
+            wrench_columns(motion, linear, angular, out[j, 10 * b : 10 * b + 10])
     return out
 
 

@@ -136,22 +136,25 @@ def _frozen(values) -> np.ndarray:
 def _pinocchio_model(source: urdf.Urdf) -> pin.Model:
     """The whole URDF as a Pinocchio model in which every moving joint has one coordinate."""
     root = ElementTree.fromstring(source.text.encode())
+    # only what was checked: its parser writes to standard error what it thinks of the rest (colours, meshes, limits)
+    tree = ElementTree.Element("robot", name=root.get("name") or "robot")
+    for name in source.links:
+        ElementTree.SubElement(tree, "link", name=name)
     for element in root.findall("joint"):
-        kind = element.get("type")
-        if kind in ("floating", "planar"):
+        joint = source.joints[element.get("name")]
+        if joint.type in ("floating", "planar"):
             raise RobotError(
-                f"joint {element.get('name')!r} is {kind}", where=str(source.path),
+                f"joint {joint.name!r} is {joint.type}", where=str(source.path),
                 allowed="revolute, continuous, prismatic, fixed", do="fix the base to the world",
             )
-        if kind == "continuous":
-            # Pinocchio would give it two coordinates (cos, sin); an unlimited angle serves here
-            element.set("type", "revolute")
-            for limit in element.findall("limit"):
-                element.remove(limit)
-        if kind in urdf.MOVING and element.find("limit") is None:
-            ElementTree.SubElement(element, "limit", lower="-1e9", upper="1e9", effort="1e9", velocity="1e9")
+        # Pinocchio would give a continuous joint two coordinates (cos, sin); an unlimited angle serves here
+        kept = ElementTree.SubElement(tree, "joint", name=joint.name, type="revolute" if joint.type == "continuous" else joint.type)
+        kept.extend(child for child in element if child.tag in ("parent", "child", "origin", "axis"))
+        if joint.type in urdf.MOVING:
+            lower, upper = (repr(float(np.clip(limit, -1e9, 1e9))) for limit in joint.limits)
+            ElementTree.SubElement(kept, "limit", lower=lower, upper=upper, effort="1e9", velocity="1e9")
     try:
-        return pin.buildModelFromXML(ElementTree.tostring(root, encoding="unicode"))
+        return pin.buildModelFromXML(ElementTree.tostring(tree, encoding="unicode"))
     except (ValueError, RuntimeError) as error:
         raise RobotError(f"Pinocchio cannot build it ({error})", where=str(source.path)) from None
 
@@ -236,7 +239,7 @@ def _rotors(spec: RobotSpec, source: urdf.Urdf, model: pin.Model, joints: tuple[
             raise RobotError(f"robot.transmission has a row for {name!r}, which has no rotor", allowed=", ".join(r.joint for r in spec.rotors) or "nothing: robot.rotors is empty", do="name the joint of a rotor")
     out: list[_Rotor] = []
     for rotor in spec.rotors:
-        where = f"rotor of {rotor.joint!r}"
+        where = f"robot.rotors: rotor of {rotor.joint!r}"
         if rotor.joint not in joints:
             raise RobotError("no such joint moves", where=where, allowed=", ".join(joints), do="correct robot.rotors")
         if rotor.joint in [other.joint for other in out]:

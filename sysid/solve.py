@@ -7,9 +7,9 @@ that must not be negative, the rest themselves. With Gamma = dx/dtheta the Hessi
 
 In theta the data bend a long, narrow valley: stiff directions that are straight in x are curved in theta, and a
 trust region that follows the curve crawls. When that begins, far from any doubt about the basin (there is only one),
-the interior-point method of `interior` finishes from where Newton stands; and always where the prior is no barrier,
-so that the optimum may lie on the boundary of the possible bodies. Both minimise the same objective, and the
-certificate does not ask how its point was found.
+the interior-point method of `interior` finishes from where Newton stands; so it does where the prior is no barrier and
+the optimum lies on the boundary of the possible bodies, at infinity in theta. Both minimise the same objective, and
+the certificate does not ask how its point was found.
 
 The trust region is a ball of the affine-invariant metric on bodies, pulled back to theta, so that a step counts
 the same for a heavy link and a small rotor, in any frame and unit. Each step is the exact minimiser of the
@@ -97,9 +97,16 @@ def solve(
     trace, values = [x], [value]
     barrier = objective.divergence.barrier and objective.weight > 0.0
     constrained = barrier or coordinates.parameterization.name != "linear"
+    inside = theta, x, value
     radius, converged, iteration = 1.0 if constrained else _LARGEST_RADIUS, False, 0
     while iteration < max_iterations:
-        gradient, hessian, metric = problem.expand(theta, x)
+        try:
+            gradient, hessian, metric = problem.expand(theta, x)
+        except np.linalg.LinAlgError:
+            # a body so thin that rounding makes it impossible: on the boundary, which is not Newton's to search
+            theta, x, value = inside
+            break
+        inside = theta, x, value
         step, promise, length = _step(gradient, hessian, metric, radius)
         trial = theta + step
         trial_x = coordinates.physical(trial)
@@ -123,7 +130,7 @@ def solve(
         if converged or (constrained and (crawling or iteration >= _PATIENCE)):
             break
     newton = iteration
-    if constrained and iteration < max_iterations and not (barrier and converged):
+    if constrained and iteration < max_iterations and not converged:
         iterates, converged = interior.minimise(
             objective, coordinates.positive, coordinates.held, x, tolerance=tolerance, max_iterations=max_iterations - iteration
         )
@@ -225,7 +232,7 @@ def _ball(g, h, radius):
     along = vectors.T @ g
     floor = max(0.0, -values[0])
     norm = lambda shift: np.linalg.norm(along / (values + shift))  # noqa: E731
-    low = floor + 1e-14 * max(1.0, abs(values[-1]))
+    low = floor + 1e-13 * max(1.0, abs(values[-1]), floor)  # above rounding, or the flattest direction divides by zero
     if norm(low) < radius:
         # the hard case: the shift alone cannot reach the boundary, the flattest direction does
         y = -vectors @ (along / (values + low))

@@ -5,6 +5,7 @@ never opened. What Pinocchio would report as a C++ exception is found here first
 """
 
 import math
+import os
 from dataclasses import dataclass
 from pathlib import Path
 from xml.etree import ElementTree
@@ -17,7 +18,7 @@ from .inertia import pseudo
 
 MOVING = ("revolute", "continuous", "prismatic")
 TYPES = MOVING + ("fixed", "floating", "planar")
-_EXAMPLES = "example-robot-data://"
+_EXAMPLES, _PACKAGE = "example-robot-data://", "package://"
 
 
 @dataclass(frozen=True)
@@ -32,7 +33,7 @@ class Link:
 
 @dataclass(frozen=True)
 class Joint:
-    """A joint as the URDF states it; `damping` [N m s/rad] and `friction` [N m] from `<dynamics>`."""
+    """A joint as the URDF states it; `damping` [N m s/rad] and `friction` [N m] from `<dynamics>`, `limits` [rad or m]."""
 
     name: str
     type: str
@@ -40,6 +41,7 @@ class Joint:
     child: str
     damping: float
     friction: float
+    limits: tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -53,19 +55,34 @@ class Urdf:
 
 
 def locate(reference: str, folder: Path) -> Path:
-    """The file that `robot.urdf` names: a path relative to `folder`, example-robot-data://, or a dataset's file."""
+    """The file that `robot.urdf` names: a path relative to `folder`, package://, example-robot-data://, or a dataset's file.
+
+    A package is looked for where ROS does (ROS_PACKAGE_PATH, AMENT_PREFIX_PATH) and in example-robot-data.
+    """
     from . import datasets
 
     if reference.startswith(_EXAMPLES):
         return _example_root() / reference.removeprefix(_EXAMPLES)
-    if reference.startswith("package://"):
-        raise RobotError(
-            f"robot.urdf is {reference!r}; package:// needs a workspace that is not known here",
-            allowed="a path, example-robot-data://…, dataset:file", do="give the path of the file",
-        )
+    if reference.startswith(_PACKAGE):
+        return _in_package(reference.removeprefix(_PACKAGE))
     if (dataset := datasets.reference(reference)) is not None:
         return dataset.locate()
     return (folder / reference).resolve()
+
+
+def _in_package(reference: str) -> Path:
+    listed = lambda variable: [Path(folder) for folder in os.environ.get(variable, "").split(os.pathsep) if folder]  # noqa: E731
+    ros = listed("ROS_PACKAGE_PATH")
+    package, _, inner = reference.partition("/")
+    places = [*ros, *(folder / "share" for folder in listed("AMENT_PREFIX_PATH")), _example_root()]
+    candidates = [folder / reference for folder in places] + [folder / inner for folder in ros if folder.name == package]
+    for candidate in candidates:
+        if candidate.is_file():
+            return candidate
+    raise RobotError(
+        f"{_PACKAGE}{reference} is in no package folder", where="robot.urdf", allowed=", ".join(map(str, places)),
+        do="set ROS_PACKAGE_PATH or AMENT_PREFIX_PATH, or give the path of the file",
+    )  # fmt: skip
 
 
 def _example_root() -> Path:
@@ -114,7 +131,11 @@ def parse(data: bytes, path: Path) -> Urdf:
             raise RobotError(f"joint {joint.name!r} appears twice", where=str(path), do="rename one")
         joints[joint.name] = joint
     _check_tree(links, joints, path)
-    return Urdf(path=path, text=data.decode("utf-8", errors="replace"), links=links, joints=joints)
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError:  # another encoding, which the XML declares
+        text = ElementTree.tostring(root, encoding="unicode")
+    return Urdf(path=path, text=text, links=links, joints=joints)
 
 
 def _safe_xml(data: bytes, path: Path) -> ElementTree.Element:
@@ -138,7 +159,8 @@ def _numbers(element, attribute: str, count: int, default: str, path: Path, owne
     except ValueError:
         values = np.array([])
     if values.shape != (count,) or not np.isfinite(values).all():
-        raise RobotError(f"{owner}: {attribute}={text!r}", where=str(path), allowed=f"{count} finite numbers")
+        tag = element.tag if element is not None else attribute
+        raise RobotError(f"{owner}: <{tag} {attribute}={text!r}>", where=str(path), allowed="a finite number" if count == 1 else f"{count} finite numbers", do="correct it")
     return values
 
 
@@ -161,7 +183,7 @@ def _pose(element, path: Path, owner: str):
 def _link(element, path: Path) -> Link:
     name = element.get("name")
     if not name:
-        raise RobotError("a <link> has no name", where=str(path))
+        raise RobotError("a <link> has no name", where=str(path), do="name it")
     owner = f"link {name!r}"
     inertial = None
     if (stated := element.find("inertial")) is not None:
@@ -173,9 +195,9 @@ def _link(element, path: Path) -> Link:
         )
         central = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
         inertial = pseudo.from_central(mass, com, turn @ central @ turn.T)
-    shapes = element.findall("collision") or element.findall("visual")
-    solids = [solid for shape in shapes if (solid := _solid(shape, path, owner)) is not None]
-    return Link(name, inertial, np.sum(solids, 0) if solids else None, bool(shapes))
+    seen, touched = ([_solid(shape, path, owner) for shape in element.findall(kind)] for kind in ("visual", "collision"))
+    solids = [solid for solid in touched or seen if solid is not None]
+    return Link(name, inertial, np.sum(solids, 0) if solids else None, bool(touched or seen))
 
 
 def _solid(shape, path: Path, owner: str) -> np.ndarray | None:
@@ -202,25 +224,27 @@ def _solid(shape, path: Path, owner: str) -> np.ndarray | None:
 def _joint(element, path: Path) -> Joint:
     name, kind = element.get("name"), element.get("type")
     if not name:
-        raise RobotError("a <joint> has no name", where=str(path))
+        raise RobotError("a <joint> has no name", where=str(path), do="name it")
     if kind not in TYPES:
         raise RobotError(f"joint {name!r} is of type {kind!r}", where=str(path), allowed=", ".join(TYPES))
     ends = []
     for end in ("parent", "child"):
         found = element.find(end)
         if found is None or not found.get("link"):
-            raise RobotError(f"joint {name!r} names no {end} link", where=str(path))
+            raise RobotError(f"joint {name!r} names no {end} link", where=str(path), allowed=f'<{end} link="…"/>', do="name it")
         ends.append(found.get("link"))
     dynamics = element.find("dynamics")
     damping, friction = (
         _numbers(dynamics, key, 1, "0", path, f"joint {name!r}")[0] for key in ("damping", "friction")
     )
+    # `lower` and `upper` are 0 where a limit leaves them out
+    lower, upper = (_numbers(limit, key, 1, "0", path, f"joint {name!r}")[0] for key in ("lower", "upper")) if (limit := element.find("limit")) is not None else (-math.inf, math.inf)
     _pose(element, path, f"joint {name!r}")
     if kind in MOVING:
         axis = _numbers(element.find("axis"), "xyz", 3, "1 0 0", path, f"joint {name!r}")
         if not np.linalg.norm(axis) > 0:
             raise RobotError(f"joint {name!r} has the axis 0 0 0", where=str(path), allowed="a direction")
-    return Joint(name, kind, ends[0], ends[1], damping, friction)
+    return Joint(name, kind, ends[0], ends[1], damping, friction, (lower, upper) if kind != "continuous" else (-math.inf, math.inf))
 
 
 def _check_tree(links, joints, path: Path) -> None:

@@ -19,7 +19,8 @@ UR5 = "example-robot-data://ur_description/urdf/ur5_robot.urdf"
 def leg() -> tuple:
     """Experiment, model, motion, compressed data and prior of configs/cheetah3.yaml."""
     experiment = config.load(ROOT / "configs" / "cheetah3.yaml")
-    return (experiment, *pipeline.compressed(experiment))
+    found = pipeline.prepared(experiment)
+    return experiment, found.model, found.motion, found.train, found.prior
 
 
 def fourier_motion(rng: np.random.Generator, seconds: float, rate: float, dof: int):

@@ -19,7 +19,7 @@ ROOT = Path(__file__).resolve().parent.parent
 ORDER = [
     "errors", "units", "inertia", "urdf", "readers", "datasets", "config", "prior", "robot", "regressor", "log", "preprocess",
     "effect", "effects", "model", "compress", "objective", "interior", "certificate", "solve", "uncertainty", "estimate",
-    "filters", "results", "urdf_export", "pipeline", "comparison", "terminal", "cli", "__main__",
+    "filters", "results", "urdf_export", "pipeline", "comparison", "report", "studies", "terminal", "cli", "__main__",
 ]  # fmt: skip
 # Late imports that close a loop on purpose: a path that names a data set, a prior that is a previous run, and the
 # effects that an effect's contract finds.

@@ -21,6 +21,8 @@ class CsvTable(Table):
                 first = file.readline(1_000_000).decode("utf-8-sig").rstrip("\r\n")
             except UnicodeDecodeError:
                 raise LogError("not text", where=str(path), do="give a CSV file") from None
+        if "\0" in first:
+            raise LogError("not text", where=str(path), do="give a CSV file")
         if not first.strip():
             raise LogError("the file is empty, or its first line is", where=str(path))
         # a comma between semicolons or tabs is a decimal one, a space beside any of them is nothing
@@ -49,7 +51,7 @@ class CsvTable(Table):
             except pl.exceptions.PolarsError:
                 frame = self._frame(wanted, None)  # as text, to find the cell that is no number
         except (pl.exceptions.PolarsError, OSError) as error:
-            raise LogError(f"cannot be read as CSV ({str(error).splitlines()[0]})", where=str(self.path)) from None
+            raise LogError(f"cannot be read as CSV ({str(error).splitlines()[0]})", where=f"{self.path}{self._longest()}", do="correct the row or leave it out") from None
         if self._truncated() and frame.height:
             warnings.warn(SysidWarning(f"{self.path.name}: the last row is truncated and was dropped"), stacklevel=2)
             frame = frame.head(frame.height - 1)
@@ -74,6 +76,14 @@ class CsvTable(Table):
     def _parsed(self, cells: pl.Series) -> pl.Series:
         cells = cells.str.strip_chars()
         return (cells if self._separator == "," else cells.str.replace(",", ".", literal=True)).cast(pl.Float64, strict=False)
+
+    def _longest(self) -> str:
+        """Names the first line with more cells than the first of all."""
+        with self.path.open(encoding="utf-8", errors="replace") as file:
+            for number, line in enumerate(file, 1):
+                if (cells := len(self._cells(line))) > len(self.names):
+                    return f" line {number} ({cells} cells, the first line has {len(self.names)})"
+        return ""
 
     def _truncated(self) -> bool:
         """The last row lacks cells, or its last cell is broken off."""

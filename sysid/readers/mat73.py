@@ -1,9 +1,11 @@
 """MAT v7.3: HDF5 with its arrays transposed; structs are groups, cells are references."""
 
+import math
+
 import numpy as np
 
 from ..errors import LogError
-from .table import ArrayTable, stacked
+from .table import ArrayTable
 
 
 class Mat73Table(ArrayTable):
@@ -17,7 +19,7 @@ class Mat73Table(ArrayTable):
         self._datasets, shapes = {}, {}
         try:
             self._file = h5py.File(path, "r")
-            self._file.visititems(self._collect)
+            self._collect("", self._file)
             for name, dataset in self._datasets.items():
                 if shape := self._shape(dataset):
                     shapes[name] = shape
@@ -29,10 +31,15 @@ class Mat73Table(ArrayTable):
         said = (str(error).splitlines() or [type(error).__name__])[0]
         return LogError(f"{what} cannot be read ({said})", where=str(self.path), do="save it again, with -v7 or -v7.3")
 
-    def _collect(self, name, item):
-        # what cells refer to stands under #refs#
-        if hasattr(item, "dtype") and not name.startswith("#"):
-            self._datasets[name.replace("/", ".")] = item
+    def _collect(self, prefix, group):
+        for name in group:
+            if name.startswith("#"):
+                continue  # what cells refer to stands under #refs#, an item for each cell
+            item = group[name]
+            if hasattr(item, "dtype"):
+                self._datasets[prefix + name] = item
+            else:
+                self._collect(f"{prefix}{name}.", item)
 
     def _shape(self, dataset):
         if not self._reference(dataset.dtype):
@@ -44,11 +51,21 @@ class Mat73Table(ArrayTable):
     def fetch(self, name):
         dataset = self._datasets[name]
         try:
-            if not self._reference(dataset.dtype):
-                return dataset[()].T
-            cells = stacked([self._file[reference][()].T for reference in dataset[()].ravel()])
+            values = self._cells(dataset) if self._reference(dataset.dtype) else dataset[()].T
         except Exception as error:  # as above
             raise self._unreadable(f"variable {name!r}", error) from None
-        if cells is None:
-            raise LogError(f"the cells of {name!r} differ in size", where=str(self.path), allowed="one sample of the same size in each cell")
-        return cells
+        if values is None:
+            raise LogError(f"the cells of {name!r} differ in size", where=str(self.path), allowed="one sample of the same size in each cell", do="correct data.columns")
+        return values
+
+    def _cells(self, dataset) -> np.ndarray | None:
+        """A row for each cell; None where they differ in size. A cell is a dataset of its own, opened at HDF5's lowest level for speed."""
+        from h5py import h5r, h5s, h5t
+
+        out = np.empty((dataset.size, self._shape(dataset)[1]))
+        for row, reference in zip(out, dataset[()].ravel()):
+            cell = h5r.dereference(reference, self._file.id)
+            if math.prod(cell.shape) != len(row):
+                return None
+            cell.read(h5s.ALL, h5s.ALL, row.reshape(cell.shape), h5t.NATIVE_DOUBLE)  # HDF5's order of the axes is MATLAB's turned round
+        return out

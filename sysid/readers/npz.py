@@ -1,5 +1,7 @@
 """NPZ: NumPy archives of plain arrays. Pickled objects are refused, as loading them would run code."""
 
+import zipfile
+
 import numpy as np
 
 from ..errors import LogError
@@ -10,6 +12,8 @@ class NpzTable(ArrayTable):
     """Variables by name, matrices column by column."""
 
     def __init__(self, path):
+        if not zipfile.is_zipfile(path):
+            raise LogError("not an NPZ file", where=str(path), do="save it again with numpy.savez")
         try:
             # given an open file, NumPy leaves the closing to us also where it fails
             with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
