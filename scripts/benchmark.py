@@ -3,12 +3,17 @@
     python scripts/benchmark.py            # everything, about two minutes
     python scripts/benchmark.py --repeats 9 --only time
 
+solve needs cvxpy and clarabel: pip install -e '.[test]'.
+
 time    The whole `sysid fit configs/cheetah3.yaml` process over a floor: a process that only imports pinocchio, numpy
         and scipy.signal, reads the training log, differentiates it, builds the regressors of links and rotors in a plain
         Pinocchio loop and takes one QR. The floor reads no test log and solves nothing. The two take turns, and each
         counts with its median.
 memory  Peak memory of `sysid fit` on the leg's log and on one 50 times as long, per joint and sample that it grew by.
         The regressor kept whole would take 1440 bytes.
+solve   On the leg's compressed problem: 20 random starts over one fit's solve (compression not counted), and cvxpy +
+        clarabel over one fit's solve, at equal objective. cvxpy's time is that of `Problem.solve`, which writes the
+        problem down for clarabel and runs it; clarabel's own time alone is printed beside it.
 """
 
 import argparse
@@ -64,14 +69,17 @@ def main() -> None:
     """Run the benchmarks and print them; with --json as one document."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--repeats", type=int, default=7, help="runs of each process; the median counts")
-    parser.add_argument("--only", choices=["time", "memory"])
+    parser.add_argument("--only", choices=["time", "memory", "solve"])
     parser.add_argument("--json", action="store_true")
     options = parser.parse_args()
     found = {}
-    if options.only != "memory":
+    wanted = [options.only] if options.only else ["time", "memory", "solve"]
+    if "time" in wanted:
         found["fit_over_floor"] = fit_over_floor(options.repeats)
-    if options.only != "time":
+    if "memory" in wanted:
         found["memory"] = memory()
+    if "solve" in wanted:
+        found["solve"] = solve(options.repeats)
     if options.json:
         print(json.dumps(found))
         return
@@ -83,6 +91,13 @@ def main() -> None:
         print(
             f"peak memory {entry['megabytes'][0]:.0f} MB on {entry['samples'][0]} samples, {entry['megabytes'][1]:.0f} MB on {entry['samples'][1]}: "
             f"{entry['bytes_per_joint_sample']:.0f} bytes per joint and sample"
+        )
+    if "solve" in found:
+        entry = found["solve"]
+        print(
+            f"one solve {1e3 * entry['solve_seconds']:.1f} ms; 20 random starts take {entry['restarts_over_solve']:.0f} times as long, "
+            f"cvxpy + clarabel {entry['cvxpy_over_solve']:.0f} times (clarabel alone {entry['clarabel_over_solve']:.1f} times), "
+            f"objectives equal to {entry['objective_difference']:.0e}"
         )
 
 
@@ -135,6 +150,66 @@ def memory() -> dict:
             peaks.append(_run([sys.executable, "-m", "sysid", "fit", str(path / "long.yaml"), "--quiet", "--out", str(path / "run")])[1])
     growth = (peaks[1] - peaks[0]) / (3 * (samples[1] - samples[0]))
     return {"bytes_per_joint_sample": growth, "samples": samples, "megabytes": [peak / 1e6 for peak in peaks]}
+
+
+def solve(repeats: int) -> dict:
+    """Our solver, 20 starts of it, and a general convex solver, on one compressed problem in one process."""
+    import warnings
+
+    import numpy as np
+
+    warnings.simplefilter("ignore")
+    import cvxpy as cp
+
+    sys.path.insert(0, str(ROOT))
+    from sysid import config
+    from sysid.inertia.pseudo import PSEUDO_BASIS, to_pseudo
+    from sysid.studies import restarts
+
+    shared = restarts.share(config.load(CONFIG))
+    problem, experiment = shared.problem, shared.experiment
+
+    starts = [restarts.random_start(len(problem.start), 0, k) for k in range(20)]
+    objective, positive = problem.objective, problem.coordinates.positive
+    prior, count = objective.divergence.prior, 10 * objective.bodies
+    size = np.append(np.repeat(np.linalg.norm(prior, axis=1), 10), np.ones(len(positive)))
+
+    def general():
+        x = cp.Variable(len(size))
+        physical = cp.multiply(size, x)
+        terms = []
+        for b in range(objective.bodies):
+            own = to_pseudo(prior[b])
+            scale = np.diag(1.0 / np.sqrt(np.diagonal(own)))
+            pseudo = scale @ sum(physical[10 * b + k] * PSEUDO_BASIS[k] for k in range(10)) @ scale
+            reference = scale @ own @ scale
+            terms.append(-cp.log_det(pseudo) + np.linalg.slogdet(reference)[1] + cp.trace(np.linalg.inv(reference) @ pseudo) - 4)
+        rows = objective.triangle[:-1]
+        cost = cp.sum_squares(rows[:, :-1] @ physical - rows[:, -1]) + objective.weight * sum(terms)
+        task = cp.Problem(cp.Minimize(cost), [physical[count + int(k)] >= 0 for k in np.flatnonzero(positive)])
+        task.solve(solver=cp.CLARABEL)
+        return float(task.value) + objective.triangle[-1, -1] ** 2, task.solver_stats.solve_time
+
+    def timed(work):
+        start = time.perf_counter()
+        result = work()
+        return time.perf_counter() - start, result
+
+    # the three take turns, so that a busy machine is busy for all; each counts with its median, after a warm-up
+    own, many, theirs, alone = [], [], [], []
+    for _ in range(repeats + 1):
+        seconds, solution = timed(lambda: problem.solve(experiment))
+        own.append(seconds)
+        seconds, ends = timed(lambda: [problem.solve(experiment, start=start) for start in starts])
+        many.append(seconds)
+        seconds, (value, clarabel) = timed(general)
+        theirs.append(seconds)
+        alone.append(clarabel)
+    own, many, theirs, alone = (statistics.median(values[1:]) for values in (own, many, theirs, alone))
+    return {
+        "solve_seconds": own, "restarts_over_solve": many / own, "cvxpy_over_solve": theirs / own, "clarabel_over_solve": alone / own,
+        "objective_difference": abs(value / solution.objective - 1), "restarts_spread": max(e.objective for e in ends) / min(e.objective for e in ends) - 1,
+    }  # fmt: skip
 
 
 if __name__ == "__main__":

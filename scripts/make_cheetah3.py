@@ -41,13 +41,14 @@ PERIOD, STEPS = 1e-3, 8  # s of control and logging; integration steps in it (ev
 ENCODER = 2.0 * np.pi / 2**14 / 10.604  # rad at the joint
 NOISE = 1.45  # N m, near the paper's RMS on test data
 VISCOUS, COULOMB = np.array([0.12, 0.09, 0.06]), np.array([0.9, 0.7, 0.6])  # N m s/rad, N m
-STIFFNESS, DAMPING = np.array([60.0, 60.0, 30.0]), np.array([3.0, 3.0, 1.5])  # N m/rad, N m s/rad
+STIFFNESS, DAMPING = np.array([200.0, 200.0, 100.0]), np.array([5.0, 5.0, 2.5])  # N m/rad, N m s/rad
 KNOWN_FRICTION, SOFT_SPEED = 0.8, 0.1  # share of Fc compensated; rad/s over which the compensation changes sign
 REST, TOP_SPEED = np.array([0.0, 0.3, -0.6]), np.array([7.5, 10.0, 13.0])  # rad, rad/s
 BAND, HARMONICS, FADE = (0.4, 3.5), 10, 1.0  # Hz, lines per joint, s
 SEEDS = {"truth": 1, "train": {"motion": 2, "noise": 3}, "test": {"motion": 4, "noise": 5}}
 # Sampling alone moves the RMS of 28 s of noise by 0.4 %, of 10 s by 0.7 %; both logs are as long as the paper's.
 DURATION = {"train": 28.0, "test": 28.0}  # s
+LEAD = 0.5  # s before logging starts: a log of a leg at rest has rows without a friction law
 
 
 def true_inertias(machine, spec, random) -> np.ndarray:
@@ -162,12 +163,13 @@ def main():
     pi = true_inertias(machine, experiment.robot, np.random.default_rng(SEEDS["truth"]))
     wrong = []
     for name in ("train", "test"):
-        t = PERIOD * np.arange(round(DURATION[name] / PERIOD) + 1)
+        lead = round(LEAD / PERIOD)
+        t = PERIOD * np.arange(round(DURATION[name] / PERIOD) + 1 + lead)
         motion, noise = (np.random.default_rng(SEEDS[name][part]) for part in ("motion", "noise"))
-        q, applied, tau = simulate(machine, pi, t, motion, noise)
+        q, applied, tau = (signal[lead:] for signal in simulate(machine, pi, t, motion, noise))
         signals = {f"q_{joint}": q[:, j] for j, joint in enumerate(machine.joints)}
         signals |= {f"tau_{joint}": tau[:, j] for j, joint in enumerate(machine.joints)}
-        log = pl.DataFrame({"t": np.round(t, 3), **signals})
+        log = pl.DataFrame({"t": np.round(t[: len(q)], 3), **signals})
         log.write_parquet(out / f"{name}.parquet", compression="zstd", compression_level=19)
         (rms, speeds), (smearing, _) = check(machine, pi, q, tau), check(machine, pi, q, applied)
         for j, joint in enumerate(machine.joints):

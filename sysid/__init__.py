@@ -14,7 +14,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from .comparison import Difference, differences
+    from .comparison import Difference, compare
     from .config import Experiment
     from .errors import SysidError, SysidWarning
     from .estimate import Fit, Prediction

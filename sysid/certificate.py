@@ -20,8 +20,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from .inertia.pseudo import to_pseudo
-from .interior import coordinates, packed, scaling, unpacked
-from .objective import Objective
+from .interior import coordinates, packed, scaled_columns, scaled_gradient, scaling, unpacked
+from .objective import Objective, add_blocks
 
 # What counts as proven: the objective is within this share of the global minimum.
 _PROVEN = 1e-8
@@ -61,22 +61,21 @@ def certify(objective: Objective, x: np.ndarray, positive: np.ndarray, held: np.
     except np.linalg.LinAlgError:
         return Certificate(False, np.inf, np.inf, {})
     spread = np.where(positive & (c > 0.0), c, 1.0)
-    turn = scaling(factors, spread)
-    image = objective.triangle[:, :-1] @ turn
+    turn = scaling(factors)
+    image = scaled_columns(objective.triangle[:, :-1], turn, spread)
     slope = 2.0 * image.T @ objective.misfit(x)
     hessian = 2.0 * image.T @ image
     own = np.arange(count)
     if barrier:
         # in these coordinates the barrier's gradient is -1 and its Hessian 1, exactly
         linear = np.append(objective.divergence.linear.ravel(), np.zeros(len(c)))
-        slope += objective.weight * (turn.T @ linear)
+        slope += objective.weight * scaled_gradient(linear, turn, spread)
         slope[:count] -= objective.weight * packed(np.ones((objective.bodies, 4)))
         hessian[own, own] += objective.weight
     elif objective.weight > 0.0:
-        slope += turn.T @ np.append(objective.weight * objective.divergence.gradient(pi).ravel(), np.zeros(len(c)))
-        for b, block in enumerate(objective.prior_hessian(x)):
-            part = slice(10 * b, 10 * b + 10)
-            hessian[part, part] += turn[part, part].T @ block @ turn[part, part]
+        pull = np.append(objective.weight * objective.divergence.gradient(pi).ravel(), np.zeros(len(c)))
+        slope += scaled_gradient(pull, turn, spread)
+        add_blocks(hessian, np.swapaxes(turn, -1, -2) @ objective.prior_hessian(x) @ turn)
     # a bound explains a positive gradient where going all the way to it costs less curvature than it gains
     push = slope[count:]
     at_zero = positive & ~held & (push > 0.0) & (np.diagonal(hessian)[count:] < 0.5 * push)

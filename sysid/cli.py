@@ -63,7 +63,7 @@ def compare(
     run = results.folder(out or Path("runs") / "-".join(["compare", *(spec.name for spec in specs)]))
     with _progress(quiet or as_json) as progress:
         fits = [pipeline.fit(spec, progress=progress) for spec in specs]
-    found = document(fits, [spec.name for spec in specs])
+    found = document(fits, _told_apart(specs))
     results.write_json(run / "compare.json", found)
     if as_json:
         print(json.dumps(found, allow_nan=False))
@@ -114,6 +114,7 @@ def fetch(dataset: Annotated[Optional[str], typer.Argument(help="One data set; w
 
 study = typer.Typer(no_args_is_help=True, help="The paper's two studies, and the choice of the prior's weight. Interrupted studies go on where they were.")
 app.add_typer(study, name="study")
+_CORES = os.cpu_count() or 1
 Jobs = Annotated[int, typer.Option("--jobs", min=1, help="Processes.")]
 Seed = Annotated[int, typer.Option("--seed", min=0, help="Seed of everything random.")]
 
@@ -121,10 +122,11 @@ Seed = Annotated[int, typer.Option("--seed", min=0, help="Seed of everything ran
 @study.command("bodies")
 def study_bodies(
     count: Annotated[int, typer.Option("--bodies", min=1, help="How many random bodies.")] = 1000,
-    seed: Seed = 0, jobs: Jobs = os.cpu_count() or 1,
+    seed: Seed = 0, jobs: Jobs = _CORES,
     about: Annotated[str, typer.Option(help="Second moments of Table I: com | origin.")] = "com",
     wrench: Annotated[str, typer.Option(help='Applied wrench: "moment and force" | "force only".')] = "moment and force",
     jacobian: Annotated[str, typer.Option(help="analytic | differences.")] = "analytic",
+    series: Annotated[int, typer.Option("--series", min=0, help="Terms of the exponential's power series; 0: the exact map.")] = 0,
     as_json: Json = False, out: Out = None, quiet: Quiet = False,
 ) -> None:  # fmt: skip
     """Section VI: random bodies, linear least squares and three parameterizations."""
@@ -135,7 +137,7 @@ def study_bodies(
     reading = Reading(*(_one_of(*choice) for choice in (
         (about, "--about", ("com", "origin")), (wrench, "--wrench", ("moment and force", "force only")),
         (jacobian, "--jacobian", ("analytic", "differences")),
-    )))  # fmt: skip
+    )), series=series)  # fmt: skip
     run = results.folder(out or Path("runs") / "study-bodies")
     with _progress(quiet or as_json) as progress:
         found = work(run, count=count, seed=seed, jobs=jobs, reading=reading, progress=progress or _silent)
@@ -178,6 +180,13 @@ def study_prior(experiment: ExperimentPath, jobs: Jobs = 1, as_json: Json = Fals
     with _progress(quiet or as_json) as progress:
         found = work(spec, run, jobs=jobs, progress=progress or _silent)
     _finish(found, as_json, quiet, "show_prior", run)
+
+
+def _told_apart(specs) -> list[str]:
+    """Experiments' names, with their folder where two share one, and a number where that does not help."""
+    names = [spec.name for spec in specs]
+    names = [f"{spec.folder.resolve().name}/{name}" if names.count(name) > 1 else name for spec, name in zip(specs, names)]
+    return [f"{name} ({names[:k].count(name) + 1})" if names.count(name) > 1 else name for k, name in enumerate(names)]
 
 
 def _silent(stage: str, share: float) -> None:

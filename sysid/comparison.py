@@ -88,14 +88,17 @@ def document(fits: list[Fit], names: list[str]) -> dict:
     experiments, notices = [], []
     for fit, name in zip(fits, names):
         errors = fit.predictions["test"].errors()
-        by_joint = lambda key: dict(zip(fit.joints, errors[key].tolist()))  # noqa: E731, B023
+        number = lambda value: float(value) if np.isfinite(value) else None  # noqa: E731
+        by_joint = lambda key: {j: number(v) for j, v in zip(fit.joints, errors[key])}  # noqa: E731, B023
         experiments.append({
-            "name": name, "rms_test": by_joint("rms"), "relative_error": {**by_joint("relative_error"), "*": float(errors["total"][1])},
+            "name": name, "rms_test": by_joint("rms"), "relative_error": {**by_joint("relative_error"), "*": number(errors["total"][1])},
             "r2": by_joint("r2"), "converged": fit.solution.converged, "globally_optimal": fit.certificate.globally_optimal,
         })  # fmt: skip
         notices += [f"{name}: {notice}" for notice in fit.notices]
     if len({(fit.filters["torque"], fit.filters["standstill"]) for fit in fits}) > 1:
         notices.append("the experiments filter torque or leave out standstill differently: their RMS measure different things")
+    if len({tuple((k, fit.filters.get(k)) for k in ("filter", "window", "cutoff")) for fit in fits}) > 1:
+        notices.append("the experiments' filters differ: a wider one leaves out more rows at the ends of a log")
     pairs = []
     for k in range(len(fits)):
         for other in range(k + 1, len(fits)):

@@ -134,16 +134,18 @@ def compress(model: Model, motion: Motion, *, thin: int = 1, progress: Callable[
     factors, block, done, length = [], 0, 0, block_length(motion)
     for piece in motion.pieces:
         # a filter needs margins on each stretch, so a filtered stretch holds many blocks
-        stretch = length if piece.smoother is None else length * max(1, _FILTERED_STRETCH // length)
+        filtered = piece.smoother is not None
+        stretch = length * max(1, _FILTERED_STRETCH // length) if filtered else length
         for rows in chunks(piece, stretch):
-            columns = model.columns(piece, rows)
-            for start in range(0, rows.stop - rows.start, length):
-                part = slice(start, min(start + length, rows.stop - rows.start))
-                own = slice(rows.start + part.start, rows.start + part.stop)
+            # rows that are not wanted need no columns, unless a filter runs over them
+            columns = model.columns(piece, rows if filtered else slice(rows.start, rows.stop, thin))
+            for start in range(rows.start, rows.stop, length):
+                own = slice(start, min(start + length, rows.stop), thin)
+                part = slice(start - rows.start, own.stop - rows.start, thin) if filtered else slice(None)
                 for joint, (values, support) in enumerate(zip(columns, supports)):
-                    stacked = np.concatenate([values[:, part], piece.tau[None, own, joint]])[:, ::thin]
+                    stacked = np.concatenate([values[:, part], piece.tau[None, own, joint]])
                     if piece.use is not None:
-                        stacked = stacked[:, piece.use[own, joint][::thin]]
+                        stacked = stacked[:, piece.use[own, joint]]
                     factors.append(Factor(joint, block, support, triangle(stacked.T), stacked.shape[1]))
                 block += 1
             done += rows.stop - rows.start

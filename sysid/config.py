@@ -19,11 +19,12 @@ from .errors import ConfigError
 _LARGEST_FILE = 1_000_000  # bytes
 _MOST_ALIASED_NODES = 10_000
 _DEEPEST = 50
+_LARGEST = 1e12  # nothing of a robot is larger in SI units, and its square is still a number
 
 
 def _finite(value: float) -> float:
-    if not math.isfinite(value):
-        raise ValueError("must be a finite number")
+    if not abs(value) <= _LARGEST:
+        raise ValueError(f"must be a finite number, at most {_LARGEST:g} in size")
     return value
 
 
@@ -42,7 +43,7 @@ def _columns(value: Any) -> Any:
 
 
 def _is_number(value: Any) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) < 1e300
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) <= _LARGEST
 
 
 def _auto_or_positive(value: Any) -> Any:
@@ -119,7 +120,7 @@ NonZero = Annotated[float, AfterValidator(_finite), AfterValidator(_nonzero)]
 
 
 def _direction(value: list[float]) -> list[float]:
-    if not any(value):
+    if math.hypot(*value) < 1e-6:
         raise ValueError("must be a direction, not 0 0 0")
     return value
 
@@ -197,7 +198,9 @@ class UnitsSpec(_Spec):
 
     def model_post_init(self, _context: Any) -> None:
         if self.torque_constant is not None and self.torque != "A":
-            raise ValueError(f"torque_constant turns current into torque, and torque is in {self.torque}: write torque: A, or leave the constants out")
+            raise ValueError(
+                f"torque_constant turns current into torque, and torque is in {self.torque}: write torque: A, or leave the constants out"
+            )
 
 
 class DataSpec(_Spec):
@@ -248,7 +251,7 @@ def _effect(value: Any) -> Any:
     if isinstance(value, str):
         return {"name": value}
     if isinstance(value, dict) and len(value) == 1:
-        (name, options), = value.items()
+        ((name, options),) = value.items()
         if isinstance(name, str) and isinstance(options, dict) and "name" not in options:
             return {"name": name, **options}
     raise ValueError("must be an effect's name, or {name: {joints: [...]}}; see `sysid effects`")
@@ -377,11 +380,17 @@ def _check_events(events, where: str) -> None:
             if isinstance(event, CollectionStartEvent):
                 open_anchors.append((event.anchor, total))
                 if len(open_anchors) > _DEEPEST:
-                    raise ConfigError(f"lists and mappings more than {_DEEPEST} deep", where=f"{where} line {event.start_mark.line + 1}", do="write an experiment")
+                    raise ConfigError(
+                        f"lists and mappings more than {_DEEPEST} deep", where=f"{where} line {event.start_mark.line + 1}", do="write an experiment"
+                    )
             elif isinstance(event, ScalarEvent) and event.anchor:
                 sizes[event.anchor] = 1
         if total > _MOST_ALIASED_NODES:
-            raise ConfigError(f"more than {_MOST_ALIASED_NODES} values, aliases counted", where=f"{where} line {event.start_mark.line + 1}", do="write the values out")
+            raise ConfigError(
+                f"more than {_MOST_ALIASED_NODES} values, aliases counted",
+                where=f"{where} line {event.start_mark.line + 1}",
+                do="write the values out",
+            )
 
 
 def _plain(node):
@@ -455,7 +464,9 @@ def _unknown_key(tree, location: tuple, path: Path) -> ConfigError:
     line = _line(tree, location)
     return ConfigError(
         f"unknown key {key!r}" + (f" in {parent}" if parent else ""),
-        where=f"{path} line {line}" if line else str(path), allowed=", ".join(close), do="correct or remove the key",
+        where=f"{path} line {line}" if line else str(path),
+        allowed=", ".join(close),
+        do="correct or remove the key",
     )
 
 
@@ -476,10 +487,17 @@ def _named(error: ValidationError, tree, path: Path) -> ConfigError:
         return _unknown_key(tree, location, path)
     if kind in ("too_short", "too_long"):
         needed = context.get("min_length") if kind == "too_short" else context.get("max_length")
-        said = f"must have {'at least' if kind == 'too_short' else 'at most'} {needed} {'entry' if needed == 1 else 'entries'}, not {context.get('actual_length')}"
+        bound, entries = "at least" if kind == "too_short" else "at most", "entry" if needed == 1 else "entries"
+        said = f"must have {bound} {needed} {entries}, not {context.get('actual_length')}"
     else:
         said = _SAID.get(kind, found["msg"].removeprefix("Value error, ").replace("Input should be", "must be"))
     given = found.get("input")
-    shown = f" (given: {str(given)[:60]!r})" if isinstance(given, str) else f" (given: {str(given)[:60]})" if isinstance(given, (int, float, type(None))) else ""
+    shown = (
+        f" (given: {str(given)[:60]!r})"
+        if isinstance(given, str)
+        else f" (given: {str(given)[:60]})"
+        if isinstance(given, (int, float, type(None)))
+        else ""
+    )
     line = _line(tree, location)
     return ConfigError(f"{_spelled(location)}: {said}{shown}", where=f"{path} line {line}" if line else str(path))

@@ -46,20 +46,21 @@ class Prediction:
 
     def errors(self) -> dict[str, np.ndarray]:
         """`rms` [N m], `relative_error` (norm of the residual over that of the torque), `r2`, each (dof,), and their
-        totals over all joints under `total`."""
+        totals over all joints under `total`; NaN where the torque itself is zero or constant."""
         squares = _sum(self.residual**2)
         kept = self.measured if self.use is None else np.where(self.use, self.measured, 0.0)
         counts = np.maximum(self.counts, 1)
         size = _sum(kept**2)
         spread = size - _sum(kept) ** 2 / counts
-        tiny = np.finfo(float).tiny
+        # a spread that is rounding of a constant is none
+        spread = np.where(spread > 1e-12 * size, spread, 0.0)
+        share = lambda part, whole: np.divide(part, whole, out=np.full(np.shape(whole), np.nan), where=np.asarray(whole) > 0)  # noqa: E731
         return {
             "rms": np.sqrt(squares / counts),
-            "relative_error": np.sqrt(squares / np.maximum(size, tiny)),
-            "r2": 1.0 - squares / np.maximum(spread, tiny),
+            "relative_error": np.sqrt(share(squares, size)),
+            "r2": 1.0 - share(squares, spread),
             "total": np.array([
-                np.sqrt(squares.sum() / counts.sum()), np.sqrt(squares.sum() / max(size.sum(), tiny)),
-                1.0 - squares.sum() / max(spread.sum(), tiny),
+                np.sqrt(squares.sum() / counts.sum()), float(np.sqrt(share(squares.sum(), size.sum()))), 1.0 - float(share(squares.sum(), spread.sum())),
             ]),
         }  # fmt: skip
 
@@ -165,10 +166,13 @@ def _starting_coefficients(model: Model, objective: Objective, prior, positive, 
 
 
 def noise_weights(compressed: Compressed, x) -> np.ndarray:
-    """(joints,) inverse residual RMS, scaled so that their mean square is one and the prior keeps its meaning."""
+    """(joints,) inverse residual RMS, scaled so that their geometric mean is one.
+
+    The objective is then the weighted sum; no single joint, however quiet, sets its size against the prior.
+    """
     rms = np.sqrt(compressed.squares(x) / np.maximum(compressed.rows, 1))
     weights = 1.0 / np.maximum(rms, 1e-9 * rms.max())
-    return weights / np.sqrt(np.mean(weights**2))
+    return weights / np.exp(np.mean(np.log(weights)))
 
 
 def identify(experiment: Experiment, model: Model, motion: Motion, compressed: Compressed, prior: np.ndarray, callback=None) -> Fit:

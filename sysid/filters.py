@@ -18,7 +18,7 @@ from .errors import SysidError, SysidWarning
 from .estimate import pose
 from .log import Log
 from .model import Model, moving_coefficients
-from .preprocess import prepare
+from .preprocess import Smoother, prepare
 
 _WINDOWS = (0.02, 0.03, 0.05, 0.07, 0.1, 0.15, 0.2, 0.3, 0.4, 0.6, 0.8)  # s
 _CUTOFFS = (1.0, 1.5, 2.0, 3.0, 5.0, 7.0, 10.0, 15.0, 20.0, 30.0, 50.0, 100.0)  # Hz
@@ -44,22 +44,53 @@ def compare(experiment: Experiment, model: Model, logs: Sequence[Log], prior) ->
     automatic = value == "auto"
     candidates = (_WINDOWS if key == "window" else _CUTOFFS) if automatic else (value / 2, value, value * 2)
     shortened = [_middle(log) for log in logs]
-    tried = []
+    edge, tried = _widest_edge(spec, key, candidates, shortened), []
     for candidate in candidates:
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", SysidWarning)
-                tried.append({key: candidate, **_held_out(experiment, spec.model_copy(update={key: candidate}), model, shortened, prior)})
+                tried.append({key: candidate, **_held_out(experiment, spec.model_copy(update={key: candidate}), model, shortened, prior, edge)})
         except SysidError:
             continue  # a window shorter than its order, a cutoff above half the sampling rate: no candidate
     if automatic:
         if not tried:
             raise SysidError(f"no {key} suits the logs", where="preprocess", do=f"give {key} a number")
-        value = min(tried, key=lambda entry: entry["relative_error"])[key]
+        value = _best(tried, key, 0.1 if key == "window" else 10.0)
         place = [entry[key] for entry in tried].index(value)
         if len(tried) > 1 and place in (0, len(tried) - 1):
             warnings.warn(SysidWarning(f"preprocess.{key}: auto chose {value:g}, the end of what was tried; give a number to go further"), stacklevel=2)
-    return {**said, "order": spec.order, key: value, "chosen": "held-out error" if automatic else "given", "held_out": tried}
+    shown = [{name: entry[name] for name in (key, "relative_error", "rms")} for entry in tried]
+    return {**said, "order": spec.order, key: value, "chosen": "held-out error" if automatic else "given", "held_out": shown}
+
+
+def _widest_edge(spec: PreprocessSpec, key: str, candidates, logs) -> float:
+    """Seconds that every candidate leaves out at both ends of a log, so that all are judged on the same rows.
+
+    A candidate that would take more than a tenth of the shortest log does not set it, and is judged on what it has.
+    """
+    shortest = min(segment.step * len(segment.t) for log in logs for segment in log.segments)
+    edges = []
+    for candidate in candidates:
+        for log in logs:
+            for segment in log.segments:
+                try:
+                    reach = Smoother(spec.model_copy(update={key: candidate}), segment.step).reach
+                except SysidError:
+                    continue
+                edges.append(reach * segment.step * (2 if spec.torque == "same" else 1))
+    return max((edge for edge in edges if edge <= 0.1 * shortest), default=0.0)
+
+
+def _best(tried: list[dict], key: str, usual: float) -> float:
+    """The candidate of least held-out error; among those within one standard error of it, the one nearest the usual."""
+    least = min(tried, key=lambda entry: entry["relative_error"])
+    tied = []
+    for entry in tried:
+        difference = np.array(entry["folds"]) - np.array(least["folds"]) if len(entry["folds"]) == len(least["folds"]) else np.array([np.inf])
+        error = difference.std(ddof=1) / np.sqrt(len(difference)) if len(difference) > 1 else 0.0
+        if difference.mean() <= error:
+            tied.append(entry[key])
+    return min(tied, key=lambda value: abs(np.log(value / usual)))
 
 
 def settled(spec: PreprocessSpec, chosen: dict) -> PreprocessSpec:
@@ -82,8 +113,9 @@ def _middle(log: Log) -> Log:
     return replace(log, segments=(part,))
 
 
-def _held_out(experiment: Experiment, spec: PreprocessSpec, model: Model, logs, prior) -> dict:
+def _held_out(experiment: Experiment, spec: PreprocessSpec, model: Model, logs, prior, edge: float) -> dict:
     motion = prepare(logs, spec, model.robot.joints)
+    motion = replace(motion, pieces=tuple(_trimmed(piece, logs[piece.log].segments[0], edge) for piece in motion.pieces))
     # against the torque as logged, over every row: what a filter smooths away or masks it has not explained
     raw = replace(motion, pieces=tuple(replace(piece, tau=piece.measured, use=None) for piece in motion.pieces))
     thin = max(1, motion.samples // _ROWS)
@@ -91,22 +123,31 @@ def _held_out(experiment: Experiment, spec: PreprocessSpec, model: Model, logs, 
     target = data if spec.torque == "raw" and spec.standstill == "keep" else compress(model, raw, thin=thin)
     moving = moving_coefficients(model, motion)
     folds = np.array_split(np.arange(data.blocks), min(_FOLDS, data.blocks))
-    squares, rows = np.zeros(model.robot.dof), np.zeros(model.robot.dof)
+    squares, rows, errors = np.zeros(model.robot.dof), np.zeros(model.robot.dof), []
     if len(folds) < 2:
         raise SysidError("the log is too short to hold a part of it out", where="preprocess")
     for fold in folds:
         kept = data.without(fold)
         problem = pose(experiment, model, kept, moving, prior)
-        iterates, _ = interior.minimise(
+        iterates, _, _ = interior.minimise(
             problem.objective, problem.coordinates.positive, problem.coordinates.held, problem.coordinates.physical(problem.start),
             tolerance=experiment.solver.tolerance,
         )  # fmt: skip
         held = _only(target, fold)
-        squares += held.squares(iterates[-1])
+        own = held.squares(iterates[-1])
+        squares += own
         rows += held.rows
+        errors.append(float(own.sum() / held.rows.sum()))
     size = sum(float(np.sum(factor.triangle[:, -1] ** 2)) for factor in target.by_joint)
     rms = np.sqrt(squares / np.maximum(rows, 1))
-    return {"relative_error": float(np.sqrt(squares.sum() / size)), "rms": dict(zip(model.robot.joints, rms.tolist()))}
+    return {"relative_error": float(np.sqrt(squares.sum() / size)), "rms": dict(zip(model.robot.joints, rms.tolist())), "folds": errors}
+
+
+def _trimmed(piece, segment, edge: float):
+    """The piece with its core cut to what lies `edge` seconds inside its segment."""
+    inside = np.flatnonzero((piece.t > segment.t[0] + edge - 0.5 * piece.step) & (piece.t < segment.t[-1] - edge + 0.5 * piece.step))
+    start, stop = max(piece.core.start, int(inside[0])), min(piece.core.stop, int(inside[-1]) + 1)
+    return replace(piece, core=slice(start, stop))
 
 
 def _only(data: Compressed, blocks) -> Compressed:

@@ -7,38 +7,54 @@ possible bodies (six joints with a weak prior do that). There the same problem, 
 
 with multipliers Z_b of the bodies and z_i of the coefficients, has its optimum at J_b Z_b = gamma 1 for the
 log-det prior (its barrier is the prior) and at J_b Z_b = 0 for the others. Nesterov-Todd scaling makes a body and
-its multiplier the same diagonal matrix, so each step is one small symmetric system.
+its multiplier the same diagonal matrix, so each step is one small symmetric system, solved twice: where does the
+straight way lead, and how is it best bent.
 
-Source: Vandenberghe 2010, "The CVXOPT linear and quadratic cone program solvers"; Mehrotra 1992 (predictor).
+Source: Vandenberghe 2010, "The CVXOPT linear and quadratic cone program solvers"; Mehrotra 1992 (predictor-corrector).
 """
 
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg.lapack import dpotrf, dpotrs
 
 from .inertia.pseudo import from_pseudo, to_pseudo
-from .objective import Objective
+from .objective import Objective, add_blocks
 
-_KEEP = 0.98  # share of the way to the boundary that a step may go
+# Share of the way to the boundary that a step must leave; near the end less, or the end comes two digits at a time.
+_LEAVE, _LEAST, _PER_GAP = 1e-2, 1e-6, 1e4
+_POOR = 0.5  # a step of less than this share of its length is tried again without its bend
 _NOTHING = 1e-12  # share of the objective that complementarity may leave at a bound
 
 # orthonormal basis of symmetric 4 x 4 matrices: coordinates of a scaled change of a body
 _BASIS = np.zeros((10, 4, 4))
 for _k, (_i, _j) in enumerate(((0, 0), (1, 1), (2, 2), (3, 3), (0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3))):
     _BASIS[_k, _i, _j] = _BASIS[_k, _j, _i] = 1.0 if _i == _j else np.sqrt(0.5)
+_ROWS = _BASIS.reshape(10, 16)
 _DIAGONAL = np.arange(4)
 
 
-def scaling(factors: np.ndarray, scales: np.ndarray) -> np.ndarray:
-    """T (size, size): columns are the changes of x for unit changes F B_k F' of each body and of each coefficient."""
-    count = 10 * len(factors)
-    out = np.zeros((count + len(scales),) * 2)
-    blocks = from_pseudo(factors[:, None] @ _BASIS @ np.swapaxes(factors, -1, -2)[:, None])  # (bodies, k, 10)
-    for b, block in enumerate(blocks):
-        out[10 * b : 10 * b + 10, 10 * b : 10 * b + 10] = block.T
-    own = np.arange(count, len(out))
-    out[own, own] = scales
+def scaling(factors: np.ndarray) -> np.ndarray:
+    """T (bodies, 10, 10): columns are the changes of pi for unit changes F B_k F' of each body."""
+    changes = factors[:, None] @ _BASIS @ np.swapaxes(factors, -1, -2)[:, None]
+    return np.swapaxes(from_pseudo(changes), -1, -2)
+
+
+def scaled_columns(root: np.ndarray, turn: np.ndarray, spread: np.ndarray) -> np.ndarray:
+    """R T (rows, size) for the bodies' T (bodies, 10, 10) and the coefficients' scales (coefficients,)."""
+    bodies, rows = len(turn), len(root)
+    out = np.empty_like(root)
+    blocks = np.swapaxes(root[:, : 10 * bodies].reshape(rows, bodies, 10), 0, 1) @ turn
+    out[:, : 10 * bodies] = np.swapaxes(blocks, 0, 1).reshape(rows, -1)
+    out[:, 10 * bodies :] = root[:, 10 * bodies :] * spread
     return out
+
+
+def scaled_gradient(gradient: np.ndarray, turn: np.ndarray, spread: np.ndarray) -> np.ndarray:
+    """T' g (size,)."""
+    count = 10 * len(turn)
+    bodies = np.swapaxes(turn, -1, -2) @ gradient[:count].reshape(-1, 10, 1)
+    return np.concatenate([bodies.ravel(), gradient[count:] * spread])
 
 
 @dataclass
@@ -48,6 +64,17 @@ class _State:
     dual: np.ndarray  # (coefficients,), zero where a coefficient is free
 
 
+@dataclass
+class _Scaled:
+    """Nesterov-Todd: F with F^-1 J F^-T = F' Z F = diag(weights); for coefficients sqrt(c / z) and sqrt(c z)."""
+
+    factors: np.ndarray
+    inverse: np.ndarray  # F^-1
+    weights: np.ndarray  # (bodies, 4)
+    spread: np.ndarray
+    root: np.ndarray
+
+
 def minimise(objective: Objective, positive: np.ndarray, held: np.ndarray, start: np.ndarray, *, tolerance: float, max_iterations: int = 100):
     """Minimise from a strictly possible x = start (size,).
 
@@ -55,66 +82,75 @@ def minimise(objective: Objective, positive: np.ndarray, held: np.ndarray, start
         positive, held: (coefficients,) bool, as in the solver's coordinates.
 
     Returns:
-        the iterates [x (size,), ...], the start included and whether the last one converged.
+        the iterates [x (size,), ...], the start included; the objective at each; whether the last one converged.
     """
     count = 10 * objective.bodies
-    free = np.append(np.ones(count, dtype=bool), ~held)
-    bound = positive & ~held
-    root, target = objective.triangle[:, :-1], objective.triangle[:, -1]
+    free, bound = ~held, positive & ~held
+    rows, target = objective.triangle[:, :-1], objective.triangle[:, -1]
     linear, quadratic, barrier = _prior_parts(objective)
     x = np.array(start, dtype=float)
-    iterates, best = [x], np.inf
-    floor_j = barrier  # where J Z must end; without a barrier it goes to nothing, as c z does
-    mu = max(0.1 * objective.value(x) / len(x), floor_j)
-    pseudo = to_pseudo(x[:count].reshape(-1, 10))
-    state = _State(x, mu * np.linalg.inv(pseudo), np.where(bound, mu / np.where(bound, x[count:], 1.0), 0.0))
+    iterates, values, best = [x], [objective.value(x)], np.inf
+    mu = max(0.01 * values[0] / len(x), barrier)
+    z = mu * np.linalg.inv(to_pseudo(x[:count].reshape(-1, 10)))
+    state = _State(x, z, np.where(bound, mu / np.where(bound, x[count:], 1.0), 0.0))
+    unit = np.concatenate([np.ones(count), np.where(bound, 1.0, 0.0)])
+    size = 4 * objective.bodies + int(bound.sum())
+    fixed = count + np.flatnonzero(held)
     for _ in range(max_iterations + 1):
-        value = max(abs(objective.value(state.x)), np.finfo(float).tiny)
+        value = max(abs(values[-1]), np.finfo(float).tiny)
         floor_c = _NOTHING * value / len(x)
         floor_j = barrier or floor_c
         try:
-            factors, weights, spread, root_c = _scaled(state, count, bound)
+            scaled = _scale(state, count, bound)
         except np.linalg.LinAlgError:
             # the last step left what double precision can tell from the boundary
-            return iterates[:-1] or iterates, False
-        turn = scaling(factors, spread)
-        image = root @ turn
+            break
+        turn = scaling(scaled.factors)
+        image = scaled_columns(rows, turn, scaled.spread)
         system = 2.0 * image.T @ image
+        slope = 2.0 * image.T @ (rows @ state.x - target) + scaled_gradient(linear, turn, scaled.spread)
         if quadratic is not None:
-            for b, block in enumerate(quadratic):
-                own = slice(10 * b, 10 * b + 10)
-                system[own, own] += turn[own, own].T @ block @ turn[own, own]
-        own = np.arange(len(state.x))
-        system[own, own] += np.append(np.ones(count), np.where(bound, 1.0, 0.0))
-        slope = 2.0 * image.T @ (root @ state.x - target) + turn.T @ linear
-        if quadratic is not None:
-            step = np.einsum("bij,bj->bi", quadratic, (state.x[:count] - objective.divergence.prior.ravel()).reshape(-1, 10))
-            slope += turn.T @ np.append(step.ravel(), np.zeros(len(bound)))
-        system[~free, :] = system[:, ~free] = 0.0
-        system[~free, ~free] = 1.0
-        size = weights.size + int(bound.sum())
-        mu = (np.sum(weights**2) + np.sum(root_c[bound] ** 2)) / size
-        off = max(np.abs(weights**2 - floor_j).max() / floor_j if barrier else 0.0, 0.0)
-        residual = slope - np.append(packed(weights), np.where(bound, root_c, 0.0))
-        residual[~free] = 0.0
-        small = 0.5 * residual @ _solve(system, residual)
-        loose = np.sum(root_c[bound] ** 2) + (0.0 if barrier else np.sum(weights**2))
-        if off < 1e-6 and small <= max(tolerance**2, 1e-13) * value and loose <= 4.0 * _NOTHING * value:
-            # the last steps cost little and take the gradient to where only rounding is left
-            if barrier or small > 0.1 * best:
-                return iterates, True
-            best = small
-        # predictor: as far as the final targets allow; its success sets how far to aim
-        aim = lambda level: np.append(packed(np.maximum(level, floor_j) / weights), np.where(bound, max(level, floor_c) / np.where(bound, root_c, 1.0), 0.0))  # noqa: E731, B023
-        step = _solve(system, np.where(free, aim(0.0) - slope, 0.0))
-        reach = _reach(step, aim(0.0), weights, root_c, bound, count)
-        sigma = (1.0 - min(1.0, reach)) ** 3
-        step = _solve(system, np.where(free, aim(sigma * mu) - slope, 0.0))
-        reach = _reach(step, aim(sigma * mu), weights, root_c, bound, count)
-        length = min(1.0, _KEEP * reach)
-        state = _moved(state, turn, factors, weights, root_c, spread, step, aim(sigma * mu), length, bound, count)
+            add_blocks(system, np.swapaxes(turn, -1, -2) @ quadratic @ turn)
+            away = (state.x[:count] - objective.divergence.prior.ravel()).reshape(-1, 10, 1)
+            slope[:count] += (np.swapaxes(turn, -1, -2) @ (quadratic @ away)).ravel()
+        system.flat[:: len(x) + 1] += unit
+        if fixed.size:
+            system[fixed, :] = system[:, fixed] = 0.0
+            system[fixed, fixed] = 1.0
+        solve = _solver(system)
+        squares_c = np.where(bound, scaled.root**2, 0.0)
+        # the objective is off by about gamma off^2
+        off = np.abs(scaled.weights**2 - floor_j).max() / floor_j if barrier else 0.0
+        loose = squares_c.sum() + (0.0 if barrier else np.sum(scaled.weights**2))
+        if off < 1e-4 and loose <= 4.0 * _NOTHING * value:
+            residual = slope - np.concatenate([packed(scaled.weights), np.where(bound, scaled.root, 0.0)])
+            residual[fixed] = 0.0
+            small = 0.5 * residual @ solve(residual)
+            if small <= max(tolerance**2, 1e-13) * value:
+                # the last steps cost little and take the gradient to where only rounding is left
+                if barrier or small > 0.1 * best:
+                    return iterates, values, True
+                best = small
+        # predictor: straight for the final targets; how far it gets sets how far the corrector aims
+        straight = _change(solve, slope, scaled, _aim(scaled, bound, floor_j, floor_c, None), fixed, bound)
+        mu = (np.sum(scaled.weights**2) + squares_c.sum()) / size
+        level = (1.0 - min(1.0, _reach(straight, scaled, bound))) ** 3 * mu
+        levels = max(level, floor_j), max(level, floor_c)
+        change = _change(solve, slope, scaled, _aim(scaled, bound, *levels, straight), fixed, bound)
+        keep = 1.0 - np.clip(_PER_GAP * loose / value, _LEAST, _LEAVE)
+        length = min(1.0, keep * _reach(change, scaled, bound))
+        if length < _POOR:
+            # far from the path the predictor knows nothing of the bend; without it the step may go further
+            plain = _change(solve, slope, scaled, _aim(scaled, bound, *levels, None), fixed, bound)
+            further = min(1.0, keep * _reach(plain, scaled, bound))
+            if further > length:
+                change, length = plain, further
+        state = _moved(state, turn, scaled, change, length, bound, free, count)
         iterates.append(state.x)
-    return iterates, False
+        values.append(objective.value(state.x))
+    # not converged: what was best stands last
+    last = int(np.argmin(values))
+    return iterates[: last + 1], values[: last + 1], False
 
 
 def _prior_parts(objective: Objective):
@@ -128,15 +164,15 @@ def _prior_parts(objective: Objective):
     return linear, objective.weight * np.asarray(objective.divergence.hessian(objective.divergence.prior)), 0.0
 
 
-def _scaled(state: _State, count: int, bound):
-    """Nesterov-Todd: F with F^-1 J F^-T = F' Z F = diag(weights); for coefficients sqrt(c / z) and sqrt(c z)."""
-    lower = np.linalg.cholesky(to_pseudo(state.x[:count].reshape(-1, 10)))
-    upper = np.linalg.cholesky(state.z)
-    _, weights, vt = np.linalg.svd(np.swapaxes(upper, -1, -2) @ lower)
-    factors = lower @ np.swapaxes(vt, -1, -2) / np.sqrt(weights)[:, None, :]
-    c, dual = state.x[count:], state.dual
-    spread = np.where(bound, np.sqrt(np.where(bound, c, 1.0) / np.where(bound, dual, 1.0)), 1.0)
-    return factors, weights, spread, np.where(bound, np.sqrt(np.where(bound, c * dual, 1.0)), 1.0)
+def _scale(state: _State, count: int, bound) -> _Scaled:
+    both = np.linalg.cholesky(np.concatenate([to_pseudo(state.x[:count].reshape(-1, 10)), state.z]))
+    lower, upper = both[: len(state.z)], both[len(state.z) :]
+    u, weights, vt = np.linalg.svd(np.swapaxes(upper, -1, -2) @ lower)
+    root = np.sqrt(weights)
+    factors = lower @ np.swapaxes(vt, -1, -2) / root[:, None, :]
+    inverse = np.swapaxes(upper @ u, -1, -2) / root[:, :, None]
+    c, dual = np.where(bound, state.x[count:], 1.0), np.where(bound, state.dual, 1.0)
+    return _Scaled(factors, inverse, weights, np.sqrt(c / dual), np.sqrt(c * dual))
 
 
 def packed(diagonals) -> np.ndarray:
@@ -148,41 +184,76 @@ def packed(diagonals) -> np.ndarray:
 
 def unpacked(vector) -> np.ndarray:
     """Symmetric matrices (bodies, 4, 4) of coordinates (10 bodies,)."""
-    return np.einsum("bk,kij->bij", vector.reshape(-1, 10), _BASIS)
+    return (vector.reshape(-1, 10) @ _ROWS).reshape(-1, 4, 4)
 
 
 def coordinates(matrices) -> np.ndarray:
     """Symmetric matrices (..., 4, 4) in the orthonormal basis (..., 10)."""
-    return np.einsum("...ij,kij->...k", matrices, _BASIS)
+    return matrices.reshape(matrices.shape[:-2] + (16,)) @ _ROWS.T
 
 
-def _solve(system, right):
-    from scipy.linalg.lapack import dposv
-
-    _, solution, fault = dposv(system, right, lower=1)
-    return solution if fault == 0 else np.linalg.lstsq(system, right, rcond=1e-14)[0]
-
-
-def _reach(step, aim, weights, root_c, bound, count) -> float:
-    """How far along a step the bodies and their multipliers, and the coefficients and theirs, stay positive."""
-    inverse = 1.0 / np.sqrt(weights)
-    change = unpacked(step[:count])
-    dual = unpacked(aim[:count]) - change
-    dual[:, _DIAGONAL, _DIAGONAL] -= weights
-    worst = [np.linalg.eigvalsh(inverse[:, :, None] * m * inverse[:, None, :])[:, 0].min() for m in (change, dual)]
-    own = step[count:][bound] / root_c[bound]
-    worst += [own.min(initial=0.0), (aim[count:][bound] / root_c[bound] - 1.0 - own).min(initial=0.0)]
-    return 1.0 / max(-min(worst), 1e-12)
+def _solver(system):
+    """Solve with one factorization; by least squares where rounding made the system singular."""
+    factor, fault = dpotrf(system, lower=1)
+    if fault == 0:
+        return lambda right: dpotrs(factor, right, lower=1)[0]
+    return lambda right: np.linalg.lstsq(system, right, rcond=1e-14)[0]
 
 
-def _moved(state, turn, factors, weights, root_c, spread, step, aim, length, bound, count) -> _State:
-    x = state.x + length * (turn @ step)
-    dual = unpacked(aim[:count] - step[:count])
-    dual[:, _DIAGONAL, _DIAGONAL] -= weights
-    scaled = length * dual
-    scaled[:, _DIAGONAL, _DIAGONAL] += weights
-    inverse = np.linalg.inv(factors)
-    z = np.swapaxes(inverse, -1, -2) @ scaled @ inverse
-    change = aim[count:] - root_c - step[count:]
-    own = np.where(bound, (root_c + length * change) / spread, 0.0)
-    return _State(x, 0.5 * (z + np.swapaxes(z, -1, -2)), own)
+@dataclass
+class _Change:
+    """A step in scaled coordinates: of x, of the bodies and of their multipliers, of the coefficients' multipliers."""
+
+    step: np.ndarray
+    body: np.ndarray  # (bodies, 4, 4)
+    multiplier: np.ndarray  # (bodies, 4, 4)
+    dual: np.ndarray
+
+
+def _change(solve, slope, scaled: _Scaled, aim, fixed, bound) -> _Change:
+    right = aim - slope
+    right[fixed] = 0.0
+    step = solve(right)
+    count = 10 * len(scaled.weights)
+    both = unpacked(np.concatenate([step[:count], aim[:count] - step[:count]]))
+    body, multiplier = both[: len(scaled.weights)], both[len(scaled.weights) :]
+    multiplier[:, _DIAGONAL, _DIAGONAL] -= scaled.weights
+    return _Change(step, body, multiplier, np.where(bound, aim[count:] - scaled.root - step[count:], 0.0))
+
+
+def _aim(scaled: _Scaled, bound, level_j: float, level_c: float, straight: _Change | None) -> np.ndarray:
+    """What body plus multiplier should change by, plus the multiplier: the right side of the scaled equations.
+
+    Complementarity asks Lambda o (dJ + dZ) = level - Lambda^2 - dJ o dZ; the last term is what the predictor
+    `straight` showed the product of both changes to be.
+    """
+    bodies = packed(level_j / scaled.weights)
+    c = np.where(bound, level_c / scaled.root, 0.0)
+    if straight is not None:
+        product = straight.body @ straight.multiplier
+        product = product + np.swapaxes(product, -1, -2)  # twice the symmetric part
+        bodies = bodies - coordinates(product / (scaled.weights[:, :, None] + scaled.weights[:, None, :])).ravel()
+        c = c - np.where(bound, straight.step[bodies.size :] * straight.dual / scaled.root, 0.0)
+    return np.concatenate([bodies, c])
+
+
+def _reach(change: _Change, scaled: _Scaled, bound) -> float:
+    """How far along a change the bodies and their multipliers, and the coefficients and theirs, stay positive."""
+    inverse = 1.0 / np.sqrt(scaled.weights)
+    inverse = inverse[:, :, None] * inverse[:, None, :]
+    worst = np.linalg.eigvalsh(np.concatenate([inverse * change.body, inverse * change.multiplier]))[:, 0].min()
+    if bound.any():
+        own = np.concatenate([change.step[len(change.step) - len(bound) :], change.dual])[np.concatenate([bound, bound])]
+        worst = min(worst, (own / np.tile(scaled.root[bound], 2)).min())
+    return 1.0 / max(-worst, 1e-12)
+
+
+def _moved(state, turn, scaled: _Scaled, change: _Change, length, bound, free, count) -> _State:
+    x = state.x.copy()
+    x[:count] += length * (turn @ change.step[:count].reshape(-1, 10, 1)).ravel()
+    x[count:] += np.where(free, length * scaled.spread * change.step[count:], 0.0)
+    moved = length * change.multiplier
+    moved[:, _DIAGONAL, _DIAGONAL] += scaled.weights
+    z = np.swapaxes(scaled.inverse, -1, -2) @ moved @ scaled.inverse
+    dual = np.where(bound, (scaled.root + length * change.dual) / scaled.spread, 0.0)
+    return _State(x, 0.5 * (z + np.swapaxes(z, -1, -2)), dual)

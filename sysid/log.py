@@ -22,6 +22,7 @@ _GAP_STEPS = 10.0
 # Steps that all stay this close to the median are uniform sampling with rounded time stamps.
 _UNIFORM = 0.02
 _EPOCH = 1e6  # s: a clock that reads more counts from 1970, not from the log's start
+_LARGEST = 1e20  # no unit makes a measured signal larger (a clock in ns, logged as a signal, reads 2e18)
 _DEGREES = 4.0 * np.pi  # rad: no robot joint turns so far from zero, but its angle in degrees does
 
 
@@ -97,7 +98,12 @@ def _load(table: Table, data: DataSpec, joints):
     lengths = {name: len(values) for name, values in columns.items()}
     if len(set(lengths.values())) > 1:
         shown = ", ".join(f"{name!r} {length}" for name, length in lengths.items())
-        raise LogError(f"columns differ in length: {shown}", where=str(table.path), allowed="a value in every column for each sample", do="correct data.columns or the log")
+        raise LogError(
+            f"columns differ in length: {shown}",
+            where=str(table.path),
+            allowed="a value in every column for each sample",
+            do="correct data.columns or the log",
+        )
     if not min(lengths.values()):
         raise LogError("the log has no samples", where=str(table.path), do="give a log with samples")
     signals = {}
@@ -131,14 +137,24 @@ def _names(table: Table, pattern, joints, signal: str) -> list[str]:
                     do="correct data.columns or robot.joints",
                 )  # fmt: skip
     if len(pattern) != len(joints):
-        raise LogError(f"{signal}: {len(pattern)} columns for {len(joints)} joints", where=str(table.path), allowed=f"one for each of {', '.join(joints)}", do="correct data.columns")
+        raise LogError(
+            f"{signal}: {len(pattern)} columns for {len(joints)} joints",
+            where=str(table.path),
+            allowed=f"one for each of {', '.join(joints)}",
+            do="correct data.columns",
+        )
     return [_single(table, column, signal) for column in pattern]
 
 
 def _single(table: Table, column, signal: str) -> str:
     name = table.resolve(column)
     if (width := table.width(name)) > 1:
-        raise LogError(f"{signal}: {name!r} is {width} columns", where=str(table.path), allowed=f"one of {name}[0] to {name}[{width - 1}]", do="correct data.columns")
+        raise LogError(
+            f"{signal}: {name!r} is {width} columns",
+            where=str(table.path),
+            allowed=f"one of {name}[0] to {name}[{width - 1}]",
+            do="correct data.columns",
+        )
     return name
 
 
@@ -174,17 +190,24 @@ def _check_time(t, where: str) -> None:
     if backwards.any():
         row = int(np.argmax(backwards)) + 1
         verb = "stands still" if t[row] == t[row - 1] else "runs backwards"
-        raise LogError(f"time {verb}: {t[row - 1]:.9g} s, then {t[row]:.9g} s", where=f"{where} row {row} counted from 0", allowed="increasing time", do="sort the rows or leave doubles out")
+        raise LogError(
+            f"time {verb}: {t[row - 1]:.9g} s, then {t[row]:.9g} s",
+            where=f"{where} row {row} counted from 0",
+            allowed="increasing time",
+            do="sort the rows or leave doubles out",
+        )
 
 
 def _check_finite(values, name: str, t, joints, where: str, first: int) -> None:
-    # a sum is finite when all its terms are; only a bad log pays for the search
-    if np.isfinite(values.sum()) or np.isfinite(values).all():
+    # only a bad log pays for the search; a NaN fails both comparisons
+    if values.max() <= _LARGEST and values.min() >= -_LARGEST:
         return
-    row, *column = (int(k) for k in np.argwhere(~np.isfinite(values))[0])
+    row, *column = (int(k) for k in np.argwhere(~(np.abs(values) <= _LARGEST))[0])
     joint = f" of joint {joints[column[0]]!r}" if column else ""
-    value = values[row, column[0]] if column else values[row]
-    raise LogError(f"{name.removeprefix('signals.')}{joint} is {value}", where=f"{where} row {first + row} counted from 0, t = {t[row]:.6g} s", allowed="finite numbers", do="leave the row out; a gap is split there")
+    raise LogError(
+        f"{name.removeprefix('signals.')}{joint} is {values[row, *column]:g}", where=f"{where} row {first + row} counted from 0, t = {t[row]:.6g} s",
+        allowed=f"finite numbers, at most {_LARGEST:g} in size", do="leave the row out; a gap is split there",
+    )  # fmt: skip
 
 
 def _convert(signals, data: DataSpec, joints, prismatic, where: str) -> None:
@@ -201,13 +224,20 @@ def _convert(signals, data: DataSpec, joints, prismatic, where: str) -> None:
         constants = data.units.torque_constant
         if constants is None or (missing := [j for j in joints if j not in constants]):
             missing = list(joints) if constants is None else missing
-            raise LogError(f"torque is in A and joint {missing[0]!r} has no torque constant", where=where, allowed="data.units.torque_constant: {joint: N m per A, …}", do="add the constants")
+            raise LogError(
+                f"torque is in A and joint {missing[0]!r} has no torque constant",
+                where=where,
+                allowed="data.units.torque_constant: {joint: N m per A, …}",
+                do="add the constants",
+            )
         signals["tau"] *= np.array([constants[j] for j in joints])
     if unit == "rad":
         largest = np.abs(signals["q"]).max(axis=0)
         for joint, value, slides in zip(joints, largest, prismatic):
             if not slides and value > _DEGREES:
-                warnings.warn(SysidWarning(f"{where}: joint {joint!r} reaches {value:.4g} rad; if that is degrees, set data.units.position: deg"), stacklevel=3)
+                warnings.warn(
+                    SysidWarning(f"{where}: joint {joint!r} reaches {value:.4g} rad; if that is degrees, set data.units.position: deg"), stacklevel=3
+                )
 
 
 def _segments(t, signals, where: str):
@@ -216,7 +246,9 @@ def _segments(t, signals, where: str):
     cuts = np.flatnonzero(steps > _GAP_STEPS * step) + 1
     if cuts.size:
         longest = steps[cuts - 1].max()
-        warnings.warn(SysidWarning(f"{where}: {cuts.size} gap(s), the longest {longest:.4g} s, split the log into {cuts.size + 1} segments"), stacklevel=3)
+        warnings.warn(
+            SysidWarning(f"{where}: {cuts.size} gap(s), the longest {longest:.4g} s, split the log into {cuts.size + 1} segments"), stacklevel=3
+        )
     resampled = 0
     bounds = [0, *cuts.tolist(), len(t)]
     for a, b in zip(bounds[:-1], bounds[1:]):
@@ -224,16 +256,35 @@ def _segments(t, signals, where: str):
         clock = t[a:b]
         if b - a < 2:
             continue
-        if np.abs(np.diff(clock) - step).max() > _UNIFORM * step:
-            clock, part = _resampled(clock, part, step)
-            resampled += 1
-        else:
-            step_here = (clock[-1] - clock[0]) / (len(clock) - 1)
-            yield _segment(clock, step_here, part)
+        if _is_uniform(clock, step):
+            mean = (clock[-1] - clock[0]) / (len(clock) - 1)
+            yield _segment(clock[0] + mean * np.arange(len(clock)), mean, part)
             continue
-        yield _segment(clock, step, part)
+        own = np.diff(clock)
+        # as many samples as were measured: the mean step, without the samples that are missing
+        own = float(np.mean(own[own < 1.5 * step]))
+        clock, part = _resampled(clock, part, own)
+        resampled += 1
+        yield _segment(clock, own, part)
     if resampled:
-        warnings.warn(SysidWarning(f"{where}: steps of {steps.min():.4g} to {np.delete(steps, cuts - 1).max():.4g} s were resampled to a uniform {step:.4g} s"), stacklevel=3)
+        warnings.warn(
+            SysidWarning(f"{where}: steps of {steps.min():.4g} to {np.delete(steps, cuts - 1).max():.4g} s were resampled to a uniform {own:.4g} s"),
+            stacklevel=3,
+        )
+
+
+def _is_uniform(t, step: float) -> bool:
+    """A steady clock: every step close to the median one, or every stamp a steady one that was rounded."""
+    if np.abs(np.diff(t) - step).max() <= _UNIFORM * step:
+        return True
+    steady = np.linspace(t[0], t[-1], len(t))
+    since = t - t[0]
+    for digits in range(10):
+        quantum = 10.0**-digits
+        if quantum <= step and np.abs(since / quantum - np.round(since / quantum)).max() < 1e-3:
+            # the two end stamps are rounded as well, each by up to half a quantum
+            return bool(np.abs(t - steady).max() <= 1.01 * quantum)
+    return False
 
 
 def _segment(t, step, part) -> Segment:
@@ -257,5 +308,3 @@ def _resampled(t, part, step):
 def _sha256(path: Path) -> str:
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
-
-

@@ -23,6 +23,7 @@ from .compress import Compressed, compress
 from .config import Experiment, LogSpec
 from .errors import ConfigError, SysidError, SysidWarning
 from .estimate import Fit, Prediction, identify, predict
+from .inertia.consistency import is_consistent
 from .model import Model, moving_coefficients
 from .preprocess import Motion, prepare
 from .robot import Robot
@@ -74,11 +75,15 @@ def fit(experiment: Experiment, *, progress: Progress | None = None) -> Fit:
             compressed = compress(structure, motion, progress=lambda share: tell("compress", share))
         with _timed(seconds, "solve"):
             found = identify(experiment, structure, motion, compressed, prior)
+        if not found.physically_consistent:
+            names = [body.name for body, possible in zip(machine.bodies, is_consistent(found.pi)) if not possible]
+            warnings.warn(SysidWarning(f"impossible bodies: {', '.join(names)}; identified.urdf will not serve a simulator. model.inertia: log-cholesky keeps them possible"), stacklevel=2)
         with _timed(seconds, "predict"):
             predictions = {"train": predict(structure, found.x, motion)}
             samples = {"train": motion.samples}
             del motion
         with _timed(seconds, "test"):
+            _tell_overlap(experiment)
             held_out = read(experiment, machine, experiment.data.test)
             provenance += [_provenance("test", log, spec) for log, spec in zip(held_out, experiment.data.test)]
             motion = prepare(held_out, preprocess, machine.joints)
@@ -142,9 +147,25 @@ def _prior(experiment: Experiment, structure: Model) -> np.ndarray:
     return read_inertias((experiment.folder / source).resolve(), structure)
 
 
+# Of a joint that moves through its reversals, a few per cent of the rows are slow; more means that it was held.
+_MUCH_STANDING = 0.1
+
+
 def _tell_still(motion: Motion) -> None:
+    for joint, share in zip(motion.joints, motion.standing):
+        if share > _MUCH_STANDING and joint not in motion.still:
+            warnings.warn(SysidWarning(f"joint {joint!r} stands still in {100 * share:.0f} % of its rows, where friction is whatever balances the rest; preprocess.standstill: mask leaves them out"), stacklevel=2)
     for joint in motion.still:
         warnings.warn(SysidWarning(f"joint {joint!r} never moves in the training logs; its friction is held at its prior, and its bodies are where the other joints' torque leaves them"), stacklevel=2)
+
+
+def _tell_overlap(experiment: Experiment) -> None:
+    for test in experiment.data.test:
+        for train in experiment.data.train:
+            low = max(test.start or 0.0, train.start or 0.0)
+            high = min(np.inf if test.stop is None else test.stop, np.inf if train.stop is None else train.stop)
+            if test.file == train.file and low < high:
+                warnings.warn(SysidWarning(f"test log {test.file} overlaps a training log; its error is not held out"), stacklevel=2)
 
 
 def _provenance(part: str, log: logs.Log, spec: LogSpec) -> dict:

@@ -20,7 +20,32 @@ from .log import Log, Segment
 # `standstill: mask` leaves a joint's rows out below this share of its own rms speed, at most 0.03 rad/s or m/s:
 # there friction is whatever balances the rest.
 _STANDSTILL_SHARE, _STANDSTILL_MOST = 0.05, 0.03
-_NEVER_MOVES = 1e-3  # rad or m, peak to peak
+# A joint never moves where its filtered angle travels less than its own noise would make it, or than this [rad or m].
+_NEVER_MOVES, _NOISE_TRAVEL = 1e-6, 6.0
+_ROUNDING = 1e-9  # share of a joint's top speed that is none
+
+
+def savitzky_golay(length: int, order: int, derivative: int, step: float) -> np.ndarray:
+    """Weights (length,) that give the middle value, or a derivative there, of the polynomial fitted to a window.
+
+    The same numbers as scipy.signal's, which works in powers of sample numbers, keeps nine digits of order 4 over 101
+    samples and none of order 9 over 401, and whose import alone would take a quarter of a fit.
+
+    Source: Savitzky & Golay 1964.
+    """
+    half = length // 2
+    u = np.arange(-half, half + 1) / half  # on [-1, 1], where powers stay apart
+    rows = np.linalg.pinv(np.vander(u, order + 1, increasing=True))
+    return rows[derivative] * math.factorial(derivative) / (half * step) ** derivative
+
+
+def _convolved(values, weights) -> np.ndarray:
+    """Values (n, ...) weighted by a window about each; the first and last half window are not to be used."""
+    flat = values.reshape(len(values), -1)
+    out = np.empty(flat.shape)
+    for k in range(flat.shape[1]):
+        out[:, k] = np.convolve(flat[:, k], weights[::-1], mode="same")
+    return out.reshape(values.shape)
 
 
 class Smoother:
@@ -51,11 +76,8 @@ class Smoother:
     def differentiate(self, q) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """q, qd, qdd (n, dof) of measured angles (n, dof); the first and last `reach` rows are not to be used."""
         if self.kind == "savitzky-golay":
-            from scipy.signal import savgol_filter
-
-            return tuple(
-                savgol_filter(q, self.length, self.order, deriv=d, delta=self.step, axis=0) for d in range(3)
-            )  # type: ignore[return-value]
+            q0, q1, q2 = (_convolved(q, savitzky_golay(self.length, self.order, d, self.step)) for d in range(3))
+            return q0, q1, q2
         smooth = self(q)
         qd = np.gradient(smooth, self.step, axis=0)
         qdd = np.zeros_like(smooth)
@@ -65,9 +87,8 @@ class Smoother:
     def __call__(self, values, axis: int = 0) -> np.ndarray:
         """The filtered values, same shape; samples along `axis`."""
         if self.kind == "savitzky-golay":
-            from scipy.signal import savgol_filter
-
-            return savgol_filter(values, self.length, self.order, axis=axis)
+            weights = savitzky_golay(self.length, self.order, 0, self.step)
+            return np.moveaxis(_convolved(np.moveaxis(values, axis, 0), weights), 0, axis)
         if self.kind == "butterworth":
             from scipy.signal import sosfiltfilt
 
@@ -81,7 +102,8 @@ class Piece:
 
     t (n,) [s]; q, qd, qdd (n, dof); tau (n, dof) as the fit sees it, `measured` as logged; signals {name: (n,)}; `use` (n, dof) bool, None where every row counts.
     `smoother` filters columns where torque was filtered, else None; then `margin` extra rows stand before and
-    after `core`, whose filtered values the filter needs but which are not used.
+    after `core`, whose filtered values the filter needs but which are not used. `rest` (dof,) [rad/s or m/s] is the
+    speed that rounding makes of a constant angle; `noise` (dof,) [rad or m] what the filter took off the angles, RMS.
     """
 
     log: int
@@ -96,6 +118,13 @@ class Piece:
     use: np.ndarray | None
     smoother: Smoother | None
     core: slice
+    rest: np.ndarray
+    noise: np.ndarray
+
+    def direction(self, joint: int) -> np.ndarray:
+        """sign(qd) (n,) of a joint, zero where the filter of a constant angle leaves nothing but rounding."""
+        qd = self.qd[:, joint]
+        return np.where(np.abs(qd) > self.rest[joint], np.sign(qd), 0.0)
 
     def part(self, rows: slice) -> "Piece":
         """The rows `rows`, without margins."""
@@ -113,11 +142,15 @@ class Piece:
 
 @dataclass(frozen=True)
 class Motion:
-    """What identification works on: pieces of motion of the same joints."""
+    """What identification works on: pieces of motion of the same joints.
+
+    still: joints that never move. standing (dof,): share of the rows that count in which a joint stands still.
+    """
 
     joints: tuple[str, ...]
     pieces: tuple[Piece, ...]
     still: tuple[str, ...]
+    standing: np.ndarray
 
     @property
     def samples(self) -> int:
@@ -148,8 +181,11 @@ def prepare(logs: Sequence[Log], spec: PreprocessSpec, joints: tuple[str, ...]) 
         if dropped := len(log.segments) - (len(pieces) - before):
             warnings.warn(SysidWarning(f"{log.path}: {dropped} segment(s) shorter than the filter's window were left out"), stacklevel=2)
     travel = np.ptp(np.concatenate([[p.q[p.core].min(0), p.q[p.core].max(0)] for p in pieces]), axis=0)
-    pieces = [_masked(piece, spec, pieces) for piece in pieces]
-    return Motion(joints, tuple(pieces), tuple(j for j, d in zip(joints, travel) if d < _NEVER_MOVES))
+    noise = np.max([piece.noise for piece in pieces], axis=0)
+    rest = _ROUNDING * np.max([np.abs(piece.qd).max(axis=0) for piece in pieces], axis=0)
+    pieces = [_masked(replace(piece, rest=rest), spec, pieces) for piece in pieces]
+    never = travel < np.maximum(_NEVER_MOVES, _NOISE_TRAVEL * noise)
+    return Motion(joints, tuple(pieces), tuple(j for j, still in zip(joints, never) if still), standing(pieces))
 
 
 def _needs(spec: PreprocessSpec, step: float) -> int:
@@ -176,7 +212,8 @@ def _piece(number: int, segment: Segment, spec: PreprocessSpec) -> Piece | None:
     return Piece(
         log=number, step=segment.step, t=segment.t[rows], q=q[rows], qd=qd[rows], qdd=qdd[rows], tau=tau[rows],
         measured=segment.tau[rows], signals={name: values[rows] for name, values in segment.signals.items()}, use=None,
-        smoother=smoother if both else None, core=slice(margin, n - margin),
+        smoother=smoother if both else None, core=slice(margin, n - margin), rest=np.zeros(q.shape[1]),
+        noise=np.sqrt(np.mean((segment.q[rows] - q[rows]) ** 2, axis=0)),
     )  # fmt: skip
 
 
@@ -184,11 +221,7 @@ def _masked(piece: Piece, spec: PreprocessSpec, pieces: list[Piece]) -> Piece:
     """The piece with the rows of a standing joint left out, widened by the filter's reach."""
     if spec.standstill == "keep":
         return piece
-    if spec.standstill == "mask":
-        square = np.mean(np.concatenate([p.qd[p.core] ** 2 for p in pieces]), axis=0)
-        threshold = np.minimum(_STANDSTILL_SHARE * np.sqrt(square), _STANDSTILL_MOST)
-    else:
-        threshold = np.full(piece.q.shape[1], spec.standstill)
+    threshold = _standstill_speed(pieces) if spec.standstill == "mask" else np.full(piece.q.shape[1], spec.standstill)
     still = np.abs(piece.qd) < threshold
     reach = Smoother(spec, piece.step).reach if piece.smoother is not None else 0
     if reach:
@@ -198,3 +231,21 @@ def _masked(piece: Piece, spec: PreprocessSpec, pieces: list[Piece]) -> Piece:
         low, high = np.maximum(rows - reach, 0), np.minimum(rows + reach + 1, len(still))
         still = count[high] - count[low] > 0
     return replace(piece, use=~still)
+
+
+def _standstill_speed(pieces) -> np.ndarray:
+    """Speed (dof,) below which a joint counts as standing, from its own rms speed."""
+    square = sum(np.sum(p.qd[p.core] ** 2, axis=0) for p in pieces) / sum(p.samples for p in pieces)
+    return np.minimum(_STANDSTILL_SHARE * np.sqrt(square), _STANDSTILL_MOST)
+
+
+def standing(pieces) -> np.ndarray:
+    """Share (dof,) of the rows that count in which each joint stands still."""
+    speed = _standstill_speed(pieces)
+    counted = rows = np.zeros(len(speed))
+    for piece in pieces:
+        use = True if piece.use is None else piece.use[piece.core]
+        slow = np.abs(piece.qd[piece.core]) < speed
+        counted = counted + np.sum(slow & use, axis=0)
+        rows = rows + (piece.samples if piece.use is None else np.sum(use, axis=0))
+    return counted / np.maximum(rows, 1)

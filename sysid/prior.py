@@ -38,7 +38,11 @@ def usable(name: str, stated: np.ndarray | None, geometry: np.ndarray | None, re
         return raised
     if geometry is not None and is_consistent(geometry):
         solid = geometry if mass is None else geometry * (mass / geometry[0])
-        _tell(name, problem, f"the prior is the uniform solid of its shapes, {solid[0]:.3g} kg ({'at 1000 kg/m^3' if mass is None else 'its mass is kept'})")
+        _tell(
+            name,
+            problem,
+            f"the prior is the uniform solid of its shapes, {solid[0]:.3g} kg ({'at 1000 kg/m^3' if mass is None else 'its mass is kept'})",
+        )
         return solid
     radius = max(0.5 * float(np.linalg.norm(reach)), 0.05)
     if mass is not None:

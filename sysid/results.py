@@ -23,8 +23,8 @@ import numpy as np
 
 from .config import Experiment
 from .errors import ConfigError, SysidError
-from .filters import settled
 from .estimate import Fit
+from .filters import settled
 from .inertia import PARAMETERS
 from .inertia.consistency import is_consistent
 from .model import Model
@@ -35,7 +35,8 @@ _PACKAGES = ("sysid", "pin", "numpy", "scipy", "yourdfpy", "polars")
 def document(fit: Fit, run: str | Path = "") -> dict:
     """The JSON document of a fit, as the contract has it and more. NaN is None."""
     errors = {part: prediction.errors() for part, prediction in fit.predictions.items()}
-    by_joint = lambda part, key: dict(zip(fit.joints, errors[part][key].tolist()))  # noqa: E731
+    # a joint whose torque never changes has no relative error and no R2
+    by_joint = lambda part, key: {j: _number(v) for j, v in zip(fit.joints, errors[part][key].tolist())}  # noqa: E731
     names, coefficients = fit.model.names, fit.model.coefficients
     certificate = fit.certificate
     held = np.append(np.zeros(10 * fit.model.bodies, dtype=bool), fit.held)
@@ -47,7 +48,7 @@ def document(fit: Fit, run: str | Path = "") -> dict:
     ]
     return {
         "rms": {part: by_joint(part, "rms") for part in errors},
-        "relative_error": {part: {**by_joint(part, "relative_error"), "*": float(errors[part]["total"][1])} for part in errors},
+        "relative_error": {part: {**by_joint(part, "relative_error"), "*": _number(errors[part]["total"][1])} for part in errors},
         "r2": {part: by_joint(part, "r2") for part in errors},
         "objective": fit.objective,
         "iterations": fit.solution.iterations,
@@ -62,6 +63,7 @@ def document(fit: Fit, run: str | Path = "") -> dict:
         "parameters": parameters,
         "weights": None if fit.weights is None else dict(zip(fit.joints, fit.weights.tolist())),
         "filter": fit.filters,
+        "robot": {"joints": list(fit.joints), "locked": fit.model.robot.locked},
         "notices": list(fit.notices),
         "logs": list(fit.logs),
         "versions": versions(),
@@ -126,13 +128,17 @@ def write(fit: Fit, out: str | Path) -> dict:
     from .urdf_export import identified_urdf
 
     path = folder(out)
+    # everything that can fail comes before the first file
     found = document(fit, path)
-    write_atomically(path / "predictions.parquet", lambda p: _predictions(fit).write_parquet(p))
     resolved = fit.experiment.model_copy(update={"preprocess": settled(fit.experiment.preprocess, fit.filters)})
-    write_atomically(path / "experiment.yaml", lambda p: p.write_text(_yaml(_relocated(resolved, path)), encoding="utf-8"))
-    urdf = identified_urdf(fit)
-    write_atomically(path / "identified.urdf", lambda p: p.write_bytes(urdf))
-    write_atomically(path / "identified.yaml", lambda p: p.write_text(_yaml(_identified(fit, _relocated(resolved, path))), encoding="utf-8"))
+    texts = {
+        "experiment.yaml": _yaml(_relocated(resolved, path)).encode(), "identified.urdf": identified_urdf(fit),
+        "identified.yaml": _yaml(_identified(fit, _relocated(resolved, path))).encode(),
+    }  # fmt: skip
+    table = _predictions(fit)
+    write_atomically(path / "predictions.parquet", lambda p: table.write_parquet(p))
+    for name, content in texts.items():
+        write_atomically(path / name, lambda p, c=content: p.write_bytes(c))
     write_json(path / "fit.json", found)
     return found
 
@@ -210,11 +216,19 @@ def read_inertias(source: Path, model: Model) -> np.ndarray:
     """
     path = source / "fit.json" if source.is_dir() else source
     try:
-        values = {entry["name"]: float(entry["value"]) for entry in json.loads(path.read_text(encoding="utf-8"))["parameters"]}
+        found = json.loads(path.read_text(encoding="utf-8"))
+        values = {entry["name"]: float(entry["value"]) for entry in found["parameters"]}
+        before = (sorted(found["robot"]["joints"]), found["robot"]["locked"])
     except OSError as error:
         raise ConfigError(f"prior.source cannot be read ({error.strerror})", where=str(path), allowed="urdf, or a run folder of `sysid fit`") from None
     except (ValueError, KeyError, TypeError):
         raise ConfigError("prior.source is no fit.json", where=str(path), allowed="urdf, or a run folder of `sysid fit`") from None
+    if before != (sorted(model.robot.joints), model.robot.locked):
+        # a locked link is part of the body that carries it: the same name would be another body
+        raise ConfigError(
+            f"the previous run moved {', '.join(before[0])} and locked {before[1] or 'nothing'}; this experiment does not", where=str(path),
+            allowed="the same robot.joints and robot.lock", do="make them equal, or use source: urdf",
+        )  # fmt: skip
     out, known = np.array(model.robot.prior), 0
     for b, body in enumerate(model.robot.bodies):
         names = [f"{body.name}.{p}" for p in PARAMETERS]

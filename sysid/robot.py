@@ -21,6 +21,10 @@ from .errors import RobotError, SysidWarning
 from .inertia import pseudo
 from .inertia.consistency import is_consistent
 
+# Before the names of links in the Pinocchio model of a URDF: a joint and a link may share a name, and Pinocchio keeps the
+# frames of both in one list.
+_LINK = "link:"
+
 
 @dataclass(frozen=True)
 class Body:
@@ -102,10 +106,6 @@ def load(spec: RobotSpec, folder: Path = Path()) -> Robot:
     for body, pi in zip(links, priors):
         model.inertias[body.row + 1] = pin.Inertia.FromDynamicParameters(pseudo.to_pinocchio(pi))
     rotors = _rotors(spec, source, model, joints)
-    limits = [
-        [model.lowerPositionLimit[body.row], model.upperPositionLimit[body.row]]
-        if source.joints[body.joint].type != "continuous" else [-np.inf, np.inf] for body in links
-    ]  # fmt: skip
     model = _tree(model, rotors)
     at = lambda name: model.getJointId(name) - 1  # noqa: E731
     bodies = tuple(replace(body, row=at(body.joint)) for body in links)
@@ -123,7 +123,7 @@ def load(spec: RobotSpec, folder: Path = Path()) -> Robot:
         subspaces=_frozen([model.joints[row + 1].createData().S.ravel() for row in range(model.nv)]),
         transmission=_frozen(transmission), gravity=_frozen(spec.gravity), prior=_frozen(priors),
         damping=_frozen([joint.damping for joint in stated]), friction=_frozen([joint.friction for joint in stated]),
-        limits=_frozen(limits), model=model, source=source, locked=locked,
+        limits=_frozen([joint.limits for joint in stated]), model=model, source=source, locked=locked,
     )  # fmt: skip
 
 
@@ -139,7 +139,7 @@ def _pinocchio_model(source: urdf.Urdf) -> pin.Model:
     # only what was checked: its parser writes to standard error what it thinks of the rest (colours, meshes, limits)
     tree = ElementTree.Element("robot", name=root.get("name") or "robot")
     for name in source.links:
-        ElementTree.SubElement(tree, "link", name=name)
+        ElementTree.SubElement(tree, "link", name=_LINK + name)
     for element in root.findall("joint"):
         joint = source.joints[element.get("name")]
         if joint.type in ("floating", "planar"):
@@ -149,7 +149,9 @@ def _pinocchio_model(source: urdf.Urdf) -> pin.Model:
             )
         # Pinocchio would give a continuous joint two coordinates (cos, sin); an unlimited angle serves here
         kept = ElementTree.SubElement(tree, "joint", name=joint.name, type="revolute" if joint.type == "continuous" else joint.type)
-        kept.extend(child for child in element if child.tag in ("parent", "child", "origin", "axis"))
+        kept.extend(child for child in element if child.tag in ("origin", "axis"))
+        for end, link in (("parent", joint.parent), ("child", joint.child)):
+            ElementTree.SubElement(kept, end, link=_LINK + link)
         if joint.type in urdf.MOVING:
             lower, upper = (repr(float(np.clip(limit, -1e9, 1e9))) for limit in joint.limits)
             ElementTree.SubElement(kept, "limit", lower=lower, upper=upper, effort="1e9", velocity="1e9")
@@ -197,7 +199,7 @@ def _link_priors(source: urdf.Urdf, model: pin.Model, bodies: list[Body]) -> np.
     for body in bodies:
         members = [f for f in model.frames if f.type == pin.FrameType.BODY and f.parentJoint == body.row + 1]
         moved = lambda pi, f: pseudo.displaced(pi, f.placement.rotation, f.placement.translation)  # noqa: E731
-        links = [(source.links[f.name], f) for f in members if f.name in source.links]
+        links = [(source.links[f.name.removeprefix(_LINK)], f) for f in members if f.name.startswith(_LINK)]
         inertials = [moved(link.inertial, f) for link, f in links if link.inertial is not None]
         solids = [moved(link.geometry, f) for link, f in links if link.geometry is not None]
         stated.append(np.sum(inertials, 0) if inertials else None)
@@ -256,7 +258,7 @@ def _rotors(spec: RobotSpec, source: urdf.Urdf, model: pin.Model, joints: tuple[
             if joint not in joints:
                 raise RobotError(f"robot.transmission names the joint {joint!r}", where=where, allowed=", ".join(joints))
             row[joints.index(joint)] = ratio
-        frame = model.frames[model.getFrameId(rotor.on, pin.FrameType.BODY)]
+        frame = model.frames[model.getFrameId(_LINK + rotor.on, pin.FrameType.BODY)]
         placement = frame.placement * pin.SE3(urdf.rotation_rpy(rotor.rpy), np.array(rotor.xyz))
         axis = np.array(rotor.axis) / np.linalg.norm(rotor.axis)
         out.append(_Rotor(rotor.joint, frame.parentJoint, placement, axis, inertia, row))

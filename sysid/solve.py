@@ -33,9 +33,12 @@ _LARGEST_RADIUS = 1e6
 _ROUNDING = 1e-14
 # Newton hands over when the trust region, not the model, ends a step that promises less than this share of the
 # objective, or after this many iterations.
-_CRAWLING, _PATIENCE = 0.1, 25
+_CRAWLING, _PATIENCE = 0.4, 25
 # A coefficient below this share of its natural size, pushed down further, has gone to zero.
 _ZERO = 1e-10
+# Without a prior, directions that no data see keep where they are: a ridge this small against the seen ones.
+_UNSEEN = 1e-12
+_TINIEST = 1e-300  # what stands for zero where a logarithm is taken
 
 
 @dataclass(frozen=True)
@@ -53,13 +56,14 @@ class Coordinates:
         pi = self.parameterization.parameters(theta[:count].reshape(self.bodies, 10))
         with np.errstate(over="ignore"):  # an infinite coefficient has an infinite objective and is stepped back from
             c = np.where(self.positive, np.exp(np.where(self.positive, theta[count:], 0.0)), theta[count:])
+            c = np.where(self.positive & (c <= _TINIEST), 0.0, c)
         return np.concatenate([pi.ravel(), c])
 
     def theta(self, x) -> np.ndarray:
         """theta (size,) of a possible x (size,); a positive coefficient of zero becomes a very small one."""
         count = 10 * self.bodies
         c = np.asarray(x[count:], dtype=float)
-        logs = np.log(np.where(self.positive, np.maximum(c, 1e-300), 1.0))
+        logs = np.log(np.where(self.positive, np.maximum(c, 0.5 * _TINIEST), 1.0))
         inner = self.parameterization.inverse(x[:count].reshape(self.bodies, 10)).ravel()
         return np.concatenate([inner, np.where(self.positive, logs, c)])
 
@@ -107,10 +111,10 @@ def solve(
             theta, x, value = inside
             break
         inside = theta, x, value
-        step, promise, length = _step(gradient, hessian, metric, radius)
+        step, promise, length = _step(gradient, hessian, metric, radius, ridge=0.0 if objective.weight > 0.0 else _UNSEEN)
         trial = theta + step
-        trial_x = coordinates.physical(trial)
-        with np.errstate(all="ignore"):
+        with np.errstate(all="ignore"):  # a step too far has no number for its objective, and is stepped back from
+            trial_x = coordinates.physical(trial)
             trial_value = objective.value(trial_x) if np.isfinite(trial_x).all() else np.inf
         converged = promise <= max(tolerance**2, _ROUNDING) * abs(value) and length < radius
         before = radius
@@ -126,20 +130,20 @@ def solve(
         values.append(value)
         if callback:
             callback(iteration, value)
-        crawling = promise < _CRAWLING * abs(value) and (length > 0.99 * before or ratio < 0.25)
+        crawling = promise < _CRAWLING * abs(values[-2]) and (length > 0.99 * before or ratio < 0.25)
         if converged or (constrained and (crawling or iteration >= _PATIENCE)):
             break
     newton = iteration
     if constrained and iteration < max_iterations and not converged:
-        iterates, converged = interior.minimise(
+        iterates, found, converged = interior.minimise(
             objective, coordinates.positive, coordinates.held, x, tolerance=tolerance, max_iterations=max_iterations - iteration
         )
-        for x in iterates[1:]:
+        for x, value in zip(iterates[1:], found[1:]):
             trace.append(x)
-            values.append(objective.value(x))
+            values.append(value)
             iteration += 1
             if callback:
-                callback(iteration, values[-1])
+                callback(iteration, value)
         x, value = trace[-1], values[-1]
     return Solution(x, value, iteration, converged, tuple(trace), tuple(values), newton)
 
@@ -166,9 +170,7 @@ class _Problem:
         c, positive = x[count:], coordinates.positive
         chain = np.where(positive, c, 1.0)
         # (R Gamma)'(R Gamma), built from the triangle so that weak directions keep their digits
-        image = np.empty_like(self.root)
-        image[:, :count] = np.einsum("rbk,bkl->rbl", self.root[:, :count].reshape(len(self.root), -1, 10), gamma).reshape(len(self.root), count)
-        image[:, count:] = self.root[:, count:] * chain
+        image = interior.scaled_columns(self.root, gamma, chain)
         hessian = 2.0 * image.T @ image
         pulled = coordinates.parameterization.hessian(blocks, slope[:count].reshape(-1, 10))
         if objective.weight:
@@ -176,9 +178,7 @@ class _Problem:
         add_blocks(hessian, pulled)
         own = np.arange(count, len(theta))
         hessian[own, own] += np.where(positive, slope[count:] * c, 0.0)
-        gradient = np.concatenate([
-            np.einsum("bkl,bk->bl", gamma, slope[:count].reshape(-1, 10)).ravel(), slope[count:] * chain,
-        ])  # fmt: skip
+        gradient = interior.scaled_gradient(slope, gamma, chain)
         at_zero = positive & (c < _ZERO * self.natural) & (slope[count:] > 0.0)
         frozen = own[at_zero | coordinates.held]
         gradient[frozen] = 0.0
@@ -202,12 +202,12 @@ class _Problem:
         return np.swapaxes(upper, -1, -2)
 
 
-def _step(gradient, hessian, metric, radius):
+def _step(gradient, hessian, metric, radius, *, ridge: float):
     """The minimiser of the quadratic model within the ball; its promised decrease and its length."""
     factors, scales = metric
     count = 10 * len(factors)
     inverse = np.linalg.inv(factors)  # L^-1, block by block
-    g = np.concatenate([np.einsum("bij,bj->bi", inverse, gradient[:count].reshape(-1, 10)).ravel(), gradient[count:] * scales])
+    g = np.concatenate([(inverse @ gradient[:count].reshape(-1, 10, 1)).ravel(), gradient[count:] * scales])
     h = hessian.copy()
     shape = (len(factors), 10, -1)
     h[:count] = (inverse @ h[:count].reshape(shape)).reshape(count, -1)
@@ -215,9 +215,11 @@ def _step(gradient, hessian, metric, radius):
     h = h.T.copy()
     h[:count] = (inverse @ h[:count].reshape(shape)).reshape(count, -1)
     h[count:] *= scales[:, None]
-    y = _ball(g, 0.5 * (h + h.T), radius)
+    h = 0.5 * (h + h.T)
+    h.flat[:: len(h) + 1] += ridge * np.max(np.diagonal(h))
+    y = _ball(g, h, radius)
     promise = -(g @ y + 0.5 * y @ h @ y)
-    step = np.concatenate([np.einsum("bji,bj->bi", inverse, y[:count].reshape(-1, 10)).ravel(), y[count:] * scales])
+    step = np.concatenate([(np.swapaxes(inverse, -1, -2) @ y[:count].reshape(-1, 10, 1)).ravel(), y[count:] * scales])
     return step, float(promise), float(np.linalg.norm(y))
 
 
@@ -228,6 +230,8 @@ def _ball(g, h, radius):
         y = dpotrs(factor, -g, lower=1)[0]
         if np.linalg.norm(y) <= radius:
             return y
+    if (y := _on_the_sphere(g, h, radius)) is not None:
+        return y
     values, vectors = np.linalg.eigh(h)
     along = vectors.T @ g
     floor = max(0.0, -values[0])
@@ -247,3 +251,35 @@ def _ball(g, h, radius):
         slope = np.sum(scaled**2 / (values + shift)) / size
         shift = max(shift + (size - radius) / radius * size / slope, 0.5 * (low + shift) if size < radius else shift, low)
     return -vectors @ (along / (values + shift))
+
+
+def _on_the_sphere(g, h, radius):
+    """The same where (h + shift) y = -g with |y| = radius has a shift that factorizations find; None where they do not.
+
+    More & Sorensen's Newton iteration on 1 / radius - 1 / |y|; a factorization costs a tenth of the eigenvalues.
+    """
+    diagonal = np.arange(len(g))
+    scale = np.linalg.norm(h, ord="fro")
+    low, high = max(0.0, -h[diagonal, diagonal].min()), np.linalg.norm(g) / radius + scale
+    shift = max(low, 1e-3 * scale) if low == 0.0 else low * (1.0 + 1e-3)
+    for _ in range(12):
+        shifted = h.copy()
+        shifted[diagonal, diagonal] += shift
+        factor, fault = dpotrf(shifted, lower=1)
+        if fault:
+            low = max(low, shift)
+            shift = max(np.sqrt(low * high) if low > 0.0 else 1e-3 * high, low + 0.01 * (high - low))
+            continue
+        y = dpotrs(factor, -g, lower=1)[0]
+        length = np.linalg.norm(y)
+        if abs(length - radius) <= 0.05 * radius:
+            return y * (radius / length)
+        if length > radius:
+            low = max(low, shift)
+        else:
+            high = min(high, shift)
+        w = dpotrs(factor, y, lower=1)[0]
+        shift += (length / radius - 1.0) * length**2 / (y @ w)
+        if not low < shift < high:
+            shift = max(np.sqrt(max(low, 0.0) * high), low + 0.01 * (high - low))
+    return None

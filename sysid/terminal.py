@@ -38,19 +38,21 @@ def show_fit(fit: Fit, document: dict) -> None:
     for joint, prismatic in zip(fit.joints, robot.prismatic):
         table.add_row(
             escape(joint), "N" if prismatic else "N m", f"{document['rms']['train'][joint]:.4g}", f"{document['rms']['test'][joint]:.4g}",
-            f"{100 * document['relative_error']['test'][joint]:.2f} %", f"{document['r2']['test'][joint]:.4f}",
+            _percent(document["relative_error"]["test"][joint]), _four(document["r2"]["test"][joint]),
         )  # fmt: skip
     console.print(table)
     certificate = document["certificate"]
-    print(f"relative error, all joints: train {100 * document['relative_error']['train']['*']:.2f} %, test {100 * document['relative_error']['test']['*']:.2f} %")
+    print(f"relative error, all joints: train {_percent(document['relative_error']['train']['*'])}, test {_percent(document['relative_error']['test']['*'])}")
     print(f"objective {document['objective']:.8g} after {document['iterations']} iterations, {'converged' if document['converged'] else 'NOT CONVERGED'}")
-    gap = "no bound" if certificate["gap"] is None else f"at most {certificate['gap']:.1e} of it can be gained"
+    known = certificate["gap"] is not None and certificate["gap"] < 1.0
+    gap = f"at most {certificate['gap']:.1e} of it can be gained" if known else "no bound was found"
     print(f"global optimum: {'proven' if certificate['globally_optimal'] else 'not proven'} ({gap})")
     for name, slope in certificate["at_zero"].items():
         print(f"  {name} went to zero and is held there (gradient {slope:+.3g})")
     print(f"every body physically possible: {'yes' if document['physically_consistent'] else 'NO'}")
     weak = sum(entry["from_data"] < _LOW for entry in document["parameters"])
-    print(f"{len(document['parameters'])} parameters, {weak} of them given by the prior rather than the data (from_data below {_LOW:g})")
+    by = "given by the prior rather than the data" if fit.experiment.prior.weight > 0 else "not determined by the data"
+    print(f"{len(document['parameters'])} parameters, {weak} of them {by} (from_data below {_LOW:g})")
     _show_filter(document["filter"])
     _show_notices(document)
     print(f"run folder: {document['run']}")
@@ -77,12 +79,20 @@ def show_comparison(document: dict) -> None:
     table.add_column("relative", justify="right")
     for entry in document["experiments"]:
         cells = [f"{entry['rms_test'][joint]:.4g}" if joint in entry["rms_test"] else "" for joint in joints]
-        table.add_row(escape(entry["name"]), *cells, f"{100 * entry['relative_error']['*']:.2f} %")
+        table.add_row(escape(entry["name"]), *cells, _percent(entry["relative_error"]["*"]))
     console.print(table)
     for entry in document["differences"]:
         se = "unknown: too few blocks" if entry["se"] is None else f"{entry['se']:.2g}"
         print(f"{entry['joint']}: {entry['from']} -> {entry['to']} {entry['delta_rms']:+.4g} (standard error {se})")
     _show_notices(document)
+
+
+def _percent(share: float | None) -> str:
+    return "-" if share is None else f"{100 * share:.2f} %"
+
+
+def _four(value: float | None) -> str:
+    return "-" if value is None else f"{value:.4f}"
 
 
 def show_effects(found: list[dict]) -> None:

@@ -1,11 +1,14 @@
 """How sure each parameter is, and whether the data or the prior said it.
 
-Residuals of smoothed signals are correlated over time, so the noise of the estimate is taken from the scores of
-whole blocks (a sandwich), not from single samples. The prior enters as what it claims to know:
+Residuals of smoothed signals are correlated over time, so the noise of the estimate is not taken from single samples
+but from what leaving a whole block out would change (a jackknife, which also allows for blocks that few others stand
+in for), with the products of neighbouring blocks, as correlation does not stop at a block's edge. The prior enters as
+what it claims to know:
 
-    cov = H^-1 (sum_b s_b s_b' + 2 sigma^2 P) H^-1,    H = 2 R'R + P,  P the prior's Hessian.
+    d_b = (H - 2 R_b'R_b)^-1 s_b,      H = 2 R'R + P,  P the prior's Hessian, s_b the block's score,
+    cov = sum_b sum_l w_l d_b d_(b+l)' + 2 sigma^2 H^-1 P H^-1,      w_0 = 1, w_1 = 2/3, w_2 = 1/3.
 
-Source: Cameron & Miller 2015 (cluster-robust variance); White 1980.
+Source: Cameron & Miller 2015 (jackknife of clusters); Newey & West 1987 (neighbours).
 """
 
 from dataclasses import dataclass
@@ -36,8 +39,6 @@ def estimate(objective: Objective, compressed: Compressed, x: np.ndarray, fixed:
     """
     size = len(x)
     free = np.flatnonzero(~fixed)
-    scores = compressed.scores(x, weights)
-    meat = scores.T @ scores * compressed.blocks / max(compressed.blocks - 1, 1)
     data = objective.data_hessian()
     prior = add_blocks(np.zeros((size, size)), objective.prior_hessian(x)) if objective.weight else np.zeros((size, size))
     misfit = objective.misfit(x)
@@ -45,7 +46,8 @@ def estimate(objective: Objective, compressed: Compressed, x: np.ndarray, fixed:
     pick = np.ix_(free, free)
     inverse, undetermined = _inverse(data[pick] + prior[pick])
     covariance = np.full((size, size), np.nan)
-    covariance[pick] = inverse @ (meat[pick] + 2.0 * variance * prior[pick]) @ inverse
+    moves = _left_out(compressed, x, weights, data + prior, free)
+    covariance[pick] = _neighbours(moves) + 2.0 * variance * inverse @ prior[pick] @ inverse
     total = np.diagonal(inverse)
     from_noise = np.einsum("ij,jk,ki->i", inverse, data[pick], inverse)
     share = np.zeros(size)
@@ -53,6 +55,31 @@ def estimate(objective: Objective, compressed: Compressed, x: np.ndarray, fixed:
     std = np.full(size, np.nan)
     std[free] = np.where(undetermined, np.nan, np.sqrt(np.clip(np.diagonal(covariance)[free], 0.0, None)))
     return Uncertainty(covariance, std, share)
+
+
+_NEIGHBOURS = {1: 2.0 / 3.0, 2: 1.0 / 3.0}
+
+
+def _left_out(compressed: Compressed, x, weights, hessian, free) -> np.ndarray:
+    """(blocks, free) change of the estimate when a block is left out, to first order in the prior's curvature."""
+    scores = compressed.scores(x, weights)
+    own = np.zeros((compressed.blocks,) + hessian.shape)
+    for factor in compressed.factors:
+        scale = 2.0 if weights is None else 2.0 * weights[factor.joint] ** 2
+        own[factor.block][np.ix_(factor.columns, factor.columns)] += scale * factor.triangle[:, :-1].T @ factor.triangle[:, :-1]
+    moves = np.zeros((compressed.blocks, len(free)))
+    pick = np.ix_(free, free)
+    for b in range(compressed.blocks):
+        moves[b] = _inverse((hessian - own[b])[pick])[0] @ scores[b, free]
+    return moves * np.sqrt(max(compressed.blocks - 1, 1) / compressed.blocks)
+
+
+def _neighbours(moves: np.ndarray) -> np.ndarray:
+    total = moves.T @ moves
+    for lag, weight in _NEIGHBOURS.items():
+        product = moves[:-lag].T @ moves[lag:]
+        total = total + weight * (product + product.T)
+    return total
 
 
 def _inverse(hessian):

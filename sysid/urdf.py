@@ -46,7 +46,7 @@ class Joint:
 
 @dataclass(frozen=True)
 class Urdf:
-    """The checked file: its text and its tree."""
+    """The checked file: its text (comments and encoding aside) and its tree."""
 
     path: Path
     text: str
@@ -130,12 +130,10 @@ def parse(data: bytes, path: Path) -> Urdf:
         if joint.name in joints:
             raise RobotError(f"joint {joint.name!r} appears twice", where=str(path), do="rename one")
         joints[joint.name] = joint
+    _check_rest(root, path)
     _check_tree(links, joints, path)
-    try:
-        text = data.decode("utf-8-sig")
-    except UnicodeDecodeError:  # another encoding, which the XML declares
-        text = ElementTree.tostring(root, encoding="unicode")
-    return Urdf(path=path, text=text, links=links, joints=joints)
+    root.set("name", root.get("name") or "robot")
+    return Urdf(path=path, text=ElementTree.tostring(root, encoding="unicode"), links=links, joints=joints)
 
 
 def _safe_xml(data: bytes, path: Path) -> ElementTree.Element:
@@ -153,14 +151,19 @@ def _safe_xml(data: bytes, path: Path) -> ElementTree.Element:
 
 
 def _numbers(element, attribute: str, count: int, default: str, path: Path, owner: str) -> np.ndarray:
-    text = (element.get(attribute) if element is not None else None) or default
+    text = element.get(attribute, default) if element is not None else default
     try:
         values = np.array([float(word) for word in text.split()])
     except ValueError:
         values = np.array([])
     if values.shape != (count,) or not np.isfinite(values).all():
         tag = element.tag if element is not None else attribute
-        raise RobotError(f"{owner}: <{tag} {attribute}={text!r}>", where=str(path), allowed="a finite number" if count == 1 else f"{count} finite numbers", do="correct it")
+        raise RobotError(
+            f"{owner}: <{tag} {attribute}={text!r}>",
+            where=str(path),
+            allowed="a finite number" if count == 1 else f"{count} finite numbers",
+            do="correct it",
+        )
     return values
 
 
@@ -189,10 +192,7 @@ def _link(element, path: Path) -> Link:
     if (stated := element.find("inertial")) is not None:
         turn, com = _pose(stated, path, owner)
         mass = _numbers(stated.find("mass"), "value", 1, "0", path, owner)[0]
-        xx, xy, xz, yy, yz, zz = (
-            _numbers(stated.find("inertia"), key, 1, "0", path, owner)[0]
-            for key in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
-        )
+        xx, xy, xz, yy, yz, zz = (_numbers(stated.find("inertia"), key, 1, "0", path, owner)[0] for key in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"))
         central = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
         inertial = pseudo.from_central(mass, com, turn @ central @ turn.T)
     seen, touched = ([_solid(shape, path, owner) for shape in element.findall(kind)] for kind in ("visual", "collision"))
@@ -234,17 +234,40 @@ def _joint(element, path: Path) -> Joint:
             raise RobotError(f"joint {name!r} names no {end} link", where=str(path), allowed=f'<{end} link="…"/>', do="name it")
         ends.append(found.get("link"))
     dynamics = element.find("dynamics")
-    damping, friction = (
-        _numbers(dynamics, key, 1, "0", path, f"joint {name!r}")[0] for key in ("damping", "friction")
-    )
+    damping, friction = (_numbers(dynamics, key, 1, "0", path, f"joint {name!r}")[0] for key in ("damping", "friction"))
     # `lower` and `upper` are 0 where a limit leaves them out
-    lower, upper = (_numbers(limit, key, 1, "0", path, f"joint {name!r}")[0] for key in ("lower", "upper")) if (limit := element.find("limit")) is not None else (-math.inf, math.inf)
+    lower, upper = (
+        (_numbers(limit, key, 1, "0", path, f"joint {name!r}")[0] for key in ("lower", "upper"))
+        if (limit := element.find("limit")) is not None
+        else (-math.inf, math.inf)
+    )
     _pose(element, path, f"joint {name!r}")
     if kind in MOVING:
         axis = _numbers(element.find("axis"), "xyz", 3, "1 0 0", path, f"joint {name!r}")
         if not np.linalg.norm(axis) > 0:
             raise RobotError(f"joint {name!r} has the axis 0 0 0", where=str(path), allowed="a direction")
     return Joint(name, kind, ends[0], ends[1], damping, friction, (lower, upper) if kind != "continuous" else (-math.inf, math.inf))
+
+
+# What identification does not use, but the identified URDF repeats: {element: {attribute: how many numbers}}.
+_REPEATED = {
+    "color": {"rgba": 4}, "mesh": {"scale": 3}, "limit": {"effort": 1, "velocity": 1}, "mimic": {"multiplier": 1, "offset": 1},
+    "calibration": {"rising": 1, "falling": 1}, "safety_controller": {"soft_lower_limit": 1, "soft_upper_limit": 1, "k_position": 1, "k_velocity": 1},
+}  # fmt: skip
+_REFERS = {"mesh": "filename", "texture": "filename", "mimic": "joint"}
+
+
+def _check_rest(root, path: Path) -> None:
+    for owner in [*root.findall("link"), *root.findall("joint"), *root.findall("material")]:
+        for element in owner.iter():
+            for attribute, count in _REPEATED.get(element.tag, {}).items():
+                _numbers(element, attribute, count, " ".join("0" * count), path, f"{owner.tag} {owner.get('name')!r}")
+            if (key := _REFERS.get(element.tag)) and not element.get(key):
+                raise RobotError(f"{owner.tag} {owner.get('name')!r} has a <{element.tag}> without {key}", where=str(path), do="name it or remove it")
+            if element.tag == "geometry" and not len(element):
+                raise RobotError(
+                    f"link {owner.get('name')!r} has an empty <geometry>", where=str(path), allowed="box, cylinder, sphere, mesh", do="remove it"
+                )
 
 
 def _check_tree(links, joints, path: Path) -> None:
@@ -255,13 +278,17 @@ def _check_tree(links, joints, path: Path) -> None:
         for end, link in (("parent", joint.parent), ("child", joint.child)):
             if link not in links:
                 raise RobotError(
-                    f"joint {joint.name!r} has the {end} link {link!r}, which is missing", where=str(path),
-                    allowed=_some(links), do="add the link or correct the name",
+                    f"joint {joint.name!r} has the {end} link {link!r}, which is missing",
+                    where=str(path),
+                    allowed=_some(links),
+                    do="add the link or correct the name",
                 )
         if joint.child in parent_joint:
             raise RobotError(
                 f"link {joint.child!r} hangs on two joints, {parent_joint[joint.child].name!r} and {joint.name!r} (a loop)",
-                where=str(path), allowed="a tree", do="cut the loop at one joint",
+                where=str(path),
+                allowed="a tree",
+                do="cut the loop at one joint",
             )
         parent_joint[joint.child] = joint
     roots = [name for name in links if name not in parent_joint]

@@ -187,7 +187,12 @@ def test_predict_on_any_log(leg):
 
 def test_results_are_never_half_written(leg, tmp_path, monkeypatch):
     out = tmp_path / "run"
-    monkeypatch.setattr(results, "_yaml", lambda tree: (_ for _ in ()).throw(OSError(28, "No space left on device")))
+    def full(path, content):
+        with open(path, "wb") as file:
+            file.write(content[:10])
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Path, "write_bytes", full)
     with pytest.raises(sysid.SysidError, match="No space left"):
         results.write(leg, out)
     assert [p.name for p in out.iterdir()] == ["predictions.parquet"]  # whole, and nothing temporary beside it
@@ -210,3 +215,33 @@ def test_a_search_that_is_cut_short_ends_with_status_one(tmp_path):
     assert done.returncode == 1
     document = json.loads(done.stdout)
     assert document["converged"] is False and document["certificate"]["globally_optimal"] is False
+
+
+def test_a_previous_run_with_other_locks_is_refused(run, tmp_path):
+    """A locked link is part of the body that carries it: under the same name it is another body."""
+    from sysid import pipeline
+
+    out, _ = run
+    text = (ROOT / "configs" / "cheetah3.yaml").read_text().replace("../data/", f"{ROOT}/data/").replace("source: urdf", f"source: {out}")
+    (tmp_path / "locked.yaml").write_text(text)
+    spec = sysid.load(tmp_path / "locked.yaml")
+    locked = spec.robot.model_copy(update={"joints": ["abad", "hip"], "rotors": spec.robot.rotors[:2]})
+    with pytest.raises(sysid.SysidError, match="previous run moved"):
+        pipeline.build(spec.model_copy(update={"robot": locked}))
+
+
+def test_a_locked_joint_that_shares_its_link_s_name():
+    spec = config.load(ROOT / "configs" / "cheetah3.yaml")
+    leg = spec.robot.model_copy(update={"joints": ["hip", "knee"], "rotors": spec.robot.rotors[1:]})
+    machine = robot.load(leg, spec.folder)
+    assert [body.name for body in machine.bodies] == ["thigh", "shank", "hip_rotor", "knee_rotor"]
+
+
+def test_without_a_prior_what_no_data_see_stays_where_it_was():
+    spec = config.load(ROOT / "configs" / "cheetah3.yaml")
+    linear = {"model": spec.model.model_copy(update={"inertia": "linear"}), "prior": spec.prior.model_copy(update={"weight": 0.0})}
+    fit = sysid.fit(spec.model_copy(update=linear))
+    x = dict(zip(fit.model.names, fit.x))
+    assert abs(x["abad.m"] - 1.5) < 0.5 and np.abs(fit.x).max() < 100
+    if not fit.physically_consistent:
+        assert any("impossible bodies" in notice for notice in fit.notices)

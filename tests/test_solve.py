@@ -161,7 +161,7 @@ def test_interior_point_alone_from_anywhere():
     ends = []
     for _ in range(3):
         x = problem.coordinates.physical(rng.uniform(-1, 1, len(problem.start)))
-        iterates, converged = interior.minimise(problem.objective, problem.coordinates.positive, problem.coordinates.held, x, tolerance=1e-8)
+        iterates, _, converged = interior.minimise(problem.objective, problem.coordinates.positive, problem.coordinates.held, x, tolerance=1e-8)
         assert converged and len(iterates) < 60
         ends.append(problem.objective.value(iterates[-1]))
     np.testing.assert_allclose(ends, ends[0], rtol=1e-12)

@@ -1,7 +1,5 @@
 """Coulomb friction."""
 
-import numpy as np
-
 from ..effect import Linear, TorqueEffect
 
 
@@ -18,4 +16,4 @@ class Coulomb(TorqueEffect):
     Fc = Linear("N m", lower=0, says="friction torque while sliding")
 
     def columns(self, motion, joint):
-        return np.sign(motion.qd[None, :, joint])
+        return motion.direction(joint)[None]

@@ -12,16 +12,19 @@ import numpy as np
 
 from .pseudo import PSEUDO_BASIS, to_pseudo
 
+_ROWS = PSEUDO_BASIS.reshape(10, 16)
+
 
 def pseudo_gradient(matrix) -> np.ndarray:
     """Gradient (..., 10) in pi of <matrix, J(pi)> for symmetric matrices (..., 4, 4)."""
-    return np.einsum("...ab,kab->...k", matrix, PSEUDO_BASIS)
+    return matrix.reshape(matrix.shape[:-2] + (16,)) @ _ROWS.T
 
 
 def affine_metric(inverse) -> np.ndarray:
     """tr(J^-1 E_i J^-1 E_j) (..., 10, 10): the affine-invariant metric on bodies, from J^-1 (..., 4, 4)."""
-    turned = np.einsum("...ab,kbc->...kac", inverse, PSEUDO_BASIS)
-    return np.einsum("...iab,...jba->...ij", turned, turned, optimize=True)
+    turned = inverse[..., None, :, :] @ PSEUDO_BASIS
+    flat = turned.shape[:-2] + (16,)
+    return turned.reshape(flat) @ np.swapaxes(np.swapaxes(turned, -1, -2).reshape(flat), -1, -2)
 
 
 class Divergence(ABC):

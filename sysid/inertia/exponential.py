@@ -6,9 +6,9 @@ from .parameterization import Parameterization
 from .pseudo import PARAMETER_BASIS, dual, from_pseudo, to_pseudo
 
 _INDEX = ((0, 0), (1, 1), (2, 2), (3, 3), (0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3))
-_BASIS = np.zeros((10, 4, 4))
+BASIS = np.zeros((10, 4, 4))
 for _k, (_i, _j) in enumerate(_INDEX):
-    _BASIS[_k, _i, _j] = _BASIS[_k, _j, _i] = 1.0
+    BASIS[_k, _i, _j] = BASIS[_k, _j, _i] = 1.0
 
 # Below this spread of eigenvalues the divided difference comes from its series, above it from the quotient;
 # at 0.1 both are right to about 1e-15.
@@ -54,7 +54,7 @@ class Exponential(Parameterization):
 
     @staticmethod
     def _symmetric(theta):
-        return np.einsum("...k,kab->...ab", np.asarray(theta, dtype=float), _BASIS)
+        return np.einsum("...k,kab->...ab", np.asarray(theta, dtype=float), BASIS)
 
     def parameters(self, theta):
         values, vectors = np.linalg.eigh(self._symmetric(theta))
@@ -71,7 +71,7 @@ class Exponential(Parameterization):
         # Daleckii-Krein: d exp(Q)[A] = V (F * V'AV) V'
         values, vectors = np.linalg.eigh(self._symmetric(theta))
         divided = first_divided_difference(values[..., :, None], values[..., None, :])
-        turned = np.einsum("...ai,kab,...bj->...kij", vectors, _BASIS, vectors, optimize=True)
+        turned = np.einsum("...ai,kab,...bj->...kij", vectors, BASIS, vectors, optimize=True)
         targets = np.einsum("...ai,kab,...bj->...kij", vectors, PARAMETER_BASIS, vectors, optimize=True)
         return np.einsum("...kij,...ij,...lij->...kl", targets, divided, turned, optimize=True)
 
@@ -80,7 +80,7 @@ class Exponential(Parameterization):
         divided = second_divided_difference(
             values[..., :, None, None], values[..., None, :, None], values[..., None, None, :]
         )
-        turned = np.einsum("...ai,kab,...bj->...kij", vectors, _BASIS, vectors, optimize=True)
+        turned = np.einsum("...ai,kab,...bj->...kij", vectors, BASIS, vectors, optimize=True)
         pull = np.swapaxes(vectors, -1, -2) @ dual(gradient) @ vectors
         weighted = divided * pull[..., :, None, :]  # f[i, j, k] G[i, k]; summed over i, k and the inner j
         half = np.einsum("...pij,...ijk,...qjk->...pq", turned, weighted, turned, optimize=True)

@@ -73,9 +73,9 @@ class LogCholesky(Parameterization):
         factor = self.factor(theta)
         image = factor @ self._reference  # U J0
         # d pi_k = 2 <P_k U J0, dU>
-        slope = 2.0 * np.einsum("kab,...bc->...kac", PARAMETER_BASIS, image)
+        slope = 2.0 * (PARAMETER_BASIS @ image[..., None, :, :])
         gamma = np.empty(theta.shape[:-1] + (10, 10))
-        gamma[..., 0] = np.einsum("...kac,...ac->...k", slope, factor)
+        gamma[..., 0] = np.sum(slope * factor[..., None, :, :], axis=(-2, -1))
         gamma[..., 1:] = slope[..., _ROW, _COLUMN] * self._directions(factor, theta)[..., None, :]
         return gamma
 
@@ -88,7 +88,7 @@ class LogCholesky(Parameterization):
         first = slope[..., _ROW, _COLUMN] * weight  # gradient in d, s, t
         out = np.empty(theta.shape[:-1] + (10, 10))
         # every entry of U carries e^alpha, so alpha differentiates pi to 2 pi
-        out[..., 0, 0] = 2.0 * np.einsum("...ac,...ac->...", slope, factor)
+        out[..., 0, 0] = 2.0 * np.sum(slope * factor, axis=(-2, -1))
         out[..., 0, 1:] = out[..., 1:, 0] = 2.0 * first
         # 2 <G dU_j J0, dU_i> = 2 G[row_i, row_j] J0[column_i, column_j]
         inner = 2.0 * pull[..., _ROW[:, None], _ROW[None, :]] * self._reference[..., _COLUMN[:, None], _COLUMN[None, :]]

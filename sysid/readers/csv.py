@@ -51,7 +51,9 @@ class CsvTable(Table):
             except pl.exceptions.PolarsError:
                 frame = self._frame(wanted, None)  # as text, to find the cell that is no number
         except (pl.exceptions.PolarsError, OSError) as error:
-            raise LogError(f"cannot be read as CSV ({str(error).splitlines()[0]})", where=f"{self.path}{self._longest()}", do="correct the row or leave it out") from None
+            raise LogError(
+                f"cannot be read as CSV ({str(error).splitlines()[0]})", where=f"{self.path}{self._longest()}", do="correct the row or leave it out"
+            ) from None
         if self._truncated() and frame.height:
             warnings.warn(SysidWarning(f"{self.path.name}: the last row is truncated and was dropped"), stacklevel=2)
             frame = frame.head(frame.height - 1)

@@ -30,7 +30,9 @@ class Mat5Table(ArrayTable):
             for name, value in _variables(path.read_bytes()):
                 self._collect(name, value)
         except (ValueError, KeyError, IndexError, struct.error, zlib.error, RecursionError, OSError, MemoryError) as error:
-            raise LogError(f"the MAT file is corrupt ({str(error) or type(error).__name__})", where=str(path), do="save it again, with -v7 or -v7.3") from None
+            raise LogError(
+                f"the MAT file is corrupt ({str(error) or type(error).__name__})", where=str(path), do="save it again, with -v7 or -v7.3"
+            ) from None
         super().__init__(path, {name: array.shape for name, array in self._arrays.items()})
 
     def _collect(self, name, value):

@@ -55,7 +55,12 @@ class Mat73Table(ArrayTable):
         except Exception as error:  # as above
             raise self._unreadable(f"variable {name!r}", error) from None
         if values is None:
-            raise LogError(f"the cells of {name!r} differ in size", where=str(self.path), allowed="one sample of the same size in each cell", do="correct data.columns")
+            raise LogError(
+                f"the cells of {name!r} differ in size",
+                where=str(self.path),
+                allowed="one sample of the same size in each cell",
+                do="correct data.columns",
+            )
         return values
 
     def _cells(self, dataset) -> np.ndarray | None:

@@ -20,7 +20,9 @@ class NpzTable(ArrayTable):
                 self._arrays = {name: archive[name] for name in archive.files}
         except Exception as error:  # zipfile, zlib and NumPy's header parser raise what they like on corrupt bytes
             said = (str(error).splitlines() or [type(error).__name__])[0]
-            raise LogError(f"not a readable NPZ file ({said})", where=str(path), allowed="plain arrays, not pickled objects", do="save it again with numpy.savez") from None
+            raise LogError(
+                f"not a readable NPZ file ({said})", where=str(path), allowed="plain arrays, not pickled objects", do="save it again with numpy.savez"
+            ) from None
         super().__init__(path, {name: array.shape for name, array in self._arrays.items()})
 
     def fetch(self, name):

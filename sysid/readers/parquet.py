@@ -42,7 +42,9 @@ class ParquetTable(Table):
             except _CORRUPT as error:
                 raise self._unreadable(error, name) from None
             if values.null_count():
-                raise LogError("a value is missing", where=f"{self.path} column {name!r} row {int(values.is_null().arg_max())}", do="leave the row out")
+                raise LogError(
+                    "a value is missing", where=f"{self.path} column {name!r} row {int(values.is_null().arg_max())}", do="leave the row out"
+                )
             out[name] = values.to_numpy()
         return out
 

@@ -23,10 +23,11 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from ..inertia import PARAMETERIZATIONS, Eigenvalue, is_consistent, violations
+from ..inertia import PARAMETERIZATIONS, Eigenvalue, Exponential, is_consistent, violations
 from ..inertia.divergence import Euclidean
 from ..inertia.eigenvalue import rotation
-from ..inertia.pseudo import from_central, rotational_inertia
+from ..inertia.exponential import BASIS as EXPONENTIAL_BASIS
+from ..inertia.pseudo import from_central, from_pseudo, rotational_inertia
 from ..objective import Objective
 from ..regressor import BodyMotion, wrench_columns
 from ..solve import Coordinates, solve
@@ -45,6 +46,35 @@ class Reading:
     wrench: str = "moment and force"  # moment and force | force only
     jacobian: str = "analytic"  # analytic | differences
     tolerance: float = 1e-6
+    series: int = 0  # terms of the exponential's power series, as section IV-A writes it; 0 for the exact map
+
+
+class SeriesExponential(Exponential):
+    """The exponential map cut off after some terms of its power series, with the exact Jacobian of what is left."""
+
+    def __init__(self, terms: int):
+        self._terms = terms
+
+    def _sums(self, theta):
+        q = self._symmetric(theta)
+        term, change, total, slope = np.eye(4), np.zeros((10, 4, 4)), np.eye(4), np.zeros((10, 4, 4))
+        for k in range(1, self._terms + 1):
+            change = (change @ q + term @ EXPONENTIAL_BASIS) / k
+            term = term @ q / k
+            total, slope = total + term, slope + change
+        return total, slope
+
+    def parameters(self, theta):
+        """pi (10,) of the truncated map, which need not be possible."""
+        return from_pseudo(self._sums(theta)[0])
+
+    def jacobian(self, theta):
+        """Its Jacobian (10, 10)."""
+        return from_pseudo(self._sums(theta)[1]).T
+
+
+def _kind(name: str, reading: "Reading"):
+    return SeriesExponential(reading.series) if name == "exponential" and reading.series else PARAMETERIZATIONS[name]()
 
 
 def draw(rng: np.random.Generator, about: str) -> np.ndarray:
@@ -149,7 +179,7 @@ def _cost(rows, target, pi) -> float:
 def _trust_region(rows, target, name: str, reading: Reading) -> tuple[dict, float]:
     from scipy.optimize import least_squares
 
-    kind = PARAMETERIZATIONS[name]()
+    kind = _kind(name, reading)
     residual = lambda theta: rows @ kind.parameters(theta) - target  # noqa: E731
     jacobian = (lambda theta: rows @ kind.jacobian(theta)) if reading.jacobian == "analytic" else "2-point"
     begin = time.perf_counter()

@@ -24,7 +24,7 @@ def one(experiment: Experiment, model: Model, data: Compressed, prior, moving, w
     for fold in folds:
         problem = pose(spec, model, data.without(fold), moving, prior)
         coordinates = problem.coordinates
-        iterates, _ = minimise(problem.objective, coordinates.positive, coordinates.held, coordinates.physical(problem.start), tolerance=spec.solver.tolerance)
+        iterates, _, _ = minimise(problem.objective, coordinates.positive, coordinates.held, coordinates.physical(problem.start), tolerance=spec.solver.tolerance)
         held = data.without(set(range(data.blocks)) - set(fold.tolist()))
         squares.append(float(held.squares(iterates[-1]).sum()))
         rows.append(int(held.rows.sum()))
