@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -187,6 +187,8 @@ def identify(experiment: Experiment, model: Model, motion: Motion, compressed: C
     barrier = problem.objective.divergence.barrier and problem.objective.weight > 0.0
     constrained = barrier or experiment.model.inertia != "linear"
     certificate = certify(problem.objective, solution.x, positive, held, constrained=constrained)
+    if certificate.globally_optimal and not solution.converged:
+        solution = replace(solution, converged=True)  # a proven optimum needs no other test
     count = 10 * model.bodies
     fixed = np.zeros(len(solution.x), dtype=bool)
     fixed[count:] = held

@@ -24,6 +24,7 @@ from .objective import Objective, add_blocks
 # Share of the way to the boundary that a step must leave; near the end less, or the end comes two digits at a time.
 _LEAVE, _LEAST, _PER_GAP = 1e-2, 1e-6, 1e4
 _POOR = 0.5  # a step of less than this share of its length is tried again without its bend
+_NEARLY = 1e-9  # the same, where the next step breaks down
 _NOTHING = 1e-12  # share of the objective that complementarity may leave at a bound
 
 # orthonormal basis of symmetric 4 x 4 matrices: coordinates of a scaled change of a body
@@ -70,6 +71,7 @@ class _Scaled:
 
     factors: np.ndarray
     inverse: np.ndarray  # F^-1
+    shrink: np.ndarray  # (2 bodies, 4, 4): the same twice, 1 / sqrt(weight_i weight_j)
     weights: np.ndarray  # (bodies, 4)
     spread: np.ndarray
     root: np.ndarray
@@ -89,7 +91,7 @@ def minimise(objective: Objective, positive: np.ndarray, held: np.ndarray, start
     rows, target = objective.triangle[:, :-1], objective.triangle[:, -1]
     linear, quadratic, barrier = _prior_parts(objective)
     x = np.array(start, dtype=float)
-    iterates, values, best = [x], [objective.value(x)], np.inf
+    iterates, values, best, near = [x], [objective.value(x)], np.inf, False
     mu = max(0.01 * values[0] / len(x), barrier)
     z = mu * np.linalg.inv(to_pseudo(x[:count].reshape(-1, 10)))
     state = _State(x, z, np.where(bound, mu / np.where(bound, x[count:], 1.0), 0.0))
@@ -103,7 +105,9 @@ def minimise(objective: Objective, positive: np.ndarray, held: np.ndarray, start
         try:
             scaled = _scale(state, count, bound)
         except np.linalg.LinAlgError:
-            # the last step left what double precision can tell from the boundary
+            # the last step left what double precision can tell from the boundary; the one before may be the answer
+            if near:
+                return iterates[:-1], values[:-1], True
             break
         turn = scaling(scaled.factors)
         image = scaled_columns(rows, turn, scaled.spread)
@@ -122,11 +126,13 @@ def minimise(objective: Objective, positive: np.ndarray, held: np.ndarray, start
         # the objective is off by about gamma off^2
         off = np.abs(scaled.weights**2 - floor_j).max() / floor_j if barrier else 0.0
         loose = squares_c.sum() + (0.0 if barrier else np.sum(scaled.weights**2))
-        if off < 1e-4 and loose <= 4.0 * _NOTHING * value:
+        near = False
+        if off < 1e-4 and loose <= _NEARLY * value:
             residual = slope - np.concatenate([packed(scaled.weights), np.where(bound, scaled.root, 0.0)])
             residual[fixed] = 0.0
             small = 0.5 * residual @ solve(residual)
-            if small <= max(tolerance**2, 1e-13) * value:
+            near = small <= _NEARLY * value
+            if small <= max(tolerance**2, 1e-13) * value and loose <= 4.0 * _NOTHING * value:
                 # the last steps cost little and take the gradient to where only rounding is left
                 if barrier or small > 0.1 * best:
                     return iterates, values, True
@@ -172,7 +178,8 @@ def _scale(state: _State, count: int, bound) -> _Scaled:
     factors = lower @ np.swapaxes(vt, -1, -2) / root[:, None, :]
     inverse = np.swapaxes(upper @ u, -1, -2) / root[:, :, None]
     c, dual = np.where(bound, state.x[count:], 1.0), np.where(bound, state.dual, 1.0)
-    return _Scaled(factors, inverse, weights, np.sqrt(c / dual), np.sqrt(c * dual))
+    shrink = 1.0 / (root[:, :, None] * root[:, None, :])
+    return _Scaled(factors, inverse, np.concatenate([shrink, shrink]), weights, np.sqrt(c / dual), np.sqrt(c * dual))
 
 
 def packed(diagonals) -> np.ndarray:
@@ -205,9 +212,16 @@ class _Change:
     """A step in scaled coordinates: of x, of the bodies and of their multipliers, of the coefficients' multipliers."""
 
     step: np.ndarray
-    body: np.ndarray  # (bodies, 4, 4)
-    multiplier: np.ndarray  # (bodies, 4, 4)
+    both: np.ndarray  # (2 bodies, 4, 4): changes of the bodies, then of their multipliers
     dual: np.ndarray
+
+    @property
+    def body(self) -> np.ndarray:
+        return self.both[: len(self.both) // 2]
+
+    @property
+    def multiplier(self) -> np.ndarray:
+        return self.both[len(self.both) // 2 :]
 
 
 def _change(solve, slope, scaled: _Scaled, aim, fixed, bound) -> _Change:
@@ -216,9 +230,8 @@ def _change(solve, slope, scaled: _Scaled, aim, fixed, bound) -> _Change:
     step = solve(right)
     count = 10 * len(scaled.weights)
     both = unpacked(np.concatenate([step[:count], aim[:count] - step[:count]]))
-    body, multiplier = both[: len(scaled.weights)], both[len(scaled.weights) :]
-    multiplier[:, _DIAGONAL, _DIAGONAL] -= scaled.weights
-    return _Change(step, body, multiplier, np.where(bound, aim[count:] - scaled.root - step[count:], 0.0))
+    both[len(scaled.weights) :, _DIAGONAL, _DIAGONAL] -= scaled.weights
+    return _Change(step, both, np.where(bound, aim[count:] - scaled.root - step[count:], 0.0))
 
 
 def _aim(scaled: _Scaled, bound, level_j: float, level_c: float, straight: _Change | None) -> np.ndarray:
@@ -239,12 +252,9 @@ def _aim(scaled: _Scaled, bound, level_j: float, level_c: float, straight: _Chan
 
 def _reach(change: _Change, scaled: _Scaled, bound) -> float:
     """How far along a change the bodies and their multipliers, and the coefficients and theirs, stay positive."""
-    inverse = 1.0 / np.sqrt(scaled.weights)
-    inverse = inverse[:, :, None] * inverse[:, None, :]
-    worst = np.linalg.eigvalsh(np.concatenate([inverse * change.body, inverse * change.multiplier]))[:, 0].min()
-    if bound.any():
-        own = np.concatenate([change.step[len(change.step) - len(bound) :], change.dual])[np.concatenate([bound, bound])]
-        worst = min(worst, (own / np.tile(scaled.root[bound], 2)).min())
+    worst = np.linalg.eigvalsh(change.both * scaled.shrink)[:, 0].min()
+    own, dual = change.step[len(change.step) - len(bound) :] / scaled.root, change.dual / scaled.root
+    worst = min(worst, np.where(bound, own, 0.0).min(initial=0.0), dual.min(initial=0.0))
     return 1.0 / max(-worst, 1e-12)
 
 

@@ -33,7 +33,7 @@ _LARGEST_RADIUS = 1e6
 _ROUNDING = 1e-14
 # Newton hands over when the trust region, not the model, ends a step that promises less than this share of the
 # objective, or after this many iterations.
-_CRAWLING, _PATIENCE = 0.4, 25
+_CRAWLING, _PATIENCE = 0.5, 25
 # A coefficient below this share of its natural size, pushed down further, has gone to zero.
 _ZERO = 1e-10
 # Without a prior, directions that no data see keep where they are: a ridge this small against the seen ones.
