@@ -150,6 +150,7 @@ def study_restarts(
     count: Annotated[int, typer.Option("--restarts", min=1, help="How many random starts.")] = 20,
     seed: Seed = 0, jobs: Jobs = 1,
     inertia: Annotated[Optional[str], typer.Option(help="Another parameterization than the experiment's.")] = None,  # noqa: UP045
+    newton_alone: Annotated[bool, typer.Option("--newton-alone", help="Newton in the parameterization's coordinates to the end, 3000 iterations at most.")] = False,
     as_json: Json = False, out: Out = None, quiet: Quiet = False,
 ) -> None:  # fmt: skip
     """Section VII: random starts of one experiment, each certified."""
@@ -161,6 +162,8 @@ def study_restarts(
     if inertia is not None:
         kind = _one_of(inertia, "--inertia", tuple(PARAMETERIZATIONS))
         spec = spec.model_copy(update={"model": spec.model.model_copy(update={"inertia": kind})})
+    if newton_alone:
+        spec = spec.model_copy(update={"solver": spec.solver.model_copy(update={"handover": 0.0, "max_iterations": 3000})})
     run = results.folder(out or Path("runs") / f"{spec.name}-restarts")
     with _progress(quiet or as_json) as progress:
         found = work(spec, run, count=count, seed=seed, jobs=jobs, progress=progress or _silent)

@@ -278,6 +278,7 @@ class SolverSpec(_Spec):
     tolerance: Annotated[float, AfterValidator(_finite), Field(gt=0, lt=1)] = 1.0e-8
     max_iterations: Annotated[int, Field(ge=1)] = 200
     weighting: Literal["none", "noise"] = "none"
+    handover: Annotated[float, AfterValidator(_finite), Field(ge=0, le=1)] = 0.5
 
 
 class Experiment(_Spec):

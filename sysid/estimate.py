@@ -129,7 +129,8 @@ class Problem:
         settings = experiment.solver
         return solve(
             self.objective, self.coordinates, self.start if start is None else start,
-            tolerance=settings.tolerance, max_iterations=settings.max_iterations, callback=callback,
+            tolerance=settings.tolerance, max_iterations=settings.max_iterations, handover=settings.handover,
+            callback=callback,
         )  # fmt: skip
 
 

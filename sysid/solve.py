@@ -31,9 +31,8 @@ from .objective import Objective, add_blocks
 _LARGEST_RADIUS = 1e6
 # Objective differences below this share of the objective are rounding, not progress.
 _ROUNDING = 1e-14
-# Newton hands over when the trust region, not the model, ends a step that promises less than this share of the
-# objective, or after this many iterations.
-_CRAWLING, _PATIENCE = 0.5, 25
+# Newton hands over after this many iterations at the latest, unless it is told never to.
+_PATIENCE = 25
 # A coefficient below this share of its natural size, pushed down further, has gone to zero.
 _ZERO = 1e-10
 # Without a prior, directions that no data see keep where they are: a ridge this small against the seen ones.
@@ -86,13 +85,17 @@ class Solution:
 
 
 def solve(
-    objective: Objective, coordinates: Coordinates, start: np.ndarray, *, tolerance: float, max_iterations: int,
+    objective: Objective, coordinates: Coordinates, start: np.ndarray, *, tolerance: float, max_iterations: int, handover: float = 0.5,
     callback: Callable[[int, float], None] | None = None,
 ) -> Solution:  # fmt: skip
     """Minimise from theta = start (size,).
 
     Converged means: the quadratic model promises a relative decrease below tolerance squared, or below what
     double precision can resolve.
+
+    Args:
+        handover: Newton hands over to the interior-point method when the trust region, not the model, ends a step that
+            promises less than this share of the objective; 0 for Newton alone.
     """
     problem = _Problem(objective, coordinates)
     theta = np.array(start, dtype=float)
@@ -130,11 +133,11 @@ def solve(
         values.append(value)
         if callback:
             callback(iteration, value)
-        crawling = promise < _CRAWLING * abs(values[-2]) and (length > 0.99 * before or ratio < 0.25)
-        if converged or (constrained and (crawling or iteration >= _PATIENCE)):
+        crawling = promise < handover * abs(values[-2]) and (length > 0.99 * before or ratio < 0.25)
+        if converged or (constrained and handover > 0.0 and (crawling or iteration >= _PATIENCE)):
             break
     newton = iteration
-    if constrained and iteration < max_iterations and not converged:
+    if constrained and handover > 0.0 and iteration < max_iterations and not converged:
         iterates, found, converged = interior.minimise(
             objective, coordinates.positive, coordinates.held, x, tolerance=tolerance, max_iterations=max_iterations - iteration
         )

@@ -154,6 +154,16 @@ def test_restarts_end_in_one_certified_point(tmp_path, inertia):
     assert (tmp_path / "figure3_restarts.svg").exists() and (tmp_path / "restarts.parquet").exists()
 
 
+def test_newton_alone_in_log_cholesky_coordinates_ends_there_too(tmp_path):
+    """The paper's claim itself: without the interior-point method, every start still reaches the one optimum."""
+    spec = load(LEG)
+    solver = spec.solver.model_copy(update={"handover": 0.0, "max_iterations": 3000})
+    stiff = spec.model_copy(update={"solver": solver, "prior": spec.prior.model_copy(update={"weight": 10.0})})
+    found = commands.study_restarts(stiff, tmp_path, count=4, seed=1, jobs=1, progress=quiet)
+    assert found["converged"] == found["globally_optimal"] == 4 and found["relative_spread"] < 1e-9
+    assert found["newton_iterations"] == found["iterations"]
+
+
 def test_restarts_on_a_real_robot(tmp_path):
     if DATASETS["ur10e"].missing():
         pytest.skip("ur10e is not in the data folder; `sysid fetch ur10e` brings it, or SYSID_DATA_DIR names where it is")

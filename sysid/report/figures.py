@@ -92,12 +92,12 @@ def restarts(runs: list[dict], out: Path) -> list[Path]:
 def prior(document: dict, out: Path) -> list[Path]:
     """Held-out error against the prior's weight."""
     plt = _pyplot()
-    figure, axis = plt.subplots(figsize=(4.8, 3.0))
+    figure, axis = plt.subplots(figsize=(4.8, 3.2))
     axis.plot(document["weights"], document["rms_held_out"], marker="o", markersize=4, color=_FADED)
     axis.axvline(document["chosen"], color=_STRONG, linewidth=1, label=f"least error: {document['chosen']:g}")
     axis.axvline(document["experiment_weight"], color="black", linewidth=1, linestyle="--", label=f"experiment: {document['experiment_weight']:g}")
     axis.set_xscale("log")
     axis.set_xlabel("prior weight γ [N² m²]")
     axis.set_ylabel("held-out RMS [N m]")
-    axis.legend(frameon=False)
+    axis.legend(frameon=False, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
     return _save(figure, out, "prior_weight")
