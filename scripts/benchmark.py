@@ -96,7 +96,7 @@ def main() -> None:
         entry = found["solve"]
         print(
             f"one solve {1e3 * entry['solve_seconds']:.1f} ms; 20 random starts take {entry['restarts_over_solve']:.0f} times as long, "
-            f"cvxpy + clarabel {entry['cvxpy_over_solve']:.0f} times (clarabel alone {entry['clarabel_over_solve']:.1f} times), "
+            f"cvxpy + clarabel {entry['cvxpy_over_solve']:.1f} times (clarabel alone {entry['clarabel_over_solve']:.1f} times), "
             f"objectives equal to {entry['objective_difference']:.0e}"
         )
 

@@ -54,8 +54,10 @@ def scaled_columns(root: np.ndarray, turn: np.ndarray, spread: np.ndarray) -> np
 def scaled_gradient(gradient: np.ndarray, turn: np.ndarray, spread: np.ndarray) -> np.ndarray:
     """T' g (size,)."""
     count = 10 * len(turn)
-    bodies = np.swapaxes(turn, -1, -2) @ gradient[:count].reshape(-1, 10, 1)
-    return np.concatenate([bodies.ravel(), gradient[count:] * spread])
+    out = np.empty(len(gradient))
+    out[:count] = (np.swapaxes(turn, -1, -2) @ gradient[:count].reshape(-1, 10, 1)).ravel()
+    out[count:] = gradient[count:] * spread
+    return out
 
 
 @dataclass
@@ -111,8 +113,9 @@ def minimise(objective: Objective, positive: np.ndarray, held: np.ndarray, start
             break
         turn = scaling(scaled.factors)
         image = scaled_columns(rows, turn, scaled.spread)
-        system = 2.0 * image.T @ image
-        slope = 2.0 * image.T @ (rows @ state.x - target) + scaled_gradient(linear, turn, scaled.spread)
+        system = image.T @ image
+        system *= 2.0
+        slope = scaled_gradient(2.0 * ((rows @ state.x - target) @ rows) + linear, turn, scaled.spread)
         if quadratic is not None:
             add_blocks(system, np.swapaxes(turn, -1, -2) @ quadratic @ turn)
             away = (state.x[:count] - objective.divergence.prior.ravel()).reshape(-1, 10, 1)
