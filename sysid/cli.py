@@ -223,6 +223,9 @@ def _progress(silent: bool):
         yield report
 
 
+_INTERRUPTED = 130
+
+
 def main() -> None:
     """The `sysid` command: bad input is one line on standard error and exit status 2."""
     try:
@@ -232,7 +235,7 @@ def main() -> None:
     except typer.Exit as stop:
         status = stop.exit_code
     except (KeyboardInterrupt, typer.Abort):
-        _fail("interrupted", 130)
+        status = _INTERRUPTED
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         status = 1
@@ -245,6 +248,8 @@ def main() -> None:
         if os.environ.get("SYSID_DEBUG"):
             raise
         _fail(f"internal error, {type(error).__name__}: {error}; SYSID_DEBUG=1 shows where", 1)
+    if status == _INTERRUPTED:  # typer makes an exit of Ctrl-C and says nothing
+        _fail("interrupted; what a study had finished is kept, run it again to go on", _INTERRUPTED)
     sys.exit(status if isinstance(status, int) else 0)
 
 

@@ -118,6 +118,19 @@ def test_killed_and_resumed_is_byte_identical(tmp_path):
     assert journal.read_bytes().count(b"\n") == 13
 
 
+def test_interruption_is_one_line_and_keeps_what_was_done(tmp_path):
+    out = tmp_path / "out"
+    command = [sys.executable, "-m", "sysid", "study", "bodies", "--bodies", "4000", "--jobs", "1", "--out", str(out)]
+    process = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    journal, deadline = out / "journal.jsonl", time.monotonic() + 60
+    while time.monotonic() < deadline and not (journal.exists() and journal.read_bytes().count(b"\n") >= 2):
+        time.sleep(0.02)
+    process.send_signal(signal.SIGINT)
+    said, complaint = process.communicate(timeout=60)
+    assert process.returncode == 130 and said == "" and complaint.startswith("sysid: interrupted") and complaint.count("\n") == 1
+    assert journal.read_bytes().count(b"\n") >= 2
+
+
 def test_number_of_processes_does_not_matter(tmp_path):
     found = [commands.study_bodies(tmp_path / str(jobs), count=12, seed=3, jobs=jobs, reading=bodies.Reading(), progress=quiet) for jobs in _made(tmp_path, (1, 2))]
     assert without_timings(found[0]) == without_timings(found[1])
