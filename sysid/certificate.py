@@ -51,7 +51,7 @@ def certify(objective: Objective, x: np.ndarray, positive: np.ndarray, held: np.
     """
     count, value = 10 * objective.bodies, objective.value(x)
     pi, c = x[:count].reshape(-1, 10), x[count:]
-    barrier = constrained and objective.divergence.barrier and objective.weight > 0.0
+    barrier = constrained and objective.barrier
     try:
         pseudo = to_pseudo(pi)
         if constrained:

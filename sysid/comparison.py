@@ -11,6 +11,7 @@ import numpy as np
 
 from .errors import SysidError
 from .estimate import Fit, Prediction
+from .results import number
 
 _BLOCKS, _SHORTEST = 40, 0.5  # blocks over the held-out data; s
 
@@ -88,7 +89,6 @@ def document(fits: list[Fit], names: list[str]) -> dict:
     experiments, notices = [], []
     for fit, name in zip(fits, names):
         errors = fit.predictions["test"].errors()
-        number = lambda value: float(value) if np.isfinite(value) else None  # noqa: E731
         by_joint = lambda key: {j: number(v) for j, v in zip(fit.joints, errors[key])}  # noqa: E731, B023
         experiments.append({
             "name": name, "rms_test": by_joint("rms"), "relative_error": {**by_joint("relative_error"), "*": number(errors["total"][1])},
@@ -103,6 +103,6 @@ def document(fits: list[Fit], names: list[str]) -> dict:
     for k in range(len(fits)):
         for other in range(k + 1, len(fits)):
             for found in compare(fits[k], fits[other], (names[k], names[other])):
-                se = found.se if np.isfinite(found.se) else None
+                se = number(found.se)
                 pairs.append({"from": found.from_, "to": found.to, "joint": found.joint, "delta_rms": found.delta_rms, "se": se})
     return {"experiments": experiments, "differences": pairs, "notices": notices}

@@ -133,6 +133,11 @@ class Problem:
             callback=callback,
         )  # fmt: skip
 
+    def certify(self, x) -> Certificate:
+        """The certificate of x (size,)."""
+        coordinates = self.coordinates
+        return certify(self.objective, x, coordinates.positive, coordinates.held, constrained=coordinates.constrained(self.objective))
+
 
 def pose(experiment: Experiment, model: Model, compressed: Compressed, moving: np.ndarray, prior: np.ndarray, weights=None) -> Problem:
     """The compressed optimisation problem of an experiment.
@@ -184,10 +189,8 @@ def identify(experiment: Experiment, model: Model, motion: Motion, compressed: C
     if experiment.solver.weighting == "noise":
         problem = pose(experiment, model, compressed, moving, prior, noise_weights(compressed, solution.x))
         solution = problem.solve(experiment, callback=callback)
-    positive, held = problem.coordinates.positive, problem.coordinates.held
-    barrier = problem.objective.divergence.barrier and problem.objective.weight > 0.0
-    constrained = barrier or experiment.model.inertia != "linear"
-    certificate = certify(problem.objective, solution.x, positive, held, constrained=constrained)
+    held = problem.coordinates.held
+    certificate = problem.certify(solution.x)
     if certificate.globally_optimal and not solution.converged:
         solution = replace(solution, converged=True)  # a proven optimum needs no other test
     count = 10 * model.bodies

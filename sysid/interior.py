@@ -167,7 +167,7 @@ def _prior_parts(objective: Objective):
     linear = np.zeros(objective.triangle.shape[1] - 1)
     if objective.weight == 0.0:
         return linear, None, 0.0
-    if objective.divergence.barrier:
+    if objective.barrier:
         linear[: 10 * objective.bodies] = objective.weight * objective.divergence.linear.ravel()
         return linear, None, objective.weight
     return linear, objective.weight * np.asarray(objective.divergence.hessian(objective.divergence.prior)), 0.0

@@ -25,6 +25,11 @@ class Objective:
         """Number of bodies."""
         return len(self.divergence.prior)
 
+    @property
+    def barrier(self) -> bool:
+        """Whether the prior keeps every body possible by itself: a log-det divergence of positive weight."""
+        return self.divergence.barrier and self.weight > 0.0
+
     def _split(self, x):
         count = 10 * self.bodies
         return x[:count].reshape(self.bodies, 10), x[count:]

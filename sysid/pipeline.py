@@ -21,7 +21,7 @@ from . import config, filters, model, robot
 from . import log as logs
 from .compress import Compressed, compress
 from .config import Experiment, LogSpec
-from .errors import ConfigError, SysidError, SysidWarning
+from .errors import SysidWarning
 from .estimate import Fit, Prediction, identify, predict
 from .inertia.consistency import is_consistent
 from .model import Model, moving_coefficients
@@ -196,4 +196,4 @@ def _timed(seconds: dict[str, float], stage: str):
     seconds[stage] = time.perf_counter() - start
 
 
-__all__ = ["ConfigError", "SysidError", "build", "fit", "load", "predict_log", "prepared", "read"]
+__all__ = ["build", "fit", "load", "predict_log", "prepared", "read"]

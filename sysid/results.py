@@ -36,19 +36,19 @@ def document(fit: Fit, run: str | Path = "") -> dict:
     """The JSON document of a fit, as the contract has it and more. NaN is None."""
     errors = {part: prediction.errors() for part, prediction in fit.predictions.items()}
     # a joint whose torque never changes has no relative error and no R2
-    by_joint = lambda part, key: {j: _number(v) for j, v in zip(fit.joints, errors[part][key].tolist())}  # noqa: E731
+    by_joint = lambda part, key: {j: number(v) for j, v in zip(fit.joints, errors[part][key].tolist())}  # noqa: E731
     names, coefficients = fit.model.names, fit.model.coefficients
     certificate = fit.certificate
     held = np.append(np.zeros(10 * fit.model.bodies, dtype=bool), fit.held)
     parameters = [
-        {"name": name, "value": value, "unit": unit, "std": _number(std), "from_data": share, **({"held": True} if fixed else {})}
+        {"name": name, "value": value, "unit": unit, "std": number(std), "from_data": share, **({"held": True} if fixed else {})}
         for name, value, unit, std, share, fixed in zip(
             names, fit.x.tolist(), fit.model.units, fit.uncertainty.std.tolist(), fit.uncertainty.from_data.tolist(), held
         )
     ]
     return {
         "rms": {part: by_joint(part, "rms") for part in errors},
-        "relative_error": {part: {**by_joint(part, "relative_error"), "*": _number(errors[part]["total"][1])} for part in errors},
+        "relative_error": {part: {**by_joint(part, "relative_error"), "*": number(errors[part]["total"][1])} for part in errors},
         "r2": {part: by_joint(part, "r2") for part in errors},
         "objective": fit.objective,
         "iterations": fit.solution.iterations,
@@ -56,8 +56,8 @@ def document(fit: Fit, run: str | Path = "") -> dict:
         "converged": fit.solution.converged,
         "physically_consistent": fit.physically_consistent,
         "certificate": {
-            "globally_optimal": certificate.globally_optimal, "stationarity": _number(certificate.stationarity),
-            "gap": _number(certificate.gap), "at_zero": {coefficients[k].name: slope for k, slope in certificate.at_zero.items()},
+            "globally_optimal": certificate.globally_optimal, "stationarity": number(certificate.stationarity),
+            "gap": number(certificate.gap), "at_zero": {coefficients[k].name: slope for k, slope in certificate.at_zero.items()},
         },
         "samples": fit.samples,
         "parameters": parameters,
@@ -73,7 +73,8 @@ def document(fit: Fit, run: str | Path = "") -> dict:
     }  # fmt: skip
 
 
-def _number(value: float) -> float | None:
+def number(value: float) -> float | None:
+    """A number as JSON can hold it: None for NaN and infinity."""
     return float(value) if math.isfinite(value) else None
 
 

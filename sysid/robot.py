@@ -178,7 +178,8 @@ def _chosen(spec: RobotSpec, source: urdf.Urdf, moving: list[str]):
         if not spec.joints:
             raise RobotError("robot.joints is empty", where=where, allowed=", ".join(moving), do="name at least one joint")
         return spec.joints
-    if mimics := [name for name in moving if _mimics(source, name) and name not in spec.lock]:
+    followers = _mimics(source)
+    if mimics := [name for name in moving if name in followers and name not in spec.lock]:
         warnings.warn(
             SysidWarning(f"joints {', '.join(mimics)} mimic others in the URDF and are locked; name them in robot.joints to move them"),
             stacklevel=4,
@@ -189,9 +190,10 @@ def _chosen(spec: RobotSpec, source: urdf.Urdf, moving: list[str]):
     return chosen
 
 
-def _mimics(source: urdf.Urdf, name: str) -> bool:
+def _mimics(source: urdf.Urdf) -> set[str | None]:
+    """Names of the joints that mimic others."""
     root = ElementTree.fromstring(source.text.encode())
-    return any(e.get("name") == name and e.find("mimic") is not None for e in root.findall("joint"))
+    return {element.get("name") for element in root.findall("joint") if element.find("mimic") is not None}
 
 
 def _link_priors(source: urdf.Urdf, model: pin.Model, bodies: list[Body]) -> np.ndarray:

@@ -12,8 +12,8 @@ the optimum lies on the boundary of the possible bodies, at infinity in theta. B
 the certificate does not ask how its point was found.
 
 The trust region is a ball of the affine-invariant metric on bodies, pulled back to theta, so that a step counts
-the same for a heavy link and a small rotor, in any frame and unit. Each step is the exact minimiser of the
-quadratic model in that ball (More & Sorensen 1983).
+the same for a heavy link and a small rotor, in any frame and unit. Each step minimises the quadratic model in that
+ball, whose radius is met to five per cent (More & Sorensen 1983).
 """
 
 from collections.abc import Callable
@@ -48,6 +48,10 @@ class Coordinates:
     bodies: int
     positive: np.ndarray
     held: np.ndarray
+
+    def constrained(self, objective: Objective) -> bool:
+        """Whether bodies are kept possible: by the coordinates, or by the objective's barrier."""
+        return objective.barrier or self.parameterization.name != "linear"
 
     def physical(self, theta) -> np.ndarray:
         """x (size,) of theta (size,)."""
@@ -102,8 +106,7 @@ def solve(
     x = coordinates.physical(theta)
     value = objective.value(x)
     trace, values = [x], [value]
-    barrier = objective.divergence.barrier and objective.weight > 0.0
-    constrained = barrier or coordinates.parameterization.name != "linear"
+    constrained = coordinates.constrained(objective)
     inside = theta, x, value
     radius, converged, iteration = 1.0 if constrained else _LARGEST_RADIUS, False, 0
     while iteration < max_iterations:

@@ -20,7 +20,7 @@ def study_bodies(out: Path, *, count: int, seed: int, jobs: int, reading: bodies
     """Section VI; writes study.json, bodies.parquet and the figures into `out`."""
     import polars as pl
 
-    settings = {"study": "bodies", "seed": seed, "reading": asdict(reading), "versions": _versions()}
+    settings = {"study": "bodies", "seed": seed, "reading": asdict(reading), "versions": results.versions()}
     journal = Journal(out / "journal.jsonl", settings)
     tasks = [(str(first), (seed, first, min(_BATCH, count - first), reading)) for first in range(0, count, _BATCH)]
     if count % _BATCH:  # a batch cut short must not be taken for a whole one by a longer study
@@ -49,7 +49,7 @@ def study_restarts(experiment: Experiment, out: Path, *, count: int, seed: int, 
     import polars as pl
 
     shared = restarts.share(experiment)
-    settings = {"study": "restarts", "seed": seed, "experiment": experiment.model_dump(mode="json"), "data": _fingerprint(shared), "versions": _versions()}
+    settings = {"study": "restarts", "seed": seed, "experiment": experiment.model_dump(mode="json"), "data": _fingerprint(shared), "versions": results.versions()}
     journal = Journal(out / "journal.jsonl", settings)
     tasks = [(str(index), (shared, seed, index)) for index in range(count)]
     done = run(journal, tasks, restarts.one, jobs=jobs, progress=lambda share: progress("restarts", share))
@@ -69,7 +69,7 @@ def study_prior(experiment: Experiment, out: Path, *, jobs: int, progress: Tell)
     """The prior's weight by cross-validation; writes study.json and the curve into `out`."""
     found = prepared(experiment)
     weights = sorted({*prior.WEIGHTS, *([experiment.prior.weight] if experiment.prior.weight > 0 else [])})
-    settings = {"study": "prior", "experiment": experiment.model_dump(mode="json"), "data": _triangle_hash(found.train), "versions": _versions()}
+    settings = {"study": "prior", "experiment": experiment.model_dump(mode="json"), "data": _triangle_hash(found.train), "versions": results.versions()}
     journal = Journal(out / "journal.jsonl", settings)
     tasks = [(repr(weight), (experiment, found.model, found.train, found.prior, found.moving, weight)) for weight in weights]
     done = run(journal, tasks, prior.one, jobs=jobs, progress=lambda share: progress("weights", share))
@@ -80,10 +80,6 @@ def study_prior(experiment: Experiment, out: Path, *, jobs: int, progress: Tell)
 
 
 
-
-
-def _versions() -> dict[str, str]:
-    return results.versions()
 
 
 def _fingerprint(shared: restarts.Shared) -> list[str]:

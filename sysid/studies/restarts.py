@@ -10,11 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..certificate import certify
 from ..compress import Compressed
 from ..config import Experiment
 from ..estimate import Problem, noise_weights, pose
 from ..pipeline import prepared
+from ..results import number
 
 
 @dataclass(frozen=True)
@@ -52,14 +52,12 @@ def one(shared: Shared, seed: int, index: int) -> dict:
     begin = time.perf_counter()
     found = problem.solve(shared.experiment, start=theta)
     seconds = time.perf_counter() - begin
-    barrier = problem.objective.divergence.barrier and problem.objective.weight > 0.0
-    constrained = barrier or shared.experiment.model.inertia != "linear"
-    certificate = certify(problem.objective, found.x, problem.coordinates.positive, problem.coordinates.held, constrained=constrained)
+    certificate = problem.certify(found.x)
     return {
         "objective": list(found.objectives), "rms_train": [_rms(shared.train, x) for x in found.trace],
         "rms_test": [_rms(shared.test, x) for x in found.trace], "iterations": found.iterations,
         "newton_iterations": found.newton_iterations, "converged": found.converged,
-        "globally_optimal": certificate.globally_optimal, "gap": certificate.gap if np.isfinite(certificate.gap) else None,
+        "globally_optimal": certificate.globally_optimal, "gap": number(certificate.gap),
         "seconds": seconds,
     }  # fmt: skip
 
