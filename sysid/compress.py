@@ -136,9 +136,10 @@ def compress(model: Model, motion: Motion, *, thin: int = 1, progress: Callable[
         # a filter needs margins on each stretch, so a filtered stretch holds many blocks
         filtered = piece.smoother is not None
         stretch = length * max(1, _FILTERED_STRETCH // length) if filtered else length
+        remembered = model.remembered(piece)
         for rows in chunks(piece, stretch):
             # rows that are not wanted need no columns, unless a filter runs over them
-            columns = model.columns(piece, rows if filtered else slice(rows.start, rows.stop, thin))
+            columns = model.columns(piece, rows if filtered else slice(rows.start, rows.stop, thin), remembered)
             for start in range(rows.start, rows.stop, length):
                 own = slice(start, min(start + length, rows.stop), thin)
                 part = slice(start - rows.start, own.stop - rows.start, thin) if filtered else slice(None)

@@ -239,10 +239,21 @@ def _known_effect(name: str) -> str:
 
 
 class EffectSpec(_Spec):
-    """An effect of the vocabulary and the joints that have it (None: every joint)."""
+    """An effect of the vocabulary, the joints that have it (None: every joint), and its own options by name."""
 
     name: Annotated[str, AfterValidator(_known_effect)]
     joints: Annotated[list[str], Field(min_length=1)] | None = None
+    options: dict[str, Any] = {}
+
+
+def _own_keys(name: str) -> list[str]:
+    """The keys that an effect has beside `joints`: its options, and its shape values, which may be held."""
+    from .effect import find, vocabulary
+
+    if name not in vocabulary():
+        return []
+    effect = find(name)
+    return [*effect.options, *(shape.name for shape in effect.shapes())]
 
 
 def _effect(value: Any) -> Any:
@@ -252,8 +263,9 @@ def _effect(value: Any) -> Any:
         return {"name": value}
     if isinstance(value, dict) and len(value) == 1:
         ((name, options),) = value.items()
-        if isinstance(name, str) and isinstance(options, dict) and "name" not in options:
-            return {"name": name, **options}
+        if isinstance(name, str) and isinstance(options, dict) and not {"name", "options"} & set(options):
+            own = {key: options[key] for key in _own_keys(name) if key in options}
+            return {"name": name, **{key: given for key, given in options.items() if key not in own}, **({"options": own} if own else {})}
     raise ValueError("must be an effect's name, or {name: {joints: [...]}}; see `sysid effects`")
 
 
@@ -426,7 +438,7 @@ def _line(tree, location: tuple) -> int | None:
 
 
 def _keys(model) -> list[str]:
-    return [name for name in model.model_fields if (model, name) not in ((Experiment, "path"), (EffectSpec, "name"))]
+    return [name for name in model.model_fields if (model, name) not in ((Experiment, "path"), (EffectSpec, "name"), (EffectSpec, "options"))]
 
 
 def _model_at(location: tuple):

@@ -1,23 +1,26 @@
 """Model = robot + effects: an ordered, named vector of parameters and the columns they multiply."""
 
+from __future__ import annotations
+
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from . import regressor, units
-from .effect import TorqueEffect, find
+from .effect import Effect, MotionEffect, SensorEffect, Shape, TorqueEffect, WrenchEffect, find
 from .errors import ConfigError
 from .inertia import PARAMETERS, UNITS
 from .preprocess import Motion, Piece
 from .robot import Robot
 
 _CHUNK = 4096  # samples whose columns stand in memory at once
+ROBOT = -1  # the "joint" of an effect of the whole robot, called `*`
 
 
 @dataclass(frozen=True)
 class Coefficient:
-    """One linear coefficient of an effect on a joint."""
+    """One linear coefficient of an effect on a joint (-1: on the robot)."""
 
     effect: str
     joint: int
@@ -27,14 +30,60 @@ class Coefficient:
 
 
 @dataclass(frozen=True)
+class ShapeValue:
+    """One value that the columns are not linear in: term, joint, what it is, its bounds here. `held`: given by the user."""
+
+    term: int
+    joint: int
+    shape: Shape
+    name: str
+    unit: str
+    low: float
+    high: float
+    held: bool = False
+
+
+@dataclass(frozen=True)
+class Scales:
+    """How large a joint's motion is: top speed, greatest torque, angle travelled, each (dof,); the longest log [s]."""
+
+    speed: np.ndarray
+    torque: np.ndarray
+    angle: np.ndarray
+    duration: float
+
+    def of(self, word: str, joint: int) -> float:
+        """What bounds that are shares of `word` are multiplied with."""
+        if word == "":
+            return 1.0
+        value = getattr(self, word)
+        return float(value) if word == "duration" else float(value.max() if joint == ROBOT else value[joint])
+
+
+def scales(motion: Motion) -> Scales:
+    """The scales of a motion."""
+    most = lambda name: np.max([np.abs(getattr(p, name)).max(0) for p in motion.pieces], axis=0)  # noqa: E731
+    low, high = (np.array([reach(p.q, 0) for p in motion.pieces]) for reach in (np.min, np.max))
+    positive = lambda x: np.where(x > 0, x, 1.0)  # noqa: E731 - of a joint that never moves nothing can be said anyway
+    return Scales(positive(most("qd")), positive(most("tau")), positive(high.max(0) - low.min(0)), float(max(np.ptp(p.t) for p in motion.pieces)))
+
+
+@dataclass(frozen=True)
 class Model:
     """A robot and the effects on its joints, in order. Immutable; estimates live in `Fit`.
 
-    terms: (effect, joints that have it) in order.
+    terms: (effect, joints that have it) in order; joints (-1,) for an effect of the whole robot.
+    shapes: the values that the columns are not linear in, in the order of `shape_values`.
+    held: {(term, joint, name): value} of shape values that the user gave.
+    reference: (bodies, 10) of the bodies whose torque is the `load` that some effects look at.
     """
 
     robot: Robot
-    terms: tuple[tuple[TorqueEffect, tuple[int, ...]], ...]
+    terms: tuple[tuple[Effect, tuple[int, ...]], ...]
+    shapes: tuple[float, ...] = ()
+    held: tuple[tuple[tuple[int, int, str], float], ...] = ()
+    reference: np.ndarray | None = None
+    scales: Scales | None = None
 
     @property
     def bodies(self) -> int:
@@ -44,30 +93,69 @@ class Model:
     @property
     def coefficients(self) -> tuple[Coefficient, ...]:
         """The effects' coefficients, after the bodies: by effect, then joint, then coefficient."""
-        robot = self.robot
         return tuple(
-            Coefficient(
-                effect.name, joint, f"{effect.name}.{robot.joints[joint]}.{linear.name}",
-                units.of_joint(linear.unit, prismatic=bool(robot.prismatic[joint])), linear.lower == 0,
-            )  # fmt: skip
+            Coefficient(effect.name, joint, self._name(effect, joint, linear.name), self._unit(linear.unit, joint), linear.lower == 0)
             for effect, joints in self.terms
             for joint in joints
             for linear in effect.coefficients()
         )
 
     @property
+    def shape_values(self) -> tuple[ShapeValue, ...]:
+        """What the columns are not linear in: by effect, then joint, then value."""
+        given = dict(self.held)
+        out = []
+        for term, (effect, joints) in enumerate(self.terms):
+            for joint in joints:
+                for shape in effect.shapes():
+                    scale = 1.0 if self.scales is None else self.scales.of(shape.of, joint)
+                    name, unit = self._name(effect, joint, shape.name), self._unit(shape.unit, joint)
+                    out.append(ShapeValue(term, joint, shape, name, unit, shape.low * scale, shape.high * scale, (term, joint, shape.name) in given))
+        return tuple(out)
+
+    def _name(self, effect: Effect, joint: int, word: str) -> str:
+        return f"{effect.name}.{'*' if joint == ROBOT else self.robot.joints[joint]}.{word}"
+
+    def _unit(self, unit: str, joint: int) -> str:
+        return units.of_joint(unit, prismatic=joint != ROBOT and bool(self.robot.prismatic[joint]))
+
+    @property
     def names(self) -> list[str]:
-        """Names of all parameters: body.m … body.Ixz, then effect.joint.coefficient."""
+        """Names of all linear parameters: body.m … body.Ixz, then effect.joint.coefficient."""
         return [f"{body.name}.{p}" for body in self.robot.bodies for p in PARAMETERS] + [c.name for c in self.coefficients]
 
     @property
     def units(self) -> list[str]:
-        """Units of all parameters."""
+        """Units of all linear parameters."""
         return list(UNITS) * self.bodies + [c.unit for c in self.coefficients]
 
-    def with_effect(self, effect: TorqueEffect, joints: tuple[int, ...]) -> "Model":
-        """The model with one more effect."""
-        return Model(self.robot, (*self.terms, (effect, joints)))
+    @property
+    def size(self) -> int:
+        """Number of linear parameters."""
+        return 10 * self.bodies + len(self.coefficients)
+
+    def with_effect(self, effect: Effect, joints: tuple[int, ...]) -> Model:
+        """The model with one more effect; its shape values start where they do nothing, or midway."""
+        grown = replace(self, terms=(*self.terms, (effect, joints)))
+        return replace(grown, shapes=(*self.shapes, *initial(grown)[len(self.shapes) :]))
+
+    def with_shapes(self, values) -> Model:
+        """The model with other shape values."""
+        return replace(self, shapes=tuple(float(v) for v in values))
+
+    def with_reference(self, pi) -> Model:
+        """The model with other bodies behind its `load`."""
+        return replace(self, reference=np.array(pi))
+
+    def measured_by(self, motion: Motion) -> Model:
+        """The model with shape bounds as wide as this motion is, and its shape values within them."""
+        sized = replace(self, scales=scales(motion))
+        return sized.with_shapes(initial(sized))
+
+    @property
+    def uses_load(self) -> bool:
+        """Whether an effect looks at the load."""
+        return any(effect.uses_load for effect, _ in self.terms)
 
     def support(self, joint: int) -> np.ndarray:
         """Indices of the parameters that can enter the torque of a joint, ascending."""
@@ -78,57 +166,133 @@ class Model:
                 depends[row] |= depends[parent]
         bodies = [10 * b + k for b, body in enumerate(robot.bodies) if depends[body.row, joint] for k in range(10)]
         first = 10 * self.bodies
-        return np.array(bodies + [first + k for k, c in enumerate(self.coefficients) if c.joint == joint], dtype=int)
+        return np.array(bodies + [first + k for k, c in enumerate(self.coefficients) if c.joint in (joint, ROBOT)], dtype=int)
 
-    def columns(self, piece: Piece, rows: slice) -> list[np.ndarray]:
-        """For each joint the columns (support, n) of the rows `rows` of a piece, filtered where its torque is."""
-        part = piece.part(_widened(piece, rows))
-        inertial = regressor.columns(self.robot, part.q, part.qd, part.qdd)
+    def _of(self, term: int, joint: int) -> dict[str, float]:
+        return {v.shape.name: value for v, value in zip(self.shape_values, self.shapes) if (v.term, v.joint) == (term, joint)}
+
+    def _reach(self, piece: Piece) -> int:
+        """Samples on either side of a row that its columns look at."""
+        return max([effect.reach for effect, _ in self.terms], default=0)
+
+    def remembered(self, piece: Piece) -> dict:
+        """Columns of the effects that look back to the start of a log, over a whole piece, by (term, joint)."""
+        if not any(effect.memory for effect, _ in self.terms):
+            return {}
+        part = self._seen(piece.part(slice(0, len(piece.t))))
+        return {
+            (term, joint): effect.columns(part, joint, **self._of(term, joint))
+            for term, (effect, joints) in enumerate(self.terms)
+            if effect.memory
+            for joint in joints
+        }
+
+    def _seen(self, part: Piece) -> Piece:
+        """A part with the load that effects look at, and moved as the motion effects say."""
+        if self.uses_load:
+            reference = self.robot.prior if self.reference is None else self.reference
+            part = replace(part, load=regressor.torque(self.robot, reference, part.q, part.qd, part.qdd))
+        for term, (effect, joints) in enumerate(self.terms):
+            if isinstance(effect, MotionEffect):
+                for joint in joints:
+                    part = effect.moved(part, joint, **self._of(term, joint))
+        return part
+
+    def columns(self, piece: Piece, rows: slice, remembered: dict | None = None) -> list[np.ndarray]:
+        """For each joint the columns (support, n) of the rows `rows` of a piece, filtered where its torque is.
+
+        Args:
+            remembered: `remembered(piece)`, where it is at hand.
+        """
+        wide, inner = self._widened(piece, rows)
+        part = self._seen(piece.part(wide))
+        inertial = regressor.columns(self.robot, part.q, part.qd, part.qdd, gravity=part.gravity, deflection=part.deflection)
         by_joint: list[list[np.ndarray]] = [[] for _ in self.robot.joints]
-        for effect, joints in self.terms:
+        if remembered is None:
+            remembered = self.remembered(piece)
+        for term, (effect, joints) in enumerate(self.terms):
             for joint in joints:
-                by_joint[joint].append(effect.columns(part, joint))
+                if effect.memory:
+                    by_joint[joint].append(remembered[term, joint][:, wide])
+                elif isinstance(effect, TorqueEffect):
+                    by_joint[joint].append(effect.columns(part, joint, **self._of(term, joint)))
+                elif isinstance(effect, WrenchEffect):
+                    for own, values in zip(by_joint, effect.columns(part, self.robot, **self._of(term, joint))):
+                        own.append(values)
         out = []
         for joint, effects in enumerate(by_joint):
             bodies = self.support(joint)
             bodies = bodies[bodies < inertial.shape[1]]
             stacked = np.concatenate([inertial[joint, bodies], *effects]) if effects else inertial[joint, bodies]
-            out.append(self._settled(piece, rows, stacked))
+            out.append(self._settled(piece, inner, self._sensed(stacked, piece.step, joint)))
         return out
 
     def torque(self, piece: Piece, pi, c) -> np.ndarray:
         """Predicted torque (samples, dof) over a piece's core, of bodies pi (bodies, 10) and coefficients c."""
         out = np.empty((piece.samples, self.robot.dof))
+        remembered = self.remembered(piece)
         for rows in chunks(piece, _CHUNK if piece.smoother is None else 4 * _CHUNK):
-            part = piece.part(_widened(piece, rows))
-            predicted = regressor.torque(self.robot, pi, part.q, part.qd, part.qdd).T
+            wide, inner = self._widened(piece, rows)
+            part = self._seen(piece.part(wide))
+            predicted = regressor.torque(self.robot, pi, part.q, part.qd, part.qdd, gravity=part.gravity, deflection=part.deflection).T
             k = 0
-            for effect, joints in self.terms:
+            for term, (effect, joints) in enumerate(self.terms):
                 size = len(effect.coefficients())
                 for joint in joints:
-                    predicted[joint] += np.asarray(c)[k : k + size] @ effect.columns(part, joint)
+                    own = np.asarray(c)[k : k + size]
+                    if effect.memory:
+                        predicted[joint] += own @ remembered[term, joint][:, wide]
+                    elif isinstance(effect, TorqueEffect):
+                        predicted[joint] += own @ effect.columns(part, joint, **self._of(term, joint))
+                    elif isinstance(effect, WrenchEffect):
+                        predicted += np.einsum("k,jkn->jn", own, effect.columns(part, self.robot, **self._of(term, joint)))
                     k += size
+            for joint in range(self.robot.dof):
+                predicted[joint] = self._sensed(predicted[None, joint], piece.step, joint)[0]
             start = rows.start - piece.core.start
-            out[start : start + rows.stop - rows.start] = self._settled(piece, rows, predicted).T
+            out[start : start + rows.stop - rows.start] = self._settled(piece, inner, predicted).T
         return out
 
+    def _sensed(self, values: np.ndarray, step: float, joint: int) -> np.ndarray:
+        for term, (effect, joints) in enumerate(self.terms):
+            if isinstance(effect, SensorEffect) and joint in joints:
+                values = effect.sensed(values, step, **self._of(term, joint))
+        return values
+
     @staticmethod
-    def _settled(piece: Piece, rows: slice, values) -> np.ndarray:
+    def _settled(piece: Piece, inner: slice, values) -> np.ndarray:
         """Columns computed on widened rows, filtered as torque was and cut back to the rows."""
-        if piece.smoother is None:
-            return values
-        wide = _widened(piece, rows)
-        inner = slice(rows.start - wide.start, rows.stop - wide.start)
-        return piece.smoother(values, axis=-1)[..., inner]
+        return (values if piece.smoother is None else piece.smoother(values, axis=-1))[..., inner]
+
+    def _widened(self, piece: Piece, rows: slice) -> tuple[slice, slice]:
+        """Rows with the margin that filters and effects need for them to come out as over the whole piece, and where the
+        rows stand among these."""
+        margin = self._reach(piece)
+        if piece.smoother is None and not margin:
+            return rows, slice(None)
+        if piece.smoother is not None:
+            # a recursive filter forgets slowly: six times its one-per-cent reach leaves 1e-13
+            margin += piece.smoother.reach * (6 if piece.smoother.kind == "butterworth" else 1)
+        wide = slice(max(0, rows.start - margin), min(len(piece.t), rows.stop + margin))
+        return wide, slice(rows.start - wide.start, rows.stop - wide.start, rows.step)
 
 
-def _widened(piece: Piece, rows: slice) -> slice:
-    """Rows with the margin that a filter needs for them to come out as over the whole piece."""
-    if piece.smoother is None:
-        return rows
-    # a recursive filter forgets slowly: six times its one-per-cent reach leaves 1e-13
-    margin = piece.smoother.reach * (6 if piece.smoother.kind == "butterworth" else 1)
-    return slice(max(0, rows.start - margin), min(len(piece.t), rows.stop + margin))
+def initial(model: Model) -> list[float]:
+    """Shape values to begin with: as given, as the model has them (within their bounds), else where they do nothing or midway."""
+    given, out = dict(model.held), []
+    for k, value in enumerate(model.shape_values):
+        if (key := (value.term, value.joint, value.shape.name)) in given:
+            out.append(float(given[key]))
+            continue
+        if k < len(model.shapes):
+            begin = model.shapes[k]
+        elif value.shape.start is not None:
+            begin = value.shape.start
+        else:
+            tried = value.shape.values(value.low, value.high)
+            begin = float(tried[len(tried) // 2])
+        out.append(float(np.clip(begin, value.low, value.high)))
+    return out
 
 
 def chunks(piece: Piece, size: int) -> Iterator[slice]:
@@ -141,21 +305,45 @@ def build(robot: Robot, effects) -> Model:
     """The model of an experiment's `model.effects`.
 
     Raises:
-        ConfigError: an effect or joint that is not there, or an effect twice on a joint.
+        ConfigError: an effect or joint that is not there, or an effect twice on a joint, or an option it does not have.
     """
-    terms, seen = [], set()
+    terms, seen, held = [], set(), {}
     for spec in effects:
-        names = spec.joints if spec.joints is not None else list(robot.joints)
+        effect = found(spec)
+        if effect.scope == "robot" and spec.joints is not None:
+            raise ConfigError(f"model.effects: {effect.name} is an effect of the whole robot", allowed="no joints", do="leave `joints` out")
+        names = ["*"] if effect.scope == "robot" else spec.joints if spec.joints is not None else list(robot.joints)
+        joints = []
         for name in names:
-            if name not in robot.joints:
-                raise ConfigError(f"model.effects: {spec.name} names the joint {name!r}", allowed=", ".join(robot.joints), do="correct the joint")
-            if (spec.name, name) in seen:
-                raise ConfigError(f"model.effects: {spec.name} stands twice on joint {name!r}", do="leave one out")
-            seen.add((spec.name, name))
-        terms.append((find(spec.name), tuple(robot.joints.index(name) for name in names)))
-    return Model(robot, tuple(terms))
+            if name != "*" and name not in robot.joints:
+                raise ConfigError(f"model.effects: {effect.name} names the joint {name!r}", allowed=", ".join(robot.joints), do="correct the joint")
+            if (effect.name, name) in seen:
+                where = "" if name == "*" else f" on joint {name!r}"
+                raise ConfigError(f"model.effects: {effect.name} stands twice{where}", do="leave one out")
+            seen.add((effect.name, name))
+            joints.append(ROBOT if name == "*" else robot.joints.index(name))
+        words = {shape.name: shape for shape in effect.shapes()}
+        for word, value in spec.options.items():
+            if word in words:
+                held |= {(len(terms), joint, word): _number(effect, word, value) for joint in joints}
+        terms.append((effect, tuple(joints)))
+    made = Model(robot, tuple(terms), held=tuple(held.items()))
+    return made.with_shapes(initial(made))
+
+
+def found(spec) -> Effect:
+    """The effect that an entry of `model.effects` names, with its options. Raises ConfigError."""
+    effect = find(spec.name)
+    words = {shape.name for shape in effect.shapes()}
+    return effect.given(**{name: value for name, value in spec.options.items() if name not in words})
+
+
+def _number(effect: Effect, word: str, value) -> float:
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not np.isfinite(value):
+        raise ConfigError(f"model.effects: {effect.name}.{word} is {value!r}", allowed="a number, which is then held", do="give a number or leave it out")
+    return float(value)
 
 
 def moving_coefficients(model: Model, motion: Motion) -> np.ndarray:
     """(coefficients,) bool: False for those of a joint that never moves, which no data can tell."""
-    return np.array([model.robot.joints[c.joint] not in motion.still for c in model.coefficients], dtype=bool)
+    return np.array([c.joint == ROBOT or model.robot.joints[c.joint] not in motion.still for c in model.coefficients], dtype=bool)

@@ -104,6 +104,9 @@ class Piece:
     `smoother` filters columns where torque was filtered, else None; then `margin` extra rows stand before and
     after `core`, whose filtered values the filter needs but which are not used. `rest` (dof,) [rad/s or m/s] is the
     speed that rounding makes of a constant angle; `noise` (dof,) [rad or m] what the filter took off the angles, RMS.
+
+    What a model adds: `load` (n, dof) the torque that its bodies alone need; `gravity` (3,) or None for the robot's own;
+    `deflection` (3, n, dof), how far each link is behind its motor in q, qd and qdd, or None.
     """
 
     log: int
@@ -120,6 +123,9 @@ class Piece:
     core: slice
     rest: np.ndarray
     noise: np.ndarray
+    load: np.ndarray | None = None
+    gravity: np.ndarray | None = None
+    deflection: np.ndarray | None = None
 
     def direction(self, joint: int) -> np.ndarray:
         """sign(qd) (n,) of a joint, zero where the filter of a constant angle leaves nothing but rounding."""
@@ -132,6 +138,8 @@ class Piece:
             self, t=self.t[rows], q=self.q[rows], qd=self.qd[rows], qdd=self.qdd[rows], tau=self.tau[rows],
             measured=self.measured[rows], signals={name: values[rows] for name, values in self.signals.items()},
             use=None if self.use is None else self.use[rows], core=slice(0, len(self.t[rows])),
+            load=None if self.load is None else self.load[rows],
+            deflection=None if self.deflection is None else self.deflection[:, rows],
         )  # fmt: skip
 
     @property

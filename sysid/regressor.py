@@ -34,14 +34,24 @@ class BodyMotion:
     jacobian: dict[int, tuple[np.ndarray, np.ndarray]]
 
 
-def body_motions(robot: Robot, q, qd, qdd) -> list[BodyMotion]:
-    """Motion of every body, in the order of `robot.bodies`. q, qd, qdd: (n, dof)."""
+def body_motions(robot: Robot, q, qd, qdd, *, gravity=None, deflection=None) -> list[BodyMotion]:
+    """Motion of every body, in the order of `robot.bodies`.
+
+    Args:
+        q, qd, qdd: (n, dof).
+        gravity: (3,) [m/s^2] in the base frame, where it is not the robot's own.
+        deflection: (3, n, dof) or None: how far q, qd and qdd of each joint's link stand behind those of its motor.
+    """
     q, qd, qdd = (np.ascontiguousarray(np.asarray(x, dtype=float).T) for x in (q, qd, qdd))
     n = q.shape[1]
     full_q, full_qd, full_qdd = (robot.transmission @ x for x in (q, qd, qdd))
+    if deflection is not None:
+        links = [body.row for body in robot.bodies if body.kind == "link"]
+        for full, behind in zip((full_q, full_qd, full_qdd), deflection):
+            full[links] -= behind.T
     zero = np.zeros((3, n))
     # the base accelerates upward at -g: gravity enters every body at no cost
-    base = (zero, zero, np.repeat(-robot.gravity[:, None], n, 1), {})
+    base = (zero, zero, np.repeat(-np.asarray(robot.gravity if gravity is None else gravity)[:, None], n, 1), {})
     rows: list[tuple] = []
     for i, parent in enumerate(robot.parents):
         w, alpha, a, jacobian = rows[parent] if parent >= 0 else base
@@ -114,9 +124,9 @@ def wrench_columns(motion: BodyMotion, linear, angular, out) -> None:
         out[k] = angular[i] * alpha[j] + angular[j] * alpha[i] + u[i] * w[j] + u[j] * w[i]
 
 
-def columns(robot: Robot, q, qd, qdd) -> np.ndarray:
-    """The regressor with samples last, (dof, 10 bodies, n); the layout that compression works on."""
-    motions = body_motions(robot, q, qd, qdd)
+def columns(robot: Robot, q, qd, qdd, **how) -> np.ndarray:
+    """The regressor with samples last, (dof, 10 bodies, n); the layout that compression works on. `how`: see `body_motions`."""
+    motions = body_motions(robot, q, qd, qdd, **how)
     out = np.zeros((robot.dof, 10 * len(motions), np.shape(q)[0]))
     for b, motion in enumerate(motions):
         for j, (linear, angular) in motion.jacobian.items():
@@ -140,13 +150,15 @@ def regressor_chunks(robot: Robot, q, qd, qdd, *, chunk: int = _CHUNK) -> Iterat
         yield regressor(robot, q[part], qd[part], qdd[part])
 
 
-def torque(robot: Robot, pi, q, qd, qdd) -> np.ndarray:
+def torque(robot: Robot, pi, q, qd, qdd, *, gravity=None, deflection=None) -> np.ndarray:
     """Inverse dynamics (n, dof) [N m] of bodies pi (bodies, 10), rotors included, friction not."""
     q, qd, qdd = (np.asarray(x, dtype=float) for x in (q, qd, qdd))
     out = np.zeros((len(q), robot.dof))
     for start in range(0, len(q), _CHUNK):
         part = slice(start, start + _CHUNK)
-        for parameters, motion in zip(np.asarray(pi), body_motions(robot, q[part], qd[part], qdd[part])):
+        behind = None if deflection is None else deflection[:, part]
+        motions = body_motions(robot, q[part], qd[part], qdd[part], gravity=gravity, deflection=behind)
+        for parameters, motion in zip(np.asarray(pi), motions):
             force, moment = _wrench(parameters, motion)
             for j, (linear, angular) in motion.jacobian.items():
                 out[part, j] += np.einsum("in,in->n", linear, force) + np.einsum("in,in->n", angular, moment)

@@ -179,7 +179,7 @@ def _relocated(experiment: Experiment, run: Path) -> dict:
     if experiment.robot.joints is None:
         tree["robot"].pop("joints", None)
     tree["model"]["effects"] = [
-        effect["name"] if effect.get("joints") is None else {effect["name"]: {"joints": effect["joints"]}}
+        {effect["name"]: own} if (own := {**({"joints": effect["joints"]} if effect.get("joints") else {}), **effect["options"]}) else effect["name"]
         for effect in tree["model"]["effects"]
     ]
     return tree
