@@ -76,6 +76,141 @@ def compare(
 
 
 @app.command()
+def simulate(
+    experiment: ExperimentPath,
+    out: Annotated[Path, typer.Option("--out", help="The folder to write: config.yaml, robot.urdf, train.csv, test.csv, truth.json.")],
+    hide: Annotated[Optional[list[str]], typer.Option("--hide", metavar="EFFECT:JOINT[:name=value,...]", help="An effect that config.yaml does not list; may be given again. Values left out are drawn; size=2 doubles them.")] = None,  # noqa: UP045
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of everything random.")] = 0,
+    duration: Annotated[float, typer.Option("--duration", help="Seconds of each log.")] = 20.0,
+    rate: Annotated[float, typer.Option("--rate", help="Samples a second.")] = 1000.0,
+    noise: Annotated[Optional[float], typer.Option("--noise", help="Standard deviation of the torque noise [N m] (default 1 to 2 % of each joint's torque).")] = None,  # noqa: UP045
+    colour: Annotated[Optional[float], typer.Option("--colour", help="Time constant [s] of half of the noise's variance (default white).")] = None,  # noqa: UP045
+    encoder: Annotated[Optional[int], typer.Option("--encoder", help="Bits a turn of the motor, of the joint where it has no rotor; 0: exact (default 14 on the motor).")] = None,  # noqa: UP045
+    speed: Annotated[Optional[float], typer.Option("--speed", help="Top speed [rad/s] (default by the robot's size).")] = None,  # noqa: UP045
+    as_json: Json = False, quiet: Quiet = False,
+) -> None:  # fmt: skip
+    """Simulate an experiment's robot in closed loop, with hidden effects, and write logs to identify."""
+    from . import simulate as simulation
+
+    hidden = [simulation.hidden(text) for text in hide or []]
+    folder = simulation.prepare(out)
+    spec, robot, notices = simulation.load(experiment)
+    with _progress(quiet or as_json) as progress:
+        found = simulation.simulate(
+            robot, hide=hidden, seed=seed, duration=duration, rate=rate, noise=noise, colour=colour, encoder=encoder, speed=speed, progress=progress
+        )
+    simulation.write(found, spec, folder)
+    if as_json:
+        print(json.dumps(found.truth, allow_nan=False))
+    elif not quiet:
+        for part, log in found.truth["logs"].items():
+            print(f"{part}: {log['samples']} samples; noise " + ", ".join(f"{joint} {rms:.3g}" for joint, rms in log["noise_rms"].items()))
+        for entry in found.truth["hidden"]:
+            print(f"hidden: {entry['effect']} on {entry['joint']}, " + ", ".join(f"{n}={v:.4g}" if isinstance(v, float) else f"{n}={v}" for n, v in entry["values"].items()))
+        for notice in notices:
+            print(f"note {notice}")
+        print(f"folder: {folder}")
+
+
+@app.command()
+def diagnose(
+    experiment: ExperimentPath,
+    model: Annotated[Optional[Path], typer.Option("--model", help="A run folder: hold its fitted model, and ask what changed.")] = None,  # noqa: UP045
+    log: Annotated[Optional[list[str]], typer.Option("--log", help="With --model: the new log.")] = None,  # noqa: UP045
+    as_json: Json = False, out: Out = None, quiet: Quiet = False,
+) -> None:  # fmt: skip
+    """Where the model fails and which effect is missing; with --model, what changed on a new log."""
+    from . import pipeline, results
+    from .diagnose.diagnosis import diagnose as work
+    from .diagnose.document import document
+
+    spec = pipeline.load(experiment)
+    run = results.folder(out or Path("runs") / spec.name)
+    with _progress(quiet or as_json) as progress:
+        found = work(spec, progress=progress)
+    results.write(found.fit, run)
+    said = document(found, run)
+    results.write_json(run / "diagnosis.json", said)
+    if as_json:
+        print(json.dumps(said, allow_nan=False))
+    elif not quiet:
+        from .terminal import show_diagnosis
+
+        show_diagnosis(found, said)
+    if not found.fit.solution.converged:
+        raise typer.Exit(1)
+
+
+@app.command()
+def add(
+    experiment: ExperimentPath,
+    effect: Annotated[str, typer.Argument(help="A word of `sysid effects`, a class my_effects.py:Name, or formula.")],
+    joint: Annotated[Optional[list[str]], typer.Option("--joint", help="The joint that has it; again for more. Default: every joint.")] = None,  # noqa: UP045
+    option: Annotated[Optional[list[str]], typer.Option("--option", metavar="NAME=VALUE", help="An option of the effect, in YAML; again for more.")] = None,  # noqa: UP045
+    as_json: Json = False, out: Out = None, quiet: Quiet = False,
+) -> None:  # fmt: skip
+    """Write an effect into the experiment file (comments kept), refit, and show the error before and after."""
+    from . import loop
+
+    path = experiment / "config.yaml" if experiment.is_dir() else experiment
+    with _progress(quiet or as_json) as progress:
+        found = loop.add(path, effect, list(joint) if joint else None, loop.options(option or []), progress=progress, out=out)
+    said = loop.document(found)
+    if as_json:
+        print(json.dumps(said, allow_nan=False))
+    elif not quiet:
+        from .terminal import show_added
+
+        show_added(said)
+    if not found.after.solution.converged:
+        raise typer.Exit(1)
+
+
+@app.command()
+def discover(
+    experiment: ExperimentPath,
+    most: Annotated[int, typer.Option("--max-steps", min=0, help="How many effects to add at most.")] = 10,
+    as_json: Json = False, out: Out = None, quiet: Quiet = False,
+) -> None:  # fmt: skip
+    """Diagnose, add, refit, until nothing is missing; a step folder each. The experiment file stays as it is."""
+    from . import loop, pipeline, results
+    from .terminal import show_step
+
+    spec = pipeline.load(experiment)
+    run = results.folder(out or Path("runs") / spec.name)
+    said_each = None if as_json or quiet else show_step
+    with _progress(quiet or as_json) as progress:
+        found = loop.discover(spec, run, most=most, progress=progress, each=said_each)
+    from .diagnose.document import document
+
+    said = {"steps": found.steps, "verdict": document(found.diagnosis, run)["verdict"], "refused": found.refused, "run": str(run)}
+    if as_json:
+        print(json.dumps(said, allow_nan=False))
+    elif not quiet:
+        from .terminal import show_discovery
+
+        show_discovery(said, document(found.diagnosis, run))
+
+
+@app.command()
+def history(experiment: ExperimentPath, as_json: Json = False, out: Out = None, quiet: Quiet = False) -> None:
+    """The steps of an experiment and the held-out error falling."""
+    from . import loop, pipeline
+
+    spec = pipeline.load(experiment)
+    run = out or Path("runs") / spec.name
+    steps = loop.read_history(run)
+    if not steps:
+        raise SysidError("no step was made yet", where=str(run), do=f"run `sysid add {experiment} EFFECT` or `sysid discover {experiment}`")
+    if as_json:
+        print(json.dumps({"steps": steps}, allow_nan=False))
+    elif not quiet:
+        from .terminal import show_history
+
+        show_history(steps)
+
+
+@app.command()
 def effects(name: Annotated[Optional[str], typer.Argument(help="One effect; without it, all.")] = None, as_json: Json = False, out: Out = None, quiet: Quiet = False) -> None:  # noqa: UP045
     """The catalogue of physical effects: equation, parameters, units, what it looks like, what it is confused with."""
     from .effect import describe, find, vocabulary

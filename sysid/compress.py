@@ -13,6 +13,7 @@ import numpy as np
 
 from .model import Model, chunks
 from .preprocess import Motion
+from .rows import difference_step
 
 # Blocks are the unit of correlation-robust statistics: long against the filter's memory, many enough to count.
 _MOST_BLOCKS, _FEWEST_SAMPLES = 60, 200
@@ -27,6 +28,54 @@ def triangle(rows: np.ndarray) -> np.ndarray:
         return np.zeros((0, rows.shape[1]))
     factor = dgeqrf(np.asfortranarray(rows), overwrite_a=1)[0]
     return np.triu(factor[: min(rows.shape)])
+
+
+@dataclass(frozen=True)
+class Linearised:
+    """A model at parameters x (size,) with one more column for each free shape value: the slope of its torque there."""
+
+    model: Model
+    x: np.ndarray
+
+    @property
+    def robot(self):
+        """The model's robot."""
+        return self.model.robot
+
+    @cached_property
+    def free(self) -> list[int]:
+        """Which of the model's shape values are not held by the user."""
+        return [k for k, value in enumerate(self.model.shape_values) if not value.held]
+
+    @property
+    def size(self) -> int:
+        """Linear parameters and free shape values."""
+        return self.model.size + len(self.free)
+
+    def support(self, joint: int) -> np.ndarray:
+        """The model's, and every slope."""
+        return np.append(self.model.support(joint), np.arange(self.model.size, self.size))
+
+    @cached_property
+    def _beside(self) -> list[tuple[Model, float]]:
+        out = []
+        for k in self.free:
+            step = difference_step(self.model.shape_values[k], self.model.shapes[k])
+            out.append((self.model.with_shapes([s + step * (i == k) for i, s in enumerate(self.model.shapes)]), step))
+        return out
+
+    def remembered(self, piece) -> list[dict]:
+        """What the model remembers of a piece, at its shape values and a step beside each."""
+        return [model.remembered(piece) for model in (self.model, *(beside for beside, _ in self._beside))]
+
+    def columns(self, piece, rows: slice, remembered: list[dict]) -> list[np.ndarray]:
+        """As `Model.columns`, with the slopes after the others."""
+        out = self.model.columns(piece, rows, remembered[0])
+        slopes: list[list[np.ndarray]] = [[] for _ in out]
+        for (beside, step), known in zip(self._beside, remembered[1:]):
+            for joint, values in enumerate(beside.columns(piece, rows, known)):
+                slopes[joint].append(self.x[self.model.support(joint)] @ (values - out[joint]) / step)
+        return [np.concatenate([values, *(s[None] for s in own)]) for values, own in zip(out, slopes)]
 
 
 @dataclass(frozen=True)
@@ -95,6 +144,15 @@ class Compressed:
             out[factor.block, factor.columns] += scale * factor.triangle[:, :-1].T @ factor.misfit(x)
         return out
 
+    def first(self, size: int) -> "Compressed":
+        """The same data with the first `size` parameters alone: the columns of a triangle are a smaller problem's."""
+        factors = []
+        for factor in self.factors:
+            kept = np.flatnonzero(factor.columns < size)
+            rows = triangle(np.asfortranarray(factor.triangle[:, np.append(kept, factor.triangle.shape[1] - 1)]))
+            factors.append(Factor(factor.joint, factor.block, factor.columns[kept], rows, factor.rows))
+        return Compressed(size, self.joints, tuple(factors), self.samples)
+
     def without(self, blocks) -> "Compressed":
         """The same data with some blocks left out."""
         leave = set(blocks)
@@ -122,14 +180,14 @@ def block_length(motion: Motion) -> int:
     return max(_FEWEST_SAMPLES, -(-motion.samples // _MOST_BLOCKS))
 
 
-def compress(model: Model, motion: Motion, *, thin: int = 1, progress: Callable[[float], None] | None = None) -> Compressed:
+def compress(model: Model | Linearised, motion: Motion, *, thin: int = 1, progress: Callable[[float], None] | None = None) -> Compressed:
     """Reduce a motion under a model to triangles.
 
     Args:
         thin: use every `thin`-th row only (for quick comparisons).
         progress: called with the share done, from 0 to 1.
     """
-    size = 10 * model.bodies + len(model.coefficients)
+    size = model.size
     supports = [model.support(joint) for joint in range(model.robot.dof)]
     factors, block, done, length = [], 0, 0, block_length(motion)
     for piece in motion.pieces:

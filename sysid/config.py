@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import difflib
 import math
+import re
 from pathlib import Path
 from pkgutil import iter_modules
 from typing import Annotated, Any, Literal
@@ -229,7 +230,16 @@ class PreprocessSpec(_Spec):
             raise ValueError(f"order {self.order} has no acceleration: savitzky-golay needs 2 to 12")
 
 
+def is_own(name: str) -> bool:
+    """Whether an effect's name is a class in a Python file, `my_effects.py:Name`."""
+    return re.fullmatch(r"[^\0]*[^\0/\\:]\.py:[A-Za-z_]\w*", name) is not None
+
+
 def _known_effect(name: str) -> str:
+    if is_own(name) or name == "formula":
+        return name
+    if ".py" in name:
+        raise ValueError(f"{name!r} names no class; write {name.partition('.py')[0]}.py:Name")
     # the folder is the vocabulary; nothing of it is loaded here
     names = sorted(module.name for module in iter_modules([str(Path(__file__).parent / "effects")]))
     if name not in names:
@@ -246,10 +256,12 @@ class EffectSpec(_Spec):
     options: dict[str, Any] = {}
 
 
-def _own_keys(name: str) -> list[str]:
+def _own_keys(name: str, given) -> list[str]:
     """The keys that an effect has beside `joints`: its options, and its shape values, which may be held."""
     from .effect import find, vocabulary
 
+    if is_own(name):
+        return [key for key in given if key != "joints"]  # only the file can tell; it is not run here
     if name not in vocabulary():
         return []
     effect = find(name)
@@ -259,14 +271,31 @@ def _own_keys(name: str) -> list[str]:
 def _effect(value: Any) -> Any:
     if isinstance(value, EffectSpec):
         return value
+    if value == "formula" or (isinstance(value, dict) and "formula" in value):
+        return _formula(value)
     if isinstance(value, str):
         return {"name": value}
     if isinstance(value, dict) and len(value) == 1:
         ((name, options),) = value.items()
         if isinstance(name, str) and isinstance(options, dict) and not {"name", "options"} & set(options):
-            own = {key: options[key] for key in _own_keys(name) if key in options}
+            own = {key: options[key] for key in _own_keys(name, options) if key in options}
             return {"name": name, **{key: given for key, given in options.items() if key not in own}, **({"options": own} if own else {})}
     raise ValueError("must be an effect's name, or {name: {joints: [...]}}; see `sysid effects`")
+
+
+def _formula(value: Any) -> dict:
+    """The entry {formula: text, joints: [...], name: ..., and shape values that are held}."""
+    from .formula import option_names
+
+    text = value.get("formula") if isinstance(value, dict) else None
+    if not isinstance(text, str) or "options" in value:
+        raise ValueError('must be {formula: "a*sin(3*q)", joints: [...]}')
+    try:
+        keys = option_names(text)
+    except ConfigError as error:
+        raise ValueError(str(error).removeprefix("model.effects: ")) from None
+    own = {key: given for key, given in value.items() if key in keys}
+    return {**{key: given for key, given in value.items() if key not in own}, "name": "formula", "options": own}
 
 
 class ModelSpec(_Spec):
@@ -274,6 +303,7 @@ class ModelSpec(_Spec):
 
     inertia: Literal["log-cholesky", "exponential", "eigenvalue", "linear"] = "log-cholesky"
     effects: list[Annotated[EffectSpec, BeforeValidator(_effect)]] = [EffectSpec(name="viscous"), EffectSpec(name="coulomb")]
+    candidates: list[Annotated[EffectSpec, BeforeValidator(_effect)]] = []
 
 
 class PriorSpec(_Spec):
@@ -334,6 +364,11 @@ def load(path: str | Path) -> Experiment:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError:
         raise ConfigError("not UTF-8 text", where=str(path), do="give an experiment in YAML") from None
+    return loads(text, path)
+
+
+def loads(text: str, path: Path) -> Experiment:
+    """The experiment that a text is, as if it stood in the file `path`. Raises ConfigError, as `load`."""
     tree = parse_yaml(text, where=str(path))
     if tree is None:
         tree = {}

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import copy
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from importlib import import_module
 from pkgutil import iter_modules
@@ -45,7 +45,9 @@ class Shape:
 
     of: what `low` and `high` are shares of: the joint's top "speed", its greatest "torque", the "angle" it travels, the
         "duration" of a log, or "" for plain units. start: the value at which the effect does nothing, from which a
-        search begins; None where there is none, and `grid` values between the bounds are tried.
+        search begins; None where there is none, and values between the bounds are tried: `grid` of them, in equal
+        ratios, or in equal steps where `even` or where a bound is not positive. spacing: the widest step between
+        tried values that misses nothing, as a share of 1 / (angle travelled); 0 where `grid` values suffice.
     """
 
     unit: str
@@ -55,14 +57,29 @@ class Shape:
     start: float | None = None
     grid: int = 8
     says: str = ""
+    even: bool = False
+    spacing: float = 0.0
     name: str = field(default="", init=False)
 
     def __set_name__(self, owner, name):
         self.name = name
 
-    def values(self, low: float, high: float) -> np.ndarray:
-        """(grid,) values between two bounds, in equal ratios where both are positive."""
-        return np.geomspace(low, high, self.grid) if low > 0 else np.linspace(low, high, self.grid)
+    def values(self, low: float, high: float, angle: float | None = None) -> np.ndarray:
+        """Values to try between two bounds, ascending.
+
+        Args:
+            angle: what the joint travels, where it is known; only `spacing` looks at it.
+        """
+        if self.spacing and angle:
+            return np.linspace(low, high, 2 + int((high - low) * angle / self.spacing))
+        return np.geomspace(low, high, self.grid) if low > 0 and not self.even else np.linspace(low, high, self.grid)
+
+
+def called(value, name: str):
+    """A coefficient or shape value under a name, for an effect whose coefficients depend on its options."""
+    out = copy.copy(value)
+    out.name = name
+    return out
 
 
 class Effect(ABC):
@@ -89,11 +106,16 @@ class Effect(ABC):
 
     def coefficients(self) -> tuple[Linear, ...]:
         """The linear coefficients, in the order of the columns."""
-        return tuple(value for value in vars(type(self)).values() if isinstance(value, Linear))
+        return self._declared(Linear)
 
     def shapes(self) -> tuple[Shape, ...]:
         """The values that it is not linear in."""
-        return tuple(value for value in vars(type(self)).values() if isinstance(value, Shape))
+        return self._declared(Shape)
+
+    def _declared(self, what: type) -> tuple:
+        """What a class and those it derives from declare, these first."""
+        found = {name: value for kind in reversed(type(self).__mro__) for name, value in vars(kind).items()}
+        return tuple(value for value in found.values() if isinstance(value, what))
 
     def given(self, **options) -> Effect:
         """This effect with the options that an experiment file gives it.
@@ -108,6 +130,14 @@ class Effect(ABC):
         chosen = copy.copy(self)
         vars(chosen).update(options)
         return chosen
+
+    def bound(self, robot, joint: int) -> Effect:
+        """This effect, knowing the robot that it stands on; the same whatever the joint (-1 where its scope is the robot).
+
+        Raises:
+            ConfigError: an option names what this robot lacks, or the effect cannot stand on this joint.
+        """
+        return self
 
     def variants(self, robot, joint: int) -> list[dict]:
         """The options under which it is worth trying on a joint (-1 where its scope is the robot), simplest first."""
@@ -154,6 +184,58 @@ class SensorEffect(Effect):
         """What the sensor makes of torque (k, n), sampled every `step` seconds; same shape."""
 
 
+def whole(effect: Effect, option: str, most: int) -> None:
+    """Refuse an option that is no whole number from 1 to `most`."""
+    value = getattr(effect, option)
+    if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= most:
+        raise ConfigError(f"{effect.name}.{option} is {value!r}", where="model.effects", allowed=f"a whole number, 1 to {most}")
+
+
+def one_of(effect: Effect, option: str, allowed, do: str | None = None) -> None:
+    """Refuse an option that is not one of the allowed words."""
+    value = getattr(effect, option)
+    if value not in allowed:
+        raise ConfigError(f"{effect.name}.{option} is {value!r}", where="model.effects", allowed=", ".join(allowed), do=do)
+
+
+def texts(effect: Effect, option: str) -> None:
+    """Refuse an option that is neither left out nor a list of texts."""
+    value = getattr(effect, option)
+    if value is not None and not (isinstance(value, list) and value and all(isinstance(item, str) for item in value)):
+        raise ConfigError(f"{effect.name}.{option} is {value!r}", where="model.effects", allowed="a list of names")
+
+
+def last_link(robot) -> str:
+    """The name of the last link, which on an arm carries the tool."""
+    return [body.name for body in robot.bodies if body.kind == "link"][-1]
+
+
+def rates(values: np.ndarray, step: float) -> np.ndarray:
+    """Values (n,) sampled every `step` seconds with their first two derivatives (3, n), by central differences."""
+    if len(values) < 3:
+        return np.stack([values, np.zeros(len(values)), np.zeros(len(values))])
+    second = np.diff(values, 2) / step**2
+    return np.stack([values, np.gradient(values, step), np.concatenate([second[:1], second, second[-1:]])])
+
+
+def deflected(motion: Piece, joint: int, behind: np.ndarray, encoder: str) -> Piece:
+    """A motion whose joint's link stands behind its motor, by `behind` (3, n) in q, qd and qdd.
+
+    Args:
+        encoder: "motor" where the encoder turns with the motor: the link is behind what was measured;
+            "joint" where it turns with the link: the motor is ahead of what was measured.
+    """
+    n, dof = motion.q.shape
+    deflection = np.zeros((3, n, dof)) if motion.deflection is None else motion.deflection.copy()
+    deflection[:, :, joint] += behind
+    if encoder == "motor":
+        return replace(motion, deflection=deflection)
+    ahead = [np.array(x) for x in (motion.q, motion.qd, motion.qdd)]
+    for values, own in zip(ahead, behind):
+        values[:, joint] += own
+    return replace(motion, q=ahead[0], qd=ahead[1], qdd=ahead[2], deflection=deflection)
+
+
 KINDS = (TorqueEffect, WrenchEffect, MotionEffect, SensorEffect)
 
 
@@ -198,7 +280,7 @@ def describe(effect: Effect) -> dict:
         "parameters": [
             {"name": c.name, "unit": c.unit, "lower": c.lower, "says": c.says} for c in effect.coefficients()
         ] + [
-            {"name": s.name, "unit": s.unit, "lower": s.low, "upper": s.high, "share_of": s.of, "says": s.says} for s in effect.shapes()
+            {"name": s.name, "unit": s.unit, "lower": s.low, "upper": s.high, "share_of": s.of, "start": s.start, "says": s.says} for s in effect.shapes()
         ],
         "options": dict(effect.options), "looks_like": effect.looks_like, "tied_with": list(effect.tied_with),
         "separate_by": effect.separate_by, "source": effect.source,

@@ -73,8 +73,8 @@ def _sum(values):
 class Fit:
     """What identification found.
 
-    pi (bodies, 10) about the joints' frames; coefficients of the effects in `model.coefficients`' order;
-    x both in one vector. `predictions` by "train" and "test". `notices`: what was decided on the way.
+    pi (bodies, 10) about the joints' frames, `prior` the same before any data; coefficients of the effects in `model.coefficients`' order;
+    x both in one vector. `shape_std` of the model's shape values, NaN where held or undetermined. `predictions` by "train" and "test". `notices`: what was decided on the way.
     """
 
     experiment: Experiment
@@ -88,6 +88,8 @@ class Fit:
     weights: np.ndarray | None
     compressed: Compressed
     physically_consistent: bool
+    prior: np.ndarray
+    shape_std: np.ndarray = field(default_factory=lambda: np.zeros(0))
     predictions: dict[str, Prediction] = field(default_factory=dict)
     samples: dict[str, int] = field(default_factory=dict)
     seconds: dict[str, float] = field(default_factory=dict)
@@ -150,10 +152,34 @@ def pose(experiment: Experiment, model: Model, compressed: Compressed, moving: n
     spec = experiment
     objective = Objective(compressed.total(weights), DIVERGENCES[spec.prior.divergence](prior), spec.prior.weight)
     positive = np.array([c.positive for c in model.coefficients], dtype=bool)
-    held = ~moving
+    held = ~moving | undetermined(objective, model, moving)
     coordinates = Coordinates(PARAMETERIZATIONS[spec.model.inertia](), model.bodies, positive, held)
     x = np.concatenate([prior.ravel(), _starting_coefficients(model, objective, prior, positive, held)])
     return Problem(objective, coordinates, coordinates.theta(x), weights)
+
+
+# A coefficient's column that others match to this share of its size is told from them by rounding alone.
+_ALIKE = 1e-6
+
+
+def undetermined(objective: Objective, model: Model, moving) -> np.ndarray:
+    """(coefficients,) bool: those that no data of this kind can tell from what stands before them in the model."""
+    count = 10 * model.bodies
+    out = np.zeros(len(model.coefficients), dtype=bool)
+    columns = objective.triangle[:, :-1]
+    # bodies have a prior; only coefficients can be left without any hold
+    basis = np.zeros((len(columns), 0))
+    for k in np.flatnonzero(moving):
+        column = columns[:, count + k]
+        size = np.linalg.norm(column)
+        rest = column - basis @ (basis.T @ column)
+        rest -= basis @ (basis.T @ rest)
+        left = np.linalg.norm(rest)
+        if left <= _ALIKE * size:
+            out[k] = True
+        else:
+            basis = np.column_stack([basis, rest / left])
+    return out
 
 
 def _starting_coefficients(model: Model, objective: Objective, prior, positive, held) -> np.ndarray:
@@ -181,8 +207,14 @@ def noise_weights(compressed: Compressed, x) -> np.ndarray:
     return weights / np.exp(np.mean(np.log(weights)))
 
 
-def identify(experiment: Experiment, model: Model, motion: Motion, compressed: Compressed, prior: np.ndarray, callback=None) -> Fit:
-    """Solve, certify and say how sure; the predictions are added by the pipeline."""
+def identify(experiment: Experiment, model: Model, motion: Motion, data: Compressed, prior: np.ndarray, callback=None) -> Fit:
+    """Solve, certify and say how sure; the predictions are added by the pipeline.
+
+    Args:
+        data: the training logs; where it holds slopes of shape values after the model's own parameters, these count in
+            the uncertainty.
+    """
+    compressed = data if data.size == model.size else data.first(model.size)
     moving = moving_coefficients(model, motion)
     problem = pose(experiment, model, compressed, moving, prior)
     solution = problem.solve(experiment, callback=callback)
@@ -197,10 +229,16 @@ def identify(experiment: Experiment, model: Model, motion: Motion, compressed: C
     fixed = np.zeros(len(solution.x), dtype=bool)
     fixed[count:] = held
     fixed[[count + k for k in certificate.at_zero]] = True
+    slopes = data.size - model.size
+    objective = problem.objective if not slopes else Objective(data.total(problem.weights), problem.objective.divergence, problem.objective.weight)
+    sure = uncertainty.estimate(objective, data, np.append(solution.x, np.zeros(slopes)), np.append(fixed, np.zeros(slopes, dtype=bool)), problem.weights)
+    shape_std = np.full(len(model.shape_values), np.nan)
+    shape_std[[k for k, value in enumerate(model.shape_values) if not value.held][:slopes]] = sure.std[model.size :]
+    kept = uncertainty.Uncertainty(sure.covariance[: model.size, : model.size], sure.std[: model.size], sure.from_data[: model.size])
     return Fit(
         experiment=experiment, model=model, x=solution.x, objective=solution.objective, solution=solution,
         certificate=certificate, held=held, weights=problem.weights, compressed=compressed,
-        uncertainty=uncertainty.estimate(problem.objective, compressed, solution.x, fixed, problem.weights),
+        uncertainty=kept, shape_std=shape_std, prior=prior,
         physically_consistent=bool(is_consistent(solution.x[:count].reshape(-1, 10)).all()),
     )  # fmt: skip
 

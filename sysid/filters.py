@@ -115,6 +115,7 @@ def _middle(log: Log) -> Log:
 
 def _held_out(experiment: Experiment, spec: PreprocessSpec, model: Model, logs, prior, edge: float) -> dict:
     motion = prepare(logs, spec, model.robot.joints)
+    model = model.measured_by(motion)
     motion = replace(motion, pieces=tuple(_trimmed(piece, logs[piece.log].segments[0], edge) for piece in motion.pieces))
     # against the torque as logged, over every row: what a filter smooths away or masks it has not explained
     raw = replace(motion, pieces=tuple(replace(piece, tau=piece.measured, use=None) for piece in motion.pieces))

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
-from . import regressor, units
+from . import own_effects, regressor, units
+from .config import is_own
 from .effect import Effect, MotionEffect, SensorEffect, Shape, TorqueEffect, WrenchEffect, find
 from .errors import ConfigError
+from .formula import Formula
 from .inertia import PARAMETERS, UNITS
 from .preprocess import Motion, Piece
 from .robot import Robot
@@ -192,6 +195,10 @@ class Model:
         if self.uses_load:
             reference = self.robot.prior if self.reference is None else self.reference
             part = replace(part, load=regressor.torque(self.robot, reference, part.q, part.qd, part.qdd))
+        return self.moved(part)
+
+    def moved(self, part: Piece) -> Piece:
+        """A part moved as the motion effects say; its load is there where they look at it."""
         for term, (effect, joints) in enumerate(self.terms):
             if isinstance(effect, MotionEffect):
                 for joint in joints:
@@ -224,15 +231,19 @@ class Model:
             bodies = self.support(joint)
             bodies = bodies[bodies < inertial.shape[1]]
             stacked = np.concatenate([inertial[joint, bodies], *effects]) if effects else inertial[joint, bodies]
-            out.append(self._settled(piece, inner, self._sensed(stacked, piece.step, joint)))
+            out.append(self._settled(piece, inner, self.sensed(stacked, piece.step, joint)))
         return out
 
-    def torque(self, piece: Piece, pi, c) -> np.ndarray:
-        """Predicted torque (samples, dof) over a piece's core, of bodies pi (bodies, 10) and coefficients c."""
-        out = np.empty((piece.samples, self.robot.dof))
+    def torque(self, piece: Piece, pi, c, stride: int = 1) -> np.ndarray:
+        """Predicted torque (samples, dof) over a piece's core, of bodies pi (bodies, 10) and coefficients c.
+
+        Args:
+            stride: predict every `stride`-th sample only.
+        """
+        out = np.empty((-(-piece.samples // stride), self.robot.dof))
         remembered = self.remembered(piece)
-        for rows in chunks(piece, _CHUNK if piece.smoother is None else 4 * _CHUNK):
-            wide, inner = self._widened(piece, rows)
+        for rows in chunks(piece, stride * max(1, (_CHUNK if piece.smoother is None else 4 * _CHUNK) // stride)):
+            wide, inner = self._widened(piece, slice(rows.start, rows.stop, stride))
             part = self._seen(piece.part(wide))
             predicted = regressor.torque(self.robot, pi, part.q, part.qd, part.qdd, gravity=part.gravity, deflection=part.deflection).T
             k = 0
@@ -248,12 +259,14 @@ class Model:
                         predicted += np.einsum("k,jkn->jn", own, effect.columns(part, self.robot, **self._of(term, joint)))
                     k += size
             for joint in range(self.robot.dof):
-                predicted[joint] = self._sensed(predicted[None, joint], piece.step, joint)[0]
-            start = rows.start - piece.core.start
-            out[start : start + rows.stop - rows.start] = self._settled(piece, inner, predicted).T
+                predicted[joint] = self.sensed(predicted[None, joint], piece.step, joint)[0]
+            settled = self._settled(piece, inner, predicted).T
+            start = (rows.start - piece.core.start) // stride
+            out[start : start + len(settled)] = settled
         return out
 
-    def _sensed(self, values: np.ndarray, step: float, joint: int) -> np.ndarray:
+    def sensed(self, values: np.ndarray, step: float, joint: int) -> np.ndarray:
+        """What the sensor of a joint makes of torque (k, n), sampled every `step` seconds."""
         for term, (effect, joints) in enumerate(self.terms):
             if isinstance(effect, SensorEffect) and joint in joints:
                 values = effect.sensed(values, step, **self._of(term, joint))
@@ -262,7 +275,7 @@ class Model:
     @staticmethod
     def _settled(piece: Piece, inner: slice, values) -> np.ndarray:
         """Columns computed on widened rows, filtered as torque was and cut back to the rows."""
-        return (values if piece.smoother is None else piece.smoother(values, axis=-1))[..., inner]
+        return values[..., inner] if piece.smoother is None else piece.smoother.at(values, inner)
 
     def _widened(self, piece: Piece, rows: slice) -> tuple[slice, slice]:
         """Rows with the margin that filters and effects need for them to come out as over the whole piece, and where the
@@ -301,15 +314,16 @@ def chunks(piece: Piece, size: int) -> Iterator[slice]:
         yield slice(start, min(start + size, piece.core.stop))
 
 
-def build(robot: Robot, effects) -> Model:
-    """The model of an experiment's `model.effects`.
+def build(robot: Robot, effects, folder: Path = Path()) -> Model:
+    """The model of an experiment's `model.effects`; files of own effects are relative to `folder`.
 
     Raises:
-        ConfigError: an effect or joint that is not there, or an effect twice on a joint, or an option it does not have.
+        ConfigError: an effect or joint that is not there, or an effect twice on a joint, or an option it does not have, or
+            an own effect that fails.
     """
     terms, seen, held = [], set(), {}
     for spec in effects:
-        effect = found(spec)
+        effect = found(spec, folder)
         if effect.scope == "robot" and spec.joints is not None:
             raise ConfigError(f"model.effects: {effect.name} is an effect of the whole robot", allowed="no joints", do="leave `joints` out")
         names = ["*"] if effect.scope == "robot" else spec.joints if spec.joints is not None else list(robot.joints)
@@ -319,9 +333,14 @@ def build(robot: Robot, effects) -> Model:
                 raise ConfigError(f"model.effects: {effect.name} names the joint {name!r}", allowed=", ".join(robot.joints), do="correct the joint")
             if (effect.name, name) in seen:
                 where = "" if name == "*" else f" on joint {name!r}"
-                raise ConfigError(f"model.effects: {effect.name} stands twice{where}", do="leave one out")
+                do = "give each a `name` of its own" if "formula" in spec.options else "leave one out"
+                raise ConfigError(f"model.effects: {effect.name} stands twice{where}", do=do)
             seen.add((effect.name, name))
             joints.append(ROBOT if name == "*" else robot.joints.index(name))
+        for joint in joints:
+            effect = effect.bound(robot, joint)
+            if is_own(spec.name):
+                own_effects.check(effect, robot, joint)
         words = {shape.name: shape for shape in effect.shapes()}
         for word, value in spec.options.items():
             if word in words:
@@ -331,11 +350,25 @@ def build(robot: Robot, effects) -> Model:
     return made.with_shapes(initial(made))
 
 
-def found(spec) -> Effect:
-    """The effect that an entry of `model.effects` names, with its options. Raises ConfigError."""
-    effect = find(spec.name)
+def found(spec, folder: Path = Path()) -> Effect:
+    """The effect that an entry of `model.effects` names, with its options; a file of own effects is relative to `folder`.
+
+    Raises:
+        ConfigError: there is none, or not with these options.
+    """
+    if "formula" in spec.options:
+        effect = Formula(spec.options["formula"], spec.options.get("name", "formula"))
+        own = {name: value for name, value in spec.options.items() if name not in ("formula", "name")}
+    else:
+        effect = own_effects.load(spec.name, folder) if is_own(spec.name) else find(spec.name)
+        own = spec.options
     words = {shape.name for shape in effect.shapes()}
-    return effect.given(**{name: value for name, value in spec.options.items() if name not in words})
+    chosen = effect.given(**{name: value for name, value in own.items() if name not in words})
+    if idle := sorted(words & set(own) - {shape.name for shape in chosen.shapes()}):
+        raise ConfigError(f"model.effects: {effect.name} with these options has no {idle[0]}", do="leave it out")
+    if "formula" in spec.options or is_own(spec.name):
+        vars(chosen)["spelled"] = (spec.name, dict(spec.options))
+    return chosen
 
 
 def _number(effect: Effect, word: str, value) -> float:

@@ -17,9 +17,9 @@ from pathlib import Path
 
 import numpy as np
 
-from . import config, filters, model, robot
+from . import config, filters, model, robot, shape
 from . import log as logs
-from .compress import Compressed, compress
+from .compress import Compressed, Linearised, compress
 from .config import Experiment, LogSpec
 from .errors import SysidWarning
 from .estimate import Fit, Prediction, identify, predict
@@ -40,7 +40,7 @@ def load(path: str | Path) -> Experiment:
 def build(experiment: Experiment) -> tuple[Robot, Model, np.ndarray]:
     """The robot, the model and the prior (bodies, 10) of an experiment. Raises RobotError, ConfigError."""
     machine = robot.load(experiment.robot, experiment.folder)
-    structure = model.build(machine, experiment.model.effects)
+    structure = model.build(machine, experiment.model.effects, experiment.folder)
     return machine, structure, _prior(experiment, structure)
 
 
@@ -58,7 +58,7 @@ def fit(experiment: Experiment, *, progress: Progress | None = None) -> Fit:
     """
     tell = progress or (lambda stage, share: None)
     seconds: dict[str, float] = {}
-    with _noticed() as notices:
+    with noticed() as notices:
         with _timed(seconds, "robot"):
             machine, structure, prior = build(experiment)
         with _timed(seconds, "read"):
@@ -71,13 +71,20 @@ def fit(experiment: Experiment, *, progress: Progress | None = None) -> Fit:
             motion = prepare(train, preprocess, machine.joints)
             del train  # the filtered motion holds all that is needed from here on
         _tell_still(motion)
+        structure = structure.measured_by(motion)
+        nonlinear = bool(structure.shape_values) or structure.uses_load
+        with _timed(seconds, "shape"):
+            slopes = None
+            if nonlinear:
+                structure, slopes = _settled(experiment, structure, motion, prior)
         with _timed(seconds, "compress"):  # the regressor is built and reduced chunk by chunk, never whole
-            compressed = compress(structure, motion, progress=lambda share: tell("compress", share))
+            compressed = compress(slopes or structure, motion, progress=lambda share: tell("compress", share))
         with _timed(seconds, "solve"):
             found = identify(experiment, structure, motion, compressed, prior)
         if not found.physically_consistent:
             names = [body.name for body, possible in zip(machine.bodies, is_consistent(found.pi)) if not possible]
             warnings.warn(SysidWarning(f"impossible bodies: {', '.join(names)}; identified.urdf will not serve a simulator. model.inertia: log-cholesky keeps them possible"), stacklevel=2)
+        _tell_undetermined(found, motion)
         with _timed(seconds, "predict"):
             predictions = {"train": predict(structure, found.x, motion)}
             samples = {"train": motion.samples}
@@ -120,7 +127,7 @@ class Prepared:
 
 def prepared(experiment: Experiment) -> Prepared:
     """Read, filter and compress the training and the test logs of an experiment. Raises SysidError."""
-    with _noticed() as notices:
+    with noticed() as notices:
         machine, structure, prior = build(experiment)
         train = read(experiment, machine, experiment.data.train)
         preprocess = experiment.preprocess
@@ -128,9 +135,47 @@ def prepared(experiment: Experiment) -> Prepared:
             preprocess = filters.settled(preprocess, filters.compare(experiment, structure, train, prior))
         motion = prepare(train, preprocess, machine.joints)
         _tell_still(motion)
+        structure = structure.measured_by(motion)
+        if structure.shape_values or structure.uses_load:
+            structure, _ = _settled(experiment, structure, motion, prior)
         held_out = prepare(read(experiment, machine, experiment.data.test), preprocess, machine.joints)
         train_data, test_data = compress(structure, motion), compress(structure, held_out)
     return Prepared(structure, motion, train_data, test_data, prior, moving_coefficients(structure, motion), tuple(notices))
+
+
+_PASSES, _NEAR = 3, 0.1  # refinements on all rows; of a standard deviation
+
+
+def _settled(experiment: Experiment, structure: Model, motion: Motion, prior) -> tuple[Model, Linearised | None]:
+    """The model with its shape values found: on rows that fit in memory, then by Gauss-Newton steps on all of them."""
+    found = shape.settle(experiment, structure, motion, prior)
+    structure, slopes = found.model, Linearised(found.model, found.x)
+    if not slopes.free:
+        return structure, None
+    for _ in range(_PASSES):
+        data = compress(slopes, motion)
+        fit = identify(experiment, structure, motion, data, prior)
+        change = shape.correction(fit, data)
+        values = np.array(structure.shapes)
+        low, high = (np.array([getattr(v, end) for v in structure.shape_values]) for end in ("low", "high"))
+        values[slopes.free] += change
+        structure = structure.with_shapes(np.clip(values, low, high))
+        if structure.uses_load:
+            structure = structure.with_reference(fit.pi)
+        slopes = Linearised(structure, fit.x)
+        std = fit.shape_std[slopes.free]
+        if not np.any(np.abs(change) > _NEAR * np.where(np.isfinite(std), std, np.inf)):
+            break
+    return structure, slopes
+
+
+def _tell_undetermined(found: Fit, motion: Motion) -> None:
+    structure = found.model
+    moving = moving_coefficients(structure, motion)
+    names = [c.name for c, held, moves in zip(structure.coefficients, found.held, moving) if held and moves]
+    names += [v.name for v, std in zip(structure.shape_values, found.shape_std) if not (v.held or np.isfinite(std))]
+    if names:
+        warnings.warn(SysidWarning(f"this log cannot tell {', '.join(names)} from the rest of the model: held at the prior"), stacklevel=2)
 
 
 def _automatic(experiment: Experiment) -> bool:
@@ -176,7 +221,7 @@ def _provenance(part: str, log: logs.Log, spec: LogSpec) -> dict:
 
 
 @contextmanager
-def _noticed():
+def noticed():
     """Collect what was decided for the user, each once, as text; other warnings go on as what they are."""
     notices: list[str] = []
     with warnings.catch_warnings(record=True) as caught:

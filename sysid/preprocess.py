@@ -95,12 +95,16 @@ class Smoother:
             return sosfiltfilt(self.sections, values, axis=axis)
         return values
 
+    def at(self, values, rows: slice) -> np.ndarray:
+        """The filtered values (..., n) at some rows of the last axis."""
+        return self(values, axis=-1)[..., rows]
+
 
 @dataclass(frozen=True)
 class Piece:
     """A contiguous stretch of motion, every row usable.
 
-    t (n,) [s]; q, qd, qdd (n, dof); tau (n, dof) as the fit sees it, `measured` as logged; signals {name: (n,)}; `use` (n, dof) bool, None where every row counts.
+    log, source: number and name of the log. t (n,) [s]; q, qd, qdd (n, dof); tau (n, dof) as the fit sees it, `measured` as logged; signals {name: (n,)}; `use` (n, dof) bool, None where every row counts.
     `smoother` filters columns where torque was filtered, else None; then `margin` extra rows stand before and
     after `core`, whose filtered values the filter needs but which are not used. `rest` (dof,) [rad/s or m/s] is the
     speed that rounding makes of a constant angle; `noise` (dof,) [rad or m] what the filter took off the angles, RMS.
@@ -123,6 +127,7 @@ class Piece:
     core: slice
     rest: np.ndarray
     noise: np.ndarray
+    source: str = ""
     load: np.ndarray | None = None
     gravity: np.ndarray | None = None
     deflection: np.ndarray | None = None
@@ -182,7 +187,7 @@ def prepare(logs: Sequence[Log], spec: PreprocessSpec, joints: tuple[str, ...]) 
         before = len(pieces)
         for segment in log.segments:
             if (piece := _piece(number, segment, spec)) is not None:
-                pieces.append(piece)
+                pieces.append(replace(piece, source=log.name))
         if len(pieces) == before:
             shortest = _needs(spec, log.segments[0].step) if log.segments else 2
             raise LogError(f"{log.samples} samples are fewer than the filter's window of {shortest}", where=str(log.path), do="give a longer log or narrow preprocess.window")
@@ -229,7 +234,7 @@ def _masked(piece: Piece, spec: PreprocessSpec, pieces: list[Piece]) -> Piece:
     """The piece with the rows of a standing joint left out, widened by the filter's reach."""
     if spec.standstill == "keep":
         return piece
-    threshold = _standstill_speed(pieces) if spec.standstill == "mask" else np.full(piece.q.shape[1], spec.standstill)
+    threshold = standstill_speed(pieces) if spec.standstill == "mask" else np.full(piece.q.shape[1], spec.standstill)
     still = np.abs(piece.qd) < threshold
     reach = Smoother(spec, piece.step).reach if piece.smoother is not None else 0
     if reach:
@@ -241,7 +246,7 @@ def _masked(piece: Piece, spec: PreprocessSpec, pieces: list[Piece]) -> Piece:
     return replace(piece, use=~still)
 
 
-def _standstill_speed(pieces) -> np.ndarray:
+def standstill_speed(pieces) -> np.ndarray:
     """Speed (dof,) below which a joint counts as standing, from its own rms speed."""
     square = sum(np.sum(p.qd[p.core] ** 2, axis=0) for p in pieces) / sum(p.samples for p in pieces)
     return np.minimum(_STANDSTILL_SHARE * np.sqrt(square), _STANDSTILL_MOST)
@@ -249,7 +254,7 @@ def _standstill_speed(pieces) -> np.ndarray:
 
 def standing(pieces) -> np.ndarray:
     """Share (dof,) of the rows that count in which each joint stands still."""
-    speed = _standstill_speed(pieces)
+    speed = standstill_speed(pieces)
     counted = rows = np.zeros(len(speed))
     for piece in pieces:
         use = True if piece.use is None else piece.use[piece.core]

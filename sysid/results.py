@@ -21,7 +21,7 @@ from pathlib import Path
 
 import numpy as np
 
-from .config import Experiment
+from .config import Experiment, is_own
 from .errors import ConfigError, SysidError
 from .estimate import Fit
 from .filters import settled
@@ -45,6 +45,10 @@ def document(fit: Fit, run: str | Path = "") -> dict:
         for name, value, unit, std, share, fixed in zip(
             names, fit.x.tolist(), fit.model.units, fit.uncertainty.std.tolist(), fit.uncertainty.from_data.tolist(), held
         )
+    ]
+    parameters += [
+        {"name": value.name, "value": at, "unit": value.unit, "std": number(std), "from_data": float(math.isfinite(std)), **({"held": True} if value.held else {})}
+        for value, at, std in zip(fit.model.shape_values, fit.model.shapes, fit.shape_std.tolist())
     ]
     return {
         "rms": {part: by_joint(part, "rms") for part in errors},
@@ -178,11 +182,23 @@ def _relocated(experiment: Experiment, run: Path) -> dict:
         tree["prior"]["source"] = moved(tree["prior"]["source"])
     if experiment.robot.joints is None:
         tree["robot"].pop("joints", None)
-    tree["model"]["effects"] = [
-        {effect["name"]: own} if (own := {**({"joints": effect["joints"]} if effect.get("joints") else {}), **effect["options"]}) else effect["name"]
-        for effect in tree["model"]["effects"]
-    ]
+    for key in ("effects", "candidates"):
+        tree["model"][key] = [_entry(effect, moved) for effect in tree["model"][key]]
     return tree
+
+
+def _entry(effect: dict, moved: Callable[[str], str]) -> dict | str:
+    """An entry of `model.effects` as an experiment file writes it, its paths moved."""
+    own = {**({"joints": effect["joints"]} if effect.get("joints") else {}), **effect["options"]}
+    if "formula" in effect["options"]:
+        return own
+    if isinstance(own.get("logs"), list):
+        own["logs"] = [moved(name) if isinstance(name, str) else name for name in own["logs"]]
+    name = effect["name"]
+    if is_own(name):
+        file, _, kind = name.rpartition(":")
+        name = f"{moved(file)}:{kind}"
+    return {name: own} if own else name
 
 
 def _identified(fit: Fit, tree: dict) -> dict:

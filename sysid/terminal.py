@@ -95,18 +95,141 @@ def _four(value: float | None) -> str:
     return "-" if value is None else f"{value:.4f}"
 
 
+def show_diagnosis(found, document: dict) -> None:
+    """The verdict in words, then what it rests on."""
+    console = Console()
+    for entry in document["verdict"]:
+        console.print(f"[bold]{escape(entry['joint'])}[/bold]: {escape(_verdict_words(entry, document))}", soft_wrap=True, highlight=False)
+    table = Table(title="held-out error against the noise floor", title_justify="left")
+    for heading in ("joint", "RMS train", "RMS test", "noise floor", "+-", "found by"):
+        table.add_column(heading, justify="left" if heading in ("joint", "found by") else "right")
+    for joint, entry in document["joints"].items():
+        se = "" if entry["noise_floor_se"] is None else f"{entry['noise_floor_se']:.2g}"
+        table.add_row(escape(joint), f"{entry['rms']['train']:.4g}", f"{entry['rms']['test']:.4g}", f"{entry['noise_floor']:.4g}", se, escape(entry["floor_detail"]))
+    console.print(table)
+    if document["findings"]:
+        table = Table(title="suspects: each alone added to the model, everything refitted", title_justify="left")
+        for heading in ("effect", "joint", "misfit removed", "RMS test", "visible", "q", "tied with"):
+            table.add_column(heading, justify="left" if heading in ("effect", "joint", "tied with") else "right")
+        for f in document["findings"]:
+            se = "" if f["misfit_removed_se"] is None else f" +- {100 * f['misfit_removed_se']:.0f}"
+            table.add_row(
+                ("* " if f["joins_as_step"] else "  ") + escape(f["effect"]), escape(f["joint"]), f"{100 * f['misfit_removed']:.0f}{se} %",
+                f"{f['rms_test_before']:.4g} -> {f['rms_test_after']:.4g}", f"{f['visible']:.2f}", f"{f['q_value']:.0e}", escape(", ".join(f["tied_with"])),
+            )  # fmt: skip
+        console.print(table)
+        print("* joined the model in the search; the others explain part of the same error")
+    for entry in document["fails_where"]:
+        if entry["words"] and document["joints"][entry["joint"]]["status"] != "complete":
+            console.print(f"where {escape(entry['joint'])} fails: {escape('; '.join(entry['words']))}", soft_wrap=True, highlight=False)
+    unseen: dict[str, list[str]] = {}
+    for entry in document["not_visible"]:
+        unseen.setdefault(f"{entry['effect']}\0{entry['separate_by']}", []).append(entry["joint"])
+    if unseen:
+        print("this log cannot show (the model absorbs it):")
+        for key, joints in unseen.items():
+            effect, by = key.split("\0")
+            console.print(f"  {escape(effect)} on {escape(', '.join(joints))}; to see it: {escape(by)}", soft_wrap=True, highlight=False)
+    _show_notices(document)
+    print(f"run folder: {document['run']}")
+
+
+def _verdict_words(entry: dict, document: dict) -> str:
+    if entry["status"] == "complete":
+        return "complete: nothing is left that held-out data support"
+    left = ""
+    if "depends_on" in entry:
+        left = "; ".join(f"{d['variable']} foretells {100 * d['share']:.0f} % of it" for d in entry["depends_on"][:3])
+    if entry["status"] == "unknown":
+        return f"unknown: structure is left that no effect of the vocabulary explains ({left})"
+    words = f"missing: {entry['effect']}"
+    head = next((f for f in document["findings"] if f["effect"] == entry["effect"] and f["joint"] in (entry["joint"], "*")), None)
+    if head:
+        words += f", removes {100 * head['misfit_removed']:.0f} % of the misfit"
+        shown = [f"{name.split('.')[-1]} = {p['value']:.4g}" + (f" +- {p['std']:.1g}" if p["std"] is not None else "") + f" {p['unit']}" for name, p in head["parameters"].items() if p["value"] is not None]
+        words += f" ({', '.join(shown)})"
+    if entry["tied_with"]:
+        words += f"; this log cannot tell it from {', '.join(entry['tied_with'])}" + (f"; to separate them: {head['separate_by']}" if head else "")
+    if entry["also"]:
+        words += f"; also missing: {', '.join(entry['also'])}"
+    return words + (f"; structure is left beside it ({left})" if left else "")
+
+
+def show_added(document: dict) -> None:
+    """The held-out error before and after an effect."""
+    console = Console()
+    table = Table(title=f"held-out RMS without and with {escape(document['added'])}", title_justify="left")
+    for heading in ("joint", "before", "after", "change", "standard error"):
+        table.add_column(heading, justify="left" if heading == "joint" else "right")
+    for entry in document["differences"]:
+        se = "-" if entry["se"] is None else f"{entry['se']:.2g}"
+        joint = entry["joint"]
+        table.add_row(escape(joint), f"{document['rms_test_before'][joint]:.4g}", f"{document['rms_test_after'][joint]:.4g}", f"{entry['delta_rms']:+.4g}", se)
+    console.print(table)
+    for parameter in document["parameters"]:
+        std = "" if parameter["std"] is None else f" +- {parameter['std']:.2g}"
+        console.print(f"{escape(parameter['name'])} = {parameter['value']:.4g}{std} {escape(parameter['unit'])}", soft_wrap=True, highlight=False)
+    print(f"written into {document['experiment']}")
+    _show_notices(document)
+
+
+def show_step(step: dict) -> None:
+    """One step of a discovery, as it is made."""
+    what = "start" if step["added"] is None else f"+ {step['added']} on {step['joint']}"
+    rms = ", ".join(f"{joint} {value:.4g}" for joint, value in step["rms_test"].items())
+    Console().print(f"{escape(what)}: held-out RMS {escape(rms)}", soft_wrap=True, highlight=False)
+
+
+def show_discovery(said: dict, document: dict) -> None:
+    """Where a discovery ended."""
+    for entry in said["refused"]:
+        print(f"not kept: {entry['effect']} on {entry['joint']}, held-out RMS {entry['delta_rms']:+.3g}")
+    for entry in document["verdict"]:
+        Console().print(f"{escape(entry['joint'])}: {escape(_verdict_words(entry, document))}", soft_wrap=True, highlight=False)
+    print(f"steps and experiment files: {said['run']}/steps")
+
+
+def show_history(steps: list[dict]) -> None:
+    """The steps, one a line, and the error of each joint as a falling row of bars."""
+    joints = list(steps[0]["rms_test"])
+    table = Table(title="held-out RMS [N m, or N on a prismatic joint]", title_justify="left")
+    table.add_column("step")
+    for joint in joints:
+        table.add_column(escape(joint), justify="right")
+    first = steps[0]["rms_test"]
+    for number, step in enumerate(steps):
+        what = "start" if step["added"] is None else f"+ {step['added']} on {step['joint']}"
+        cells = [f"{step['rms_test'][j]:.4g} {'#' * max(1, round(10 * step['rms_test'][j] / first[j])) if first.get(j) else ''}" if j in step["rms_test"] else "" for j in joints]
+        table.add_row(f"{number} {escape(what)}", *cells)
+    Console().print(table)
+
+
 def show_effects(found: list[dict]) -> None:
     """The catalogue, one block an effect."""
     for effect in found:
         print(f"{effect['name']}: {effect['summary']}")
+        print(f"  kind         {effect['kind']}, of {'the whole robot' if effect['scope'] == 'robot' else 'a joint'}")
         print(f"  equation     {effect['equation']}")
         for parameter in effect["parameters"]:
-            bound = ", not negative" if parameter["lower"] == 0 else ""
-            print(f"  {parameter['name']:<12} {parameter['unit']}{bound}: {parameter['says']}")
+            unit = "" if parameter["unit"] == "1" else f" {parameter['unit']}"
+            print(f"  {parameter['name']:<12}{unit}{_bounds(parameter)}: {parameter['says']}")
+        for option, says in effect["options"].items():
+            print(f"  {option + ':':<12} {says}")
         print(f"  looks like   {effect['looks_like']}")
         print(f"  tied with    {', '.join(effect['tied_with']) or 'nothing known'}")
         print(f"  separate by  {effect['separate_by']}")
         print(f"  source       {effect['source']}")
+
+
+_SHARES = {"speed": "times the joint's top speed", "torque": "times its greatest torque", "angle": "times the angle it travels", "duration": "times the longest log"}
+
+
+def _bounds(parameter: dict) -> str:
+    """What a parameter may be, in words."""
+    if "upper" not in parameter:
+        return ", not negative" if parameter["lower"] == 0 else ""
+    share = _SHARES.get(parameter["share_of"])
+    return f", {parameter['lower']:g} to {parameter['upper']:g}" + (f" {share}" if share else "")
 
 
 def show_bodies(document: dict, run) -> None:

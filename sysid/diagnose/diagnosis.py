@@ -1,0 +1,331 @@
+"""A fitted experiment -> where it fails, which effect is missing, and what its logs cannot show.
+
+The whole loop on one page: fit; the noise floor; the ground of questions; every candidate asked; what held-out data
+support joins the model, and again; is structure left that nothing explains; the verdict.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cache
+
+import numpy as np
+
+from .. import model, pipeline, rows
+from ..config import Experiment, is_own
+from ..effect import vocabulary
+from ..estimate import Fit
+from ..filters import settled
+from ..model import ROBOT, Model
+from ..preprocess import prepare
+from . import regions, search, structure
+from .candidate import candidates
+from .domain import CUTOFFS, questioned, stride_of
+from .ground import Answer, Ground
+from .noise import NoiseFloor, floor
+
+_MOST_STEPS = 8
+_UNSEEN = 0.05  # of its root mean square: below it a signature is absorbed by the model
+_SHOWN = 12  # findings
+
+
+@dataclass(frozen=True)
+class Finding:
+    """A candidate that held-out data support.
+
+    joint: its name, or `*`. removed, removed_se: share of the misfit (squared error above the noise floor, on the test logs
+    as the fit sees them) that it removes. parameters: {name: (value, std or NaN, unit)}. tied_with: words of other
+    effects on the joint that this log cannot tell from it. step: which step of the search it heads, or None.
+    """
+
+    answer: Answer
+    joint: str
+    q: float
+    rms_before: float
+    rms_after: float
+    removed: float
+    removed_se: float
+    parameters: dict[str, tuple[float, float, str]]
+    tied_with: tuple[str, ...]
+    step: int | None
+
+    @property
+    def effect(self) -> str:
+        """The effect's word."""
+        return self.answer.candidate.name
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """complete, missing (effect, tied_with; also: further effects) or unknown (depends_on) for one joint."""
+
+    joint: str
+    status: str
+    effect: str | None = None
+    tied_with: tuple[str, ...] = ()
+    also: tuple[str, ...] = ()
+    structure: structure.Structure | None = None
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """Everything that `sysid diagnose` says. steps: the search's; grounds: the first and the last."""
+
+    fit: Fit
+    floors: dict[str, NoiseFloor]
+    findings: tuple[Finding, ...]
+    not_visible: tuple[Answer, ...]
+    verdict: tuple[Verdict, ...]
+    failures: tuple[regions.Failure, ...]
+    steps: tuple[search.Step, ...]
+    first: Ground
+    last: Ground
+
+
+class Logs:
+    """An experiment's logs, read once, as grounds under any low-pass."""
+
+    def __init__(self, experiment: Experiment, fit: Fit):
+        machine = fit.model.robot
+        self.experiment, self.fit = experiment, fit
+        with pipeline.noticed():
+            self.train = pipeline.read(experiment, machine, experiment.data.train)
+            self.test = pipeline.read(experiment, machine, experiment.data.test)
+
+    def ground(self, structure: Model, cutoff: float, weights=None, grid: bool = False) -> Ground | None:
+        """A model's ground under a low-pass; None where a log is too short for it."""
+        joints = structure.robot.joints
+        train, test = questioned(self.train, joints, cutoff), questioned(self.test, joints, cutoff)
+        if train is None or test is None or min(m.samples for m in (train, test)) < 50:
+            return None
+        stride = stride_of(train, cutoff)
+        structure = replace(structure, scales=structure.scales or structure.measured_by(train).scales)
+        make = lambda w: Ground(self.experiment, structure, train, test, self.fit.prior, stride=stride, weights=w, grid=grid)  # noqa: E731
+        return make(weights) if weights is not None else make(by_noise(make(None)))
+
+    def as_fitted(self) -> Ground:
+        """The fitted model on the logs as the experiment filters them, thinned; its shape values stay."""
+        spec = settled(self.experiment.preprocess, self.fit.filters)
+        joints = self.fit.joints
+        train, test = prepare(self.train, spec, joints), prepare(self.test, spec, joints)
+        return Ground(self.experiment, self.fit.model, train, test, self.fit.prior, stride=rows.stride_for(train, 6000), hold=True)
+
+
+def by_noise(ground: Ground) -> np.ndarray:
+    """(dof,) weights: the inverse of what each joint's training residual is, with a geometric mean of one."""
+    rms = ground.rms("train")
+    rms = np.maximum(rms, 1e-6 * rms.max())
+    return 1.0 / (rms / np.exp(np.mean(np.log(rms))))
+
+
+def diagnose(experiment: Experiment, *, fit: Fit | None = None, progress: pipeline.Progress | None = None) -> Diagnosis:
+    """Question an experiment's model.
+
+    Args:
+        fit: where it is at hand.
+
+    Raises:
+        SysidError: bad input, or logs too short to question.
+    """
+    tell = progress or (lambda stage, share: None)
+    fit = fit or pipeline.fit(experiment, progress=progress)
+    extra = _own(experiment)
+    with pipeline.noticed():
+        logs = Logs(experiment, fit)
+        ground = logs.ground(fit.model, CUTOFFS[0])
+        if ground is None:
+            from ..errors import LogError
+
+            raise LogError("the logs are too short to question", where="diagnose", allowed="some seconds of training and of test logs", do="log longer")
+        fitted = logs.as_fitted()
+        floors = _floors(fitted, fit)
+        answers = search.ask(ground, candidates(ground.model, extra), lambda share: tell("ask", share))
+        other = cache(lambda: logs.ground(ground.model, CUTOFFS[1], weights=ground.weights))
+        steps = _steps(logs, ground, other, fitted, answers, extra, tell)
+        last = steps[-1].ground if steps else ground
+        left = structure.structures(last)
+        found = _findings(fitted, fit, floors, ground, other, answers, steps)
+        failures = regions.failures(ground, ([r for r in _residuals(fitted, fit, "test")], [p.step for p in fitted.test.pieces]), np.array([floors[j].rms for j in fit.joints]))
+        return Diagnosis(
+            fit, floors, tuple(found), tuple(_not_visible(answers)), tuple(_verdict(fit, floors, steps, last, left)), tuple(failures), tuple(steps), ground, last,
+        )  # fmt: skip
+
+
+def _steps(logs: Logs, ground: Ground, other, fitted: Ground, answers: list[Answer], extra, tell: Callable) -> list[search.Step]:
+    steps: list[search.Step] = []
+    while len(steps) < _MOST_STEPS:
+        step = search.next_step(ground, other, answers, lambda answer, at=fitted: _harms(at, answer))
+        if step is None:
+            break
+        steps.append(step)
+        other = cache(lambda at=step.ground: logs.ground(at.model, CUTOFFS[1], weights=at.weights))
+        ground, fitted = step.ground, _held(fitted, step.head)
+        answers = search.ask(ground, candidates(ground.model, extra), lambda share: tell(f"ask, with {steps[-1].head.candidate.name}", share))
+    return steps
+
+
+def _own(experiment: Experiment) -> list:
+    """The user's own effects, those named as candidates and those in the model, to be asked on every joint."""
+    specs = experiment.model.candidates + [s for s in experiment.model.effects if is_own(s.name) or "formula" in s.options]
+    found = {}
+    for spec in specs:
+        effect = model.found(spec, experiment.folder)
+        found.setdefault(effect.name, effect)
+    return [effect for name, effect in found.items() if name not in vocabulary()]
+
+
+def _harms(fitted: Ground, answer: Answer) -> bool:
+    """Whether the held-out error as the experiment filters it rises, on the joints that an answer is judged by."""
+    squares = _as_fitted(fitted, answer)
+    own = range(squares.shape[1]) if answer.candidate.joint == ROBOT else [answer.candidate.joint]
+    rise = (squares - fitted.squares)[:, own].sum(1)
+    return rise.sum() > 0 and (search.away(rise) > 1.0 or rise.sum() > 0.002 * fitted.squares[:, own].sum())
+
+
+# ---- the noise floor
+
+
+def _residuals(fitted: Ground, fit: Fit, part: str) -> list[np.ndarray]:
+    """Raw measured minus predicted torque of each piece."""
+    motion, predicted = (fitted.train if part == "train" else fitted.test), fit.predictions[part].predicted
+    out, at = [], 0
+    for piece in motion.pieces:
+        out.append(piece.measured[piece.core] - predicted[at : at + piece.samples])
+        at += piece.samples
+    return out
+
+
+def _floors(fitted: Ground, fit: Fit) -> dict[str, NoiseFloor]:
+    """The noise floor of each joint, as the fit sees its torque."""
+    pieces = (*fitted.train.pieces, *fitted.test.pieces)
+    residuals = _residuals(fitted, fit, "train") + _residuals(fitted, fit, "test")
+    measured, q = [p.measured[p.core] for p in pieces], [p.q[p.core] for p in pieces]
+    out, limit = {}, fit.predictions["test"].errors()["rms"]
+    for j, joint in enumerate(fit.joints):
+        found = floor(residuals, measured, q, [p.step for p in pieces], j)
+        if (smoother := pieces[0].smoother) is not None:
+            # the fit filters torque: of white noise this much comes through
+            impulse = np.zeros(20 * smoother.reach + 1)
+            impulse[len(impulse) // 2] = 1.0
+            gain = float(np.sqrt(np.sum(smoother(impulse) ** 2)))
+            found = replace(found, rms=found.rms * gain, std=found.std * gain, detail=found.detail + "; carried through the fit's filter")
+        out[joint] = replace(found, rms=float(min(found.rms, limit[j])))
+    return out
+
+
+# ---- findings
+
+
+def _findings(fitted: Ground, fit: Fit, floors, ground: Ground, other: Callable[[], Ground | None], answers, steps) -> list[Finding]:
+    """The search's steps with their families, each against the model that it joined; then what else stands out alone."""
+    q = search.q_values(answers)
+    scale = np.array([fit.rms("test")[joint] for joint in fit.joints]) / np.maximum(fitted.rms(), 1e-300)
+    levels = np.array([floors[joint].rms for joint in fit.joints]) / np.maximum(scale, 1e-300)
+    out, at = [], fitted
+    for k, step in enumerate(steps):
+        for number, member in enumerate(step.family):
+            tied = tuple(dict.fromkeys(a.candidate.name for a in step.family if a is not member and a.candidate.name != member.candidate.name))
+            out.append(_finding(at, fit, scale, levels, step.ground if number == 0 else None, member, step.q[member.candidate], tied, k if number == 0 else None))
+        if k + 1 < len(steps):
+            at = _held(at, step.head)
+    there = {(f.answer.candidate.name, f.answer.candidate.joint) for f in out}
+    rest = []
+    for answer in sorted(answers, key=lambda a: -a.score):
+        key = (answer.candidate.name, answer.candidate.joint)
+        if key not in there and search.passes(ground, answer, q[answer.candidate]) and search.survives(other(), answer) and not _harms(fitted, answer):
+            there.add(key)
+            rest.append(answer)
+    return out + [_finding(fitted, fit, scale, levels, None, a, q[a.candidate], (), None) for a in rest[: max(0, _SHOWN - len(out))]]
+
+
+def _finding(fitted: Ground, fit: Fit, scale, levels, after: Ground | None, answer: Answer, q: float, tied, step: int | None) -> Finding:
+    """What an answer does to the fit's own held-out error; `scale` turns the thinned rows' error into that of all rows."""
+    candidate = answer.candidate
+    own = list(range(len(fit.joints))) if candidate.joint == ROBOT else [candidate.joint]
+    squares = _as_fitted(fitted, answer)
+    rows_ = np.maximum(fitted.counts.sum(0), 1)[own]
+    before, then = (np.sum(s[:, own], 0) / rows_ for s in (fitted.squares, squares))
+    blocks = ((fitted.squares - squares)[:, own] / rows_).sum(1)
+    fall = float(blocks.sum())
+    misfit = max(float((before - levels[own] ** 2).sum()), fall, 1e-300)
+    se = float(np.sqrt(len(blocks) * np.var(blocks, ddof=1))) / misfit if len(blocks) > 2 else float("nan")
+    name = "*" if candidate.joint == ROBOT else fit.joints[candidate.joint]
+    return Finding(
+        answer, name, q, _together(np.sqrt(before) * scale[own]), _together(np.sqrt(then) * scale[own]), fall / misfit, se,
+        _parameters(after, answer, fit), tied, step,
+    )  # fmt: skip
+
+
+def _together(rms) -> float:
+    return float(np.sqrt(np.mean(np.square(rms))))
+
+
+def _as_fitted(fitted: Ground, answer: Answer) -> np.ndarray:
+    """(blocks, dof) squares on the test rows as the fit sees them, with a candidate at the shape values found."""
+    starts = {s.name: s.start for s in answer.candidate.effect.shapes()}
+    if answer.candidate.curved and any(answer.shapes[name] != start for name, start in starts.items() if start is not None):
+        return _held(fitted, answer).squares
+    again = fitted.answer(answer.candidate, answer.shapes)
+    return fitted.squares if again is None else again.squares
+
+
+def _held(fitted: Ground, answer: Answer) -> Ground:
+    """The ground with a candidate in the model, at the shape values found."""
+    grown = fitted.grown(answer.candidate, answer.shapes)
+    return Ground(fitted.experiment, grown, fitted.train, fitted.test, fitted.prior, stride=fitted.stride, weights=fitted.weights, hold=True)
+
+
+def _parameters(after: Ground | None, answer: Answer, fit: Fit) -> dict[str, tuple[float, float, str]]:
+    """The parameters of a finding: from the model that it joined, else from its answer, without their deviations."""
+    candidate = answer.candidate
+    if after is not None:
+        grown, first = after.model, 10 * after.model.bodies
+        stds, shape_stds = after.std()
+        out = {c.name: (float(after.settled.x[first + k]), float(stds[k]), c.unit) for k, c in enumerate(grown.coefficients) if (c.effect, c.joint) == (candidate.name, candidate.joint)}
+        out |= {v.name: (float(grown.shapes[k]), float(shape_stds[k]), v.unit) for k, v in enumerate(grown.shape_values) if v.term == len(grown.terms) - 1}
+        return out
+    grown = fit.model.with_effect(candidate.effect, (candidate.joint,))
+    nan = float("nan")
+    linear = [c for c in grown.coefficients[len(fit.model.coefficients) :]]
+    out = {} if candidate.curved else {c.name: (float(v), nan, c.unit) for c, v in zip(linear, answer.coefficients)}
+    for value in grown.shape_values:
+        if value.term == len(grown.terms) - 1:
+            at = answer.shapes.get(value.shape.name, nan)
+            if candidate.curved and value.shape.start is not None and at == value.shape.start:
+                at += float(answer.coefficients[[s.name for s in candidate.effect.shapes()].index(value.shape.name)])
+            out[value.name] = (float(at), nan, value.unit)
+    return out
+
+
+def _not_visible(answers: list[Answer]) -> list[Answer]:
+    """Effects whose signature the model absorbs on this log, under every variant."""
+    best: dict[tuple, Answer] = {}
+    for answer in answers:
+        key = (answer.candidate.name, answer.candidate.joint)
+        if key not in best or answer.most_visible > best[key].most_visible:
+            best[key] = answer
+    return [a for a in best.values() if a.most_visible < _UNSEEN]
+
+
+# ---- the verdict
+
+
+def _verdict(fit: Fit, floors, steps, last: Ground, left: list[structure.Structure]) -> list[Verdict]:
+    out = []
+    gained = (last.squares.sum(0) / np.maximum(last.counts.sum(0), 1)) if steps else None
+    for j, joint in enumerate(fit.joints):
+        own = [s for s in steps if s.head.candidate.joint == j or (s.head.candidate.joint == ROBOT and s.shares[j] >= search.WORTH)]
+        if own:
+            tied = tuple(dict.fromkeys(a.candidate.name for a in own[0].family[1:] if a.candidate.name != own[0].head.candidate.name))
+            out.append(Verdict(joint, "missing", own[0].head.candidate.name, tied, tuple(s.head.candidate.name for s in own[1:]), left[j] if left[j].there else None))
+        elif left[j].there or (gained is None and _far_above(fit.rms("test")[joint], floors[joint])):
+            out.append(Verdict(joint, "unknown", structure=left[j]))
+        else:
+            out.append(Verdict(joint, "complete"))
+    return out
+
+
+def _far_above(rms: float, level: NoiseFloor) -> bool:
+    """Whether more than half of a joint's squared error lies above its noise floor, beyond doubt about the floor."""
+    return rms**2 > 2.0 * (level.rms + 3.0 * level.std) ** 2

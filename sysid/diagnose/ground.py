@@ -1,0 +1,302 @@
+"""A model on its logs, ready for questions: what does everything in it leave, and what would one more effect take of that?
+
+A candidate is fitted on the training rows together with everything that is in the model (which may absorb it: what is
+absorbed is not visible), and judged on the test rows. Sums are kept by blocks of time, as residuals of smoothed signals
+are correlated.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from .. import rows as row
+from ..config import Experiment
+from ..model import ROBOT, Model
+from ..preprocess import Motion
+from ..shape import Projection, prior_hessian, settle
+from .candidate import Candidate
+
+_BATCH = 64  # shape values whose columns stand in memory at once
+_MOST_BLOCKS, _FEWEST, _SHORTEST = 48, 12, 0.4  # blocks a set of logs; s
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What one candidate does on a ground, at some shape values.
+
+    coefficients (k,) of its columns, or its shape values where it is curved; visible: the share of its signature's
+        root mean square that the model cannot absorb, `most_visible` the same at the shape values that show it best; gain: by how much the training objective falls.
+    squares: (blocks, dof) sums of squared residuals on the test rows with the candidate; the ground has those without.
+    score: fall of the held-out log-likelihood's minus, over all joints; p: probability of the training evidence by chance.
+    """
+
+    candidate: Candidate
+    shapes: dict[str, float]
+    coefficients: np.ndarray
+    visible: float
+    gain: float
+    squares: np.ndarray
+    score: float
+    p: float
+    allowed: bool
+    most_visible: float = 0.0
+
+
+class Ground:
+    """A settled model on training and test motions."""
+
+    def __init__(self, experiment: Experiment, model: Model, train: Motion, test: Motion, prior, *, stride: int, weights=None, grid: bool = True, hold: bool = False):
+        """Settle the model on `train`; without `grid` from the shape values that it has; with `hold` at them."""
+        self.experiment, self.train, self.test, self.prior, self.stride = experiment, train, test, prior, stride
+        if weights is None:
+            weights = np.ones(model.robot.dof)
+        self.settled = settle(experiment, model, train, prior, weights=weights, stride=stride, grid=grid, hold=hold)
+        self.weights = np.asarray(weights)
+
+    @property
+    def model(self) -> Model:
+        """The model, with its shape values found."""
+        return self.settled.model
+
+    @cached_property
+    def rows(self) -> row.Rows:
+        """Training rows."""
+        return self.settled.rows
+
+    @cached_property
+    def held_out(self) -> row.Rows:
+        """Test rows."""
+        return row.stack(self.model, self.test, self.stride)
+
+    @cached_property
+    def residual(self) -> np.ndarray:
+        """(n, dof) on the training rows."""
+        return self.rows.residual(self.settled.x)
+
+    @cached_property
+    def residual_test(self) -> np.ndarray:
+        """(n, dof) on the test rows."""
+        return self.held_out.residual(self.settled.x)
+
+    def rms(self, part: str = "test") -> np.ndarray:
+        """(dof,) root mean square of the residual."""
+        rows, residual = (self.held_out, self.residual_test) if part == "test" else (self.rows, self.residual)
+        return np.sqrt((residual**2).sum(0) / np.maximum(rows.use.sum(0), 1))
+
+    @cached_property
+    def _slopes(self) -> tuple[np.ndarray, np.ndarray]:
+        """Slopes of the model's own shape values on both motions."""
+        x, model = self.settled.x, self.model
+        if not model.shape_values:
+            return tuple(np.zeros((model.robot.dof, len(r.t), 0)) for r in (self.rows, self.held_out))
+        return tuple(row.tangents(model, motion, x, self.stride, rows.use) for motion, rows in ((self.train, self.rows), (self.test, self.held_out)))
+
+    @cached_property
+    def projection(self) -> Projection:
+        """Least squares of everything in the model on the training rows."""
+        slopes = self._slopes[0]
+        columns = np.concatenate([self.rows.columns, slopes], axis=2) if slopes.shape[2] else self.rows.columns
+        hessian = np.zeros((columns.shape[2],) * 2)
+        hessian[: self.model.size, : self.model.size] = prior_hessian(self.settled)
+        return Projection(columns, self.residual, hessian, self.weights)
+
+    @cached_property
+    def _test_columns(self) -> np.ndarray:
+        slopes = self._slopes[1]
+        return np.concatenate([self.held_out.columns, slopes], axis=2) if slopes.shape[2] else self.held_out.columns
+
+    @cached_property
+    def blocks(self) -> tuple[np.ndarray, np.ndarray]:
+        """(n,) the block of each training row, and of each test row."""
+        return _blocks(self.rows), _blocks(self.held_out)
+
+    @cached_property
+    def squares(self) -> np.ndarray:
+        """(blocks, dof) sums of squared residuals on the test rows."""
+        return summed(self.blocks[1], self.residual_test**2)
+
+    @cached_property
+    def counts(self) -> np.ndarray:
+        """(blocks, dof) test rows that count."""
+        return summed(self.blocks[1], self.held_out.use.astype(float))
+
+    @cached_property
+    def _seen(self):
+        return row.seen(self.model, self.train), row.seen(self.model, self.test)
+
+    # ---- signatures
+
+    def signature(self, candidate: Candidate, shapes: dict[str, float], part: str) -> np.ndarray:
+        """Columns (n, k) of a joint, or (dof, n, k), that a candidate would add."""
+        which = part == "test"
+        motion, rows, pieces = ((self.train, self.rows, self._seen[0]), (self.test, self.held_out, self._seen[1]))[which]
+        if not candidate.curved:
+            return row.signature(self.model, motion, pieces, candidate.effect, candidate.joint, shapes, self.stride, rows.use)
+        grown = self.grown(candidate, shapes)
+        mine = [k for k, value in enumerate(grown.shape_values) if value.term == len(grown.terms) - 1]
+        x = self.settled.x
+        others = [replace(grown, held=(*grown.held, *(((v.term, v.joint, v.shape.name), 0.0) for v in grown.shape_values if v.term < len(grown.terms) - 1)))]
+        return row.tangents(others[0], motion, x, self.stride, rows.use)[:, :, mine]
+
+    def grown(self, candidate: Candidate, shapes: dict[str, float]) -> Model:
+        """The model with a candidate, at shape values."""
+        grown = self.model.with_effect(candidate.effect, (candidate.joint,))
+        if candidate.effect.uses_load and grown.reference is None:
+            grown = grown.with_reference(self.pi)
+        values = list(grown.shapes)
+        for k, value in enumerate(grown.shape_values):
+            if value.term == len(grown.terms) - 1 and value.shape.name in shapes:
+                values[k] = shapes[value.shape.name]
+        return grown.with_shapes(values)
+
+    @property
+    def pi(self) -> np.ndarray:
+        """Bodies (bodies, 10)."""
+        return self.settled.x[: 10 * self.model.bodies].reshape(-1, 10)
+
+    def bounds(self, candidate: Candidate) -> list[tuple]:
+        """(shape, low, high, angle travelled) of a candidate's shape values."""
+        scales, joint = self.model.scales, candidate.joint
+        angle = None if joint == ROBOT else float(scales.angle[joint])
+        return [(s, s.low * scales.of(s.of, joint), s.high * scales.of(s.of, joint), angle) for s in candidate.effect.shapes()]
+
+    def std(self) -> tuple[np.ndarray, np.ndarray]:
+        """Standard deviations of the effects' coefficients (coefficients,) and of the shape values (shape values,), from
+        blocks of time; NaN for what is held or not determined."""
+        model, columns = self.model, self.projection.columns
+        scores = np.zeros((int(self.blocks[0].max()) + 1, columns.shape[2]))
+        for j, weight in enumerate(self.weights):
+            scores += 2.0 * weight**2 * summed(self.blocks[0], columns[j] * self.residual[:, [j]])
+        moves = scores @ self.projection.inverse
+        blocks = len(moves)
+        variance = (moves**2).sum(0) * blocks / max(blocks - 1, 1)
+        found = np.where(np.diagonal(self.projection.inverse) > 0, np.sqrt(variance), np.nan)
+        first = 10 * model.bodies
+        shapes = found[model.size :] if len(found) > model.size else np.full(len(model.shape_values), np.nan)
+        return found[first : model.size], np.where([v.held for v in model.shape_values], np.nan, shapes) if len(model.shape_values) else shapes
+
+    # ---- answers
+
+    def gains(self, candidate: Candidate, tried: list[dict[str, float]]) -> tuple[list[float], float]:
+        """Fall of the training objective at several shape values of a torque effect, zero where a sign is not allowed; and
+        the most of its signature that is visible at any of them."""
+        out, most = [], 0.0
+        for start in range(0, len(tried), _BATCH):
+            batch = tried[start : start + _BATCH]
+            for columns in row.signatures(self.model, self.train, self._seen[0], candidate.effect, candidate.joint, batch, self.stride, self.rows.use):
+                c, _, gain, visible = self.projection.step(columns, candidate.joint)
+                out.append(gain if _allowed(candidate, c) else 0.0)
+                most = max(most, float(np.sqrt(visible.max(initial=0.0))))
+        return out, most
+
+    def answer(self, candidate: Candidate, shapes: dict[str, float], *, tests: int = 1) -> Answer | None:
+        """What a candidate takes of the residual; None where it has no signature here.
+
+        Args:
+            tests: how many shape values were tried, for which p allows.
+        """
+        columns = self.signature(candidate, shapes, "train")
+        if not np.isfinite(columns).all() or not np.any(columns):
+            return None
+        c, change, gain, share = self.projection.step(columns, candidate.joint)
+        if not np.isfinite(c).all():
+            return None
+        fitted = _apply(columns, c, candidate.joint, self.model.robot.dof) + np.einsum("jnk,k->nj", self.projection.columns, change)
+        p = self._chance(columns, candidate.joint)
+        held_out = self.signature(candidate, shapes, "test")
+        after = self.residual_test - _apply(held_out, c, candidate.joint, self.model.robot.dof) - np.einsum("jnk,k->nj", self._test_columns, change)
+        squares = summed(self.blocks[1], (after * self.held_out.use) ** 2)
+        whole = self._size(_apply(columns, c, candidate.joint, self.model.robot.dof))
+        seen = self._size(fitted) / whole if whole > 0 else float(np.sqrt(share.max(initial=0.0)))
+        alone = float(np.sqrt(share.max(initial=0.0)))
+        return Answer(
+            candidate, dict(shapes), c, float(min(seen, 1.0)), gain, squares, score(self.squares, squares, self.counts), min(1.0, p * tests),
+            _allowed(candidate, c), max(alone, float(min(seen, 1.0))),
+        )  # fmt: skip
+
+    def _size(self, torque) -> float:
+        return float(np.linalg.norm(torque * self.weights))
+
+    def _chance(self, columns, joint: int) -> float:
+        """Probability of the candidate's score under no effect: Hotelling's test over blocks of time."""
+        from scipy.stats import f
+
+        weights, residual = self.weights, self.residual
+        scores = np.zeros((self.blocks[0].max() + 1, columns.shape[-1]))
+        absorbed = self.projection.inverse @ sum(
+            2.0 * weights[j] ** 2 * self.projection.columns[j].T @ (columns[j] if columns.ndim == 3 else columns)
+            for j in (range(len(weights)) if columns.ndim == 3 else [joint])
+        )
+        for j in range(len(weights)):
+            own = -self.projection.columns[j] @ absorbed
+            if columns.ndim == 3:
+                own = own + columns[j]
+            elif j == joint:
+                own = own + columns
+            scores += weights[j] ** 2 * summed(self.blocks[0], own * residual[:, [j]])
+        scores = scores[np.any(scores != 0, axis=1)]
+        blocks, k = scores.shape
+        if blocks <= k + 2:
+            return 1.0
+        scale = np.sqrt((scores**2).mean(0))
+        scores = scores[:, scale > 0] / scale[scale > 0]
+        k = scores.shape[1]
+        if not k:
+            return 1.0
+        mean = scores.mean(0)
+        spread = (scores - mean).T @ (scores - mean) / (blocks - 1)
+        values, vectors = np.linalg.eigh(spread)
+        keep = values > 1e-9 * values[-1]
+        along = vectors[:, keep].T @ mean
+        k = int(keep.sum())
+        t2 = blocks * float(np.sum(along**2 / values[keep]))
+        return float(f.sf(t2 * (blocks - k) / (k * (blocks - 1)), k, blocks - k))
+
+
+def _apply(columns, c, joint: int, dof: int) -> np.ndarray:
+    """Torque (n, dof) of columns with coefficients c."""
+    if columns.ndim == 3:
+        return np.einsum("jnk,k->nj", columns, c)
+    out = np.zeros((len(columns), dof))
+    out[:, joint] = columns @ c
+    return out
+
+
+def _allowed(candidate: Candidate, c) -> bool:
+    """Whether the coefficients have the signs that the effect allows; a curved effect's bounds are kept when it is refitted."""
+    if candidate.curved:
+        return all(not (s.low == 0.0 and s.start == 0.0 and value < 0) for s, value in zip(candidate.effect.shapes(), c))
+    return all(not (linear.lower == 0 and value < 0) for linear, value in zip(candidate.effect.coefficients(), c))
+
+
+def _blocks(rows: row.Rows) -> np.ndarray:
+    """Blocks of equal numbers of rows within each piece, none shorter than they must be."""
+    n = len(rows.t)
+    step = float(np.median(np.diff(rows.t))) if n > 1 else 1.0
+    length = max(n // _MOST_BLOCKS, int(_SHORTEST / max(step, 1e-9)), 1)
+    if n // length < _FEWEST:
+        length = max(n // _FEWEST, 1)
+    out, first = np.zeros(n, dtype=int), 0
+    for piece in range(rows.piece.max() + 1):
+        own = np.flatnonzero(rows.piece == piece)
+        count = max(1, round(len(own) / length))
+        out[own] = first + np.minimum(np.arange(len(own)) * count // len(own), count - 1)
+        first += count
+    return out
+
+
+def summed(blocks, values) -> np.ndarray:
+    """Sums (blocks, columns) of values (n, columns)."""
+    size = int(blocks.max()) + 1
+    return np.stack([np.bincount(blocks, v, minlength=size) for v in values.T], 1) if values.shape[1] else np.zeros((size, 0))
+
+
+def score(before, after, counts) -> float:
+    """Held-out log-likelihood ratio over joints: half the rows times the log of the ratio of squares."""
+    rows = counts.sum(0)
+    b, a = before.sum(0), after.sum(0)
+    tiny = 1e-12 * np.maximum(b, 1e-300)
+    return float(np.sum(0.5 * rows * np.log(np.maximum(b, 1e-300) / np.maximum(a, tiny))))

@@ -1,0 +1,129 @@
+"""Where a model fails: the joints, speeds, angles, times and frequencies that hold most of its squared error."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from .ground import Ground
+from .structure import variables
+
+_CUTS, _HALF = 10, 0.5  # quantiles a region may begin or end at; of the squared error
+_MAP, _WINDOW = 12, 0.5  # cells of a map along a side; s
+_BANDS = (0.0, 0.5, 1.0, 2.0, 4.0, 8.0, 15.0, 30.0, 60.0, 125.0, 250.0, 500.0)  # Hz
+
+
+@dataclass(frozen=True)
+class Region:
+    """A stretch of one variable, from `low` to `high`, that holds `error` of the squared error in `rows` of the rows."""
+
+    variable: str
+    unit: str
+    low: float
+    high: float
+    error: float
+    rows: float
+
+    def words(self) -> str:
+        """As a sentence says it."""
+        what = {"q": "angle", "qd": "speed", "time": "time"}.get(self.variable, self.variable)
+        return f"{100 * self.error:.0f} % of the squared error lies in the {100 * self.rows:.0f} % of the rows with {what} {self.low:.3g} to {self.high:.3g} {self.unit}"
+
+
+@dataclass(frozen=True)
+class Failure:
+    """Where one joint's residual is: its share of all joints' error in units of their noise, the regions most crowded with
+    error, a map of the mean residual over (q, qd), the error over time, and over frequency.
+
+    map: {"q": edges (m + 1,), "qd": edges (m + 1,), "mean": (m, m) [N m], NaN where no row is, "rows": (m, m)}.
+    time: {"log": (k,), "start": (k,) [s], "rms": (k,)}. frequency: {"edges": (k + 1,) [Hz], "share": (k,)}.
+    """
+
+    joint: str
+    share: float
+    regions: tuple[Region, ...]
+    map: dict = field(repr=False)
+    time: dict = field(repr=False)
+    frequency: dict = field(repr=False)
+
+    def words(self) -> list[str]:
+        """Sentences, the most telling first."""
+        return [region.words() for region in self.regions]
+
+
+def failures(ground: Ground, raw, levels) -> list[Failure]:
+    """Where each joint's test residual is.
+
+    Args:
+        raw: (residuals of test pieces (n, dof), their steps [s]) as the fit sees them, for the frequencies.
+        levels: (dof,) noise floors, in which the joints' errors are compared.
+    """
+    robot, rows = ground.model.robot, ground.held_out
+    known = variables(ground, "test")
+    weighted = (ground.rms("test") / np.maximum(levels, 1e-9 * max(np.max(levels), 1e-300))) ** 2
+    out = []
+    for j, joint in enumerate(robot.joints):
+        use = rows.use[:, j]
+        square = ground.residual_test[use, j] ** 2
+        regions = []
+        if square.sum() > 0:
+            for name in ("q", "qd"):
+                unit, values = known[f"{name}_{joint}"]
+                regions.append(_crowded(name, unit, values[use], square))
+            regions.append(_crowded("time", "s", rows.t[use], square))
+        regions = sorted((r for r in regions if r is not None and r.error - r.rows > 0.1), key=lambda r: r.rows - r.error)
+        out.append(Failure(
+            joint, float(weighted[j] / max(weighted.sum(), 1e-300)), tuple(regions),
+            _map(known[f"q_{joint}"][1][use], known[f"qd_{joint}"][1][use], ground.residual_test[use, j]),
+            _windows(rows.t[use], rows.log[use], square), _bands([r[:, j] for r in raw[0]], raw[1]),
+        ))  # fmt: skip
+    return out
+
+
+def _crowded(name: str, unit: str, values, square) -> Region | None:
+    """The shortest stretch, in rows, that holds half of the squared error, if it is clearly less than half of the rows."""
+    order = np.argsort(values)
+    x, total = values[order], np.cumsum(square[order]) / square.sum()
+    cuts = np.linspace(0, len(x) - 1, 4 * _CUTS + 1).astype(int)
+    best = None
+    for a in range(len(cuts) - 1):
+        before = total[cuts[a] - 1] if cuts[a] else 0.0
+        b = np.searchsorted(total[cuts], before + _HALF)
+        if b >= len(cuts) or b <= a:
+            continue
+        rows = (cuts[b] - cuts[a]) / (len(x) - 1)
+        if best is None or rows < best[0]:
+            best = (rows, a, b, total[cuts[b]] - before)
+    if best is None or best[0] > 0.4:
+        return None
+    rows, a, b, error = best
+    return Region(name, unit, float(x[cuts[a]]), float(x[cuts[b]]), float(error), float(rows))
+
+
+def _map(q, qd, residual) -> dict:
+    edges = [np.linspace(v.min(), v.max() if np.ptp(v) > 0 else v.min() + 1.0, _MAP + 1) for v in (q, qd)]
+    rows, *_ = np.histogram2d(q, qd, bins=edges)
+    total, *_ = np.histogram2d(q, qd, bins=edges, weights=residual)
+    return {"q": edges[0], "qd": edges[1], "mean": np.divide(total, rows, out=np.full(rows.shape, np.nan), where=rows > 0), "rows": rows}
+
+
+def _windows(t, log, square) -> dict:
+    if not len(t):
+        return {"log": np.zeros(0, dtype=int), "start": np.zeros(0), "rms": np.zeros(0)}
+    key = log.astype(np.int64) * 10**9 + np.floor(t / _WINDOW).astype(np.int64)
+    unique, index = np.unique(key, return_inverse=True)
+    rms = np.sqrt(np.bincount(index, square) / np.bincount(index))
+    return {"log": unique // 10**9, "start": (unique % 10**9) * _WINDOW, "rms": rms}
+
+
+def _bands(residuals, steps) -> dict:
+    from scipy.signal import periodogram
+
+    edges = np.array(_BANDS)
+    total = np.zeros(len(edges) - 1)
+    for residual, step in zip(residuals, steps):
+        frequency, power = periodogram(residual, fs=1.0 / step, window="hann")
+        total += np.histogram(frequency, bins=edges, weights=power * (frequency[1] if len(frequency) > 1 else 1.0) * len(residual))[0]
+    last = int(np.flatnonzero(total > 0).max(initial=0)) + 1
+    return {"edges": edges[: last + 1], "share": total[:last] / max(total.sum(), 1e-300)}

@@ -1,0 +1,242 @@
+"""Which effect is missing? Every candidate is asked, the best that held-out data support joins the model, and again.
+
+A candidate must pass four gates: its training evidence against chance, allowing for correlated residuals and for the
+number of questions; a fall of the held-out error that stands out from block to block; a fall worth having; and all of
+that once more under another low-pass. Candidates that this log cannot tell from the best stand with it as one family.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..model import ROBOT
+from .candidate import Candidate
+from .ground import Answer, Ground, score
+
+Q_LEVEL, SUPPORT, WORTH = 0.01, 3.0, 0.02  # false discoveries; standard errors; share of the joint's squared residual
+_SHORTLIST, _NEAR = 8, 0.5  # how many are refitted exactly, and how near to the best they must be
+_TIED, _TIED_SHARE = 2.0, 0.03  # standard errors; share of what the best removes
+_SEEN = 0.03  # share of a signature's root mean square that the model must leave for it to be judged
+_SAME = 0.99  # share of a signature that another one holds
+_BATCH = 64
+
+
+@dataclass(frozen=True)
+class Support:
+    """What held-out data say of one answer against none: share of the squared residual removed on its joints, its
+    standard errors away from zero."""
+
+    share: float
+    away: float
+
+
+@dataclass(frozen=True)
+class Step:
+    """One effect that joined: the family (simplest first) of answers that the log cannot tell apart, their q-values, the
+    ground after it, and what it took of each joint's held-out squared residual (dof,)."""
+
+    family: tuple[Answer, ...]
+    q: dict[Candidate, float]
+    support: Support
+    ground: Ground
+    shares: np.ndarray
+
+    @property
+    def head(self) -> Answer:
+        """The simplest of the family."""
+        return self.family[0]
+
+
+def ask(ground: Ground, candidates: list[Candidate], progress: Callable[[float], None] | None = None) -> list[Answer]:
+    """The best answer of every candidate, over the shape values tried."""
+    out = []
+    for number, candidate in enumerate(candidates):
+        if (answer := _best(ground, candidate)) is not None:
+            out.append(answer)
+        if progress:
+            progress((number + 1) / len(candidates))
+    return out
+
+
+def _best(ground: Ground, candidate: Candidate) -> Answer | None:
+    bounds = ground.bounds(candidate)
+    if candidate.curved:
+        return ground.answer(candidate, {s.name: s.start if s.start is not None else float(np.sqrt(low * high)) for s, low, high, _ in bounds})
+    if not bounds:
+        return ground.answer(candidate, {})
+    if not candidate.effect.coefficients():
+        return None
+    middle = {s.name: float(np.median(s.values(low, high))) for s, low, high, _ in bounds}
+    tests, most = 0, 0.0
+    for shape, low, high, angle in bounds:
+        tried = shape.values(low, high, angle)
+        gains, seen = ground.gains(candidate, [{**middle, shape.name: float(v)} for v in tried])
+        most = max(most, seen)
+        tests += len(tried)
+        best = int(np.argmax(gains))
+        if 0 < best < len(tried) - 1:
+            finer = np.linspace(tried[best - 1], tried[best + 1], 9) if shape.even or low <= 0 else np.geomspace(tried[best - 1], tried[best + 1], 9)
+            again, _ = ground.gains(candidate, [{**middle, shape.name: float(v)} for v in finer])
+            middle[shape.name] = float(finer[int(np.argmax(again))])
+        else:
+            middle[shape.name] = float(tried[best])
+    answer = ground.answer(candidate, middle, tests=tests)
+    return None if answer is None else replace(answer, most_visible=max(answer.most_visible, most))
+
+
+def q_values(answers: list[Answer]) -> dict[Candidate, float]:
+    """False discovery rates (Benjamini & Hochberg 1995) of the answers' p."""
+    p = np.array([a.p for a in answers])
+    order = np.argsort(p)
+    scaled = p[order] * len(p) / (1 + np.arange(len(p)))
+    q = np.minimum.accumulate(scaled[::-1])[::-1]
+    return {answers[i].candidate: float(min(1.0, value)) for i, value in zip(order, q)}
+
+
+def support(ground: Ground, answer: Answer) -> Support:
+    """What the test rows say of an answer."""
+    joints = _own(answer, ground)
+    weights = 1.0 / np.maximum(answer.squares.sum(0) / np.maximum(ground.counts.sum(0), 1), 1e-300)
+    before, after = ground.squares[:, joints] @ weights[joints], answer.squares[:, joints] @ weights[joints]
+    total = before.sum()
+    return Support(float((total - after.sum()) / total) if total > 0 else 0.0, stands_out(before, after))
+
+
+def stands_out(before, after) -> float:
+    """Standard errors by which squares over blocks fall: of their sum, or of the mean of their logarithms, which a few blocks
+    with most of the error do not drown."""
+    there = (before > 0) & (after > 0)
+    return max(away(before - after), away(np.log(before[there] / after[there])))
+
+
+def _own(answer: Answer, ground: Ground) -> list[int]:
+    """The joints by which an answer is judged: its own, or for the robot all."""
+    return list(range(ground.model.robot.dof)) if answer.candidate.joint == ROBOT else [answer.candidate.joint]
+
+
+def away(differences) -> float:
+    """Standard errors that a sum over blocks is away from zero; neighbouring blocks count together (jackknife of pairs)."""
+    d = np.asarray(differences)
+    if len(d) > 7:
+        d = d[: len(d) // 2 * 2].reshape(-1, 2).sum(1)
+    if len(d) < 3:
+        return 0.0
+    se = np.sqrt(len(d) * np.var(d, ddof=1))
+    return float(d.sum() / se) if se > 0 else 0.0
+
+
+def passes(ground: Ground, answer: Answer, q: float) -> bool:
+    """The gates of one low-pass."""
+    found = support(ground, answer)
+    return answer.allowed and answer.visible >= _SEEN and q <= Q_LEVEL and found.away >= SUPPORT and found.share >= WORTH and answer.score > 0
+
+
+def next_step(ground: Ground, other: Callable[[], Ground | None], answers: list[Answer], harms: Callable[[Answer], bool] = lambda _: False) -> Step | None:
+    """The effect that joins next, or None where no candidate passes.
+
+    Args:
+        other: makes the ground of the same model under another low-pass.
+        answers: `ask(ground, ...)`.
+        harms: whether an answer raises the held-out error as the experiment's own filter shows it.
+    """
+    q = q_values(answers)
+    hopeful = [a for a in answers if passes(ground, a, q[a.candidate])]
+    while hopeful:
+        best = max(hopeful, key=lambda a: a.score)
+        short = sorted((a for a in hopeful if a.score >= _NEAR * best.score), key=lambda a: -a.score)[:_SHORTLIST]
+        standing = [a for a in short if survives(other(), a)]
+        refined = [(a, g) for a, g in (refit(ground, a) for a in standing) if passes(ground, a, q[a.candidate])]
+        refined = [(a, g) for a, g in refined if not harms(a)]
+        if refined:
+            family = _family(ground, [a for a, _ in refined])
+            head = family[0]
+            after = dict((a.candidate, g) for a, g in refined)[head.candidate] or refit(ground, head, always=True)[1]
+            shares = 1.0 - after.squares.sum(0) / np.maximum(ground.squares.sum(0), 1e-300)
+            return Step(tuple(family), q, support(ground, head), after, shares)
+        leave = {a.candidate for a in short}
+        hopeful = [a for a in hopeful if a.candidate not in leave]
+    return None
+
+
+def refit(ground: Ground, answer: Answer, always: bool = False) -> tuple[Answer, Ground | None]:
+    """An answer with everything that is not linear in it refitted; columns that are linear have nothing to refit."""
+    candidate = answer.candidate
+    if not (candidate.curved or always):
+        return answer, None
+    shapes = dict(answer.shapes)
+    if candidate.curved:
+        for shape, low, high, _ in ground.bounds(candidate):
+            index = [s.name for s in candidate.effect.shapes()].index(shape.name)
+            shapes[shape.name] = float(np.clip(shapes[shape.name] + answer.coefficients[index], low, high))
+    grown = Ground(
+        ground.experiment, ground.grown(candidate, shapes), ground.train, ground.test, ground.prior, stride=ground.stride, weights=ground.weights, grid=False
+    )
+    found = score(ground.squares, grown.squares, ground.counts)
+    mine = {v.shape.name: s for v, s in zip(grown.model.shape_values, grown.model.shapes) if v.term == len(grown.model.terms) - 1}
+    return replace(answer, shapes=mine, squares=grown.squares, score=found), grown
+
+
+_AGREE = 2.5  # how far apart an effect's size may be under two low-passes
+
+
+def survives(other: Ground | None, answer: Answer) -> bool:
+    """Whether an effect is supported under another low-pass too, and of the same size there: what encoder noise makes of a
+    second derivative also lowers the held-out error, but by another amount in every band."""
+    if other is None:
+        return True
+    again = _best(other, answer.candidate)
+    if again is None or not again.allowed:
+        return False
+    found = support(other, again)
+    if found.away < SUPPORT - 1.0 or found.share < 0.5 * WORTH:
+        return False
+    if len(answer.coefficients) == 1 or answer.candidate.curved:
+        k = int(np.argmax(np.abs(answer.coefficients) * [s.start is not None for s in answer.candidate.effect.shapes()])) if answer.candidate.curved else 0
+        ratio = again.coefficients[k] / answer.coefficients[k] if answer.coefficients[k] else 0.0
+        same = answer.candidate.curved or all(0.7 < again.shapes[n] / v < 1.4 for n, v in answer.shapes.items() if v)
+        return 1.0 / _AGREE < ratio < _AGREE or (not same and ratio > 0)
+    return True
+
+
+def _family(ground: Ground, answers: list[Answer]) -> list[Answer]:
+    """The answers that held-out data cannot tell from the best, the simplest first; more general forms of a simpler one
+    that bring nothing are left out."""
+    best = max(answers, key=lambda a: a.score)
+    rms2 = best.squares.sum(0) / np.maximum(ground.counts.sum(0), 1)
+    weigh = lambda squares: squares @ (1.0 / np.maximum(rms2, 1e-300))  # noqa: E731
+    base, top = weigh(ground.squares), weigh(best.squares)
+    removed = (base - top).sum()
+    family = []
+    for answer in answers:
+        worse = weigh(answer.squares) - top
+        # `away` of a sum that is zero throughout is zero
+        if worse.sum() <= _TIED_SHARE * removed or away(worse) < _TIED and worse.sum() <= 0.15 * removed:
+            family.append(answer)
+    family.sort(key=lambda a: (a.candidate.simplicity, -a.score))
+    head = family[0]
+    kept, names = [], set()
+    for answer in family:
+        key = (answer.candidate.name, answer.candidate.joint)
+        if key in names or (answer is not head and answer.candidate.parameters > head.candidate.parameters and _holds(ground, answer, head)):
+            continue
+        names.add(key)
+        kept.append(answer)
+    return kept
+
+
+def _holds(ground: Ground, general: Answer, special: Answer) -> bool:
+    """Whether the torque of one answer is within reach of another's columns: then the other only adds freedom."""
+    if general.candidate.joint != special.candidate.joint or general.candidate.curved or special.candidate.curved:
+        return False
+    columns = ground.signature(general.candidate, general.shapes, "train")
+    target = ground.signature(special.candidate, special.shapes, "train") @ special.coefficients
+    if columns.ndim == 3:
+        return False
+    base = ground.projection.columns[general.candidate.joint]
+    both = np.concatenate([columns, base], axis=1)
+    rest = lambda a: target - a @ np.linalg.lstsq(a, target, rcond=1e-9)[0]  # noqa: E731
+    alone = np.sum(rest(base) ** 2)
+    return bool(alone > 0 and np.sum(rest(both) ** 2) < (1.0 - _SAME) * alone)

@@ -1,0 +1,185 @@
+"""Is structure left that nothing in the vocabulary explains, and what does it depend on?
+
+A residual that is noise cannot be foretold. So what is left on the training rows is learned as a smooth function of the
+motion, of one variable at a time and of several together, and the test rows say which share of their own residual that
+foretells. A share that stands out from block to block is structure, whatever it is called.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .ground import Ground, summed
+from .search import away
+
+LEAST, STANDS_OUT = 0.05, 4.0  # share of the held-out square foretold; standard errors
+# Noise through a low-pass is Gaussian, whatever its colour: its tenth of largest rows holds 0.44 of its square.
+_LARGEST, _CROWDED = 0.1, 0.65
+_KNOTS, _BINS, _FEATURES, _RIDGES = 9, 25, 160, np.geomspace(1e-3, 1e3, 7)
+_FOLDS = 5
+
+
+@dataclass(frozen=True)
+class Dependence:
+    """Which share of a joint's held-out squared residual a variable foretells, and the curve: at (bins,) values of the
+    variable the mean residual of training and test rows together (bins,), with its standard error."""
+
+    variable: str
+    unit: str
+    share: float
+    away: float
+    at: np.ndarray
+    mean: np.ndarray
+    se: np.ndarray
+
+
+@dataclass(frozen=True)
+class Structure:
+    """What of a joint's residual can be foretold: by the best of all together, and by each variable, best first; crowded: the
+    share of the held-out square that the largest tenth of the rows holds."""
+
+    joint: int
+    share: float
+    away: float
+    depends_on: tuple[Dependence, ...]
+    crowded: float = 0.0
+
+    @property
+    def bursts(self) -> bool:
+        """Whether the residual comes in bursts, as no noise through a low-pass does."""
+        return self.crowded >= _CROWDED
+
+    @property
+    def there(self) -> bool:
+        """Whether structure is left."""
+        return self.bursts or (self.share >= LEAST and self.away >= STANDS_OUT)
+
+
+def structures(ground: Ground) -> list[Structure]:
+    """For each joint, what of its residual can be foretold."""
+    train, test = variables(ground, "train"), variables(ground, "test")
+    return [_structure(ground, joint, train, test) for joint in range(ground.model.robot.dof)]
+
+
+def variables(ground: Ground, part: str) -> dict[str, tuple[str, np.ndarray]]:
+    """{name: (unit, (n,) values)} on the rows of a part: q, qd, qdd of every joint, the predicted torque, time."""
+    motion, rows = (ground.train, ground.rows) if part == "train" else (ground.test, ground.held_out)
+    robot = ground.model.robot
+    pick = lambda name, j: np.concatenate([  # noqa: E731
+        getattr(piece, name)[rows.index[rows.piece == k], j] for k, piece in enumerate(motion.pieces)
+    ])  # fmt: skip
+    predicted = np.einsum("jnk,k->nj", rows.columns, ground.settled.x)
+    out = {}
+    for j, (joint, slides) in enumerate(zip(robot.joints, robot.prismatic)):
+        base, force = ("m", "N") if slides else ("rad", "N m")
+        out[f"q_{joint}"] = (base, pick("q", j))
+        out[f"qd_{joint}"] = (f"{base}/s", pick("qd", j))
+        out[f"qdd_{joint}"] = (f"{base}/s^2", pick("qdd", j))
+        out[f"tau_{joint}"] = (force, predicted[:, j])
+    return out | {"time": ("s", rows.t)}
+
+
+def _structure(ground: Ground, joint: int, train, test) -> Structure:
+    use, use_test = ground.rows.use[:, joint], ground.held_out.use[:, joint]
+    if use.sum() < 100 or use_test.sum() < 100:
+        return Structure(joint, 0.0, 0.0, ())
+    y, y_test = ground.residual[use, joint], ground.residual_test[use_test, joint]
+    blocks, blocks_test = ground.blocks[0][use], ground.blocks[1][use_test]
+    found, robot = [], ground.model.robot
+    for name, (unit, values) in train.items():
+        a, b = values[use], test[name][1][use_test]
+        if name == "time":
+            share, far = _over_time(b, y_test, blocks_test)
+        else:
+            knots = np.quantile(a, np.linspace(0, 1, _KNOTS))
+            share, far = _foretold(_splines(a, knots), y, blocks, _splines(b, knots), y_test, blocks_test)
+        found.append(Dependence(name, unit, share, far, *_curve(np.concatenate([a, b]), np.concatenate([y, y_test]))))
+    found.sort(key=lambda d: -d.share)
+    own = robot.joints[joint]
+    near = [f"{word}_{own}" for word in ("q", "qd", "qdd", "tau")] + [f"{word}_{other}" for other in robot.joints if other != own for word in ("q", "qd")]
+    together = _together([train[n][1][use] for n in near], [test[n][1][use_test] for n in near])
+    share, far = _foretold(together[0], y, blocks, together[1], y_test, blocks_test)
+    best = max([(share, far), *((d.share, d.away) for d in found)], key=lambda pair: pair[0] if pair[1] >= STANDS_OUT else -1.0)
+    return Structure(joint, best[0], best[1], tuple(d for d in found if d.away >= 2.0 and d.share > 0.0), _crowded(y_test))
+
+
+def _splines(x, knots) -> np.ndarray:
+    """Linear splines (n, knots + 2) of a variable, and what it does across its sign."""
+    knots = np.unique(knots)
+    size = max(np.ptp(knots), 1e-12)
+    hats = [np.interp(x, knots, row) for row in np.eye(len(knots))]
+    return np.column_stack([*hats, np.sign(x), np.clip((x - knots[0]) / size, -1, 2)])
+
+
+def _together(train, test) -> tuple[np.ndarray, np.ndarray]:
+    """Random cosines of several standardised variables at three widths (Rahimi & Recht 2007), also times the sign of speed."""
+    rng = np.random.default_rng(0)
+    a, b = np.stack(train, 1), np.stack(test, 1)
+    middle, spread = a.mean(0), np.where(a.std(0) > 0, a.std(0), 1.0)
+    a, b = (a - middle) / spread, (b - middle) / spread
+    out = []
+    for own in (slice(0, 4), slice(0, a.shape[1])):
+        d = a[:, own].shape[1]
+        for width in (1.0, 2.5):
+            w, phase = rng.normal(size=(d, _FEATURES // 4)) / (width * np.sqrt(d)) * 2.0, rng.uniform(0, 2 * np.pi, _FEATURES // 4)
+            out.append([np.cos(x[:, own] @ w + phase) for x in (a, b)])
+    made = [np.concatenate([entry[k] for entry in out], axis=1) for k in (0, 1)]
+    signs = [np.sign(x[:, 1] * spread[1] + middle[1])[:, None] for x in (a, b)]
+    return tuple(np.concatenate([f, f * s], axis=1) for f, s in zip(made, signs))
+
+
+def _foretold(a, y, blocks, b, y_test, blocks_test) -> tuple[float, float]:
+    """Share of the test rows' squares that ridge regression on the training rows foretells, and its standard errors from
+    zero; the ridge is chosen over blocks of the training rows."""
+    middle = a.mean(0)
+    a, b = a - middle, b - middle
+    scale = np.where(a.std(0) > 1e-9, a.std(0), 1.0)
+    a, b = a / scale, b / scale
+    fold = blocks * _FOLDS // (blocks.max() + 1)
+    grams = [(a[fold == k].T @ a[fold == k], a[fold == k].T @ y[fold == k]) for k in range(_FOLDS)]
+    system, right = sum(g for g, _ in grams), sum(r for _, r in grams)
+    errors = np.zeros(len(_RIDGES))
+    for k, (g, r) in enumerate(grams):
+        values, vectors = np.linalg.eigh(system - g)
+        turned = vectors.T @ (right - r)
+        for i, ridge in enumerate(_RIDGES):
+            w = vectors @ (turned / (np.clip(values, 0, None) + ridge * len(y) / len(_RIDGES)))
+            errors[i] += np.sum((y[fold == k] - a[fold == k] @ w) ** 2)
+    ridge = _RIDGES[int(np.argmin(errors))] * len(y) / len(_RIDGES)
+    w = np.linalg.solve(system + ridge * np.eye(len(system)), right)
+    if errors.min() >= np.sum(y**2):
+        return 0.0, 0.0
+    fall = summed(blocks_test, (y_test**2 - (y_test - b @ w) ** 2)[:, None])[:, 0]
+    total = np.sum(y_test**2)
+    return (float(fall.sum() / total), away(fall)) if total > 0 else (0.0, 0.0)
+
+
+def _over_time(t, y, blocks) -> tuple[float, float]:
+    """Share of slow drift: a smooth curve over every other block of a log foretells the blocks between."""
+    even = blocks % 2 == 0
+    if even.all() or not even.any():
+        return 0.0, 0.0
+    knots = np.linspace(t.min(), t.max(), 7)
+    features = _splines(t, knots)[:, :-2]
+    fall = np.zeros(len(y))
+    for own in (even, ~even):
+        a = features[own]
+        w = np.linalg.solve(a.T @ a + 1e-2 * len(a) * np.eye(a.shape[1]) / 7, a.T @ y[own])
+        fall[~own] = y[~own] ** 2 - (y[~own] - features[~own] @ w) ** 2
+    total = np.sum(y**2)
+    return (float(fall.sum() / total), away(summed(blocks, fall[:, None])[:, 0])) if total > 0 else (0.0, 0.0)
+
+
+def _crowded(y) -> float:
+    """The share of the squares of y that its largest tenth holds."""
+    square = np.sort(y**2)[::-1]
+    return float(square[: max(1, round(_LARGEST * len(square)))].sum() / max(square.sum(), 1e-300))
+
+
+def _curve(x, y) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Means of y over bins of x with equal numbers of rows."""
+    order = np.argsort(x)
+    parts = [p for p in np.array_split(order, _BINS) if len(p)]
+    return tuple(np.array([f(p) for p in parts]) for f in (lambda p: x[p].mean(), lambda p: y[p].mean(), lambda p: y[p].std() / np.sqrt(len(p))))

@@ -1,0 +1,37 @@
+"""Torque ripple over the angle."""
+
+import numpy as np
+
+from ..effect import Linear, Shape, TorqueEffect, called, whole
+
+
+class Cogging(TorqueEffect):
+    """Magnets prefer the iron's teeth, and gears their mesh: torque that repeats with the angle, whatever the speed.
+
+    On a joint that carries weight a ripple of k = 1 is gravity itself and cannot be seen. On a prismatic joint k
+    counts per metre; give a larger `k` by hand where the pitch is below 50 mm.
+    """
+
+    name = "cogging"
+    equation = "tau = sum_j (a_j sin(j k q) + b_j cos(j k q))"
+    looks_like = "lines at the frequency k qd / 2 pi, the same torque at any speed and both ways"
+    tied_with = ("spring", "cable", "position_friction", "encoder_eccentricity", "gravity where k is 1")
+    separate_by = "a slow scan both ways over several periods"
+    source = "Holtz 1996"
+    options = {"lines": "how many multiples of k, from 1 (default 1)"}
+
+    lines = 1
+    k = Shape("1/rad", 1.0, 120.0, grid=480, even=True, spacing=np.pi / 2, says="periods in 2 pi rad")
+
+    def given(self, **options):
+        chosen = super().given(**options)
+        whole(chosen, "lines", 8)
+        return chosen
+
+    def coefficients(self):
+        part = {"a": "sine", "b": "cosine"}
+        return tuple(called(Linear("N m", says=f"{part[word]} of {j} k q"), f"{word}{j}") for j in range(1, self.lines + 1) for word in "ab")
+
+    def columns(self, motion, joint, k):
+        angles = np.arange(1, self.lines + 1)[:, None] * k * motion.q[:, joint]
+        return np.stack([np.sin(angles), np.cos(angles)], axis=1).reshape(2 * self.lines, -1)

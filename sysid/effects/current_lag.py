@@ -1,0 +1,22 @@
+"""A current loop that follows late."""
+
+import numpy as np
+
+from ..effect import SensorEffect, Shape
+
+
+class CurrentLag(SensorEffect):
+    """The torque that acts is the commanded or logged one through the current loop's low-pass of time constant T."""
+
+    name = "current_lag"
+    equation = "T tau' + tau = tau_measured"
+    looks_like = "residual in proportion to the rate of the torque"
+    tied_with = ("delay", "elasticity")
+    separate_by = "steps or a random binary torque: a lag rounds them, a delay moves them"
+    source = "first-order lag; no reference"
+    reach = 1
+
+    T = Shape("s", 0.0, 0.05, start=0.0, says="time constant of the current loop")
+
+    def sensed(self, torque, step, T):
+        return torque + T * np.gradient(torque, step, axis=-1) if torque.shape[-1] > 1 else torque

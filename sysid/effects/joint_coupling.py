@@ -1,0 +1,45 @@
+"""A motor that turns with a second joint."""
+
+import numpy as np
+
+from ..effect import Linear, TorqueEffect, one_of
+from ..errors import ConfigError
+
+
+class JointCoupling(TorqueEffect):
+    """A wrist's motor, or the bevel gear it drives, turns with a neighbouring joint too: inertia and friction of one
+    joint follow the motion of the other.
+    """
+
+    name = "joint_coupling"
+    equation = "tau = Ia qdd_i + Fv qd_i + Fs sign(qd_i + qd_j) + Fd sign(qd_i - qd_j), i the other joint"
+    looks_like = "residual of one joint that follows the motion of another"
+    tied_with = ("products of inertia of the links between both joints", "coulomb")
+    separate_by = "move one joint alone, then the other"
+    source = "wrists of the Staubli kind; no reference"
+    options = {"other": "the name of the other joint (default: the joint before it, for the first the one after)"}
+
+    other = None
+    joints: tuple[str, ...] = ()
+    Ia = Linear("kg m^2", says="inertia that the other joint's acceleration moves")
+    Fv = Linear("N m s/rad", says="viscous friction with the other joint's speed")
+    Fs = Linear("N m", says="Coulomb friction with the sum of both speeds")
+    Fd = Linear("N m", says="Coulomb friction with the difference of both speeds")
+
+    def bound(self, robot, joint):
+        if len(robot.joints) < 2:
+            raise ConfigError("joint_coupling needs a second joint", where="model.effects", do="leave it out")
+        bound = self.given()
+        bound.joints = tuple(robot.joints)
+        if self.other is not None:
+            one_of(bound, "other", [name for k, name in enumerate(robot.joints) if k != joint])
+        return bound
+
+    def variants(self, robot, joint):
+        return [{"other": name} for k, name in enumerate(robot.joints) if k != joint]
+
+    def columns(self, motion, joint):
+        i = self.joints.index(self.other) if self.other is not None else joint - 1 if joint else 1
+        qd, rest = motion.qd, motion.rest[i] + motion.rest[joint]
+        signs = [np.where(np.abs(speed) > rest, np.sign(speed), 0.0) for speed in (qd[:, i] + qd[:, joint], qd[:, i] - qd[:, joint])]
+        return np.stack([motion.qdd[:, i], qd[:, i], *signs])

@@ -1,0 +1,255 @@
+"""Add an effect, refit, compare; again until nothing is missing. Every step is a run folder that can be reproduced.
+
+    runs/<experiment>/history.json      the steps: what was added, to which joint, the held-out error after it
+    runs/<experiment>/steps/NN-…        one run folder each, whose experiment.yaml gives the same fit again
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import shutil
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from . import comparison, config, pipeline, results
+from .config import EffectSpec, Experiment
+from .diagnose.diagnosis import Diagnosis, diagnose
+from .errors import ConfigError
+from .estimate import Fit
+
+_HISTORY, _STEPS = "history.json", "steps"
+
+
+@dataclass(frozen=True)
+class Added:
+    """An effect that joined an experiment: the fits before and after, and on each joint the difference of the held-out RMS
+    with its standard error."""
+
+    experiment: Experiment
+    before: Fit
+    after: Fit
+    differences: tuple[comparison.Difference, ...]
+
+
+# ---- the experiment file
+
+
+def with_effect(text: str, effect: str, joints: list[str] | None, options: dict, where: str = "") -> str:
+    """The text of an experiment file with one more effect, its comments kept.
+
+    Args:
+        joints: None for every joint, or for an effect of the whole robot.
+
+    Raises:
+        ConfigError: the effect is there already.
+    """
+    from ruamel.yaml import YAML
+    from ruamel.yaml.comments import CommentedMap, CommentedSeq
+
+    writer = YAML()
+    writer.preserve_quotes, writer.width = True, 4096
+    tree = config.parse_yaml(text, where=where)
+    if tree is None:
+        tree = CommentedMap()
+    model = tree.setdefault("model", CommentedMap())
+    if model.get("effects") is None:
+        model["effects"] = CommentedSeq(["viscous", "coulomb"])
+        model["effects"].fa.set_flow_style()
+    listed = model["effects"]
+    formula = options.get("formula") if effect == "formula" else None
+    own = {**({"joints": list(joints)} if joints is not None else {}), **options}
+    for entry in listed:
+        if formula is not None or _word(entry) != effect:
+            continue
+        there = entry[effect] if isinstance(entry, dict) else {}
+        taken = set(there.get("joints") or []) if there.get("joints") is not None else None
+        if taken is None or joints is None or taken & set(joints):
+            said = "" if not taken or joints is None else f" on {', '.join(sorted(taken & set(joints)))}"
+            raise ConfigError(f"{effect} is in the model already{said}", where=where, do="add another effect, or another joint")
+        if {k: v for k, v in there.items() if k != "joints"} == options:
+            there["joints"].extend(joints)
+            break
+    else:
+        listed.append(_flow(own) if formula is not None else effect if not own else CommentedMap({effect: _flow(own)}))
+        if listed and isinstance(listed[-1], CommentedMap):
+            listed[-1].fa.set_flow_style()
+    stream = io.StringIO()
+    writer.dump(tree, stream)
+    return stream.getvalue()
+
+
+def _word(entry) -> str:
+    return str(next(iter(entry))) if isinstance(entry, dict) else str(entry)
+
+
+def _flow(own: dict):
+    from ruamel.yaml.comments import CommentedMap, CommentedSeq
+
+    out = CommentedMap()
+    for key, value in own.items():
+        if isinstance(value, list):
+            value = CommentedSeq(value)
+            value.fa.set_flow_style()
+        out[key] = value
+    out.fa.set_flow_style()
+    return out
+
+
+def grown(experiment: Experiment, effect: str, joints: list[str] | None, options: dict) -> Experiment:
+    """The experiment with one more effect, as its file would say it."""
+    spec = EffectSpec(name=effect, joints=joints, options=options)
+    model = experiment.model.model_copy(update={"effects": [*experiment.model.effects, spec]})
+    return experiment.model_copy(update={"model": model})
+
+
+# ---- one step
+
+
+def add(path: Path, effect: str, joints: list[str] | None, options: dict, *, progress=None, out: Path | None = None) -> Added:
+    """Write an effect into an experiment file, refit, and say what that changed.
+
+    The file is written last: where the effect cannot be, or the fit fails, it stays as it was.
+
+    Raises:
+        SysidError: bad input.
+    """
+    experiment = pipeline.load(path)
+    run = results.folder(out or Path("runs") / experiment.name)
+    file = experiment.path
+    text = with_effect(file.read_text(encoding="utf-8-sig"), effect, joints, options, str(file))
+    after = config.loads(text, file)
+    pipeline.build(after)
+    before_fit = pipeline.fit(experiment, progress=progress)
+    after_fit = pipeline.fit(after, progress=progress)
+    history = read_history(run)
+    if not history or history[-1]["rms_test"] != before_fit.rms("test"):
+        history = [_record(run, 0, before_fit, None, None)]
+    named = "*" if joints is None else ", ".join(joints)
+    history.append(_record(run, len(history), after_fit, effect, named))
+    results.write(after_fit, run)
+    results.write_atomically(file, lambda p: p.write_text(text, encoding="utf-8"))
+    _write_history(run, history)
+    return Added(after, before_fit, after_fit, tuple(comparison.compare(before_fit, after_fit, ("before", "after"))))
+
+
+def _record(run: Path, number: int, fit: Fit, effect: str | None, joint: str | None) -> dict:
+    """Write one step's folder; returns what the history says of it."""
+    word = "start" if effect is None else "-".join(c for c in (effect.rpartition(":")[2], "" if joint in (None, "*") else joint.replace(", ", "-")) if c)
+    safe = "".join(c if c.isalnum() or c in "-_." else "_" for c in word)
+    folder = run / _STEPS / f"{number:02d}-{safe}"
+    results.write(fit, folder)
+    return {"added": effect, "joint": joint, "rms_test": fit.rms("test"), "rms_train": fit.rms("train"), "folder": str(folder.relative_to(run))}
+
+
+def read_history(run: Path) -> list[dict]:
+    """The steps of a run folder, oldest first; empty where there are none."""
+    try:
+        found = json.loads((run / _HISTORY).read_text(encoding="utf-8"))["steps"]
+        return found if isinstance(found, list) else []
+    except (OSError, ValueError, KeyError, TypeError):
+        return []
+
+
+def _write_history(run: Path, steps: list[dict], **more) -> None:
+    results.write_json(run / _HISTORY, {"steps": steps, **more})
+
+
+# ---- until nothing is missing
+
+
+@dataclass(frozen=True)
+class Discovery:
+    """The steps that held-out data support, as the history has them; the fits; the last diagnosis; candidates that the
+    diagnosis named and the fit's own held-out error did not support, with the rise."""
+
+    steps: list[dict]
+    experiment: Experiment
+    fits: list[Fit]
+    diagnosis: Diagnosis
+    refused: list[dict]
+
+
+def discover(experiment: Experiment, run: Path, *, most: int = 10, progress=None, each: Callable[[dict], None] | None = None) -> Discovery:
+    """Diagnose, add, refit, until the verdict is complete or nothing helps. The experiment's file stays as it is.
+
+    Args:
+        most: effects to add at most. each: called with each step as it is made.
+    """
+    shutil.rmtree(run / _STEPS, ignore_errors=True)
+    tell = each or (lambda step: None)
+    found = diagnose(experiment, progress=progress)
+    fits, steps, refused = [found.fit], [_record(run, 0, found.fit, None, None)], []
+    tell(steps[0])
+    again = True
+    while again and len(steps) <= most:
+        again = False
+        for step in found.steps:
+            if len(steps) > most:
+                break
+            candidate = step.head.candidate
+            joint = "*" if candidate.joint < 0 else found.fit.joints[candidate.joint]
+            name, joints, options = spelled(candidate, joint)
+            if any((r["effect"], r["joint"]) == (name, joint) for r in refused):
+                continue
+            tried = grown(experiment, name, joints, options)
+            fit = pipeline.fit(tried, progress=progress)
+            rise = _rise(fits[-1], fit, None if candidate.joint < 0 else joint)
+            if rise >= 0:
+                refused.append({"effect": name, "joint": joint, "delta_rms": rise})
+                continue
+            experiment, again = tried, True
+            fits.append(fit)
+            steps.append(_record(run, len(steps), fit, name, joint))
+            tell(steps[-1])
+        if again:
+            found = diagnose(experiment, fit=fits[-1], progress=progress)
+    results.write(fits[-1], run)
+    from .diagnose.document import document
+
+    said = document(found, run)
+    results.write_json(run / "diagnosis.json", said)
+    _write_history(run, steps, verdict=said["verdict"], refused=refused)
+    return Discovery(steps, experiment, fits, found, refused)
+
+
+def spelled(candidate, joint: str) -> tuple[str, list[str] | None, dict]:
+    """A candidate as an experiment file names it: word, joints, options."""
+    spec = getattr(candidate.effect, "spelled", None)
+    name, own = (candidate.name, {}) if spec is None else spec
+    return name, None if joint == "*" else [joint], {**own, **dict(candidate.options)}
+
+
+def _rise(before: Fit, after: Fit, joint: str | None) -> float:
+    """Change of the held-out RMS on a joint, or of all joints together in units of what it was."""
+    first, second = before.rms("test"), after.rms("test")
+    if joint is not None:
+        return second[joint] - first[joint]
+    return sum(second[j] ** 2 / max(first[j] ** 2, 1e-300) for j in first) - len(first)
+
+
+# ---- what the commands say
+
+
+def options(texts: list[str]) -> dict:
+    """Options of an effect from NAME=VALUE texts, the value in YAML. Raises ConfigError."""
+    out = {}
+    for text in texts:
+        name, equals, value = text.partition("=")
+        if not equals or not name.strip():
+            raise ConfigError(f"--option {text!r}", allowed="NAME=VALUE", do="correct it")
+        out[name.strip()] = config.parse_yaml(value, where="--option")
+    return out
+
+
+def document(added: Added) -> dict:
+    """The document of `sysid add`."""
+    name = added.experiment.model.effects[-1].name
+    before = {entry["name"] for entry in results.document(added.before)["parameters"]}
+    found = results.document(added.after)
+    return {
+        "added": name, "experiment": str(added.experiment.path), "rms_test_before": added.before.rms("test"), "rms_test_after": added.after.rms("test"),
+        "differences": [{"joint": d.joint, "delta_rms": d.delta_rms, "se": results.number(d.se)} for d in added.differences],
+        "parameters": [p for p in found["parameters"] if p["name"] not in before], "converged": found["converged"], "notices": found["notices"],
+    }  # fmt: skip

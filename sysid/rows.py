@@ -1,0 +1,146 @@
+"""Model x motion -> rows that stand in memory: a thinned log's columns, and the derivative of its torque in shape values.
+
+Triangles hold all of a log but only for one set of shape values. Rows are what a search over these works on, and
+what a diagnosis asks its questions of: few enough to keep, spread over the whole motion.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .model import Model, chunks
+from .preprocess import Motion
+
+_STRETCH = 16384  # samples whose columns are computed at once
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Every `stride`-th row of a motion.
+
+    columns (dof, n, size) and tau (n, dof), zero where a row does not count for a joint; use (n, dof) bool; t (n,) [s];
+    log (n,) the number of the log; piece (n,) the number of the piece and index (n,) the row in it.
+    """
+
+    columns: np.ndarray
+    tau: np.ndarray
+    use: np.ndarray
+    t: np.ndarray
+    log: np.ndarray
+    piece: np.ndarray
+    index: np.ndarray
+
+    def residual(self, x) -> np.ndarray:
+        """tau - columns x (n, dof), zero where a row does not count."""
+        return self.tau - np.einsum("jnk,k->nj", self.columns, x)
+
+
+def stride_for(motion: Motion, most: int) -> int:
+    """The stride that leaves at most `most` rows."""
+    return max(1, -(-motion.samples // most))
+
+
+def starts(motion: Motion, stride: int) -> list[slice]:
+    """The rows of each piece that a stride keeps."""
+    return [slice(piece.core.start, piece.core.stop, stride) for piece in motion.pieces]
+
+
+def stack(model: Model, motion: Motion, stride: int) -> Rows:
+    """The rows of a motion under a model."""
+    supports = [model.support(joint) for joint in range(model.robot.dof)]
+    kept = [np.arange(rows.start, rows.stop, stride) for rows in starts(motion, stride)]
+    n, dof = sum(map(len, kept)), model.robot.dof
+    columns = np.zeros((dof, n, model.size))
+    at = 0
+    for piece in motion.pieces:
+        remembered = model.remembered(piece)
+        # a stretch holds a whole number of strides, so that the kept rows go on where the last stretch ended
+        for rows in chunks(piece, stride * max(1, _STRETCH // stride)):
+            parts = model.columns(piece, slice(rows.start, rows.stop, stride), remembered)
+            size = parts[0].shape[-1]
+            for joint, (values, support) in enumerate(zip(parts, supports)):
+                columns[joint, at : at + size, support] = values
+            at += size
+    joined = lambda pick: np.concatenate([pick(piece)[own] for piece, own in zip(motion.pieces, kept)])  # noqa: E731
+    use = joined(lambda p: np.ones(p.q.shape, dtype=bool) if p.use is None else p.use)
+    tau = np.where(use, joined(lambda p: p.tau), 0.0)
+    columns *= use.T[:, :, None]
+    return Rows(
+        columns, tau, use, joined(lambda p: p.t), joined(lambda p: np.full(len(p.t), p.log)),
+        np.concatenate([np.full(len(own), k) for k, own in enumerate(kept)]), np.concatenate(kept),
+    )  # fmt: skip
+
+
+def predicted(model: Model, motion: Motion, x, stride: int) -> np.ndarray:
+    """Torque (n, dof) that parameters x (size,) predict at the rows that a stride keeps."""
+    count = 10 * model.bodies
+    pi, c = np.asarray(x)[:count].reshape(-1, 10), np.asarray(x)[count:]
+    return np.concatenate([model.torque(piece, pi, c, stride) for piece in motion.pieces])
+
+
+def tangents(model: Model, motion: Motion, x, stride: int, use: np.ndarray) -> np.ndarray:
+    """d torque / d shape (dof, n, shapes) at parameters x: by differences, as an effect says what it does, not its slope.
+
+    A step is a small share of what the bounds span, towards the inside; zero for values that the user holds.
+    """
+    values = model.shape_values
+    out = np.zeros((model.robot.dof, len(use), len(values)))
+    if not values:
+        return out
+    middle = predicted(model, motion, x, stride)
+    for k, value in enumerate(values):
+        if value.held:
+            continue
+        step = difference_step(value, model.shapes[k])
+        moved = model.with_shapes([s + step * (i == k) for i, s in enumerate(model.shapes)])
+        out[:, :, k] = ((predicted(moved, motion, x, stride) - middle) / step * use).T
+    return out
+
+
+def difference_step(value, at: float) -> float:
+    """The step of a difference in a shape value, away from the nearer bound."""
+    size = 1e-4 * (abs(at) if value.shape.start is None and at else value.high - value.low)
+    return size if at + size <= value.high else -size
+
+
+def seen(model: Model, motion: Motion) -> list:
+    """Each whole piece as the effects of a model see it: moved, with the load that its bodies need."""
+    from dataclasses import replace
+
+    from . import regressor
+
+    out = []
+    for piece in motion.pieces:
+        part = piece.part(slice(0, len(piece.t)))
+        reference = model.robot.prior if model.reference is None else model.reference
+        part = replace(part, load=regressor.torque(model.robot, reference, part.q, part.qd, part.qdd))
+        out.append(model.moved(part))
+    return out
+
+
+def signature(model: Model, motion: Motion, pieces: list, effect, joint: int, shapes: dict, stride: int, use: np.ndarray) -> np.ndarray:
+    """Columns (dof, n, k), or (n, k) of the joint alone, that a torque effect would add to a model's rows.
+
+    Args:
+        pieces: `seen(model, motion)`. joint: its joint, -1 for the robot. use: (n, dof) bool.
+    """
+    (out,) = signatures(model, motion, pieces, effect, joint, [shapes], stride, use)
+    return out
+
+
+def signatures(model: Model, motion: Motion, pieces: list, effect, joint: int, tried: list[dict], stride: int, use: np.ndarray) -> list[np.ndarray]:
+    """`signature` at several shape values at once."""
+    out = []
+    for piece, part, rows in zip(motion.pieces, pieces, starts(motion, stride)):
+        # (joints, tried k, n): everything that follows is linear and the same for each
+        values = [effect.columns(part, model.robot if joint < 0 else joint, **shapes) for shapes in tried]
+        stacked = np.concatenate([v if v.ndim == 3 else v[None] for v in values], axis=1)
+        joints = range(model.robot.dof) if joint < 0 else [joint]
+        read = [model.sensed(entry, piece.step, j) for entry, j in zip(stacked, joints)]
+        out.append(np.stack([entry[..., rows] if piece.smoother is None else piece.smoother.at(entry, rows) for entry in read]))
+    joined = np.moveaxis(np.concatenate(out, axis=-1), 1, 2)
+    joined = joined * (use[:, [joint]] if joint >= 0 else use.T[:, :, None])
+    k = joined.shape[2] // len(tried)
+    return [joined[0, :, i : i + k] if joint >= 0 else joined[:, :, i : i + k] for i in range(0, k * len(tried), k)] if k else [joined] * len(tried)

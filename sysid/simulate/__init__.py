@@ -1,0 +1,12 @@
+"""Simulated logs of a robot that has more in it than its model: closed loop in time, sticking, sensors, hidden effects.
+
+    simulation = simulate(robot, hide=[hidden("stribeck:hip:dF=2,vs=0.1")], seed=1)
+    simulation.train.q, simulation.train.tau, simulation.truth
+    write(simulation, experiment, "out")
+"""
+
+from .folder import load, prepare, write
+from .hidden import Hidden, Scales, defaults, hidden
+from .run import SimulatedLog, Simulation, simulate
+
+__all__ = ["Hidden", "Scales", "SimulatedLog", "Simulation", "defaults", "hidden", "load", "prepare", "simulate", "write"]

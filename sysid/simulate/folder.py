@@ -1,0 +1,127 @@
+"""A simulation as a folder: config.yaml, robot.urdf, train.csv, test.csv, truth.json.
+
+config.yaml is what one would write who knows nothing of what is hidden. Everything is written under another name and
+renamed when it is whole.
+"""
+
+import io
+import json
+import os
+import shutil
+import uuid
+import warnings
+from pathlib import Path
+
+import numpy as np
+
+from .. import config
+from ..config import Experiment, PreprocessSpec
+from ..errors import SysidError, SysidWarning
+from ..robot import Robot
+from ..robot import load as robot_of
+from .run import SimulatedLog, Simulation
+
+FILES = ("config.yaml", "robot.urdf", "train.csv", "test.csv", "truth.json")
+
+
+def load(path: str | Path) -> tuple[Experiment, Robot, tuple[str, ...]]:
+    """An experiment, its robot, and what was decided for the user on the way. Its logs need not be there. Raises SysidError."""
+    experiment = config.load(path)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", SysidWarning)
+        machine = robot_of(experiment.robot, experiment.folder)
+    return experiment, machine, tuple(dict.fromkeys(str(w.message) for w in caught if issubclass(w.category, SysidWarning)))
+
+
+def prepare(out: str | Path) -> Path:
+    """Make sure that a simulation can be written to a folder, before any work is done.
+
+    Raises:
+        SysidError: it is a file, cannot be written, or holds something that is no simulation.
+    """
+    path = Path(out)
+    if path.exists() and not path.is_dir():
+        raise SysidError("there is a file of that name", where=str(path), allowed="a new folder", do="give another with --out")
+    if path.is_dir() and any(path.iterdir()) and not _is_simulation(path):
+        raise SysidError("the folder holds something that is no simulation", where=str(path), allowed="a new or empty folder, or one that sysid simulate wrote", do="give another with --out")
+    probe = path.absolute().parent / f".{uuid.uuid4().hex}"
+    try:
+        probe.parent.mkdir(parents=True, exist_ok=True)
+        probe.touch()
+        probe.unlink()
+    except OSError as error:
+        raise SysidError(f"the folder cannot be written ({error.strerror})", where=str(path), do="give another with --out") from None
+    return path
+
+
+def _is_simulation(path: Path) -> bool:
+    try:
+        return json.loads((path / "truth.json").read_text(encoding="utf-8"))["simulated_by"] == "sysid simulate"
+    except (OSError, ValueError, KeyError, TypeError):
+        return False
+
+
+def write(simulation: Simulation, experiment: Experiment, out: str | Path) -> None:
+    """Write the folder of a simulation of an experiment's robot.
+
+    Raises:
+        SysidError: see `prepare`; or the disk refuses.
+    """
+    path = prepare(out)
+    robot = simulation.robot
+    texts = {
+        "config.yaml": _config(experiment, robot), "robot.urdf": "<?xml version=\"1.0\"?>\n" + robot.source.text + "\n",
+        "train.csv": _csv(simulation.train, robot), "test.csv": _csv(simulation.test, robot),
+        "truth.json": json.dumps(simulation.truth, indent=1, allow_nan=False) + "\n",
+    }  # fmt: skip
+    temporary = path.absolute().parent / f".{path.name}.{uuid.uuid4().hex}"
+    try:
+        temporary.mkdir()
+        for name in FILES:
+            (temporary / name).write_text(texts[name], encoding="utf-8")
+        if path.is_dir() and any(path.iterdir()):
+            for name in FILES:
+                os.replace(temporary / name, path / name)
+        else:
+            if path.is_dir():
+                path.rmdir()
+            os.replace(temporary, path)
+    except OSError as error:
+        raise SysidError(f"cannot be written ({error.strerror})", where=str(path), do="free the disk or give another --out") from None
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+
+
+def _csv(log: SimulatedLog, robot: Robot) -> str:
+    import polars as pl
+
+    columns = {"t": log.t, **{f"q_{joint}": np.round(log.q[:, j], 12) for j, joint in enumerate(robot.joints)}}
+    columns |= {f"tau_{joint}": np.round(log.tau[:, j], 12) for j, joint in enumerate(robot.joints)}
+    return pl.DataFrame(columns).write_csv()
+
+
+def _config(experiment: Experiment, robot: Robot) -> str:
+    """The experiment as one would write it who knows nothing of what is hidden."""
+    from ruamel.yaml import YAML
+
+    rotors = [rotor.joint for rotor in experiment.robot.rotors]
+    bare = [joint for joint in robot.joints if joint not in rotors]
+    effects: list = ["viscous", "coulomb"]
+    if bare:
+        effects.append({"armature": {"joints": bare}} if rotors else "armature")
+    spec = experiment.robot.model_dump(exclude_none=True, exclude_defaults=True)
+    preprocess = experiment.preprocess if experiment.preprocess.filter != "none" else PreprocessSpec()
+    tree = {
+        "robot": {**spec, "urdf": "robot.urdf", "joints": list(robot.joints), "gravity": list(experiment.robot.gravity)},
+        "data": {"train": ["train.csv"], "test": ["test.csv"]},
+        "preprocess": preprocess.model_dump(exclude_none=True),
+        "model": {"inertia": experiment.model.inertia, "effects": effects},
+        "prior": {**experiment.prior.model_dump(exclude_none=True), "source": "urdf"},
+        "solver": experiment.solver.model_dump(exclude_none=True),
+    }
+    stream = io.StringIO()
+    writer = YAML()
+    writer.width = 200
+    writer.default_flow_style = None
+    writer.dump(tree, stream)
+    return stream.getvalue()

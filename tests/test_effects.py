@@ -1,0 +1,436 @@
+"""What each effect does, against closed forms, Pinocchio and a fine integration of the same law."""
+
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from sysid import config, effect, regressor, robot
+from sysid.errors import ConfigError
+from sysid.inertia import pseudo
+from sysid.preprocess import Piece
+from tests.problems import UR5, fourier_motion
+
+SLIDE = """<robot name="slide"><link name="base"/>
+<link name="cart"><inertial><origin xyz="0 0 0.1"/><mass value="2"/><inertia ixx="0.02" ixy="0" ixz="0" iyy="0.02" iyz="0" izz="0.02"/></inertial></link>
+<link name="arm"><inertial><origin xyz="0.2 0 0.1"/><mass value="1"/><inertia ixx="0.01" ixy="0" ixz="0" iyy="0.02" iyz="0" izz="0.02"/></inertial></link>
+<joint name="rail" type="prismatic"><parent link="base"/><child link="cart"/><axis xyz="0 0.6 0.8"/><limit lower="-9" upper="9" effort="1" velocity="1"/></joint>
+<joint name="hinge" type="revolute"><parent link="cart"/><child link="arm"/><origin xyz="0 0.1 0.2"/><axis xyz="0 1 0"/>
+<limit lower="-9" upper="9" effort="1" velocity="1"/></joint></robot>"""
+
+
+def piece_of(machine, t, q, qd, qdd, **more) -> Piece:
+    """A motion as effects see it, with the load of the robot's prior bodies."""
+    load = regressor.torque(machine, machine.prior, q, qd, qdd)
+    return Piece(
+        log=0, step=float(t[1] - t[0]), t=t, q=q, qd=qd, qdd=qdd, tau=load, measured=load, signals={}, use=None, smoother=None,
+        core=slice(0, len(t)), rest=np.zeros(q.shape[1]), noise=np.zeros(q.shape[1]), load=load, **more,
+    )  # fmt: skip
+
+
+@cache
+def moving() -> tuple:
+    """A slide with a hinged arm, and a motion of it that begins at rest."""
+    import tempfile
+
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "slide.urdf"
+        file.write_text(SLIDE)
+        machine = robot.load(config.RobotSpec(urdf=str(file)))
+    t, q, qd, qdd = fourier_motion(np.random.default_rng(1), 2.0, 200.0, machine.dof)
+    still = t < 0.25
+    q[still], qd[still], qdd[still] = q[~still][0], 0.0, 0.0
+    return machine, piece_of(machine, t, q, qd, qdd)
+
+
+@cache
+def arm_moving() -> tuple:
+    """A six-joint arm and a motion of it."""
+    machine = robot.load(config.RobotSpec(urdf=UR5))
+    return machine, piece_of(machine, *fourier_motion(np.random.default_rng(2), 3.0, 200.0, machine.dof))
+
+
+def middle(found, machine, piece, joint) -> dict[str, float]:
+    """A value for each shape: midway between its bounds on this motion."""
+    of = {
+        "": lambda k: 1.0, "speed": lambda k: np.abs(piece.qd[:, k]).max(), "torque": lambda k: np.abs(piece.tau[:, k]).max(),
+        "angle": lambda k: np.ptp(piece.q[:, k]), "duration": lambda k: np.ptp(piece.t),
+    }  # fmt: skip
+    out = {}
+    for shape in found.shapes():
+        scale = of[shape.of](joint)
+        values = shape.values(shape.low * scale, shape.high * scale)
+        out[shape.name] = float(values[len(values) // 2])
+    return out
+
+
+def applied(found, machine, piece, joint, shapes) -> list[np.ndarray]:
+    """What an effect makes of a motion: its columns, or q, qd, qdd, or the torque that its sensor reads."""
+    if isinstance(found, effect.TorqueEffect):
+        return [found.columns(piece, joint, **shapes)]
+    if isinstance(found, effect.WrenchEffect):
+        return [found.columns(piece, machine, **shapes)]
+    if isinstance(found, effect.SensorEffect):
+        return [found.sensed(piece.tau.T, piece.step, **shapes).T]
+    moved = found.moved(piece, joint, **shapes)
+    more = [x for x in (moved.gravity, moved.deflection) if x is not None]
+    return [moved.q, moved.qd, moved.qdd, *more]
+
+
+MOVERS = [name for name in effect.vocabulary() if isinstance(effect.find(name), effect.MotionEffect)]
+SENSORS = [name for name in effect.vocabulary() if isinstance(effect.find(name), effect.SensorEffect)]
+
+
+def torque_of(machine, piece) -> np.ndarray:
+    """What the prior bodies need on a motion, as the model asks for it."""
+    return regressor.torque(machine, machine.prior, piece.q, piece.qd, piece.qdd, gravity=piece.gravity, deflection=piece.deflection)
+
+
+def rnea(machine, piece, *, model=None) -> np.ndarray:
+    """The same by Pinocchio, on q, qd and qdd alone."""
+    model = machine.model if model is None else model
+    data, turn = model.createData(), machine.transmission
+    return np.array([turn.T @ pin.rnea(model, data, turn @ q, turn @ qd, turn @ qdd) for q, qd, qdd in zip(piece.q, piece.qd, piece.qdd)])
+
+
+def test_grid_of_cogging_misses_no_line():
+    """Two neighbouring k turn against each other by less than a quarter turn over the whole travel."""
+    k = effect.find("cogging").k
+    for angle in (0.05, 1.0, 6.0):
+        values = k.values(k.low, k.high, angle)
+        assert values[0] == k.low and values[-1] == k.high and np.diff(values).max() * angle <= np.pi / 2
+    assert len(k.values(k.low, k.high)) == k.grid and np.diff(k.values(k.low, k.high)).max() < 0.25
+
+
+@pytest.mark.parametrize("name", MOVERS + SENSORS)
+@pytest.mark.parametrize("make", [moving, arm_moving])
+def test_start_changes_nothing(name, make):
+    machine, piece = make()
+    for joint in [-1] if effect.find(name).scope == "robot" else range(machine.dof):
+        for options in effect.find(name).variants(machine, joint):
+            found = effect.find(name).given(**options).bound(machine, joint)
+            shapes = middle(found, machine, piece, joint) | {s.name: s.start for s in found.shapes() if s.start is not None}
+            if name in SENSORS:
+                np.testing.assert_array_equal(found.sensed(piece.tau.T, piece.step, **shapes), piece.tau.T)
+            else:
+                np.testing.assert_array_equal(torque_of(machine, found.moved(piece, joint, **shapes)), piece.load)
+
+
+@pytest.mark.parametrize("name", [*MOVERS, *SENSORS, "presliding", "warmup", "joint_coupling"])
+@pytest.mark.parametrize("filtered", ["raw", "same"])
+def test_columns_of_a_stretch_are_those_of_the_whole(name, filtered):
+    from sysid.compress import chunks
+    from sysid.model import ROBOT, Model, initial
+    from sysid.preprocess import prepare
+    from tests.problems import arm_log
+
+    machine, _ = arm_moving()
+    spec = config.PreprocessSpec(torque=filtered)
+    motion = prepare([arm_log(machine, np.random.default_rng(0), seconds=4.0)], spec, machine.joints)
+    (piece,) = motion.pieces
+    joint = ROBOT if effect.find(name).scope == "robot" else 1
+    found = effect.find(name).bound(machine, joint)
+    model = Model(machine, ((found, (joint,)),)).measured_by(motion)
+    shapes = [0.3 * value.high if value.shape.start == 0 else at for value, at in zip(model.shape_values, initial(model))]
+    model = model.with_shapes(shapes)
+    whole = model.columns(piece, piece.core)
+    remembered = model.remembered(piece)
+    parts = [model.columns(piece, rows, remembered) for rows in chunks(piece, 150)]
+    for joint, columns in enumerate(whole):
+        np.testing.assert_allclose(np.concatenate([part[joint] for part in parts], axis=1), columns, atol=1e-9 * np.abs(columns).max())
+
+
+# ---- sensors
+
+
+@pytest.mark.parametrize("d", [0.0037, -0.0037, 0.005, -0.0125, 0.03, -0.03])
+def test_delay_shifts_a_sine(d):
+    step = 0.001
+    t = np.arange(2000) * step
+    delay = effect.find("delay")
+    wave = lambda t: np.stack([np.sin(2 * np.pi * 5 * t), np.cos(2 * np.pi * 12 * t + 1)])  # noqa: E731
+    inner = slice(delay.reach, -delay.reach)
+    np.testing.assert_allclose(delay.sensed(wave(t), step, d)[:, inner], wave(t - d)[:, inner], atol=1e-6)
+    assert delay.sensed(wave(t), step, d).shape == (2, 2000)
+
+
+def test_delay_by_whole_samples_is_exact_and_holds_the_edges():
+    torque = np.random.default_rng(0).normal(size=(3, 200))
+    delay = effect.find("delay")
+    np.testing.assert_array_equal(delay.sensed(torque, 0.5, 2.0)[:, 4:], torque[:, :-4])
+    np.testing.assert_array_equal(delay.sensed(torque, 0.5, 2.0)[:, :4], np.repeat(torque[:, :1], 4, 1))
+    np.testing.assert_array_equal(delay.sensed(torque, 0.5, -1.0)[:, -2:], np.repeat(torque[:, -1:], 2, 1))
+    assert np.isfinite(delay.sensed(torque, 1e-5, 0.03)).all()
+
+
+def test_lag_is_undone_by_its_low_pass():
+    """What a first-order low-pass of time constant T makes of the reading is the torque."""
+    from scipy.signal import lsim, lti
+
+    t = np.arange(4000) * 0.001
+    torque, T = np.sin(2 * np.pi * 3 * t) * (1 - np.exp(-10 * t)), 0.02
+    read = effect.find("current_lag").sensed(torque[None], 0.001, T)[0]
+    np.testing.assert_allclose(lsim(lti([1.0], [T, 1.0]), read, t)[1], torque, atol=5e-4)
+    assert effect.find("current_lag").sensed(torque[None, :1], 0.001, T).shape == (1, 1)
+
+
+def test_gain_multiplies():
+    np.testing.assert_allclose(effect.find("torque_gain").sensed(np.array([[1.0, -2.0]]), 0.01, 0.3), [[1.3, -2.6]])
+
+
+# ---- motion
+
+
+@pytest.mark.parametrize("make", [moving, arm_moving])
+def test_tilt_turns_gravity(make):
+    machine, piece = make()
+    tilt = effect.find("gravity_tilt").bound(machine, -1)
+    model = machine.model.copy()
+    model.gravity.linear = pin.rpy.rpyToMatrix(0.2, -0.3, 0.0).T @ machine.gravity
+    moved = tilt.moved(piece, -1, roll=0.2, pitch=-0.3)
+    np.testing.assert_allclose(torque_of(machine, moved), rnea(machine, piece, model=model), atol=1e-9)
+
+
+def test_offset_is_another_pose():
+    machine, piece = arm_moving()
+    moved = effect.find("encoder_offset").moved(piece, 2, d=0.1)
+    shifted = replace(piece, q=piece.q + 0.1 * (np.arange(6) == 2))
+    np.testing.assert_allclose(torque_of(machine, moved), rnea(machine, shifted), atol=1e-9)
+
+
+def test_eccentricity_follows_the_chain_rule():
+    machine, _ = arm_moving()
+    t = np.arange(2000) * 1e-4
+    q, qd, qdd = (np.repeat(x[:, None], 6, 1) for x in (np.sin(3 * t), 3 * np.cos(3 * t), -9 * np.sin(3 * t)))
+    piece = piece_of(machine, t, q, qd, qdd)
+    moved = effect.find("encoder_eccentricity").moved(piece, 1, s=0.06, c=0.08)
+    np.testing.assert_allclose(moved.q[:, 1], q[:, 1] + 0.1 * np.sin(q[:, 1] + np.arctan2(0.08, 0.06)), atol=1e-12)
+    np.testing.assert_allclose(moved.qd[1:-1, 1], np.gradient(moved.q[:, 1], 1e-4)[1:-1], atol=1e-6)
+    np.testing.assert_allclose(moved.qdd[1:-1, 1], np.gradient(moved.qd[:, 1], 1e-4)[1:-1], atol=1e-5)
+    np.testing.assert_array_equal(moved.q[:, 0], q[:, 0])
+
+
+PENDULUM = """<robot name="pendulum"><link name="base"/>
+<link name="bob"><inertial><origin xyz="0 0 -0.5"/><mass value="2"/><inertia ixx="0.1" ixy="0" ixz="0" iyy="0.1" iyz="0" izz="0.01"/></inertial></link>
+<joint name="hinge" type="revolute"><parent link="base"/><child link="bob"/><axis xyz="0 1 0"/>
+<limit lower="-9" upper="9" effort="1" velocity="1"/></joint></robot>"""
+
+
+@pytest.mark.parametrize("encoder", ["motor", "joint"])
+@pytest.mark.parametrize("name", ["elasticity", "backlash"])
+def test_a_soft_joint_parts_link_and_motor(tmp_path, encoder, name):
+    """A pendulum with a rotor: the link's inertia and weight feel the link's angle, the rotor's inertia the motor's."""
+    file = tmp_path / "pendulum.urdf"
+    file.write_text(PENDULUM)
+    rotor = {"joint": "hinge", "ratio": 10.0, "on": "base", "axis": [0, 1, 0], "inertia": {"parameters": [1, 0, 0, 0, 0.006, 0.005, 0.006, 0, 0, 0]}}
+    machine = robot.load(config.RobotSpec(urdf=str(file), rotors=[config.RotorSpec.model_validate(rotor)]))
+    t = np.arange(2000) * 5e-4
+    q, qd, qdd = (x[:, None] for x in (0.6 * np.sin(4 * t), 2.4 * np.cos(4 * t), -9.6 * np.sin(4 * t)))
+    piece = piece_of(machine, t, q, qd, qdd)
+    load = (5 * np.sin(7 * t), 35 * np.cos(7 * t), -245 * np.sin(7 * t))
+    piece = replace(piece, load=load[0][:, None])
+    found = effect.find(name).given(encoder=encoder)
+    if name == "elasticity":
+        moved = found.moved(piece, 0, compliance=0.01)
+        behind = [0.01 * x for x in load]
+    else:
+        moved = found.moved(piece, 0, b=0.04, soft=10.0)
+        u = [x / 10.0 for x in load]
+        level = np.tanh(u[0])
+        behind = [0.02 * level, 0.02 * (1 - level**2) * u[1], 0.02 * (1 - level**2) * (u[2] - 2 * level * u[1] ** 2)]
+    measured = (q[:, 0], qd[:, 0], qdd[:, 0])
+    link, motor = ([m - b for m, b in zip(measured, behind)], measured) if encoder == "motor" else (measured, [m + b for m, b in zip(measured, behind)])
+    wanted = (0.1 + 2 * 0.25) * link[2] + 2 * 9.81 * 0.5 * np.sin(link[0]) + 0.005 * 100 * motor[2]
+    inner = slice(2, -2)
+    np.testing.assert_allclose(torque_of(machine, moved)[inner, 0], wanted[inner], atol=1e-4)
+
+
+def test_two_soft_effects_add_up():
+    machine, piece = arm_moving()
+    soft = effect.find("elasticity")
+    once = soft.moved(soft.moved(piece, 1, compliance=0.002), 1, compliance=0.003)
+    np.testing.assert_allclose(once.deflection, soft.moved(piece, 1, compliance=0.005).deflection, atol=1e-12)
+    assert not np.any(once.deflection[:, :, [0, 2, 3, 4, 5]])
+
+
+# ---- torque
+
+
+def test_presliding_against_a_fine_integration():
+    from scipy.integrate import solve_ivp
+
+    machine, _ = arm_moving()
+    t = np.arange(0.0, 4.0, 0.002)
+    angle, speed = (lambda t: 0.05 * np.sin(2 * t) + 0.01 * np.sin(9 * t)), (lambda t: 0.1 * np.cos(2 * t) + 0.09 * np.cos(9 * t))
+    still = np.zeros((len(t), 6))
+    q = still.copy()
+    q[:, 3] = angle(t)
+    piece = piece_of(machine, t, q, still, still)
+    for x0 in (0.002, 0.02):
+        truth = solve_ivp(lambda t, z, x0=x0: (speed(t) - abs(speed(t)) * z) / x0, (0, t[-1]), [0.0], t_eval=t, rtol=1e-9, atol=1e-10, max_step=0.005).y[0]
+        np.testing.assert_allclose(effect.find("presliding").columns(piece, 3, x0=x0)[0], truth, atol=2e-3)
+    assert not np.any(effect.find("presliding").columns(piece, 0, x0=0.01))  # a joint that never moves
+
+
+def test_presliding_is_the_recurrence_of_its_samples():
+    machine, _ = arm_moving()
+    rng = np.random.default_rng(3)
+    q = np.cumsum(rng.normal(size=(500, 6)) * (rng.random((500, 6)) < 0.7), axis=0) * 0.01
+    piece = piece_of(machine, np.arange(500) * 0.01, q, 0 * q, 0 * q)
+    z, out = 0.0, [0.0]
+    for move in np.diff(q[:, 2]):
+        z = np.sign(move) + (z - np.sign(move)) * np.exp(-abs(move) / 0.02)
+        out.append(z)
+    np.testing.assert_allclose(effect.find("presliding").columns(piece, 2, x0=0.02)[0], out, atol=1e-12)
+
+
+def small_piece():
+    """Three joints, four samples, by hand: joint 1 forwards, backwards, at rest, forwards."""
+    q, qd, qdd, load = (np.zeros((4, 3)) for _ in range(4))
+    q[:, 1], qd[:, 1], load[:, 1] = [0.0, 0.5, 1.0, 2.0], [2.0, -1.0, 0.0, 0.5], [3.0, 4.0, -5.0, -8.0]
+    qd[:, 0], qdd[:, 0] = [-1.0, -1.0, 0.0, 1.0], [7.0, 8.0, 9.0, 10.0]
+    return Piece(
+        log=0, step=0.1, t=np.array([0.0, 1.0, 2.0, 3.0]), q=q, qd=qd, qdd=qdd, tau=load, measured=load, signals={"heat": np.array([20.0, 40.0, 60.0, 0.0])},
+        use=None, smoother=None, core=slice(0, 4), rest=np.zeros(3), noise=np.zeros(3), load=load,
+    )  # fmt: skip
+
+
+R2 = np.sqrt(2.0)
+BY_HAND = {
+    "asymmetric_coulomb": ({}, {}, [[0.5, 0.5, 0, 0.5]]),
+    "asymmetric_viscous": ({}, {}, [[1, 0.5, 0, 0.25]]),
+    "stribeck": ({}, {"vs": 1.0}, [[np.exp(-4), -np.exp(-1), 0, np.exp(-0.25)]]),
+    "quadratic_drag": ({}, {}, [[4, -1, 0, 0.25]]),
+    "sublinear_viscous": ({}, {"a": 0.5}, [[R2, -1, 0, 1 / R2]]),
+    "load_friction": ({}, {}, [[3, -4, 0, 8]]),
+    "directional_efficiency": ({}, {}, [[3, 0, 0, 0]]),
+    "position_friction": ({"harmonics": 1}, {}, [[1, -np.cos(0.5), 0, np.cos(2)], [0, -np.sin(0.5), 0, np.sin(2)]]),
+    "warmup": ({"signal": "heat"}, {}, [[0, -1, 0, -0.5], [0, -1, 0, -1]]),
+    "joint_coupling": ({}, {}, [[7, 8, 9, 10], [-1, -1, 0, 1], [1, -1, 0, 1], [-1, 0, 0, 1]]),
+    "cogging": ({"lines": 2}, {"k": 3.0}, [f(j * 3 * np.array([0, 0.5, 1, 2])) for j in (1, 2) for f in (np.sin, np.cos)]),
+    "torque_saturation": ({}, {"limit": 4.5}, [[0, 0, -0.5, -3.5]]),
+    "spring": ({}, {}, [[0, 0.5, 1, 2], [1, 1, 1, 1]]),
+    "cable": ({"order": 2}, {}, [np.array([0, 0.5, 1, 2]) / np.pi, (np.array([0, 0.5, 1, 2]) / np.pi) ** 2]),
+}
+
+
+@pytest.mark.parametrize("name", BY_HAND)
+def test_columns_by_hand(name):
+    options, shapes, wanted = BY_HAND[name]
+    found = effect.find(name).given(**options)
+    np.testing.assert_allclose(found.columns(small_piece(), 1, **shapes), wanted, atol=1e-12)
+
+
+def test_more_columns_by_hand():
+    piece = small_piece()
+    speed = effect.find("position_friction").given(times="speed", harmonics=2)
+    np.testing.assert_allclose(speed.columns(piece, 1)[2], np.cos(2 * piece.q[:, 1]) * piece.qd[:, 1])
+    assert [c.name for c in speed.coefficients()] == ["a1", "b1", "a2", "b2"] and speed.coefficients()[0].unit == "N m s/rad"
+    cold = effect.find("warmup").columns(piece, 1, T=2.0)
+    np.testing.assert_allclose(cold, np.stack([piece.qd[:, 1], np.sign(piece.qd[:, 1])]) * np.exp(-piece.t / 2.0))
+    machine, _ = arm_moving()
+    other = effect.find("joint_coupling").given(other=machine.joints[0]).bound(machine, 2)
+    np.testing.assert_array_equal(other.columns(piece, 2)[0], piece.qdd[:, 0])
+    assert len(other.variants(machine, 2)) == 5
+
+
+def test_payload_is_an_added_inertia():
+    machine, piece = arm_moving()
+    held = pseudo.box(1.5, (0.02, -0.03, 0.1), (0.1, 0.2, 0.15))
+    payload = effect.find("payload").bound(machine, -1)
+    for link in (None, machine.bodies[3].name):
+        payload = effect.find("payload").given(link=link).bound(machine, -1)
+        row = 5 if link is None else 3
+        heavier = np.array(machine.prior)
+        heavier[row] += held
+        added = rnea(machine, piece, model=machine.with_inertias(heavier)) - rnea(machine, piece)
+        np.testing.assert_allclose(np.einsum("jkn,k->nj", payload.columns(piece, machine), held), added, atol=1e-8)
+    logs = payload.given(logs=["with.csv"])
+    assert not np.any(logs.columns(replace(piece, source="without.csv"), machine))
+    np.testing.assert_array_equal(logs.columns(replace(piece, source="with.csv"), machine), payload.columns(piece, machine))
+
+
+@pytest.mark.parametrize("make", [moving, arm_moving])
+def test_external_force_is_the_jacobian_s(make):
+    machine, piece = make()
+    contact = effect.find("external_force").given(during=[[0.5, 1.5], [1.6, 1.7]]).bound(machine, -1)
+    assert [c.name for c in contact.coefficients()] == ["f1x", "f1y", "f1z", "f2x", "f2y", "f2z"]
+    columns = contact.columns(piece, machine)
+    data = machine.model.createData()
+    inside = 200 if make is arm_moving else 150
+    assert 0.55 < piece.t[inside] < 1.45
+    for k, weight in ((inside, 1.0), (20, 0.0)):
+        pin.computeJointJacobians(machine.model, data, machine.transmission @ piece.q[k])
+        body = [b for b in machine.bodies if b.kind == "link"][-1]
+        jacobian = pin.getJointJacobian(machine.model, data, body.row + 1, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)[:3] @ machine.transmission
+        np.testing.assert_allclose(columns[:, :3, k], weight * jacobian.T, atol=1e-12)
+    assert columns.shape == (machine.dof, 6, len(piece.t)) and not np.any(columns[:, 3:, inside])
+    edge = columns[:, 0, (piece.t > 0.5) & (piece.t < 0.55)]
+    assert np.any(edge) and effect.find("external_force").columns(piece, machine).shape == (machine.dof, 0, len(piece.t))
+
+
+REFUSED = {
+    "position_friction": [{"times": "angle"}, {"harmonics": 0}, {"harmonics": 2.5}, {"harmonics": True}],
+    "cogging": [{"lines": "two"}, {"lines": 99}],
+    "cable": [{"order": 0}],
+    "elasticity": [{"encoder": "both"}],
+    "backlash": [{"encoder": 1}],
+    "warmup": [{"signal": 3}],
+    "payload": [{"logs": "a.csv"}, {"logs": []}, {"link": "torso"}],
+    "external_force": [{"during": [[2, 1]]}, {"during": 3}, {"during": [["a", "b"]]}, {"during": [1, 2]}, {"link": ["x"]}],
+    "joint_coupling": [{"other": "wrist"}, {"other": "hinge"}, {"wrong": 1}],
+}
+
+
+@pytest.mark.parametrize("name, options", [(name, options) for name, all_ in REFUSED.items() for options in all_])
+def test_options_that_cannot_be_are_refused(name, options):
+    machine, _ = moving()
+    with pytest.raises(ConfigError, match=name) as error:
+        effect.find(name).given(**options).bound(machine, -1 if effect.find(name).scope == "robot" else 1)
+    assert "allowed: " in str(error.value)
+
+
+def test_signals_and_neighbours_that_are_not_there(tmp_path):
+    with pytest.raises(ConfigError, match="'cold' is not logged; allowed: heat"):
+        effect.find("warmup").given(signal="cold").columns(small_piece(), 1)
+    file = tmp_path / "pendulum.urdf"
+    file.write_text(PENDULUM)
+    machine = robot.load(config.RobotSpec(urdf=str(file)))
+    with pytest.raises(ConfigError, match="second joint"):
+        effect.find("joint_coupling").bound(machine, 0)
+    assert effect.find("joint_coupling").variants(machine, 0) == []
+
+
+def test_every_effect_is_shown(capsys):
+    from sysid.terminal import show_effects
+
+    show_effects([effect.describe(effect.find(name)) for name in effect.vocabulary()])
+    said = capsys.readouterr().out
+    assert "  k            1/rad, 1 to 120: " in said and "  vs           rad/s, 0.003 to 0.7 times the joint's top speed: " in said
+    assert "  Fc           N m, not negative: " in said and "  encoder:     motor where" in said
+    assert "  kind         motion, of the whole robot" in said
+
+
+def test_effects_through_the_experiment_file(experiment):
+    """Every kind at once, with options and a value that is held, from YAML to a model's columns and back to YAML."""
+    from sysid import pipeline
+    from sysid.results import _relocated
+
+    entries = [
+        "viscous", {"stribeck": {"joints": ["elbow"], "vs": 0.1}}, {"joint_coupling": {"joints": ["elbow"], "other": "shoulder"}},
+        {"cogging": {"joints": ["shoulder"], "lines": 2}}, {"elasticity": {"joints": ["elbow"], "encoder": "joint"}}, "gravity_tilt",
+        {"payload": {"logs": ["train.csv"]}}, {"external_force": {"during": [[0.5, 1.0]]}}, {"delay": {"joints": ["elbow"], "d": 0.002}},
+    ]  # fmt: skip
+    folder = experiment(config={"model.effects": entries})
+    spec = pipeline.load(folder)
+    machine, model, _ = pipeline.build(spec)
+    names = [c.name for c in model.coefficients]
+    assert "cogging.shoulder.b2" in names and "payload.*.Ixx" in names and "external_force.*.f1z" in names and "joint_coupling.elbow.Fd" in names
+    held = {value.name: at for value, at in zip(model.shape_values, model.shapes) if value.held}
+    assert held == {"stribeck.elbow.vs": 0.1, "delay.elbow.d": 0.002}
+    assert _relocated(spec, folder)["model"]["effects"] == entries
+    moved = _relocated(spec, folder / "run")["model"]["effects"]
+    assert moved[6] == {"payload": {"logs": ["../train.csv"]}}
