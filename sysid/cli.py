@@ -125,6 +125,11 @@ def diagnose(
     from .diagnose.document import document
 
     spec = pipeline.load(experiment)
+    if (model is None) != (not log):
+        raise SysidError("--model and --log belong together", allowed="both, or neither", do="give the run folder and the new log")
+    if model is not None:
+        _changed(spec, model, log, as_json, out, quiet)
+        return
     run = results.folder(out or Path("runs") / spec.name)
     with _progress(quiet or as_json) as progress:
         found = work(spec, progress=progress)
@@ -137,6 +142,45 @@ def diagnose(
         from .terminal import show_diagnosis
 
         show_diagnosis(found, said)
+    if not found.fit.solution.converged:
+        raise typer.Exit(1)
+
+
+def _changed(spec, model: Path, logs: list[str], as_json: bool, out: Path | None, quiet: bool) -> None:
+    from . import results
+    from .diagnose.changed import changed, document
+
+    run = results.folder(out or Path("runs") / f"{spec.name}-changed")
+    said = document(changed(spec, model, logs), run)
+    results.write_json(run / "changed.json", said)
+    if as_json:
+        print(json.dumps(said, allow_nan=False))
+    elif not quiet:
+        from .terminal import show_changed
+
+        show_changed(said)
+
+
+@app.command()
+def report(experiment: ExperimentPath, as_json: Json = False, out: Out = None, quiet: Quiet = False) -> None:
+    """Diagnose, and write one self-contained HTML file that opens anywhere."""
+    from . import loop, pipeline, results
+    from .diagnose.diagnosis import diagnose as work
+    from .diagnose.document import document
+    from .report import page
+
+    spec = pipeline.load(experiment)
+    run = results.folder(out or Path("runs") / spec.name)
+    with _progress(quiet or as_json) as progress:
+        found = work(spec, progress=progress)
+    results.write(found.fit, run)
+    said = document(found, run)
+    results.write_json(run / "diagnosis.json", said)
+    path = page.write(found.fit, found, said, loop.read_history(run), run / "report.html")
+    if as_json:
+        print(json.dumps({"report": str(path), "bytes": path.stat().st_size, "verdict": said["verdict"], "run": str(run)}, allow_nan=False))
+    elif not quiet:
+        print(path)
     if not found.fit.solution.converged:
         raise typer.Exit(1)
 

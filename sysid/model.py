@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -93,7 +94,7 @@ class Model:
         """Number of bodies; their parameters are the first 10 times as many."""
         return len(self.robot.bodies)
 
-    @property
+    @cached_property
     def coefficients(self) -> tuple[Coefficient, ...]:
         """The effects' coefficients, after the bodies: by effect, then joint, then coefficient."""
         return tuple(
@@ -103,7 +104,7 @@ class Model:
             for linear in effect.coefficients()
         )
 
-    @property
+    @cached_property
     def shape_values(self) -> tuple[ShapeValue, ...]:
         """What the columns are not linear in: by effect, then joint, then value."""
         given = dict(self.held)
@@ -122,17 +123,17 @@ class Model:
     def _unit(self, unit: str, joint: int) -> str:
         return units.of_joint(unit, prismatic=joint != ROBOT and bool(self.robot.prismatic[joint]))
 
-    @property
+    @cached_property
     def names(self) -> list[str]:
         """Names of all linear parameters: body.m … body.Ixz, then effect.joint.coefficient."""
         return [f"{body.name}.{p}" for body in self.robot.bodies for p in PARAMETERS] + [c.name for c in self.coefficients]
 
-    @property
+    @cached_property
     def units(self) -> list[str]:
         """Units of all linear parameters."""
         return list(UNITS) * self.bodies + [c.unit for c in self.coefficients]
 
-    @property
+    @cached_property
     def size(self) -> int:
         """Number of linear parameters."""
         return 10 * self.bodies + len(self.coefficients)

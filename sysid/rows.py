@@ -80,16 +80,20 @@ def predicted(model: Model, motion: Motion, x, stride: int) -> np.ndarray:
     return np.concatenate([model.torque(piece, pi, c, stride) for piece in motion.pieces])
 
 
-def tangents(model: Model, motion: Motion, x, stride: int, use: np.ndarray) -> np.ndarray:
+def tangents(model: Model, motion: Motion, x, stride: int, use: np.ndarray, middle: np.ndarray | None = None) -> np.ndarray:
     """d torque / d shape (dof, n, shapes) at parameters x: by differences, as an effect says what it does, not its slope.
 
     A step is a small share of what the bounds span, towards the inside; zero for values that the user holds.
+
+    Args:
+        middle: `predicted(model, motion, x, stride)`, where it is at hand.
     """
     values = model.shape_values
     out = np.zeros((model.robot.dof, len(use), len(values)))
     if not values:
         return out
-    middle = predicted(model, motion, x, stride)
+    if middle is None:
+        middle = predicted(model, motion, x, stride)
     for k, value in enumerate(values):
         if value.held:
             continue

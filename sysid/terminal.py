@@ -155,6 +155,26 @@ def _verdict_words(entry: dict, document: dict) -> str:
     return words + (f"; structure is left beside it ({left})" if left else "")
 
 
+def show_changed(document: dict) -> None:
+    """What is different on a log while a fitted model is held."""
+    console = Console()
+    table = Table(title="the held model on the new log, low-passed at 15 Hz [N m or N]", title_justify="left")
+    for heading in ("joint", "RMS held", "RMS with the changes"):
+        table.add_column(heading, justify="left" if heading == "joint" else "right")
+    for joint, entry in document["joints"].items():
+        table.add_row(escape(joint), f"{entry['rms']['held']:.4g}", f"{entry['rms']['after']:.4g}")
+    console.print(table)
+    if not document["findings"]:
+        print("nothing has changed that one half of the log would tell of the other")
+    for f in document["findings"]:
+        print(f"{f['effect']} on {f['joint']}: removes {100 * f['misfit_removed']:.0f} % of the squared residual")
+        for name, p in f["parameters"].items():
+            std = "" if p["std"] is None else f" +- {p['std']:.2g}"
+            console.print(f"  {escape(name)} = {p['value']:.4g}{std} {escape(p['unit'])}", soft_wrap=True, highlight=False)
+    _show_notices(document)
+    print(f"run folder: {document['run']}")
+
+
 def show_added(document: dict) -> None:
     """The held-out error before and after an effect."""
     console = Console()

@@ -219,7 +219,7 @@ def _floors(fitted: Ground, fit: Fit) -> dict[str, NoiseFloor]:
 
 def _findings(fitted: Ground, fit: Fit, floors, ground: Ground, other: Callable[[], Ground | None], answers, steps) -> list[Finding]:
     """The search's steps with their families, each against the model that it joined; then what else stands out alone."""
-    q = search.q_values(answers)
+    q = search.q_values(ground, answers)
     scale = np.array([fit.rms("test")[joint] for joint in fit.joints]) / np.maximum(fitted.rms(), 1e-300)
     levels = np.array([floors[joint].rms for joint in fit.joints]) / np.maximum(scale, 1e-300)
     out, at = [], fitted

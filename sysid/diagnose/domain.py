@@ -21,6 +21,9 @@ from ..preprocess import Motion, Piece, standing, standstill_speed
 CUTOFFS = (15.0, 8.0)  # Hz: the verdict's own, and another one that it must survive
 _ANGLES = 4.0  # the angles' own low-pass, as a multiple of the cutoff: derivatives need some, laws of motion none
 _HIGHEST = 0.3  # of the sampling rate
+# Laws are evaluated at this many samples a cycle of the cutoff: what is steeper than that, friction at a reversal, is left
+# out anyway.
+_SAMPLES_PER_CYCLE = 16.0
 _ROWS_PER_CYCLE = 6.67  # 100 Hz at 15 Hz
 _WIDTH = 4.0  # standard deviations of the kernel that are kept
 MOST_ROWS = 12_000
@@ -81,21 +84,23 @@ def stride_of(motion: Motion, cutoff: float) -> int:
 
 def _piece(number: int, source: str, segment, cutoff: float) -> Piece | None:
     rate = 1.0 / segment.step
+    every = max(1, int(rate / (_SAMPLES_PER_CYCLE * cutoff)))
     both = Gaussian(min(cutoff, _HIGHEST * rate), segment.step)
+    settling = Gaussian(both.cutoff, every * segment.step)
     angles = Gaussian(min(_ANGLES * cutoff, _HIGHEST * rate), segment.step)
     edge = angles.reach + 2
-    n = len(segment.t) - 2 * edge
-    if n < 6 * both.reach + 20:
+    rows = slice(edge, len(segment.t) - edge, every)
+    n = len(range(*rows.indices(len(segment.t))))
+    if n < 6 * settling.reach + 20:
         return None
     smooth = angles(segment.q, axis=0)
     qd = np.gradient(smooth, segment.step, axis=0)
     qdd = np.zeros_like(smooth)
     qdd[1:-1] = (smooth[2:] - 2.0 * smooth[1:-1] + smooth[:-2]) / segment.step**2
-    rows = slice(edge, len(segment.t) - edge)
     return Piece(
-        log=number, step=segment.step, t=segment.t[rows], q=smooth[rows], qd=qd[rows], qdd=qdd[rows], tau=both(segment.tau, axis=0)[rows],
-        measured=segment.tau[rows], signals={name: values[rows] for name, values in segment.signals.items()}, use=None, smoother=both,
-        core=slice(both.reach, n - both.reach), rest=np.zeros(smooth.shape[1]), noise=np.sqrt(np.mean((segment.q[rows] - smooth[rows]) ** 2, axis=0)),
+        log=number, step=every * segment.step, t=segment.t[rows], q=smooth[rows], qd=qd[rows], qdd=qdd[rows], tau=both(segment.tau, axis=0)[rows],
+        measured=segment.tau[rows], signals={name: values[rows] for name, values in segment.signals.items()}, use=None, smoother=settling,
+        core=slice(settling.reach, n - settling.reach), rest=np.zeros(smooth.shape[1]), noise=np.sqrt(np.mean((segment.q[rows] - smooth[rows]) ** 2, axis=0)),
         source=source,
     )  # fmt: skip
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from .. import rows as row
 from ..config import Experiment
+from ..effect import SensorEffect
 from ..model import ROBOT, Model
 from ..preprocess import Motion
 from ..shape import Projection, prior_hessian, settle
@@ -135,11 +136,45 @@ class Ground:
         motion, rows, pieces = ((self.train, self.rows, self._seen[0]), (self.test, self.held_out, self._seen[1]))[which]
         if not candidate.curved:
             return row.signature(self.model, motion, pieces, candidate.effect, candidate.joint, shapes, self.stride, rows.use)
+        if isinstance(candidate.effect, SensorEffect):
+            return self._read_otherwise(candidate, shapes, part)
         grown = self.grown(candidate, shapes)
-        mine = [k for k, value in enumerate(grown.shape_values) if value.term == len(grown.terms) - 1]
-        x = self.settled.x
-        others = [replace(grown, held=(*grown.held, *(((v.term, v.joint, v.shape.name), 0.0) for v in grown.shape_values if v.term < len(grown.terms) - 1)))]
-        return row.tangents(others[0], motion, x, self.stride, rows.use)[:, :, mine]
+        last = len(grown.terms) - 1
+        at_start = all(shapes[s.name] == s.start for s in candidate.effect.shapes() if s.start is not None)
+        # where an effect does nothing yet, a value that only says how it does it changes nothing
+        idle = [v for v in grown.shape_values if v.term < last or (at_start and v.shape.start is None)]
+        held = tuple(((v.term, v.joint, v.shape.name), 0.0) for v in idle)
+        slopes = row.tangents(
+            replace(grown, held=(*grown.held, *held)), motion, self.settled.x, self.stride, rows.use, self._predicted[which] if at_start else None
+        )  # fmt: skip
+        return slopes[:, :, [k for k, value in enumerate(grown.shape_values) if value.term == last]]
+
+    @cached_property
+    def _predicted(self) -> tuple[np.ndarray, np.ndarray]:
+        """Torque (n, dof) that the model predicts on both motions' rows, low-passed as the columns are."""
+        return tuple(row.predicted(self.model, motion, self.settled.x, self.stride) for motion in (self.train, self.test))
+
+    @cached_property
+    def _unsettled(self) -> tuple[list[np.ndarray], list[np.ndarray]]:
+        """Torque (dof, n) that the model predicts over whole pieces, before the low-pass."""
+        pi, c = self.pi, self.settled.x[10 * self.model.bodies :]
+        bare = lambda piece: replace(piece, smoother=None, core=slice(0, len(piece.t)))  # noqa: E731
+        return tuple([self.model.torque(bare(piece), pi, c).T for piece in motion.pieces] for motion in (self.train, self.test))
+
+    def _read_otherwise(self, candidate: Candidate, shapes: dict[str, float], part: str) -> np.ndarray:
+        """Slopes (n, k) of a sensor effect: what it makes of the predicted torque of its joint, by differences."""
+        which = part == "test"
+        motion, rows = ((self.train, self.rows), (self.test, self.held_out))[which]
+        out = []
+        for piece, torque, kept in zip(motion.pieces, self._unsettled[which], row.starts(motion, self.stride)):
+            base, own = torque[None, candidate.joint], []
+            for shape, low, high, _ in self.bounds(candidate):
+                step = 1e-4 * (high - low)
+                read = [candidate.effect.sensed(base, piece.step, **{**shapes, shape.name: shapes[shape.name] + h}) for h in (0.0, step)]
+                slope = (read[1] - read[0])[0] / step
+                own.append(slope[kept] if piece.smoother is None else piece.smoother.at(slope, kept))
+            out.append(np.stack(own, axis=1))
+        return np.concatenate(out) * rows.use[:, [candidate.joint]]
 
     def grown(self, candidate: Candidate, shapes: dict[str, float]) -> Model:
         """The model with a candidate, at shape values."""
@@ -205,15 +240,17 @@ class Ground:
         if not np.isfinite(c).all():
             return None
         fitted = _apply(columns, c, candidate.joint, self.model.robot.dof) + np.einsum("jnk,k->nj", self.projection.columns, change)
-        p = self._chance(columns, candidate.joint)
         held_out = self.signature(candidate, shapes, "test")
         after = self.residual_test - _apply(held_out, c, candidate.joint, self.model.robot.dof) - np.einsum("jnk,k->nj", self._test_columns, change)
         squares = summed(self.blocks[1], (after * self.held_out.use) ** 2)
+        gained = score(self.squares, squares, self.counts)
+        # what held-out data refuse needs no other evidence; it still counts as a question asked
+        p = self._chance(columns, candidate.joint) if gained > 0 else 1.0
         whole = self._size(_apply(columns, c, candidate.joint, self.model.robot.dof))
         seen = self._size(fitted) / whole if whole > 0 else float(np.sqrt(share.max(initial=0.0)))
         alone = float(np.sqrt(share.max(initial=0.0)))
         return Answer(
-            candidate, dict(shapes), c, float(min(seen, 1.0)), gain, squares, score(self.squares, squares, self.counts), min(1.0, p * tests),
+            candidate, dict(shapes), c, float(min(seen, 1.0)), gain, squares, gained, min(1.0, p * tests),
             _allowed(candidate, c), max(alone, float(min(seen, 1.0))),
         )  # fmt: skip
 

@@ -18,7 +18,8 @@ from .ground import Answer, Ground, score
 
 Q_LEVEL, SUPPORT, WORTH = 0.01, 3.0, 0.02  # false discoveries; standard errors; share of the joint's squared residual
 _SHORTLIST, _NEAR = 8, 0.5  # how many are refitted exactly, and how near to the best they must be
-_TIED, _TIED_SHARE = 2.0, 0.03  # standard errors; share of what the best removes
+# standard errors; share of what the best removes and of what it leaves; share of the former that is never a tie
+_TIED, _TIED_SHARE, _TIED_MOST = 2.0, 0.02, 0.15
 _SEEN = 0.03  # share of a signature's root mean square that the model must leave for it to be judged
 _SAME = 0.99  # share of a signature that another one holds
 _BATCH = 64
@@ -87,9 +88,16 @@ def _best(ground: Ground, candidate: Candidate) -> Answer | None:
     return None if answer is None else replace(answer, most_visible=max(answer.most_visible, most))
 
 
-def q_values(answers: list[Answer]) -> dict[Candidate, float]:
-    """False discovery rates (Benjamini & Hochberg 1995) of the answers' p."""
+def q_values(ground: Ground, answers: list[Answer]) -> dict[Candidate, float]:
+    """False discovery rates (Benjamini & Hochberg 1995) of all answers, from two logs that know nothing of each other: the
+    training evidence and the fall of the held-out error (combined as Fisher 1925)."""
+    from scipy.stats import chi2, t
+
     p = np.array([a.p for a in answers])
+    far = np.array([support(ground, a).away for a in answers])
+    # two measures of the fall were tried
+    other = np.clip(2.0 * t.sf(far, max(len(ground.squares) // 2 - 1, 2)), 1e-300, 1.0)
+    p = chi2.sf(-2.0 * (np.log(np.maximum(p, 1e-300)) + np.log(other)), 4)
     order = np.argsort(p)
     scaled = p[order] * len(p) / (1 + np.arange(len(p)))
     q = np.minimum.accumulate(scaled[::-1])[::-1]
@@ -142,17 +150,18 @@ def next_step(ground: Ground, other: Callable[[], Ground | None], answers: list[
         answers: `ask(ground, ...)`.
         harms: whether an answer raises the held-out error as the experiment's own filter shows it.
     """
-    q = q_values(answers)
+    q = q_values(ground, answers)
     hopeful = [a for a in answers if passes(ground, a, q[a.candidate])]
     while hopeful:
         best = max(hopeful, key=lambda a: a.score)
         short = sorted((a for a in hopeful if a.score >= _NEAR * best.score), key=lambda a: -a.score)[:_SHORTLIST]
         standing = [a for a in short if survives(other(), a)]
         refined = [(a, g) for a, g in (refit(ground, a) for a in standing) if passes(ground, a, q[a.candidate])]
-        refined = [(a, g) for a, g in refined if not harms(a)]
-        if refined:
-            family = _family(ground, [a for a, _ in refined])
-            head = family[0]
+        family = _family(ground, [a for a, _ in refined]) if refined else []
+        helpful = [a for a in family if not harms(a)]
+        if helpful:
+            head = helpful[0]
+            family = [head, *(a for a in family if a is not head), *_alike(other(), head, standing, family)]
             after = dict((a.candidate, g) for a, g in refined)[head.candidate] or refit(ground, head, always=True)[1]
             shares = 1.0 - after.squares.sum(0) / np.maximum(ground.squares.sum(0), 1e-300)
             return Step(tuple(family), q, support(ground, head), after, shares)
@@ -202,20 +211,24 @@ def survives(other: Ground | None, answer: Answer) -> bool:
 
 
 def _family(ground: Ground, answers: list[Answer]) -> list[Answer]:
-    """The answers that held-out data cannot tell from the best, the simplest first; more general forms of a simpler one
-    that bring nothing are left out."""
+    """The answers that held-out data cannot tell from the best: those that leave as little, the simplest first, then those
+    that leave more, but not in enough blocks to be told apart. More general forms of the head that bring nothing are
+    left out."""
     best = max(answers, key=lambda a: a.score)
     rms2 = best.squares.sum(0) / np.maximum(ground.counts.sum(0), 1)
     weigh = lambda squares: squares @ (1.0 / np.maximum(rms2, 1e-300))  # noqa: E731
     base, top = weigh(ground.squares), weigh(best.squares)
     removed = (base - top).sum()
-    family = []
+    close, loose = [], []
     for answer in answers:
         worse = weigh(answer.squares) - top
-        # `away` of a sum that is zero throughout is zero
-        if worse.sum() <= _TIED_SHARE * removed or away(worse) < _TIED and worse.sum() <= 0.15 * removed:
-            family.append(answer)
-    family.sort(key=lambda a: (a.candidate.simplicity, -a.score))
+        # what the best leaves is the measure: of a large misfit, one hundredth may still stand clear of the noise
+        if worse.sum() <= _TIED_SHARE * min(removed, top.sum()):
+            close.append(answer)
+        elif worse.sum() <= _TIED_MOST * removed and stands_out(weigh(answer.squares), top) < _TIED:
+            loose.append(answer)
+    order = lambda a: (a.candidate.simplicity, -a.score)  # noqa: E731
+    family = sorted(close, key=order) + sorted(loose, key=order)
     head = family[0]
     kept, names = [], set()
     for answer in family:
@@ -225,6 +238,23 @@ def _family(ground: Ground, answers: list[Answer]) -> list[Answer]:
         names.add(key)
         kept.append(answer)
     return kept
+
+
+def _alike(other: Ground | None, head: Answer, answers: list[Answer], family: list[Answer]) -> list[Answer]:
+    """Curved effects of the head's joint that stand outside its family only because they pass on more of the encoder's noise:
+    under the lower low-pass, to first order, they leave the same."""
+    if other is None or not head.candidate.curved:
+        return []
+    rivals = [a for a in answers if a.candidate.curved and a.candidate.joint == head.candidate.joint and a.candidate.name not in {f.candidate.name for f in family}]
+    if not rivals:
+        return []
+    again = {a.candidate: _best(other, a.candidate) for a in (head, *rivals)}
+    top = again[head.candidate]
+    if top is None:
+        return []
+    own = head.candidate.joint
+    left = top.squares[:, own].sum()
+    return [a for a in rivals if again[a.candidate] is not None and again[a.candidate].squares[:, own].sum() <= (1.0 + _TIED_SHARE) * left]
 
 
 def _holds(ground: Ground, general: Answer, special: Answer) -> bool:
