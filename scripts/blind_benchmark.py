@@ -70,7 +70,7 @@ SPECS = {
     "panda": {"urdf": "example-robot-data://panda_description/urdf/panda.urdf", "joints": list(JOINTS["panda"])},
 }
 RATE = {"planar": 1000.0, "leg": 1000.0, "ur5": 500.0, "panda": 500.0}
-SECONDS = 20.0
+SECONDS = {"planar": 20.0, "leg": 20.0, "ur5": 16.0, "panda": 16.0}  # of each log
 
 # ---- what is hidden
 
@@ -84,10 +84,10 @@ EFFECTS = (
 )  # fmt: skip
 SIZES = (0.3, 3.0)  # times the simulator's default strength
 LARGEST = {"asymmetric_coulomb": 2.0, "asymmetric_viscous": 2.0, "torque_saturation": 1.9}  # beyond it friction turns negative, or little torque is read
-SINGLES = ("planar", "leg", "planar", "leg", "planar", "ur5", "planar", "leg", "panda")  # the robots of each effect's cases
-_PAIRS = {"planar": 18, "leg": 14, "ur5": 6, "panda": 4}
-_CONTROLS = {"planar": 46, "leg": 32, "ur5": 16, "panda": 10}
-_OUTSIDE = ("planar", "leg", "planar", "leg", "planar", ("ur5", "panda"))
+SINGLES = ("planar", "leg", "planar", "leg", "planar", ("ur5", "panda"))  # the robots of each effect's cases; of two, in turn
+_PAIRS = {"planar": 14, "leg": 10, "ur5": 4, "panda": 2}
+_CONTROLS = {"planar": 54, "leg": 38, "ur5": 8, "panda": 4}
+_OUTSIDE = ("planar", "leg", "planar", "leg", ("ur5", "panda"))
 MOST_STEPS = 4
 _LIMIT = 1200  # s a case may take
 
@@ -170,11 +170,11 @@ def cases(seed: int, which: str = "full") -> list[Case]:
     """Every case of the benchmark, in an order in which each beginning is a fair sample. The small one is a subset."""
     one, few = [], []
     for n, effect in enumerate(EFFECTS):
-        own = [_single(seed, robot, effect, number) for number, robot in enumerate(SINGLES)]
+        own = [_single(seed, robot if isinstance(robot, str) else robot[n % 2], effect, number) for number, robot in enumerate(SINGLES)]
         one += own
         few.append(own[n % len(own)])
     for effect in ABSORBED:
-        own = [_single(seed, robot, effect, number) for number, robot in enumerate(("planar", "leg", "ur5", "leg"))]
+        own = [_single(seed, robot, effect, number) for number, robot in enumerate(("planar", "leg"))]
         one += own
         few.append(own[0])
     for n, kind in enumerate(OUTSIDE):
@@ -304,7 +304,7 @@ def one(case: dict, keep: str | None = None) -> dict:
 
 
 def _conditions(case: Case) -> dict:
-    return {"seed": case.seed, "duration": SECONDS, "rate": RATE[case.robot], "colour": case.colour, "encoder": case.encoder, "pace": case.pace}
+    return {"seed": case.seed, "duration": SECONDS[case.robot], "rate": RATE[case.robot], "colour": case.colour, "encoder": case.encoder, "pace": case.pace}
 
 
 @contextmanager
@@ -339,7 +339,7 @@ def _one(case: Case, folder: Path, found: dict, stage: list[str]) -> None:
 
     folder.mkdir(parents=True, exist_ok=True)
     experiment, machine = timed("simulate", lambda: experiment_of(case.robot, folder))
-    options = {"seed": case.seed, "duration": SECONDS, "rate": RATE[case.robot], "colour": case.colour, "encoder": case.encoder}
+    options = {"seed": case.seed, "duration": SECONDS[case.robot], "rate": RATE[case.robot], "colour": case.colour, "encoder": case.encoder}
     options["speed"] = None if case.pace is None else case.pace * float(motion.top_speeds(machine).max())
     plain = None
     if case.kind in ("one", "outside"):  # the same logs without it
@@ -530,7 +530,8 @@ def wilson(successes: int, count: int, z: float = 1.959963984540054) -> tuple[fl
         return 0.0, 1.0
     share = successes / count
     middle, half = share + z * z / (2 * count), z * math.sqrt(share * (1.0 - share) / count + z * z / (4.0 * count * count))
-    return max(0.0, (middle - half) / (1 + z * z / count)), min(1.0, (middle + half) / (1 + z * z / count))
+    low, high = (middle - half) / (1 + z * z / count), (middle + half) / (1 + z * z / count)
+    return 0.0 if successes == 0 else low, 1.0 if successes == count else high
 
 
 def share(successes: int, count: int) -> dict:
@@ -695,6 +696,8 @@ def _draw_errors(plt, rows: list[dict], records: list[dict]):
     right.axhline(1.0 + WITHIN, color="black", linewidth=0.8, linestyle="--")
     right.axhline(1.0, color="black", linewidth=0.8)
     right.set_yscale("log")
+    for which in (right.yaxis.set_major_formatter, right.yaxis.set_minor_formatter):
+        which(plt.FuncFormatter(lambda value, place: f"{value:g}"))
     right.set_xlabel("share of the held-out RMS that the true model takes away")
     right.set_ylabel("held-out RMS after discover / of the true model")
     return figure
@@ -705,7 +708,7 @@ def _scaled(rows: list[dict], noise: dict) -> list[dict]:
 
 
 def _draw_effects(plt, found: dict):
-    figure, (left, right) = plt.subplots(1, 2, figsize=(10.0, 5.4), width_ratios=(1.5, 1.0))
+    figure, (left, right) = plt.subplots(1, 2, figsize=(11.0, 5.6), width_ratios=(1.2, 1.0))
     names = [e for e in EFFECTS if found["effects"][e]["hidden"]][::-1]
     at = np.zeros(len(names))
     for c in CATEGORIES:
@@ -717,17 +720,18 @@ def _draw_effects(plt, found: dict):
     left.barh(range(len(names)), np.array(hidden) - at, left=at, color="none", edgecolor=_GREY, linewidth=0.6, height=0.75, label="not visible")
     left.set_yticks(range(len(names)), names, fontsize=8)
     left.set_xlabel("cases")
-    left.legend(frameon=False, fontsize=7, loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    left.xaxis.get_major_locator().set_params(integer=True)
+    left.legend(frameon=False, fontsize=8, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3)
     bins = [b for b in found["by_lowered"] if b["named"]["of"]]
     for key, colour, shift in (("named", _BLUE, -0.08), ("alone", _GREEN, 0.0), ("wrong", _RED, 0.08)):
         values = np.array([[b[key]["share"], b[key]["low"], b[key]["high"]] for b in bins]) if bins else np.zeros((0, 3))
         right.errorbar(np.arange(len(bins)) + shift, values[:, 0], [values[:, 0] - values[:, 1], values[:, 2] - values[:, 0]], fmt="o-", color=colour, markersize=4, linewidth=1, capsize=2, label={"named": "named (alone or head)", "alone": "named alone", "wrong": "another effect named"}[key])
-    right.set_xticks(range(len(bins)), [f"{_range(b)}\n({b['named']['of']})" for b in bins], fontsize=7)
+    right.set_xticks(range(len(bins)), [f"{_range(b).replace(' %', '')}\n({b['named']['of']})" for b in bins], fontsize=8)
     right.set_ylim(0.0, 1.02)
     right.grid(alpha=0.25)
-    right.set_xlabel("share of the held-out RMS that the true model takes away (cases)")
+    right.set_xlabel("what the true model takes away of the held-out RMS [%] (cases)")
     right.set_ylabel("share of cases, 95 % intervals")
-    right.legend(frameon=False, fontsize=8)
+    right.legend(frameon=False, fontsize=8, loc="lower left", bbox_to_anchor=(0.0, 1.0))
     return figure
 
 
@@ -773,7 +777,7 @@ def page(found: dict, records: list[dict], settings: dict, notes: str = "") -> s
         "This page is written by `scripts/blind_benchmark.py` from its results; nothing in it is edited by hand except the notes at its end.",
         f"    {command} --jobs 2 --publish",
         f"{hidden} simulated experiments with something hidden ({cases_['one']} with one effect of the catalogue, {cases_['two']} with two, {cases_['outside']} with one "
-        f"that the catalogue does not have) and {cases_['control']} controls with nothing hidden; two logs of {SECONDS:g} s each, one to train and one held out; "
+        f"that the catalogue does not have) and {cases_['control']} controls with nothing hidden; two logs of {min(SECONDS.values()):g} to {max(SECONDS.values()):g} s each, one to train and one held out; "
         f"base seed {settings['seed']}, from which every case draws a seed of its own. `sysid discover` sees the folder that `sysid simulate` writes and nothing of "
         "the truth. Joints, sizes (log-uniform from 0.3 to 3 times the simulator's default), masses, friction, motion and the colour of the noise are drawn.",
         "An effect is **visible** when the true model, refitted, lowers the held-out RMS of its joint by at least 10 % (of any joint for an effect of the whole robot; "
@@ -866,7 +870,7 @@ def tell(record: dict, folder: Path) -> None:
             print(f"  finding: {f['effect']}:{f['joint']} removes {f['removed']:.2f}, visible {f['visible']:.2f}, tied {f['tied_with']} {step} { {n: float(f'{v:.3g}') for n, v in f['parameters'].items() if v is not None} }")
         print(f"  discover added {record['added']}, refused {record['refused']}, ended {[(v['joint'], v['status']) for v in record['last'] if v['status'] != 'complete']}")
     for row in score(record):
-        more = "" if row["lowered"] is None else f", the true model lowers the RMS by {100 * row['lowered']:.1f} %"
+        more = "" if row["lowered"] is None else f", the true model lowers the RMS by {100 * row['lowered']:.1f} %" + (f" (without the effect it is {100 * row['hurts']:.1f} % lower)" if "hurts" in row else "")
         print(f"  -> {row['effect']} on {row['joint']}: {row['category'].upper()} ({row['named']}){more}, {'visible' if row['visible'] else 'not visible'}"
               + (f", after/true {row['after'] / row['true']:.3f}" if "after" in row else "") + (f", misfit removed {row['removed']:.2f}" if row.get("removed") is not None else ""))  # fmt: skip
     print(f"  {({k: round(v, 1) for k, v in record['seconds'].items()})}; folder {folder}", flush=True)

@@ -139,7 +139,8 @@ def diagnose(experiment: Experiment, *, fit: Fit | None = None, progress: pipeli
 
             raise LogError("the logs are too short to question", where="diagnose", allowed="some seconds of training and of test logs", do="log longer")
         fitted = logs.as_fitted()
-        floors = _floors(fitted, fit)
+        levels = _levels(fitted, fit)
+        floors = _floors(fitted, fit, levels)
         answers = search.ask(ground, candidates(ground.model, extra), lambda share: tell("ask", share))
         other = cache(lambda: logs.ground(ground.model, CUTOFFS[1], weights=ground.weights))
         steps = _steps(logs, ground, other, fitted, answers, extra, tell)
@@ -148,7 +149,7 @@ def diagnose(experiment: Experiment, *, fit: Fit | None = None, progress: pipeli
         found = _findings(fitted, fit, floors, ground, other, answers, steps)
         failures = regions.failures(ground, ([r for r in _residuals(fitted, fit, "test")], [p.step for p in fitted.test.pieces]), np.array([floors[j].rms for j in fit.joints]))
         return Diagnosis(
-            fit, floors, tuple(found), tuple(_not_visible(answers)), tuple(_verdict(fit, floors, steps, last, left)), tuple(failures), tuple(steps), ground, last,
+            fit, floors, tuple(found), tuple(_not_visible(answers)), tuple(_verdict(fit, levels, steps, last, left)), tuple(failures), tuple(steps), ground, last,
         )  # fmt: skip
 
 
@@ -196,15 +197,20 @@ def _residuals(fitted: Ground, fit: Fit, part: str) -> list[np.ndarray]:
     return out
 
 
-def _floors(fitted: Ground, fit: Fit) -> dict[str, NoiseFloor]:
-    """The noise floor of each joint, as the fit sees its torque."""
+def _levels(fitted: Ground, fit: Fit) -> dict[str, NoiseFloor]:
+    """The noise floor of each joint's torque as logged."""
     pieces = (*fitted.train.pieces, *fitted.test.pieces)
     residuals = _residuals(fitted, fit, "train") + _residuals(fitted, fit, "test")
     measured, q = [p.measured[p.core] for p in pieces], [p.q[p.core] for p in pieces]
+    return {joint: floor(residuals, measured, q, [p.step for p in pieces], j) for j, joint in enumerate(fit.joints)}
+
+
+def _floors(fitted: Ground, fit: Fit, levels: dict[str, NoiseFloor]) -> dict[str, NoiseFloor]:
+    """The noise floor of each joint, as the fit sees its torque."""
     out, limit = {}, fit.predictions["test"].errors()["rms"]
     for j, joint in enumerate(fit.joints):
-        found = floor(residuals, measured, q, [p.step for p in pieces], j)
-        if (smoother := pieces[0].smoother) is not None:
+        found = levels[joint]
+        if (smoother := fitted.train.pieces[0].smoother) is not None:
             # the fit filters torque: of white noise this much comes through
             impulse = np.zeros(20 * smoother.reach + 1)
             impulse[len(impulse) // 2] = 1.0
@@ -311,15 +317,15 @@ def _not_visible(answers: list[Answer]) -> list[Answer]:
 # ---- the verdict
 
 
-def _verdict(fit: Fit, floors, steps, last: Ground, left: list[structure.Structure]) -> list[Verdict]:
+def _verdict(fit: Fit, levels, steps, last: Ground, left: list[structure.Structure]) -> list[Verdict]:
     out = []
-    gained = (last.squares.sum(0) / np.maximum(last.counts.sum(0), 1)) if steps else None
+    raw = last.raw_rms()
     for j, joint in enumerate(fit.joints):
         own = [s for s in steps if s.head.candidate.joint == j or (s.head.candidate.joint == ROBOT and s.shares[j] >= search.WORTH)]
         if own:
             tied = tuple(dict.fromkeys(a.candidate.name for a in own[0].family[1:] if a.candidate.name != own[0].head.candidate.name))
             out.append(Verdict(joint, "missing", own[0].head.candidate.name, tied, tuple(s.head.candidate.name for s in own[1:]), left[j] if left[j].there else None))
-        elif left[j].there or (gained is None and _far_above(fit.rms("test")[joint], floors[joint])):
+        elif left[j].there or _far_above(raw[j], levels[joint]):
             out.append(Verdict(joint, "unknown", structure=left[j]))
         else:
             out.append(Verdict(joint, "complete"))
@@ -328,4 +334,4 @@ def _verdict(fit: Fit, floors, steps, last: Ground, left: list[structure.Structu
 
 def _far_above(rms: float, level: NoiseFloor) -> bool:
     """Whether more than half of a joint's squared error lies above its noise floor, beyond doubt about the floor."""
-    return rms**2 > 2.0 * (level.rms + 3.0 * level.std) ** 2
+    return rms**2 > 2.0 * (level.rms + 2.0 * level.std) ** 2

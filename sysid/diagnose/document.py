@@ -68,7 +68,7 @@ def _verdict(v: Verdict) -> dict:
     if v.status == "missing":
         out |= {"effect": v.effect, "tied_with": list(v.tied_with), "also": list(v.also)}
     if v.structure is not None:
-        out |= {"depends_on": dependences(v.structure), "share_left": v.structure.share}
+        out |= {"depends_on": dependences(v.structure), "share_left": v.structure.share, "follows": list(v.structure.together), "bursts": v.structure.bursts}
     return out
 
 
@@ -77,7 +77,7 @@ def dependences(structure: Structure) -> list[dict]:
     return [
         {"variable": d.variable, "unit": d.unit, "share": d.share, "se": number(d.share / d.away if d.away else float("nan")), "curve": {"at": _plain(d.at), "mean": _plain(d.mean), "se": _plain(d.se)}}
         for d in structure.depends_on[:6]
-    ] or [{"variable": "several together", "unit": "", "share": structure.share, "se": number(structure.share / structure.away if structure.away else float("nan")), "curve": None}]
+    ] or [{"variable": " and ".join(structure.together) or "time, in bursts", "unit": "", "share": structure.share, "se": number(structure.share / structure.away if structure.away else float("nan")), "curve": None}]
 
 
 def _plain(values):

@@ -161,6 +161,12 @@ class Ground:
         bare = lambda piece: replace(piece, smoother=None, core=slice(0, len(piece.t)))  # noqa: E731
         return tuple([self.model.torque(bare(piece), pi, c).T for piece in motion.pieces] for motion in (self.train, self.test))
 
+    def raw_rms(self) -> np.ndarray:
+        """(dof,) root mean square on the test rows that count of torque as logged minus predicted torque, which was low-passed."""
+        rows = self.held_out
+        logged = np.concatenate([piece.measured[rows.index[rows.piece == k]] for k, piece in enumerate(self.test.pieces)])
+        return np.sqrt((((logged - rows.tau + self.residual_test) * rows.use) ** 2).sum(0) / np.maximum(rows.use.sum(0), 1))
+
     def _read_otherwise(self, candidate: Candidate, shapes: dict[str, float], part: str) -> np.ndarray:
         """Slopes (n, k) of a sensor effect: what it makes of the predicted torque of its joint, by differences."""
         which = part == "test"

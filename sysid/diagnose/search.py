@@ -188,7 +188,8 @@ def refit(ground: Ground, answer: Answer, always: bool = False) -> tuple[Answer,
     return replace(answer, shapes=mine, squares=grown.squares, score=found), grown
 
 
-_AGREE = 2.5  # how far apart an effect's size may be under two low-passes
+# the factor by which encoder noise changes an effect's size between these low-passes is 3.5
+_AGREE, _WORTH_BELOW = 1.7, 0.1  # how far apart an effect's size may be under two low-passes; share
 
 
 def survives(other: Ground | None, answer: Answer) -> bool:
@@ -200,7 +201,9 @@ def survives(other: Ground | None, answer: Answer) -> bool:
     if again is None or not again.allowed:
         return False
     found = support(other, again)
-    if found.away < SUPPORT - 1.0 or found.share < 0.5 * WORTH:
+    # of the load's second derivative encoder noise makes most near the cutoff: the effect must be worth much below it
+    least = _WORTH_BELOW if answer.candidate.curved and answer.candidate.effect.uses_load else 0.5 * WORTH
+    if found.away < SUPPORT - 1.0 or found.share < least:
         return False
     if len(answer.coefficients) == 1 or answer.candidate.curved:
         k = int(np.argmax(np.abs(answer.coefficients) * [s.start is not None for s in answer.candidate.effect.shapes()])) if answer.candidate.curved else 0

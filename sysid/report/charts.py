@@ -15,7 +15,7 @@ from .decimate import broken
 
 INK, GREY, BLUE, VERMILLION, GREEN, ORANGE, PURPLE, SKY = "#000000", "#999999", "#0072B2", "#D55E00", "#009E73", "#E69F00", "#CC79A7", "#56B4E9"
 MIDDLE, EMPTY = "#FDFDFD", "#DCDCDC"  # of a map's scale; cells where no row is
-_MOST, _BUDGET = 2000, 240_000  # points a trace; points of all torque traces together
+_MOST, _BUDGET = 2000, 150_000  # points a trace; points of all torque traces together
 
 
 def plain(text) -> str:
@@ -85,7 +85,7 @@ def torque(name: str, joint: str, unit: str, line: dict, series: dict, joints: i
             data.append({
                 "type": "scatter", "mode": "lines", "x": rounded(t, 6), "y": rounded(y, 4), "name": what, "legendgroup": what, "showlegend": number == 0,
                 "line": {"color": colour, "width": width}, "yaxis": place, "xaxis": "x", "connectgaps": False,
-                "hovertemplate": f"%{{y:.4g}} {unit}<extra>{part}, {what}</extra>",
+                "hovertemplate": f"{part}, {what}: %{{y:.4g}} {unit}<extra></extra>",
             })  # fmt: skip
     shapes, notes = [], []
     for part, own in line.items():
@@ -119,13 +119,13 @@ def staircase(name: str, joint: str, unit: str, names: list[str], made: list, ex
         ends = [-0.5, len(names) - 0.5]
         if doubt:
             data.append({"type": "scatter", "mode": "lines", "x": ends + ends[::-1], "y": rounded([level + 2 * doubt] * 2 + [max(level - 2 * doubt, 0.0)] * 2), "fill": "toself", "fillcolor": GREEN, "opacity": 0.2, "line": {"width": 0, "color": GREEN}, "hoverinfo": "skip", "showlegend": False})
-        data.append({"type": "scatter", "mode": "lines", "x": ends, "y": rounded([level] * 2), "name": "noise floor", "line": {"color": GREEN, "width": 2, "dash": "dot"}, "hovertemplate": f"%{{y:.4g}} {unit}<extra>noise floor</extra>"})
+        data.append({"type": "scatter", "mode": "lines", "x": ends, "y": rounded([level] * 2), "name": "noise floor", "line": {"color": GREEN, "width": 2, "dash": "dot"}, "hovertemplate": f"noise floor %{{y:.4g}} {unit}<extra></extra>"})
     for values, word, dash, symbol in ((made, "held-out error", "solid", "circle"), (expected, "expected by the diagnosis", "dash", "circle-open")):
         if any(v is not None for v in values):
             shown = [v if v is not None and math.isfinite(v) else None for v in values]
             data.append({
                 "type": "scatter", "mode": "lines+markers", "x": at, "y": shown, "name": word, "line": {"color": BLUE, "width": 2, "shape": "hvh", "dash": dash},
-                "marker": {"size": 8, "symbol": symbol}, "text": [plain(n) for n in names], "hovertemplate": f"%{{text}}: %{{y:.4g}} {unit}<extra>{word}</extra>",
+                "marker": {"size": 8, "symbol": symbol}, "text": [plain(n) for n in names], "hovertemplate": f"%{{text}}, {word}: %{{y:.4g}} {unit}<extra></extra>",
             })  # fmt: skip
     layout = {
         "title": {"text": plain(joint), "x": 0.01, "y": 0.99, "yanchor": "top", "font": {"size": 14}},
@@ -234,7 +234,7 @@ def whiskers(name: str, label: str, groups: list[dict]) -> dict:
             })  # fmt: skip
         unit = "" if group["unit"] in ("", "1") else f" [{group['unit']}]"
         layout[f"xaxis{number}"] = axis(f"{group.get('quantity', 'value')}{unit}", anchor=f"y{number}", zeroline=True, nticks=6)
-        layout[f"yaxis{number}"] = {"type": "category", "domain": [1 - (top + size) / total, 1 - top / total], "anchor": f"x{number}", "autorange": "reversed", "automargin": True, "showgrid": True}
+        layout[f"yaxis{number}"] = {"type": "category", "domain": [max(1 - (top + size) / total, 0.0), 1 - top / total], "anchor": f"x{number}", "autorange": "reversed", "automargin": True, "showgrid": True}
         top += size + gap
     layout |= {"showlegend": True, "legend": _LEGEND, "margin": {"l": 60, "r": 14, "t": 34, "b": 46}}
     return chart(name, label, data, layout, height=int(80 + 24 * total))
@@ -261,13 +261,13 @@ def bodies(name: str, found: list[dict], lines: list) -> dict:
             data.append({
                 "type": "mesh3d", **{key: rounded(points[:, k], 4) for k, key in enumerate("xyz")}, **{key: faces[:, k].tolist() for k, key in enumerate("ijk")},
                 "color": colour, "opacity": 0.55, "flatshading": False, "name": f"{entry['kind']}, identified", "legendgroup": entry["kind"], "showlegend": first,
-                "hovertemplate": f"{plain(entry['words'])}<extra>{plain(entry['name'])}</extra>",
+                "hovertemplate": f"{plain(entry['name'])}: {plain(entry['words'])}<extra></extra>",
             })  # fmt: skip
         if entry["prior"] is not None:
             ring = entry["prior"].rings()
             data.append({
                 "type": "scatter3d", "mode": "lines", **{key: rounded(ring[:, k], 4) for k, key in enumerate("xyz")}, "line": {"color": ORANGE, "width": 3}, "name": "prior", "legendgroup": "prior",
-                "showlegend": "prior" not in shown, "hovertemplate": f"prior<extra>{plain(entry['name'])}</extra>",
+                "showlegend": "prior" not in shown, "hovertemplate": f"{plain(entry['name'])}: prior<extra></extra>",
             })  # fmt: skip
             shown.add("prior")
     skeleton = np.concatenate([np.array([a, b, [np.nan] * 3], dtype=float) for a, b in lines]) if lines else np.zeros((0, 3))

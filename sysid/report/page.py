@@ -64,6 +64,7 @@ def page(name: str, made: dict[str, dict]) -> str:
 <title>{title} · sysid report</title>
 <link rel="icon" href="data:,">
 <style>{STYLE}</style>
+<noscript><style>figure.chart, .tools {{ display: none; }}</style></noscript>
 </head>
 <body>
 <a class="skip" href="#verdict">to the verdict</a>

@@ -30,6 +30,7 @@ function dressed(chart) {
   for (const axis of axes) Object.assign(axis, {gridcolor: grid, linecolor: line, zerolinecolor: line, color: ink});
   if (layout.scene) for (const k of ["xaxis", "yaxis", "zaxis"]) Object.assign(layout.scene[k], {gridcolor: line, zerolinecolor: line, color: ink, showbackground: false});
   if (coarse.matches && !layout.scene) layout.dragmode = false;  // a finger scrolls the page
+  if (layout.scene && innerWidth < 600) for (const k of "xyz") layout.scene.camera.eye[k] *= 1.2;
   if (chart.link === "time" && range) layout.xaxis.range = [...range];
   return figure;
 }
@@ -68,6 +69,7 @@ function redraw() {
     const plot = place.querySelector(".plot");
     if (!plot.data) continue;
     const figure = dressed(chart);
+    if (printing && place.closest(".split")) figure.layout.height *= 0.85;
     if (printing) figure.layout.width = place.closest(".grid") ? 330 : place.closest(".split") ? 370 : 680;  // as the style sheet lays out A4
     else { delete figure.layout.width; figure.layout.autosize = true; }
     Plotly.react(plot, figure.data, figure.layout, settings(chart));
@@ -92,15 +94,22 @@ function follow(but) {
   const all = timed().filter(p => p !== but).map(p => Plotly.relayout(p, {"xaxis.range": [...(range || whole)]}));
   Promise.all(all).finally(() => { moving = false; });
 }
-for (const button of document.querySelectorAll("[data-time]")) button.addEventListener("click", () => {
-  for (const place of places) if (/^torque/.test(place.dataset.chart) && !drawn.size) draw(place);
+function shift(what) {
+  if (!whole) { const first = places.find(p => /^torque/.test(p.dataset.chart)); if (first) draw(first); }
   if (!whole) return;
-  const [a, b] = range || whole, width = b - a, middle = (a + b) / 2, what = button.dataset.time;
+  const [a, b] = range || whole, width = b - a, middle = (a + b) / 2;
   if (what === "all") range = null;
   else if (what === "in") range = [middle - width / 4, middle + width / 4];
   else if (what === "out") range = width * 2 >= whole[1] - whole[0] ? null : [middle - width, middle + width];
   else { const by = (what === "on" ? 1 : -1) * width / 2; range = [a + by, b + by]; }
   follow(null);
+}
+for (const button of document.querySelectorAll("[data-time]")) button.addEventListener("click", () => shift(button.dataset.time));
+const KEYS = {ArrowLeft: "back", ArrowRight: "on", "+": "in", "=": "in", "-": "out", "0": "all"};
+for (const place of places) if (place.tabIndex === 0) place.addEventListener("keydown", event => {
+  if (!KEYS[event.key] || event.ctrlKey || event.metaKey || event.altKey) return;
+  event.preventDefault();
+  shift(KEYS[event.key]);
 });
 // ---- drawn when they come near
 const near = new IntersectionObserver(entries => {

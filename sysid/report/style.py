@@ -66,7 +66,8 @@ button:hover { border-color: var(--accent); }
 footer { color: var(--quiet); font-size: .85rem; padding-top: 1rem; padding-bottom: 2rem; }
 @media (max-width: 56rem) { .split { grid-template-columns: minmax(0, 1fr); } }
 @media (max-width: 40rem) { body { font-size: 15px; } header.top, main, footer { padding-left: .75rem; padding-right: .75rem; } .bar { width: 5.5rem; } th, td { padding-right: .6rem; }
-  table.wrap { font-size: .8rem; } table.wrap th, table.wrap td { white-space: normal; min-width: 3.2rem; overflow-wrap: anywhere; } .key { white-space: normal; display: block; }
+  tbody th { white-space: normal; min-width: 6.5rem; max-width: 10rem; } .parameters tbody th { min-width: 5.5rem; } .suspects tbody th { max-width: none; }
+  table.wrap { font-size: .8rem; } table.wrap th, table.wrap td { white-space: normal; min-width: 3.2rem; overflow-wrap: normal; } .key { white-space: normal; display: block; }
   .suspects, .suspects tbody, .suspects tr:not(.family) { display: block; width: 100%; } .suspects thead { position: absolute; clip-path: inset(50%); width: 1px; height: 1px; overflow: hidden; }
   .suspects tbody tr.family, .suspects tbody tr.family th { display: block; } .suspects tr:not(.family) { padding: .4rem 0 .4rem .7rem; border-bottom: 1px solid var(--line); }
   .suspects tr:not(.family) > * { display: block; border: 0 !important; padding: .05rem 0 !important; text-align: left; white-space: normal; }
@@ -80,6 +81,6 @@ footer { color: var(--quiet); font-size: .85rem; padding-top: 1rem; padding-bott
   h2, h3, summary { break-after: avoid; } figure, .card, tr, pre { break-inside: avoid; } .scroll { overflow: visible; }
   table { font-size: 8pt; } th, td { white-space: normal; padding-right: .5rem; } td code { overflow-wrap: anywhere; } pre { white-space: pre-wrap; overflow-wrap: anywhere; }
   .grid, .grid.three { grid-template-columns: 330px 330px; } .split { grid-template-columns: minmax(0, 1fr) 370px; break-inside: avoid; } .bar { width: 6rem; }
-  .split table { font-size: 7pt; } .split .meter { width: 1.5rem; }
+  .plot { min-height: 0; } .split table { font-size: 7pt; } .split .meter { width: 1.5rem; }
 }
 """
