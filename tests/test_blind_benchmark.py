@@ -127,7 +127,7 @@ def test_summary_holds_the_bars_of_the_issue(blind):
     counted = lambda name: (bars[name]["reached"]["count"], bars[name]["reached"]["of"])  # noqa: E731
     assert counted("named") == (2, 8) and counted("alone") == (1, 8) and counted("after discover") == (2, 2)
     assert counted("controls accused") == (1, 3) and counted("outside") == (1, 2)
-    assert not any(bars[name]["met"] for name in ("named", "alone", "controls accused", "outside", "controls")) and bars["after discover"]["met"]
+    assert not any(bars[name]["met"] for name in ("named", "alone", "controls accused", "outside", "controls", "cases")) and bars["after discover"]["met"]
     assert found["controls"]["unknown"]["count"] == 1
     table = found["confusion"]
     at = lambda hidden, named: table["counts"][table["hidden"].index(hidden)][table["named"].index(named)]  # noqa: E731
@@ -152,12 +152,12 @@ def test_cases_are_as_promised(blind):
     other = blind.cases(6)
     assert {c.key for c in other} == {c.key for c in full} and not {c.seed for c in other} & {c.seed for c in full}
     kinds, robots = Counter(c.kind for c in full), Counter(c.robot for c in full)
-    assert sum(kinds.values()) - kinds["control"] >= 300 and kinds["control"] >= 100 and kinds["two"] >= 40 and kinds["outside"] >= 40
-    assert len(robots) == 4 and min(robots.values()) >= 40
+    assert len(full) >= 300 and len(full) - kinds["control"] >= 200 and kinds["control"] >= 100 and kinds["two"] >= 30 and kinds["outside"] >= 40
+    assert len(robots) == 4 and min(robots.values()) >= 20
     effects = Counter(h["effect"] for c in full if c.kind == "one" for h in c.hidden)
     from sysid.effect import vocabulary
 
-    assert set(effects) == set(vocabulary()) - set(blind.BASELINE) and min(effects[e] for e in blind.EFFECTS) == 9
+    assert set(effects) == set(vocabulary()) - set(blind.BASELINE) and min(effects[e] for e in blind.EFFECTS) >= 6
     assert len({c.hidden[0]["effect"] for c in full if c.kind == "outside"}) >= 6
     for case in full:
         sizes = [h["size"] for h in case.hidden]
@@ -176,7 +176,7 @@ def test_keys_are_matched_by_their_parts(blind):
 
 
 def test_a_killed_run_ends_in_the_same_journal(blind, tmp_path, monkeypatch):
-    keys = ("planar/stribeck/0", "planar/control/0", "leg/delay/1", "ur5/control/78")
+    keys = [c.key for c in blind.cases(3)[:4]]
     calls = []
 
     def fake(case, keep=None, killed=None):
@@ -214,8 +214,7 @@ def test_a_killed_run_ends_in_the_same_journal(blind, tmp_path, monkeypatch):
 
 def test_one_case_from_end_to_end(blind, monkeypatch):
     monkeypatch.setitem(blind.SECONDS, "planar", 4.0)
-    (case,) = [c for c in blind.cases(1) if c.key == "planar/torque_bias/4"]
-    case = asdict(case) | {"hidden": [{"effect": "torque_bias", "joint": "elbow", "size": 3.0}]}
+    case = asdict(next(c for c in blind.cases(1) if blind.matches(c.key, "planar/torque_bias"))) | {"hidden": [{"effect": "torque_bias", "joint": "elbow", "size": 3.0}]}
     found = blind.one(case)
     assert found["error"] is None, found["error"]
     (row,) = blind.score(json.loads(json.dumps(found)))

@@ -322,7 +322,10 @@ def _verdict(fit: Fit, levels, steps, last: Ground, left: list[structure.Structu
     raw = last.raw_rms()
     for j, joint in enumerate(fit.joints):
         own = [s for s in steps if s.head.candidate.joint == j or (s.head.candidate.joint == ROBOT and s.shares[j] >= search.WORTH)]
-        if own:
+        if own and left[j].there and left[j].share * last.squares[:, j].sum() > steps[0].before[j] - last.squares[:, j].sum():
+            # what was found is the smaller part of what is wrong
+            out.append(Verdict(joint, "unknown", also=tuple(s.head.candidate.name for s in own), structure=left[j]))
+        elif own:
             tied = tuple(dict.fromkeys(a.candidate.name for a in own[0].family[1:] if a.candidate.name != own[0].head.candidate.name))
             out.append(Verdict(joint, "missing", own[0].head.candidate.name, tied, tuple(s.head.candidate.name for s in own[1:]), left[j] if left[j].there else None))
         elif left[j].there or _far_above(raw[j], levels[joint]):

@@ -67,6 +67,8 @@ def _verdict(v: Verdict) -> dict:
     out: dict = {"joint": v.joint, "status": v.status}
     if v.status == "missing":
         out |= {"effect": v.effect, "tied_with": list(v.tied_with), "also": list(v.also)}
+    if v.status == "unknown":
+        out |= {"also": list(v.also)}
     if v.structure is not None:
         out |= {"depends_on": dependences(v.structure), "share_left": v.structure.share, "follows": list(v.structure.together), "bursts": v.structure.bursts}
     return out

@@ -31,7 +31,8 @@ class Answer:
     coefficients (k,) of its columns, or its shape values where it is curved; visible: the share of its signature's
         root mean square that the model cannot absorb, `most_visible` the same at the shape values that show it best; gain: by how much the training objective falls.
     squares: (blocks, dof) sums of squared residuals on the test rows with the candidate; the ground has those without.
-    score: fall of the held-out log-likelihood's minus, over all joints; p: probability of the training evidence by chance.
+    score: fall of the held-out log-likelihood's minus, over all joints; forecast: standard errors from zero of the slope of the
+        test residual on what the candidate foretells of it; p: probability of the training evidence by chance.
     """
 
     candidate: Candidate
@@ -44,6 +45,7 @@ class Answer:
     p: float
     allowed: bool
     most_visible: float = 0.0
+    forecast: float = 0.0
 
 
 class Ground:
@@ -102,7 +104,9 @@ class Ground:
         columns = np.concatenate([self.rows.columns, slopes], axis=2) if slopes.shape[2] else self.rows.columns
         hessian = np.zeros((columns.shape[2],) * 2)
         hessian[: self.model.size, : self.model.size] = prior_hessian(self.settled)
-        return Projection(columns, self.residual, hessian, self.weights)
+        first = 10 * self.model.bodies
+        positive = {first + k: float(self.settled.x[first + k]) for k, c in enumerate(self.model.coefficients) if c.positive}
+        return Projection(columns, self.residual, hessian, self.weights, positive)
 
     @cached_property
     def _test_columns(self) -> np.ndarray:
@@ -228,7 +232,7 @@ class Ground:
         for start in range(0, len(tried), _BATCH):
             batch = tried[start : start + _BATCH]
             for columns in row.signatures(self.model, self.train, self._seen[0], candidate.effect, candidate.joint, batch, self.stride, self.rows.use):
-                c, _, gain, visible = self.projection.step(columns, candidate.joint)
+                c, _, _, gain, visible = self.projection.step(columns, candidate.joint)
                 out.append(gain if _allowed(candidate, c) else 0.0)
                 most = max(most, float(np.sqrt(visible.max(initial=0.0))))
         return out, most
@@ -242,7 +246,7 @@ class Ground:
         columns = self.signature(candidate, shapes, "train")
         if not np.isfinite(columns).all() or not np.any(columns):
             return None
-        c, change, gain, share = self.projection.step(columns, candidate.joint)
+        c, change, absorbed, gain, share = self.projection.step(columns, candidate.joint)
         if not np.isfinite(c).all():
             return None
         fitted = _apply(columns, c, candidate.joint, self.model.robot.dof) + np.einsum("jnk,k->nj", self.projection.columns, change)
@@ -251,52 +255,83 @@ class Ground:
         squares = summed(self.blocks[1], (after * self.held_out.use) ** 2)
         gained = score(self.squares, squares, self.counts)
         # what held-out data refuse needs no other evidence; it still counts as a question asked
-        p = self._chance(columns, candidate.joint) if gained > 0 else 1.0
+        p = self._chance(columns, candidate.joint, c, absorbed, fitted) if gained > 0 else 1.0
         whole = self._size(_apply(columns, c, candidate.joint, self.model.robot.dof))
         seen = self._size(fitted) / whole if whole > 0 else float(np.sqrt(share.max(initial=0.0)))
         alone = float(np.sqrt(share.max(initial=0.0)))
         return Answer(
             candidate, dict(shapes), c, float(min(seen, 1.0)), gain, squares, gained, min(1.0, p * tests),
-            _allowed(candidate, c), max(alone, float(min(seen, 1.0))),
+            _allowed(candidate, c), max(alone, float(min(seen, 1.0))), self.forecast(after, candidate.joint),
         )  # fmt: skip
+
+    def forecast(self, after: np.ndarray, joint: int) -> float:
+        """How far the slope of the test residual on what was foretold of it stands from zero, in standard errors.
+
+        Blocks count by what is foretold in them, so that an effect at rare speeds is judged where it acts.
+
+        Args:
+            after: (n, dof) what is left of the test residual. joint: by which it is judged, -1 for all.
+        """
+        own = slice(None) if joint == ROBOT else [joint]
+        use = self.held_out.use[:, own]
+        scale = 1.0 / np.maximum(np.sqrt((after[:, own] ** 2 * use).sum(0) / np.maximum(use.sum(0), 1)), 1e-300)
+        before, left = self.residual_test[:, own] * use * scale, after[:, own] * use * scale
+        told = before - left
+        size = summed(self.blocks[1], told**2).sum(1)
+        if not size.sum() > 0:
+            return 0.0
+        slope = float((before * told).sum() / size.sum())
+        scores = summed(self.blocks[1], told * (before - slope * told)).sum(1)
+        return standard(slope * size.sum(), scores, size)
 
     def _size(self, torque) -> float:
         return float(np.linalg.norm(torque * self.weights))
 
-    def _chance(self, columns, joint: int) -> float:
-        """Probability of the candidate's score under no effect: Hotelling's test over blocks of time."""
+    def _chance(self, columns, joint: int, c, absorbed, fitted) -> float:
+        """Probability of a candidate's coefficients under no effect: Wald's test with blocks of time as clusters (Cameron &
+        Miller 2015), of as many degrees of freedom as blocks in which the candidate acts.
+
+        Args:
+            c: (k,); absorbed: (size, k) what the model takes of its columns; fitted: (n, dof) what it makes of the residual.
+        """
         from scipy.stats import f
 
-        weights, residual = self.weights, self.residual
-        scores = np.zeros((self.blocks[0].max() + 1, columns.shape[-1]))
-        absorbed = self.projection.inverse @ sum(
-            2.0 * weights[j] ** 2 * self.projection.columns[j].T @ (columns[j] if columns.ndim == 3 else columns)
-            for j in (range(len(weights)) if columns.ndim == 3 else [joint])
-        )
+        weights = self.weights
+        count, k = int(self.blocks[0].max()) + 1, columns.shape[-1]
+        scores, size, system = np.zeros((count, k)), np.zeros(count), np.zeros((k, k))
         for j in range(len(weights)):
             own = -self.projection.columns[j] @ absorbed
             if columns.ndim == 3:
                 own = own + columns[j]
             elif j == joint:
                 own = own + columns
-            scores += weights[j] ** 2 * summed(self.blocks[0], own * residual[:, [j]])
-        scores = scores[np.any(scores != 0, axis=1)]
-        blocks, k = scores.shape
-        if blocks <= k + 2:
-            return 1.0
-        scale = np.sqrt((scores**2).mean(0))
-        scores = scores[:, scale > 0] / scale[scale > 0]
-        k = scores.shape[1]
-        if not k:
-            return 1.0
-        mean = scores.mean(0)
-        spread = (scores - mean).T @ (scores - mean) / (blocks - 1)
+            told = own @ c
+            scores += weights[j] ** 2 * summed(self.blocks[0], own * (self.residual - fitted)[:, [j]])
+            size += weights[j] ** 2 * summed(self.blocks[0], (told**2)[:, None])[:, 0]
+            system += weights[j] ** 2 * own.T @ own
+        acting = size.sum() ** 2 / max(np.sum(size**2), 1e-300)
+        scale = np.sqrt(np.where(np.diagonal(system) > 0, np.diagonal(system), 1.0))
+        pull, spread = system @ c / scale, scores.T @ scores / np.outer(scale, scale) * count / max(count - 1, 1)
         values, vectors = np.linalg.eigh(spread)
-        keep = values > 1e-9 * values[-1]
-        along = vectors[:, keep].T @ mean
-        k = int(keep.sum())
-        t2 = blocks * float(np.sum(along**2 / values[keep]))
-        return float(f.sf(t2 * (blocks - k) / (k * (blocks - 1)), k, blocks - k))
+        keep = values > 1e-9 * max(values[-1], 1e-300)
+        rank = int(keep.sum())
+        left = acting - rank
+        if not rank or left < 1.0:
+            return 1.0
+        wald = float(np.sum((vectors[:, keep].T @ pull) ** 2 / values[keep]))
+        return float(f.sf(wald * left / (rank * max(acting - 1.0, 1.0)), rank, left))
+
+
+def standard(pull: float, scores, size) -> float:
+    """A sum over blocks in standard errors, as a normal variable would have them: `scores` of the blocks give its spread,
+    their `size` how many blocks count."""
+    from scipy.stats import norm, t
+
+    acting = size.sum() ** 2 / max(np.sum(size**2), 1e-300)
+    spread = np.sqrt(np.sum(scores**2) * len(scores) / max(len(scores) - 1, 1))
+    if acting < 2.0 or not spread > 0:
+        return 0.0
+    return float(np.clip(norm.isf(max(t.sf(pull / spread, acting - 1.0), 1e-300)), -37.0, 37.0))
 
 
 def _apply(columns, c, joint: int, dof: int) -> np.ndarray:

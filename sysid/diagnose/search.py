@@ -37,13 +37,14 @@ class Support:
 @dataclass(frozen=True)
 class Step:
     """One effect that joined: the family (simplest first) of answers that the log cannot tell apart, their q-values, the
-    ground after it, and what it took of each joint's held-out squared residual (dof,)."""
+    ground after it, and what it took of each joint's held-out squared residual (dof,), and what that was before (dof,)."""
 
     family: tuple[Answer, ...]
     q: dict[Candidate, float]
     support: Support
     ground: Ground
     shares: np.ndarray
+    before: np.ndarray
 
     @property
     def head(self) -> Answer:
@@ -95,8 +96,8 @@ def q_values(ground: Ground, answers: list[Answer]) -> dict[Candidate, float]:
 
     p = np.array([a.p for a in answers])
     far = np.array([support(ground, a).away for a in answers])
-    # two measures of the fall were tried
-    other = np.clip(2.0 * t.sf(far, max(len(ground.squares) // 2 - 1, 2)), 1e-300, 1.0)
+    # three measures of the fall were tried
+    other = np.clip(3.0 * t.sf(far, max(len(ground.squares) // 2 - 1, 2)), 1e-300, 1.0)
     p = chi2.sf(-2.0 * (np.log(np.maximum(p, 1e-300)) + np.log(other)), 4)
     order = np.argsort(p)
     scaled = p[order] * len(p) / (1 + np.arange(len(p)))
@@ -110,7 +111,7 @@ def support(ground: Ground, answer: Answer) -> Support:
     weights = 1.0 / np.maximum(answer.squares.sum(0) / np.maximum(ground.counts.sum(0), 1), 1e-300)
     before, after = ground.squares[:, joints] @ weights[joints], answer.squares[:, joints] @ weights[joints]
     total = before.sum()
-    return Support(float((total - after.sum()) / total) if total > 0 else 0.0, stands_out(before, after))
+    return Support(float((total - after.sum()) / total) if total > 0 else 0.0, max(stands_out(before, after), answer.forecast))
 
 
 def stands_out(before, after) -> float:
@@ -164,7 +165,7 @@ def next_step(ground: Ground, other: Callable[[], Ground | None], answers: list[
             family = [head, *(a for a in family if a is not head), *_alike(other(), head, standing, family)]
             after = dict((a.candidate, g) for a, g in refined)[head.candidate] or refit(ground, head, always=True)[1]
             shares = 1.0 - after.squares.sum(0) / np.maximum(ground.squares.sum(0), 1e-300)
-            return Step(tuple(family), q, support(ground, head), after, shares)
+            return Step(tuple(family), q, support(ground, head), after, shares, ground.squares.sum(0))
         leave = {a.candidate for a in short}
         hopeful = [a for a in hopeful if a.candidate not in leave]
     return None
@@ -185,7 +186,8 @@ def refit(ground: Ground, answer: Answer, always: bool = False) -> tuple[Answer,
     )
     found = score(ground.squares, grown.squares, ground.counts)
     mine = {v.shape.name: s for v, s in zip(grown.model.shape_values, grown.model.shapes) if v.term == len(grown.model.terms) - 1}
-    return replace(answer, shapes=mine, squares=grown.squares, score=found), grown
+    forecast = ground.forecast(grown.residual_test, candidate.joint)
+    return replace(answer, shapes=mine, squares=grown.squares, score=found, forecast=forecast), grown
 
 
 # the factor by which encoder noise changes an effect's size between these low-passes is 3.5

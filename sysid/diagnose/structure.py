@@ -15,11 +15,12 @@ import numpy as np
 from .ground import Ground, summed
 from .search import away, stands_out
 
-LEAST, STANDS_OUT = 0.06, 4.0  # share of the held-out square foretold; standard errors
+LEAST, STANDS_OUT = 0.1, 4.0  # share of the held-out square foretold; standard errors
 # Noise through a low-pass is Gaussian, whatever its colour: its tenth of largest rows holds 0.44 of its square.
 _LARGEST, _CROWDED = 0.1, 0.65
 _KNOTS, _BINS, _FEATURES, _TURNS, _WIDTHS, _RIDGES = 9, 25, 24, 5, (0.25, 0.6, 1.5), np.geomspace(1e-4, 1e2, 7)
 _FOLDS = 5
+_LOWEST, _SCATTER = 0.5, 5.0  # Hz; a peak of twenty times its surroundings counts as four standard errors
 
 
 @dataclass(frozen=True)
@@ -108,10 +109,33 @@ def _structure(ground: Ground, joint: int, train, test) -> Structure:
         made = _together([train[n][1][use] for n in names], [test[n][1][use_test] for n in names])
         share, far = _foretold(made[0], y, blocks, made[1], y_test, blocks_test)
         together.append((share, far, names))
+    together.append((*_tone(ground, joint), ("time, in a tone",)))
     best = max([*((d.share, d.away, (d.variable,)) for d in found), *together], key=lambda t: t[0] if t[1] >= STANDS_OUT else -1.0)
     return Structure(
         joint, best[0], best[1], tuple(d for d in found if d.away >= 2.0 and d.share > 0.0), best[2] if best[1] >= STANDS_OUT else (), _crowded(y_test),
     )  # fmt: skip
+
+
+def _tone(ground: Ground, joint: int) -> tuple[float, float]:
+    """Share of the test rows' squares at the one frequency that stands out most of the training rows, and how far it stands
+    out: a tone keeps its frequency from log to log, noise of any colour does not."""
+    power = []
+    for rows, residual in ((ground.rows, ground.residual), (ground.held_out, ground.residual_test)):
+        longest = np.bincount(rows.piece).argmax()
+        own = residual[rows.piece == longest, joint]
+        step = float(np.median(np.diff(rows.t[rows.piece == longest])))
+        power.append((np.fft.rfftfreq(4 * len(own), step), np.abs(np.fft.rfft(own * np.hanning(len(own)), 4 * len(own))) ** 2))
+    (first, p), (second, other) = power
+    width = 4.0 * max(first[1], second[1]) * 2.0  # the window's main lobe, on both sides
+    smooth = np.convolve(p, np.ones(161) / 161, mode="same")
+    peak = first[int(np.argmax(p / np.maximum(smooth, 1e-300) * (first > _LOWEST)))]
+    near = np.abs(second - peak) <= width
+    around = (np.abs(second - peak) <= 12.0 * width) & ~near
+    if not around.any() or not other.sum() > 0:
+        return 0.0, 0.0
+    excess = other[near].sum() - near.sum() * other[around].mean()
+    # of noise the power within one lobe scatters by about its own mean
+    return float(max(excess, 0.0) / other.sum()), float(other[near].max() / max(other[around].mean(), 1e-300) / _SCATTER)
 
 
 def _splines(x, knots) -> np.ndarray:
