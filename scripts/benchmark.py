@@ -11,6 +11,8 @@ time    The whole `sysid fit configs/cheetah3.yaml` process over a floor: a proc
         counts with its median.
 memory  Peak memory of `sysid fit` on the leg's log and on one 50 times as long, per joint and sample that it grew by.
         The regressor kept whole would take 1440 bytes.
+diagnose  The whole `sysid diagnose configs/cheetah3.yaml` process, the whole catalogue on every joint, over `sysid fit` on
+        the same experiment, in turns. At most 10 is the aim.
 solve   On the leg's compressed problem: 20 random starts over one fit's solve (compression not counted), and cvxpy +
         clarabel over one fit's solve, at equal objective. cvxpy's time is that of `Problem.solve`, which writes the
         problem down for clarabel and runs it; clarabel's own time alone is printed beside it.
@@ -69,15 +71,17 @@ def main() -> None:
     """Run the benchmarks and print them; with --json as one document."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--repeats", type=int, default=7, help="runs of each process; the median counts")
-    parser.add_argument("--only", choices=["time", "memory", "solve"])
+    parser.add_argument("--only", choices=["time", "memory", "diagnose", "solve"])
     parser.add_argument("--json", action="store_true")
     options = parser.parse_args()
     found = {}
-    wanted = [options.only] if options.only else ["time", "memory", "solve"]
+    wanted = [options.only] if options.only else ["time", "memory", "diagnose", "solve"]
     if "time" in wanted:
         found["fit_over_floor"] = fit_over_floor(options.repeats)
     if "memory" in wanted:
         found["memory"] = memory()
+    if "diagnose" in wanted:
+        found["diagnose_over_fit"] = diagnose_over_fit(min(options.repeats, 3))
     if "solve" in wanted:
         found["solve"] = solve(options.repeats)
     if options.json:
@@ -92,6 +96,9 @@ def main() -> None:
             f"peak memory {entry['megabytes'][0]:.0f} MB on {entry['samples'][0]} samples, {entry['megabytes'][1]:.0f} MB on {entry['samples'][1]}: "
             f"{entry['bytes_per_joint_sample']:.0f} bytes per joint and sample"
         )
+    if "diagnose_over_fit" in found:
+        entry = found["diagnose_over_fit"]
+        print(f"sysid diagnose {entry['diagnose_seconds']:.1f} s / sysid fit {entry['fit_seconds']:.2f} s = {entry['ratio']:.1f} (medians of {entry['runs']})")
     if "solve" in found:
         entry = found["solve"]
         print(
@@ -129,6 +136,18 @@ def fit_over_floor(repeats: int) -> dict:
             times["fit"].append(_run(fit)[0])
     medians = {name: statistics.median(values[1:]) for name, values in times.items()}
     return {"ratio": medians["fit"] / medians["floor"], "fit_seconds": medians["fit"], "floor_seconds": medians["floor"]}
+
+
+def diagnose_over_fit(runs: int) -> dict:
+    """Medians of alternating runs, after one warm-up of each."""
+    with tempfile.TemporaryDirectory() as out:
+        command = lambda word: [sys.executable, "-m", "sysid", word, str(CONFIG), "--quiet", "--out", out]  # noqa: E731
+        times: dict[str, list[float]] = {"fit": [], "diagnose": []}
+        for _ in range(runs + 1):
+            for word, spent in times.items():
+                spent.append(_run(command(word))[0])
+    medians = {name: statistics.median(values[1:]) for name, values in times.items()}
+    return {"ratio": medians["diagnose"] / medians["fit"], "diagnose_seconds": medians["diagnose"], "fit_seconds": medians["fit"], "runs": runs}
 
 
 def memory() -> dict:

@@ -138,10 +138,15 @@ def diagnose(
     results.write_json(run / "diagnosis.json", said)
     if as_json:
         print(json.dumps(said, allow_nan=False))
-    elif not quiet:
-        from .terminal import show_diagnosis
+    else:
+        from .report.failures import failures
 
-        show_diagnosis(found, said)
+        robot = found.fit.model.robot
+        failures(said, run, {joint for joint, slides in zip(robot.joints, robot.prismatic) if slides})
+        if not quiet:
+            from .terminal import show_diagnosis
+
+            show_diagnosis(found, said)
     if not found.fit.solution.converged:
         raise typer.Exit(1)
 
