@@ -28,6 +28,7 @@ from .noise import NoiseFloor, floor
 _MOST_STEPS = 8
 _UNSEEN = 0.05  # of its root mean square: below it a signature is absorbed by the model
 _SHOWN = 12  # findings
+_LEFT = 0.25  # of what the effects took: where as much can still be foretold, they are not the whole of it
 
 
 @dataclass(frozen=True)
@@ -322,8 +323,9 @@ def _verdict(fit: Fit, levels, steps, last: Ground, left: list[structure.Structu
     raw = last.raw_rms()
     for j, joint in enumerate(fit.joints):
         own = [s for s in steps if s.head.candidate.joint == j or (s.head.candidate.joint == ROBOT and s.shares[j] >= search.WORTH)]
-        if own and left[j].there and left[j].share * last.squares[:, j].sum() > steps[0].before[j] - last.squares[:, j].sum():
-            # what was found is the smaller part of what is wrong
+        after = last.squares[:, j].sum()
+        if own and left[j].there and left[j].share * after > _LEFT * (steps[0].before[j] - after):
+            # what was found is not most of what is wrong
             out.append(Verdict(joint, "unknown", also=tuple(s.head.candidate.name for s in own), structure=left[j]))
         elif own:
             tied = tuple(dict.fromkeys(a.candidate.name for a in own[0].family[1:] if a.candidate.name != own[0].head.candidate.name))

@@ -131,7 +131,7 @@ def _tone(ground: Ground, joint: int) -> tuple[float, float]:
     peak = first[int(np.argmax(p / np.maximum(smooth, 1e-300) * (first > _LOWEST)))]
     near = np.abs(second - peak) <= width
     around = (np.abs(second - peak) <= 12.0 * width) & ~near
-    if not around.any() or not other.sum() > 0:
+    if not near.any() or not around.any() or not other.sum() > 0:
         return 0.0, 0.0
     excess = other[near].sum() - near.sum() * other[around].mean()
     # of noise the power within one lobe scatters by about its own mean

@@ -6,8 +6,8 @@ SCRIPT = r"""
 const DARK = {"#000000":"#e4e7ea", "#0072b2":"#56b4e9", "#d55e00":"#f59350", "#009e73":"#35c79d", "#999999":"#6f7882", "#e69f00":"#f0b429", "#cc79a7":"#e39cc4",
   "#56b4e9":"#3d86b0", "#fdfdfd":"#101315", "#dcdcdc":"#3c434b"};
 const darkness = matchMedia("(prefers-color-scheme: dark)"), coarse = matchMedia("(pointer: coarse)");
-const places = [...document.querySelectorAll("figure.chart")];
-const drawn = new Map();
+let places = [];
+const drawn = new Map(), known = new WeakSet();
 let printing = false, range = null, whole = null;
 
 function turned(value) {
@@ -39,7 +39,7 @@ const CONFIG = {displaylogo: false, responsive: true, showTips: false, plotlySer
 const settings = chart => ({...CONFIG, displayModeBar: coarse.matches && !chart.figure.layout.scene ? false : "hover"});
 let loaded = false;
 function engine() {
-  if (loaded) return;
+  if (loaded || window.Plotly) return;
   const script = document.createElement("script");
   script.textContent = document.getElementById("plotly").textContent;
   document.head.append(script);
@@ -47,27 +47,37 @@ function engine() {
 }
 function draw(place) {
   if (drawn.has(place)) return;
-  engine();
-  const source = document.getElementById("figure-" + place.dataset.chart), plot = place.querySelector(".plot");
+  const source = document.getElementById("figure-" + place.dataset.chart);
+  if (source) { show(place, () => JSON.parse(source.textContent)); return; }
+  if (!window.sysid.figure) return;  // a page that is alive asks for it
+  drawn.set(place, null);
+  window.sysid.figure(place.dataset.chart).then(chart => { if (place.isConnected) show(place, () => chart); }, error => { drawn.delete(place); failed(place, error); });
+}
+function show(place, read) {
+  const plot = place.querySelector(".plot");
   try {
-    const chart = JSON.parse(source.textContent);
+    engine();
+    const chart = read();
     drawn.set(place, chart);
-    plot.replaceChildren();
     const figure = dressed(chart);
+    if (plot.data) { Plotly.react(plot, figure.data, figure.layout, settings(chart)); return; }
+    plot.replaceChildren();
     Plotly.newPlot(plot, figure.data, figure.layout, settings(chart));
     if (chart.link === "time") linked(plot);
   } catch (error) {
-    plot.innerHTML = "";
-    const note = document.createElement("p");
-    note.className = "waiting";
-    note.textContent = "This chart could not be drawn here (" + error.message + "). The words and tables hold what it shows.";
-    plot.append(note);
+    failed(place, error);
   }
+}
+function failed(place, error) {
+  const note = document.createElement("p");
+  note.className = "waiting";
+  note.textContent = "This chart could not be drawn here (" + error.message + "). The words and tables hold what it shows.";
+  place.querySelector(".plot").replaceChildren(note);
 }
 function redraw() {
   for (const [place, chart] of drawn) {
     const plot = place.querySelector(".plot");
-    if (!plot.data) continue;
+    if (!chart || !plot.data) continue;
     const figure = dressed(chart);
     if (printing && place.closest(".split")) figure.layout.height *= 0.85;
     if (printing) figure.layout.width = place.closest(".grid") ? 330 : place.closest(".split") ? 370 : 680;  // as the style sheet lays out A4
@@ -76,7 +86,7 @@ function redraw() {
   }
 }
 // ---- one time axis
-const timed = () => [...drawn].filter(([, chart]) => chart.link === "time").map(([place]) => place.querySelector(".plot")).filter(p => p._fullLayout);
+const timed = () => [...drawn].filter(([, chart]) => chart && chart.link === "time").map(([place]) => place.querySelector(".plot")).filter(p => p._fullLayout);
 let moving = false;
 function linked(plot) {
   if (!whole && plot._fullLayout) whole = [...plot._fullLayout.xaxis.range];
@@ -104,22 +114,30 @@ function shift(what) {
   else { const by = (what === "on" ? 1 : -1) * width / 2; range = [a + by, b + by]; }
   follow(null);
 }
-for (const button of document.querySelectorAll("[data-time]")) button.addEventListener("click", () => shift(button.dataset.time));
 const KEYS = {ArrowLeft: "back", ArrowRight: "on", "+": "in", "=": "in", "-": "out", "0": "all"};
-for (const place of places) if (place.tabIndex === 0) place.addEventListener("keydown", event => {
+function keyed(event) {
   if (!KEYS[event.key] || event.ctrlKey || event.metaKey || event.altKey) return;
   event.preventDefault();
   shift(KEYS[event.key]);
-});
+}
 // ---- drawn when they come near
 const near = new IntersectionObserver(entries => {
   for (const entry of entries) if (entry.isIntersecting) { near.unobserve(entry.target); draw(entry.target); }
 }, {rootMargin: "300px"});
-const start = () => { for (const place of places) near.observe(place); };
-requestAnimationFrame(() => setTimeout(start, 0));
-for (const box of document.querySelectorAll("details")) box.addEventListener("toggle", () => {
-  for (const place of box.querySelectorAll("figure.chart")) { const plot = place.querySelector(".plot"); if (plot.data) Plotly.Plots.resize(plot); }
-});
+const opened = event => {
+  for (const place of event.target.querySelectorAll("figure.chart")) { const plot = place.querySelector(".plot"); if (plot.data) Plotly.Plots.resize(plot); }
+};
+function begin() {  // whatever stands in the page now; again when the page was changed
+  for (const place of [...drawn.keys()]) if (!place.isConnected) { const plot = place.querySelector(".plot"); if (plot.data) Plotly.purge(plot); near.unobserve(place); drawn.delete(place); }
+  if (!timed().length) whole = null;
+  places = [...document.querySelectorAll("figure.chart")];
+  const unknown = selector => [...document.querySelectorAll(selector)].filter(e => !known.has(e) && known.add(e));
+  for (const button of unknown("[data-time]")) button.addEventListener("click", () => shift(button.dataset.time));
+  for (const box of unknown("details")) box.addEventListener("toggle", opened);
+  for (const place of unknown("figure.chart")) { if (place.tabIndex === 0) place.addEventListener("keydown", keyed); near.observe(place); }
+}
+window.sysid = {begin, show: (place, chart) => show(place, () => chart), figure: null};
+requestAnimationFrame(() => setTimeout(begin, 0));
 darkness.addEventListener("change", redraw);
 // ---- paper: everything drawn, light, at the width of the sheet
 let closed = [];

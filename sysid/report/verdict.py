@@ -117,7 +117,7 @@ def suspects(diagnosis: Diagnosis, document: dict) -> tuple[str, str, list]:
     groups, path = [], text(shlex.quote(str(diagnosis.fit.experiment.path or "EXPERIMENT")))
     for family in families(diagnosis, document):
         tied = len(family) > 1
-        rows = "".join(_suspect(found[k]) for k in family)
+        rows = "".join(_suspect(k, found[k]) for k in family)
         head = found[family[0]]
         word = f"step {head['joins_as_step']}" if head["joins_as_step"] else ""
         if tied:
@@ -137,7 +137,7 @@ def suspects(diagnosis: Diagnosis, document: dict) -> tuple[str, str, list]:
         words = ["sysid add", path, text(shlex.quote(name)), *(f"--joint {text(shlex.quote(j))}" for j in joints or []), *(f"--option {text(shlex.quote(f'{k}={v}'))}" for k, v in options.items())]
         commands.append(" ".join(words))
     if commands:
-        body += f"<p>To add what comes first of each step:</p><pre>{chr(10).join(commands)}</pre>"
+        body += f"<div class='by-hand'><p>To add what comes first of each step:</p><pre>{chr(10).join(commands)}</pre></div>"
     if others:
         body += f"<h3>Also better than nothing</h3><p class='quiet'>Alone, each of these explains part of the same error; none is needed once the steps are in the model.</p>{make(others, 'other effects that explain part of the error')}"
     separate = {f["separate_by"]: None for f in found if f["tied_with"] and f["separate_by"]}
@@ -146,13 +146,13 @@ def suspects(diagnosis: Diagnosis, document: dict) -> tuple[str, str, list]:
     return "Suspects", body, []
 
 
-def _suspect(f: dict) -> str:
+def _suspect(k: int, f: dict) -> str:
     known = [f"{text(name.split('.')[-1])} = {plus_minus(p['value'], p['std'])}{unit_of(p['unit'])}" for name, p in f["parameters"].items() if p["value"] is not None]
     options = ", ".join(f"{text(k)} = {text(v)}" for k, v in f["options"].items())
     small = "; ".join(w for w in (", ".join(known), options) if w)
     after = f"{level(f['rms_test_before'])} → {level(f['rms_test_after'])}"
     return (
-        f'<tr><th scope="row">{text(f["effect"])}{f"<small>{small}</small>" if small else ""}</th><td>{text(f["joint"]) if f["joint"] != "*" else "whole robot"}</td>'
+        f'<tr data-finding="{k}"><th scope="row">{text(f["effect"])}{f"<small>{small}</small>" if small else ""}</th><td>{text(f["joint"]) if f["joint"] != "*" else "whole robot"}</td>'
         f"<td>{_bar(f['misfit_removed'], f['misfit_removed_se'])}<span class='value'>{removed(f)}</span></td><td data-label='held-out RMS'>{after}</td>"
         f"<td data-label='visible'>{number(f['visible'], 2)}</td><td data-label='q'>{_q(f['q_value'])}</td></tr>"
     )
