@@ -1,0 +1,133 @@
+"""The requests that the page makes. Reading never changes anything; what changes something says which text it saw."""
+
+from __future__ import annotations
+
+import json
+from urllib.parse import quote
+
+from starlette.applications import Starlette
+from starlette.concurrency import run_in_threadpool
+from starlette.requests import Request
+from starlette.responses import Response
+from starlette.routing import Route
+
+from ..errors import SysidError
+from . import page
+from .bench import Bench
+from .desk import Changed
+from .guard import Guard
+from .view import dumped
+
+_CHANGED = 409
+
+
+def application(bench: Bench, *, host: str = "127.0.0.1", port: int = 8765, token: str | None = None, csrf: str | None = None) -> Guard:
+    """The ASGI application on one experiment, behind its guard."""
+    app = Starlette()
+    guard = Guard(app, host=host, port=port, token=token, csrf=csrf)
+
+    def reading(path: str, answer) -> None:
+        def endpoint(request: Request) -> Response:  # in a thread of its own: nothing waits for it
+            return _said(lambda: answer(request))
+
+        app.router.routes.append(Route(path, endpoint, methods=["GET"]))
+
+    def changing(path: str, act) -> None:
+        async def endpoint(request: Request) -> Response:
+            try:
+                body = json.loads(await request.body())
+                if not isinstance(body, dict):
+                    raise ValueError
+            except (ValueError, RecursionError):
+                return _json({"error": "no JSON object"}, 400)
+            return await run_in_threadpool(_said, lambda: _json(act(body)))
+
+        app.router.routes.append(Route(path, endpoint, methods=["POST"]))
+
+    reading("/", lambda r: _text(page.shell(bench.desk.name, guard.csrf), "text/html"))
+    reading("/studio.js", lambda r: _text(page.script(), "text/javascript"))
+    reading("/studio.css", lambda r: _text(page.style(), "text/css"))
+    reading("/plotly.js", lambda r: Response(page.engine(), media_type="text/javascript", headers={"cache-control": "private, max-age=86400"}))
+    reading("/api/state", lambda r: _json(bench.state()))
+    reading("/api/view", lambda r: _json(bench.page(_word(r, "sha"))))
+    reading("/api/figure", lambda r: _figure(bench, r))
+    reading("/api/residual", lambda r: _json(bench.view(_word(r, "sha")).looks.residual(_whole(r, "joint"), _whole(r, "finding") if "finding" in r.query_params else None)))
+    reading("/api/stretch", lambda r: _json(bench.view(_word(r, "sha")).looks.stretch(_number(r, "from"), _number(r, "to"))))
+    reading("/api/compare", lambda r: _json(bench.compare(_whole(r, "from"), _whole(r, "to"))))
+    reading("/export/report.html", lambda r: _file(bench.report(_word(r, "sha")), "text/html", f"{bench.desk.name}.html"))
+    reading("/export/experiment.yaml", lambda r: _file(bench.desk.text(), "application/yaml", f"{bench.desk.name}.yaml"))
+    changing("/api/run", lambda b: bench.run(_given(b, "sha", optional=True)))
+    changing("/api/cancel", lambda b: bench.cancel())
+    changing("/api/undo", lambda b: bench.undo(_given(b, "sha")))
+    changing("/api/redo", lambda b: bench.redo(_given(b, "sha")))
+    changing("/api/add", lambda b: _add(bench, b))
+    return guard
+
+
+def _add(bench: Bench, body: dict) -> dict:
+    sha = _given(body, "sha")
+    if "finding" in body:
+        number = body["finding"]
+        if isinstance(number, bool) or not isinstance(number, int):
+            raise SysidError("finding must be a number")
+        return bench.add_finding(sha, number)
+    joint = _given(body, "joint", optional=True)
+    if "formula" in body:
+        return bench.add_formula(sha, _given(body, "formula"), joint)
+    return bench.add_effect(sha, _given(body, "effect"), joint)
+
+
+def _figure(bench: Bench, request: Request) -> Response:
+    found = bench.view(_word(request, "sha")).chart(_word(request, "id"))
+    if found is None:
+        return _json({"error": "there is no such chart"}, 404)
+    return Response(found, media_type="application/json", headers={"cache-control": "no-store"})
+
+
+def _said(act) -> Response:
+    """What an action answers; bad input as one line."""
+    try:
+        return act()
+    except Changed as error:
+        return _json({"error": str(error), "changed": True}, _CHANGED)
+    except SysidError as error:
+        return _json({"error": str(error)}, 422)
+
+
+def _word(request: Request, name: str) -> str:
+    return request.query_params.get(name, "")
+
+
+def _whole(request: Request, name: str) -> int:
+    try:
+        return int(request.query_params.get(name, ""))
+    except ValueError:
+        raise SysidError(f"{name} must be a whole number") from None
+
+
+def _number(request: Request, name: str) -> float:
+    try:
+        return float(request.query_params.get(name, ""))
+    except ValueError:
+        raise SysidError(f"{name} must be a number") from None
+
+
+def _given(body: dict, name: str, optional: bool = False) -> str:
+    value = body.get(name)
+    if value is None and optional:
+        return None
+    if not isinstance(value, str):
+        raise SysidError(f"{name} must be a text")
+    return value
+
+
+def _json(value, status: int = 200) -> Response:
+    return Response(dumped(value), status, media_type="application/json", headers={"cache-control": "no-store"})
+
+
+def _text(text: str, kind: str) -> Response:
+    return Response(text, media_type=kind, headers={"cache-control": "no-store"})
+
+
+def _file(text: str, kind: str, name: str) -> Response:
+    return Response(text, media_type=kind, headers={"cache-control": "no-store", "content-disposition": f"attachment; filename*=UTF-8''{quote(name, safe='')}"})

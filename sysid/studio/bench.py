@@ -1,0 +1,186 @@
+"""One experiment at work: its file, the job that runs on it, and what was found under each of its texts."""
+
+from __future__ import annotations
+
+import hashlib
+import threading
+from collections import OrderedDict
+from pathlib import Path
+
+from .. import comparison, loop, pipeline, results
+from ..config import Experiment
+from ..diagnose.diagnosis import diagnose
+from ..effect import find, vocabulary
+from ..errors import SysidError
+from ..model import ROBOT
+from ..report import page as report
+from ..report.sections import sections
+from .desk import Desk, hashed
+from .look import compared
+from .view import View
+from .work import Job, Worker
+
+_KEPT, _SAMPLES = 8, 4_000_000  # views in memory; samples that they hold together (at least two are kept)
+
+
+class Bench:
+    """What the requests of a page do. Safe to use from several threads."""
+
+    def __init__(self, path: Path, out: Path | None = None):
+        self.desk, self.worker = Desk(path, out), Worker()
+        self._views: OrderedDict[str, View] = OrderedDict()
+        self._lock = threading.RLock()
+
+    # ---- what stands
+
+    def state(self) -> dict:
+        """The hash of the file, the job, and what can be undone. Never raises for a bad experiment file."""
+        job = self.worker.job
+        try:
+            sha, error = self.desk.sync(), None
+        except SysidError as problem:
+            sha, error = None, str(problem)
+        undo, redo = self.desk.labels()
+        return {"name": self.desk.name, "sha": sha, "error": error, "job": None if job is None else job.document(), "ready": sha is not None and self._find(sha) is not None, "undo": undo, "redo": redo}
+
+    def view(self, sha: str) -> View:
+        """What was found under the text with a hash. Raises SysidError where nothing is at hand."""
+        found = self._find(sha)
+        if found is None:
+            raise SysidError("nothing was found under this text yet", do="reload")
+        return found
+
+    def page(self, sha: str) -> dict:
+        """A view as the page shows it, with the steps that led to it."""
+        return self.view(sha).page(self.desk.history())
+
+    # ---- work
+
+    def run(self, seen: str | None = None) -> dict:
+        """Fit and diagnose the file as it is, where that was not done yet."""
+        sha = self.desk.sync()
+        if seen is not None and sha != seen:
+            from .desk import Changed
+
+            raise Changed("the experiment file changed", do="reload")
+        self._ensure(sha)
+        return self.state()
+
+    def cancel(self) -> dict:
+        """Ask the job to stop."""
+        self.worker.cancel()
+        return self.state()
+
+    def add_finding(self, seen: str, number: int) -> dict:
+        """Add a suspect to the model."""
+        found = self.view(seen)
+        if not 0 <= number < len(found.diagnosis.findings):
+            raise SysidError("there is no such suspect", do="reload")
+        candidate = found.diagnosis.findings[number].answer.candidate
+        name, joints, options = loop.spelled(candidate, "*" if candidate.joint == ROBOT else found.fit.joints[candidate.joint])
+        return self._grow(seen, name, joints, options)
+
+    def add_effect(self, seen: str, effect: str, joint: str | None) -> dict:
+        """Add an effect of the vocabulary."""
+        if effect not in vocabulary():
+            raise SysidError("there is no such effect", allowed=", ".join(vocabulary()))
+        return self._grow(seen, effect, None if joint is None or find(effect).scope == "robot" else [joint], {})
+
+    def add_formula(self, seen: str, formula: str, joint: str | None) -> dict:
+        """Add a formula of the user's own."""
+        if not formula.strip():
+            raise SysidError("there is no formula", do="write one, such as a*sin(3*q)")
+        return self._grow(seen, "formula", None if joint is None else [joint], {"formula": formula.strip()})
+
+    def undo(self, seen: str) -> dict:
+        """Restore the text before."""
+        return self._moved(self.desk.undo(seen))
+
+    def redo(self, seen: str) -> dict:
+        """Take an undo back."""
+        return self._moved(self.desk.redo(seen))
+
+    def _grow(self, seen: str, effect: str, joints: list[str] | None, options: dict) -> dict:
+        make = lambda text: loop.with_effect(text.removeprefix("\ufeff"), effect, joints, options, str(self.desk.path))  # noqa: E731
+        return self._moved(self.desk.change(seen, make, effect if effect != "formula" else options["formula"], "*" if joints is None else ", ".join(joints)))
+
+    def _moved(self, sha: str) -> dict:
+        self._ensure(sha)
+        return self.state()
+
+    def _ensure(self, sha: str) -> None:
+        if self._find(sha) is not None:
+            job = self.worker.job
+            if job is not None and job.state == "running" and job.sha != sha:
+                self.worker.cancel()  # of a text that does not stand any more
+            return
+        text = self.desk.text()
+        if hashed(text) == sha:
+            self.worker.start(sha, lambda job: self._work(job, text))
+
+    def _work(self, job: Job, text: str) -> None:
+        experiment = self.desk.experiment(text)
+        key = _key(text, experiment)
+        fit = pipeline.fit(experiment, progress=job.tell)
+        found = diagnose(experiment, fit=fit, progress=job.tell)
+        job.tell("drawing", 0.0)
+        view = View(hashed(text), fit, found, self.desk.run)
+        view.looks.warm(lambda share: job.tell("drawing", share))
+        results.write(fit, self.desk.run)
+        results.write_json(self.desk.run / "diagnosis.json", view.said)
+        self.keep(key, text, view)
+
+    def keep(self, key: str, text: str, view: View) -> None:
+        """Remember a view, and forget the oldest where they grow too many."""
+        with self._lock:
+            self._views[key] = view
+            self._views.move_to_end(key)
+            while len(self._views) > _KEPT or (len(self._views) > 2 and sum(v.samples for v in self._views.values()) > _SAMPLES):
+                self._views.popitem(last=False)
+        self.desk.measured(text, view.fit.rms("test"), view.fit.rms("train"))
+
+    def _find(self, sha: str) -> View | None:
+        with self._lock:
+            for key, view in self._views.items():
+                if view.sha == sha:
+                    if key != _key_of(sha, view.fit.experiment):
+                        break  # a log or the URDF was changed since
+                    self._views.move_to_end(key)
+                    return view
+        return None
+
+    # ---- answers
+
+    def compare(self, one: int, other: int) -> dict:
+        """Two steps compared, with standard errors where both fits are in memory."""
+        steps = self.desk.history()
+        found = compared(steps, one, other)
+        first, second = (self._find(steps[k].get("sha", "")) for k in (one, other))
+        if first is not None and second is not None:
+            errors = {d.joint: results.number(d.se) for d in comparison.compare(first.fit, second.fit, ("from", "to"))}
+            for entry in found["joints"]:
+                entry["se"] = errors.get(entry["joint"])
+        return found
+
+    def report(self, sha: str) -> str:
+        """The report as `sysid report` writes it."""
+        view = self.view(sha)
+        return report.page(self.desk.name, sections(view.fit, view.diagnosis, view.said, self.desk.history()))
+
+
+def _key(text: str, experiment: Experiment) -> str:
+    return _key_of(hashed(text), experiment)
+
+
+def _key_of(sha: str, experiment: Experiment) -> str:
+    """A text's hash with the state of the files that it names."""
+    names = [experiment.robot.urdf, *(log.file for part in (experiment.data.train, experiment.data.test) for log in part)]
+    names += [spec.name.rpartition(":")[0] for spec in [*experiment.model.effects, *experiment.model.candidates] if ":" in spec.name]
+    state = hashlib.sha256(sha.encode())
+    for name in names:
+        try:
+            found = (experiment.folder / name).stat()
+            state.update(f"{name}|{found.st_mtime_ns}|{found.st_size}\n".encode())
+        except (OSError, ValueError):
+            state.update(f"{name}|elsewhere\n".encode())
+    return state.hexdigest()

@@ -1,0 +1,66 @@
+"""A diagnosed experiment as the page shows it: the report's own sections, and the charts that it asks for one by one."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+
+from ..diagnose.diagnosis import Diagnosis
+from ..diagnose.document import document
+from ..estimate import Fit
+from ..report import fitted
+from ..report.sections import sections
+from ..report.words import units
+from .look import Looks
+
+ORDER = ("verdict", "steps", "suspects", "look", "torque", "failures", "unseen", "parameters", "bodies", "provenance")
+
+
+class View:
+    """Everything about one text of the experiment file that the page may ask for, made once."""
+
+    def __init__(self, sha: str, fit: Fit, diagnosis: Diagnosis, run=""):
+        self.sha, self.fit, self.diagnosis = sha, fit, diagnosis
+        self.said = document(diagnosis, run)
+        self.looks = Looks(diagnosis)
+        made = sections(fit, diagnosis, self.said, [])
+        self._html = {name: {"title": section["title"], "html": section["html"]} for name, section in made.items() if name != "steps"}
+        self._charts = {chart["id"]: dumped(chart) for section in made.values() for chart in section["charts"]}
+
+    @property
+    def samples(self) -> int:
+        """Samples that it keeps in memory."""
+        return sum(self.fit.samples.values())
+
+    def page(self, history: list[dict]) -> dict:
+        """What the page needs to show itself, but for the charts."""
+        title, html, drawn = fitted.steps(self.fit, self.diagnosis, self.said, history)
+        self._charts |= {chart["id"]: dumped(chart) for chart in drawn}
+        joints, unit = self.fit.joints, units(self.fit)
+        heads = {f["joins_as_step"]: k for k, f in reversed(list(enumerate(self.said["findings"]))) if f["joins_as_step"]}
+        offered = [{"finding": k, "step": step, "effect": self.said["findings"][k]["effect"], "joint": self.said["findings"][k]["joint"]} for step, k in sorted(heads.items())]
+        return {
+            "sha": self.sha, "sections": {**self._html, "steps": {"title": title, "html": html}}, "order": ORDER,
+            "joints": [{"name": j, "unit": unit[j][0]} for j in joints],
+            "findings": [{"effect": f["effect"], "joint": f["joint"]} for f in self.said["findings"]],
+            "verdict": [{"joint": v["joint"], "status": v["status"]} for v in self.said["verdict"]], "offered": offered,
+            "steps": [step_name(s) for s in history] or ["start"], "seconds": [0.0, float(np.round(max((s[1] for s in self.looks.line["spans"]), default=0.0), 3))],
+            "converged": bool(self.fit.solution.converged),
+        }  # fmt: skip
+
+    def chart(self, name: str) -> bytes | None:
+        """The JSON of a chart."""
+        return self._charts.get(name)
+
+
+def step_name(step: dict) -> str:
+    """A step of the history in words."""
+    if step.get("added") is None:
+        return "start"
+    return f"+ {step['added']}" + ("" if step.get("joint") in (None, "*") else f" on {step['joint']}")
+
+
+def dumped(value) -> bytes:
+    """Strict JSON."""
+    return json.dumps(value, allow_nan=False, separators=(",", ":"), ensure_ascii=False).encode()

@@ -1,0 +1,94 @@
+"""Long work on a thread of its own: one job at a time, with progress, and stopped where its progress is reported."""
+
+from __future__ import annotations
+
+import threading
+import traceback
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from ..errors import SysidError
+
+_WORDS = {"compress": "fitting", "ask": "asking what is missing"}
+_FIT, _FIRST = 0.2, 0.5  # shares of a job that the fit takes, and the first round of questions
+
+
+class Cancelled(Exception):
+    """The job was asked to stop."""
+
+
+@dataclass
+class Job:
+    """One piece of work. state: running, done, failed or cancelled; share between 0 and 1; error: the line that says why."""
+
+    number: int
+    sha: str
+    state: str = "running"
+    stage: str = "starting"
+    share: float = 0.0
+    error: str | None = None
+    stop: threading.Event = field(default_factory=threading.Event)
+    _rounds: list[str] = field(default_factory=list)
+
+    def tell(self, stage: str, share: float) -> None:
+        """Progress, as `pipeline.fit` and `diagnose` report it. Raises Cancelled."""
+        if self.stop.is_set():
+            raise Cancelled
+        word = stage.partition(",")[0]
+        self.stage = _WORDS.get(word, word) + stage[len(word) :]
+        if word == "compress":
+            now = _FIT * share
+        else:
+            if stage not in self._rounds:
+                self._rounds.append(stage)
+            before = len(self._rounds) - 1
+            now = _FIT + _FIRST * share if not before else 1.0 - (1.0 - _FIT - _FIRST) * 0.5 ** (before - 1) * (1.0 - 0.5 * share)
+        self.share = max(self.share, min(now, 0.99))
+
+    def document(self) -> dict:
+        """What the page polls."""
+        return {"number": self.number, "sha": self.sha, "state": "cancelling" if self.state == "running" and self.stop.is_set() else self.state, "stage": self.stage, "share": self.share, "error": self.error}
+
+
+class Worker:
+    """Runs the newest job; one that it overtakes is stopped."""
+
+    def __init__(self):
+        self._lock = threading.Lock()
+        self._turn = threading.Lock()  # held by the job that runs
+        self.job: Job | None = None
+        self._count = 0
+
+    def start(self, sha: str, work: Callable[[Job], None]) -> Job:
+        """Begin a job on the text with a hash, unless it is the one that runs."""
+        with self._lock:
+            if self.job is not None and self.job.state == "running" and not self.job.stop.is_set():
+                if self.job.sha == sha:
+                    return self.job
+                self.job.stop.set()
+            self._count += 1
+            self.job = job = Job(self._count, sha)
+            threading.Thread(target=self._run, args=(job, work), name=f"sysid-job-{job.number}", daemon=True).start()
+            return job
+
+    def cancel(self) -> None:
+        """Ask the job to stop."""
+        with self._lock:
+            if self.job is not None:
+                self.job.stop.set()
+
+    def _run(self, job: Job, work: Callable[[Job], None]) -> None:
+        with self._turn:
+            try:
+                job.tell("starting", 0.0)
+                work(job)
+                job.share, job.state = 1.0, "done"
+            except Cancelled:
+                job.state = "cancelled"
+            except SysidError as error:
+                job.error, job.state = str(error), "failed"
+            except MemoryError:
+                job.error, job.state = "out of memory", "failed"
+            except Exception as error:  # a page must hear of a mistake of ours as well
+                traceback.print_exc()
+                job.error, job.state = f"internal error, {type(error).__name__}: {error}", "failed"
