@@ -134,14 +134,23 @@ def show_diagnosis(found, document: dict) -> None:
     print(f"run folder: {document['run']}")
 
 
+def _follows(dependence: dict) -> str:
+    if dependence["variable"] == "time, in bursts":
+        return f"it comes in bursts: a tenth of the rows holds {100 * dependence['share']:.0f} % of its square"
+    if dependence["variable"] == "nothing that was tried":
+        return "it stands far above the noise floor, and nothing that was tried foretells it"
+    return f"{dependence['variable']} foretells {100 * dependence['share']:.0f} % of it"
+
+
 def _verdict_words(entry: dict, document: dict) -> str:
     if entry["status"] == "complete":
         return "complete: nothing is left that held-out data support"
     left = ""
     if "depends_on" in entry:
-        left = "; ".join(f"{d['variable']} foretells {100 * d['share']:.0f} % of it" for d in entry["depends_on"][:3])
+        left = "; ".join(_follows(d) for d in entry["depends_on"][:3])
     if entry["status"] == "unknown":
-        return f"unknown: structure is left that no effect of the vocabulary explains ({left})"
+        also = f"; part of it looks like {', '.join(entry['also'])}" if entry["also"] else ""
+        return f"unknown: structure is left that no effect of the vocabulary explains ({left}){also}"
     words = f"missing: {entry['effect']}"
     head = next((f for f in document["findings"] if f["effect"] == entry["effect"] and f["joint"] in (entry["joint"], "*")), None)
     if head:

@@ -75,11 +75,19 @@ def _verdict(v: Verdict) -> dict:
 
 
 def dependences(structure: Structure) -> list[dict]:
-    """The variables that a residual follows, with the held-out share that each explains, and the curve."""
-    return [
-        {"variable": d.variable, "unit": d.unit, "share": d.share, "se": number(d.share / d.away if d.away else float("nan")), "curve": {"at": _plain(d.at), "mean": _plain(d.mean), "se": _plain(d.se)}}
-        for d in structure.depends_on[:6]
-    ] or [{"variable": " and ".join(structure.together) or "time, in bursts", "unit": "", "share": structure.share, "se": number(structure.share / structure.away if structure.away else float("nan")), "curve": None}]
+    """What a residual follows, with the held-out share that each explains, and the curve; two variables that only together
+    foretell it come first, then single ones."""
+    entry = lambda name, unit, share, away, curve: {  # noqa: E731
+        "variable": name, "unit": unit, "share": share, "se": number(share / away if away else float("nan")), "curve": curve,
+    }  # fmt: skip
+    out = [
+        entry(d.variable, d.unit, d.share, d.away, {"at": _plain(d.at), "mean": _plain(d.mean), "se": _plain(d.se)}) for d in structure.depends_on[:6]
+    ]
+    if len(structure.together) > 1 or (structure.together and not out):
+        out.insert(0, entry(" and ".join(structure.together), "", structure.share, structure.away, None))
+    if structure.bursts:
+        out.append(entry("time, in bursts", "", structure.crowded, 0.0, None))
+    return out or [entry("nothing that was tried", "", 0.0, 0.0, None)]
 
 
 def _plain(values):

@@ -84,7 +84,7 @@ def verdict_words(found: dict, document: dict, diagnosis: Diagnosis) -> str:
 
 def structure_words(found: dict, diagnosis: Diagnosis) -> str:
     """What the structure left on a joint follows; nothing where nothing is left, or nothing foretells it."""
-    said = [f"{text(d['variable'])} foretells {percentage(d['share'])} of it" for d in found.get("depends_on", [])[:3] if d["share"] >= 0.01]
+    said = [f"{text(d['variable'])} foretells {percentage(d['share'])} of it" for d in found.get("depends_on", [])[:3] if d["share"] >= 0.01 and d["variable"] != "time, in bursts"]
     structure = next((v.structure for v in diagnosis.verdict if v.joint == found["joint"]), None)
     if structure is not None and structure.bursts:
         said.append(f"it comes in bursts, its largest tenth of rows holds {percentage(structure.crowded)} of its square")
