@@ -105,6 +105,16 @@ class Logs:
         make = lambda w: Ground(self.experiment, structure, train, test, self.fit.prior, stride=stride, weights=w, grid=grid)  # noqa: E731
         return make(weights) if weights is not None else make(by_noise(make(None)))
 
+    def from_angles(self, ground: Ground) -> np.ndarray:
+        """(dof,) RMS of the torque that the angles' own noise makes in a ground's test residual: as much again is added, and what
+        that changes is looked at."""
+        rng, noise = np.random.default_rng(0), np.max([piece.noise for piece in ground.test.pieces], axis=0)
+        rougher = [replace(log, segments=tuple(replace(s, q=s.q + noise * rng.normal(size=s.q.shape)) for s in log.segments)) for log in self.test]
+        motion = questioned(rougher, ground.model.robot.joints, CUTOFFS[0])
+        again = rows.predicted(ground.model, motion, ground.settled.x, ground.stride)
+        change = (again - ground.predicted[1]) * ground.held_out.use
+        return np.sqrt((change**2).sum(0) / np.maximum(ground.held_out.use.sum(0), 1))
+
     def as_fitted(self) -> Ground:
         """The fitted model on the logs as the experiment filters them, thinned; its shape values stay."""
         spec = settled(self.experiment.preprocess, self.fit.filters)
@@ -150,7 +160,7 @@ def diagnose(experiment: Experiment, *, fit: Fit | None = None, progress: pipeli
         found = _findings(fitted, fit, floors, ground, other, answers, steps)
         failures = regions.failures(ground, ([r for r in _residuals(fitted, fit, "test")], [p.step for p in fitted.test.pieces]), np.array([floors[j].rms for j in fit.joints]))
         return Diagnosis(
-            fit, floors, tuple(found), tuple(_not_visible(answers)), tuple(_verdict(fit, levels, steps, last, left)), tuple(failures), tuple(steps), ground, last,
+            fit, floors, tuple(found), tuple(_not_visible(answers)), tuple(_verdict(fit, levels, steps, last, left, logs)), tuple(failures), tuple(steps), ground, last,
         )  # fmt: skip
 
 
@@ -318,9 +328,9 @@ def _not_visible(answers: list[Answer]) -> list[Answer]:
 # ---- the verdict
 
 
-def _verdict(fit: Fit, levels, steps, last: Ground, left: list[structure.Structure]) -> list[Verdict]:
+def _verdict(fit: Fit, levels, steps, last: Ground, left: list[structure.Structure], logs: Logs) -> list[Verdict]:
     out = []
-    raw = last.raw_rms()
+    raw, angles = last.raw_rms(), cache(lambda: logs.from_angles(last))
     for j, joint in enumerate(fit.joints):
         own = [s for s in steps if s.head.candidate.joint == j or (s.head.candidate.joint == ROBOT and s.shares[j] >= search.WORTH)]
         after = last.squares[:, j].sum()
@@ -330,7 +340,7 @@ def _verdict(fit: Fit, levels, steps, last: Ground, left: list[structure.Structu
         elif own:
             tied = tuple(dict.fromkeys(a.candidate.name for a in own[0].family[1:] if a.candidate.name != own[0].head.candidate.name))
             out.append(Verdict(joint, "missing", own[0].head.candidate.name, tied, tuple(s.head.candidate.name for s in own[1:]), left[j] if left[j].there else None))
-        elif left[j].there or _far_above(raw[j], levels[joint]):
+        elif left[j].there or (_far_above(raw[j], levels[joint]) and _far_above(np.sqrt(max(raw[j] ** 2 - 2.0 * angles()[j] ** 2, 0.0)), levels[joint])):
             out.append(Verdict(joint, "unknown", structure=left[j]))
         else:
             out.append(Verdict(joint, "complete"))

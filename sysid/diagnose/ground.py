@@ -149,12 +149,12 @@ class Ground:
         idle = [v for v in grown.shape_values if v.term < last or (at_start and v.shape.start is None)]
         held = tuple(((v.term, v.joint, v.shape.name), 0.0) for v in idle)
         slopes = row.tangents(
-            replace(grown, held=(*grown.held, *held)), motion, self.settled.x, self.stride, rows.use, self._predicted[which] if at_start else None
+            replace(grown, held=(*grown.held, *held)), motion, self.settled.x, self.stride, rows.use, self.predicted[which] if at_start else None
         )  # fmt: skip
         return slopes[:, :, [k for k, value in enumerate(grown.shape_values) if value.term == last]]
 
     @cached_property
-    def _predicted(self) -> tuple[np.ndarray, np.ndarray]:
+    def predicted(self) -> tuple[np.ndarray, np.ndarray]:
         """Torque (n, dof) that the model predicts on both motions' rows, low-passed as the columns are."""
         return tuple(row.predicted(self.model, motion, self.settled.x, self.stride) for motion in (self.train, self.test))
 

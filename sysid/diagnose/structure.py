@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
+from scipy.ndimage import gaussian_filter1d
 
 from .ground import Ground, summed
 from .search import away, stands_out
@@ -20,6 +21,7 @@ LEAST, STANDS_OUT = 0.1, 4.0  # share of the held-out square foretold; standard 
 _LARGEST, _CROWDED = 0.1, 0.65
 _KNOTS, _BINS, _FEATURES, _TURNS, _WIDTHS, _RIDGES = 9, 25, 24, 5, (0.25, 0.6, 1.5), np.geomspace(1e-4, 1e2, 7)
 _FOLDS = 5
+_SMOOTH = np.sqrt(np.log(2.0)) / (2.0 * np.pi * 5.0)  # s: a low-pass of 5 Hz
 _LOWEST, _SCATTER = 0.5, 5.0  # Hz; a peak of twenty times its surroundings counts as four standard errors
 
 
@@ -68,18 +70,24 @@ def structures(ground: Ground) -> list[Structure]:
 
 def variables(ground: Ground, part: str) -> dict[str, tuple[str, np.ndarray]]:
     """{name: (unit, (n,) values)} on the rows of a part: q, qd, qdd of every joint, the predicted torque, time."""
-    motion, rows = (ground.train, ground.rows) if part == "train" else (ground.test, ground.held_out)
+    which = part == "test"
+    motion, rows = ((ground.train, ground.rows), (ground.test, ground.held_out))[which]
     robot = ground.model.robot
-    pick = lambda name, j: np.concatenate([  # noqa: E731
-        getattr(piece, name)[rows.index[rows.piece == k], j] for k, piece in enumerate(motion.pieces)
+    own = [rows.index[rows.piece == k] for k in range(len(motion.pieces))]
+    pick = lambda name: np.concatenate([getattr(piece, name)[i] for piece, i in zip(motion.pieces, own)])  # noqa: E731
+    # the encoder's noise is in the residual too: what depends on acceleration must do so where the motion is, not the noise
+    slow = lambda values, step: gaussian_filter1d(values, _SMOOTH / step, axis=0, mode="nearest")  # noqa: E731
+    q, qd = pick("q"), pick("qd")
+    qdd = np.concatenate([slow(piece.qdd, piece.step)[i] for piece, i in zip(motion.pieces, own)])
+    predicted = np.concatenate([
+        slow(ground.predicted[which][rows.piece == k], piece.step * ground.stride) for k, piece in enumerate(motion.pieces)
     ])  # fmt: skip
-    predicted = np.einsum("jnk,k->nj", rows.columns, ground.settled.x)
     out = {}
     for j, (joint, slides) in enumerate(zip(robot.joints, robot.prismatic)):
         base, force = ("m", "N") if slides else ("rad", "N m")
-        out[f"q_{joint}"] = (base, pick("q", j))
-        out[f"qd_{joint}"] = (f"{base}/s", pick("qd", j))
-        out[f"qdd_{joint}"] = (f"{base}/s^2", pick("qdd", j))
+        out[f"q_{joint}"] = (base, q[:, j])
+        out[f"qd_{joint}"] = (f"{base}/s", qd[:, j])
+        out[f"qdd_{joint}"] = (f"{base}/s^2", qdd[:, j])
         out[f"tau_{joint}"] = (force, predicted[:, j])
     return out | {"time": ("s", rows.t)}
 
