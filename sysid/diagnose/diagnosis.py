@@ -334,13 +334,15 @@ def _verdict(fit: Fit, levels, steps, last: Ground, left: list[structure.Structu
     for j, joint in enumerate(fit.joints):
         own = [s for s in steps if s.head.candidate.joint == j or (s.head.candidate.joint == ROBOT and s.shares[j] >= search.WORTH)]
         after = last.squares[:, j].sum()
-        if own and left[j].there and left[j].share * after > _LEFT * (steps[0].before[j] - after):
+        # of what the angles' noise makes, as much again was looked at
+        above = _far_above(raw[j], levels[joint]) and _far_above(np.sqrt(max(raw[j] ** 2 - 2.0 * angles()[j] ** 2, 0.0)), levels[joint])
+        if own and (above or (left[j].there and left[j].share * after > _LEFT * (steps[0].before[j] - after))):
             # what was found is not most of what is wrong
             out.append(Verdict(joint, "unknown", also=tuple(s.head.candidate.name for s in own), structure=left[j]))
         elif own:
             tied = tuple(dict.fromkeys(a.candidate.name for a in own[0].family[1:] if a.candidate.name != own[0].head.candidate.name))
             out.append(Verdict(joint, "missing", own[0].head.candidate.name, tied, tuple(s.head.candidate.name for s in own[1:]), left[j] if left[j].there else None))
-        elif left[j].there or (_far_above(raw[j], levels[joint]) and _far_above(np.sqrt(max(raw[j] ** 2 - 2.0 * angles()[j] ** 2, 0.0)), levels[joint])):
+        elif left[j].there or above:
             out.append(Verdict(joint, "unknown", structure=left[j]))
         else:
             out.append(Verdict(joint, "complete"))
