@@ -50,9 +50,8 @@ def with_effect(text: str, effect: str, joints: list[str] | None, options: dict,
 
     writer = YAML()
     writer.preserve_quotes, writer.width = True, 4096
-    tree = config.parse_yaml(text, where=where)
-    if tree is None:
-        tree = CommentedMap()
+    # checked as every experiment file is, then read once more as it is written
+    tree = CommentedMap() if (only_comments := config.parse_yaml(text, where=where) is None) else writer.load(text)
     model = tree.setdefault("model", CommentedMap())
     if model.get("effects") is None:
         model["effects"] = CommentedSeq(["viscous", "coulomb"])
@@ -77,7 +76,7 @@ def with_effect(text: str, effect: str, joints: list[str] | None, options: dict,
             listed[-1].fa.set_flow_style()
     stream = io.StringIO()
     writer.dump(tree, stream)
-    return stream.getvalue()
+    return (text.rstrip("\n") + "\n" if only_comments and text.strip() else "") + stream.getvalue()
 
 
 def _word(entry) -> str:

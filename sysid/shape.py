@@ -158,6 +158,10 @@ class Projection:
         self._system = sum(2.0 * w**2 * a.T @ a for w, a in zip(self.weights, columns)) + hessian
         self.inverse = inverted(self._system)
         self._inverses = {(): self.inverse}
+        # where a parameter is held at zero the objective still falls away from it: it is no stationary point
+        self._pull = np.zeros(len(self._system))
+        for k in self.positive:
+            self._pull[k] = sum(2.0 * w**2 * a[:, k] @ r for w, a, r in zip(self.weights, columns, residual.T))
 
     def _rest(self, pinned: tuple[int, ...]) -> np.ndarray:
         """The inverse (size, size) where some parameters may not move, zero for these."""
@@ -183,25 +187,23 @@ class Projection:
             right = right + w * (own.T @ self.residual[:, j])
         absorbed = self.inverse @ cross
         system = square - cross.T @ absorbed
-        c = inverted(system) @ right
-        change, gain = -absorbed @ c, 0.5 * float(c @ right)
         size = np.diagonal(square)
         visible = np.clip(np.diagonal(system), 0.0, None) / np.where(size > 0, size, 1.0)
         pinned: tuple[int, ...] = ()
-        for _ in range(len(self.positive)):
+        for _ in range(len(self.positive) + 1):
+            # the least of 1/2 d'Hd - pull'd + d'Xc + 1/2 c'Sc - right'c, with the pinned d taking their parameters to zero
+            inverse, gone = self._rest(pinned), np.zeros(len(self._system))
+            gone[list(pinned)] = [self.positive[k] for k in pinned]
+            absorbed = inverse @ cross
+            base = inverse @ (self._pull + self._system @ gone)
+            c = inverted(square - cross.T @ absorbed) @ (right + cross.T @ gone - cross.T @ base)
+            change = base - absorbed @ c - gone
             # friction that would help by turning negative is taken to zero, and stays there
             below = [k for k, value in self.positive.items() if k not in pinned and value + change[k] < -1e-9 * abs(value)]
             if not below:
                 break
             pinned = tuple(sorted({*pinned, *below}))
-            inverse, gone = self._rest(pinned), np.zeros(len(self._system))
-            gone[list(pinned)] = [self.positive[k] for k in pinned]
-            push = self._system @ gone
-            absorbed = inverse @ cross
-            c = inverted(square - cross.T @ absorbed) @ (right + cross.T @ gone - absorbed.T @ push)
-            change = inverse @ push - absorbed @ c - gone
-            # of the quadratic objective along the whole change
-            gain = float(c @ right) - 0.5 * float(c @ square @ c + 2.0 * change @ cross @ c + change @ self._system @ change)
+        gain = float(c @ right + self._pull @ change) - 0.5 * float(c @ square @ c + 2.0 * change @ cross @ c + change @ self._system @ change)
         return c, change, absorbed, gain, visible
 
 

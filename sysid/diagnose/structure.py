@@ -22,6 +22,7 @@ _LARGEST, _CROWDED = 0.1, 0.65
 _KNOTS, _BINS, _FEATURES, _TURNS, _WIDTHS, _RIDGES = 9, 25, 24, 5, (0.25, 0.6, 1.5), np.geomspace(1e-4, 1e2, 7)
 _FOLDS = 5
 _SMOOTH = np.sqrt(np.log(2.0)) / (2.0 * np.pi * 5.0)  # s: a low-pass of 5 Hz
+_FEWER = (13, 85)  # features: the plain ones, and those with the random ones
 _LOWEST, _SCATTER = 0.5, 5.0  # Hz; a peak of twenty times its surroundings counts as four standard errors
 
 
@@ -173,30 +174,34 @@ def _together(train, test) -> tuple[np.ndarray, np.ndarray]:
 
 def _foretold(a, y, blocks, b, y_test, blocks_test) -> tuple[float, float]:
     """Share of the test rows' squares that ridge regression on the training rows foretells, and its standard errors from
-    zero; the ridge is chosen over blocks of the training rows."""
-    middle = a.mean(0)
-    a, b = a - middle, b - middle
-    scale = np.where(a.std(0) > 1e-9, a.std(0), 1.0)
-    a, b = a / scale, b / scale
+    zero; the ridge, and how many of the features are used, are chosen over blocks of the training rows."""
+    counts = _FEWER + (a.shape[1],) if a.shape[1] > _FEWER[-1] else (a.shape[1],)
     fold = blocks * _FOLDS // (blocks.max() + 1)
+    error, told = min((_learned(a[:, :k], y, fold, b[:, :k]) for k in counts), key=lambda pair: pair[0])
+    if error >= np.sum(y**2):
+        return 0.0, 0.0
+    before, after = summed(blocks_test, np.stack([y_test**2, (y_test - told) ** 2], 1)).T
+    total = before.sum()
+    return (float((total - after.sum()) / total), stands_out(before, after)) if total > 0 else (0.0, 0.0)
+
+
+def _learned(a, y, fold, b) -> tuple[float, np.ndarray]:
+    """Error over the folds at the best ridge, and what is foretold of the test rows with it: never beyond what was foretold of
+    the training rows."""
+    middle, scale, mean = a.mean(0), np.where(a.std(0) > 1e-9, a.std(0), 1.0), y.mean()
+    a, b, y = (a - middle) / scale, (b - middle) / scale, y - mean
     grams = [(a[fold == k].T @ a[fold == k], a[fold == k].T @ y[fold == k]) for k in range(_FOLDS)]
     system, right = sum(g for g, _ in grams), sum(r for _, r in grams)
-    errors = np.zeros(len(_RIDGES))
+    errors, unit = np.zeros(len(_RIDGES)), len(y) / len(_RIDGES)
     for k, (g, r) in enumerate(grams):
         values, vectors = np.linalg.eigh(system - g)
         turned = vectors.T @ (right - r)
         for i, ridge in enumerate(_RIDGES):
-            w = vectors @ (turned / (np.clip(values, 0, None) + ridge * len(y) / len(_RIDGES)))
+            w = vectors @ (turned / (np.clip(values, 0, None) + ridge * unit))
             errors[i] += np.sum((y[fold == k] - a[fold == k] @ w) ** 2)
-    ridge = _RIDGES[int(np.argmin(errors))] * len(y) / len(_RIDGES)
-    w = np.linalg.solve(system + ridge * np.eye(len(system)), right)
-    if errors.min() >= np.sum(y**2):
-        return 0.0, 0.0
-    # beyond what the training rows visited nothing is claimed
-    guess = np.clip(b @ w, (a @ w).min(), (a @ w).max())
-    before, after = summed(blocks_test, np.stack([y_test**2, (y_test - guess) ** 2], 1)).T
-    total = before.sum()
-    return (float((total - after.sum()) / total), stands_out(before, after)) if total > 0 else (0.0, 0.0)
+    w = np.linalg.solve(system + _RIDGES[int(np.argmin(errors))] * unit * np.eye(len(system)), right)
+    inside = a @ w
+    return float(errors.min()), np.clip(b @ w, inside.min(), inside.max()) + mean
 
 
 def _over_time(t, y, blocks) -> tuple[float, float]:
