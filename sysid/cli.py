@@ -191,6 +191,32 @@ def report(experiment: ExperimentPath, as_json: Json = False, out: Out = None, q
 
 
 @app.command()
+def studio(
+    experiment: ExperimentPath,
+    port: Annotated[int, typer.Option("--port", min=0, max=65535, help="Port; 0 takes a free one.")] = 8765,
+    host: Annotated[str, typer.Option("--host", help="Address to serve on. Any but this machine's own needs the token.")] = "127.0.0.1",
+    token: Annotated[Optional[str], typer.Option("--token", help="What whoever opens the page must know (default: made up where --host is not this machine's own).")] = None,  # noqa: UP045
+    no_browser: Annotated[bool, typer.Option("--no-browser", help="Do not open the browser.")] = False,
+    as_json: Json = False, out: Out = None, quiet: Quiet = False,
+) -> None:  # fmt: skip
+    """The report's page alive in the browser: look, add, refit, undo. The experiment file stays the truth."""
+    from .studio.serve import serve
+
+    def ready(address: str) -> None:
+        if as_json:
+            print(json.dumps({"studio": address}), flush=True)
+        elif not quiet or (token is None and "?token=" in address):  # made up: nobody could know it
+            print(f"{address}  (Ctrl-C stops it)", flush=True)
+        if not (no_browser or as_json):
+            import webbrowser
+
+            webbrowser.open(address)
+
+    path = experiment / "config.yaml" if experiment.is_dir() else experiment
+    serve(path, out=out, host=host, port=port, token=token, ready=ready)
+
+
+@app.command()
 def add(
     experiment: ExperimentPath,
     effect: Annotated[str, typer.Argument(help="A word of `sysid effects`, a class my_effects.py:Name, or formula.")],

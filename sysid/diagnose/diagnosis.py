@@ -336,7 +336,7 @@ def _verdict(fit: Fit, levels, steps, last: Ground, left: list[structure.Structu
         after = last.squares[:, j].sum()
         # of what the angles' noise makes, as much again was looked at
         above = _far_above(raw[j], levels[joint]) and _far_above(np.sqrt(max(raw[j] ** 2 - 2.0 * angles()[j] ** 2, 0.0)), levels[joint])
-        if own and (above or (left[j].there and left[j].share * after > _LEFT * (steps[0].before[j] - after))):
+        if own and left[j].there and left[j].share * after > _LEFT * (steps[0].before[j] - after):
             # what was found is not most of what is wrong
             out.append(Verdict(joint, "unknown", also=tuple(s.head.candidate.name for s in own), structure=left[j]))
         elif own:

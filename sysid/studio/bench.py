@@ -15,7 +15,7 @@ from ..errors import SysidError
 from ..model import ROBOT
 from ..report import page as report
 from ..report.sections import sections
-from .desk import Desk, hashed
+from .desk import Changed, Desk, hashed
 from .look import compared
 from .view import View
 from .work import Job, Worker
@@ -60,8 +60,6 @@ class Bench:
         """Fit and diagnose the file as it is, where that was not done yet."""
         sha = self.desk.sync()
         if seen is not None and sha != seen:
-            from .desk import Changed
-
             raise Changed("the experiment file changed", do="reload")
         self._ensure(sha)
         return self.state()
@@ -126,6 +124,7 @@ class Bench:
         job.tell("drawing", 0.0)
         view = View(hashed(text), fit, found, self.desk.run)
         view.looks.warm(lambda share: job.tell("drawing", share))
+        view.film  # noqa: B018 - made once, here
         results.write(fit, self.desk.run)
         results.write_json(self.desk.run / "diagnosis.json", view.said)
         self.keep(key, text, view)
@@ -133,8 +132,9 @@ class Bench:
     def keep(self, key: str, text: str, view: View) -> None:
         """Remember a view, and forget the oldest where they grow too many."""
         with self._lock:
+            for old in [k for k, v in self._views.items() if v.sha == view.sha]:
+                del self._views[old]
             self._views[key] = view
-            self._views.move_to_end(key)
             while len(self._views) > _KEPT or (len(self._views) > 2 and sum(v.samples for v in self._views.values()) > _SAMPLES):
                 self._views.popitem(last=False)
         self.desk.measured(text, view.fit.rms("test"), view.fit.rms("train"))

@@ -18,7 +18,7 @@ from .. import config, loop, pipeline, results
 from ..config import Experiment
 from ..errors import ConfigError, SysidError
 
-_MOST = 200  # texts kept
+_MOST, _LARGEST = 200, 1_000_000  # texts kept; bytes of one
 _EDIT = "edit by hand"
 
 
@@ -42,6 +42,7 @@ class Desk:
         self.run = results.folder(out or Path("runs") / self.name)
         self._store = results.folder(self.run / "studio") / "undo.json"
         self._lock = threading.RLock()
+        self._stamp = None
         self._items, self._at, self._measured, self._before = self._remembered()
 
     # ---- reading
@@ -49,7 +50,10 @@ class Desk:
     def text(self) -> str:
         """The experiment file as it is now. Raises ConfigError."""
         try:
-            return self.path.read_bytes().decode("utf-8")
+            data = self.path.read_bytes()
+            if len(data) > _LARGEST:
+                raise ConfigError(f"an experiment file of {len(data)} bytes", where=str(self.path), allowed=f"at most {_LARGEST}")
+            return data.decode("utf-8")
         except OSError as error:
             raise ConfigError(f"the experiment file cannot be read ({error.strerror})", where=str(self.path), do="check its name") from None
         except UnicodeDecodeError:
@@ -62,6 +66,8 @@ class Desk:
     def sync(self) -> str:
         """The hash of the file now; an edit made elsewhere becomes a step that can be taken back. Raises ConfigError."""
         with self._lock:
+            if self._stamped() != self._stamp:  # another studio was at work on the same run folder
+                self._items, self._at, self._measured, self._before = self._remembered()
             text = self.text()
             if not self._items or self._items[self._at]["text"] != text:
                 known = [k for k, item in enumerate(self._items) if item["text"] == text]
@@ -132,8 +138,7 @@ class Desk:
                 if len(steps) > 1 and steps[-1].get("rms_test") == rms_test:
                     self._before = steps
             self._save()
-            if len(steps := self.history()) > 1:
-                results.write_json(self.run / "history.json", {"steps": [{k: v for k, v in s.items() if k != "sha"} for s in steps]})
+            self._tell()
 
     # ---- inside
 
@@ -152,12 +157,18 @@ class Desk:
             self._write(text, new)
             self._at += by
             self._save()
+            self._tell()
             return hashed(new)
 
     def _write(self, old: str, new: str) -> None:
         if self.text() != old:
             raise Changed("the experiment file changed", do="reload")
         results.write_atomically(self.path, lambda p: p.write_bytes(new.encode("utf-8")))
+
+    def _tell(self) -> None:
+        """Write the steps for `sysid history`, where this page made any."""
+        if any(item["added"] not in (None, _EDIT) for item in self._items):
+            results.write_json(self.run / "history.json", {"steps": [{k: v for k, v in step.items() if k != "sha"} for step in self.history()]})
 
     def _append(self, text: str, added: str | None, joint: str | None) -> None:
         kept = self._items[: self._at + 1] if self._items else []
@@ -168,8 +179,17 @@ class Desk:
 
     def _save(self) -> None:
         results.write_json(self._store, {"items": self._items, "at": self._at, "measured": self._measured, "before": self._before})
+        self._stamp = self._stamped()
+
+    def _stamped(self) -> tuple | None:
+        try:
+            found = self._store.stat()
+            return found.st_mtime_ns, found.st_size, found.st_ino
+        except OSError:
+            return None
 
     def _remembered(self) -> tuple[list[dict], int, dict, list]:
+        self._stamp = self._stamped()
         try:
             found = json.loads(self._store.read_text(encoding="utf-8"))
             items = [{"text": str(i["text"]), "added": i["added"], "joint": i["joint"]} for i in found["items"]]

@@ -11,10 +11,13 @@ from __future__ import annotations
 
 import hmac
 import ipaddress
+import re
 import secrets
 import socket
 from http.cookies import CookieError, SimpleCookie
 from urllib.parse import parse_qs
+
+from ..errors import SysidError
 
 _LOCAL = ("127.0.0.1", "localhost", "[::1]")
 _LARGEST = 65536  # bytes of a request
@@ -33,10 +36,21 @@ def is_local(host: str) -> bool:
     return host in ("localhost", "127.0.0.1", "::1", "[::1]")
 
 
+def checked(token: str) -> str:
+    """A token that an address and a cookie can carry. Raises SysidError."""
+    if not re.fullmatch(r"[A-Za-z0-9_.~-]+", token):
+        raise SysidError("this token cannot stand in an address", where="--token", allowed="letters, digits, - _ . ~, at least one", do="leave it out to have one made up")
+    return token
+
+
 class Guard:
     """Wraps the application (ASGI)."""
 
     def __init__(self, app, *, host: str, port: int, token: str | None = None, csrf: str | None = None):
+        if token is None and not is_local(host):
+            raise ValueError("an address that others reach needs a token")
+        if token is not None:
+            checked(token)
         self._app, self._token = app, token
         self.csrf = csrf or secrets.token_urlsafe(32)
         self.cookie = f"sysid_{port}"
@@ -50,6 +64,8 @@ class Guard:
         if scope["type"] != "http":
             if scope["type"] == "lifespan":
                 await self._app(scope, receive, send)
+            elif scope["type"] == "websocket":
+                await send({"type": "websocket.close", "code": 1008})
             return
         headers: dict[str, list[str]] = {}
         for name, value in scope["headers"]:

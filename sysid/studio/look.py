@@ -61,12 +61,14 @@ class Looks:
             return self._removed[k]
 
     def _explained(self, k: int) -> np.ndarray:
-        ground, answer = self.ground, self.diagnosis.findings[k].answer
-        candidate, shapes = answer.candidate, answer.shapes
+        ground, finding = self.ground, self.diagnosis.findings[k]
+        candidate, shapes = finding.answer.candidate, finding.answer.shapes
         use = ground.held_out.use
-        starts = {s.name: s.start for s in candidate.effect.shapes()}
-        if candidate.curved and any(shapes[name] != start for name, start in starts.items() if start is not None):
-            grown = Ground(ground.experiment, ground.grown(candidate, shapes), ground.train, ground.test, ground.prior, stride=ground.stride, weights=ground.weights, hold=True)
+        if finding.step == 0:
+            grown = self.diagnosis.steps[0].ground
+            return (ground.residual_test - grown.residual_test) * use
+        if candidate.effect.shapes():  # the answer stands at a point of a grid: from there to the best
+            grown = Ground(ground.experiment, ground.grown(candidate, shapes), ground.train, ground.test, ground.prior, stride=ground.stride, weights=ground.weights, grid=False)
             return (ground.residual_test - grown.residual_test) * use
         c, change, *_ = ground.projection.step(ground.signature(candidate, shapes, "train"), candidate.joint)
         held_out = ground.signature(candidate, shapes, "test")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from functools import cached_property
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from ..report import fitted
 from ..report.sections import sections
 from ..report.words import units
 from .look import Looks
+from .play import play
 
 ORDER = ("verdict", "steps", "suspects", "look", "torque", "failures", "unseen", "parameters", "bodies", "provenance")
 
@@ -27,6 +29,11 @@ class View:
         made = sections(fit, diagnosis, self.said, [])
         self._html = {name: {"title": section["title"], "html": section["html"]} for name, section in made.items() if name != "steps"}
         self._charts = {chart["id"]: dumped(chart) for section in made.values() for chart in section["charts"]}
+
+    @cached_property
+    def film(self) -> bytes:
+        """The test logs played on the robot."""
+        return dumped(play(self.looks))
 
     @property
     def samples(self) -> int:

@@ -9,8 +9,9 @@ from dataclasses import dataclass, field
 
 from ..errors import SysidError
 
-_WORDS = {"compress": "fitting", "ask": "asking what is missing"}
+_WORDS = {"starting": "reading the logs", "compress": "fitting", "ask": "asking what is missing"}
 _FIT, _FIRST = 0.2, 0.5  # shares of a job that the fit takes, and the first round of questions
+_SHARES = {"starting": (0.0, 0.0), "compress": (0.0, _FIT), "drawing": (0.97, 1.0)}
 
 
 class Cancelled(Exception):
@@ -24,7 +25,7 @@ class Job:
     number: int
     sha: str
     state: str = "running"
-    stage: str = "starting"
+    stage: str = "waiting for its turn"
     share: float = 0.0
     error: str | None = None
     stop: threading.Event = field(default_factory=threading.Event)
@@ -36,13 +37,15 @@ class Job:
             raise Cancelled
         word = stage.partition(",")[0]
         self.stage = _WORDS.get(word, word) + stage[len(word) :]
-        if word == "compress":
-            now = _FIT * share
+        if word in _SHARES:
+            low, high = _SHARES[word]
+            now = low + (high - low) * share
         else:
             if stage not in self._rounds:
                 self._rounds.append(stage)
             before = len(self._rounds) - 1
             now = _FIT + _FIRST * share if not before else 1.0 - (1.0 - _FIT - _FIRST) * 0.5 ** (before - 1) * (1.0 - 0.5 * share)
+            now = min(now, 0.97)
         self.share = max(self.share, min(now, 0.99))
 
     def document(self) -> dict:

@@ -1,0 +1,530 @@
+"""The studio: what the page's requests do to the experiment file, and who may make them."""
+
+import copy
+import html
+import json
+import math
+import shutil
+import socket
+import subprocess
+import sys
+import threading
+import time
+from dataclasses import replace
+
+import anyio
+import httpx
+import numpy as np
+import pytest
+
+from sysid import loop
+from sysid.diagnose.diagnosis import diagnose
+from sysid.errors import SysidError
+from sysid.studio import bench as benches
+from sysid.studio import guard, page
+from sysid.studio.app import application
+from sysid.studio.bench import Bench
+from sysid.studio.desk import Desk, hashed
+from sysid.studio.serve import serve
+from sysid.studio.view import View
+from sysid.studio.work import Cancelled, Job, Worker
+from tests.test_report import EVIL, Elements, written
+
+PORT, CSRF = 8765, "of-this-start"
+HOME = f"http://127.0.0.1:{PORT}"
+
+
+def rippled(folder):
+    """An arm whose first joint has a name that looks like markup, and a ripple over its angle that its model lacks."""
+    written(folder, 0.0)
+    for file in folder.glob("*.csv"):
+        head, *rows = file.read_text().splitlines()
+        q, tau = (head.split(",").index(f"{column}_{EVIL}") for column in ("q", "tau"))
+        rows = [row.split(",") for row in rows]
+        for row in rows:
+            row[tau] = repr(float(row[tau]) + 0.5 * math.sin(6.0 * float(row[q])))
+        file.write_text("\n".join([head, *(",".join(row) for row in rows)]) + "\n")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def arm(tmp_path_factory):
+    """The folder of that arm, and what is found on it."""
+    folder = rippled(tmp_path_factory.mktemp("studio") / "arm")
+    experiment = loop.pipeline.load(folder)
+    found = diagnose(experiment)
+    return folder, View(hashed((folder / "config.yaml").read_text()), found.fit, found)
+
+
+def told(bench, job, text, view):
+    """What a job finds, from a diagnosis made before."""
+    own = copy.copy(view)
+    own.sha, own._charts, own.fit = hashed(text), dict(view._charts), replace(view.fit, experiment=bench.desk.experiment(text))
+    job.tell("compress", 0.5)
+    bench.keep(benches._key(text, bench.desk.experiment(text)), text, own)
+
+
+@pytest.fixture
+def opened(arm, tmp_path, monkeypatch):
+    """A studio on a copy of the folder whose jobs are done at once: (bench, client, post, file)."""
+    folder = shutil.copytree(arm[0], tmp_path / "arm")
+    monkeypatch.setattr(Bench, "_work", lambda self, job, text: told(self, job, text, arm[1]))
+    return studio(folder, tmp_path / "run")
+
+
+class TestClient:
+    """Requests to an application, each in an event loop of its own, so that threads may make them; cookies are kept."""
+
+    __test__ = False
+
+    def __init__(self, app, base_url=HOME):
+        self.app, self.base_url, self.cookies = app, base_url, httpx.Cookies()
+
+    def request(self, method, path, follow_redirects=True, **more):
+        async def ask():
+            async with httpx.AsyncClient(transport=httpx.ASGITransport(self.app), base_url=self.base_url, cookies=self.cookies, follow_redirects=follow_redirects) as client:
+                answer = await client.request(method, path, **more)
+                self.cookies.update(client.cookies)
+                return answer
+
+        return anyio.run(ask)
+
+    def __getattr__(self, method):
+        return lambda path, **more: self.request(method.upper(), path, **more)
+
+
+class studio:
+    def __init__(self, folder, run, **more):
+        self.file, self.run = folder / "config.yaml", run
+        self.bench = Bench(folder, run)
+        self.client = TestClient(application(self.bench, port=PORT, csrf=CSRF, **more), base_url=HOME)
+        self.bench.run()
+        self.wait()
+
+    def get(self, path, **words):
+        return self.client.get(path, params=words)
+
+    def post(self, path, headers=(), **body):
+        return self.client.post(path, json=body, headers={"x-sysid-csrf": CSRF, **dict(headers)})
+
+    @property
+    def sha(self):
+        return self.get("/api/state").json()["sha"]
+
+    def wait(self, seconds=60.0):
+        end = time.monotonic() + seconds
+        while time.monotonic() < end:
+            state = self.get("/api/state").json()
+            if state["job"] is None or state["job"]["state"] not in ("running", "cancelling"):
+                return state
+            time.sleep(0.02)
+        raise AssertionError("the job does not end")
+
+
+# ---- the way a user goes
+
+
+def test_add_for_real_error_falls_and_undo_is_at_hand(arm, tmp_path):
+    folder = shutil.copytree(arm[0], tmp_path / "arm")
+    before = (folder / "config.yaml").read_bytes()
+    own = studio(folder, tmp_path / "run")
+    state = own.wait()
+    assert state["job"]["state"] == "done" and state["ready"]
+    first = own.get("/api/view", sha=state["sha"]).json()
+    assert first["offered"][0] == {"finding": 0, "step": 1, "effect": "cogging", "joint": EVIL}
+    added = own.post("/api/add", sha=state["sha"], finding=0).json()
+    assert added["sha"] != state["sha"] and added["undo"] == f"cogging on {EVIL}"
+    assert b"cogging" in own.file.read_bytes() and b"alert(4)" in own.file.read_bytes()
+    assert own.wait()["ready"]
+    second = own.get("/api/view", sha=added["sha"]).json()
+    assert "missing" not in [v["status"] for v in second["verdict"]] and second["steps"] == ["start", f"+ cogging on {EVIL}"]
+    found = own.get("/api/compare", **{"from": 0, "to": 1}).json()["joints"][0]
+    assert found["delta"] < -0.1 and found["se"] < -0.2 * found["delta"]
+    steps = loop.read_history(own.run)
+    assert [s["added"] for s in steps] == [None, "cogging"] and steps[1]["rms_test"][EVIL] < steps[0]["rms_test"][EVIL]
+    start = time.monotonic()
+    state = own.post("/api/undo", sha=added["sha"]).json()
+    assert state["ready"] and own.file.read_bytes() == before
+    assert own.get("/api/view", sha=state["sha"]).json()["steps"] == ["start"]
+    assert time.monotonic() - start < 1.0
+    assert (own.run / "fit.json").is_file() and (own.run / "diagnosis.json").is_file()
+
+
+def test_undo_and_redo_are_found_again_after_a_restart(opened, tmp_path):
+    before = opened.file.read_text()
+    sha = opened.post("/api/add", sha=opened.sha, effect="stribeck", joint="elbow").json()["sha"]
+    opened.wait()
+    after = opened.file.read_text()
+    sha = opened.post("/api/undo", sha=sha).json()["sha"]
+    again = studio(opened.file.parent, opened.run)
+    state = again.wait()
+    assert state["sha"] == sha and state["undo"] is None and state["redo"] == "stribeck on elbow"
+    sha = again.post("/api/redo", sha=sha).json()["sha"]
+    assert again.file.read_text() == after
+    assert [step["added"] for step in loop.read_history(opened.run)] == [None, "stribeck"]
+    again = studio(opened.file.parent, opened.run)
+    assert again.get("/api/view", sha=again.sha).json()["steps"] == ["start", "+ stribeck on elbow"]
+    again.post("/api/undo", sha=sha)
+    assert again.file.read_text() == before and [step["added"] for step in loop.read_history(opened.run)] == [None]
+
+
+def test_two_studios_on_one_experiment_share_its_steps(opened):
+    other = studio(opened.file.parent, opened.run)
+    sha = opened.post("/api/add", sha=opened.sha, effect="stribeck", joint="elbow").json()["sha"]
+    opened.wait()
+    assert other.sha == sha and other.get("/api/state").json()["undo"] == "stribeck on elbow"
+    sha = other.post("/api/add", sha=sha, formula="a*sin(3*q)", joint="elbow").json()["sha"]
+    other.wait()
+    assert opened.get("/api/state").json()["undo"] == "a*sin(3*q) on elbow"
+    sha = opened.post("/api/undo", sha=sha).json()["sha"]
+    assert other.get("/api/state").json()["redo"] == "a*sin(3*q) on elbow" and other.sha == sha
+
+
+def test_an_undo_that_was_spoilt_begins_anew(opened):
+    (opened.run / "studio" / "undo.json").write_text('{"items": [{}], "at": 7}')
+    again = studio(opened.file.parent, opened.run)
+    assert again.wait()["ready"] and again.get("/api/state").json()["undo"] is None
+
+
+# ---- two tabs, an editor
+
+
+def test_what_was_thought_for_another_text_is_refused(opened):
+    seen = opened.sha
+    assert opened.post("/api/add", sha=seen, effect="stribeck", joint="elbow").status_code == 200
+    text = opened.file.read_text()
+    for path, body in (("add", {"finding": 0}), ("add", {"effect": "armature", "joint": "elbow"}), ("add", {"formula": "a*q"}), ("undo", {}), ("redo", {}), ("run", {})):
+        answer = opened.post(f"/api/{path}", sha=seen, **body)
+        assert answer.status_code == 409 and answer.json()["changed"] and "reload" in answer.json()["error"]
+    assert opened.file.read_text() == text
+
+
+def test_an_edit_elsewhere_is_noticed_and_can_be_taken_back(opened):
+    seen, before = opened.sha, opened.file.read_text()
+    opened.file.write_text(before + "# by hand\n")
+    assert opened.post("/api/add", sha=seen, finding=0).status_code == 409
+    state = opened.get("/api/state").json()
+    assert state["sha"] != seen and state["undo"] == "edit by hand" and not state["ready"]
+    opened.post("/api/undo", sha=state["sha"])
+    assert opened.file.read_text() == before
+    state = opened.get("/api/state").json()
+    opened.post("/api/redo", sha=state["sha"])
+    assert opened.file.read_text().endswith("# by hand\n")
+
+
+def test_a_log_that_changed_makes_the_results_stale(opened):
+    assert opened.get("/api/state").json()["ready"]
+    log = opened.file.parent / "test.csv"
+    log.write_text(log.read_text() + "\n")
+    state = opened.get("/api/state").json()
+    assert not state["ready"] and state["sha"] == opened.sha
+    assert opened.post("/api/run", sha=state["sha"]).json()["job"]["number"] == 2 and opened.wait()["ready"]
+
+
+def test_many_tabs_at_once_make_one_change(opened):
+    seen, answers = opened.sha, []
+    work = lambda k: answers.append(opened.post("/api/add", sha=seen, formula=f"a*sin({k}*q)", joint="elbow").status_code)  # noqa: E731
+    threads = [threading.Thread(target=work, args=(k,)) for k in range(2, 8)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert sorted(answers) == [200] + [409] * 5
+    assert opened.file.read_text().count("sin(") == 1
+    opened.bench.desk.experiment(opened.file.read_text())
+
+
+# ---- what is refused, with the file as it was
+
+
+@pytest.mark.parametrize(
+    "body, words",
+    [
+        ({"formula": "import os", "joint": "elbow"}, "formula"), ({"formula": "__import__('os')", "joint": "elbow"}, ""), ({"formula": " "}, "no formula"), ({"formula": "a*q", "joint": "nowhere"}, "nowhere"),
+        ({"formula": "a*q: [", "joint": "elbow"}, ""), ({"effect": "../../etc/passwd:Thing", "joint": "elbow"}, "no such effect"), ({"effect": "own.py:Thing"}, "no such effect"),
+        ({"effect": "viscous", "joint": "elbow"}, "already"), ({"finding": 99}, "no such suspect"), ({"finding": -1}, "no such suspect"), ({"finding": True}, "number"), ({"finding": "0"}, "number"),
+        ({"effect": 3}, "text"), ({}, "effect must be"),
+    ],
+)  # fmt: skip
+def test_bad_additions_say_so_in_one_line(opened, body, words):
+    before = opened.file.read_bytes()
+    answer = opened.post("/api/add", sha=opened.sha, **body)
+    assert answer.status_code == 422 and words in answer.json()["error"] and "\n" not in answer.json()["error"]
+    assert opened.file.read_bytes() == before and opened.get("/api/state").json()["undo"] is None
+
+
+def test_a_formula_goes_into_the_file(opened):
+    opened.post("/api/add", sha=opened.sha, formula="a*sin(3*q)", joint="elbow")
+    (entry,) = [e for e in opened.bench.desk.experiment(opened.file.read_text()).model.effects if e.name == "formula"]
+    assert entry.options["formula"] == "a*sin(3*q)" and entry.joints == ["elbow"]
+    assert opened.wait()["undo"] == "a*sin(3*q) on elbow"
+
+
+def test_a_file_that_cannot_be_meant_is_said_on_the_page(opened):
+    opened.file.write_text("modle: {}\n")
+    answer = opened.post("/api/run")
+    assert answer.status_code == 200
+    state = opened.wait()
+    assert state["job"]["state"] == "failed" and "modle" in state["job"]["error"] and not state["ready"]
+    opened.file.unlink()
+    state = opened.get("/api/state").json()
+    assert state["sha"] is None and "cannot be read" in state["error"]
+    assert opened.get("/").status_code == 200
+
+
+def test_unknown_things_are_not_found(opened):
+    sha = opened.sha
+    for path, words in (("view", {"sha": "x"}), ("residual", {"sha": sha, "joint": 9}), ("residual", {"sha": sha, "joint": 0, "finding": 99}), ("residual", {"sha": sha, "joint": "x"}), ("stretch", {"sha": sha, "from": "nan", "to": 1}), ("compare", {"from": 0, "to": 9})):
+        assert opened.get(f"/api/{path}", **words).status_code == 422, path
+    assert opened.get("/api/figure", sha=sha, id="../../etc/passwd").status_code == 404
+    for path in ("/../pyproject.toml", "/api", "/export/../../x", "/%2e%2e/%2e%2e/etc/passwd", "/studio/undo.json"):
+        assert opened.get(path).status_code == 404
+
+
+# ---- answers without a refit
+
+
+def test_preview_is_what_the_suspect_removes(arm):
+    _, view = arm
+    looks = view.looks
+    for k, finding in enumerate(view.diagnosis.findings):
+        own = looks.own(k)
+        left = ((looks.ground.residual_test - looks.removed(k)) ** 2).sum(0)[own]
+        if finding.answer.candidate.effect.shapes():  # found on a grid, refined for the preview
+            assert left.sum() < 1.05 * finding.answer.squares[:, own].sum()
+        else:
+            np.testing.assert_allclose(left, finding.answer.squares.sum(0)[own], rtol=0.01 if finding.step == 0 else 1e-9)
+    bare, with_one = looks.residual(0), looks.residual(0, 0)
+    assert len(bare["chart"]["figure"]["data"]) == 1 and len(with_one["chart"]["figure"]["data"]) == 2
+    assert with_one["explained"] < 0.7 * with_one["rms"] == 0.7 * bare["rms"]
+    assert with_one["explained"] == pytest.approx(view.diagnosis.steps[0].ground.rms()[0])
+
+
+def test_the_film_shows_every_joint_at_every_moment(arm):
+    film = json.loads(arm[1].film)
+    count = len(film["time"])
+    assert 50 < count <= 300 and film["time"] == sorted(film["time"]) and film["names"] == [EVIL, "elbow"]
+    assert all(len(film[key]) == count for key in ("links", "joints", "levels"))
+    elbow = np.array([[axis[1] for axis in frame] for frame in film["joints"]])
+    np.testing.assert_allclose(np.linalg.norm(elbow - [0, 0, 1], axis=1), 0.4, atol=1e-3)  # on a circle about the shoulder
+    known = [v for levels in film["levels"] for v in levels if v is not None]  # none where a joint stands still throughout
+    assert 0.5 < np.mean(known) < 1.2 and EVIL not in film["chart"]["figure"]["data"][1]["text"]
+
+
+def test_a_stretch_of_time_names_the_suspect(arm):
+    looks = arm[1].looks
+    whole = looks.stretch(-1.0, 1e6)
+    assert whole["suspects"][0]["effect"] == "cogging" and whole["suspects"][0]["joint"] == EVIL and whole["suspects"][0]["share"] > 0.5
+    for entry in whole["joints"]:
+        assert entry["here"] == pytest.approx(entry["whole"])
+    half = looks.stretch(4.0, 2.0)
+    assert half["from"] == 2.0 and 0 < half["rows"] < whole["rows"]
+    assert looks.stretch(50.0, 60.0)["rows"] == 0 and looks.stretch(50.0, 60.0)["suspects"] == []
+
+
+# ---- jobs
+
+
+def test_a_job_stops_where_it_tells_and_the_next_one_runs():
+    worker, begun, done = Worker(), threading.Event(), []
+
+    def endless(job):
+        while True:
+            begun.set()
+            job.tell("ask", 0.5)
+            time.sleep(0.005)
+
+    first = worker.start("a", endless)
+    assert begun.wait(5) and worker.start("a", endless) is first
+    worker.start("b", lambda job: done.append(1))
+    end = time.monotonic() + 5
+    while worker.job.state == "running" and time.monotonic() < end:
+        time.sleep(0.01)
+    assert first.state == "cancelled" and worker.job.state == "done" and done == [1]
+
+
+def test_shares_of_a_job_only_rise():
+    job, shares = Job(1, "x"), []
+    for stage, share in [("starting", 0), ("compress", 0.5), ("compress", 1), ("compress", 0.2), ("ask", 0.5), ("ask", 1), ("ask, with stribeck", 0.1), ("ask, with stribeck", 1), ("ask, with x", 0.5), ("drawing", 0)]:
+        job.tell(stage, share)
+        shares.append(job.share)
+    assert shares == sorted(shares) and shares[-1] < 1 and shares[0] == 0
+    job.stop.set()
+    with pytest.raises(Cancelled):
+        job.tell("ask", 1)
+
+
+def test_cancel_keeps_the_page_answering_and_the_file_whole(arm, tmp_path):
+    folder = shutil.copytree(arm[0], tmp_path / "arm")
+    own = studio.__new__(studio)
+    own.file, own.run, own.bench = folder / "config.yaml", tmp_path / "run", Bench(folder, tmp_path / "run")
+    own.client = TestClient(application(own.bench, port=PORT, csrf=CSRF), base_url=HOME)
+    before = own.file.read_bytes()
+    assert own.post("/api/run").json()["job"]["state"] == "running"
+    own.post("/api/cancel")
+    state = own.wait()
+    assert state["job"]["state"] == "cancelled" and not state["ready"] and own.file.read_bytes() == before
+    assert own.post("/api/run", sha=state["sha"]).json()["job"]["number"] == 2
+    own.post("/api/cancel")
+    own.wait()
+
+
+def test_a_mistake_of_ours_ends_the_job_not_the_studio(opened, monkeypatch, capsys):
+    monkeypatch.setattr(Bench, "_work", lambda self, job, text: 1 / 0)
+    opened.post("/api/add", sha=opened.sha, effect="stribeck", joint="elbow")
+    state = opened.wait()
+    assert state["job"]["state"] == "failed" and "ZeroDivisionError" in state["job"]["error"] and state["undo"]
+    assert opened.post("/api/undo", sha=state["sha"]).json()["ready"]
+
+
+# ---- who may ask
+
+
+async def chunks():
+    yield b"{}"
+
+
+@pytest.mark.parametrize("headers", [{"host": "evil.example"}, {"host": "evil.example:8765"}, {"host": "127.0.0.1"}, {"host": "127.0.0.1:80"}, {"host": "localhost:8765.evil.example"}, {"origin": "http://evil.example"}, {"origin": "null"}, {"origin": "http://127.0.0.1:9999"}, {"origin": "https://127.0.0.1:8765"}, {"sec-fetch-site": "cross-site"}, {"sec-fetch-site": "same-site"}])  # fmt: skip
+def test_other_pages_are_refused(opened, headers):
+    for path in ("/", "/api/state", "/studio.js", "/export/experiment.yaml"):
+        assert opened.client.get(path, headers=headers).status_code == 403
+    before = opened.file.read_bytes()
+    assert opened.post("/api/add", headers, sha=opened.sha, finding=0).status_code == 403
+    assert opened.file.read_bytes() == before
+
+
+@pytest.mark.parametrize("host", ["127.0.0.1:8765", "localhost:8765", "LOCALHOST:8765", "[::1]:8765"])
+def test_this_machine_s_names_are_welcome(opened, host):
+    assert opened.client.get("/", headers={"host": host, "sec-fetch-site": "none"}).status_code == 200
+    assert opened.client.get("/api/state", headers={"host": host, "origin": f"http://{host.lower()}", "sec-fetch-site": "same-origin"}).status_code == 200
+
+
+def test_changes_need_post_json_and_the_header(opened):
+    sha, good = opened.sha, {"x-sysid-csrf": CSRF}
+    before = opened.file.read_bytes()
+    for path in ("run", "cancel", "undo", "redo", "add"):
+        path = f"/api/{path}"
+        assert opened.client.get(path).status_code == 405
+        for method in ("put", "delete", "patch", "options"):
+            assert getattr(opened.client, method)(path, headers=good).status_code == 405
+        assert opened.client.post(path, json={"sha": sha}).status_code == 403
+        assert opened.client.post(path, json={"sha": sha}, headers={"x-sysid-csrf": "guess"}).status_code == 403
+        for kind in ("text/plain", "application/x-www-form-urlencoded", "multipart/form-data"):
+            assert opened.client.post(path, content=json.dumps({"sha": sha}), headers={**good, "content-type": kind}).status_code == 415
+        for bad in ("[]", "{", "7", '"x"', "[" * 30000):
+            assert opened.client.post(path, content=bad, headers={**good, "content-type": "application/json"}).status_code == 400
+        assert opened.client.post(path, content=b"x" * 70000, headers={**good, "content-type": "application/json"}).status_code == 413
+        assert opened.client.post(path, content=chunks(), headers={**good, "content-type": "application/json"}).status_code == 413
+    assert opened.file.read_bytes() == before
+
+
+def test_a_token_is_asked_of_everyone(opened):
+    app = application(opened.bench, host="192.0.2.7", port=PORT, token="geheim", csrf=CSRF)
+    home = f"http://192.0.2.7:{PORT}"
+    for path in ("/", "/?token=wrong", "/api/state", "/studio.js", "/api/state?token=geheim"):
+        assert TestClient(app, base_url=home).get(path).status_code == 401, path
+    assert TestClient(app, base_url=home).post("/api/run", json={}, headers={"x-sysid-csrf": CSRF}).status_code == 401
+    client = TestClient(app, base_url=home)
+    first = client.get("/?token=geheim", follow_redirects=False)
+    assert first.status_code == 303 and first.headers["location"] == "/"
+    assert {"HttpOnly", "SameSite=Strict"} <= {part.strip() for part in first.headers["set-cookie"].split(";")}
+    assert client.get("/").status_code == 200 and client.get("/api/state").status_code == 200
+    assert TestClient(app, base_url=home).get("/api/state", headers={"authorization": "Bearer geheim"}).status_code == 200
+    assert client.get("/", headers={"host": "evil.example:8765"}).status_code == 403
+
+
+@pytest.mark.parametrize("token", [None, "", "with space", "semi;colon", "ümlaut"])
+def test_no_address_is_served_to_others_without_a_token(opened, token):
+    with pytest.raises((ValueError, SysidError)):
+        application(opened.bench, host="0.0.0.0", port=PORT, token=token)
+    if token is not None:
+        with pytest.raises(SysidError, match="token"):
+            serve(opened.file, host="127.0.0.1", port=0, token=token, out=opened.run)
+
+
+def test_bound_to_every_address_names_of_others_are_refused(opened):
+    app = application(opened.bench, host="0.0.0.0", port=PORT, token="geheim")
+    auth = {"authorization": "Bearer geheim"}
+    for host, status in (("192.0.2.7:8765", 200), ("[2001:db8::1]:8765", 200), (f"{socket.gethostname()}:8765", 200), ("evil.example:8765", 403), ("192.0.2.7:80", 403), ("192.0.2.7", 403)):
+        assert TestClient(app).get("/api/state", headers={"host": host, **auth}).status_code == status, host
+
+
+def test_every_answer_carries_the_policy(opened):
+    for path in ("/", "/studio.js", "/studio.css", "/plotly.js", "/api/state", "/nowhere"):
+        answer = opened.get(path)
+        policy = answer.headers["content-security-policy"]
+        assert "default-src 'none'" in policy and "frame-ancestors 'none'" in policy and "script-src 'self' 'unsafe-eval';" in policy and "http:" not in policy
+        assert answer.headers["x-content-type-options"] == "nosniff"
+    assert opened.client.get("/", headers={"host": "evil"}).headers["content-security-policy"] == guard.POLICY
+
+
+# ---- names are text
+
+
+def test_names_show_as_text(opened, arm):
+    shell = page.shell(EVIL, '"><b>')
+    assert EVIL not in shell and html.escape(EVIL) in shell and '"><b>' not in shell
+    assert [tag for tag, _ in Elements(shell).found].count("script") == 1
+    assert "innerHTML" not in page.script().replace("section.innerHTML = part.html;", "")
+    view = opened.get("/api/view", sha=opened.sha).json()
+    for name, section in view["sections"].items():
+        assert EVIL not in section["html"], name
+        assert not [1 for tag, a in Elements(section["html"]).found if tag in ("script", "iframe", "object") or any(k.startswith("on") for k in a)]
+    for joint in range(2):
+        chart = opened.get("/api/residual", sha=opened.sha, joint=joint, finding=0)
+        assert "<b>" not in chart.text and chart.headers["content-type"] == "application/json"
+
+
+def test_exports_are_the_report_and_the_file(opened):
+    report = opened.get("/export/report.html", sha=opened.sha)
+    assert report.status_code == 200 and "attachment" in report.headers["content-disposition"]
+    assert '<section id="verdict"' in report.text and EVIL not in report.text.partition("<script")[0]
+    yaml = opened.get("/export/experiment.yaml")
+    assert yaml.content == opened.file.read_bytes() and "attachment" in yaml.headers["content-disposition"]
+
+
+# ---- the command
+
+
+def test_a_port_that_is_taken_is_one_line(cli, experiment):
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        said = cli("studio", experiment(), "--port", taken.getsockname()[1], "--no-browser")
+    assert said.status == 2 and len(said.err.splitlines()) == 1 and "--port" in said.err
+
+
+def test_an_experiment_that_is_not_there_is_one_line(cli, tmp_path):
+    said = cli("studio", tmp_path / "nothing.yaml", "--no-browser")
+    assert said.status == 2 and "cannot be read" in said.err and len(said.err.splitlines()) == 1
+
+
+def test_without_the_extra_it_says_what_to_install(cli, experiment, monkeypatch):
+    monkeypatch.setitem(sys.modules, "uvicorn", None)
+    said = cli("studio", experiment(), "--no-browser")
+    assert said.status == 2 and "sysid[studio]" in said.err and len(said.err.splitlines()) == 1
+
+
+def test_the_command_serves_until_interrupted(experiment, tmp_path):
+    import signal
+    import urllib.request
+
+    folder = experiment()
+    run = [sys.executable, "-m", "sysid", "studio", str(folder), "--port", "0", "--token", "t", "--json", "--out", str(tmp_path / "run")]
+    with subprocess.Popen(run, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        try:
+            address = json.loads(process.stdout.readline())["studio"]
+            assert address.startswith("http://127.0.0.1:") and address.endswith("?token=t")
+            asked = urllib.request.Request(address.partition("?")[0] + "api/state", headers={"authorization": "Bearer t"})
+            with urllib.request.urlopen(asked, timeout=10) as answer:
+                assert json.load(answer)["name"] == "experiment"
+        finally:
+            process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=30)
+    assert process.returncode == 0 and err == "" and out == ""
+
+
+def test_the_desk_refuses_a_run_folder_that_cannot_be(arm, tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(SysidError):
+        Desk(arm[0], tmp_path / "file" / "run")
