@@ -164,14 +164,6 @@ def test_rows_at_standstill_are_left_out_with_what_the_filters_see_of_them():
     assert 0.4 < piece.use[:, 0].mean() < 1.0
 
 
-def test_rows_near_any_reversal_are_left_out():
-    """A law's jump at a reversal reaches no row that counts: there both sides' filters see one sign."""
-    t = np.arange(8000) * STEP
-    (piece,) = questioned([a_log(t, *smooth(t)[:2])], planar().joints, 15.0).pieces
-    sign = piece.smoother(np.sign(piece.qd), axis=0)[piece.core]
-    np.testing.assert_allclose(np.abs(sign[piece.use[piece.core]]), 1.0, atol=1e-12)
-
-
 def test_logs_too_short_for_the_low_pass_give_no_domain():
     t = np.arange(120) * STEP
     q, qd, qdd = smooth(t)

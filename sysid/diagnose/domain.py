@@ -108,9 +108,7 @@ def _piece(number: int, source: str, segment, cutoff: float) -> Piece | None:
 def _moving(piece: Piece, threshold) -> Piece:
     """The piece without each joint's rows at standstill, or within sight of one through the filters."""
     still = np.abs(piece.qd) < threshold
-    turns = piece.qd[1:] * piece.qd[:-1] < 0.0  # fast reversals pass standstill between two samples
-    still[1:] |= turns
-    still[:-1] |= turns
+    # a reversal that passes standstill between two samples stays: both sides see its jump alike, and slow friction lives there
     reach = round(1.25 * piece.smoother.reach)  # the angles' filter sees a quarter as far
     count = np.cumsum(np.concatenate([np.zeros((1, still.shape[1])), still]), axis=0)
     rows = np.arange(len(still))
