@@ -34,6 +34,10 @@ class Candidate:
         """Whether it has no columns of its own, only slopes."""
         return isinstance(self.effect, (MotionEffect, SensorEffect))
 
+    def judged_by(self, dof: int) -> list[int]:
+        """The joints whose error judges it: its own, or for the robot all."""
+        return list(range(dof)) if self.joint == ROBOT else [self.joint]
+
     @property
     def simplicity(self) -> tuple:
         """Sorts the simplest first."""

@@ -6,7 +6,7 @@ support joins the model, and again; is structure left that nothing explains; the
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cache
 
@@ -154,27 +154,30 @@ def diagnose(experiment: Experiment, *, fit: Fit | None = None, progress: pipeli
         floors = _floors(fitted, fit, levels)
         answers = search.ask(ground, candidates(ground.model, extra), lambda share: tell("ask", share))
         other = cache(lambda: logs.ground(ground.model, CUTOFFS[1], weights=ground.weights))
-        steps = _steps(logs, ground, other, fitted, answers, extra, tell)
+        writer, steps, found = _Writer(fit, floors, fitted), [], []
+        for step, at in _steps(logs, ground, other, fitted, answers, extra, tell):
+            found += writer.joined(at, step, len(steps))
+            steps.append(step)
         last = steps[-1].ground if steps else ground
         left = structure.structures(last)
-        found = _findings(fitted, fit, floors, ground, other, answers, steps)
+        found += writer.apart(fitted, ground, other, answers, found)
         failures = regions.failures(ground, ([r for r in _residuals(fitted, fit, "test")], [p.step for p in fitted.test.pieces]), np.array([floors[j].rms for j in fit.joints]))
         return Diagnosis(
             fit, floors, tuple(found), tuple(_not_visible(answers)), tuple(_verdict(fit, levels, steps, last, left, logs)), tuple(failures), tuple(steps), ground, last,
         )  # fmt: skip
 
 
-def _steps(logs: Logs, ground: Ground, other, fitted: Ground, answers: list[Answer], extra, tell: Callable) -> list[search.Step]:
-    steps: list[search.Step] = []
-    while len(steps) < _MOST_STEPS:
+def _steps(logs: Logs, ground: Ground, other, fitted: Ground, answers: list[Answer], extra, tell: Callable) -> Iterator[tuple[search.Step, Ground]]:
+    """The steps of the search, each with the fitted model before it, on the logs as the experiment filters them."""
+    for _ in range(_MOST_STEPS):
         step = search.next_step(ground, other, answers, lambda answer, at=fitted: _harms(at, answer))
         if step is None:
-            break
-        steps.append(step)
-        other = cache(lambda at=step.ground: logs.ground(at.model, CUTOFFS[1], weights=at.weights))
-        ground, fitted = step.ground, _held(fitted, step.head)
-        answers = search.ask(ground, candidates(ground.model, extra), lambda share: tell(f"ask, with {steps[-1].head.candidate.name}", share))
-    return steps
+            return
+        before, ground, fitted = fitted, step.ground, fitted.holding(step.head)
+        yield step, before
+        other = cache(lambda at=ground: logs.ground(at.model, CUTOFFS[1], weights=at.weights))
+        stage = f"ask, with {step.head.candidate.name}"
+        answers = search.ask(ground, candidates(ground.model, extra), lambda share, stage=stage: tell(stage, share))
 
 
 def _own(experiment: Experiment) -> list:
@@ -190,7 +193,7 @@ def _own(experiment: Experiment) -> list:
 def _harms(fitted: Ground, answer: Answer) -> bool:
     """Whether the held-out error as the experiment filters it rises, on the joints that an answer is judged by."""
     squares = _as_fitted(fitted, answer)
-    own = range(squares.shape[1]) if answer.candidate.joint == ROBOT else [answer.candidate.joint]
+    own = answer.candidate.judged_by(squares.shape[1])
     rise = (squares - fitted.squares)[:, own].sum(1)
     return rise.sum() > 0 and (search.away(rise) > 1.0 or rise.sum() > 0.002 * fitted.squares[:, own].sum())
 
@@ -234,44 +237,48 @@ def _floors(fitted: Ground, fit: Fit, levels: dict[str, NoiseFloor]) -> dict[str
 # ---- findings
 
 
-def _findings(fitted: Ground, fit: Fit, floors, ground: Ground, other: Callable[[], Ground | None], answers, steps) -> list[Finding]:
-    """The search's steps with their families, each against the model that it joined; then what else stands out alone."""
-    q = search.q_values(ground, answers)
-    scale = np.array([fit.rms("test")[joint] for joint in fit.joints]) / np.maximum(fitted.rms(), 1e-300)
-    levels = np.array([floors[joint].rms for joint in fit.joints]) / np.maximum(scale, 1e-300)
-    out, at = [], fitted
-    for k, step in enumerate(steps):
-        for number, member in enumerate(step.family):
+class _Writer:
+    """Writes findings: what an answer does to the fit's own held-out error, which is found on thinned rows and told as of all."""
+
+    def __init__(self, fit: Fit, floors: dict[str, NoiseFloor], fitted: Ground):
+        self.fit = fit
+        self.scale = np.array([fit.rms("test")[joint] for joint in fit.joints]) / np.maximum(fitted.rms(), 1e-300)
+        self.levels = np.array([floors[joint].rms for joint in fit.joints]) / np.maximum(self.scale, 1e-300)
+
+    def joined(self, at: Ground, step: search.Step, number: int) -> list[Finding]:
+        """A step's family, against the model that it joined, as the experiment filters its logs."""
+        out = []
+        for member in step.family:
             tied = tuple(dict.fromkeys(a.candidate.name for a in step.family if a is not member and a.candidate.name != member.candidate.name))
-            out.append(_finding(at, fit, scale, levels, step.ground if number == 0 else None, member, step.q[member.candidate], tied, k if number == 0 else None))
-        if k + 1 < len(steps):
-            at = _held(at, step.head)
-    there = {(f.answer.candidate.name, f.answer.candidate.joint) for f in out}
-    rest = []
-    for answer in sorted(answers, key=lambda a: -a.score):
-        key = (answer.candidate.name, answer.candidate.joint)
-        if key not in there and search.passes(ground, answer, q[answer.candidate]) and search.survives(other(), answer) and not _harms(fitted, answer):
-            there.add(key)
-            rest.append(answer)
-    return out + [_finding(fitted, fit, scale, levels, None, a, q[a.candidate], (), None) for a in rest[: max(0, _SHOWN - len(out))]]
+            heads = member is step.head
+            out.append(self._finding(at, step.ground if heads else None, member, step.q[member.candidate], tied, number if heads else None))
+        return out
 
+    def apart(self, fitted: Ground, ground: Ground, other: Callable[[], Ground | None], answers: list[Answer], said: list[Finding]) -> list[Finding]:
+        """What else stands out alone, beside the findings said."""
+        q, there, rest = search.q_values(ground, answers), {(f.answer.candidate.name, f.answer.candidate.joint) for f in said}, []
+        for answer in sorted(answers, key=lambda a: -a.score):
+            key = (answer.candidate.name, answer.candidate.joint)
+            if key not in there and search.passes(ground, answer, q[answer.candidate]) and search.survives(other(), answer) and not _harms(fitted, answer):
+                there.add(key)
+                rest.append(answer)
+        return [self._finding(fitted, None, a, q[a.candidate], (), None) for a in rest[: max(0, _SHOWN - len(said))]]
 
-def _finding(fitted: Ground, fit: Fit, scale, levels, after: Ground | None, answer: Answer, q: float, tied, step: int | None) -> Finding:
-    """What an answer does to the fit's own held-out error; `scale` turns the thinned rows' error into that of all rows."""
-    candidate = answer.candidate
-    own = list(range(len(fit.joints))) if candidate.joint == ROBOT else [candidate.joint]
-    squares = _as_fitted(fitted, answer)
-    rows_ = np.maximum(fitted.counts.sum(0), 1)[own]
-    before, then = (np.sum(s[:, own], 0) / rows_ for s in (fitted.squares, squares))
-    blocks = ((fitted.squares - squares)[:, own] / rows_).sum(1)
-    fall = float(blocks.sum())
-    misfit = max(float((before - levels[own] ** 2).sum()), fall, 1e-300)
-    se = float(np.sqrt(len(blocks) * np.var(blocks, ddof=1))) / misfit if len(blocks) > 2 else float("nan")
-    name = "*" if candidate.joint == ROBOT else fit.joints[candidate.joint]
-    return Finding(
-        answer, name, q, _together(np.sqrt(before) * scale[own]), _together(np.sqrt(then) * scale[own]), fall / misfit, se,
-        _parameters(after, answer, fit), tied, step,
-    )  # fmt: skip
+    def _finding(self, at: Ground, after: Ground | None, answer: Answer, q: float, tied, step: int | None) -> Finding:
+        candidate, joints = answer.candidate, self.fit.joints
+        own = candidate.judged_by(len(joints))
+        squares = _as_fitted(at, answer)
+        rows_ = np.maximum(at.counts.sum(0), 1)[own]
+        before, then = (np.sum(s[:, own], 0) / rows_ for s in (at.squares, squares))
+        blocks = ((at.squares - squares)[:, own] / rows_).sum(1)
+        fall = float(blocks.sum())
+        misfit = max(float((before - self.levels[own] ** 2).sum()), fall, 1e-300)
+        se = float(np.sqrt(len(blocks) * np.var(blocks, ddof=1))) / misfit if len(blocks) > 2 else float("nan")
+        name = "*" if candidate.joint == ROBOT else joints[candidate.joint]
+        return Finding(
+            answer, name, q, _together(np.sqrt(before) * self.scale[own]), _together(np.sqrt(then) * self.scale[own]), fall / misfit, se,
+            _parameters(after, answer, self.fit), tied, step,
+        )  # fmt: skip
 
 
 def _together(rms) -> float:
@@ -282,15 +289,9 @@ def _as_fitted(fitted: Ground, answer: Answer) -> np.ndarray:
     """(blocks, dof) squares on the test rows as the fit sees them, with a candidate at the shape values found."""
     starts = {s.name: s.start for s in answer.candidate.effect.shapes()}
     if answer.candidate.curved and any(answer.shapes[name] != start for name, start in starts.items() if start is not None):
-        return _held(fitted, answer).squares
+        return fitted.holding(answer).squares
     again = fitted.answer(answer.candidate, answer.shapes)
     return fitted.squares if again is None else again.squares
-
-
-def _held(fitted: Ground, answer: Answer) -> Ground:
-    """The ground with a candidate in the model, at the shape values found."""
-    grown = fitted.grown(answer.candidate, answer.shapes)
-    return Ground(fitted.experiment, grown, fitted.train, fitted.test, fitted.prior, stride=fitted.stride, weights=fitted.weights, hold=True)
 
 
 def _parameters(after: Ground | None, answer: Answer, fit: Fit) -> dict[str, tuple[float, float, str]]:

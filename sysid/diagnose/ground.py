@@ -7,6 +7,7 @@ are correlated.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -58,6 +59,8 @@ class Ground:
             weights = np.ones(model.robot.dof)
         self.settled = settle(experiment, model, train, prior, weights=weights, stride=stride, grid=grid, hold=hold)
         self.weights = np.asarray(weights)
+        self._asked: dict[Candidate, Answer | None] = {}
+        self._holding: tuple[Candidate, dict[str, float], Ground] | None = None
 
     @property
     def model(self) -> Model:
@@ -197,6 +200,15 @@ class Ground:
                 values[k] = shapes[value.shape.name]
         return grown.with_shapes(values)
 
+    def holding(self, answer: Answer) -> Ground:
+        """This ground with an answer's candidate in the model, at the shape values found. The latest one is remembered."""
+        asked = (answer.candidate, answer.shapes)
+        if self._holding is None or self._holding[:2] != asked:
+            grown = self.grown(*asked)
+            held = Ground(self.experiment, grown, self.train, self.test, self.prior, stride=self.stride, weights=self.weights, hold=True)
+            self._holding = (*asked, held)
+        return self._holding[2]
+
     @property
     def pi(self) -> np.ndarray:
         """Bodies (bodies, 10)."""
@@ -225,6 +237,12 @@ class Ground:
 
     # ---- answers
 
+    def asked(self, candidate: Candidate, ask: Callable[[Ground, Candidate], Answer | None]) -> Answer | None:
+        """What `ask` says of a candidate here, which is worked out once."""
+        if candidate not in self._asked:
+            self._asked[candidate] = ask(self, candidate)
+        return self._asked[candidate]
+
     def gains(self, candidate: Candidate, tried: list[dict[str, float]]) -> tuple[list[float], float]:
         """Fall of the training objective at several shape values of a torque effect, zero where a sign is not allowed; and
         the most of its signature that is visible at any of them."""
@@ -249,30 +267,30 @@ class Ground:
         c, change, absorbed, gain, share = self.projection.step(columns, candidate.joint)
         if not np.isfinite(c).all():
             return None
-        fitted = _apply(columns, c, candidate.joint, self.model.robot.dof) + np.einsum("jnk,k->nj", self.projection.columns, change)
+        own = _apply(columns, c, candidate.joint, self.model.robot.dof)
+        fitted = own + np.einsum("jnk,k->nj", self.projection.columns, change)
         held_out = self.signature(candidate, shapes, "test")
         after = self.residual_test - _apply(held_out, c, candidate.joint, self.model.robot.dof) - np.einsum("jnk,k->nj", self._test_columns, change)
         squares = summed(self.blocks[1], (after * self.held_out.use) ** 2)
         gained = score(self.squares, squares, self.counts)
         # what held-out data refuse needs no other evidence; it still counts as a question asked
         p = self._chance(columns, candidate.joint, c, absorbed, fitted) if gained > 0 else 1.0
-        whole = self._size(_apply(columns, c, candidate.joint, self.model.robot.dof))
-        seen = self._size(fitted) / whole if whole > 0 else float(np.sqrt(share.max(initial=0.0)))
-        alone = float(np.sqrt(share.max(initial=0.0)))
+        whole, alone = self._size(own), float(np.sqrt(share.max(initial=0.0)))
+        seen = self._size(fitted) / whole if whole > 0 else alone
         return Answer(
             candidate, dict(shapes), c, float(min(seen, 1.0)), gain, squares, gained, min(1.0, p * tests),
-            _allowed(candidate, c), max(alone, float(min(seen, 1.0))), self.forecast(after, candidate.joint),
+            _allowed(candidate, c), max(alone, float(min(seen, 1.0))), self.forecast(after, candidate),
         )  # fmt: skip
 
-    def forecast(self, after: np.ndarray, joint: int) -> float:
+    def forecast(self, after: np.ndarray, candidate: Candidate) -> float:
         """How far the slope of the test residual on what was foretold of it stands from zero, in standard errors.
 
         Blocks count by what is foretold in them, so that an effect at rare speeds is judged where it acts.
 
         Args:
-            after: (n, dof) what is left of the test residual. joint: by which it is judged, -1 for all.
+            after: (n, dof) what is left of the test residual. candidate: what foretells.
         """
-        own = slice(None) if joint == ROBOT else [joint]
+        own = candidate.judged_by(self.model.robot.dof)
         use = self.held_out.use[:, own]
         scale = 1.0 / np.maximum(np.sqrt((after[:, own] ** 2 * use).sum(0) / np.maximum(use.sum(0), 1)), 1e-300)
         before, left = self.residual_test[:, own] * use * scale, after[:, own] * use * scale

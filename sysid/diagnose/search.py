@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..model import ROBOT
 from .candidate import Candidate
 from .ground import Answer, Ground, score
 
@@ -22,7 +21,6 @@ _SHORTLIST, _NEAR = 8, 0.5  # how many are refitted exactly, and how near to the
 _TIED, _TIED_SHARE, _TIED_MOST = 2.0, 0.02, 0.15
 _SEEN = 0.03  # share of a signature's root mean square that the model must leave for it to be judged
 _SAME = 0.99  # share of a signature that another one holds
-_BATCH = 64
 
 
 @dataclass(frozen=True)
@@ -56,7 +54,7 @@ def ask(ground: Ground, candidates: list[Candidate], progress: Callable[[float],
     """The best answer of every candidate, over the shape values tried."""
     out = []
     for number, candidate in enumerate(candidates):
-        if (answer := _best(ground, candidate)) is not None:
+        if (answer := ground.asked(candidate, _best)) is not None:
             out.append(answer)
         if progress:
             progress((number + 1) / len(candidates))
@@ -107,7 +105,7 @@ def q_values(ground: Ground, answers: list[Answer]) -> dict[Candidate, float]:
 
 def support(ground: Ground, answer: Answer) -> Support:
     """What the test rows say of an answer."""
-    joints = _own(answer, ground)
+    joints = answer.candidate.judged_by(ground.model.robot.dof)
     weights = 1.0 / np.maximum(answer.squares.sum(0) / np.maximum(ground.counts.sum(0), 1), 1e-300)
     before, after = ground.squares[:, joints] @ weights[joints], answer.squares[:, joints] @ weights[joints]
     total = before.sum()
@@ -119,11 +117,6 @@ def stands_out(before, after) -> float:
     with most of the error do not drown."""
     there = (before > 0) & (after > 0)
     return max(away(before - after), away(np.log(before[there] / after[there])))
-
-
-def _own(answer: Answer, ground: Ground) -> list[int]:
-    """The joints by which an answer is judged: its own, or for the robot all."""
-    return list(range(ground.model.robot.dof)) if answer.candidate.joint == ROBOT else [answer.candidate.joint]
 
 
 def away(differences) -> float:
@@ -186,7 +179,7 @@ def refit(ground: Ground, answer: Answer, always: bool = False) -> tuple[Answer,
     )
     found = score(ground.squares, grown.squares, ground.counts)
     mine = {v.shape.name: s for v, s in zip(grown.model.shape_values, grown.model.shapes) if v.term == len(grown.model.terms) - 1}
-    forecast = ground.forecast(grown.residual_test, candidate.joint)
+    forecast = ground.forecast(grown.residual_test, candidate)
     return replace(answer, shapes=mine, squares=grown.squares, score=found, forecast=forecast), grown
 
 
@@ -199,7 +192,7 @@ def survives(other: Ground | None, answer: Answer) -> bool:
     second derivative also lowers the held-out error, but by another amount in every band."""
     if other is None:
         return True
-    again = _best(other, answer.candidate)
+    again = other.asked(answer.candidate, _best)
     if again is None or not again.allowed:
         return False
     found = support(other, again)
@@ -253,7 +246,7 @@ def _alike(other: Ground | None, head: Answer, answers: list[Answer], family: li
     rivals = [a for a in answers if a.candidate.curved and a.candidate.joint == head.candidate.joint and a.candidate.name not in {f.candidate.name for f in family}]
     if not rivals:
         return []
-    again = {a.candidate: _best(other, a.candidate) for a in (head, *rivals)}
+    again = {a.candidate: other.asked(a.candidate, _best) for a in (head, *rivals)}
     top = again[head.candidate]
     if top is None:
         return []
