@@ -24,7 +24,6 @@ from ..results import number, read_fit
 from ..shape import inverted
 from ..solve import Coordinates, solve
 from .domain import CUTOFFS, questioned, stride_of
-from .ground import summed
 from .noise import floor
 from .search import SUPPORT, away
 
@@ -151,7 +150,7 @@ def _chosen(tried, residual, weights, blocks) -> list[tuple]:
                 continue
             after = _halves(tried, [*chosen, key], residual, weights, halves)
             own = slice(None) if key[1] == ROBOT else [key[1]]
-            fall = summed(blocks, ((current**2 - after**2) * weights**2)[:, own]).sum(1)
+            fall = rows.summed(blocks, ((current**2 - after**2) * weights**2)[:, own]).sum(1)
             share, far = float(fall.sum() / max(np.sum((current * weights)[:, own] ** 2), 1e-300)), away(fall)
             if share >= _WORTH and far >= SUPPORT and (best is None or share > best[0]):
                 best = (share, key, after)
@@ -196,7 +195,7 @@ def _settled(structure: Model, tried, chosen, residual, weights, blocks) -> tupl
     for k, (name, joint) in enumerate(chosen):
         rest = _halves(tried, [key for key in chosen if key != (name, joint)], residual, weights, halves)
         own = slice(None) if joint == ROBOT else [joint]
-        fall = summed(blocks, ((rest**2 - with_all**2) * weights**2)[:, own]).sum(1)
+        fall = rows.summed(blocks, ((rest**2 - with_all**2) * weights**2)[:, own]).sum(1)
         share = float(fall.sum() / max(np.sum((rest * weights)[:, own] ** 2), 1e-300))
         span = slice(int(ends[k]) - tried[name, joint].shape[2], int(ends[k]))
         out.append(Change(name, "*" if joint == ROBOT else structure.robot.joints[joint], share, away(fall), _parameters(structure, name, joint, c[span], std[span], without[:, span])))
