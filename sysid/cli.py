@@ -120,9 +120,7 @@ def diagnose(
     as_json: Json = False, out: Out = None, quiet: Quiet = False,
 ) -> None:  # fmt: skip
     """Where the model fails and which effect is missing; with --model, what changed on a new log."""
-    from . import pipeline, results
-    from .diagnose.diagnosis import diagnose as work
-    from .diagnose.document import document
+    from . import pipeline
 
     spec = pipeline.load(experiment)
     if (model is None) != (not log):
@@ -130,12 +128,7 @@ def diagnose(
     if model is not None:
         _changed(spec, model, log, as_json, out, quiet)
         return
-    run = results.folder(out or Path("runs") / spec.name)
-    with _progress(quiet or as_json) as progress:
-        found = work(spec, progress=progress)
-    results.write(found.fit, run)
-    said = document(found, run)
-    results.write_json(run / "diagnosis.json", said)
+    found, said, run = _diagnosed(spec, out, quiet or as_json)
     if as_json:
         print(json.dumps(said, allow_nan=False))
     else:
@@ -149,6 +142,21 @@ def diagnose(
             show_diagnosis(found, said)
     if not found.fit.solution.converged:
         raise typer.Exit(1)
+
+
+def _diagnosed(spec, out: Path | None, silent: bool) -> tuple:
+    """The diagnosis of an experiment, its document and its run folder, where both it and its fit were written."""
+    from . import results
+    from .diagnose.diagnosis import diagnose as work
+    from .diagnose.document import document
+
+    run = results.folder(out or Path("runs") / spec.name)
+    with _progress(silent) as progress:
+        found = work(spec, progress=progress)
+    results.write(found.fit, run)
+    said = document(found, run)
+    results.write_json(run / "diagnosis.json", said)
+    return found, said, run
 
 
 def _changed(spec, model: Path, logs: list[str], as_json: bool, out: Path | None, quiet: bool) -> None:
@@ -169,18 +177,10 @@ def _changed(spec, model: Path, logs: list[str], as_json: bool, out: Path | None
 @app.command()
 def report(experiment: ExperimentPath, as_json: Json = False, out: Out = None, quiet: Quiet = False) -> None:
     """Diagnose, and write one self-contained HTML file that opens anywhere."""
-    from . import loop, pipeline, results
-    from .diagnose.diagnosis import diagnose as work
-    from .diagnose.document import document
+    from . import loop, pipeline
     from .report import page
 
-    spec = pipeline.load(experiment)
-    run = results.folder(out or Path("runs") / spec.name)
-    with _progress(quiet or as_json) as progress:
-        found = work(spec, progress=progress)
-    results.write(found.fit, run)
-    said = document(found, run)
-    results.write_json(run / "diagnosis.json", said)
+    found, said, run = _diagnosed(pipeline.load(experiment), out, quiet or as_json)
     path = page.write(found.fit, found, said, loop.read_history(run), run / "report.html")
     if as_json:
         print(json.dumps({"report": str(path), "bytes": path.stat().st_size, "verdict": said["verdict"], "run": str(run)}, allow_nan=False))
@@ -227,9 +227,8 @@ def add(
     """Write an effect into the experiment file (comments kept), refit, and show the error before and after."""
     from . import loop
 
-    path = experiment / "config.yaml" if experiment.is_dir() else experiment
     with _progress(quiet or as_json) as progress:
-        found = loop.add(path, effect, list(joint) if joint else None, loop.options(option or []), progress=progress, out=out)
+        found = loop.add(experiment, effect, list(joint) if joint else None, loop.options(option or []), progress=progress, out=out)
     said = loop.document(found)
     if as_json:
         print(json.dumps(said, allow_nan=False))
@@ -256,15 +255,13 @@ def discover(
     said_each = None if as_json or quiet else show_step
     with _progress(quiet or as_json) as progress:
         found = loop.discover(spec, run, most=most, progress=progress, each=said_each)
-    from .diagnose.document import document
-
-    said = {"steps": found.steps, "verdict": document(found.diagnosis, run)["verdict"], "refused": found.refused, "run": str(run)}
+    said = {"steps": found.steps, "verdict": found.said["verdict"], "refused": found.refused, "run": str(run)}
     if as_json:
         print(json.dumps(said, allow_nan=False))
     elif not quiet:
         from .terminal import show_discovery
 
-        show_discovery(said, document(found.diagnosis, run))
+        show_discovery(said, found.said)
 
 
 @app.command()

@@ -12,6 +12,7 @@ import numpy as np
 from .errors import SysidError
 from .estimate import Fit, Prediction
 from .results import number
+from .rows import summed
 
 _BLOCKS, _SHORTEST = 40, 0.5  # blocks over the held-out data; s
 
@@ -69,8 +70,7 @@ def _block_sums(prediction: Prediction, width: float, columns):
     size = (int(prediction.log.max()) + 1) * span
     residual = prediction.residual[:, columns]
     use = np.ones_like(residual) if prediction.use is None else prediction.use[:, columns].astype(float)
-    total = lambda values: np.stack([np.bincount(index, v, minlength=size) for v in values.T], 1)  # noqa: E731
-    return total(residual**2), total(use)
+    return summed(index, residual**2, size), summed(index, use, size)
 
 
 def _jackknife(first, second) -> tuple[float, float]:

@@ -184,6 +184,62 @@ class SensorEffect(Effect):
         """What the sensor makes of torque (k, n), sampled every `step` seconds; same shape."""
 
 
+class LinkEffect(WrenchEffect):
+    """An effect on one link: the one that its option `link` names, by default the last."""
+
+    link = None
+
+    def bound(self, robot, joint):
+        bound = self.given()
+        bound.link = robot.bodies[self.body(robot)].name
+        return bound
+
+    def body(self, robot) -> int:
+        """Number of the link's body. Raises ConfigError where the robot has no such link."""
+        if self.link is None:
+            return last_link(robot)
+        links = {body.name: number for number, body in enumerate(robot.bodies) if body.kind == "link"}
+        one_of(self, "link", list(links))
+        return links[self.link]
+
+
+class Deflection(MotionEffect):
+    """An effect by which a joint's link stands behind its motor under load.
+
+    encoder: "motor" where the encoder turns with the motor: the link is behind what was measured;
+        "joint" where it turns with the link: the motor is ahead of what was measured.
+    """
+
+    options = {"encoder": "motor where the encoder turns with the motor, joint where it turns with the link (default motor)"}
+    reach = 4
+    uses_load = True
+
+    encoder = "motor"
+
+    def given(self, **options):
+        chosen = super().given(**options)
+        one_of(chosen, "encoder", ("motor", "joint"))
+        return chosen
+
+    def variants(self, robot, joint):
+        return [{"encoder": "motor"}, {"encoder": "joint"}]
+
+    @abstractmethod
+    def behind(self, load: np.ndarray, step: float, **shapes: float) -> np.ndarray:
+        """How far the link stands behind its motor under load (n,) sampled every `step` seconds: (3, n) in q, qd and qdd."""
+
+    def moved(self, motion, joint, **shapes):
+        behind = self.behind(motion.load[:, joint], motion.step, **shapes)
+        deflection = np.zeros((3, *motion.q.shape)) if motion.deflection is None else motion.deflection.copy()
+        deflection[:, :, joint] += behind
+        if self.encoder == "motor":
+            return replace(motion, deflection=deflection)
+        ahead = [np.array(x) for x in (motion.q, motion.qd, motion.qdd)]
+        for values, own in zip(ahead, behind):
+            values[:, joint] += own
+        return replace(motion, q=ahead[0], qd=ahead[1], qdd=ahead[2], deflection=deflection)
+
+
 def whole(effect: Effect, option: str, most: int) -> None:
     """Refuse an option that is no whole number from 1 to `most`."""
     value = getattr(effect, option)
@@ -205,9 +261,9 @@ def texts(effect: Effect, option: str) -> None:
         raise ConfigError(f"{effect.name}.{option} is {value!r}", where="model.effects", allowed="a list of names")
 
 
-def last_link(robot) -> str:
-    """The name of the last link, which on an arm carries the tool."""
-    return [body.name for body in robot.bodies if body.kind == "link"][-1]
+def last_link(robot) -> int:
+    """Number of the last link's body, which on an arm carries the tool."""
+    return max(number for number, body in enumerate(robot.bodies) if body.kind == "link")
 
 
 def rates(values: np.ndarray, step: float) -> np.ndarray:
@@ -216,24 +272,6 @@ def rates(values: np.ndarray, step: float) -> np.ndarray:
         return np.stack([values, np.zeros(len(values)), np.zeros(len(values))])
     second = np.diff(values, 2) / step**2
     return np.stack([values, np.gradient(values, step), np.concatenate([second[:1], second, second[-1:]])])
-
-
-def deflected(motion: Piece, joint: int, behind: np.ndarray, encoder: str) -> Piece:
-    """A motion whose joint's link stands behind its motor, by `behind` (3, n) in q, qd and qdd.
-
-    Args:
-        encoder: "motor" where the encoder turns with the motor: the link is behind what was measured;
-            "joint" where it turns with the link: the motor is ahead of what was measured.
-    """
-    n, dof = motion.q.shape
-    deflection = np.zeros((3, n, dof)) if motion.deflection is None else motion.deflection.copy()
-    deflection[:, :, joint] += behind
-    if encoder == "motor":
-        return replace(motion, deflection=deflection)
-    ahead = [np.array(x) for x in (motion.q, motion.qd, motion.qdd)]
-    for values, own in zip(ahead, behind):
-        values[:, joint] += own
-    return replace(motion, q=ahead[0], qd=ahead[1], qdd=ahead[2], deflection=deflection)
 
 
 KINDS = (TorqueEffect, WrenchEffect, MotionEffect, SensorEffect)

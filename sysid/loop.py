@@ -107,7 +107,7 @@ def grown(experiment: Experiment, effect: str, joints: list[str] | None, options
 
 
 def add(path: Path, effect: str, joints: list[str] | None, options: dict, *, progress=None, out: Path | None = None) -> Added:
-    """Write an effect into an experiment file, refit, and say what that changed.
+    """Write an effect into an experiment file, or into a folder's config.yaml, refit, and say what that changed.
 
     The file is written last: where the effect cannot be, or the fit fails, it stays as it was.
 
@@ -160,13 +160,14 @@ def _write_history(run: Path, steps: list[dict], **more) -> None:
 
 @dataclass(frozen=True)
 class Discovery:
-    """The steps that held-out data support, as the history has them; the fits; the last diagnosis; candidates that the
-    diagnosis named and the fit's own held-out error did not support, with the rise."""
+    """The steps that held-out data support, as the history has them; the fits; the last diagnosis, and its document as `said`;
+    candidates that the diagnosis named and the fit's own held-out error did not support, with the rise."""
 
     steps: list[dict]
     experiment: Experiment
     fits: list[Fit]
     diagnosis: Diagnosis
+    said: dict
     refused: list[dict]
 
 
@@ -210,7 +211,7 @@ def discover(experiment: Experiment, run: Path, *, most: int = 10, progress=None
     said = document(found, run)
     results.write_json(run / "diagnosis.json", said)
     _write_history(run, steps, verdict=said["verdict"], refused=refused)
-    return Discovery(steps, experiment, fits, found, refused)
+    return Discovery(steps, experiment, fits, found, said, refused)
 
 
 def spelled(candidate, joint: str) -> tuple[str, list[str] | None, dict]:
@@ -247,7 +248,8 @@ def options(texts: list[str]) -> dict:
 def document(added: Added) -> dict:
     """The document of `sysid add`."""
     name = added.experiment.model.effects[-1].name
-    before = {entry["name"] for entry in results.document(added.before)["parameters"]}
+    model = added.before.model
+    before = {*model.names, *(value.name for value in model.shape_values)}
     found = results.document(added.after)
     return {
         "added": name, "experiment": str(added.experiment.path), "rms_test_before": added.before.rms("test"), "rms_test_after": added.after.rms("test"),

@@ -123,6 +123,11 @@ class Model:
     def _unit(self, unit: str, joint: int) -> str:
         return units.of_joint(unit, prismatic=joint != ROBOT and bool(self.robot.prismatic[joint]))
 
+    @property
+    def last_shapes(self) -> slice:
+        """Which of `shape_values`, and of `shapes`, are the last term's: none where it has none."""
+        return slice(sum(value.term < len(self.terms) - 1 for value in self.shape_values), None)
+
     @cached_property
     def names(self) -> list[str]:
         """Names of all linear parameters: body.m … body.Ixz, then effect.joint.coefficient."""
@@ -151,9 +156,13 @@ class Model:
         """The model with other bodies behind its `load`."""
         return replace(self, reference=np.array(pi))
 
+    def scaled_by(self, motion: Motion) -> Model:
+        """The model with shape bounds as wide as this motion is; its shape values stay, within them or not."""
+        return replace(self, scales=scales(motion))
+
     def measured_by(self, motion: Motion) -> Model:
         """The model with shape bounds as wide as this motion is, and its shape values within them."""
-        sized = replace(self, scales=scales(motion))
+        sized = self.scaled_by(motion)
         return sized.with_shapes(initial(sized))
 
     @property

@@ -71,12 +71,8 @@ def fit(experiment: Experiment, *, progress: Progress | None = None) -> Fit:
             motion = prepare(train, preprocess, machine.joints)
             del train  # the filtered motion holds all that is needed from here on
         _tell_still(motion)
-        structure = structure.measured_by(motion)
-        nonlinear = bool(structure.shape_values) or structure.uses_load
         with _timed(seconds, "shape"):
-            slopes = None
-            if nonlinear:
-                structure, slopes = _settled(experiment, structure, motion, prior)
+            structure, slopes = _settled(experiment, structure, motion, prior)
         with _timed(seconds, "compress"):  # the regressor is built and reduced chunk by chunk, never whole
             compressed = compress(slopes or structure, motion, progress=lambda share: tell("compress", share))
         with _timed(seconds, "solve"):
@@ -135,9 +131,7 @@ def prepared(experiment: Experiment) -> Prepared:
             preprocess = filters.settled(preprocess, filters.compare(experiment, structure, train, prior))
         motion = prepare(train, preprocess, machine.joints)
         _tell_still(motion)
-        structure = structure.measured_by(motion)
-        if structure.shape_values or structure.uses_load:
-            structure, _ = _settled(experiment, structure, motion, prior)
+        structure, _ = _settled(experiment, structure, motion, prior)
         held_out = prepare(read(experiment, machine, experiment.data.test), preprocess, machine.joints)
         train_data, test_data = compress(structure, motion), compress(structure, held_out)
     return Prepared(structure, motion, train_data, test_data, prior, moving_coefficients(structure, motion), tuple(notices))
@@ -147,7 +141,11 @@ _PASSES, _NEAR = 3, 0.1  # refinements on all rows; of a standard deviation
 
 
 def _settled(experiment: Experiment, structure: Model, motion: Motion, prior) -> tuple[Model, Linearised | None]:
-    """The model with its shape values found: on rows that fit in memory, then by Gauss-Newton steps on all of them."""
+    """The model measured by a motion, its shape values found: on rows that fit in memory, then by Gauss-Newton steps on all
+    of them. And its slopes there, None where no shape value is free."""
+    structure = structure.measured_by(motion)
+    if not (structure.shape_values or structure.uses_load):
+        return structure, None
     found = shape.settle(experiment, structure, motion, prior)
     structure, slopes = found.model, Linearised(found.model, found.x)
     if not slopes.free:

@@ -39,6 +39,13 @@ def savitzky_golay(length: int, order: int, derivative: int, step: float) -> np.
     return rows[derivative] * math.factorial(derivative) / (half * step) ** derivative
 
 
+def differences(q, step: float) -> tuple[np.ndarray, np.ndarray]:
+    """qd, qdd (n, dof) of angles (n, dof) `step` seconds apart, by central differences; not to be used in the first and last row."""
+    qdd = np.zeros_like(q)
+    qdd[1:-1] = (q[2:] - 2.0 * q[1:-1] + q[:-2]) / step**2
+    return np.gradient(q, step, axis=0), qdd
+
+
 def _convolved(values, weights) -> np.ndarray:
     """Values (n, ...) weighted by a window about each; the first and last half window are not to be used."""
     flat = values.reshape(len(values), -1)
@@ -79,10 +86,7 @@ class Smoother:
             q0, q1, q2 = (_convolved(q, savitzky_golay(self.length, self.order, d, self.step)) for d in range(3))
             return q0, q1, q2
         smooth = self(q)
-        qd = np.gradient(smooth, self.step, axis=0)
-        qdd = np.zeros_like(smooth)
-        qdd[1:-1] = (smooth[2:] - 2.0 * smooth[1:-1] + smooth[:-2]) / self.step**2
-        return smooth, qd, qdd
+        return smooth, *differences(smooth, self.step)
 
     def __call__(self, values, axis: int = 0) -> np.ndarray:
         """The filtered values, same shape; samples along `axis`."""
@@ -193,12 +197,20 @@ def prepare(logs: Sequence[Log], spec: PreprocessSpec, joints: tuple[str, ...]) 
             raise LogError(f"{log.samples} samples are fewer than the filter's window of {shortest}", where=str(log.path), do="give a longer log or narrow preprocess.window")
         if dropped := len(log.segments) - (len(pieces) - before):
             warnings.warn(SysidWarning(f"{log.path}: {dropped} segment(s) shorter than the filter's window were left out"), stacklevel=2)
+    if spec.standstill != "keep":
+        threshold = standstill_speed(pieces) if spec.standstill == "mask" else spec.standstill
+        pieces = [without_standstill(piece, threshold, 0 if piece.smoother is None else piece.smoother.reach) for piece in pieces]
+    return assembled(joints, pieces)
+
+
+def assembled(joints: tuple[str, ...], pieces: Sequence[Piece]) -> Motion:
+    """Pieces as one motion, which knows the speed that rounding makes of a constant angle and the joints that never move."""
+    rest = _ROUNDING * np.max([np.abs(piece.qd).max(axis=0) for piece in pieces], axis=0)
     travel = np.ptp(np.concatenate([[p.q[p.core].min(0), p.q[p.core].max(0)] for p in pieces]), axis=0)
     noise = np.max([piece.noise for piece in pieces], axis=0)
-    rest = _ROUNDING * np.max([np.abs(piece.qd).max(axis=0) for piece in pieces], axis=0)
-    pieces = [_masked(replace(piece, rest=rest), spec, pieces) for piece in pieces]
     never = travel < np.maximum(_NEVER_MOVES, _NOISE_TRAVEL * noise)
-    return Motion(joints, tuple(pieces), tuple(j for j, still in zip(joints, never) if still), standing(pieces))
+    still = tuple(joint for joint, stays in zip(joints, never) if stays)
+    return Motion(joints, tuple(replace(piece, rest=rest) for piece in pieces), still, standing(pieces))
 
 
 def _needs(spec: PreprocessSpec, step: float) -> int:
@@ -230,20 +242,16 @@ def _piece(number: int, segment: Segment, spec: PreprocessSpec) -> Piece | None:
     )  # fmt: skip
 
 
-def _masked(piece: Piece, spec: PreprocessSpec, pieces: list[Piece]) -> Piece:
-    """The piece with the rows of a standing joint left out, widened by the filter's reach."""
-    if spec.standstill == "keep":
-        return piece
-    threshold = standstill_speed(pieces) if spec.standstill == "mask" else np.full(piece.q.shape[1], spec.standstill)
+def without_standstill(piece: Piece, threshold, reach: int) -> Piece:
+    """The piece without the rows where a joint is slower than its threshold (dof,) [rad/s or m/s], or within `reach` rows of one.
+
+    A filter that sees so far carries standstill into them.
+    """
     still = np.abs(piece.qd) < threshold
-    reach = Smoother(spec, piece.step).reach if piece.smoother is not None else 0
-    if reach:
-        # a sample is touched when any standing sample lies within the filter's reach
-        count = np.cumsum(np.concatenate([np.zeros((1, still.shape[1])), still]), axis=0)
-        rows = np.arange(len(still))
-        low, high = np.maximum(rows - reach, 0), np.minimum(rows + reach + 1, len(still))
-        still = count[high] - count[low] > 0
-    return replace(piece, use=~still)
+    count = np.cumsum(np.concatenate([np.zeros((1, still.shape[1])), still]), axis=0)
+    rows = np.arange(len(still))
+    low, high = np.maximum(rows - reach, 0), np.minimum(rows + reach + 1, len(still))
+    return replace(piece, use=count[high] == count[low])
 
 
 def standstill_speed(pieces) -> np.ndarray:

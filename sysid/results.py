@@ -222,6 +222,25 @@ def _yaml(tree: dict) -> str:
     return stream.getvalue()
 
 
+def read_fit(path: Path, asked: str, allowed: str = "a run folder of `sysid fit`") -> tuple[dict[str, float], tuple[list[str], dict[str, float]]]:
+    """Every parameter's value by its name from a run's fit.json, and its robot: its joints, sorted, and the angles of the locked.
+
+    Args:
+        asked: the option or key that names the run. allowed: what it may be.
+
+    Raises:
+        ConfigError: there is no such run.
+    """
+    try:
+        found = json.loads(path.read_text(encoding="utf-8"))
+        values = {entry["name"]: float(entry["value"]) for entry in found["parameters"]}
+        return values, (sorted(found["robot"]["joints"]), found["robot"]["locked"])
+    except OSError as error:
+        raise ConfigError(f"{asked} cannot be read ({error.strerror})", where=str(path), allowed=allowed) from None
+    except (ValueError, KeyError, TypeError):
+        raise ConfigError(f"{asked} is no run folder", where=str(path), allowed=allowed) from None
+
+
 def read_inertias(source: Path, model: Model) -> np.ndarray:
     """Bodies (bodies, 10) of a previous run for a model; bodies that it lacks stay at the URDF's prior.
 
@@ -232,14 +251,7 @@ def read_inertias(source: Path, model: Model) -> np.ndarray:
         ConfigError: there is no such run, or none of its bodies is the model's, or one is impossible.
     """
     path = source / "fit.json" if source.is_dir() else source
-    try:
-        found = json.loads(path.read_text(encoding="utf-8"))
-        values = {entry["name"]: float(entry["value"]) for entry in found["parameters"]}
-        before = (sorted(found["robot"]["joints"]), found["robot"]["locked"])
-    except OSError as error:
-        raise ConfigError(f"prior.source cannot be read ({error.strerror})", where=str(path), allowed="urdf, or a run folder of `sysid fit`") from None
-    except (ValueError, KeyError, TypeError):
-        raise ConfigError("prior.source is no fit.json", where=str(path), allowed="urdf, or a run folder of `sysid fit`") from None
+    values, before = read_fit(path, "prior.source", "urdf, or a run folder of `sysid fit`")
     if before != (sorted(model.robot.joints), model.robot.locked):
         # a locked link is part of the body that carries it: the same name would be another body
         raise ConfigError(

@@ -157,7 +157,7 @@ class Projection:
         self.positive = dict(positive or {})
         self._system = sum(2.0 * w**2 * a.T @ a for w, a in zip(self.weights, columns)) + hessian
         self.inverse = inverted(self._system)
-        self._inverses = {(): self.inverse}
+        self._inverses: dict[tuple[int, ...], np.ndarray] = {}
         # where a parameter is held at zero the objective still falls away from it: it is no stationary point
         self._pull = np.zeros(len(self._system))
         for k in self.positive:
@@ -189,20 +189,21 @@ class Projection:
         system = square - cross.T @ absorbed
         size = np.diagonal(square)
         visible = np.clip(np.diagonal(system), 0.0, None) / np.where(size > 0, size, 1.0)
-        pinned: tuple[int, ...] = ()
+        pinned, gone, inverse = (), np.zeros(len(self._system)), self.inverse
         for _ in range(len(self.positive) + 1):
             # the least of 1/2 d'Hd - pull'd + d'Xc + 1/2 c'Sc - right'c, with the pinned d taking their parameters to zero
-            inverse, gone = self._rest(pinned), np.zeros(len(self._system))
-            gone[list(pinned)] = [self.positive[k] for k in pinned]
-            absorbed = inverse @ cross
             base = inverse @ (self._pull + self._system @ gone)
-            c = inverted(square - cross.T @ absorbed) @ (right + cross.T @ gone - cross.T @ base)
+            c = inverted(system) @ (right + cross.T @ gone - cross.T @ base)
             change = base - absorbed @ c - gone
             # friction that would help by turning negative is taken to zero, and stays there
             below = [k for k, value in self.positive.items() if k not in pinned and value + change[k] < -1e-9 * abs(value)]
             if not below:
                 break
             pinned = tuple(sorted({*pinned, *below}))
+            gone[list(pinned)] = [self.positive[k] for k in pinned]
+            inverse = self._rest(pinned)
+            absorbed = inverse @ cross
+            system = square - cross.T @ absorbed
         gain = float(c @ right + self._pull @ change) - 0.5 * float(c @ square @ c + 2.0 * change @ cross @ c + change @ self._system @ change)
         return c, change, absorbed, gain, visible
 

@@ -8,30 +8,28 @@ leaving a block of time out (jackknife).
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from .. import pipeline, rows
+from .. import datasets, pipeline, rows
 from ..config import Experiment, LogSpec
 from ..effect import MotionEffect, find
 from ..errors import ConfigError, LogError
 from ..inertia import DIVERGENCES, PARAMETERIZATIONS, pseudo
 from ..model import ROBOT, Model
 from ..objective import Objective
-from ..results import number
+from ..results import number, read_fit
 from ..shape import inverted
 from ..solve import Coordinates, solve
 from .domain import CUTOFFS, questioned, stride_of
-from .ground import summed
 from .noise import floor
 from .search import SUPPORT, away
 
 _BLOCKS, _MOST = 24, 12
 _WORTH = 0.1  # of the squared residual: below it, a held model's own errors on another motion look like changes
-_PER_JOINT = (("coulomb",), ("viscous",), ("torque_bias",))
+_PER_JOINT = ("coulomb", "viscous", "torque_bias")
 _WEAK = 1e-2  # of the noise's square: the weight of the payload's prior, a ball of a kilogram
 
 
@@ -66,15 +64,8 @@ def read_run(run: Path, experiment: Experiment) -> tuple[Model, np.ndarray]:
     Raises:
         ConfigError: the folder holds no fit, or one of another robot.
     """
-    try:
-        found = json.loads((run / "fit.json").read_text(encoding="utf-8"))
-        values = {entry["name"]: float(entry["value"]) for entry in found["parameters"]}
-    except OSError as error:
-        raise ConfigError(f"--model cannot be read ({error.strerror})", where=str(run / "fit.json"), allowed="a run folder of `sysid fit`") from None
-    except (ValueError, KeyError, TypeError):
-        raise ConfigError("--model is no run folder", where=str(run / "fit.json"), allowed="a run folder of `sysid fit`") from None
-    fitted = pipeline.load(run / "experiment.yaml")
-    _, structure, _ = pipeline.build(fitted.model_copy(update={"robot": fitted.robot}))
+    values, _ = read_fit(run / "fit.json", "--model")
+    _, structure, _ = pipeline.build(pipeline.load(run / "experiment.yaml"))
     missing = [name for name in (*structure.names, *(v.name for v in structure.shape_values)) if name not in values]
     if missing:
         raise ConfigError(f"the run has no value for {missing[0]}", where=str(run), do="fit it again")
@@ -97,12 +88,12 @@ def changed(experiment: Experiment, run: Path, logs: list[str]) -> Changed:
     """
     structure, x = read_run(run, experiment)
     robot = structure.robot
-    specs = [LogSpec(file=_named(log, experiment)) for log in logs]
+    specs = [LogSpec(file=_located(log)) for log in logs]
     with pipeline.noticed():
         motion = questioned(pipeline.read(experiment, robot, specs), robot.joints, CUTOFFS[0])
     if motion is None or motion.duration < 4.0:
         raise LogError("the log is too short to say what changed", where=", ".join(logs), allowed="4 s or more of motion", do="give a longer log")
-    structure = _sized(structure, motion)
+    structure = structure.scaled_by(motion)
     stride = stride_of(motion, CUTOFFS[0])
     data = rows.stack(structure, motion, stride)
     residual = data.residual(x)
@@ -122,40 +113,28 @@ def changed(experiment: Experiment, run: Path, logs: list[str]) -> Changed:
     )  # fmt: skip
 
 
-def _named(log: str, experiment: Experiment) -> str:
-    from .. import datasets
-
+def _located(log: str) -> str:
     return log if datasets.reference(log) is not None else str(Path(log).resolve())
 
 
-def _sized(structure: Model, motion) -> Model:
-    shapes = structure.shapes
-    from dataclasses import replace
-
-    from ..model import scales
-
-    return replace(structure, scales=scales(motion)).with_shapes(shapes)
-
-
-def _signatures(structure: Model, x, motion, stride: int, use) -> dict[tuple[tuple[str, ...], int], np.ndarray]:
-    """Columns (dof, n, k) of every change, by (effects, joint)."""
+def _signatures(structure: Model, x, motion, stride: int, use) -> dict[tuple[str, int], np.ndarray]:
+    """Columns (dof, n, k) of every change, by (effect, joint)."""
     robot, pieces = structure.robot, rows.seen(structure, motion)
     out = {}
     for joint in range(robot.dof):
-        for names in _PER_JOINT:
-            columns = np.zeros((robot.dof, len(use), len(names)))
-            columns[joint] = np.concatenate([rows.signature(structure, motion, pieces, find(name), joint, {}, stride, use) for name in names], axis=1)
-            out[names, joint] = columns
+        for name in _PER_JOINT:
+            columns = np.zeros((robot.dof, len(use), 1))
+            columns[joint] = rows.signature(structure, motion, pieces, find(name), joint, {}, stride, use)
+            out[name, joint] = columns
     for name in ("payload", "gravity_tilt"):
         effect = find(name).bound(robot, ROBOT)
         if isinstance(effect, MotionEffect):
             if any(term.name == name for term, _ in structure.terms):
                 continue
             grown = structure.with_effect(effect, (ROBOT,))
-            own = [k for k, v in enumerate(grown.shape_values) if v.term == len(grown.terms) - 1]
-            out[(name,), ROBOT] = rows.tangents(grown, motion, x, stride, use)[:, :, own]
+            out[name, ROBOT] = rows.tangents(grown, motion, x, stride, use)[:, :, grown.last_shapes]
         else:
-            out[(name,), ROBOT] = rows.signature(structure, motion, pieces, effect, ROBOT, {}, stride, use)
+            out[name, ROBOT] = rows.signature(structure, motion, pieces, effect, ROBOT, {}, stride, use)
     return out
 
 
@@ -171,7 +150,7 @@ def _chosen(tried, residual, weights, blocks) -> list[tuple]:
                 continue
             after = _halves(tried, [*chosen, key], residual, weights, halves)
             own = slice(None) if key[1] == ROBOT else [key[1]]
-            fall = summed(blocks, ((current**2 - after**2) * weights**2)[:, own]).sum(1)
+            fall = rows.summed(blocks, ((current**2 - after**2) * weights**2)[:, own]).sum(1)
             share, far = float(fall.sum() / max(np.sum((current * weights)[:, own] ** 2), 1e-300)), away(fall)
             if share >= _WORTH and far >= SUPPORT and (best is None or share > best[0]):
                 best = (share, key, after)
@@ -203,7 +182,7 @@ def _settled(structure: Model, tried, chosen, residual, weights, blocks) -> tupl
     if not chosen:
         return (), residual
     columns = np.concatenate([tried[key] for key in chosen], axis=2)
-    body = next((k for k, key in enumerate(chosen) if key[0] == ("payload",)), None)
+    body = next((k for k, key in enumerate(chosen) if key[0] == "payload"), None)
     ends = np.cumsum([tried[key].shape[2] for key in chosen])
     own = None if body is None else slice(int(ends[body]) - 10, int(ends[body]))
     fitted = lambda kept: _possible(columns[:, kept], residual[kept], weights, own)  # noqa: E731
@@ -213,13 +192,13 @@ def _settled(structure: Model, tried, chosen, residual, weights, blocks) -> tupl
     after = residual - np.einsum("jnk,k->nj", columns, c)
     halves, out = blocks < _BLOCKS // 2, []
     with_all = _halves(tried, chosen, residual, weights, halves)
-    for k, (names, joint) in enumerate(chosen):
-        rest = _halves(tried, [key for key in chosen if key != (names, joint)], residual, weights, halves)
+    for k, (name, joint) in enumerate(chosen):
+        rest = _halves(tried, [key for key in chosen if key != (name, joint)], residual, weights, halves)
         own = slice(None) if joint == ROBOT else [joint]
-        fall = summed(blocks, ((rest**2 - with_all**2) * weights**2)[:, own]).sum(1)
+        fall = rows.summed(blocks, ((rest**2 - with_all**2) * weights**2)[:, own]).sum(1)
         share = float(fall.sum() / max(np.sum((rest * weights)[:, own] ** 2), 1e-300))
-        span = slice(int(ends[k]) - tried[names, joint].shape[2], int(ends[k]))
-        out.append(Change(names[0], "*" if joint == ROBOT else structure.robot.joints[joint], share, away(fall), _parameters(structure, names, joint, c[span], std[span], without[:, span])))
+        span = slice(int(ends[k]) - tried[name, joint].shape[2], int(ends[k]))
+        out.append(Change(name, "*" if joint == ROBOT else structure.robot.joints[joint], share, away(fall), _parameters(structure, name, joint, c[span], std[span], without[:, span])))
     return tuple(sorted(out, key=lambda change: -change.removed)), after
 
 
@@ -241,16 +220,11 @@ def _possible(columns, residual, weights, own: slice | None) -> np.ndarray:
     return out
 
 
-def _parameters(structure: Model, names, joint: int, c, std, without) -> dict[str, tuple[float, float, str]]:
-    grown = structure.with_effect(find(names[0]).bound(structure.robot, joint), (joint,))
-    if names[0] == "payload":
-        listed = [(v.name, v.unit) for v in grown.coefficients[-10:]]
-    elif names[0] == "gravity_tilt":
-        listed = [(v.name, v.unit) for v in grown.shape_values[-2:]]
-    else:
-        listed = [(v.name, v.unit) for v in grown.coefficients[-1:]]
-    out = {name: (float(value), float(s), unit) for (name, unit), value, s in zip(listed, c, std)}
-    if names[0] == "payload":
+def _parameters(structure: Model, name: str, joint: int, c, std, without) -> dict[str, tuple[float, float, str]]:
+    grown = structure.with_effect(find(name).bound(structure.robot, joint), (joint,))
+    listed = [*grown.coefficients[len(structure.coefficients) :], *grown.shape_values[grown.last_shapes]]
+    out = {p.name: (float(value), float(s), p.unit) for p, value, s in zip(listed, c, std)}
+    if name == "payload":
         blocks = len(without)
         for axis, word in enumerate("xyz"):
             each = without[:, 1 + axis] / without[:, 0]

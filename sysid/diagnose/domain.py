@@ -11,15 +11,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
 from ..log import Log
-from ..preprocess import Motion, Piece, standing, standstill_speed
+from ..preprocess import Motion, Piece, assembled, differences, standstill_speed, without_standstill
 
 CUTOFFS = (15.0, 8.0)  # Hz: the verdict's own, and another one that it must survive
 _ANGLES = 4.0  # the angles' own low-pass, as a multiple of the cutoff: derivatives need some, laws of motion none
+_SIGHT = 1.25  # how far both low-passes see, as a multiple of the torque's own: the angles' sees a quarter as far
 _HIGHEST = 0.3  # of the sampling rate
 # Laws are evaluated at this many samples a cycle of the cutoff: what is steeper than that, friction at a reversal, is left
 # out anyway.
@@ -65,14 +65,9 @@ def questioned(logs: Sequence[Log], joints: tuple[str, ...], cutoff: float) -> M
         pieces += [piece for segment in log.segments if (piece := _piece(number, log.name, segment, cutoff)) is not None]
     if not pieces:
         return None
-    rest = 1e-9 * np.max([np.abs(piece.qd).max(axis=0) for piece in pieces], axis=0)
-    pieces = [replace(piece, rest=rest) for piece in pieces]
     threshold = standstill_speed(pieces)
-    pieces = [_moving(piece, threshold) for piece in pieces]
-    travel = np.ptp(np.concatenate([[p.q[p.core].min(0), p.q[p.core].max(0)] for p in pieces]), axis=0)
-    noise = np.max([piece.noise for piece in pieces], axis=0)
-    never = travel < np.maximum(1e-6, 6.0 * noise)
-    return Motion(joints, tuple(pieces), tuple(j for j, still in zip(joints, never) if still), standing(pieces))
+    # a reversal that passes standstill between two samples stays: both sides see its jump alike, and slow friction lives there
+    return assembled(joints, [without_standstill(piece, threshold, round(_SIGHT * piece.smoother.reach)) for piece in pieces])
 
 
 def stride_of(motion: Motion, cutoff: float) -> int:
@@ -94,23 +89,10 @@ def _piece(number: int, source: str, segment, cutoff: float) -> Piece | None:
     if n < 6 * settling.reach + 20:
         return None
     smooth = angles(segment.q, axis=0)
-    qd = np.gradient(smooth, segment.step, axis=0)
-    qdd = np.zeros_like(smooth)
-    qdd[1:-1] = (smooth[2:] - 2.0 * smooth[1:-1] + smooth[:-2]) / segment.step**2
+    qd, qdd = differences(smooth, segment.step)
     return Piece(
         log=number, step=every * segment.step, t=segment.t[rows], q=smooth[rows], qd=qd[rows], qdd=qdd[rows], tau=both(segment.tau, axis=0)[rows],
         measured=segment.tau[rows], signals={name: values[rows] for name, values in segment.signals.items()}, use=None, smoother=settling,
         core=slice(settling.reach, n - settling.reach), rest=np.zeros(smooth.shape[1]), noise=np.sqrt(np.mean((segment.q[rows] - smooth[rows]) ** 2, axis=0)),
         source=source,
     )  # fmt: skip
-
-
-def _moving(piece: Piece, threshold) -> Piece:
-    """The piece without each joint's rows at standstill, or within sight of one through the filters."""
-    still = np.abs(piece.qd) < threshold
-    # a reversal that passes standstill between two samples stays: both sides see its jump alike, and slow friction lives there
-    reach = round(1.25 * piece.smoother.reach)  # the angles' filter sees a quarter as far
-    count = np.cumsum(np.concatenate([np.zeros((1, still.shape[1])), still]), axis=0)
-    rows = np.arange(len(still))
-    low, high = np.maximum(rows - reach, 0), np.minimum(rows + reach + 1, len(still))
-    return replace(piece, use=~(count[high] - count[low] > 0))

@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from ..effect import Linear, WrenchEffect, called, last_link, one_of
+from ..effect import Linear, LinkEffect, called
 from ..errors import ConfigError
 from ..regressor import columns as regressor_columns
 
 
-class ExternalForce(WrenchEffect):
+class ExternalForce(LinkEffect):
     """A link presses with a constant force on what it touches, during stated stretches of the logs' clocks.
 
     The force acts at the origin of the link's frame; what acts on the link is its opposite.
@@ -22,7 +22,6 @@ class ExternalForce(WrenchEffect):
     options = {"during": "a list of [start, stop] in seconds of the log's clock", "link": "the link that touches (default: the last)"}
 
     during = ()
-    link = None
 
     def given(self, **options):
         chosen = super().given(**options)
@@ -30,12 +29,6 @@ class ExternalForce(WrenchEffect):
         if not good:
             raise ConfigError(f"external_force.during is {chosen.during!r}", where="model.effects", allowed="a list of [start, stop], start < stop, in s")
         return chosen
-
-    def bound(self, robot, joint):
-        bound = self.given()
-        bound.link = self.link if self.link is not None else last_link(robot)
-        one_of(bound, "link", [body.name for body in robot.bodies if body.kind == "link"])
-        return bound
 
     def coefficients(self):
         return tuple(
@@ -45,10 +38,10 @@ class ExternalForce(WrenchEffect):
         )
 
     def columns(self, motion, robot):
-        (row,) = [b for b, body in enumerate(robot.bodies) if body.kind == "link" and body.name == (self.link or last_link(robot))]
         still, behind = np.zeros(motion.q.shape), None if motion.deflection is None else motion.deflection * [[[1.0]], [[0.0]], [[0.0]]]
         # a unit mass at rest under gravity -e needs the force e at the origin of its frame: its column is J' e
-        unit = [regressor_columns(robot, motion.q, still, still, gravity=-e, deflection=behind)[:, 10 * row] for e in np.eye(3)]
+        mass = 10 * self.body(robot)
+        unit = [regressor_columns(robot, motion.q, still, still, gravity=-e, deflection=behind)[:, mass] for e in np.eye(3)]
         parts = [_window(motion.t, start, stop) * column for start, stop in self.during for column in unit]
         return np.stack(parts, axis=1) if parts else np.zeros((robot.dof, 0, len(motion.t)))
 

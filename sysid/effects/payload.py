@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from ..effect import Linear, WrenchEffect, called, last_link, one_of, texts
+from ..effect import Linear, LinkEffect, called, texts
 from ..inertia import PARAMETERS, UNITS
 from ..regressor import body_motions, wrench_columns
 
 
-class Payload(WrenchEffect):
+class Payload(LinkEffect):
     """A rigid body held by a link during some logs; its ten parameters stand about that link's frame.
 
     Present in every log, it is the link's own inertia and cannot be told from it.
@@ -24,19 +24,12 @@ class Payload(WrenchEffect):
         "logs": "the logs that have it, by their names under `data` (default: all)",
     }
 
-    link = None
     logs = None
 
     def given(self, **options):
         chosen = super().given(**options)
         texts(chosen, "logs")
         return chosen
-
-    def bound(self, robot, joint):
-        bound = self.given()
-        bound.link = self.link if self.link is not None else last_link(robot)
-        one_of(bound, "link", [body.name for body in robot.bodies if body.kind == "link"])
-        return bound
 
     def coefficients(self):
         return tuple(called(Linear(unit, lower=0 if p == "m" else None, says=f"{p} of the payload"), p) for p, unit in zip(PARAMETERS, UNITS))
@@ -45,8 +38,7 @@ class Payload(WrenchEffect):
         out = np.zeros((robot.dof, 10, len(motion.t)))
         if self.logs is not None and motion.source not in self.logs:
             return out
-        (row,) = [b for b, body in enumerate(robot.bodies) if body.kind == "link" and body.name == (self.link or last_link(robot))]
-        held = body_motions(robot, motion.q, motion.qd, motion.qdd, gravity=motion.gravity, deflection=motion.deflection)[row]
+        held = body_motions(robot, motion.q, motion.qd, motion.qdd, gravity=motion.gravity, deflection=motion.deflection)[self.body(robot)]
         for joint, (linear, angular) in held.jacobian.items():
             wrench_columns(held, linear, angular, out[joint])
         return out

@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 import pinocchio as pin
 
-from ..effect import last_link as last_link_name
+from ..effect import last_link
 from ..inertia import pseudo
 from ..robot import Robot
 
@@ -415,11 +415,6 @@ PARTS: dict[str, Callable[..., Part]] = {
     "external_force": ExternalForce, "current_lag": CurrentLag, "torque_gain": TorqueGain, "torque_saturation": TorqueSaturation,
     "delay": Delay, "torque_bias": TorqueBias, "encoder_offset": EncoderOffset, "encoder_eccentricity": EncoderEccentricity,
 }  # fmt: skip
-
-
-def last_link(robot: Robot) -> int:
-    """Number of the body that carries payloads and meets forces."""
-    return [body.name for body in robot.bodies].index(last_link_name(robot))
 
 
 def build(robot: Robot, hidden, bursts) -> list[Part]:

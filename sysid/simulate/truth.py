@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pinocchio as pin
 
+from ..effect import last_link
 from ..inertia import PARAMETERS, LogCholesky
 from ..inertia import pseudo as bodies
 from ..robot import Robot
@@ -67,7 +68,7 @@ def measured(robot: Robot, reference, rigid, masses, rng, duration: float) -> tu
     middle = 0.5 * (reference.q.max(axis=0) + reference.q.min(axis=0))
     scales = Scales(
         robot.joints, rms, peak, inertia + armature, speed, np.abs(reference.q - middle).max(axis=0), middle, coulomb, viscous,
-        float(robot.prior[parts.last_link(robot), 0]), motion.reach(robot), float(force), duration,
+        float(robot.prior[last_link(robot), 0]), motion.reach(robot), float(force), duration,
     )  # fmt: skip
     return scales, armature
 
@@ -133,9 +134,9 @@ def document(robot, truth: Truth, scales: Scales, named, custom, logs, bursts, s
             entry["bursts"] = {
                 part: [{"start": start, "stop": stop, "force": force.tolist()} for start, stop, force in windows] for part, windows in bursts.items()
             }
-            entry["body"] = robot.bodies[parts.last_link(robot)].name
+            entry["body"] = robot.bodies[last_link(robot)].name
         if entry["effect"] == "payload":
-            entry["body"] = robot.bodies[parts.last_link(robot)].name
+            entry["body"] = robot.bodies[last_link(robot)].name
             v = entry["values"]
             entry["inertia"] = bodies.box(v["m"], [v[key] for key in "xyz"], [v[f"l{key}"] for key in "xyz"]).tolist()
     hidden += [{"effect": "custom", "joint": "*", "name": getattr(f, "__name__", type(f).__name__)} for f in custom]
