@@ -202,7 +202,11 @@ def noise_weights(compressed: Compressed, x) -> np.ndarray:
 
     The objective is then the weighted sum; no single joint, however quiet, sets its size against the prior.
     """
-    rms = np.sqrt(compressed.squares(x) / np.maximum(compressed.rows, 1))
+    return inverse(np.sqrt(compressed.squares(x) / np.maximum(compressed.rows, 1)))
+
+
+def inverse(rms: np.ndarray) -> np.ndarray:
+    """(joints,) weights: the inverse of residual RMS, with a geometric mean of one."""
     weights = 1.0 / np.maximum(rms, 1e-9 * rms.max())
     return weights / np.exp(np.mean(np.log(weights)))
 

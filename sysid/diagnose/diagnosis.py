@@ -15,7 +15,7 @@ import numpy as np
 from .. import model, pipeline, rows
 from ..config import Experiment, is_own
 from ..effect import vocabulary
-from ..estimate import Fit
+from ..estimate import Fit, inverse
 from ..filters import settled
 from ..model import ROBOT, Model
 from ..preprocess import prepare
@@ -101,9 +101,9 @@ class Logs:
         if train is None or test is None or min(m.samples for m in (train, test)) < 50:
             return None
         stride = stride_of(train, cutoff)
-        structure = replace(structure, scales=structure.scales or structure.measured_by(train).scales)
+        structure = structure if structure.scales else structure.scaled_by(train)
         make = lambda w: Ground(self.experiment, structure, train, test, self.fit.prior, stride=stride, weights=w, grid=grid)  # noqa: E731
-        return make(weights) if weights is not None else make(by_noise(make(None)))
+        return make(weights) if weights is not None else make(inverse(make(None).rms("train")))
 
     def from_angles(self, ground: Ground) -> np.ndarray:
         """(dof,) RMS of the torque that the angles' own noise makes in a ground's test residual: as much again is added, and what
@@ -121,13 +121,6 @@ class Logs:
         joints = self.fit.joints
         train, test = prepare(self.train, spec, joints), prepare(self.test, spec, joints)
         return Ground(self.experiment, self.fit.model, train, test, self.fit.prior, stride=rows.stride_for(train, 6000), hold=True)
-
-
-def by_noise(ground: Ground) -> np.ndarray:
-    """(dof,) weights: the inverse of what each joint's training residual is, with a geometric mean of one."""
-    rms = ground.rms("train")
-    rms = np.maximum(rms, 1e-6 * rms.max())
-    return 1.0 / (rms / np.exp(np.mean(np.log(rms))))
 
 
 def diagnose(experiment: Experiment, *, fit: Fit | None = None, progress: pipeline.Progress | None = None) -> Diagnosis:
@@ -301,18 +294,18 @@ def _parameters(after: Ground | None, answer: Answer, fit: Fit) -> dict[str, tup
         grown, first = after.model, 10 * after.model.bodies
         stds, shape_stds = after.std()
         out = {c.name: (float(after.settled.x[first + k]), float(stds[k]), c.unit) for k, c in enumerate(grown.coefficients) if (c.effect, c.joint) == (candidate.name, candidate.joint)}
-        out |= {v.name: (float(grown.shapes[k]), float(shape_stds[k]), v.unit) for k, v in enumerate(grown.shape_values) if v.term == len(grown.terms) - 1}
+        own = grown.last_shapes
+        out |= {v.name: (float(at), float(std), v.unit) for v, at, std in zip(grown.shape_values[own], grown.shapes[own], shape_stds[own])}
         return out
     grown = fit.model.with_effect(candidate.effect, (candidate.joint,))
     nan = float("nan")
     linear = [c for c in grown.coefficients[len(fit.model.coefficients) :]]
     out = {} if candidate.curved else {c.name: (float(v), nan, c.unit) for c, v in zip(linear, answer.coefficients)}
-    for value in grown.shape_values:
-        if value.term == len(grown.terms) - 1:
-            at = answer.shapes.get(value.shape.name, nan)
-            if candidate.curved and value.shape.start is not None and at == value.shape.start:
-                at += float(answer.coefficients[[s.name for s in candidate.effect.shapes()].index(value.shape.name)])
-            out[value.name] = (float(at), nan, value.unit)
+    for value in grown.shape_values[grown.last_shapes]:
+        at = answer.shapes.get(value.shape.name, nan)
+        if candidate.curved and value.shape.start is not None and at == value.shape.start:
+            at += float(answer.coefficients[[s.name for s in candidate.effect.shapes()].index(value.shape.name)])
+        out[value.name] = (float(at), nan, value.unit)
     return out
 
 

@@ -18,6 +18,7 @@ from ..config import Experiment
 from ..effect import SensorEffect
 from ..model import ROBOT, Model
 from ..preprocess import Motion
+from ..rows import summed
 from ..shape import Projection, prior_hessian, settle
 from .candidate import Candidate
 
@@ -146,15 +147,15 @@ class Ground:
         if isinstance(candidate.effect, SensorEffect):
             return self._read_otherwise(candidate, shapes, part)
         grown = self.grown(candidate, shapes)
-        last = len(grown.terms) - 1
+        own = grown.last_shapes
         at_start = all(shapes[s.name] == s.start for s in candidate.effect.shapes() if s.start is not None)
         # where an effect does nothing yet, a value that only says how it does it changes nothing
-        idle = [v for v in grown.shape_values if v.term < last or (at_start and v.shape.start is None)]
+        idle = [*grown.shape_values[: own.start], *(v for v in grown.shape_values[own] if at_start and v.shape.start is None)]
         held = tuple(((v.term, v.joint, v.shape.name), 0.0) for v in idle)
         slopes = row.tangents(
             replace(grown, held=(*grown.held, *held)), motion, self.settled.x, self.stride, rows.use, self.predicted[which] if at_start else None
         )  # fmt: skip
-        return slopes[:, :, [k for k, value in enumerate(grown.shape_values) if value.term == last]]
+        return slopes[:, :, own]
 
     @cached_property
     def predicted(self) -> tuple[np.ndarray, np.ndarray]:
@@ -194,11 +195,9 @@ class Ground:
         grown = self.model.with_effect(candidate.effect, (candidate.joint,))
         if candidate.effect.uses_load and grown.reference is None:
             grown = grown.with_reference(self.pi)
-        values = list(grown.shapes)
-        for k, value in enumerate(grown.shape_values):
-            if value.term == len(grown.terms) - 1 and value.shape.name in shapes:
-                values[k] = shapes[value.shape.name]
-        return grown.with_shapes(values)
+        own = grown.last_shapes
+        asked = [shapes.get(value.shape.name, at) for value, at in zip(grown.shape_values[own], grown.shapes[own])]
+        return grown.with_shapes([*grown.shapes[: own.start], *asked])
 
     def holding(self, answer: Answer) -> Ground:
         """This ground with an answer's candidate in the model, at the shape values found. The latest one is remembered."""
@@ -294,13 +293,7 @@ class Ground:
         use = self.held_out.use[:, own]
         scale = 1.0 / np.maximum(np.sqrt((after[:, own] ** 2 * use).sum(0) / np.maximum(use.sum(0), 1)), 1e-300)
         before, left = self.residual_test[:, own] * use * scale, after[:, own] * use * scale
-        told = before - left
-        size = summed(self.blocks[1], told**2).sum(1)
-        if not size.sum() > 0:
-            return 0.0
-        slope = float((before * told).sum() / size.sum())
-        scores = summed(self.blocks[1], told * (before - slope * told)).sum(1)
-        return standard(slope * size.sum(), scores, size)
+        return foretells(before - left, before, self.blocks[1])
 
     def _size(self, torque) -> float:
         return float(np.linalg.norm(torque * self.weights))
@@ -338,6 +331,15 @@ class Ground:
             return 1.0
         wald = float(np.sum((vectors[:, keep].T @ pull) ** 2 / values[keep]))
         return float(f.sf(wald * left / (rank * max(acting - 1.0, 1.0)), rank, left))
+
+
+def foretells(told, residual, blocks) -> float:
+    """How far the slope of a residual (n, k) on what was foretold of it (n, k) stands from zero, in standard errors."""
+    size = summed(blocks, told**2).sum(1)
+    if not size.sum() > 0:
+        return 0.0
+    slope = float((residual * told).sum() / size.sum())
+    return standard(slope * size.sum(), summed(blocks, told * (residual - slope * told)).sum(1), size)
 
 
 def standard(pull: float, scores, size) -> float:
@@ -382,12 +384,6 @@ def _blocks(rows: row.Rows) -> np.ndarray:
         out[own] = first + np.minimum(np.arange(len(own)) * count // len(own), count - 1)
         first += count
     return out
-
-
-def summed(blocks, values) -> np.ndarray:
-    """Sums (blocks, columns) of values (n, columns)."""
-    size = int(blocks.max()) + 1
-    return np.stack([np.bincount(blocks, v, minlength=size) for v in values.T], 1) if values.shape[1] else np.zeros((size, 0))
 
 
 def score(before, after, counts) -> float:

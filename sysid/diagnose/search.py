@@ -178,7 +178,8 @@ def refit(ground: Ground, answer: Answer, always: bool = False) -> tuple[Answer,
         ground.experiment, ground.grown(candidate, shapes), ground.train, ground.test, ground.prior, stride=ground.stride, weights=ground.weights, grid=False
     )
     found = score(ground.squares, grown.squares, ground.counts)
-    mine = {v.shape.name: s for v, s in zip(grown.model.shape_values, grown.model.shapes) if v.term == len(grown.model.terms) - 1}
+    own = grown.model.last_shapes
+    mine = {v.shape.name: s for v, s in zip(grown.model.shape_values[own], grown.model.shapes[own])}
     forecast = ground.forecast(grown.residual_test, candidate)
     return replace(answer, shapes=mine, squares=grown.squares, score=found, forecast=forecast), grown
 

@@ -1,8 +1,8 @@
 """Is structure left that nothing in the vocabulary explains, and what does it depend on?
 
 A residual that is noise cannot be foretold. So what is left on the training rows is learned as a smooth function of the
-motion, of one variable at a time and of several together, and the test rows say which share of their own residual that
-foretells. A share that stands out from block to block is structure, whatever it is called.
+motion and of its past, of one variable at a time and of several together, and the test rows say which share of their own
+residual that foretells. A share that stands out from block to block is structure, whatever it is called.
 """
 
 from __future__ import annotations
@@ -12,8 +12,10 @@ from itertools import combinations
 
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
+from scipy.signal import lfilter
 
-from .ground import Ground, summed
+from ..rows import summed
+from .ground import Ground, foretells
 from .search import away, stands_out
 
 LEAST, STANDS_OUT = 0.1, 4.0  # share of the held-out square foretold; standard errors
@@ -22,7 +24,8 @@ _LARGEST, _CROWDED = 0.1, 0.65
 _KNOTS, _BINS, _FEATURES, _TURNS, _WIDTHS, _RIDGES = 9, 25, 24, 5, (0.25, 0.6, 1.5), np.geomspace(1e-4, 1e2, 7)
 _FOLDS = 5
 _SMOOTH = np.sqrt(np.log(2.0)) / (2.0 * np.pi * 5.0)  # s: a low-pass of 5 Hz
-_FEWER = (13, 85)  # features: the plain ones, and those with the random ones
+_FEWER = (22, 94)  # features: the plain ones, and those with the random ones
+_PAST = (0.1, 0.4, 1.6)  # s: how far back a joint may remember its speed
 _LOWEST, _SCATTER = 0.5, 5.0  # Hz; a peak of twenty times its surroundings counts as four standard errors
 
 
@@ -70,7 +73,8 @@ def structures(ground: Ground) -> list[Structure]:
 
 
 def variables(ground: Ground, part: str) -> dict[str, tuple[str, np.ndarray]]:
-    """{name: (unit, (n,) values)} on the rows of a part: q, qd, qdd of every joint, the predicted torque, time."""
+    """{name: (unit, (n,) values)} on the rows of a part: q, qd, qdd of every joint, the predicted torque, what each joint's
+    speed was lately, time."""
     which = part == "test"
     motion, rows = ((ground.train, ground.rows), (ground.test, ground.held_out))[which]
     robot = ground.model.robot
@@ -83,6 +87,9 @@ def variables(ground: Ground, part: str) -> dict[str, tuple[str, np.ndarray]]:
     predicted = np.concatenate([
         slow(ground.predicted[which][rows.piece == k], piece.step * ground.stride) for k, piece in enumerate(motion.pieces)
     ])  # fmt: skip
+    lately = {
+        past: np.concatenate([_lately(piece.qd, piece.step, past)[i] for piece, i in zip(motion.pieces, own)]) for past in _PAST
+    }  # fmt: skip
     out = {}
     for j, (joint, slides) in enumerate(zip(robot.joints, robot.prismatic)):
         base, force = ("m", "N") if slides else ("rad", "N m")
@@ -90,7 +97,18 @@ def variables(ground: Ground, part: str) -> dict[str, tuple[str, np.ndarray]]:
         out[f"qd_{joint}"] = (f"{base}/s", qd[:, j])
         out[f"qdd_{joint}"] = (f"{base}/s^2", qdd[:, j])
         out[f"tau_{joint}"] = (force, predicted[:, j])
+        out |= {_past(joint, past): (f"{base}/s", values[:, j]) for past, values in lately.items()}
     return out | {"time": ("s", rows.t)}
+
+
+def _past(joint: str, seconds: float) -> str:
+    return f"qd_{joint} of the last {seconds:g} s"
+
+
+def _lately(values, step: float, seconds: float) -> np.ndarray:
+    """Values (n, dof) through a lag of first order."""
+    keep = np.exp(-step / seconds)
+    return lfilter([1.0 - keep], [1.0, -keep], values, axis=0)
 
 
 def _structure(ground: Ground, joint: int, train, test) -> Structure:
@@ -100,7 +118,10 @@ def _structure(ground: Ground, joint: int, train, test) -> Structure:
     y, y_test = ground.residual[use, joint], ground.residual_test[use_test, joint]
     blocks, blocks_test = ground.blocks[0][use], ground.blocks[1][use_test]
     found, together, robot = [], [], ground.model.robot
+    others_past = {_past(other, past) for other in robot.joints if other != robot.joints[joint] for past in _PAST}
     for name, (unit, values) in train.items():
+        if name in others_past:
+            continue
         a, b = values[use], test[name][1][use_test]
         if name == "time":
             share, far = _over_time(b, y_test, blocks_test)
@@ -111,6 +132,7 @@ def _structure(ground: Ground, joint: int, train, test) -> Structure:
     found.sort(key=lambda d: -d.share)
     own = robot.joints[joint]
     pairs = [(f"{a}_{own}", f"{b}_{own}") for a, b in combinations(("q", "qd", "qdd", "tau"), 2)]
+    pairs += [(f"{a}_{own}", _past(own, past)) for a in ("q", "qd") for past in _PAST]
     for other in robot.joints:
         if other != own:
             pairs += [(f"{a}_{own}", f"{b}_{other}") for a, b in (("q", "q"), ("qd", "q"), ("qd", "qd"), ("tau", "qd"))]
@@ -156,11 +178,13 @@ def _splines(x, knots) -> np.ndarray:
 
 
 def _together(train, test) -> tuple[np.ndarray, np.ndarray]:
-    """Random cosines of two standardised variables at several widths (Rahimi & Recht 2007), also times the sign of each."""
+    """Plain functions of two variables and of their signs and sizes, then random cosines of both at several widths (Rahimi &
+    Recht 2007), also times the sign of each."""
     rng = np.random.default_rng(0)
     a, b = np.stack(train, 1), np.stack(test, 1)
     signs = [np.sign(x) for x in (a, b)]
     middle, spread = a.mean(0), np.where(a.std(0) > 0, a.std(0), 1.0)
+    sizes = [np.abs(x) / spread for x in (a, b)]
     a, b = (a - middle) / spread, (b - middle) / spread
     w = np.concatenate([rng.normal(size=(2, _FEATURES)) / width for width in _WIDTHS], axis=1)
     phase = rng.uniform(0, 2 * np.pi, w.shape[1])
@@ -168,7 +192,11 @@ def _together(train, test) -> tuple[np.ndarray, np.ndarray]:
     turns = np.arange(1, _TURNS + 1)
     # what is in proportion to the second variable and changes with the first, and the second's own size
     along = [np.concatenate([np.cos(x[:, :1] * turns), np.sin(x[:, :1] * turns)], axis=1) * x[:, 1:] for x in (a, b)]
-    plain = [np.column_stack([x, x[:, :1] * x[:, 1:], w]) for x, w in zip((a, b), along)]
+    product = lambda x: x[:, :1] * x[:, 1:]  # noqa: E731
+    plain = [
+        np.column_stack([x, product(x), s, product(s), z, s * z[:, ::-1], s * z.prod(1, keepdims=True), w])
+        for x, s, z, w in zip((a, b), signs, sizes, along)
+    ]  # fmt: skip
     return tuple(np.concatenate([p, f, f * s[:, :1], f[:, :_FEATURES] * s[:, 1:]], axis=1) for p, f, s in zip(plain, waves, signs))
 
 
@@ -182,7 +210,9 @@ def _foretold(a, y, blocks, b, y_test, blocks_test) -> tuple[float, float]:
         return 0.0, 0.0
     before, after = summed(blocks_test, np.stack([y_test**2, (y_test - told) ** 2], 1)).T
     total = before.sum()
-    return (float((total - after.sum()) / total), stands_out(before, after)) if total > 0 else (0.0, 0.0)
+    if not total > 0:
+        return 0.0, 0.0
+    return float((total - after.sum()) / total), max(stands_out(before, after), foretells(told[:, None], y_test[:, None], blocks_test))
 
 
 def _learned(a, y, fold, b) -> tuple[float, np.ndarray]:
