@@ -13,15 +13,17 @@ import numpy as np
 import pytest
 from ruamel.yaml import YAML
 from scipy.optimize import lsq_linear
+from scipy.signal import lfilter
 
 from sysid import config, loop, pipeline, regressor, results, robot, simulate
 from sysid.diagnose import changed, search
 from sysid.diagnose.changed import document as changes_document
-from sysid.diagnose.diagnosis import diagnose
+from sysid.diagnose.diagnosis import _verdict, diagnose
 from sysid.diagnose.document import document
 from sysid.diagnose.domain import CUTOFFS, Gaussian, questioned, stride_of
 from sysid.diagnose.ground import Ground, standard, summed
-from sysid.diagnose.structure import structures
+from sysid.diagnose.noise import NoiseFloor
+from sysid.diagnose.structure import TONE, Structure, structures
 from sysid.errors import ConfigError, LogError, SysidError
 from sysid.log import Log, Segment
 from sysid.preprocess import standstill_speed
@@ -696,10 +698,46 @@ def test_what_follows_two_variables_is_structure(ground):
 
 @pytest.mark.parametrize(("law", "words"), [
     (lambda v: 0.2 * np.sin(2.0 * v["q_shoulder"]) * v["qd_elbow"], {"q_shoulder", "qd_elbow"}), (lambda v: 0.2 * np.abs(v["qd_shoulder"]), {"qd_shoulder"}),
+    (lambda v: 0.15 * np.abs(v["qd_elbow"]) * v["qd_shoulder"], {"qd_shoulder", "qd_elbow"}),
 ])  # fmt: skip
 def test_strong_simple_laws_are_structure(ground, law, words):
     own = follows(ground, law)
     assert own.there and own.share > 0.6 and words <= {*own.together, *(d.variable for d in own.depends_on)}
+
+
+def test_what_remembers_is_structure(ground):
+    def creep(v):  # a lag of 0.25 s, which is none of those that are tried
+        keep = np.exp(-np.median(np.diff(v["time"])) / 0.25)
+        return 0.3 * lfilter([1.0 - keep], [1.0, -keep], v["qd_elbow"])
+
+    own = follows(ground, creep)
+    assert own.there and own.share > 0.6 and any(name.startswith("qd_elbow of the last") for name in own.together)
+
+
+def verdict_on(share: float, *, away: float = 9.0, together=("q_elbow",), taken: float | None = None, error: float = 1.0, angles: float = 0.0):
+    """The verdict on a joint of which a share can be foretold of what is left, one per row; the noise floor is one."""
+    left = Structure(0, share, away, (), together)
+    count = 1000.0
+    last = SimpleNamespace(raw_rms=lambda: np.array([error]), squares=np.full((10, 1), count / 10), counts=np.full((10, 1), count / 10))
+    head = SimpleNamespace(candidate=SimpleNamespace(joint=0, name="viscous"))
+    steps = [] if taken is None else [SimpleNamespace(head=head, family=(head,), before=np.array([count * (1.0 + taken)]))]
+    (found,) = _verdict(SimpleNamespace(joints=("elbow",)), {"elbow": NoiseFloor(1.0, 0.05, "spectral", "")}, steps, last, [left], SimpleNamespace(from_angles=lambda _: np.array([angles])))
+    return found
+
+
+@pytest.mark.parametrize(("given", "status"), [
+    ({"share": 0.3}, "unknown"), ({"share": 0.3, "away": 3.0}, "complete"), ({"share": 0.05}, "complete"),
+    # what is foretold is no more than the angles' own noise makes; a tone is none of its making
+    ({"share": 0.3, "angles": 0.7}, "complete"), ({"share": 0.3, "angles": 0.7, "together": (TONE,)}, "unknown"),
+    # nothing foretells it, but the error is far above the floor; not where the angles' noise makes it
+    ({"share": 0.0, "error": 2.0}, "unknown"), ({"share": 0.0, "error": 2.0, "angles": 1.0}, "complete"),
+    # an effect was found: is it most of what is wrong?
+    ({"share": 0.3, "taken": 1.0}, "unknown"), ({"share": 0.3, "taken": 4.0}, "missing"), ({"share": 0.0, "taken": 1.0}, "missing"),
+    ({"share": 0.0, "taken": 1.0, "error": 1.4}, "unknown"), ({"share": 0.0, "taken": 6.0, "error": 1.4}, "missing"),
+])  # fmt: skip
+def test_a_verdict_weighs_what_was_found_against_what_is_left(given, status):
+    found = verdict_on(**given)
+    assert found.status == status and (found.also == ("viscous",)) == (status == "unknown" and "taken" in given)
 
 
 # ---- what changed on another log

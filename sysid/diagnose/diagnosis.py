@@ -14,7 +14,7 @@ import numpy as np
 
 from .. import model, pipeline, rows
 from ..config import Experiment, is_own
-from ..effect import vocabulary
+from ..effect import SensorEffect, vocabulary
 from ..estimate import Fit, inverse
 from ..filters import settled
 from ..model import ROBOT, Model
@@ -28,7 +28,8 @@ from .noise import NoiseFloor, floor
 _MOST_STEPS = 8
 _UNSEEN = 0.05  # of its root mean square: below it a signature is absorbed by the model
 _SHOWN = 12  # findings
-_LEFT = 0.25  # of what the effects took: where as much can still be foretold, they are not the whole of it
+# of what the effects took: where as much can still be foretold, or lies above the noise floor, they are not the whole of it
+_LEFT, _UNEXPLAINED = 0.15, 0.25
 
 
 @dataclass(frozen=True)
@@ -163,7 +164,9 @@ def diagnose(experiment: Experiment, *, fit: Fit | None = None, progress: pipeli
 def _steps(logs: Logs, ground: Ground, other, fitted: Ground, answers: list[Answer], extra, tell: Callable) -> Iterator[tuple[search.Step, Ground]]:
     """The steps of the search, each with the fitted model before it, on the logs as the experiment filters them."""
     for _ in range(_MOST_STEPS):
-        step = search.next_step(ground, other, answers, lambda answer, at=fitted: _harms(at, answer))
+        angles = cache(lambda at=ground: logs.from_angles(at))
+        refused = lambda answer, at=fitted, ground=ground, angles=angles: _harms(at, answer) or _smooths(ground, angles, answer)  # noqa: E731
+        step = search.next_step(ground, other, answers, refused)
         if step is None:
             return
         before, ground, fitted = fitted, step.ground, fitted.holding(step.head)
@@ -189,6 +192,15 @@ def _harms(fitted: Ground, answer: Answer) -> bool:
     own = answer.candidate.judged_by(squares.shape[1])
     rise = (squares - fitted.squares)[:, own].sum(1)
     return rise.sum() > 0 and (search.away(rise) > 1.0 or rise.sum() > 0.002 * fitted.squares[:, own].sum())
+
+
+def _smooths(ground: Ground, angles: Callable[[], np.ndarray], answer: Answer) -> bool:
+    """Whether an effect that filters torque takes no more than the angles' noise makes of it: any filter lessens that."""
+    candidate = answer.candidate
+    if not (isinstance(candidate.effect, SensorEffect) or (candidate.curved and candidate.effect.uses_load)):
+        return False
+    j = candidate.joint
+    return (ground.squares - answer.squares)[:, j].sum() <= ground.counts[:, j].sum() * angles()[j] ** 2
 
 
 # ---- the noise floor
@@ -324,25 +336,32 @@ def _not_visible(answers: list[Answer]) -> list[Answer]:
 
 def _verdict(fit: Fit, levels, steps, last: Ground, left: list[structure.Structure], logs: Logs) -> list[Verdict]:
     out = []
-    raw, angles = last.raw_rms(), cache(lambda: logs.from_angles(last))
+    raw, angles = last.raw_rms() ** 2, cache(lambda: logs.from_angles(last) ** 2)
     for j, joint in enumerate(fit.joints):
         own = [s for s in steps if s.head.candidate.joint == j or (s.head.candidate.joint == ROBOT and s.shares[j] >= search.WORTH)]
-        after = last.squares[:, j].sum()
-        # of what the angles' noise makes, as much again was looked at
-        above = _far_above(raw[j], levels[joint]) and _far_above(np.sqrt(max(raw[j] ** 2 - 2.0 * angles()[j] ** 2, 0.0)), levels[joint])
-        if own and left[j].there and left[j].share * after > _LEFT * (steps[0].before[j] - after):
-            # what was found is not most of what is wrong
-            out.append(Verdict(joint, "unknown", also=tuple(s.head.candidate.name for s in own), structure=left[j]))
-        elif own:
-            tied = tuple(dict.fromkeys(a.candidate.name for a in own[0].family[1:] if a.candidate.name != own[0].head.candidate.name))
-            out.append(Verdict(joint, "missing", own[0].head.candidate.name, tied, tuple(s.head.candidate.name for s in own[1:]), left[j] if left[j].there else None))
-        elif left[j].there or above:
+        after, count = last.squares[:, j].sum(), max(last.counts[:, j].sum(), 1.0)
+        foretold = left[j].share * after / count
+        # the angles' noise is in the residual too and hangs on the motion a little, but is no tone and comes in no bursts
+        there = left[j].there and (left[j].bursts or left[j].tone or foretold > angles()[j])
+        kept = left[j] if there else None
+        if own:
+            taken = (steps[0].before[j] - after) / count
+            words = tuple(s.head.candidate.name for s in own)
+            if (there and foretold > _LEFT * taken) or _above(raw[j], levels[joint], 1.0, lambda at=j: angles()[at]) > _UNEXPLAINED * taken:
+                # what was found is not most of what is wrong
+                out.append(Verdict(joint, "unknown", also=words, structure=left[j]))
+            else:
+                tied = tuple(dict.fromkeys(a.candidate.name for a in own[0].family[1:] if a.candidate.name != words[0]))
+                out.append(Verdict(joint, "missing", words[0], tied, words[1:], kept))
+        elif there or _above(raw[j], levels[joint], 2.0, lambda at=j: angles()[at]) > 0.5 * raw[j]:
             out.append(Verdict(joint, "unknown", structure=left[j]))
         else:
             out.append(Verdict(joint, "complete"))
     return out
 
 
-def _far_above(rms: float, level: NoiseFloor) -> bool:
-    """Whether more than half of a joint's squared error lies above its noise floor, beyond doubt about the floor."""
-    return rms**2 > 2.0 * (level.rms + 2.0 * level.std) ** 2
+def _above(square: float, level: NoiseFloor, doubt: float, angles: Callable[[], float]) -> float:
+    """How far a joint's mean squared error lies above its noise floor, so many standard deviations of the floor in doubt, and
+    above what the angles' noise makes, as much again of which was looked at."""
+    above = square - (level.rms + doubt * level.std) ** 2
+    return above - 2.0 * angles() if above > 0 else above

@@ -136,13 +136,13 @@ def passes(ground: Ground, answer: Answer, q: float) -> bool:
     return answer.allowed and answer.visible >= _SEEN and q <= Q_LEVEL and found.away >= SUPPORT and found.share >= WORTH and answer.score > 0
 
 
-def next_step(ground: Ground, other: Callable[[], Ground | None], answers: list[Answer], harms: Callable[[Answer], bool] = lambda _: False) -> Step | None:
+def next_step(ground: Ground, other: Callable[[], Ground | None], answers: list[Answer], refused: Callable[[Answer], bool] = lambda _: False) -> Step | None:
     """The effect that joins next, or None where no candidate passes.
 
     Args:
         other: makes the ground of the same model under another low-pass.
         answers: `ask(ground, ...)`.
-        harms: whether an answer raises the held-out error as the experiment's own filter shows it.
+        refused: whether an answer is refused on other grounds.
     """
     q = q_values(ground, answers)
     hopeful = [a for a in answers if passes(ground, a, q[a.candidate])]
@@ -152,7 +152,7 @@ def next_step(ground: Ground, other: Callable[[], Ground | None], answers: list[
         standing = [a for a in short if survives(other(), a)]
         refined = [(a, g) for a, g in (refit(ground, a) for a in standing) if passes(ground, a, q[a.candidate])]
         family = _family(ground, [a for a, _ in refined]) if refined else []
-        helpful = [a for a in family if not harms(a)]
+        helpful = [a for a in family if not refused(a)]
         if helpful:
             head = helpful[0]
             family = [head, *(a for a in family if a is not head), *_alike(other(), head, standing, family)]

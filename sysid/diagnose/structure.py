@@ -18,6 +18,7 @@ from ..rows import summed
 from .ground import Ground, foretells
 from .search import away, stands_out
 
+TONE = "time, in a tone"
 LEAST, STANDS_OUT = 0.1, 4.0  # share of the held-out square foretold; standard errors
 # Noise through a low-pass is Gaussian, whatever its colour: its tenth of largest rows holds 0.44 of its square.
 _LARGEST, _CROWDED = 0.1, 0.65
@@ -59,6 +60,11 @@ class Structure:
     def bursts(self) -> bool:
         """Whether the residual comes in bursts, as no noise through a low-pass does."""
         return self.crowded >= _CROWDED
+
+    @property
+    def tone(self) -> bool:
+        """Whether one frequency foretells most."""
+        return self.together == (TONE,)
 
     @property
     def there(self) -> bool:
@@ -140,7 +146,7 @@ def _structure(ground: Ground, joint: int, train, test) -> Structure:
         made = _together([train[n][1][use] for n in names], [test[n][1][use_test] for n in names])
         share, far = _foretold(made[0], y, blocks, made[1], y_test, blocks_test)
         together.append((share, far, names))
-    together.append((*_tone(ground, joint), ("time, in a tone",)))
+    together.append((*_tone(ground, joint), (TONE,)))
     best = max([*((d.share, d.away, (d.variable,)) for d in found), *together], key=lambda t: t[0] if t[1] >= STANDS_OUT else -1.0)
     return Structure(
         joint, best[0], best[1], tuple(d for d in found if d.away >= 2.0 and d.share > 0.0), best[2] if best[1] >= STANDS_OUT else (), _crowded(y_test),
