@@ -41,6 +41,13 @@ class Gaussian:
         weights = np.exp(-0.5 * (np.arange(-self.reach, self.reach + 1) / sigma) ** 2)
         self.weights = weights / weights.sum()
 
+    @property
+    def taken_of_noise(self) -> float:
+        """The share of white noise's root mean square that it takes away."""
+        rest = -self.weights
+        rest[self.reach] += 1.0
+        return float(np.sqrt(np.sum(rest**2)))
+
     def at(self, values, rows: slice) -> np.ndarray:
         """The filtered values (..., n) at some rows of the last axis; the edge's value goes on beyond the edge."""
         n = values.shape[-1]
@@ -93,6 +100,6 @@ def _piece(number: int, source: str, segment, cutoff: float) -> Piece | None:
     return Piece(
         log=number, step=every * segment.step, t=segment.t[rows], q=smooth[rows], qd=qd[rows], qdd=qdd[rows], tau=both(segment.tau, axis=0)[rows],
         measured=segment.tau[rows], signals={name: values[rows] for name, values in segment.signals.items()}, use=None, smoother=settling,
-        core=slice(settling.reach, n - settling.reach), rest=np.zeros(smooth.shape[1]), noise=np.sqrt(np.mean((segment.q[rows] - smooth[rows]) ** 2, axis=0)),
+        core=slice(settling.reach, n - settling.reach), rest=np.zeros(smooth.shape[1]), noise=np.sqrt(np.mean((segment.q[rows] - smooth[rows]) ** 2, axis=0)) / angles.taken_of_noise,
         source=source,
     )  # fmt: skip
