@@ -48,7 +48,8 @@ def compare(first: Fit, second: Fit, names: tuple[str, str] | None = None) -> li
     if not joints:
         raise SysidError(f"{names[0]} and {names[1]} share no joint", where="compare")
     blocks = _block_width(first.predictions["test"], second.predictions["test"])
-    sums = [_block_sums(fit.predictions["test"], blocks, [fit.joints.index(j) for j in joints]) for fit in (first, second)]
+    span = tuple(end(np.concatenate([fit.predictions["test"].t for fit in (first, second)])) for end in (np.min, np.max))
+    sums = [_block_sums(fit.predictions["test"], blocks, [fit.joints.index(j) for j in joints], span) for fit in (first, second)]
     both = (sums[0][1] > 0) & (sums[1][1] > 0)  # a block counts where both models have rows in it
     return [
         Difference(*names, joint, *_jackknife(*((s[both[:, k], k], n[both[:, k], k]) for s, n in sums)))
@@ -61,13 +62,17 @@ def _block_width(first: Prediction, second: Prediction) -> float:
     return max(duration / _BLOCKS, _SHORTEST)
 
 
-def _block_sums(prediction: Prediction, width: float, columns):
-    """Sums of squares and counts (blocks, joints) over blocks of `width` seconds of each log's own clock."""
-    block = np.floor(prediction.t / width).astype(np.int64)
-    lowest = block.min()
-    span = int(block.max() - lowest) + 1
-    index = prediction.log.astype(np.int64) * span + block - lowest
-    size = (int(prediction.log.max()) + 1) * span
+def _block_sums(prediction: Prediction, width: float, columns, span: tuple[float, float]):
+    """Sums of squares and counts (blocks, joints) over blocks of `width` seconds of each log's own clock.
+
+    Args:
+        span: first and last time [s] of all predictions that are compared: a filter that leaves out more at the ends of a
+            log must not shift the blocks.
+    """
+    lowest, highest = (int(np.floor(t / width)) for t in span)
+    count = highest - lowest + 1
+    index = prediction.log.astype(np.int64) * count + np.floor(prediction.t / width).astype(np.int64) - lowest
+    size = (int(prediction.log.max()) + 1) * count
     residual = prediction.residual[:, columns]
     use = np.ones_like(residual) if prediction.use is None else prediction.use[:, columns].astype(float)
     return summed(index, residual**2, size), summed(index, use, size)

@@ -111,7 +111,8 @@ class Piece:
     log, source: number and name of the log. t (n,) [s]; q, qd, qdd (n, dof); tau (n, dof) as the fit sees it, `measured` as logged; signals {name: (n,)}; `use` (n, dof) bool, None where every row counts.
     `smoother` filters columns where torque was filtered, else None; then `margin` extra rows stand before and
     after `core`, whose filtered values the filter needs but which are not used. `rest` (dof,) [rad/s or m/s] is the
-    speed that rounding makes of a constant angle; `noise` (dof,) [rad or m] what the filter took off the angles, RMS, or an estimate of their noise from that.
+    speed that rounding makes of a constant angle; `noise` (dof,) [rad or m] what the filter took off the angles, RMS, or an
+    estimate of their noise from that.
 
     What a model adds: `load` (n, dof) the torque that its bodies alone need; `gravity` (3,) or None for the robot's own;
     `deflection` (3, n, dof), how far each link is behind its motor in q, qd and qdd, or None.

@@ -172,12 +172,26 @@ def test_standard_error_of_a_difference_is_its_scatter():
         sums = []
         for residual in (shared, shared + 0.3 * extra):
             prediction = Prediction(np.zeros(4000, np.int16), t, residual, np.zeros_like(residual), None)
-            s, n = _block_sums(prediction, 1.0, [0])
+            s, n = _block_sums(prediction, 1.0, [0], (t[0], t[-1]))
             sums.append((s[:, 0], n[:, 0]))
         delta, se = _jackknife(*sums)
         deltas.append(delta)
         errors.append(se)
     np.testing.assert_allclose(np.median(errors), np.std(deltas), rtol=0.15)
+
+
+def test_blocks_stand_where_they_are_whatever_a_filter_leaves_out():
+    """The same residual, cut at the ends as by a wider filter: block by block the same squares."""
+    from sysid.comparison import _block_sums
+    from sysid.estimate import Prediction
+
+    t, residual = np.arange(1000) * 0.01, np.random.default_rng(1).normal(size=(1000, 1))
+    sums = []
+    for kept in (slice(0, 1000), slice(130, 1000)):
+        whole = Prediction(np.zeros(1000, np.int16)[kept], t[kept], residual[kept], np.zeros_like(residual[kept]), None)
+        sums.append(_block_sums(whole, 1.0, [0], (t[0], t[-1]))[0])
+    assert sums[1][0] == 0
+    np.testing.assert_allclose(sums[1][2:], sums[0][2:])
 
 
 def test_predict_on_any_log(leg):
