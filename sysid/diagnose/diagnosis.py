@@ -342,7 +342,7 @@ def _verdict(fit: Fit, levels, steps, last: Ground, left: list[structure.Structu
         after, count = last.squares[:, j].sum(), max(last.counts[:, j].sum(), 1.0)
         foretold = left[j].share * after / count
         # the angles' noise is in the residual too and hangs on the motion a little, but is no tone and comes in no bursts
-        there = left[j].there and (left[j].bursts or left[j].tone or foretold > angles()[j])
+        there = left[j].there and (left[j].bursts or left[j].tone or foretold > 0.5 * angles()[j])
         kept = left[j] if there else None
         if own:
             taken = (steps[0].before[j] - after) / count
