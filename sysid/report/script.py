@@ -79,9 +79,11 @@ function redraw() {
     const plot = place.querySelector(".plot");
     if (!chart || !plot.data) continue;
     const figure = dressed(chart);
-    if (printing && place.closest(".split")) figure.layout.height *= 0.85;
-    if (printing) figure.layout.width = place.closest(".grid") ? 330 : place.closest(".split") ? 370 : 680;  // as the style sheet lays out A4
-    else { delete figure.layout.width; figure.layout.autosize = true; }
+    if (printing) {  // as the style sheet lays out A4
+      const [width, part] = place.closest(".three") ? [222, 0.75] : place.closest(".grid") ? [330, 0.9] : place.closest(".split") ? [370, 0.78] : [680, 1];
+      figure.layout.width = width; figure.layout.height *= part;
+    }
+    else figure.layout.autosize = true;
     Plotly.react(plot, figure.data, figure.layout, settings(chart));
   }
 }
