@@ -40,7 +40,7 @@ def axis(title: str, **more) -> dict:
     return {"title": {"text": title, "standoff": 6, "font": {"size": 12}}, "automargin": True, "zeroline": False} | more
 
 
-LEGEND = {"orientation": "h", "xref": "container", "x": 0, "y": 1.0, "yanchor": "bottom", "xanchor": "left", "itemwidth": 30, "font": {"size": 11}}
+LEGEND = {"orientation": "h", "x": 0, "y": 1.0, "yanchor": "bottom", "xanchor": "left", "itemwidth": 30, "font": {"size": 11}}
 
 
 # ---- torque over time

@@ -71,7 +71,7 @@ def steps(fit: Fit, diagnosis: Diagnosis, document: dict, history: list[dict]) -
     ahead = _expected(fit, diagnosis, document) if same else []
     names = ["start" if s.get("added") is None else f"+ {s['added']}" + ("" if s.get("joint") in (None, "*") else f" on {s['joint']}") for s in done]
     every = names + [f"(+ {word})" for word, _ in ahead]
-    if not usable:
+    if len(done) == 1 and same:
         words = "No step was made yet. "
         words += "The broken line is what the diagnosis expects of the effects that it names, added one after another." if ahead else "The diagnosis names no effect to add."
     elif not same:
