@@ -68,7 +68,7 @@ footer { color: var(--quiet); font-size: .85rem; padding-top: 1rem; padding-bott
 @media (max-width: 40rem) { body { font-size: 15px; } header.top, main, footer { padding-left: .75rem; padding-right: .75rem; } .bar { width: 5.5rem; } table { font-size: .8rem; } th, td { padding-right: .45rem; }
   .scroll table:not(.suspects) th:first-child { position: sticky; left: 0; background: var(--paper); }
   tbody th { white-space: normal; max-width: 10rem; } .suspects tbody th { max-width: none; } .steps tbody th { min-width: 7.5rem; }
-  .parameters { font-size: .76rem; } .parameters .meter { display: none; } .parameters th, .parameters td { padding-right: .35rem; } .parameters .quiet { font-size: inherit; }
+  .parameters { font-size: .73rem; } .parameters .meter { display: none; } .parameters th, .parameters td { padding-right: .28rem; } .parameters .quiet { font-size: inherit; }
   .bodies td, .bodies th { white-space: normal; padding-right: .3rem; } .bodies { font-size: .72rem; } .logs td { white-space: normal; } .logs code { overflow-wrap: anywhere; display: block; min-width: 7rem; }
   table.wrap th, table.wrap td { white-space: normal; min-width: 3.2rem; overflow-wrap: normal; } .key { white-space: normal; display: block; }
   .suspects, .suspects tbody, .suspects tr:not(.family) { display: block; width: 100%; } .suspects thead { position: absolute; clip-path: inset(50%); width: 1px; height: 1px; overflow: hidden; }

@@ -105,7 +105,7 @@ async function follow(state) {
   if (runs) at("progress").value = job.share;
   at("cancel").hidden = !runs;
   at("cancel").disabled = runs && job.state === "cancelling";
-  const stale = shown !== null && shown !== looking;
+  const stale = shown !== null && (shown !== looking || stranger);
   at("main").classList.toggle("stale", stale);
   at("main").setAttribute("aria-busy", String(Boolean(runs)));
   at("waiting").hidden = shown !== null || stranger || Boolean(state.error) || Boolean(job && !runs && !state.ready);
@@ -208,7 +208,7 @@ function steps() {
       const found = await get("api/compare", {from: one.value, to: other.value});
       const rows = found.joints.map(j => { const unit = (page.joints.find(p => p.name === j.joint) || {unit: ""}).unit; return make("tr", {}, make("th", {scope: "row"}, j.joint), make("td", {}, level(j.from) + " " + unit), make("td", {}, level(j.to) + " " + unit),
         make("td", {class: j.delta < 0 ? "falls" : j.delta > 0 ? "rises" : ""}, (j.delta > 0 ? "+" : "") + number(j.delta, 3) + (j.se ? " ± " + number(j.se, 2) : "") + " " + unit)); });
-      answer.replaceChildren(make("div", {class: "scroll"}, make("table", {}, make("thead", {}, make("tr", {}, ...["joint", "held-out RMS, first", "second", "difference"].map(w => make("th", {scope: "col"}, w)))), make("tbody", {}, ...rows))));
+      answer.replaceChildren(make("div", {class: "scroll", tabindex: "0", role: "region", "aria-label": "two steps compared"}, make("table", {}, make("thead", {}, make("tr", {}, ...["joint", "held-out RMS, first", "second", "difference"].map(w => make("th", {scope: "col"}, w)))), make("tbody", {}, ...rows))));
     } catch (error) { answer.textContent = error.message; }
   };
   one.addEventListener("change", ask); other.addEventListener("change", ask);
@@ -306,7 +306,7 @@ async function stretch(from, to) {
     const words = found.suspects.length ? found.suspects.map(s => make("li", {}, s.effect + (s.joint === "*" ? "" : " on " + s.joint) + " would take " + Math.round(100 * s.share) + " % of the squared residual here ", button("preview", () => preview(s.finding))))
       : [make("li", {}, "None of the suspects explains what is missed here.")];
     answer.replaceChildren(make("h3", {}, "Between " + number(found.from, 4) + " and " + number(found.to, 4) + " s"), make("ul", {}, ...words),
-      make("div", {class: "scroll"}, make("table", {}, make("thead", {}, make("tr", {}, ...["joint", "RMS here", "RMS of all", "ratio"].map(w => make("th", {scope: "col"}, w)))), make("tbody", {}, ...rows))));
+      make("div", {class: "scroll", tabindex: "0", role: "region", "aria-label": "residual in that stretch of time"}, make("table", {}, make("thead", {}, make("tr", {}, ...["joint", "RMS here", "RMS of all", "ratio"].map(w => make("th", {scope: "col"}, w)))), make("tbody", {}, ...rows))));
   } catch (error) { answer.textContent = error.message; }
 }
 

@@ -33,6 +33,6 @@ input.moment { flex: 1 1 12rem; max-width: 30rem; padding: 0; accent-color: var(
 h2[tabindex="-1"]:focus { outline: none; } .experiments { border: 0 !important; font-size: .9rem; } .experiments summary { font-weight: normal; padding: .2rem 0; } .experiments ul { display: flex; flex-wrap: wrap; gap: .2rem 1.2rem; list-style: none; padding: 0; margin: .2rem 0; } .experiments [aria-current] { color: var(--ink); font-weight: 600; text-decoration: none; }
 .answer { min-height: 1.5rem; } .falls { color: var(--good); } .rises { color: var(--bad); }
 #notice > :last-child { margin-bottom: 0; }
-@media (max-width: 40rem) { body { padding-bottom: 7.5rem; } #redo:disabled { display: none; } #bar { padding: .45rem .75rem; } .suspects th .acts button { flex: 1 1 auto; } }
+@media (max-width: 40rem) { body { padding-bottom: 7.5rem; } #redo:disabled { display: none; } #bar { padding: .45rem .75rem; } .suspects th .acts button { flex: 1 1 auto; text-align: center; } .answer td { white-space: normal; } }
 @media print { #bar, .acts, form.own, #notice { display: none; } body { padding: 0; } }
 """
