@@ -31,7 +31,7 @@ function dressed(chart) {
   if (layout.scene) for (const k of ["xaxis", "yaxis", "zaxis"]) Object.assign(layout.scene[k], {gridcolor: line, zerolinecolor: line, color: ink, showbackground: false});
   if (coarse.matches && !layout.scene) layout.dragmode = false;  // a finger scrolls the page
   if (layout.legend && !layout.scene && innerWidth < 600) layout.legend.font = {...layout.legend.font, size: 10};  // in one row
-  if (layout.scene && innerWidth < 600) for (const k of "xyz") layout.scene.camera.eye[k] *= 1.2;
+  if (layout.scene && innerWidth < 600) for (const k of "xyz") layout.scene.camera.eye[k] *= layout.scene.aspectratio.z < 1 ? 1.6 : 1.2;  // the whole width in sight
   if (chart.link === "time" && range) layout.xaxis.range = [...range];
   return figure;
 }

@@ -69,7 +69,7 @@ def verdict_words(found: dict, document: dict, diagnosis: Diagnosis) -> str:
         return out + "."
     head, finding = document["findings"][at], diagnosis.findings[at]
     out += f": it removes {removed(head)} of the misfit"
-    known = [f"{text(name.split('.')[-1])} = {plus_minus(p['value'], p['std'])}{unit_of(p['unit'])}" for name, p in head["parameters"].items() if p["value"] is not None]
+    known = [f"{text(name.split('.')[-1])}{SPACE}={SPACE}{plus_minus(p['value'], p['std'])}{unit_of(p['unit'])}" for name, p in head["parameters"].items() if p["value"] is not None]
     out += f" ({', '.join(known)})." if known else "."
     summary = describe(finding.answer.candidate.effect)["summary"].replace("`", "").split(". ")[0].rstrip(".")
     out += f' <span class="quiet">{text(summary)}.</span>'
@@ -154,7 +154,7 @@ def suspects(diagnosis: Diagnosis, document: dict) -> tuple[str, str, list]:
 
 
 def _suspect(k: int, f: dict) -> str:
-    known = [f"{text(name.split('.')[-1])} = {plus_minus(p['value'], p['std'])}{unit_of(p['unit'])}" for name, p in f["parameters"].items() if p["value"] is not None]
+    known = [f"{text(name.split('.')[-1])}{SPACE}={SPACE}{plus_minus(p['value'], p['std'])}{unit_of(p['unit'])}" for name, p in f["parameters"].items() if p["value"] is not None]
     options = ", ".join(f"{text(k)} = {text(v)}" for k, v in f["options"].items())
     small = "; ".join(w for w in (", ".join(known), options) if w)
     after = f"{level(f['rms_test_before'])} → {level(f['rms_test_after'])}"

@@ -34,5 +34,5 @@ h2[tabindex="-1"]:focus { outline: none; } .experiments { border: 0 !important; 
 .answer { min-height: 1.5rem; } .falls { color: var(--good); } .rises { color: var(--bad); }
 #notice > :last-child { margin-bottom: 0; }
 @media (max-width: 40rem) { body { padding-bottom: 7.5rem; } #redo:disabled { display: none; } #bar { padding: .45rem .75rem; } .suspects th .acts button { flex: 1 1 auto; text-align: center; } .answer td { white-space: normal; } }
-@media print { #bar, .acts, form.own, #notice { display: none; } body { padding: 0; } }
+@media print { #bar, .experiments, .acts, form.own, #notice { display: none; } body { padding: 0; } }
 """
