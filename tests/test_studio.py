@@ -288,6 +288,26 @@ def test_the_state_is_answered_while_an_addition_is_checked(opened, monkeypatch)
     assert opened.sha != sha
 
 
+def test_while_it_works_the_state_needs_no_file_and_yet_hears_of_edits(opened, monkeypatch):
+    go = threading.Event()
+    monkeypatch.setattr(Bench, "_work", lambda self, job, text: (job.tell("compress", 0.5), go.wait(20)))
+    sha = opened.post("/api/add", sha=opened.sha, effect="armature", joint="elbow").json()["sha"]
+    reads, read = [], desk.Desk.text
+    monkeypatch.setattr(desk.Desk, "text", lambda self: (reads.append(threading.current_thread()), read(self))[1])
+    waiting = []
+    found = opened.bench.glance(waiting.append)
+    assert found["sha"] == sha and found["job"]["state"] == "running" and not reads and len(waiting) == 1
+    assert opened.bench.glance(waiting.append) == found and len(waiting) == 1  # one look at a time
+    waiting[0]()
+    opened.file.write_text(opened.file.read_text() + "# by hand\n")
+    end = time.monotonic() + 10
+    while opened.sha == sha and time.monotonic() < end:
+        time.sleep(0.05)
+    assert opened.sha != sha and opened.get("/api/state").json()["undo"] == "edit by hand"
+    go.set()
+    opened.wait()
+
+
 # ---- several experiments
 
 

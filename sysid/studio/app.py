@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 from urllib.parse import quote
 
@@ -41,6 +42,11 @@ def application(shelf: Shelf | Bench, *, host: str = "127.0.0.1", port: int = 87
 
         routed(path, endpoint, "GET")
 
+    async def state(request: Request) -> Response:
+        bench = shelf.opened(request.path_params.get("number", 0))
+        glanced = bench and bench.glance(lambda look: asyncio.get_running_loop().run_in_executor(None, look))
+        return _json(glanced) if glanced else await run_in_threadpool(_said, lambda: _json(at(request).state()))
+
     def changing(path: str, act) -> None:
         async def endpoint(request: Request) -> Response:
             try:
@@ -60,7 +66,7 @@ def application(shelf: Shelf | Bench, *, host: str = "127.0.0.1", port: int = 87
     reading("/studio.js", lambda r: _text(page.script(), "text/javascript"))
     reading("/studio.css", lambda r: _text(page.style(), "text/css"))
     reading("/plotly.js", lambda r: Response(page.engine(), media_type="text/javascript", headers={"cache-control": "private, max-age=3600"}))
-    own("/api/state", lambda bench, r: _json(bench.state()))
+    routed("/api/state", state, "GET")
     own("/api/view", lambda bench, r: _json(bench.page(_word(r, "sha"))))
     own("/api/figure", _figure)
     own("/api/residual", lambda bench, r: _json(bench.view(_word(r, "sha")).looks.residual(_whole(r, "joint"), _whole(r, "finding") if "finding" in r.query_params else None)))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import threading
+from collections.abc import Callable
 from pathlib import Path
 
 from .. import comparison, loop, pipeline, results
@@ -30,18 +31,44 @@ class Bench:
     def __init__(self, path: Path, out: Path | None = None, *, views: Views | None = None, turn: threading.Lock | None = None):
         self.desk, self.worker = Desk(path, out), Worker(turn)
         self._views = views or Views()
+        self._last: dict | None = None
+        self._looks, self._looking = 0, False
 
     # ---- what stands
 
     def state(self) -> dict:
         """The hash of the file, the job, and what can be undone. Never raises for a bad experiment file."""
-        job = self.worker.job
+        self._looks += 1
+        look, job = self._looks, self.worker.job
         try:
             sha, error = self.desk.sync(), None
         except SysidError as problem:
             sha, error = None, str(problem)
         undo, redo = self.desk.labels()
-        return {"name": self.desk.name, "sha": sha, "error": error, "job": None if job is None else job.document(), "ready": sha is not None and self._find(sha) is not None, "undo": undo, "redo": redo}
+        found = {"name": self.desk.name, "sha": sha, "error": error, "job": None if job is None else job.document(), "ready": sha is not None and self._find(sha) is not None, "undo": undo, "redo": redo}
+        if look == self._looks:  # none that began later, after a change perhaps
+            self._last = found
+        return found
+
+    def glance(self, beside: Callable[[Callable[[], None]], object]) -> dict | None:
+        """The state as it was last seen, with the job as it is now; None where that is not good enough.
+
+        While a job runs, every look at a file waits for the job to hand over, several times. So the page hears at once what
+        was seen a moment ago, and `beside`, which runs a function in another thread, makes the next look.
+        """
+        job, last = self.worker.job, self._last
+        if last is None or job is None or job.state != "running" or last["job"] is None or last["job"]["number"] != job.number:
+            return None
+        if not self._looking:
+            self._looking = True
+            beside(self._look)
+        return {**last, "job": job.document()}
+
+    def _look(self) -> None:
+        try:
+            self.state()
+        finally:
+            self._looking = False
 
     def view(self, sha: str) -> View:
         """What was found under the text with a hash. Raises SysidError where nothing is at hand."""

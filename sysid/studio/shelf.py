@@ -48,6 +48,10 @@ class Shelf:
                 self._benches[number] = Bench(self._paths[number], out, views=self._views, turn=self._turn)
             return self._benches[number]
 
+    def opened(self, number: int) -> Bench | None:
+        """The experiment with a number where it is open already; never waits."""
+        return self._benches.get(number)
+
     def cancel(self) -> None:
         """Ask every job to stop."""
         with self._lock:
