@@ -27,6 +27,7 @@ from sysid import config, regressor, robot
 from sysid.diagnose import candidate, diagnosis
 from sysid.studio.app import application
 from sysid.studio.bench import Bench
+from sysid.studio.serve import responsive
 
 LIMIT, PORT, CSRF = 0.3, 8765, "benchmark"
 URDF = "example-robot-data://ur_description/urdf/ur5_robot.urdf"
@@ -93,6 +94,7 @@ def main() -> int:
     if not given.whole:
         every = candidate.candidates
         diagnosis.candidates = lambda model, extra=(): [c for c in every(model, extra) if c.name in ASKED]
+    responsive()  # as `sysid studio` sets it
     with tempfile.TemporaryDirectory() as folder:
         start = time.perf_counter()
         path = written(Path(folder), given.samples)
@@ -109,6 +111,11 @@ def main() -> int:
         print(f"fitted and questioned in {time.perf_counter() - start:.1f} s", flush=True)
         start = time.perf_counter()
         second = clicks.ask("/api/add", {"sha": first, "finding": 0})[0].json()["sha"]
+        previewed = []
+        while bench.worker.job.state == "running":
+            during.append(clicks.ask("/api/state")[1])
+            previewed.append(clicks.ask(f"/api/residual?sha={first}&joint=1&finding=0")[1])
+            time.sleep(0.25)
         clicks.settle()
         print(f"an effect added, refitted and questioned in {time.perf_counter() - start:.1f} s", flush=True)
         view = clicks.ask(f"/api/view?sha={first}")[0].json()
@@ -123,13 +130,13 @@ def main() -> int:
         for _ in range(given.repeat):
             times["undo (cached)"].append(clicks.ask("/api/undo", {"sha": second})[1])
             times["redo (cached)"].append(clicks.ask("/api/redo", {"sha": first})[1])
-        times["state, while it works"] = during
+        times["state, while it works"], times["preview, while it works"] = during, previewed
         slow = 0
-        print(f"\n{'click':<24}{'median':>10}{'worst':>10}   (ms, {given.repeat} times)")
+        print(f"\n{'click':<26}{'median':>10}{'worst':>10}   (ms; {given.repeat} times, while it works {len(during)} and {len(previewed)})")
         for name, own in times.items():
-            over = name != "state, while it works" and max(own) >= LIMIT
+            over = max(own) >= LIMIT
             slow += over
-            print(f"{name:<24}{1000 * float(np.median(own)):>10.1f}{1000 * max(own):>10.1f}{'   TOO SLOW' if over else ''}")
+            print(f"{name:<26}{1000 * float(np.median(own)):>10.1f}{1000 * max(own):>10.1f}{'   TOO SLOW' if over else ''}")
         print(f"memory at most: {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6:.2f} GB")
     return int(slow > 0)
 

@@ -19,13 +19,14 @@ import pytest
 
 from sysid import loop
 from sysid.diagnose.diagnosis import diagnose
+from sysid.effect import vocabulary
 from sysid.errors import SysidError
-from sysid.studio import bench as benches
-from sysid.studio import guard, page
+from sysid.studio import desk, guard, page, views
 from sysid.studio.app import application
 from sysid.studio.bench import Bench
 from sysid.studio.desk import Desk, hashed
 from sysid.studio.serve import serve
+from sysid.studio.shelf import Shelf, beside
 from sysid.studio.view import View
 from sysid.studio.work import Cancelled, Job, Worker
 from tests.test_report import EVIL, Elements, written
@@ -61,7 +62,7 @@ def told(bench, job, text, view):
     own = copy.copy(view)
     own.sha, own._charts, own.fit = hashed(text), dict(view._charts), replace(view.fit, experiment=bench.desk.experiment(text))
     job.tell("compress", 0.5)
-    bench.keep(benches._key(text, bench.desk.experiment(text)), text, own)
+    bench.keep(views.key(hashed(text), bench.desk.experiment(text)), text, own)
 
 
 @pytest.fixture
@@ -258,6 +259,119 @@ def test_a_formula_goes_into_the_file(opened):
     (entry,) = [e for e in opened.bench.desk.experiment(opened.file.read_text()).model.effects if e.name == "formula"]
     assert entry.options["formula"] == "a*sin(3*q)" and entry.joints == ["elbow"]
     assert opened.wait()["undo"] == "a*sin(3*q) on elbow"
+
+
+def test_an_effect_that_is_no_suspect_goes_into_the_file(opened):
+    known = {e["effect"]: e for e in opened.get("/api/view", sha=opened.sha).json()["vocabulary"]}
+    assert list(known) == vocabulary() and known["payload"]["scope"] == "robot" and all(e["says"] and "`" not in e["says"] for e in known.values())
+    opened.post("/api/add", sha=opened.sha, effect="quadratic_drag", joint="elbow")
+    opened.wait()
+    opened.post("/api/add", sha=opened.sha, effect="gravity_tilt", joint=None)
+    opened.wait()
+    *_, drag, tilt = opened.bench.desk.experiment(opened.file.read_text()).model.effects
+    assert (drag.name, drag.joints) == ("quadratic_drag", ["elbow"]) and (tilt.name, tilt.joints) == ("gravity_tilt", None)
+    said = opened.post("/api/add", sha=opened.sha, effect="quadratic_drag", joint="elbow").json()["error"]
+    assert said.startswith("quadratic_drag is in the model already on elbow") and "config.yaml" not in said
+
+
+def test_the_state_is_answered_while_an_addition_is_checked(opened, monkeypatch):
+    built, checked = threading.Event(), threading.Event()
+    monkeypatch.setattr(desk.pipeline, "build", lambda experiment: (checked.set(), built.wait(10)))
+    sha = opened.sha
+    thread = threading.Thread(target=lambda: opened.post("/api/add", sha=sha, effect="armature", joint="elbow"))
+    thread.start()
+    assert checked.wait(10)
+    start = time.monotonic()
+    assert opened.get("/api/state").json()["sha"] == sha and time.monotonic() - start < 2
+    built.set()
+    thread.join()
+    assert opened.sha != sha
+
+
+def test_while_it_works_the_state_needs_no_file_and_yet_hears_of_edits(opened, monkeypatch):
+    go = threading.Event()
+    monkeypatch.setattr(Bench, "_work", lambda self, job, text: (job.tell("compress", 0.5), go.wait(20)))
+    sha = opened.post("/api/add", sha=opened.sha, effect="armature", joint="elbow").json()["sha"]
+    reads, read = [], desk.Desk.text
+    monkeypatch.setattr(desk.Desk, "text", lambda self: (reads.append(threading.current_thread()), read(self))[1])
+    waiting = []
+    found = opened.bench.glance(waiting.append)
+    assert found["sha"] == sha and found["job"]["state"] == "running" and not reads and len(waiting) == 1
+    assert opened.bench.glance(waiting.append) == found and len(waiting) == 1  # one look at a time
+    waiting[0]()
+    opened.file.write_text(opened.file.read_text() + "# by hand\n")
+    end = time.monotonic() + 10
+    while opened.sha == sha and time.monotonic() < end:
+        time.sleep(0.05)
+    assert opened.sha != sha and opened.get("/api/state").json()["undo"] == "edit by hand"
+    go.set()
+    opened.wait()
+
+
+# ---- several experiments
+
+
+@pytest.fixture
+def shelf(arm, tmp_path, monkeypatch):
+    """Two folders with the same experiment file and one file beside them, and requests to the studio on all."""
+    for name in ("one", "two"):
+        shutil.copytree(arm[0], tmp_path / "all" / name)
+    (tmp_path / "all" / "lone.yml").write_text((arm[0] / "config.yaml").read_text())
+    (tmp_path / "all" / "notes.yaml").write_text("shopping: [milk]\n")
+    monkeypatch.setattr(Bench, "_work", lambda self, job, text: told(self, job, text, arm[1]))
+    own = Shelf(beside(tmp_path / "all" / "config.yaml"), tmp_path / "run")
+    own.folder, own.client = tmp_path / "all", TestClient(application(own, port=PORT, csrf=CSRF))
+    return own
+
+
+def test_a_folder_offers_its_experiments(shelf):
+    assert shelf.names == ["lone", "one", "two"]
+    for number, name in enumerate(shelf.names):
+        shown = shelf.client.get(f"/{number}/").text
+        assert f"<h1>{name}</h1>" in shown and [a["href"] for tag, a in Elements(shown).found if tag == "a" and a.get("href", "").endswith("/")] == ["/0/", "/1/", "/2/"]
+        assert shelf.client.get(f"/{number}/api/state").json()["name"] == name
+    assert shelf.client.get("/api/state").json()["name"] == "lone" and shelf.client.get("/2").status_code == 200
+    for path in ("/3/", "/-1/", "/99999999999999999999/api/state", "/one/", "/../notes.yaml", "/1/../../notes.yaml"):
+        assert shelf.client.get(path).status_code == 404, path
+    assert beside(shelf.folder / "one" / "config.yaml") == [shelf.folder / "one" / "config.yaml"]
+    assert beside(shelf.folder / "lone.yml") == [shelf.folder / "lone.yml"]
+    assert beside(shelf.folder / "nothing.yaml") == [shelf.folder / "nothing.yaml"]
+
+
+def test_experiments_with_the_same_text_are_kept_apart(shelf):
+    post = lambda number, act, **body: shelf.client.post(f"/{number}/api/{act}", json=body, headers={"x-sysid-csrf": CSRF}).json()  # noqa: E731
+    state = lambda number: shelf.client.get(f"/{number}/api/state").json()  # noqa: E731
+    sha = state(1)["sha"]
+    assert state(2)["sha"] == sha
+    post(1, "run")
+    end = time.monotonic() + 10
+    while not state(1)["ready"] and time.monotonic() < end:
+        time.sleep(0.02)
+    assert state(1)["ready"] and not state(2)["ready"]
+    before = (shelf.folder / "two" / "config.yaml").read_text()
+    post(1, "add", sha=sha, effect="armature", joint="elbow")
+    assert state(1)["undo"] == "armature on elbow" and state(2)["undo"] is None and (shelf.folder / "two" / "config.yaml").read_text() == before
+    assert shelf.bench(1).desk.run != shelf.bench(2).desk.run != shelf.bench(0).desk.run
+
+
+def test_an_experiment_of_the_same_name_elsewhere_does_not_undo_into_this_one(opened, arm, tmp_path):
+    opened.post("/api/add", sha=opened.sha, effect="stribeck", joint="elbow")
+    opened.wait()
+    other = studio(shutil.copytree(arm[0], tmp_path / "elsewhere" / "arm"), opened.run)
+    assert other.get("/api/state").json()["undo"] is None and other.get("/api/state").json()["redo"] is None
+
+
+def test_a_job_that_waits_for_its_turn_can_be_cancelled():
+    turn, go = threading.Lock(), threading.Event()
+    first, second = Worker(turn), Worker(turn)
+    first.start("a", lambda job: go.wait(10))
+    waiting = second.start("b", lambda job: None)
+    second.cancel()
+    end = time.monotonic() + 5
+    while waiting.state == "running" and time.monotonic() < end:
+        time.sleep(0.01)
+    assert waiting.state == "cancelled" and first.job.state == "running"
+    go.set()
 
 
 def test_a_file_that_cannot_be_meant_is_said_on_the_page(opened):

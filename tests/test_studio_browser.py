@@ -162,7 +162,7 @@ def test_two_tabs_keyboard_and_mistakes(opened):
     box = first.locator("input.code")
     box.fill("import os")
     box.press("Enter")
-    expect(first.locator("#suspects .wrong")).to_contain_text("formula")
+    expect(first.locator("#suspects .wrong").last).to_contain_text("formula")
     # by keyboard alone, and cancelled
     text = opened.file.read_text()
     button = first.get_by_role("button", name="add stribeck to hip").first
@@ -209,3 +209,67 @@ def test_a_phone_shows_it_without_sideways_scrolling(browser, opened):
     page.set_viewport_size({"width": 390, "height": 844})
     page.wait_for_timeout(500)
     assert page.evaluate("document.documentElement.scrollWidth") <= 390
+
+
+def test_any_effect_is_added_by_keyboard_alone(opened):
+    from playwright.sync_api import expect
+
+    text = opened.file.read_text()
+    page = opened()
+    page.wait_for_function(DONE, timeout=WAIT)
+    press = page.keyboard.press
+    for _ in range(200):  # from the top of the page, as a hand without a mouse goes
+        press("Tab")
+        if page.evaluate("document.activeElement.id") == "own-effect":
+            break
+    else:
+        raise AssertionError("the list of effects cannot be reached by keyboard")
+    page.keyboard.type("payload")
+    expect(page.locator("#own-says")).to_contain_text("rigid body held")
+    where = page.locator("form.own", has=page.locator("#own-effect")).locator("select").nth(1)
+    expect(where).to_be_disabled()  # the whole robot has it
+    page.wait_for_timeout(1500)  # a list goes on with the word that was begun for about a second
+    page.keyboard.type("viscous")
+    press("Tab")
+    page.keyboard.type("knee")
+    press("Tab")
+    press("Enter")
+    expect(page.locator("#suspects .wrong").first).to_contain_text("viscous is in the model already")
+    assert opened.file.read_text() == text
+    press("Shift+Tab")
+    press("Shift+Tab")
+    page.keyboard.type("quadratic_drag")
+    press("Tab")
+    page.keyboard.type("knee")
+    press("Tab")
+    press("Enter")
+    expect(page.get_by_role("button", name="undo quadratic_drag on knee")).to_be_enabled(timeout=WAIT)
+    assert "quadratic_drag: {joints: [knee]}" in opened.file.read_text()
+    page.locator("#undo").focus()
+    press("Enter")
+    expect(page.get_by_role("button", name="redo quadratic_drag on knee")).to_be_visible(timeout=WAIT)
+    assert opened.file.read_text() == text
+
+
+def test_one_of_several_experiments_is_picked(browser, leg, tmp_path):
+    from playwright.sync_api import expect
+
+    shutil.copytree(leg, tmp_path / "all" / "leg")
+    rippled(tmp_path / "all" / EVIL_NAME)
+    served = Served(tmp_path / "all", tmp_path / "run")
+    try:
+        page = browser.new_page(viewport={"width": 390, "height": 844})
+        page.goto(served.address)
+        expect(page.locator("h1")).to_have_text(EVIL_NAME)
+        page.locator(".experiments summary").focus()
+        page.keyboard.press("Enter")
+        expect(page.locator(".experiments [aria-current]")).to_have_text(EVIL_NAME)
+        page.get_by_role("link", name="leg", exact=True).click()
+        expect(page.locator("h1")).to_have_text("leg")
+        page.wait_for_function(DONE, timeout=WAIT)
+        expect(page.locator("#verdict .card", has_text="hip")).to_contain_text("stribeck")
+        assert page.get_by_role("link", name="YAML").evaluate("a => new URL(a.href).pathname") == "/1/export/experiment.yaml"
+        page.close()
+    finally:
+        served.stop()
+    assert (tmp_path / "run" / "leg" / "fit.json").is_file()

@@ -12,6 +12,7 @@ import math
 import numpy as np
 
 from .decimate import broken
+from .words import raised
 
 INK, GREY, BLUE, VERMILLION, GREEN, ORANGE, PURPLE, SKY = "#000000", "#999999", "#0072B2", "#D55E00", "#009E73", "#E69F00", "#CC79A7", "#56B4E9"
 MIDDLE, EMPTY = "#FDFDFD", "#DCDCDC"  # of a map's scale; cells where no row is
@@ -39,7 +40,7 @@ def axis(title: str, **more) -> dict:
     return {"title": {"text": title, "standoff": 6, "font": {"size": 12}}, "automargin": True, "zeroline": False} | more
 
 
-_LEGEND = {"orientation": "h", "x": 0, "y": 1.0, "yanchor": "bottom", "xanchor": "left", "itemwidth": 30, "font": {"size": 11}}
+LEGEND = {"orientation": "h", "x": 0, "y": 1.0, "yanchor": "bottom", "xanchor": "left", "itemwidth": 30, "font": {"size": 11}}
 
 
 # ---- torque over time
@@ -52,22 +53,23 @@ def timeline(parts: dict) -> dict:
         parts: {"train": (log (n,), t (n,), names), "test": ...}.
 
     Returns:
-        {part: {"t": (n,), "breaks": indices, "spans": [(begin, end, name)]}}.
+        {part: {"t": (n,), "breaks": indices, "spans": [(begin, end, name)], "starts": the logs' own first times [s]}}.
     """
     out, end = {}, 0.0
     for part, (log, t, names) in parts.items():
         log, t = np.asarray(log), np.asarray(t, dtype=float)
-        moved, spans = np.zeros(len(t)), []
+        moved, spans, lows = np.zeros(len(t)), [], []
         starts = np.append(0, np.flatnonzero(np.diff(log)) + 1) if len(t) else []
         for number, (a, b) in enumerate(zip(starts, [*starts[1:], len(t)])):
             low, high = float(t[a:b].min()), float(t[a:b].max())
             moved[a:b] = t[a:b] - low + end
             name = names[int(log[a])] if int(log[a]) < len(names) else f"log {number + 1}"
             spans.append((end, end + high - low, name))
+            lows.append(low)
             end += (high - low) * 1.02 + 1e-9
         steps = np.diff(moved)
         usual = float(np.median(steps)) if len(steps) else 0.0
-        out[part] = {"t": moved, "breaks": np.flatnonzero((steps > 1.5 * usual + 1e-12) | (steps < 0)) + 1, "spans": spans}
+        out[part] = {"t": moved, "breaks": np.flatnonzero((steps > 1.5 * usual + 1e-12) | (steps < 0)) + 1, "spans": spans, "starts": lows}
     return out
 
 
@@ -99,9 +101,9 @@ def torque(name: str, joint: str, unit: str, line: dict, series: dict, joints: i
     layout = {
         "xaxis": axis("time, logs end to end [s]", anchor="y2", range=[0.0, float(f"{end:.6g}")]), "yaxis": axis(f"torque [{unit}]" if unit == "N m" else f"force [{unit}]", domain=[0.38, 1.0]),
         "yaxis2": axis(f"residual [{unit}]", domain=[0.0, 0.30], zeroline=True), "shapes": shapes, "annotations": notes, "showlegend": True,
-        "legend": _LEGEND, "hovermode": "x", "dragmode": "zoom", "margin": {"l": 66, "r": 14, "t": 34, "b": 46},
+        "legend": LEGEND, "hovermode": "x", "dragmode": "zoom", "margin": {"l": 66, "r": 14, "t": 34, "b": 46},
     }  # fmt: skip
-    return chart(name, f"Measured and predicted torque of {joint} over time, and the residual", data, layout, height=380, link="time")
+    return chart(name, f"Measured and predicted {'torque' if unit == 'N m' else 'force'} of {joint} over time, and the residual", data, layout, height=380, link="time")
 
 
 # ---- the staircase
@@ -139,7 +141,8 @@ def staircase(name: str, joint: str, unit: str, names: list[str], made: list, ex
 
 
 def residual_map(name: str, joint: str, unit: str, base: str, found: dict) -> dict:
-    """The mean residual over angle and speed."""
+    """The mean residual over angle (or position) and speed."""
+    quantity = "angle" if base == "rad" else "position"
     mean = np.array([[np.nan if v is None else v for v in row] for row in found["mean"]], dtype=float).reshape(len(found["q"]) - 1, -1)
     rows = np.array(found["rows"], dtype=float)
     known = np.sort(np.abs(mean[np.isfinite(mean) & (rows >= 3)]))
@@ -148,16 +151,15 @@ def residual_map(name: str, joint: str, unit: str, base: str, found: dict) -> di
     data = [{
         "type": "heatmap", "x": middle(found["q"]), "y": middle(found["qd"]), "z": [rounded(row, 3) for row in mean.T], "zmin": -most or -1.0, "zmax": most or 1.0,
         "customdata": [[int(v) for v in row] for row in rows.T.tolist()], "colorscale": [[0, BLUE], [0.5, MIDDLE], [1, VERMILLION]], "hoverongaps": False, "xgap": 1, "ygap": 1,
-        "colorbar": {"title": {"text": f"mean residual [{unit}]", "side": "right"}, "thickness": 10, "len": 1.0, "outlinewidth": 0},
-        "hovertemplate": f"angle %{{x:.3g}} {base}<br>speed %{{y:.3g}} {base}/s<br>mean residual %{{z:.3g}} {unit}<br>%{{customdata}} rows<extra></extra>",
+        "colorbar": {"title": {"text": f"mean residual [{unit}]", "side": "right", "font": {"size": 12}}, "thickness": 10, "len": 1.0, "outlinewidth": 0},
+        "hovertemplate": f"{quantity} %{{x:.3g}} {base}<br>speed %{{y:.3g}} {base}/s<br>mean residual %{{z:.3g}} {unit}<br>%{{customdata}} rows<extra></extra>",
     }]  # fmt: skip
-    quantity = "angle" if base == "rad" else "position"
     layout = {
         "xaxis": axis(f"{quantity} q [{base}]", showgrid=False), "yaxis": axis(f"speed qd [{base}/s]", showgrid=False), "plot_bgcolor": EMPTY,
-        "title": {"text": "over angle and speed" if base == "rad" else "over position and speed", "x": 0.01, "y": 0.99, "yanchor": "top", "font": {"size": 13}},
+        "title": {"text": f"over {quantity} and speed", "x": 0.01, "y": 0.99, "yanchor": "top", "font": {"size": 13}},
         "margin": {"l": 60, "r": 10, "t": 34, "b": 46},
     }  # fmt: skip
-    return chart(name, f"Mean residual of {joint} over angle and speed", data, layout, height=300)
+    return chart(name, f"Mean residual of {joint} over {quantity} and speed", data, layout, height=300)
 
 
 def residual_time(name: str, joint: str, unit: str, found: dict) -> dict:
@@ -166,12 +168,14 @@ def residual_time(name: str, joint: str, unit: str, found: dict) -> dict:
     numbers = sorted(set(found["log"]))
     for k, number in enumerate(numbers):
         own = [(t, v) for log, t, v in zip(found["log"], found["start"], found["rms"]) if log == number]
+        if len(own) > 1:  # the last window is as wide as the others
+            own.append((own[-1][0] + float(np.median(np.diff([t for t, _ in own]))), own[-1][1]))
         data.append({
             "type": "scatter", "mode": "lines", "x": rounded([t for t, _ in own]), "y": rounded([np.nan if v is None else v for _, v in own], 4), "name": f"test log {int(number) + 1}",
             "line": {"shape": "hv", "width": 1.6, "color": (VERMILLION, BLUE, GREEN, ORANGE, PURPLE)[k % 5]}, "hovertemplate": f"%{{x:.3g}} s: %{{y:.3g}} {unit}<extra></extra>",
         })  # fmt: skip
     layout = {
-        "xaxis": axis("time in the test log [s]"), "yaxis": axis(f"residual RMS [{unit}]", rangemode="tozero"), "showlegend": len(numbers) > 1, "legend": _LEGEND,
+        "xaxis": axis("time in the test log [s]"), "yaxis": axis(f"residual RMS [{unit}]", rangemode="tozero"), "showlegend": len(numbers) > 1, "legend": LEGEND,
         "title": {"text": "over time", "x": 0.01, "y": 0.99, "yanchor": "top", "font": {"size": 13}}, "margin": {"l": 60, "r": 10, "t": 34 if len(numbers) < 2 else 58, "b": 46},
     }  # fmt: skip
     return chart(name, f"RMS residual of {joint} over time", data, layout, height=300)
@@ -189,12 +193,12 @@ def residual_bands(name: str, joint: str, found: dict) -> dict:
     return chart(name, f"Share of the squared residual of {joint} in bands of frequency", data, layout, height=300)
 
 
-def dependence(name: str, joint: str, unit: str, found: dict) -> dict:
-    """The curve of the mean residual over a variable that it follows, with two standard errors."""
+def dependence(name: str, joint: str, unit: str, what: str, found: dict) -> dict:
+    """The curve of the mean residual over a variable that it follows, `what` in words, with two standard errors."""
     curve = found["curve"]
     clean = lambda values: np.array([np.nan if v is None else v for v in values], dtype=float)  # noqa: E731
     at, mean, se = (clean(curve[key]) for key in ("at", "mean", "se"))
-    variable = f"{plain(found['variable'])} [{plain(found['unit'])}]" if found["unit"] else plain(found["variable"])
+    variable = f"{plain(what)} [{plain(raised(found['unit']))}]" if found["unit"] else plain(what)
     data = [
         {"type": "scatter", "mode": "lines+markers", "x": rounded(at), "y": rounded(mean, 4), "error_y": {"type": "data", "array": rounded(2 * se, 3), "thickness": 1, "width": 2, "color": VERMILLION}, "line": {"color": VERMILLION, "width": 1.6}, "marker": {"size": 5}, "hovertemplate": f"%{{x:.3g}}: %{{y:.3g}} {unit}<extra></extra>"},
     ]  # fmt: skip
@@ -202,7 +206,7 @@ def dependence(name: str, joint: str, unit: str, found: dict) -> dict:
         "xaxis": axis(variable), "yaxis": axis(f"mean residual [{unit}]", zeroline=True), "margin": {"l": 60, "r": 10, "t": 34, "b": 46},
         "title": {"text": f"foretells {100 * found['share']:.0f} %", "x": 0.01, "y": 0.99, "yanchor": "top", "font": {"size": 13}},
     }  # fmt: skip
-    return chart(name, f"Mean residual of {joint} over {found['variable']}", data, layout, height=280)
+    return chart(name, f"Mean residual of {joint} over {what}", data, layout, height=280)
 
 
 # ---- parameters
@@ -214,7 +218,9 @@ def whiskers(name: str, label: str, groups: list[dict]) -> dict:
     Args:
         groups: [{"unit", "names", "values", "stds", "priors", "shares"}], priors None where there is none.
     """
-    data, layout = [], {}
+    # the legend's dot is not pale, whatever the first value is
+    data: list[dict] = [{"type": "scatter", "mode": "markers", "x": [None], "y": [None], "name": "identified, ± 2 std", "marker": {"color": BLUE, "size": 8}, "showlegend": True, "hoverinfo": "skip"}]
+    layout: dict = {}
     sizes = [len(g["names"]) + 1.6 for g in groups]
     total, gap, top = sum(sizes) + 2.2 * (len(groups) - 1), 2.2, 0.0
     for k, (group, size) in enumerate(zip(groups, sizes)):
@@ -222,7 +228,7 @@ def whiskers(name: str, label: str, groups: list[dict]) -> dict:
         names = [plain(n) for n in group["names"]]
         stds = [2 * s if s is not None and math.isfinite(s) else 0.0 for s in group["stds"]]
         data.append({
-            "type": "scatter", "mode": "markers", "x": rounded(group["values"]), "y": names, "name": "identified, ± 2 std", "legendgroup": "identified", "showlegend": k == 0,
+            "type": "scatter", "mode": "markers", "x": rounded(group["values"]), "y": names, "name": "identified, ± 2 std", "showlegend": False,
             "error_x": {"type": "data", "array": rounded(stds), "thickness": 1.4, "width": 3, "color": BLUE},
             "marker": {"color": BLUE, "size": 8, "opacity": [round(0.25 + 0.75 * float(s or 0.0), 2) for s in group["shares"]]}, "xaxis": f"x{number}", "yaxis": f"y{number}",
             "customdata": rounded([100 * (s or 0.0) for s in group["shares"]], 3), "hovertemplate": f"%{{x:.4g}} {group['unit']}, %{{customdata:.0f}} % from data<extra></extra>",
@@ -236,7 +242,7 @@ def whiskers(name: str, label: str, groups: list[dict]) -> dict:
         layout[f"xaxis{number}"] = axis(f"{group.get('quantity', 'value')}{unit}", anchor=f"y{number}", zeroline=True, nticks=6)
         layout[f"yaxis{number}"] = {"type": "category", "domain": [max(1 - (top + size) / total, 0.0), 1 - top / total], "anchor": f"x{number}", "autorange": "reversed", "automargin": True, "showgrid": True}
         top += size + gap
-    layout |= {"showlegend": True, "legend": _LEGEND, "margin": {"l": 60, "r": 14, "t": 34, "b": 46}}
+    layout |= {"showlegend": True, "legend": LEGEND, "margin": {"l": 60, "r": 14, "t": 34, "b": 46}}
     return chart(name, label, data, layout, height=int(80 + 24 * total))
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from ..diagnose.diagnosis import Diagnosis
 from ..estimate import Fit
 from . import charts
-from .words import breaking, drawing, empty, level, number, plus_minus, table, text, units
+from .words import SPACE, breaking, drawing, empty, level, number, percentage, plus_minus, raised, table, text, units
 
 _KEY = '<span class="key"><i class="line"></i>held-out RMS error</span> <span class="key"><i class="floor"></i>noise floor ± 2 standard errors</span>'
 _KEY_AHEAD = _KEY + ' <span class="key"><i class="broken"></i>expected by the diagnosis; steps in brackets are not made</span>'
@@ -32,7 +32,7 @@ def torque(fit: Fit) -> tuple[str, str, list]:
         drawn.append(charts.torque(f"torque{j}", joint, unit[joint][0], line, series, len(fit.joints)))
     errors = {part: p.errors() for part, p in parts.items()}
     rows = [
-        [breaking(joint), *(f"{level(errors[part]['rms'][j])} {unit[joint][0]}" for part in parts), *(_percent(errors[part]["relative_error"][j]) for part in parts)]
+        [breaking(joint), *(f"{level(errors[part]['rms'][j])}{SPACE}{raised(unit[joint][0])}" for part in parts), *(_percent(errors[part]["relative_error"][j]) for part in parts)]
         for j, joint in enumerate(fit.joints)
     ]
     listed = table(["joint", *(f"RMS, {part}" for part in parts), *(f"relative error, {part}" for part in parts)], rows, label="errors of each joint")
@@ -41,13 +41,16 @@ def torque(fit: Fit) -> tuple[str, str, list]:
         '<button type="button" data-time="back">←<span class="only-read"> earlier</span></button><button type="button" data-time="on">→<span class="only-read"> later</span></button>'
         '<button type="button" data-time="all">whole</button></div>'
     )
-    spans = [f"{part}: {text(name)} from {number(begin, 3)} s" for part, own in line.items() for begin, _, name in own["spans"]]
+    spans = [
+        f"{part}: {text(name)} from {number(begin, 3)} s" + (f" (its own clock says {number(low, 4)} s there)" if abs(low - begin) > 0.05 else "")
+        for part, own in line.items() for (begin, _, name), low in zip(own["spans"], own["starts"])
+    ]  # fmt: skip
     where = f'<p class="quiet">Tinted: test logs, which the fit never saw. All joints share the time axis. Long logs are thinned for display; every peak is kept. On the axis: {"; ".join(spans[:12])}{"; …" if len(spans) > 12 else ""}.</p>'
     return "Measured and predicted", listed + where + tools + "".join(f"<h3>{text(joint)}</h3>{drawing(c)}" for joint, c in zip(fit.joints, drawn)), drawn
 
 
 def _percent(value) -> str:
-    return "–" if value is None or not math.isfinite(value) else f"{number(100 * value, 3)} %"
+    return "–" if value is None or not math.isfinite(value) else f"{number(100 * value, 3)}{SPACE}%"
 
 
 def _log_names(fit: Fit, part: str) -> list[str]:
@@ -68,7 +71,7 @@ def steps(fit: Fit, diagnosis: Diagnosis, document: dict, history: list[dict]) -
     ahead = _expected(fit, diagnosis, document) if same else []
     names = ["start" if s.get("added") is None else f"+ {s['added']}" + ("" if s.get("joint") in (None, "*") else f" on {s['joint']}") for s in done]
     every = names + [f"(+ {word})" for word, _ in ahead]
-    if not usable:
+    if len(done) == 1 and same:
         words = "No step was made yet. "
         words += "The broken line is what the diagnosis expects of the effects that it names, added one after another." if ahead else "The diagnosis names no effect to add."
     elif not same:
@@ -86,7 +89,7 @@ def steps(fit: Fit, diagnosis: Diagnosis, document: dict, history: list[dict]) -
         drawn.append(charts.staircase(f"steps{j}", joint, unit[joint][0], _short(every, done, ahead), made, expected, entry["noise_floor"], entry["noise_floor_se"]))
     rows = [[f"{k}: {breaking(name)}", *(level(v) for v in values)] for k, (name, values) in enumerate(zip(every, [[s["rms_test"].get(j) for j in fit.joints] for s in done] + [[r[j] for j in fit.joints] for _, r in ahead]))]
     rows.append(["noise floor", *(plus_minus(document["joints"][j]["noise_floor"], document["joints"][j]["noise_floor_se"]) for j in fit.joints)])
-    listed = table(["step", *(f"{text(j)} [{unit[j][0]}]" for j in fit.joints)], rows, label="held-out error after each step")
+    listed = table(["step", *(f"{breaking(j)} [{raised(unit[j][0])}]" for j in fit.joints)], rows, "steps", "held-out error after each step")
     how = "".join(f"<li>{text(j)}: {text(e['floor_detail'])}</li>" for j, e in document["joints"].items())
     return "Error against the noise floor", (
         f"<p>{words}</p>{listed}<p class='quiet'>{_KEY if not ahead else _KEY_AHEAD}</p>"
@@ -136,11 +139,19 @@ def failures(fit: Fit, document: dict) -> tuple[str, str, list]:
             charts.residual_bands(f"bands{j}", joint, entry["frequency"]),
         ]
         drawn += own
-        words = "".join(f"<li>{text(w)}</li>" for w in entry["words"])
-        said = f"<ul>{words}</ul>" if words else '<p class="quiet">The error is spread evenly: no stretch of angle, speed or time holds much more than its share.</p>'
-        share = f"{100 * entry['share_of_error']:.0f} % of the robot’s squared error, in units of each joint’s noise"
+        where = "angle" if base == "rad" else "position"
+        words = "".join(f"<li>{_region(region, where)}</li>" for region in entry["regions"])
+        said = f"<ul>{words}</ul>" if words else f'<p class="quiet">The error is spread evenly: no stretch of {where}, speed or time holds much more than its share.</p>'
+        share = f"{percentage(entry['share_of_error'])} of the robot’s squared error, in units of each joint’s noise"
         parts.append(f'<h3>{text(joint)} <span class="quiet">{share}</span></h3>{said}<div class="grid three">{"".join(drawing(c) for c in own)}</div>')
     if not parts:
         return "Where it fails", empty("The test logs were not questioned."), []
-    about = f'<p class="quiet">Test logs. Map and time: below {number(cutoff, 3)} Hz, where the model is questioned. Frequency: the whole residual. In the map, grey cells were never visited.</p>'
+    about = f'<p class="quiet">Test logs, times by their own clock. Map and time: below {number(cutoff, 3)} Hz, where the model is questioned. Frequency: the whole residual. In the map, grey cells were never visited.</p>'
     return "Where it fails", about + "".join(parts), drawn
+
+
+def _region(found: dict, where: str) -> str:
+    """Where much of the error is, as a sentence of HTML; the angle of a joint that slides is a position."""
+    what = {"q": where, "qd": "speed"}.get(found["variable"], text(found["variable"]))
+    span = f"{number(found['low'], 3)} to {number(found['high'], 3)}{SPACE}{text(raised(found['unit']))}"
+    return f"{percentage(found['share_of_error'])} of the squared error lies in the {percentage(found['share_of_rows'])} of the rows with {what} {span}"

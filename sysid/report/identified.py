@@ -12,7 +12,7 @@ from ..estimate import Fit
 from ..inertia import PARAMETERS, UNITS
 from ..model import ROBOT
 from . import charts, solids
-from .words import breaking, drawing, empty, number, plus_minus, table, text, unit_of
+from .words import SPACE, breaking, drawing, empty, number, plus_minus, table, text, unit_of
 
 
 def parameters(fit: Fit) -> tuple[str, str, list]:
@@ -100,7 +100,7 @@ def bodies(fit: Fit, diagnosis: Diagnosis) -> tuple[str, str, list]:
     angles = ", ".join(f"{text(j)} {number(v, 3)} {'m' if slides else 'rad'}" for j, v, slides in zip(fit.joints, (low + high) / 2, robot.prismatic))
     body = (
         f"<p>Each body as the uniform ellipsoid of its mass, centre of mass and inertia, at the middle of the logged motion: {angles}.</p>{drawing(chart, kind='space')}"
-        + table(["body", "kind", "mass [kg]", "prior [kg]", "centre x, y, z [m]", "semi-axes [m]", "prior [m]"], rows, label="ellipsoids of the bodies")
+        + table(["body", "kind", "mass [kg]", "prior [kg]", "centre x, y, z [m]", "semi-axes [m]", "prior [m]"], rows, "bodies", "ellipsoids of the bodies")
         + '<p class="quiet">Filled: identified. Lines: prior. What the data cannot see of a shape is free within what the prior allows: a needle is a shape that these logs do not determine, and is cut where it leaves the box.</p>'
     )
     return "Bodies", body, [chart]
@@ -125,12 +125,18 @@ def provenance(fit: Fit, document: dict) -> tuple[str, str, list]:
         source = path.read_text(encoding="utf-8-sig") if path else ""
     except OSError:
         source = ""
-    body = f"<h3>Command</h3><pre>{text(command)}</pre><h3>Logs</h3>" + table(["log", "part", "SHA-256", "samples", "piece"], logs, label="logs")
+    body = f"<h3>Command</h3><pre>{text(command)}</pre><h3>Logs</h3>" + table(["log", "part", "SHA-256", "samples", "piece"], logs, "logs", "logs")
     body += f"<h3>Versions</h3>{table(['package', 'version'], versions, label='versions')}<p>Seeds: {seeds}.</p>"
     certificate = fit.certificate
-    body += f"<p>{fit.solution.iterations} iterations, {'converged' if fit.solution.converged else 'not converged'}; objective {number(fit.objective, 8)}; certificate: stationarity {number(certificate.stationarity, 2)}, no other parameters can gain more than {number(certificate.gap, 2)}.</p>"
+    body += f"<p>{fit.solution.iterations} iterations, {'converged' if fit.solution.converged else 'not converged'}; objective {number(fit.objective, 8)}{_squared(fit)}; certificate: stationarity {number(certificate.stationarity, 2)}, no other parameters can gain more than {number(certificate.gap, 2)}.</p>"
     body += f"<h3>Experiment</h3><pre>{text(source)}</pre>" if source else empty("The experiment file is not at hand.")
     return "Provenance", body, []
+
+
+def _squared(fit: Fit) -> str:
+    """The unit of the objective; none where joints that turn and joints that slide are summed."""
+    slides = set(fit.model.robot.prismatic)
+    return "" if len(slides) > 1 else f"{SPACE}N²" if True in slides else f"{SPACE}N²{SPACE}m²"
 
 
 def _span(entry: dict) -> str:

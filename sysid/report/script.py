@@ -30,7 +30,8 @@ function dressed(chart) {
   for (const axis of axes) Object.assign(axis, {gridcolor: grid, linecolor: line, zerolinecolor: line, color: ink});
   if (layout.scene) for (const k of ["xaxis", "yaxis", "zaxis"]) Object.assign(layout.scene[k], {gridcolor: line, zerolinecolor: line, color: ink, showbackground: false});
   if (coarse.matches && !layout.scene) layout.dragmode = false;  // a finger scrolls the page
-  if (layout.scene && innerWidth < 600) for (const k of "xyz") layout.scene.camera.eye[k] *= 1.2;
+  if (layout.legend && !layout.scene && innerWidth < 600) layout.legend.font = {...layout.legend.font, size: 10};  // in one row
+  if (layout.scene && innerWidth < 600) for (const k of "xyz") layout.scene.camera.eye[k] *= layout.scene.aspectratio.z < 1 ? 1.6 : 1.2;  // the whole width in sight
   if (chart.link === "time" && range) layout.xaxis.range = [...range];
   return figure;
 }
@@ -79,9 +80,11 @@ function redraw() {
     const plot = place.querySelector(".plot");
     if (!chart || !plot.data) continue;
     const figure = dressed(chart);
-    if (printing && place.closest(".split")) figure.layout.height *= 0.85;
-    if (printing) figure.layout.width = place.closest(".grid") ? 330 : place.closest(".split") ? 370 : 680;  // as the style sheet lays out A4
-    else { delete figure.layout.width; figure.layout.autosize = true; }
+    if (printing) {  // as the style sheet lays out A4
+      const [width, part] = place.closest(".three") ? [222, 0.75] : place.closest(".grid") ? [330, 0.9] : place.closest(".split") ? [370, 0.78] : [680, 1];
+      figure.layout.width = width; figure.layout.height *= part;
+    }
+    else figure.layout.autosize = true;
     Plotly.react(plot, figure.data, figure.layout, settings(chart));
   }
 }

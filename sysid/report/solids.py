@@ -75,7 +75,16 @@ def solids(robot: Robot, pi, placed: list[pin.SE3]) -> list[Solid | None]:
 
 
 def skeleton(robot: Robot, placed: list[pin.SE3]) -> list[tuple[np.ndarray, np.ndarray]]:
-    """The links as lines, each from one joint's origin to the next's (3,) [m]; the first from the base."""
+    """The links as lines, each from one joint's origin to the next's (3,) [m]; the first from the base.
+
+    A link that carries no further joint ends at its centre of mass in the robot's description: without it, that joint's
+    motion could not be seen.
+    """
     rows = {body.row for body in robot.bodies if body.kind == "link"}
     origin = lambda row: placed[row].translation if row >= 0 else np.zeros(3)  # noqa: E731
-    return [(origin(int(robot.parents[row])), origin(row)) for row in sorted(rows)]
+    lines = [(origin(int(robot.parents[row])), origin(row)) for row in sorted(rows)]
+    carrying = {int(robot.parents[row]) for row in rows}
+    for body, own in zip(robot.bodies, robot.prior):
+        if body.kind == "link" and body.row not in carrying and own[0] > 0:
+            lines.append((origin(body.row), placed[body.row].act(np.asarray(own[1:4]) / own[0])))
+    return lines

@@ -36,12 +36,12 @@ section { padding: 1.6rem 0 1.2rem; border-bottom: 1px solid var(--line); }
 .scroll { overflow-x: auto; max-width: 100%; margin: .4rem 0 .8rem; }
 table { border-collapse: collapse; font-size: .875rem; font-variant-numeric: tabular-nums; }
 th, td { text-align: right; padding: .3rem .8rem .3rem 0; border-bottom: 1px solid var(--line); vertical-align: top; white-space: nowrap; }
-thead th { color: var(--quiet); font-weight: 600; vertical-align: bottom; }
+thead th { color: var(--quiet); font-weight: 600; vertical-align: bottom; white-space: normal; }
 th:first-child, td:first-child { text-align: left; } tbody th { font-weight: 600; }
 table.wrap td { white-space: normal; text-align: left; min-width: 7rem; } table.wrap th { text-align: left; }
 code, pre { font: .82rem/1.45 ui-monospace, SFMono-Regular, Menlo, Consolas, "DejaVu Sans Mono", monospace; }
 pre { background: var(--raised); border: 1px solid var(--line); border-radius: 4px; padding: .7rem .9rem; overflow-x: auto; }
-details { border-top: 1px solid var(--line); padding: .3rem 0; } details:last-of-type { border-bottom: 1px solid var(--line); }
+details { border-top: 1px solid var(--line); padding: .3rem 0; } details:last-of-type { border-bottom: 1px solid var(--line); } section > details:last-child { border-bottom: 0; padding-bottom: 0; }
 summary { cursor: pointer; padding: .35rem 0; font-weight: 600; overflow-wrap: anywhere; }
 .grid { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 21rem), 1fr)); gap: .6rem 1rem; }
 .grid.three { grid-template-columns: repeat(auto-fit, minmax(min(100%, 19rem), 1fr)); }
@@ -65,9 +65,12 @@ button:hover { border-color: var(--accent); }
 .meter { display: inline-block; width: 3rem; height: .5rem; margin-right: .5rem; background: linear-gradient(90deg, var(--bar) var(--share), var(--bar-ground) var(--share)); }
 footer { color: var(--quiet); font-size: .85rem; padding-top: 1rem; padding-bottom: 2rem; }
 @media (max-width: 56rem) { .split { grid-template-columns: minmax(0, 1fr); } }
-@media (max-width: 40rem) { body { font-size: 15px; } header.top, main, footer { padding-left: .75rem; padding-right: .75rem; } .bar { width: 5.5rem; } th, td { padding-right: .6rem; }
-  tbody th { white-space: normal; min-width: 6.5rem; max-width: 10rem; } .parameters tbody th { min-width: 5.5rem; } .suspects tbody th { max-width: none; }
-  table.wrap { font-size: .8rem; } table.wrap th, table.wrap td { white-space: normal; min-width: 3.2rem; overflow-wrap: normal; } .key { white-space: normal; display: block; }
+@media (max-width: 40rem) { body { font-size: 15px; } header.top, main, footer { padding-left: .75rem; padding-right: .75rem; } .bar { width: 5.5rem; } table { font-size: .8rem; } th, td { padding-right: .45rem; }
+  .scroll table:not(.suspects) th:first-child { position: sticky; left: 0; background: var(--paper); }
+  tbody th { white-space: normal; max-width: 10rem; } .suspects tbody th { max-width: none; } .steps tbody th { min-width: 7.5rem; }
+  .parameters { font-size: .73rem; } .parameters .meter { display: none; } .parameters th, .parameters td { padding-right: .28rem; } .parameters .quiet { font-size: inherit; }
+  .bodies td, .bodies th { white-space: normal; padding-right: .3rem; } .bodies { font-size: .72rem; } .logs td { white-space: normal; } .logs code { overflow-wrap: anywhere; display: block; min-width: 7rem; }
+  table.wrap th, table.wrap td { white-space: normal; min-width: 3.2rem; overflow-wrap: normal; } .key { white-space: normal; display: block; }
   .suspects, .suspects tbody, .suspects tr:not(.family) { display: block; width: 100%; } .suspects thead { position: absolute; clip-path: inset(50%); width: 1px; height: 1px; overflow: hidden; }
   .suspects tbody tr.family, .suspects tbody tr.family th { display: block; } .suspects tr:not(.family) { padding: .4rem 0 .4rem .7rem; border-bottom: 1px solid var(--line); }
   .suspects tr:not(.family) > * { display: block; border: 0 !important; padding: .05rem 0 !important; text-align: left; white-space: normal; }
@@ -78,9 +81,9 @@ footer { color: var(--quiet); font-size: .85rem; padding-top: 1rem; padding-bott
   @page { size: A4; margin: 14mm; }
   body { font-size: 10pt; print-color-adjust: exact; -webkit-print-color-adjust: exact; } nav, .tools, .skip, .modebar { display: none !important; }
   header.top, main, footer { max-width: none; padding: 0; } section { break-inside: auto; border: 0; padding: .8rem 0; }
-  h2, h3, summary { break-after: avoid; } figure, .card, tr, pre { break-inside: avoid; } .scroll { overflow: visible; }
+  h2, h3, summary, #failures ul, #failures p { break-after: avoid; } figure, .card, tr, pre { break-inside: avoid; } .scroll { overflow: visible; }
   table { font-size: 8pt; } th, td { white-space: normal; padding-right: .5rem; } td code { overflow-wrap: anywhere; } pre { white-space: pre-wrap; overflow-wrap: anywhere; }
-  .grid, .grid.three { grid-template-columns: 330px 330px; } .split { grid-template-columns: minmax(0, 1fr) 370px; break-inside: avoid; } .bar { width: 6rem; }
+  .grid { grid-template-columns: 330px 330px; } .grid.three { grid-template-columns: repeat(3, 222px); gap: 4px; } .grid.three .plot { break-inside: avoid; } .split { grid-template-columns: minmax(0, 1fr) 370px; break-inside: avoid; } .bar { width: 6rem; }
   .plot { min-height: 0; } .split table { font-size: 7pt; } .split .meter { width: 1.5rem; }
 }
 """

@@ -13,7 +13,7 @@ from ..estimate import Fit
 from ..loop import spelled
 from ..model import ROBOT
 from . import charts
-from .words import breaking, drawing, either, empty, level, number, percentage, plus_minus, table, text, unit_of, units
+from .words import SPACE, breaking, drawing, either, empty, level, number, percentage, plus_minus, quantity, raised, table, text, unit_of, units
 
 _MARK = {"complete": "✓", "missing": "+", "unknown": "?"}
 _SAID = {"complete": "complete", "missing": "missing physics", "unknown": "unknown structure"}
@@ -39,12 +39,12 @@ def verdict(fit: Fit, diagnosis: Diagnosis, document: dict) -> tuple[str, str, l
     cards = []
     for found in document["verdict"]:
         joint, entry = found["joint"], document["joints"][found["joint"]]
-        floor, error = entry["noise_floor"], entry["rms"]["test"]
-        ratio = f" ({number(error / floor, 3)} times the floor)" if floor and error is not None else ""
+        floor, error, force = entry["noise_floor"], entry["rms"]["test"], raised(unit[joint][0])
+        ratio = f" ({error / floor:#.3g} times the floor)" if floor and error is not None else ""
         cards.append(
             f'<article class="card {found["status"]}"><h3><span class="mark" aria-hidden="true">{_MARK[found["status"]]}</span>{text(joint)} <span class="status">{_SAID[found["status"]]}</span></h3>'
             f"<p>{verdict_words(found, document, diagnosis)}</p>"
-            f'<p class="numbers">held-out error {level(error)} {unit[joint][0]}, noise floor {plus_minus(floor, entry["noise_floor_se"])} {unit[joint][0]}{ratio}</p></article>'
+            f'<p class="numbers">held-out error {level(error)}{SPACE}{force}, noise floor {plus_minus(floor, entry["noise_floor_se"])}{SPACE}{force}{ratio}</p></article>'
         )
     notes = "".join(f"<li>{text(n)}</li>" for n in document["notices"])
     proof = "The fit is proven to be the global optimum." if fit.certificate.globally_optimal else "The fit is not proven to be the global optimum."
@@ -69,7 +69,7 @@ def verdict_words(found: dict, document: dict, diagnosis: Diagnosis) -> str:
         return out + "."
     head, finding = document["findings"][at], diagnosis.findings[at]
     out += f": it removes {removed(head)} of the misfit"
-    known = [f"{text(name.split('.')[-1])} = {plus_minus(p['value'], p['std'])}{unit_of(p['unit'])}" for name, p in head["parameters"].items() if p["value"] is not None]
+    known = [f"{text(name.split('.')[-1])}{SPACE}={SPACE}{plus_minus(p['value'], p['std'])}{unit_of(p['unit'])}" for name, p in head["parameters"].items() if p["value"] is not None]
     out += f" ({', '.join(known)})." if known else "."
     summary = describe(finding.answer.candidate.effect)["summary"].replace("`", "").split(". ")[0].rstrip(".")
     out += f' <span class="quiet">{text(summary)}.</span>'
@@ -84,11 +84,17 @@ def verdict_words(found: dict, document: dict, diagnosis: Diagnosis) -> str:
 
 def structure_words(found: dict, diagnosis: Diagnosis) -> str:
     """What the structure left on a joint follows; nothing where nothing is left, or nothing foretells it."""
-    said = [f"{text(d['variable'])} foretells {percentage(d['share'])} of it" for d in found.get("depends_on", [])[:3] if d["share"] >= 0.01 and d["variable"] != "time, in bursts"]
+    said = [f"{_named(d, diagnosis.fit)} foretells {percentage(d['share'])} of it" for d in found.get("depends_on", [])[:3] if d["share"] >= 0.01 and d["variable"] != "time, in bursts"]
     structure = next((v.structure for v in diagnosis.verdict if v.joint == found["joint"]), None)
     if structure is not None and structure.bursts:
         said.append(f"it comes in bursts, its largest tenth of rows holds {percentage(structure.crowded)} of its square")
     return "; ".join(said)
+
+
+def _named(entry: dict, fit: Fit) -> str:
+    """A variable that a residual follows, escaped, with the article that a sentence needs."""
+    words = quantity(entry["variable"], fit)
+    return text(words if words == entry["variable"] else f"the {words}")
 
 
 def removed(finding: dict) -> str:
@@ -139,7 +145,8 @@ def suspects(diagnosis: Diagnosis, document: dict) -> tuple[str, str, list]:
     if commands:
         body += f"<div class='by-hand'><p>To add what comes first of each step:</p><pre>{chr(10).join(commands)}</pre></div>"
     if others:
-        body += f"<h3>Also better than nothing</h3><p class='quiet'>Alone, each of these explains part of the same error; none is needed once the steps are in the model.</p>{make(others, 'other effects that explain part of the error')}"
+        after = "none is needed once the steps are in the model" if steps_ else "none is sure enough to join the model"
+        body += f"<h3>Others that were tried</h3><p class='quiet'>Alone, each of these explains some of the same error, or hardly any; {after}.</p>{make(others, 'other effects that explain part of the error')}"
     separate = {f["separate_by"]: None for f in found if f["tied_with"] and f["separate_by"]}
     if separate:
         body += "<h3>To separate the ties</h3><ul>" + "".join(f"<li>{text(s)}</li>" for s in separate) + "</ul>"
@@ -147,7 +154,7 @@ def suspects(diagnosis: Diagnosis, document: dict) -> tuple[str, str, list]:
 
 
 def _suspect(k: int, f: dict) -> str:
-    known = [f"{text(name.split('.')[-1])} = {plus_minus(p['value'], p['std'])}{unit_of(p['unit'])}" for name, p in f["parameters"].items() if p["value"] is not None]
+    known = [f"{text(name.split('.')[-1])}{SPACE}={SPACE}{plus_minus(p['value'], p['std'])}{unit_of(p['unit'])}" for name, p in f["parameters"].items() if p["value"] is not None]
     options = ", ".join(f"{text(k)} = {text(v)}" for k, v in f["options"].items())
     small = "; ".join(w for w in (", ".join(known), options) if w)
     after = f"{level(f['rms_test_before'])} → {level(f['rms_test_after'])}"
@@ -200,9 +207,9 @@ def unseen(fit: Fit, diagnosis: Diagnosis, document: dict) -> tuple[str, str, li
         own = []
         for k, entry in enumerate(found["depends_on"]):
             if entry.get("curve"):
-                own.append(charts.dependence(f"depends{j}x{k}", found["joint"], unit[found["joint"]][0], entry))
+                own.append(charts.dependence(f"depends{j}x{k}", found["joint"], unit[found["joint"]][0], quantity(entry["variable"], fit), entry))
         drawn += own
-        rows = [[text(d["variable"]), percentage(d["share"], d["se"])] for d in found["depends_on"]]
+        rows = [[text(quantity(d["variable"], fit)), percentage(d["share"], d["se"])] for d in found["depends_on"]]
         words = structure_words(found, diagnosis)
         body += f"<h3>What the residual of {text(found['joint'])} follows{beside}</h3><p>{words[0].upper() + words[1:] if words else 'Nothing in the motion foretells it'}.</p>"
         if any(d["share"] >= 0.01 for d in found["depends_on"]):

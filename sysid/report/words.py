@@ -8,6 +8,8 @@ import re
 
 from ..estimate import Fit
 
+SPACE = "\u00a0"  # between a number and what belongs to it: no line ends there
+
 
 def text(value) -> str:
     """Any value as text of a page."""
@@ -42,13 +44,27 @@ def plus_minus(value, std, digits: int = 4) -> str:
     places = 1 - int(math.floor(math.log10(std)))
     if -2 <= places <= 6 and abs(value) < 1e6:
         places = max(places, 0)
-        return f"{round(value, places) + 0.0:.{places}f} ± {std:.{places}f}".replace("-", "−")  # + 0.0: no minus before a zero
-    return f"{number(value, digits)} ± {number(std, 2)}"
+        return f"{round(value, places) + 0.0:.{places}f}{SPACE}±{SPACE}{std:.{places}f}".replace("-", "−")  # + 0.0: no minus before a zero
+    return f"{number(value, digits)}{SPACE}±{SPACE}{number(std, 2)}"
 
 
 def unit_of(word: str) -> str:
     """A unit as text behind a number, escaped; nothing where there is none."""
-    return "" if word in ("", "1") else " " + text(word.replace("^2", "²").replace("^3", "³"))
+    return "" if word in ("", "1") else SPACE + text(raised(word))
+
+
+def raised(unit: str) -> str:
+    """A unit with its powers as they are printed, in one piece."""
+    return unit.replace("^2", "²").replace("^3", "³").replace(" ", SPACE)
+
+
+def quantity(variable: str, fit: Fit) -> str:
+    """A variable of the diagnosis (`qd_hip`) in words; itself where it is none of the motion's."""
+    for joint, slides in zip(fit.joints, fit.model.robot.prismatic):
+        known = {f"q_{joint}": "position" if slides else "angle", f"qd_{joint}": "speed", f"qdd_{joint}": "acceleration"}
+        if variable in known:
+            return f"{known[variable]} of {joint}"
+    return variable
 
 
 def units(fit: Fit) -> dict[str, tuple[str, str]]:
@@ -90,4 +106,4 @@ def percentage(share, se=None) -> str:
         return "–"
     places = 0 if abs(share) >= 0.0995 else 1
     said = lambda value: f"{round(100 * value, places) + 0.0:.{places}f}"  # noqa: E731 - no minus before a zero
-    return f"{said(share)}{'' if se is None or not math.isfinite(se) else f' ± {said(se)}'} %".replace("-", "−")
+    return f"{said(share)}{'' if se is None or not math.isfinite(se) else f'{SPACE}±{SPACE}{said(se)}'}{SPACE}%".replace("-", "−")

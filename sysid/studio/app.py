@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 from urllib.parse import quote
 
@@ -16,21 +17,35 @@ from . import page
 from .bench import Bench
 from .desk import Changed
 from .guard import Guard
+from .shelf import Absent, Shelf
 from .view import dumped
 
 _CHANGED = 409
 
 
-def application(bench: Bench, *, host: str = "127.0.0.1", port: int = 8765, token: str | None = None, csrf: str | None = None) -> Guard:
-    """The ASGI application on one experiment, behind its guard."""
+def application(shelf: Shelf | Bench, *, host: str = "127.0.0.1", port: int = 8765, token: str | None = None, csrf: str | None = None) -> Guard:
+    """The ASGI application on the experiments of a shelf, behind its guard: the first at `/`, each at `/NUMBER/`."""
+    shelf = shelf if isinstance(shelf, Shelf) else Shelf.of(shelf)
     app = Starlette()
     guard = Guard(app, host=host, port=port, token=token, csrf=csrf)
+
+    def at(request: Request) -> Bench:
+        return shelf.bench(request.path_params.get("number", 0))
+
+    def routed(path: str, endpoint, method: str) -> None:
+        for place in (path, "/{number:int}" + path):
+            app.router.routes.append(Route(place, endpoint, methods=[method]))
 
     def reading(path: str, answer) -> None:
         def endpoint(request: Request) -> Response:  # in a thread of its own: nothing waits for it
             return _said(lambda: answer(request))
 
-        app.router.routes.append(Route(path, endpoint, methods=["GET"]))
+        routed(path, endpoint, "GET")
+
+    async def state(request: Request) -> Response:
+        bench = shelf.opened(request.path_params.get("number", 0))
+        glanced = bench and bench.glance(lambda look: asyncio.get_running_loop().run_in_executor(None, look))
+        return _json(glanced) if glanced else await run_in_threadpool(_said, lambda: _json(at(request).state()))
 
     def changing(path: str, act) -> None:
         async def endpoint(request: Request) -> Response:
@@ -40,28 +55,31 @@ def application(bench: Bench, *, host: str = "127.0.0.1", port: int = 8765, toke
                     raise ValueError
             except (ValueError, RecursionError):
                 return _json({"error": "no JSON object"}, 400)
-            return await run_in_threadpool(_said, lambda: _json(act(body)))
+            return await run_in_threadpool(_said, lambda: _json(act(at(request), body)))
 
-        app.router.routes.append(Route(path, endpoint, methods=["POST"]))
+        routed(path, endpoint, "POST")
 
-    reading("/", lambda r: _text(page.shell(bench.desk.name, guard.csrf), "text/html"))
+    def own(path: str, answer) -> None:
+        reading(path, lambda r: answer(at(r), r))
+
+    own("/", lambda bench, r: _text(page.shell(bench.desk.name, guard.csrf, shelf.names, r.path_params.get("number", 0)), "text/html"))
     reading("/studio.js", lambda r: _text(page.script(), "text/javascript"))
     reading("/studio.css", lambda r: _text(page.style(), "text/css"))
     reading("/plotly.js", lambda r: Response(page.engine(), media_type="text/javascript", headers={"cache-control": "private, max-age=3600"}))
-    reading("/api/state", lambda r: _json(bench.state()))
-    reading("/api/view", lambda r: _json(bench.page(_word(r, "sha"))))
-    reading("/api/figure", lambda r: _figure(bench, r))
-    reading("/api/residual", lambda r: _json(bench.view(_word(r, "sha")).looks.residual(_whole(r, "joint"), _whole(r, "finding") if "finding" in r.query_params else None)))
-    reading("/api/stretch", lambda r: _json(bench.view(_word(r, "sha")).looks.stretch(_number(r, "from"), _number(r, "to"))))
-    reading("/api/play", lambda r: Response(bench.view(_word(r, "sha")).film, media_type="application/json", headers={"cache-control": "no-store"}))
-    reading("/api/compare", lambda r: _json(bench.compare(_whole(r, "from"), _whole(r, "to"))))
-    reading("/export/report.html", lambda r: _file(bench.report(_word(r, "sha")), "text/html", f"{bench.desk.name}.html"))
-    reading("/export/experiment.yaml", lambda r: _file(bench.desk.text(), "application/yaml", f"{bench.desk.name}.yaml"))
-    changing("/api/run", lambda b: bench.run(_given(b, "sha", optional=True)))
-    changing("/api/cancel", lambda b: bench.cancel())
-    changing("/api/undo", lambda b: bench.undo(_given(b, "sha")))
-    changing("/api/redo", lambda b: bench.redo(_given(b, "sha")))
-    changing("/api/add", lambda b: _add(bench, b))
+    routed("/api/state", state, "GET")
+    own("/api/view", lambda bench, r: _json(bench.page(_word(r, "sha"))))
+    own("/api/figure", _figure)
+    own("/api/residual", lambda bench, r: _json(bench.view(_word(r, "sha")).looks.residual(_whole(r, "joint"), _whole(r, "finding") if "finding" in r.query_params else None)))
+    own("/api/stretch", lambda bench, r: _json(bench.view(_word(r, "sha")).looks.stretch(_number(r, "from"), _number(r, "to"))))
+    own("/api/play", lambda bench, r: Response(bench.view(_word(r, "sha")).film, media_type="application/json", headers={"cache-control": "no-store"}))
+    own("/api/compare", lambda bench, r: _json(bench.compare(_whole(r, "from"), _whole(r, "to"))))
+    own("/export/report.html", lambda bench, r: _file(bench.report(_word(r, "sha")), "text/html", f"{bench.desk.name}.html"))
+    own("/export/experiment.yaml", lambda bench, r: _file(bench.desk.text(), "application/yaml", f"{bench.desk.name}.yaml"))
+    changing("/api/run", lambda bench, b: bench.run(_given(b, "sha", optional=True)))
+    changing("/api/cancel", lambda bench, b: bench.cancel())
+    changing("/api/undo", lambda bench, b: bench.undo(_given(b, "sha")))
+    changing("/api/redo", lambda bench, b: bench.redo(_given(b, "sha")))
+    changing("/api/add", _add)
     return guard
 
 
@@ -91,6 +109,8 @@ def _said(act) -> Response:
         return act()
     except Changed as error:
         return _json({"error": str(error), "changed": True}, _CHANGED)
+    except Absent as error:
+        return _json({"error": str(error)}, 404)
     except SysidError as error:
         return _json({"error": str(error)}, 422)
 

@@ -2,46 +2,73 @@
 
 from __future__ import annotations
 
-import hashlib
+import re
 import threading
-from collections import OrderedDict
+from collections.abc import Callable
 from pathlib import Path
 
 from .. import comparison, loop, pipeline, results
-from ..config import Experiment
 from ..diagnose.diagnosis import diagnose
 from ..effect import find, vocabulary
-from ..errors import SysidError
+from ..errors import ConfigError, SysidError
 from ..model import ROBOT
 from ..report import page as report
 from ..report.sections import sections
 from .desk import Changed, Desk, hashed
 from .look import compared
 from .view import View
+from .views import Views, key
 from .work import Job, Worker
-
-_KEPT, _SAMPLES = 8, 4_000_000  # views in memory; samples that they hold together (at least two are kept)
 
 
 class Bench:
-    """What the requests of a page do. Safe to use from several threads."""
+    """What the requests of a page do. Safe to use from several threads.
 
-    def __init__(self, path: Path, out: Path | None = None):
-        self.desk, self.worker = Desk(path, out), Worker()
-        self._views: OrderedDict[str, View] = OrderedDict()
-        self._lock = threading.RLock()
+    Args:
+        views, turn: what several experiments share: the memory, and the lock of the one that works.
+    """
+
+    def __init__(self, path: Path, out: Path | None = None, *, views: Views | None = None, turn: threading.Lock | None = None):
+        self.desk, self.worker = Desk(path, out), Worker(turn)
+        self._views = views or Views()
+        self._last: dict | None = None
+        self._looks, self._looking = 0, False
 
     # ---- what stands
 
     def state(self) -> dict:
         """The hash of the file, the job, and what can be undone. Never raises for a bad experiment file."""
-        job = self.worker.job
+        self._looks += 1
+        look, job = self._looks, self.worker.job
         try:
             sha, error = self.desk.sync(), None
         except SysidError as problem:
             sha, error = None, str(problem)
         undo, redo = self.desk.labels()
-        return {"name": self.desk.name, "sha": sha, "error": error, "job": None if job is None else job.document(), "ready": sha is not None and self._find(sha) is not None, "undo": undo, "redo": redo}
+        found = {"name": self.desk.name, "sha": sha, "error": error, "job": None if job is None else job.document(), "ready": sha is not None and self._find(sha) is not None, "undo": undo, "redo": redo}
+        if look == self._looks:  # none that began later, after a change perhaps
+            self._last = found
+        return found
+
+    def glance(self, beside: Callable[[Callable[[], None]], object]) -> dict | None:
+        """The state as it was last seen, with the job as it is now; None where that is not good enough.
+
+        While a job runs, every look at a file waits for the job to hand over, several times. So the page hears at once what
+        was seen a moment ago, and `beside`, which runs a function in another thread, makes the next look.
+        """
+        job, last = self.worker.job, self._last
+        if last is None or job is None or job.state != "running" or last["job"] is None or last["job"]["number"] != job.number:
+            return None
+        if not self._looking:
+            self._looking = True
+            beside(self._look)
+        return {**last, "job": job.document()}
+
+    def _look(self) -> None:
+        try:
+            self.state()
+        finally:
+            self._looking = False
 
     def view(self, sha: str) -> View:
         """What was found under the text with a hash. Raises SysidError where nothing is at hand."""
@@ -100,7 +127,11 @@ class Bench:
 
     def _grow(self, seen: str, effect: str, joints: list[str] | None, options: dict) -> dict:
         make = lambda text: loop.with_effect(text.removeprefix("\ufeff"), effect, joints, options, str(self.desk.path))  # noqa: E731
-        return self._moved(self.desk.change(seen, make, effect if effect != "formula" else options["formula"], "*" if joints is None else ", ".join(joints)))
+        try:
+            return self._moved(self.desk.change(seen, make, effect if effect != "formula" else options["formula"], "*" if joints is None else ", ".join(joints)))
+        except ConfigError as error:
+            # the line of a text that was never written says nothing to who clicked
+            raise SysidError(re.sub(rf"^{re.escape(str(self.desk.path))}( line \d+)?: (model\.effects(\[\d+\])?: )?", "", str(error))) from None
 
     def _moved(self, sha: str) -> dict:
         self._ensure(sha)
@@ -118,7 +149,7 @@ class Bench:
 
     def _work(self, job: Job, text: str) -> None:
         experiment = self.desk.experiment(text)
-        key = _key(text, experiment)
+        state = key(hashed(text), experiment)
         fit = pipeline.fit(experiment, progress=job.tell)
         found = diagnose(experiment, fit=fit, progress=job.tell)
         job.tell("drawing", 0.0)
@@ -127,27 +158,15 @@ class Bench:
         view.film  # noqa: B018 - made once, here
         results.write(fit, self.desk.run)
         results.write_json(self.desk.run / "diagnosis.json", view.said)
-        self.keep(key, text, view)
+        self.keep(state, text, view)
 
-    def keep(self, key: str, text: str, view: View) -> None:
-        """Remember a view, and forget the oldest where they grow too many."""
-        with self._lock:
-            for old in [k for k, v in self._views.items() if v.sha == view.sha]:
-                del self._views[old]
-            self._views[key] = view
-            while len(self._views) > _KEPT or (len(self._views) > 2 and sum(v.samples for v in self._views.values()) > _SAMPLES):
-                self._views.popitem(last=False)
+    def keep(self, state: str, text: str, view: View) -> None:
+        """Remember a view, and the errors under its text."""
+        self._views.keep(self.desk.path, state, view)
         self.desk.measured(text, view.fit.rms("test"), view.fit.rms("train"))
 
     def _find(self, sha: str) -> View | None:
-        with self._lock:
-            for key, view in self._views.items():
-                if view.sha == sha:
-                    if key != _key_of(sha, view.fit.experiment):
-                        break  # a log or the URDF was changed since
-                    self._views.move_to_end(key)
-                    return view
-        return None
+        return self._views.find(self.desk.path, sha)
 
     # ---- answers
 
@@ -166,21 +185,3 @@ class Bench:
         """The report as `sysid report` writes it."""
         view = self.view(sha)
         return report.page(self.desk.name, sections(view.fit, view.diagnosis, view.said, self.desk.history()))
-
-
-def _key(text: str, experiment: Experiment) -> str:
-    return _key_of(hashed(text), experiment)
-
-
-def _key_of(sha: str, experiment: Experiment) -> str:
-    """A text's hash with the state of the files that it names."""
-    names = [experiment.robot.urdf, *(log.file for part in (experiment.data.train, experiment.data.test) for log in part)]
-    names += [spec.name.rpartition(":")[0] for spec in [*experiment.model.effects, *experiment.model.candidates] if ":" in spec.name]
-    state = hashlib.sha256(sha.encode())
-    for name in names:
-        try:
-            found = (experiment.folder / name).stat()
-            state.update(f"{name}|{found.st_mtime_ns}|{found.st_size}\n".encode())
-        except (OSError, ValueError):
-            state.update(f"{name}|elsewhere\n".encode())
-    return state.hexdigest()

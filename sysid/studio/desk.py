@@ -112,8 +112,10 @@ class Desk:
         """
         with self._lock:
             text = self._as_seen(seen)
-            new = make(text)
-            pipeline.build(self.experiment(new))
+        new = make(text)
+        pipeline.build(self.experiment(new))  # takes a while: who asks for the state need not wait
+        with self._lock:
+            self._as_seen(seen)
             self._write(text, new)
             self._append(new, added, joint)
             self._save()
@@ -178,7 +180,7 @@ class Desk:
         self._at = len(self._items) - 1
 
     def _save(self) -> None:
-        results.write_json(self._store, {"items": self._items, "at": self._at, "measured": self._measured, "before": self._before})
+        results.write_json(self._store, {"file": str(self.path.resolve()), "items": self._items, "at": self._at, "measured": self._measured, "before": self._before})
         self._stamp = self._stamped()
 
     def _stamped(self) -> tuple | None:
@@ -192,6 +194,8 @@ class Desk:
         self._stamp = self._stamped()
         try:
             found = json.loads(self._store.read_text(encoding="utf-8"))
+            if found.get("file", str(self.path.resolve())) != str(self.path.resolve()):
+                return [], 0, {}, []  # of another experiment of the same name: its texts are not this one's
             items = [{"text": str(i["text"]), "added": i["added"], "joint": i["joint"]} for i in found["items"]]
             at = int(found["at"])
             if not 0 <= at < len(items):

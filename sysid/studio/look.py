@@ -106,7 +106,7 @@ class Looks:
         end = max((span[1] for span in self.line["spans"]), default=1.0)
         layout = {
             "xaxis": charts.axis("time, test logs end to end [s]", range=[0.0, float(f"{end:.6g}")]), "yaxis": charts.axis(f"residual [{unit}]", zeroline=True), "showlegend": True,
-            "legend": {"orientation": "h", "x": 0, "y": 1.0, "yanchor": "bottom", "xanchor": "left", "font": {"size": 11}}, "hovermode": "x", "dragmode": "select", "selectdirection": "h",
+            "legend": charts.LEGEND, "hovermode": "x", "dragmode": "select", "selectdirection": "h",
             "margin": {"l": 66, "r": 14, "t": 30, "b": 46},
         }  # fmt: skip
         chart = charts.chart("look", f"Residual of {name} over the test logs", data, layout, height=320)

@@ -11,8 +11,12 @@ from .script import SCRIPT
 from .style import STYLE
 
 
-def shell(name: str, csrf: str) -> str:
-    """The HTML of the empty page under the name of an experiment."""
+def shell(name: str, csrf: str, names: list[str] | None = None, number: int = 0) -> str:
+    """The HTML of the empty page under the name of an experiment.
+
+    Args:
+        names: of all experiments that the studio was opened on; number: of this one among them.
+    """
     title = html.escape(name)
     grey = "".join(f'<div class="bone" style="height:{height}rem"></div>' for height in (2, 6, 16, 10))
     return f"""<!DOCTYPE html>
@@ -27,7 +31,7 @@ def shell(name: str, csrf: str) -> str:
 </head>
 <body>
 <a class="skip" href="#verdict">to the verdict</a>
-<header class="top"><h1>{title}</h1><p class="quiet">What the model says, where it fails, what is missing. Every change is written to the experiment file.</p></header>
+<header class="top"><h1>{title}</h1><p class="quiet">What the model says, where it fails, what is missing. Every change is written to the experiment file.</p>{_others(names or [], number)}</header>
 <nav aria-label="sections"><ul id="links"></ul></nav>
 <main id="main" aria-busy="true">
 <noscript><p class="empty">The studio needs JavaScript. <code>sysid report</code> writes a page that does without.</p></noscript>
@@ -37,12 +41,20 @@ def shell(name: str, csrf: str) -> str:
 </main>
 <div id="bar" role="region" aria-label="work and steps">
 <div class="work"><span id="status" role="status" aria-live="polite">connecting</span> <span id="share"></span><progress id="progress" max="1" value="0" aria-label="progress" hidden></progress></div>
-<div class="buttons"><button type="button" id="cancel" hidden>cancel</button><button type="button" id="undo" disabled>undo</button><button type="button" id="redo" disabled>redo</button><a class="button" id="report" hidden download>report</a><a class="button" id="yaml" href="/export/experiment.yaml" download>YAML</a></div>
+<div class="buttons"><button type="button" id="cancel" hidden>cancel</button><button type="button" id="undo" disabled>undo</button><button type="button" id="redo" disabled>redo</button><a class="button" id="report" hidden download>report</a><a class="button" id="yaml" href="export/experiment.yaml" download>YAML</a></div>
 </div>
 <script src="/studio.js" defer></script>
 </body>
 </html>
 """
+
+
+def _others(names: list[str], number: int) -> str:
+    """The way to the other experiments; nothing where there are none."""
+    if len(names) < 2:
+        return ""
+    links = "".join(f'<li><a href="/{k}/"{" aria-current=page" if k == number else ""}>{html.escape(name)}</a></li>' for k, name in enumerate(names))
+    return f'<details class="experiments"><summary>another experiment ({len(names) - 1} beside this one)</summary><ul>{links}</ul></details>'
 
 
 def script() -> str:

@@ -45,13 +45,13 @@ def play(looks: Looks) -> dict:
         {
             "type": "scatter3d", "mode": "markers", **spread(joints[0]), "text": [charts.plain(j) for j in fit.joints], "hovertemplate": "%{text}: %{marker.color:.2f} times its own<extra></extra>", "showlegend": False,
             "marker": {
-                "size": 11, "color": charts.rounded(np.nan_to_num(levels[0]), 3), "cmin": 0, "cmax": _SPEED, "colorscale": _SCALE, "line": {"width": 1, "color": charts.INK},
+                "size": 8, "color": charts.rounded(np.nan_to_num(levels[0]), 3), "cmin": 0, "cmax": _SPEED, "colorscale": _SCALE, "line": {"width": 1, "color": charts.INK},
                 "colorbar": {"title": {"text": "residual, times its RMS", "side": "top"}, "orientation": "h", "y": 0, "yanchor": "top", "thickness": 10, "len": 0.6, "outlinewidth": 0},
             },
         },
     ]  # fmt: skip
     layout = {
-        "scene": {"aspectmode": "manual", "aspectratio": {k: float(f"{size[i] / size.max():.4g}") for i, k in enumerate("xyz")}, **axes, "camera": {"eye": {"x": 1.3, "y": 1.15, "z": 0.45}}},
+        "scene": {"aspectmode": "manual", "aspectratio": {k: float(f"{size[i] / size.max():.4g}") for i, k in enumerate("xyz")}, **axes, "camera": {"eye": {"x": 1.4, "y": 1.25, "z": 0.5}, "center": {"x": 0, "y": 0, "z": -0.15}}},
         "margin": {"l": 0, "r": 0, "t": 0, "b": 64},
     }  # fmt: skip
     chart = charts.chart("play", "The robot over the test logs, its joints coloured by their residual", data, layout, height=440)

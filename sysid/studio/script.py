@@ -20,8 +20,8 @@ function make(tag, attributes = {}, ...children) {
   element.append(...children);
   return element;
 }
-const number = (value, digits = 4) => value === null || value === undefined || !isFinite(value) ? "–" : Number(value).toPrecision(digits).replace(/\.?0+$/, m => m.startsWith(".") ? "" : m).replace("-", "−");
-const level = value => value === null || value === undefined ? "–" : Number(value).toPrecision(4).replace("-", "−");
+const number = (value, digits = 4) => value === null || value === undefined || !isFinite(value) ? "–" : Number(value).toPrecision(digits).replace(/\.?0+$/, m => m.startsWith(".") ? "" : m).replaceAll("-", "−");
+const level = value => value === null || value === undefined ? "–" : Number(value).toPrecision(4).replaceAll("-", "−");
 const on = (effect, where) => where === "*" ? effect : effect + " to " + where;
 
 // ---- asking the server
@@ -33,7 +33,7 @@ async function answered(response) {
 }
 async function get(path, words = {}) {
   const query = new URLSearchParams(words).toString();
-  return answered(await fetch(path + (query ? "?" + query : ""), {cache: path.startsWith("/api/figure") ? "default" : "no-store"}));
+  return answered(await fetch(path + (query ? "?" + query : ""), {cache: path.startsWith("api/figure") ? "default" : "no-store"}));
 }
 async function post(path, body = {}) {
   return answered(await fetch(path, {method: "POST", headers: {"content-type": "application/json", "x-sysid-csrf": CSRF}, body: JSON.stringify(body)}));
@@ -43,7 +43,7 @@ function engine() {
   plotly ??= new Promise((done, failed) => document.head.append(make("script", {src: "/plotly.js", onload: done, onerror: () => failed(new Error("plotly.js did not load"))})));
   return plotly;
 }
-window.sysid.figure = async id => { const [chart] = await Promise.all([get("/api/figure", {sha: shown, id}), engine()]); return chart; };
+window.sysid.figure = async id => { const [chart] = await Promise.all([get("api/figure", {sha: shown, id}), engine()]); return chart; };
 
 // ---- what changes the experiment
 async function act(path, body, wrong) {
@@ -90,10 +90,10 @@ async function follow(state) {
   const stranger = state.sha !== null && state.sha !== looking;
   if (stranger || told === "changed") notice("The experiment file changed elsewhere: in another tab or in an editor.", button("reload", () => location.reload(), {class: "first"}));
   else if (state.error) notice(state.error);
-  else if (job && job.sha === looking && job.state === "failed") notice(job.error, button("try again", () => act("/api/run", {})), ...(state.undo ? [button("undo " + state.undo, () => act("/api/undo", {}))] : []));
-  else if (job && job.sha === looking && job.state === "cancelled" && !state.ready) notice("Stopped. The experiment file holds the change; what stands below is of the text before.", button("go on", () => act("/api/run", {}), {class: "first"}), ...(state.undo ? [button("undo " + state.undo, () => act("/api/undo", {}))] : []));
+  else if (job && job.sha === looking && job.state === "failed") notice(job.error, button("try again", () => act("api/run", {})), ...(state.undo ? [button("undo " + state.undo, () => act("api/undo", {}))] : []));
+  else if (job && job.sha === looking && job.state === "cancelled" && !state.ready) notice("Stopped. The experiment file holds the change; what stands below is of the text before.", button("go on", () => act("api/run", {}), {class: "first"}), ...(state.undo ? [button("undo " + state.undo, () => act("api/undo", {}))] : []));
   else if (told) notice(told);
-  else if (shown === looking && shown !== null && !state.ready && !runs && !busy) notice("A log or the URDF changed since this was computed.", button("compute again", () => act("/api/run", {}), {class: "first"}));
+  else if (shown === looking && shown !== null && !state.ready && !runs && !busy) notice("What was computed is not at hand any more: a log or the URDF changed, or other experiments took its memory.", button("compute again", () => act("api/run", {}), {class: "first"}));
   else notice("");
   if (shown !== null && shown === looking && runs && job.sha === looking) shown = "";  // computed again
   if (!stranger && state.ready && shown !== looking) await show(looking);
@@ -105,12 +105,12 @@ async function follow(state) {
   if (runs) at("progress").value = job.share;
   at("cancel").hidden = !runs;
   at("cancel").disabled = runs && job.state === "cancelling";
-  const stale = shown !== null && shown !== looking;
+  const stale = shown !== null && (shown !== looking || stranger);
   at("main").classList.toggle("stale", stale);
   at("main").setAttribute("aria-busy", String(Boolean(runs)));
-  at("waiting").hidden = shown !== null || Boolean(state.error) || Boolean(job && !runs && !state.ready);
+  at("waiting").hidden = shown !== null || stranger || Boolean(state.error) || Boolean(job && !runs && !state.ready);
   at("report").hidden = !(shown && shown === looking);
-  if (at("report").hidden === false) at("report").href = "/export/report.html?sha=" + encodeURIComponent(shown);
+  if (at("report").hidden === false) at("report").href = "export/report.html?sha=" + encodeURIComponent(shown);
   enable();
 }
 let timer = null;
@@ -118,19 +118,19 @@ async function tick() {
   clearTimeout(timer);
   let wait = 2500;
   try {
-    const state = await get("/api/state");
+    const state = await get("api/state");
     await follow(state);
     if (working(state) || (state.ready && shown !== looking)) wait = 250;
   } catch (error) {
     if (error.status === 401) notice("The token is gone: open the address that sysid studio printed.");
-    else { notice("The studio does not answer. Is it still running?"); at("status").textContent = "not connected"; }
+    else { notice("The studio does not answer. Is it still running?"); at("status").textContent = "not connected"; at("share").textContent = ""; at("progress").hidden = at("waiting").hidden = true; }
   }
   timer = setTimeout(tick, document.hidden ? 4 * wait : wait);
 }
 
 // ---- the page
 async function show(sha) {
-  const found = await get("/api/view", {sha});
+  const found = await get("api/view", {sha});
   const focus = document.activeElement && document.activeElement.dataset ? document.activeElement.dataset.key : null, lost = at("sections").contains(document.activeElement);
   shown = sha; page = found; finding = null;
   joint = Math.min(joint, page.joints.length - 1);
@@ -157,23 +157,46 @@ function offers() {
   const lead = at("verdict").querySelector(".lead");
   if (!lead || !page.offered.length) return;
   const acts = make("div", {class: "acts"});
-  page.offered.slice(0, 4).forEach((offer, k) => acts.append(button("add " + on(offer.effect, offer.joint), () => act("/api/add", {finding: offer.finding}), {"data-acts": true, class: k ? "" : "first", "data-key": "offer" + k})));
+  page.offered.slice(0, 4).forEach((offer, k) => acts.append(button("add " + on(offer.effect, offer.joint), () => act("api/add", {finding: offer.finding}), {"data-acts": true, class: k ? "" : "first", "data-key": "offer" + k})));
   lead.after(acts);
 }
 function suspects() {
   for (const row of at("suspects").querySelectorAll("tr[data-finding]")) {
     const k = Number(row.dataset.finding), f = page.findings[k];
     row.querySelector("th").append(make("div", {class: "acts"},
-      button("add", () => act("/api/add", {finding: k}), {"data-acts": true, "aria-label": "add " + on(f.effect, f.joint), "data-key": "add" + k}),
+      button("add", () => act("api/add", {finding: k}), {"data-acts": true, "aria-label": "add " + on(f.effect, f.joint), "data-key": "add" + k}),
       button("preview", event => preview(k, event.currentTarget), {"aria-pressed": "false", "aria-label": "preview what " + f.effect + " on " + (f.joint === "*" ? "the whole robot" : f.joint) + " would explain", "data-preview": k, "data-key": "preview" + k})));
   }
+  anyEffect();
   const wrong = make("p", {class: "wrong", role: "alert"}), formula = make("input", {class: "code", type: "text", maxlength: 500, placeholder: "a*sin(3*q)", spellcheck: "false", autocomplete: "off", required: true});
-  const where = make("select", {}, ...page.joints.map(j => make("option", {value: j.name}, j.name)), make("option", {value: ""}, "every joint"));
-  where.value = page.joints[joint].name;
-  const send = event => { event.preventDefault(); act("/api/add", {formula: formula.value, joint: where.value || null}, wrong); };
+  const where = whereabouts();
+  const send = event => { event.preventDefault(); act("api/add", {formula: formula.value, joint: where.value || null}, wrong); };
   at("suspects").append(make("h3", {}, "A formula of your own"),
     make("p", {class: "quiet"}, "Torque as a formula of the joint’s motion; names that it does not know are fitted."),
     make("form", {class: "own", onsubmit: send}, make("label", {class: "wide"}, "torque = ", formula), make("label", {}, "joint", where), make("button", {type: "submit", "data-acts": true}, "add formula")), wrong);
+}
+function whereabouts() {
+  const where = make("select", {}, ...page.joints.map(j => make("option", {value: j.name}, j.name)), make("option", {value: ""}, "every joint"));
+  where.value = page.joints[joint].name;
+  return where;
+}
+function anyEffect() {  // whatever the vocabulary has, suspect or not
+  const wrong = make("p", {class: "wrong", role: "alert"}), where = whereabouts(), says = make("p", {class: "quiet", "aria-live": "polite", id: "own-says"});
+  const effect = make("select", {id: "own-effect", "aria-describedby": "own-says"}, ...page.vocabulary.map(e => make("option", {value: e.effect}, e.effect)));
+  const chosen = () => page.vocabulary.find(e => e.effect === effect.value);
+  const whole = make("option", {value: "*"}, "whole robot");
+  const told = () => {
+    says.textContent = chosen().says;
+    const robot = chosen().scope === "robot";
+    if (robot && !whole.isConnected) { where.append(whole); where.value = "*"; }
+    if (!robot && whole.isConnected) { whole.remove(); where.value = page.joints[joint].name; }
+    where.disabled = robot;
+  };
+  effect.addEventListener("change", told);
+  const send = event => { event.preventDefault(); act("api/add", {effect: effect.value, joint: chosen().scope === "robot" ? null : where.value || null}, wrong); };
+  at("suspects").append(make("h3", {}, "Any other effect"),
+    make("form", {class: "own", onsubmit: send}, make("label", {}, "effect", effect), make("label", {}, "joint", where), make("button", {type: "submit", "data-acts": true}, "add effect")), says, wrong);
+  told();
 }
 function steps() {
   if (page.steps.length < 2) return;
@@ -182,10 +205,10 @@ function steps() {
   one.value = String(page.steps.length - 2); other.value = String(page.steps.length - 1);
   const ask = async () => {
     try {
-      const found = await get("/api/compare", {from: one.value, to: other.value});
+      const found = await get("api/compare", {from: one.value, to: other.value});
       const rows = found.joints.map(j => { const unit = (page.joints.find(p => p.name === j.joint) || {unit: ""}).unit; return make("tr", {}, make("th", {scope: "row"}, j.joint), make("td", {}, level(j.from) + " " + unit), make("td", {}, level(j.to) + " " + unit),
         make("td", {class: j.delta < 0 ? "falls" : j.delta > 0 ? "rises" : ""}, (j.delta > 0 ? "+" : "") + number(j.delta, 3) + (j.se ? " ± " + number(j.se, 2) : "") + " " + unit)); });
-      answer.replaceChildren(make("div", {class: "scroll"}, make("table", {}, make("thead", {}, make("tr", {}, ...["joint", "held-out RMS, first", "second", "difference"].map(w => make("th", {scope: "col"}, w)))), make("tbody", {}, ...rows))));
+      answer.replaceChildren(make("div", {class: "scroll", tabindex: "0", role: "region", "aria-label": "two steps compared"}, make("table", {}, make("thead", {}, make("tr", {}, ...["joint", "held-out RMS, first", "second", "difference"].map(w => make("th", {scope: "col"}, w)))), make("tbody", {}, ...rows))));
     } catch (error) { answer.textContent = error.message; }
   };
   one.addEventListener("change", ask); other.addEventListener("change", ask);
@@ -216,7 +239,7 @@ function film() {
   slider.addEventListener("input", () => { if (found) at_(Number(slider.value)); });
   place.addEventListener("near", async () => {
     try {
-      const [answer] = await Promise.all([get("/api/play", {sha: own}), engine()]);
+      const [answer] = await Promise.all([get("api/play", {sha: own}), engine()]);
       if (!place.isConnected) return;
       found = answer;
       place.setAttribute("aria-label", found.chart.label);
@@ -259,7 +282,7 @@ async function residual() {
   for (const b of document.querySelectorAll("[data-preview]")) b.setAttribute("aria-pressed", String(Number(b.dataset.preview) === finding));
   [...at("look-joints").children].forEach((b, k) => b.setAttribute("aria-pressed", String(k === joint)));
   try {
-    const [found] = await Promise.all([get("/api/residual", {sha: shown, joint, ...(finding === null ? {} : {finding})}), engine()]);
+    const [found] = await Promise.all([get("api/residual", {sha: shown, joint, ...(finding === null ? {} : {finding})}), engine()]);
     if (own !== asked) return;
     const place = at("look-figure");
     place.setAttribute("aria-label", found.chart.label);
@@ -277,22 +300,22 @@ async function residual() {
 async function stretch(from, to) {
   const answer = at("stretch-answer");
   try {
-    const found = await get("/api/stretch", {sha: shown, from, to});
+    const found = await get("api/stretch", {sha: shown, from, to});
     if (!found.rows) { answer.textContent = "No row of the test logs lies there."; return; }
     const rows = found.joints.map(j => make("tr", {}, make("th", {scope: "row"}, j.joint), make("td", {}, level(j.here) + " " + j.unit), make("td", {}, level(j.whole) + " " + j.unit), make("td", {}, j.whole > 0 ? number(j.here / j.whole, 2) + " ×" : "–")));
     const words = found.suspects.length ? found.suspects.map(s => make("li", {}, s.effect + (s.joint === "*" ? "" : " on " + s.joint) + " would take " + Math.round(100 * s.share) + " % of the squared residual here ", button("preview", () => preview(s.finding))))
       : [make("li", {}, "None of the suspects explains what is missed here.")];
     answer.replaceChildren(make("h3", {}, "Between " + number(found.from, 4) + " and " + number(found.to, 4) + " s"), make("ul", {}, ...words),
-      make("div", {class: "scroll"}, make("table", {}, make("thead", {}, make("tr", {}, ...["joint", "RMS here", "RMS of all", "ratio"].map(w => make("th", {scope: "col"}, w)))), make("tbody", {}, ...rows))));
+      make("div", {class: "scroll", tabindex: "0", role: "region", "aria-label": "residual in that stretch of time"}, make("table", {}, make("thead", {}, make("tr", {}, ...["joint", "RMS here", "RMS of all", "ratio"].map(w => make("th", {scope: "col"}, w)))), make("tbody", {}, ...rows))));
   } catch (error) { answer.textContent = error.message; }
 }
 
-at("undo").addEventListener("click", () => act("/api/undo", {}));
-at("redo").addEventListener("click", () => act("/api/redo", {}));
-at("cancel").addEventListener("click", async () => { try { await follow(await post("/api/cancel")); } catch (error) { notice(error.message); } });
+at("undo").addEventListener("click", () => act("api/undo", {}));
+at("redo").addEventListener("click", () => act("api/redo", {}));
+at("cancel").addEventListener("click", async () => { try { await follow(await post("api/cancel")); } catch (error) { notice(error.message); } });
 document.addEventListener("visibilitychange", () => { if (!document.hidden) tick(); });
 (async () => {
-  try { await follow(await post("/api/run")); } catch (error) { if (error.status !== 422) notice(error.message); }
+  try { await follow(await post("api/run")); } catch (error) { if (error.status !== 422) notice(error.message); }
   tick();
 })();
 })();

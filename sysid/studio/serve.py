@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import secrets
 import socket
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -11,10 +12,11 @@ from ..errors import SysidError
 from .guard import checked, is_local
 
 PORT = 8765
+SWITCH = 5e-4  # s
 
 
 def serve(path: Path, *, out: Path | None = None, host: str = "127.0.0.1", port: int = PORT, token: str | None = None, ready: Callable[[str], None] | None = None) -> None:
-    """Serve an experiment's page until interrupted.
+    """Serve the page of an experiment, and of those beside it, until interrupted.
 
     Args:
         port: 0 takes a free one. token: needed by whoever asks; made up where the host is not this machine's own.
@@ -29,18 +31,20 @@ def serve(path: Path, *, out: Path | None = None, host: str = "127.0.0.1", port:
     except ImportError as error:
         raise SysidError(f"the studio needs {error.name}, which is not installed", do="pip install 'sysid[studio]'") from None
     from .app import application
-    from .bench import Bench
+    from .shelf import Shelf, beside
 
     if token is None and not is_local(host):
         token = secrets.token_urlsafe(24)
     if token is not None:
         checked(token)
-    bench = Bench(path, out)
+    shelf = Shelf(beside(Path(path)), out)
+    bench = shelf.bench(0)
     bench.desk.text()  # a file that is not there is bad input; one that cannot be meant is said on the page
     found = _listening(host, port)
+    responsive()
     with found:
         port = found.getsockname()[1]
-        app = application(bench, host=host, port=port, token=token)
+        app = application(shelf, host=host, port=port, token=token)
         server = uvicorn.Server(uvicorn.Config(app, log_level="error", access_log=False, lifespan="off", server_header=False, timeout_graceful_shutdown=1))
         try:
             bench.run()
@@ -55,7 +59,12 @@ def serve(path: Path, *, out: Path | None = None, host: str = "127.0.0.1", port:
         except KeyboardInterrupt:
             pass  # the way to stop it
         finally:
-            bench.cancel()
+            shelf.cancel()
+
+
+def responsive() -> None:
+    """Let requests interrupt the work of this process sooner than Python does by itself (5 ms for each turn of a thread)."""
+    sys.setswitchinterval(SWITCH)
 
 
 def _listening(host: str, port: int) -> socket.socket:

@@ -23,15 +23,16 @@ button[aria-pressed=true] { border-color: var(--accent); box-shadow: inset 0 0 0
 .bone { background: var(--raised); border-radius: 4px; margin: 0 0 1rem; animation: breathe 1.6s ease-in-out infinite alternate; }
 @keyframes breathe { from { opacity: 1; } to { opacity: .45; } }
 @media (prefers-reduced-motion: reduce) { .bone { animation: none; } }
-main.stale #sections { opacity: .55; }
+main.stale #sections { opacity: .75; }
 form.own { display: flex; flex-wrap: wrap; gap: .5rem; align-items: end; margin: .5rem 0; } form.own label { display: flex; flex-direction: column; font-size: .82rem; color: var(--quiet); min-width: 0; }
 form.own label.wide { flex: 1 1 16rem; max-width: 32rem; }
 input, select { font: inherit; font-size: .9rem; color: var(--ink); background: var(--paper); border: 1px solid var(--line); border-radius: 4px; padding: .2rem .5rem; min-height: 2rem; max-width: 100%; }
 input[type=number] { width: 7rem; } input.code { font-family: ui-monospace, SFMono-Regular, Menlo, Consolas, "DejaVu Sans Mono", monospace; width: 100%; }
 .wrong { color: var(--bad); margin: .2rem 0; overflow-wrap: anywhere; } .wrong:empty { display: none; }
 input.moment { flex: 1 1 12rem; max-width: 30rem; padding: 0; accent-color: var(--bar); }
+h2[tabindex="-1"]:focus { outline: none; } .experiments { border: 0 !important; font-size: .9rem; } .experiments summary { font-weight: normal; padding: .2rem 0; } .experiments ul { display: flex; flex-wrap: wrap; gap: .2rem 1.2rem; list-style: none; padding: 0; margin: .2rem 0; } .experiments [aria-current] { color: var(--ink); font-weight: 600; text-decoration: none; }
 .answer { min-height: 1.5rem; } .falls { color: var(--good); } .rises { color: var(--bad); }
 #notice > :last-child { margin-bottom: 0; }
-@media (max-width: 40rem) { body { padding-bottom: 7.5rem; } #redo:disabled { display: none; } #bar { padding: .45rem .75rem; } .suspects th .acts button { flex: 1 1 auto; } }
-@media print { #bar, .acts, form.own, #notice { display: none; } body { padding: 0; } }
+@media (max-width: 40rem) { body { padding-bottom: 7.5rem; } #redo:disabled { display: none; } #bar { padding: .45rem .75rem; } .suspects th .acts button { flex: 1 1 auto; text-align: center; } .answer td { white-space: normal; } }
+@media print { #bar, .experiments, .acts, form.own, #notice { display: none; } body { padding: 0; } }
 """

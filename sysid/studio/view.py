@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
 
 from ..diagnose.diagnosis import Diagnosis
 from ..diagnose.document import document
+from ..effect import describe, find, vocabulary
 from ..estimate import Fit
 from ..report import fitted
 from ..report.sections import sections
@@ -53,12 +54,19 @@ class View:
             "findings": [{"effect": f["effect"], "joint": f["joint"]} for f in self.said["findings"]],
             "verdict": [{"joint": v["joint"], "status": v["status"]} for v in self.said["verdict"]], "offered": offered,
             "steps": [step_name(s) for s in history] or ["start"], "seconds": [0.0, float(np.round(max((s[1] for s in self.looks.line["spans"]), default=0.0), 3))],
-            "converged": bool(self.fit.solution.converged),
+            "vocabulary": spoken(), "converged": bool(self.fit.solution.converged),
         }  # fmt: skip
 
     def chart(self, name: str) -> bytes | None:
         """The JSON of a chart."""
         return self._charts.get(name)
+
+
+@cache
+def spoken() -> list[dict]:
+    """The effects that may be added, each with what it says."""
+    found = {name: find(name) for name in vocabulary()}
+    return [{"effect": name, "scope": effect.scope, "says": describe(effect)["summary"].replace("`", "")} for name, effect in found.items()]
 
 
 def step_name(step: dict) -> str:

@@ -11,6 +11,7 @@ from ..errors import SysidError
 
 _WORDS = {"starting": "reading the logs", "compress": "fitting", "ask": "asking what is missing"}
 _FIT, _FIRST = 0.2, 0.5  # shares of a job that the fit takes, and the first round of questions
+_WAIT = 0.1  # s between looks whether a job that waits was cancelled
 _SHARES = {"starting": (0.0, 0.0), "compress": (0.0, _FIT), "drawing": (0.97, 1.0)}
 
 
@@ -56,9 +57,10 @@ class Job:
 class Worker:
     """Runs the newest job; one that it overtakes is stopped."""
 
-    def __init__(self):
+    def __init__(self, turn: threading.Lock | None = None):
+        """turn: held by the job that runs; shared by the workers of several experiments, of which one works at a time."""
         self._lock = threading.Lock()
-        self._turn = threading.Lock()  # held by the job that runs
+        self._turn = turn or threading.Lock()
         self.job: Job | None = None
         self._count = 0
 
@@ -81,7 +83,11 @@ class Worker:
                 self.job.stop.set()
 
     def _run(self, job: Job, work: Callable[[Job], None]) -> None:
-        with self._turn:
+        while not self._turn.acquire(timeout=_WAIT):
+            if job.stop.is_set():  # overtaken or cancelled before its turn
+                job.state = "cancelled"
+                return
+        try:
             try:
                 job.tell("starting", 0.0)
                 work(job)
@@ -95,3 +101,5 @@ class Worker:
             except Exception as error:  # a page must hear of a mistake of ours as well
                 traceback.print_exc()
                 job.error, job.state = f"internal error, {type(error).__name__}: {error}", "failed"
+        finally:
+            self._turn.release()

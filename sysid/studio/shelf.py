@@ -1,0 +1,80 @@
+"""The experiments that a studio was opened on: the one that was named, and those beside it.
+
+The page names them by number. No path of a request reaches the disk; what stands on the shelf is settled at the start.
+"""
+
+from __future__ import annotations
+
+import re
+import threading
+from pathlib import Path
+
+from ..config import Experiment
+from ..errors import SysidError
+from .bench import Bench
+from .views import Views
+
+_LOOKED_AT = 100_000  # bytes of a file, to see whether it is an experiment
+
+
+class Absent(SysidError):
+    """There is no experiment with that number."""
+
+
+class Shelf:
+    """Experiments by number, the first is the one that was named. Safe to use from several threads."""
+
+    def __init__(self, paths: list[Path], out: Path | None = None):
+        self._paths, self._out = paths, out
+        self.names = [Experiment(path=path).name for path in paths]
+        self._benches: dict[int, Bench] = {}
+        self._views, self._turn, self._lock = Views(), threading.Lock(), threading.Lock()
+
+    @classmethod
+    def of(cls, bench: Bench) -> Shelf:
+        """A shelf that holds one experiment."""
+        shelf = cls([bench.desk.path])
+        shelf._benches[0] = bench
+        return shelf
+
+    def bench(self, number: int) -> Bench:
+        """The experiment with a number, opened when it is first asked for. Raises Absent, SysidError."""
+        if not 0 <= number < len(self._paths):
+            raise Absent("there is no such experiment", do="go back to the first")
+        with self._lock:
+            if number not in self._benches:
+                # two experiments never share a run folder that was given for one
+                out = self._out if self._out is None or number == 0 else self._out / self.names[number]
+                self._benches[number] = Bench(self._paths[number], out, views=self._views, turn=self._turn)
+            return self._benches[number]
+
+    def opened(self, number: int) -> Bench | None:
+        """The experiment with a number where it is open already; never waits."""
+        return self._benches.get(number)
+
+    def cancel(self) -> None:
+        """Ask every job to stop."""
+        with self._lock:
+            for bench in self._benches.values():
+                bench.worker.cancel()
+
+
+def beside(path: Path) -> list[Path]:
+    """An experiment file and those in its folder; of a folder without a config.yaml, what it and its own folders hold."""
+    folder = path.parent
+    found = [file for kind in ("*.yaml", "*.yml") for file in folder.glob(kind)]
+    if path.is_file():
+        return [path, *(file for file in sorted(found) if file != path and _is_experiment(file))]
+    if path.name != "config.yaml":
+        return [path]
+    found += folder.glob("*/config.yaml")
+    return [file for file in sorted(found) if _is_experiment(file)] or [path]
+
+
+def _is_experiment(path: Path) -> bool:
+    """Whether a file names a robot, as every experiment does."""
+    try:
+        with path.open("rb") as file:
+            return re.search(rb"^robot\s*:", file.read(_LOOKED_AT), re.MULTILINE) is not None
+    except OSError:
+        return False
