@@ -727,8 +727,8 @@ def verdict_on(share: float, *, away: float = 9.0, together=("q_elbow",), taken:
 
 @pytest.mark.parametrize(("given", "status"), [
     ({"share": 0.3}, "unknown"), ({"share": 0.3, "away": 3.0}, "complete"), ({"share": 0.05}, "complete"),
-    # what is foretold is no more than the angles' own noise makes; a tone is none of its making
-    ({"share": 0.3, "angles": 0.7}, "complete"), ({"share": 0.3, "angles": 0.7, "together": (TONE,)}, "unknown"),
+    # what is foretold is less than half of what the angles' own noise makes; a tone is none of its making
+    ({"share": 0.3, "angles": 0.9}, "complete"), ({"share": 0.3, "angles": 0.9, "together": (TONE,)}, "unknown"),
     # nothing foretells it, but the error is far above the floor; not where the angles' noise makes it
     ({"share": 0.0, "error": 2.0}, "unknown"), ({"share": 0.0, "error": 2.0, "angles": 1.0}, "complete"),
     # an effect was found: is it most of what is wrong?
