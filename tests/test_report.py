@@ -6,6 +6,7 @@ import json
 import re
 import sys
 from html.parser import HTMLParser
+from types import SimpleNamespace
 
 import numpy as np
 import plotly.graph_objects as go
@@ -21,6 +22,7 @@ from sysid.report import charts, page, solids
 from sysid.report.decimate import broken, kept
 from sysid.report.failures import failures
 from sysid.report.sections import sections
+from sysid.report.words import quantity
 from tests.conftest import CONFIG, URDF, csv, dump, motion, put
 
 EVIL = "<script>alert(1)</script>"
@@ -129,6 +131,15 @@ def test_names_show_as_text(text, missing):
         assert not set("<>&") & set(figure)
         # plotly reads markup in its texts: there too a name stands escaped
         assert EVIL not in json.dumps(json.loads(figure)["figure"])
+
+
+@pytest.mark.parametrize(("variable", "words"), [
+    ("qd_hip", "speed of hip"), ("q_rail", "position of rail"), ("q_hip and tau_rail", "angle of hip and predicted force of rail"),
+    ("q_hip and qd_hip of the last 0.4 s", "angle of hip and speed of hip over the last 0.4 s"), ("time, in a tone", "time, in a tone"), ("q_nothing and q_hip", "q_nothing and q_hip"),
+])  # fmt: skip
+def test_variables_are_said_in_words(variable, words):
+    fit = SimpleNamespace(joints=("hip", "rail"), model=SimpleNamespace(robot=SimpleNamespace(prismatic=(False, True))))
+    assert quantity(variable, fit) == words
 
 
 def test_every_chart_has_its_place_and_every_axis_its_quantity(missing):

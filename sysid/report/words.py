@@ -59,12 +59,19 @@ def raised(unit: str) -> str:
 
 
 def quantity(variable: str, fit: Fit) -> str:
-    """A variable of the diagnosis (`qd_hip`) in words; itself where it is none of the motion's."""
+    """Variables of the diagnosis (`qd_hip`, `q_hip and q_knee`, `qd_hip of the last 0.4 s`) in words; themselves where they are
+    none of the motion's."""
+    known = {}
     for joint, slides in zip(fit.joints, fit.model.robot.prismatic):
-        known = {f"q_{joint}": "position" if slides else "angle", f"qd_{joint}": "speed", f"qdd_{joint}": "acceleration"}
-        if variable in known:
-            return f"{known[variable]} of {joint}"
-    return variable
+        known |= {f"q_{joint}": f"{'position' if slides else 'angle'} of {joint}", f"qd_{joint}": f"speed of {joint}", f"qdd_{joint}": f"acceleration of {joint}"}
+        known |= {f"tau_{joint}": f"predicted {'force' if slides else 'torque'} of {joint}"}
+    said = []
+    for part in variable.split(" and "):
+        name, of_the_last, span = part.partition(" of the last ")
+        if name not in known:
+            return variable
+        said.append(known[name] + (f" over the last {span}" if of_the_last else ""))
+    return " and ".join(said)
 
 
 def units(fit: Fit) -> dict[str, tuple[str, str]]:
