@@ -282,15 +282,31 @@ def bodies(name: str, found: list[dict], lines: list) -> dict:
         "name": "joints and links", "hoverinfo": "skip", "showlegend": True,
     })  # fmt: skip
     middle, size = _box(found, skeleton)
-    axes = {
-        f"{key}axis": {"title": {"text": f"{key} [m]", "font": {"size": 12}}, "nticks": max(3, int(round(6 * size[k] / size.max()))), "range": rounded(middle[k] + np.array([-0.5, 0.5]) * size[k]), "tickfont": {"size": 11}}
-        for k, key in enumerate("xyz")
-    }
     layout = {
-        "scene": {"aspectmode": "manual", "aspectratio": {key: float(f"{size[k] / size.max():.4g}") for k, key in enumerate("xyz")}, **axes, "camera": {"eye": {"x": 1.2, "y": 1.05, "z": 0.4}, "center": {"x": 0, "y": 0, "z": -0.1}}},
+        "scene": scene(middle, size, (1.2, 1.05, 0.4), -0.1),
         "showlegend": True, "legend": {"orientation": "h", "x": 0, "y": 0, "yanchor": "top", "xanchor": "left"}, "margin": {"l": 0, "r": 0, "t": 0, "b": 60},
     }  # fmt: skip
     return chart(name, "The bodies as ellipsoids of equal mass and inertia on the robot, identified and prior", data, layout, height=540)
+
+
+def scene(middle, size, eye: tuple[float, float, float], below: float) -> dict:
+    """A box in space, to scale, with its axes in metres.
+
+    Args:
+        middle, size: (3,) [m]. eye: where it is looked at from; below: what height is looked at, both in units of the box.
+    """
+    axes = {}
+    for k, key in enumerate("xyz"):
+        power = 10.0 ** np.floor(np.log10(least := min(size.max() / 5.0, 0.4 * size[k])))
+        step = power * max(nice for nice in (1, 2, 5) if nice * power <= least * (1 + 1e-9))
+        # no number near the box's corners, where those of two axes would touch
+        first, last = (np.round(f((middle[k] + side * 0.42 * size[k]) / step)) for f, side in ((np.ceil, -1), (np.floor, 1)))
+        axes[f"{key}axis"] = {
+            "title": {"text": f"{key} [m]", "font": {"size": 12}}, "range": rounded(middle[k] + np.array([-0.5, 0.5]) * size[k]), "tickvals": rounded(step * np.arange(first, last + 1), 6),
+            "tickfont": {"size": 11},
+        }  # fmt: skip
+    ratio = {key: float(f"{size[k] / size.max():.4g}") for k, key in enumerate("xyz")}
+    return {"aspectmode": "manual", "aspectratio": ratio, **axes, "camera": {"eye": dict(zip("xyz", eye)), "center": {"x": 0, "y": 0, "z": below}}}
 
 
 def _box(found: list[dict], skeleton) -> tuple[np.ndarray, np.ndarray]:

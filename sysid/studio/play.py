@@ -38,7 +38,6 @@ def play(looks: Looks) -> dict:
     every = every[np.isfinite(every).all(1)]
     middle, size = (every.max(0) + every.min(0)) / 2, np.ptp(every, 0)
     size = np.maximum(1.15 * size, 0.3 * max(size.max(), 1e-3))
-    axes = {f"{k}axis": {"title": {"text": f"{k} [m]", "font": {"size": 12}}, "nticks": max(2, round(5 * size[i] / size.max())), "range": charts.rounded(middle[i] + np.array([-0.5, 0.5]) * size[i]), "tickfont": {"size": 11}} for i, k in enumerate("xyz")}
     spread = lambda values: {key: charts.rounded(values[i], 4) for i, key in enumerate("xyz")}  # noqa: E731
     data = [
         {"type": "scatter3d", "mode": "lines", **spread(links[0]), "line": {"color": charts.INK, "width": 7}, "hoverinfo": "skip", "showlegend": False},
@@ -51,7 +50,7 @@ def play(looks: Looks) -> dict:
         },
     ]  # fmt: skip
     layout = {
-        "scene": {"aspectmode": "manual", "aspectratio": {k: float(f"{size[i] / size.max():.4g}") for i, k in enumerate("xyz")}, **axes, "camera": {"eye": {"x": 1.4, "y": 1.25, "z": 0.5}, "center": {"x": 0, "y": 0, "z": -0.15}}},
+        "scene": charts.scene(middle, size, (1.4, 1.25, 0.5), -0.15),
         "margin": {"l": 0, "r": 0, "t": 0, "b": 64},
     }  # fmt: skip
     chart = charts.chart("play", "The robot over the test logs, its joints coloured by their residual", data, layout, height=440)
