@@ -733,11 +733,25 @@ def verdict_on(share: float, *, away: float = 9.0, together=("q_elbow",), taken:
     ({"share": 0.0, "error": 2.0}, "unknown"), ({"share": 0.0, "error": 2.0, "angles": 1.0}, "complete"),
     # an effect was found: is it most of what is wrong?
     ({"share": 0.3, "taken": 1.0}, "unknown"), ({"share": 0.3, "taken": 4.0}, "missing"), ({"share": 0.0, "taken": 1.0}, "missing"),
-    ({"share": 0.0, "taken": 1.0, "error": 1.4}, "unknown"), ({"share": 0.0, "taken": 6.0, "error": 1.4}, "missing"),
+    ({"share": 0.2, "taken": 4.0, "together": (TONE,)}, "unknown"), ({"share": 0.0, "taken": 1.0, "error": 1.4}, "unknown"), ({"share": 0.0, "taken": 6.0, "error": 1.4}, "missing"),
 ])  # fmt: skip
 def test_a_verdict_weighs_what_was_found_against_what_is_left(given, status):
     found = verdict_on(**given)
     assert found.status == status and (found.also == ("viscous",)) == (status == "unknown" and "taken" in given)
+
+
+def test_ties_on_another_joint_are_said_with_that_joint():
+    """Of two torque sensors only the ratio of the gains is seen: either may be the wrong one, and both verdicts say so."""
+    answer = lambda name, joint: SimpleNamespace(candidate=SimpleNamespace(name=name, joint=joint))  # noqa: E731
+    family = (answer("torque_gain", 0), answer("torque_gain", 1), answer("torque_bias", 0))
+    step = SimpleNamespace(head=family[0], family=family, before=np.array([2000.0, 2000.0]))
+    quiet = SimpleNamespace(raw_rms=lambda: np.ones(2), squares=np.full((10, 2), 100.0), counts=np.full((10, 2), 100.0))
+    left, level = [Structure(j, 0.0, 0.0, ()) for j in range(2)], NoiseFloor(1.0, 0.05, "spectral", "")
+    joints = ("shoulder", "elbow")
+    found = _verdict(SimpleNamespace(joints=joints), dict.fromkeys(joints, level), [step], quiet, left, SimpleNamespace(from_angles=lambda _: np.zeros(2)))
+    assert [(v.status, v.effect, v.tied_with) for v in found] == [
+        ("missing", "torque_gain", ("torque_gain on elbow", "torque_bias")), ("missing", "torque_gain", ("torque_gain on shoulder", "torque_bias on shoulder")),
+    ]  # fmt: skip
 
 
 # ---- what changed on another log

@@ -38,7 +38,7 @@ class Finding:
 
     joint: its name, or `*`. removed, removed_se: share of the misfit (squared error above the noise floor, on the test logs
     as the fit sees them) that it removes. parameters: {name: (value, std or NaN, unit)}. tied_with: words of other
-    effects on the joint that this log cannot tell from it. step: which step of the search it heads, or None.
+    effects that this log cannot tell from it, with their joint where it is another. step: which step of the search it heads, or None.
     """
 
     answer: Answer
@@ -254,8 +254,7 @@ class _Writer:
         """A step's family, against the model that it joined, as the experiment filters its logs."""
         out = []
         for member in step.family:
-            tied = tuple(dict.fromkeys(a.candidate.name for a in step.family if a is not member and a.candidate.name != member.candidate.name))
-            heads = member is step.head
+            heads, tied = member is step.head, _tied(step, member, self.fit.joints)
             out.append(self._finding(at, step.ground if heads else None, member, step.q[member.candidate], tied, number if heads else None))
         return out
 
@@ -264,7 +263,7 @@ class _Writer:
         q, there, rest = search.q_values(ground, answers), {(f.answer.candidate.name, f.answer.candidate.joint) for f in said}, []
         for answer in sorted(answers, key=lambda a: -a.score):
             key = (answer.candidate.name, answer.candidate.joint)
-            if key not in there and search.passes(ground, answer, q[answer.candidate]) and search.survives(other(), answer) and not _harms(fitted, answer):
+            if key not in there and search.passes(ground, answer, q[answer.candidate]) and search.survives(ground, other(), answer) and not _harms(fitted, answer):
                 there.add(key)
                 rest.append(answer)
         return [self._finding(fitted, None, a, q[a.candidate], (), None) for a in rest[: max(0, _SHOWN - len(said))]]
@@ -284,6 +283,17 @@ class _Writer:
             answer, name, q, _together(np.sqrt(before) * self.scale[own]), _together(np.sqrt(then) * self.scale[own]), fall / misfit, se,
             _parameters(after, answer, self.fit), tied, step,
         )  # fmt: skip
+
+
+def _tied(step: search.Step, member: Answer, joints) -> tuple[str, ...]:
+    """Words for the rest of a family; what stands on another joint with that joint's name."""
+    own, words = member.candidate.joint, []
+    for candidate in (a.candidate for a in step.family if a is not member):
+        if own == ROBOT or candidate.joint in (own, ROBOT):
+            words.append(candidate.name)
+        else:
+            words.append(f"{candidate.name} on {joints[candidate.joint]}")
+    return tuple(dict.fromkeys(word for word in words if word != member.candidate.name))
 
 
 def _together(rms) -> float:
@@ -340,6 +350,8 @@ def _verdict(fit: Fit, levels, steps, last: Ground, left: list[structure.Structu
     for j, joint in enumerate(fit.joints):
         own = [s for s in steps if s.head.candidate.joint == j or (s.head.candidate.joint == ROBOT and s.shares[j] >= search.WORTH)]
         after, count = last.squares[:, j].sum(), max(last.counts[:, j].sum(), 1.0)
+        # the other places of effects that were found on another joint: two gains that only their ratio is seen of
+        elsewhere = [(s, a) for s in steps for a in s.family[1:] if a.candidate.joint == j and s.head.candidate.joint not in (j, ROBOT)]
         foretold = left[j].share * after / count
         # the angles' noise is in the residual too and hangs on the motion a little, but is no tone and comes in no bursts
         there = left[j].there and (left[j].bursts or left[j].tone or foretold > 0.5 * angles()[j])
@@ -347,14 +359,17 @@ def _verdict(fit: Fit, levels, steps, last: Ground, left: list[structure.Structu
         if own:
             taken = (steps[0].before[j] - after) / count
             words = tuple(s.head.candidate.name for s in own)
-            if (there and foretold > _LEFT * taken) or _above(raw[j], levels[joint], 1.0, lambda at=j: angles()[at]) > _UNEXPLAINED * taken:
+            # a tone that two logs share is no part of any effect
+            if (there and (left[j].tone or foretold > _LEFT * taken)) or _above(raw[j], levels[joint], 1.0, lambda at=j: angles()[at]) > _UNEXPLAINED * taken:
                 # what was found is not most of what is wrong
                 out.append(Verdict(joint, "unknown", also=words, structure=left[j]))
             else:
-                tied = tuple(dict.fromkeys(a.candidate.name for a in own[0].family[1:] if a.candidate.name != words[0]))
-                out.append(Verdict(joint, "missing", words[0], tied, words[1:], kept))
+                out.append(Verdict(joint, "missing", words[0], _tied(own[0], own[0].head, fit.joints), words[1:], kept))
         elif there or _above(raw[j], levels[joint], 2.0, lambda at=j: angles()[at]) > 0.5 * raw[j]:
             out.append(Verdict(joint, "unknown", structure=left[j]))
+        elif elsewhere:
+            step, member = elsewhere[0]
+            out.append(Verdict(joint, "missing", member.candidate.name, _tied(step, member, fit.joints)))
         else:
             out.append(Verdict(joint, "complete"))
     return out

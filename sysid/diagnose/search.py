@@ -149,7 +149,7 @@ def next_step(ground: Ground, other: Callable[[], Ground | None], answers: list[
     while hopeful:
         best = max(hopeful, key=lambda a: a.score)
         short = sorted((a for a in hopeful if a.score >= _NEAR * best.score), key=lambda a: -a.score)[:_SHORTLIST]
-        standing = [a for a in short if survives(other(), a)]
+        standing = [a for a in short if survives(ground, other(), a)]
         refined = [(a, g) for a, g in (refit(ground, a) for a in standing) if passes(ground, a, q[a.candidate])]
         family = _family(ground, [a for a, _ in refined]) if refined else []
         helpful = [a for a in family if not refused(a)]
@@ -188,7 +188,7 @@ def refit(ground: Ground, answer: Answer, always: bool = False) -> tuple[Answer,
 _AGREE, _WORTH_BELOW = 1.7, 0.1  # how far apart an effect's size may be under two low-passes; share
 
 
-def survives(other: Ground | None, answer: Answer) -> bool:
+def survives(ground: Ground, other: Ground | None, answer: Answer) -> bool:
     """Whether an effect is supported under another low-pass too, and of the same size there: what encoder noise makes of a
     second derivative also lowers the held-out error, but by another amount in every band."""
     if other is None:
@@ -201,12 +201,23 @@ def survives(other: Ground | None, answer: Answer) -> bool:
     least = _WORTH_BELOW if answer.candidate.curved and answer.candidate.effect.uses_load else 0.5 * WORTH
     if found.away < SUPPORT - 1.0 or found.share < least:
         return False
-    if len(answer.coefficients) == 1 or answer.candidate.curved:
-        k = int(np.argmax(np.abs(answer.coefficients) * [s.start is not None for s in answer.candidate.effect.shapes()])) if answer.candidate.curved else 0
-        ratio = again.coefficients[k] / answer.coefficients[k] if answer.coefficients[k] else 0.0
-        same = answer.candidate.curved or all(0.7 < again.shapes[n] / v < 1.4 for n, v in answer.shapes.items() if v)
-        return 1.0 / _AGREE < ratio < _AGREE or (not same and ratio > 0)
+    if answer.candidate.curved:
+        shapes = answer.candidate.effect.shapes()
+        k = int(np.argmax(np.abs(answer.coefficients) * [s.start is not None for s in shapes]))
+        if _agree(answer.coefficients[k], again.coefficients[k]):
+            return True
+        # one step from where an effect does nothing may fall far short of a large one: how large is it once it is refitted?
+        size = lambda at, a: refit(at, a)[0].shapes[shapes[k].name] - (shapes[k].start or 0.0)  # noqa: E731
+        return _agree(size(ground, answer), size(other, again))
+    if len(answer.coefficients) == 1:
+        same = all(0.7 < again.shapes[n] / v < 1.4 for n, v in answer.shapes.items() if v)
+        return _agree(answer.coefficients[0], again.coefficients[0]) or (not same and again.coefficients[0] * answer.coefficients[0] > 0)
     return True
+
+
+def _agree(first: float, second: float) -> bool:
+    """Whether two sizes are about the same."""
+    return bool(first) and 1.0 / _AGREE < second / first < _AGREE
 
 
 def _family(ground: Ground, answers: list[Answer]) -> list[Answer]:

@@ -61,9 +61,11 @@ def verdict_words(found: dict, document: dict, diagnosis: Diagnosis) -> str:
         return "Nothing is left that held-out data support."
     left = structure_words(found, diagnosis)
     if found["status"] == "unknown":
-        return f"Structure is left that no effect of the vocabulary explains: {left or 'the held-out error is far above the noise floor, and nothing in the motion foretells it'}."
+        also = f" Part of it looks like {text(', '.join(found['also']))}." if found["also"] else ""
+        return f"Structure is left that no effect of the vocabulary explains: {left or 'the held-out error is far above the noise floor, and nothing in the motion foretells it'}.{also}"
     joint, word = found["joint"], found["effect"]
-    at = next((k for k, f in enumerate(document["findings"]) if f["effect"] == word and f["joint"] in (joint, "*") and f["joins_as_step"]), None)
+    places = [k for k, f in enumerate(document["findings"]) if f["effect"] == word and f["joint"] in (joint, "*")]
+    at = next((k for k in places if document["findings"][k]["joins_as_step"]), places[0] if places else None)
     out = f"<strong>{text(word)}</strong> is missing"
     if at is None:
         return out + "."
