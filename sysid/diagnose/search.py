@@ -19,6 +19,7 @@ Q_LEVEL, SUPPORT, WORTH = 0.01, 3.0, 0.02  # false discoveries; standard errors;
 _SHORTLIST, _NEAR = 8, 0.5  # how many are refitted exactly, and how near to the best they must be
 # standard errors; share of what the best removes and of what it leaves; share of the former that is never a tie
 _TIED, _TIED_SHARE, _TIED_MOST = 2.0, 0.02, 0.15
+_CLEARLY = 0.9  # of what another leaves
 _SEEN = 0.03  # share of a signature's root mean square that the model must leave for it to be judged
 _SAME = 0.99  # share of a signature that another one holds
 
@@ -154,8 +155,11 @@ def next_step(ground: Ground, other: Callable[[], Ground | None], answers: list[
         family = _family(ground, [a for a, _ in refined]) if refined else []
         helpful = [a for a in family if not refused(a)]
         if helpful:
-            head = helpful[0]
-            family = [head, *(a for a in family if a is not head), *_alike(other(), head, standing, family)]
+            head = _clearer(other(), helpful[0], [a for a, _ in refined])
+            if head is helpful[0]:
+                family = [head, *(a for a in family if a is not head), *_alike(other(), head, standing, family)]
+            else:
+                family = [head]
             after = dict((a.candidate, g) for a, g in refined)[head.candidate] or refit(ground, head, always=True)[1]
             shares = 1.0 - after.squares.sum(0) / np.maximum(ground.squares.sum(0), 1e-300)
             return Step(tuple(family), q, support(ground, head), after, shares, ground.squares.sum(0))
@@ -248,6 +252,20 @@ def _family(ground: Ground, answers: list[Answer]) -> list[Answer]:
         names.add(key)
         kept.append(answer)
     return kept
+
+
+def _clearer(other: Ground | None, head: Answer, refined: list[Answer]) -> Answer:
+    """The head, or another curved effect of its joint that under the lower low-pass leaves clearly less, all refitted: a lag
+    passes on more of the encoder's noise than a delay does, which counts against it the more the higher the cutoff."""
+    rivals = [a for a in refined if a.candidate.curved and a.candidate.joint == head.candidate.joint and a.candidate.name != head.candidate.name]
+    if other is None or not head.candidate.curved or not rivals:
+        return head
+    own = head.candidate.judged_by(other.model.robot.dof)
+    # all of them survived there: none is without an answer
+    left = {a.candidate: refit(other, other.asked(a.candidate, _best))[0].squares[:, own].sum(1) for a in (head, *rivals)}
+    best = min(rivals, key=lambda a: left[a.candidate].sum())
+    first, second = left[head.candidate], left[best.candidate]
+    return best if second.sum() < _CLEARLY * first.sum() and stands_out(first, second) >= SUPPORT else head
 
 
 def _alike(other: Ground | None, head: Answer, answers: list[Answer], family: list[Answer]) -> list[Answer]:
