@@ -377,6 +377,6 @@ def _verdict(fit: Fit, levels, steps, last: Ground, left: list[structure.Structu
 
 def _above(square: float, level: NoiseFloor, doubt: float, angles: Callable[[], float]) -> float:
     """How far a joint's mean squared error lies above its noise floor, so many standard deviations of the floor in doubt, and
-    above what the angles' noise makes, as much again of which was looked at."""
+    above what the angles' noise makes."""
     above = square - (level.rms + doubt * level.std) ** 2
-    return above - 2.0 * angles() if above > 0 else above
+    return above - angles() if above > 0 else above
