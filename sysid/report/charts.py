@@ -295,14 +295,15 @@ def scene(middle, size, eye: tuple[float, float, float], below: float) -> dict:
     Args:
         middle, size: (3,) [m]. eye: where it is looked at from; below: what height is looked at, both in units of the box.
     """
+    power = 10.0 ** np.floor(np.log10(least := size.max() / 8.0))
+    step = power * min(nice for nice in (1, 2, 5, 10) if nice * power >= least * (1 - 1e-9))
     axes = {}
     for k, key in enumerate("xyz"):
-        power = 10.0 ** np.floor(np.log10(least := min(size.max() / 5.0, 0.4 * size[k])))
-        step = power * max(nice for nice in (1, 2, 5) if nice * power <= least * (1 + 1e-9))
         # no number near the box's corners, where those of two axes would touch
-        first, last = (np.round(f((middle[k] + side * 0.42 * size[k]) / step)) for f, side in ((np.ceil, -1), (np.floor, 1)))
+        first, last = (f((middle[k] + side * 0.42 * size[k]) / step) for f, side in ((np.ceil, -1), (np.floor, 1)))
+        at = rounded(step * np.arange(first, last + 1) + 0.0, 6) if first <= last else rounded(middle[k : k + 1], 2)  # + 0.0: no minus before a zero
         axes[f"{key}axis"] = {
-            "title": {"text": f"{key} [m]", "font": {"size": 12}}, "range": rounded(middle[k] + np.array([-0.5, 0.5]) * size[k]), "tickvals": rounded(step * np.arange(first, last + 1), 6),
+            "title": {"text": f"{key} [m]", "font": {"size": 12}}, "range": rounded(middle[k] + np.array([-0.5, 0.5]) * size[k]), "tickvals": at,
             "tickfont": {"size": 11},
         }  # fmt: skip
     ratio = {key: float(f"{size[k] / size.max():.4g}") for k, key in enumerate("xyz")}
