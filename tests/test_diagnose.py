@@ -7,6 +7,7 @@ with the simulator's truth.json, which the diagnosis does not read.
 import json
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -18,7 +19,7 @@ from scipy.signal import lfilter
 from sysid import config, loop, pipeline, regressor, results, robot, simulate
 from sysid.diagnose import changed, search
 from sysid.diagnose.changed import document as changes_document
-from sysid.diagnose.diagnosis import _verdict, diagnose
+from sysid.diagnose.diagnosis import _around_standstill, _verdict, diagnose
 from sysid.diagnose.document import document
 from sysid.diagnose.domain import CUTOFFS, Gaussian, questioned, stride_of
 from sysid.diagnose.ground import Ground, standard, summed
@@ -26,7 +27,7 @@ from sysid.diagnose.noise import NoiseFloor
 from sysid.diagnose.structure import TONE, Structure, structures
 from sysid.errors import ConfigError, LogError, SysidError
 from sysid.log import Log, Segment
-from sysid.preprocess import standstill_speed
+from sysid.preprocess import prepare, standstill_speed
 from sysid.shape import Projection
 from tests.conftest import csv
 
@@ -97,8 +98,6 @@ def test_at_some_rows_is_the_filter_at_those_rows(rows):
 @cache
 def planar() -> robot.Robot:
     import tempfile
-    from pathlib import Path
-
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "robot.urdf"
         file.write_text(PLANAR)
@@ -115,8 +114,6 @@ def smooth(t, seed: int = 0, fastest: float = 1.5):
 
 
 def a_log(t, q, tau) -> Log:
-    from pathlib import Path
-
     return Log("made", Path("made"), "", (Segment(t, float(t[1] - t[0]), q, tau, None, None, {}),))
 
 
@@ -752,6 +749,21 @@ def test_ties_on_another_joint_are_said_with_that_joint():
     assert [(v.status, v.effect, v.tied_with) for v in found] == [
         ("missing", "torque_gain", ("torque_gain on elbow", "torque_bias")), ("missing", "torque_gain", ("torque_gain on shoulder", "torque_bias on shoulder")),
     ]  # fmt: skip
+
+
+@pytest.mark.parametrize(("standstill", "at_rest", "said"), [("keep", 1.0, True), ("keep", 0.1, False), ("mask", 1.0, False)])
+def test_error_around_standstill_is_said_with_what_leaves_it_out(standstill, at_rest, said):
+    """A joint that swings, whose residual is 0.1 in motion and `at_rest` where it turns."""
+    t = np.arange(4000) * 1e-3
+    q = np.sin(2.0 * t)[:, None]
+    spec = config.PreprocessSpec(standstill=standstill)
+    pieces = prepare([Log("swing", Path("swing"), "", (Segment(t, 1e-3, q, q, None, None, {}),))], spec, ("hip",)).pieces
+    qd = np.concatenate([piece.qd[piece.core] for piece in pieces])
+    residual = np.where(np.abs(qd) < 0.02, at_rest, 0.1)
+    measured = np.concatenate([piece.measured[piece.core] for piece in pieces])
+    fit = SimpleNamespace(joints=("hip",), filters={}, experiment=SimpleNamespace(preprocess=spec), predictions={"test": SimpleNamespace(predicted=measured - residual)})
+    found = list(_around_standstill(SimpleNamespace(test=SimpleNamespace(pieces=pieces)), fit))
+    assert len(found) == said and all("'hip'" in notice and "standstill: mask" in notice for notice in found)
 
 
 # ---- what changed on another log

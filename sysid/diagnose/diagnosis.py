@@ -18,7 +18,7 @@ from ..effect import SensorEffect, vocabulary
 from ..estimate import Fit, inverse
 from ..filters import settled
 from ..model import ROBOT, Model
-from ..preprocess import prepare
+from ..preprocess import Smoother, prepare, standstill_speed, without_standstill
 from . import regions, search, structure
 from .candidate import candidates
 from .domain import CUTOFFS, questioned, stride_of
@@ -28,6 +28,7 @@ from .noise import NoiseFloor, floor
 _MOST_STEPS = 8
 _UNSEEN = 0.05  # of its root mean square: below it a signature is absorbed by the model
 _SHOWN = 12  # findings
+_MUCH_THERE = 0.4  # of a joint's squared error, around standstill
 # of what the effects took: where as much can still be foretold, or lies above the noise floor, they are not the whole of it
 _LEFT, _UNEXPLAINED = 0.15, 0.25
 
@@ -72,7 +73,8 @@ class Verdict:
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """Everything that `sysid diagnose` says. steps: the search's; grounds: the first and the last."""
+    """Everything that `sysid diagnose` says. steps: the search's; grounds: the first and the last; notices: what to know of the
+    error as the experiment filters it."""
 
     fit: Fit
     floors: dict[str, NoiseFloor]
@@ -83,6 +85,7 @@ class Diagnosis:
     steps: tuple[search.Step, ...]
     first: Ground
     last: Ground
+    notices: tuple[str, ...] = ()
 
 
 class Logs:
@@ -158,6 +161,7 @@ def diagnose(experiment: Experiment, *, fit: Fit | None = None, progress: pipeli
         failures = regions.failures(ground, ([r for r in _residuals(fitted, fit, "test")], [p.step for p in fitted.test.pieces]), np.array([floors[j].rms for j in fit.joints]))
         return Diagnosis(
             fit, floors, tuple(found), tuple(_not_visible(answers)), tuple(_verdict(fit, levels, steps, last, left, logs)), tuple(failures), tuple(steps), ground, last,
+            tuple(_around_standstill(fitted, fit)),
         )  # fmt: skip
 
 
@@ -237,6 +241,25 @@ def _floors(fitted: Ground, fit: Fit, levels: dict[str, NoiseFloor]) -> dict[str
             found = replace(found, rms=found.rms * gain, std=found.std * gain, detail=found.detail + "; carried through the fit's filter")
         out[joint] = replace(found, rms=float(min(found.rms, limit[j])))
     return out
+
+
+def _around_standstill(fitted: Ground, fit: Fit) -> Iterator[str]:
+    """Joints whose held-out error stands where the angles' filter sees standstill: there it smears the jump of friction, which no
+    effect takes away."""
+    spec = settled(fit.experiment.preprocess, fit.filters)
+    if spec.standstill != "keep" or spec.filter == "none":
+        return
+    pieces, residuals = fitted.test.pieces, _residuals(fitted, fit, "test")
+    speed = standstill_speed(pieces)
+    near = np.concatenate([~without_standstill(p, speed, Smoother(spec, p.step).reach).use[p.core] for p in pieces])
+    square = np.concatenate(residuals) ** 2
+    for j, joint in enumerate(fit.joints):
+        error, share = square[near[:, j], j].sum() / max(square[:, j].sum(), 1e-300), near[:, j].mean()
+        if error > _MUCH_THERE and error > 2.0 * share:
+            yield (
+                f"joint {joint!r}: {100 * error:.0f} % of its held-out squared error stands in the {100 * share:.0f} % of the rows around standstill, where the filter "
+                "smears friction's jump and no effect helps; preprocess.standstill: mask leaves them out"
+            )
 
 
 # ---- findings

@@ -41,7 +41,7 @@ def document(found: Diagnosis, run="") -> dict:
             for f in found.failures
         ],
         "domain": {"cutoff_hz": 15.0, "survives_hz": 8.0, "rms_test_before": dict(zip(joints, found.first.rms().tolist())), "rms_test_after": dict(zip(joints, found.last.rms().tolist()))},
-        "notices": list(fit.notices), "logs": list(fit.logs), "versions": versions(), "run": str(run),
+        "notices": [*fit.notices, *found.notices], "logs": list(fit.logs), "versions": versions(), "run": str(run),
     }  # fmt: skip
 
 
