@@ -212,8 +212,7 @@ def studio(
 
             webbrowser.open(address)
 
-    path = experiment / "config.yaml" if experiment.is_dir() else experiment
-    serve(path, out=out, host=host, port=port, token=token, ready=ready)
+    serve(experiment, out=out, host=host, port=port, token=token, ready=ready)
 
 
 @app.command()

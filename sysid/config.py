@@ -345,15 +345,19 @@ class Experiment(_Spec):
         return self.path.resolve().parent.name if self.path.stem == "config" else self.path.stem
 
 
+def file_of(path: str | Path) -> Path:
+    """The experiment file that a path means: itself, or the config.yaml of a folder."""
+    path = Path(path)
+    return path / "config.yaml" if path.is_dir() else path
+
+
 def load(path: str | Path) -> Experiment:
     """Read an experiment file, or the config.yaml of a folder.
 
     Raises:
         ConfigError: with the line, the key, and what is allowed there.
     """
-    path = Path(path)
-    if path.is_dir():
-        path = path / "config.yaml"
+    path = file_of(path)
     try:
         data = path.read_bytes()
     except OSError as error:

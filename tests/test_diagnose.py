@@ -16,6 +16,7 @@ from ruamel.yaml import YAML
 from scipy.optimize import lsq_linear
 from scipy.signal import lfilter
 
+from scripts.blind_benchmark import PLANAR
 from sysid import config, loop, pipeline, regressor, results, robot, simulate
 from sysid.diagnose import changed, search
 from sysid.diagnose.changed import document as changes_document
@@ -30,22 +31,6 @@ from sysid.log import Log, Segment
 from sysid.preprocess import prepare, standstill_speed
 from sysid.shape import Projection
 from tests.conftest import csv
-
-PLANAR = """<robot name="planar">
- <link name="base"/>
- <link name="upper"><inertial><origin xyz="0.2 0 0"/><mass value="4"/><inertia ixx="0.01" iyy="0.06" izz="0.06" ixy="0" ixz="0" iyz="0"/></inertial></link>
- <link name="fore"><inertial><origin xyz="0.18 0 0"/><mass value="2.5"/><inertia ixx="0.005" iyy="0.03" izz="0.03" ixy="0" ixz="0" iyz="0"/></inertial></link>
- <joint name="shoulder" type="revolute"><parent link="base"/><child link="upper"/><axis xyz="0 1 0"/><limit lower="-2.5" upper="2.5" effort="200" velocity="6"/></joint>
- <joint name="elbow" type="revolute"><parent link="upper"/><child link="fore"/><origin xyz="0.4 0 0"/><axis xyz="0 1 0"/><limit lower="-2.5" upper="2.5" effort="100" velocity="6"/></joint>
-</robot>
-"""
-
-
-def test_the_robots_of_the_tests_are_the_benchmark_s():
-    from scripts import blind_benchmark
-
-    assert PLANAR == blind_benchmark.PLANAR
-
 
 # ---- the low-pass
 
@@ -293,8 +278,6 @@ def test_step_releases_what_the_model_holds_at_zero():
 
 def coloured(rng, n: int, draws: int, step: float = 0.01, slow: float = 0.1, share: float = 0.5, cutoff: float = 15.0):
     """Residuals (n, draws) of white and coloured noise, through the low-pass."""
-    from scipy.signal import lfilter
-
     margin = 60
     white = rng.normal(size=(n + 2 * margin, draws))
     keep = np.exp(-step / slow)

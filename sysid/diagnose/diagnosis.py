@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, cached_property
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -18,7 +19,7 @@ from ..effect import SensorEffect, vocabulary
 from ..estimate import Fit, inverse
 from ..filters import settled
 from ..model import ROBOT, Model
-from ..preprocess import Smoother, prepare, standstill_speed, without_standstill
+from ..preprocess import Motion, Smoother, prepare, standstill_speed, without_standstill
 from . import regions, search, structure
 from .candidate import candidates
 from .domain import CUTOFFS, questioned, stride_of
@@ -94,6 +95,7 @@ class Logs:
     def __init__(self, experiment: Experiment, fit: Fit):
         machine = fit.model.robot
         self.experiment, self.fit = experiment, fit
+        self._from_angles: WeakKeyDictionary[Ground, np.ndarray] = WeakKeyDictionary()
         with pipeline.noticed():
             self.train = pipeline.read(experiment, machine, experiment.data.train)
             self.test = pipeline.read(experiment, machine, experiment.data.test)
@@ -110,14 +112,21 @@ class Logs:
         return make(weights) if weights is not None else make(inverse(make(None).rms("train")))
 
     def from_angles(self, ground: Ground) -> np.ndarray:
-        """(dof,) RMS of the torque that the angles' own noise makes in a ground's test residual: as much again is added, and what
-        that changes is looked at."""
-        rng, noise = np.random.default_rng(0), np.max([piece.noise for piece in ground.test.pieces], axis=0)
-        rougher = [replace(log, segments=tuple(replace(s, q=s.q + noise * rng.normal(size=s.q.shape)) for s in log.segments)) for log in self.test]
-        motion = questioned(rougher, ground.model.robot.joints, CUTOFFS[0])
-        again = rows.predicted(ground.model, motion, ground.settled.x, ground.stride)
-        change = (again - ground.predicted[1]) * ground.held_out.use
-        return np.sqrt((change**2).sum(0) / np.maximum(ground.held_out.use.sum(0), 1))
+        """(dof,) RMS of the torque that the angles' own noise makes in the test residual of a ground under the first low-pass: as
+        much again is added, and what that changes is looked at."""
+        if ground not in self._from_angles:
+            again = rows.predicted(ground.model, self._rougher, ground.settled.x, ground.stride)
+            change = (again - ground.predicted[1]) * ground.held_out.use
+            self._from_angles[ground] = np.sqrt((change**2).sum(0) / np.maximum(ground.held_out.use.sum(0), 1))
+        return self._from_angles[ground]
+
+    @cached_property
+    def _rougher(self) -> Motion:
+        """The test logs with as much noise again on their angles, the same whatever the model."""
+        joints, rng = self.fit.model.robot.joints, np.random.default_rng(0)
+        noise = np.max([piece.noise for piece in questioned(self.test, joints, CUTOFFS[0]).pieces], axis=0)
+        logs = [replace(log, segments=tuple(replace(s, q=s.q + noise * rng.normal(size=s.q.shape)) for s in log.segments)) for log in self.test]
+        return questioned(logs, joints, CUTOFFS[0])
 
     def as_fitted(self) -> Ground:
         """The fitted model on the logs as the experiment filters them, thinned; its shape values stay."""
@@ -158,7 +167,7 @@ def diagnose(experiment: Experiment, *, fit: Fit | None = None, progress: pipeli
         last = steps[-1].ground if steps else ground
         left = structure.structures(last)
         found += writer.apart(fitted, ground, other, answers, found)
-        failures = regions.failures(ground, ([r for r in _residuals(fitted, fit, "test")], [p.step for p in fitted.test.pieces]), np.array([floors[j].rms for j in fit.joints]))
+        failures = regions.failures(ground, (_residuals(fitted, fit, "test"), [p.step for p in fitted.test.pieces]), np.array([floors[j].rms for j in fit.joints]))
         return Diagnosis(
             fit, floors, tuple(found), tuple(_not_visible(answers)), tuple(_verdict(fit, levels, steps, last, left, logs)), tuple(failures), tuple(steps), ground, last,
             tuple(_around_standstill(fitted, fit)),
@@ -168,8 +177,7 @@ def diagnose(experiment: Experiment, *, fit: Fit | None = None, progress: pipeli
 def _steps(logs: Logs, ground: Ground, other, fitted: Ground, answers: list[Answer], extra, tell: Callable) -> Iterator[tuple[search.Step, Ground]]:
     """The steps of the search, each with the fitted model before it, on the logs as the experiment filters them."""
     for _ in range(_MOST_STEPS):
-        angles = cache(lambda at=ground: logs.from_angles(at))
-        refused = lambda answer, at=fitted, ground=ground, angles=angles: _harms(at, answer) or _smooths(ground, angles, answer)  # noqa: E731
+        refused = lambda answer, at=fitted, ground=ground: _harms(at, answer) or _smooths(logs, ground, answer)  # noqa: E731
         step = search.next_step(ground, other, answers, refused)
         if step is None:
             return
@@ -198,13 +206,13 @@ def _harms(fitted: Ground, answer: Answer) -> bool:
     return rise.sum() > 0 and (search.away(rise) > 1.0 or rise.sum() > 0.002 * fitted.squares[:, own].sum())
 
 
-def _smooths(ground: Ground, angles: Callable[[], np.ndarray], answer: Answer) -> bool:
+def _smooths(logs: Logs, ground: Ground, answer: Answer) -> bool:
     """Whether an effect that filters torque takes no more than the angles' noise makes of it: any filter lessens that."""
     candidate = answer.candidate
     if not (isinstance(candidate.effect, SensorEffect) or (candidate.curved and candidate.effect.uses_load)):
         return False
     j = candidate.joint
-    return (ground.squares - answer.squares)[:, j].sum() <= ground.counts[:, j].sum() * angles()[j] ** 2
+    return (ground.squares - answer.squares)[:, j].sum() <= ground.counts[:, j].sum() * logs.from_angles(ground)[j] ** 2
 
 
 # ---- the noise floor
@@ -369,7 +377,7 @@ def _not_visible(answers: list[Answer]) -> list[Answer]:
 
 def _verdict(fit: Fit, levels, steps, last: Ground, left: list[structure.Structure], logs: Logs) -> list[Verdict]:
     out = []
-    raw, angles = last.raw_rms() ** 2, cache(lambda: logs.from_angles(last) ** 2)
+    raw, angles = last.raw_rms() ** 2, lambda j: logs.from_angles(last)[j] ** 2
     for j, joint in enumerate(fit.joints):
         own = [s for s in steps if s.head.candidate.joint == j or (s.head.candidate.joint == ROBOT and s.shares[j] >= search.WORTH)]
         after, count = last.squares[:, j].sum(), max(last.counts[:, j].sum(), 1.0)
@@ -377,18 +385,19 @@ def _verdict(fit: Fit, levels, steps, last: Ground, left: list[structure.Structu
         elsewhere = [(s, a) for s in steps for a in s.family[1:] if a.candidate.joint == j and s.head.candidate.joint not in (j, ROBOT)]
         foretold = left[j].share * after / count
         # the angles' noise is in the residual too and hangs on the motion a little, but is no tone and comes in no bursts
-        there = left[j].there and (left[j].bursts or left[j].tone or foretold > 0.5 * angles()[j])
+        there = left[j].there and (left[j].bursts or left[j].tone or foretold > 0.5 * angles(j))
         kept = left[j] if there else None
+        above = lambda doubt, j=j, level=levels[joint]: _above(raw[j], level, doubt, lambda: angles(j))  # noqa: E731
         if own:
             taken = (steps[0].before[j] - after) / count
             words = tuple(s.head.candidate.name for s in own)
             # a tone that two logs share is no part of any effect
-            if (there and (left[j].tone or foretold > _LEFT * taken)) or _above(raw[j], levels[joint], 1.0, lambda at=j: angles()[at]) > _UNEXPLAINED * taken:
+            if (there and (left[j].tone or foretold > _LEFT * taken)) or above(1.0) > _UNEXPLAINED * taken:
                 # what was found is not most of what is wrong
                 out.append(Verdict(joint, "unknown", also=words, structure=left[j]))
             else:
                 out.append(Verdict(joint, "missing", words[0], _tied(own[0], own[0].head, fit.joints), words[1:], kept))
-        elif there or _above(raw[j], levels[joint], 2.0, lambda at=j: angles()[at]) > 0.5 * raw[j]:
+        elif there or above(2.0) > 0.5 * raw[j]:
             out.append(Verdict(joint, "unknown", structure=left[j]))
         elif elsewhere:
             step, member = elsewhere[0]

@@ -60,7 +60,7 @@ class Ground:
             weights = np.ones(model.robot.dof)
         self.settled = settle(experiment, model, train, prior, weights=weights, stride=stride, grid=grid, hold=hold)
         self.weights = np.asarray(weights)
-        self._asked: dict[Candidate, Answer | None] = {}
+        self._asked: dict[tuple[Callable, Candidate], Answer | None] = {}
         self._holding: tuple[Candidate, dict[str, float], Ground] | None = None
 
     @property
@@ -238,9 +238,9 @@ class Ground:
 
     def asked(self, candidate: Candidate, ask: Callable[[Ground, Candidate], Answer | None]) -> Answer | None:
         """What `ask` says of a candidate here, which is worked out once."""
-        if candidate not in self._asked:
-            self._asked[candidate] = ask(self, candidate)
-        return self._asked[candidate]
+        if (ask, candidate) not in self._asked:
+            self._asked[ask, candidate] = ask(self, candidate)
+        return self._asked[ask, candidate]
 
     def gains(self, candidate: Candidate, tried: list[dict[str, float]]) -> tuple[list[float], float]:
         """Fall of the training objective at several shape values of a torque effect, zero where a sign is not allowed; and

@@ -211,12 +211,17 @@ def survives(ground: Ground, other: Ground | None, answer: Answer) -> bool:
         if _agree(answer.coefficients[k], again.coefficients[k]):
             return True
         # one step from where an effect does nothing may fall far short of a large one: how large is it once it is refitted?
-        size = lambda at, a: refit(at, a)[0].shapes[shapes[k].name] - (shapes[k].start or 0.0)  # noqa: E731
-        return _agree(size(ground, answer), size(other, again))
+        size = lambda at: at.asked(answer.candidate, _refitted).shapes[shapes[k].name] - (shapes[k].start or 0.0)  # noqa: E731
+        return _agree(size(ground), size(other))
     if len(answer.coefficients) == 1:
         same = all(0.7 < again.shapes[n] / v < 1.4 for n, v in answer.shapes.items() if v)
         return _agree(answer.coefficients[0], again.coefficients[0]) or (not same and again.coefficients[0] * answer.coefficients[0] > 0)
     return True
+
+
+def _refitted(ground: Ground, candidate: Candidate) -> Answer:
+    """The best answer of a candidate that has one, refitted."""
+    return refit(ground, ground.asked(candidate, _best))[0]
 
 
 def _agree(first: float, second: float) -> bool:
@@ -262,7 +267,7 @@ def _clearer(other: Ground | None, head: Answer, refined: list[Answer]) -> Answe
         return head
     own = head.candidate.judged_by(other.model.robot.dof)
     # all of them survived there: none is without an answer
-    left = {a.candidate: refit(other, other.asked(a.candidate, _best))[0].squares[:, own].sum(1) for a in (head, *rivals)}
+    left = {a.candidate: other.asked(a.candidate, _refitted).squares[:, own].sum(1) for a in (head, *rivals)}
     best = min(rivals, key=lambda a: left[a.candidate].sum())
     first, second = left[head.candidate], left[best.candidate]
     return best if second.sum() < _CLEARLY * first.sum() and stands_out(first, second) >= SUPPORT else head

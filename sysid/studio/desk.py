@@ -36,8 +36,7 @@ class Desk:
 
     def __init__(self, path: Path, out: Path | None = None):
         """Raises SysidError where the run folder cannot be written."""
-        path = Path(path)
-        self.path = path / "config.yaml" if path.is_dir() else path
+        self.path = config.file_of(path)
         self.name = Experiment(path=self.path).name
         self.run = results.folder(out or Path("runs") / self.name)
         self._store = results.folder(self.run / "studio") / "undo.json"

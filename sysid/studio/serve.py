@@ -8,6 +8,7 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
+from ..config import file_of
 from ..errors import SysidError
 from .guard import checked, is_local
 
@@ -37,7 +38,7 @@ def serve(path: Path, *, out: Path | None = None, host: str = "127.0.0.1", port:
         token = secrets.token_urlsafe(24)
     if token is not None:
         checked(token)
-    shelf = Shelf(beside(Path(path)), out)
+    shelf = Shelf(beside(file_of(path)), out)
     bench = shelf.bench(0)
     bench.desk.text()  # a file that is not there is bad input; one that cannot be meant is said on the page
     found = _listening(host, port)
