@@ -87,6 +87,13 @@ def simulate(
     colour: Annotated[Optional[float], typer.Option("--colour", help="Time constant [s] of half of the noise's variance (default white).")] = None,  # noqa: UP045
     encoder: Annotated[Optional[int], typer.Option("--encoder", help="Bits a turn of the motor, of the joint where it has no rotor; 0: exact (default 14 on the motor).")] = None,  # noqa: UP045
     speed: Annotated[Optional[float], typer.Option("--speed", help="Top speed [rad/s] (default by the robot's size).")] = None,  # noqa: UP045
+    motion: Annotated[str, typer.Option("--motion", help="exciting, moves (from point to point, with stops), or sines (one slow sine a joint).")] = "exciting",
+    logs: Annotated[int, typer.Option("--logs", help="Training logs: train_1.csv, train_2.csv, ..., each of --duration.")] = 1,
+    knocks: Annotated[int, typer.Option("--knocks", help="Knocks on the arm in each log.")] = 0,
+    spikes: Annotated[float, typer.Option("--spikes", help="Wrong samples in the torque, a second and joint.")] = 0.0,
+    brakes: Annotated[bool, typer.Option("--brakes", help="A joint that rests is braked: its torque reads 0, its angle is frozen (with --motion moves).")] = False,
+    jitter: Annotated[float, typer.Option("--jitter", help="Milliseconds (standard deviation) that samples come early or late; a slow logger: --rate 100 --jitter 2.")] = 0.0,
+    current: Annotated[Optional[str], typer.Option("--current", metavar="STEP", help="Step of the logged torque [N m], or a share of each joint's peak, as in 2%.")] = None,  # noqa: UP045
     as_json: Json = False, quiet: Quiet = False,
 ) -> None:  # fmt: skip
     """Simulate an experiment's robot in closed loop, with hidden effects, and write logs to identify."""
@@ -97,14 +104,18 @@ def simulate(
     spec, robot, notices = simulation.load(experiment)
     with _progress(quiet or as_json) as progress:
         found = simulation.simulate(
-            robot, hide=hidden, seed=seed, duration=duration, rate=rate, noise=noise, colour=colour, encoder=encoder, speed=speed, progress=progress
-        )
+            robot, hide=hidden, seed=seed, duration=duration, rate=rate, noise=noise, colour=colour, encoder=encoder, speed=speed, progress=progress,
+            motion=motion, logs=logs, knocks=knocks, spikes=spikes, brakes=brakes, jitter=jitter, current=current,
+        )  # fmt: skip
     simulation.write(found, spec, folder)
     if as_json:
         print(json.dumps(found.truth, allow_nan=False))
     elif not quiet:
         for part, log in found.truth["logs"].items():
             print(f"{part}: {log['samples']} samples; noise " + ", ".join(f"{joint} {rms:.3g}" for joint, rms in log["noise_rms"].items()))
+            kinds = [event["kind"] for event in log["events"]]
+            if kinds:
+                print("  " + ", ".join(f"{kinds.count(kind)} {kind}{'s' if kinds.count(kind) > 1 else ''}" for kind in dict.fromkeys(kinds)))
         for entry in found.truth["hidden"]:
             print(f"hidden: {entry['effect']} on {entry['joint']}, " + ", ".join(f"{n}={v:.4g}" if isinstance(v, float) else f"{n}={v}" for n, v in entry["values"].items()))
         for notice in notices:

@@ -1,8 +1,9 @@
-"""Eight torque laws that the catalogue does not have, written before the method was changed (issue 10).
+"""Eight torque laws that the catalogue does not have, written before the method was changed.
 
-The method is never to be changed for one of them. A maker of (a, j, i, s) gives the torque of joint j, to overcome:
-i another joint, a the size, s the joint's scales: rms `torque` [N m], `inertia` [kg m^2], top `speed` [rad/s], `coulomb`
-friction [N m], and `low` and `high` [rad], the angles between which it moves. It is called once every millisecond.
+The method is never to be changed for one of them. A maker of (a, j, i, s) gives the torque of joint
+j, to overcome: i another joint, a the size, s the joint's scales: rms `torque` [N m], `inertia`
+[kg m^2], top `speed` [rad/s], `coulomb` friction [N m], and `low` and `high` [rad], the angles
+between which it moves. It is called once every millisecond.
 """
 
 from __future__ import annotations
@@ -42,7 +43,7 @@ def _ageing_contact(a, j, i, s):
     slow = _SLOW * s["speed"]
 
     def torque(q, qd, qdd, t, load, memory):
-        # Dieterich 1979: the contact grows older by the second, and is renewed every `way` that it slides
+        # Dieterich 1979: the contact ages by the second, and is renewed every `way` that it slides
         age = memory.get("age", 0.1)
         memory["age"] = age = max(age + STEP * (1.0 - age * abs(qd[j]) / way), 1e-4)
         return a * 0.6 * s["coulomb"] * math.log1p(age / young) * math.tanh(qd[j] / slow)
@@ -112,7 +113,10 @@ def _gas_strut(a, j, i, s):
 NEW: dict[str, tuple[str, Callable]] = {
     "seal_carried_along": ("a (1 + sign qd_i) sign qd_j", _seal_carried_along),
     "whipped_cable": ("a abs(qd_j) tanh(qdd_j / w), late by 20 ms", _whipped_cable),
-    "ageing_contact": ("a log(1 + age / 0.02 s) sign qd_j, age' = 1 - age abs(qd_j) / d", _ageing_contact),
+    "ageing_contact": (
+        "a log(1 + age / 0.02 s) sign qd_j, age' = 1 - age abs(qd_j) / d",
+        _ageing_contact,
+    ),
     "loaded_tooth": ("a abs(load_j) (1 + sin 4 q_j) sign qd_j", _loaded_tooth),
     "loose_load": ("a (w^2 (q_j - x) + c (qd_j - x')), x'' the same without a", _loose_load),
     "heat": ("a sign qd_j / (1 + 12 h), h' = (qd_j^2 / v^2 - h) / 2 s", _heat),

@@ -1,6 +1,7 @@
 """Eight torque laws that the catalogue does not have; they were known while the method was tuned.
 
-A maker of (a, j, i, s) gives the torque of joint j, to overcome: i another joint, a the size, s the joint's scales.
+A maker of (a, j, i, s) gives the torque of joint j, to overcome: i another joint, a the size, s the
+joint's scales.
 """
 
 from __future__ import annotations
@@ -16,16 +17,22 @@ def _product(a, j, i, s):
 
 def _friction_by_other_angle(a, j, i, s):
     slow = 0.01 * s["speed"]
-    return lambda q, qd, qdd, t, load, memory: a * s["coulomb"] * (1.0 + np.sin(2.0 * q[i])) * np.tanh(qd[j] / slow)
+    return lambda q, qd, qdd, t, load, memory: (
+        a * s["coulomb"] * (1.0 + np.sin(2.0 * q[i])) * np.tanh(qd[j] / slow)
+    )
 
 
 def _dead_zone_drag(a, j, i, s):
     free = 0.4 * s["speed"]
-    return lambda q, qd, qdd, t, load, memory: a * 0.4 * s["torque"] / s["speed"] * max(abs(qd[j]) - free, 0.0) * np.sign(qd[j])
+    return lambda q, qd, qdd, t, load, memory: (
+        a * 0.4 * s["torque"] / s["speed"] * max(abs(qd[j]) - free, 0.0) * np.sign(qd[j])
+    )
 
 
 def _speed_ripple(a, j, i, s):
-    return lambda q, qd, qdd, t, load, memory: a * 0.15 * s["torque"] / s["speed"] * np.sin(5.0 * q[j]) * qd[j]
+    return lambda q, qd, qdd, t, load, memory: (
+        a * 0.15 * s["torque"] / s["speed"] * np.sin(5.0 * q[j]) * qd[j]
+    )
 
 
 def _turning_inertia(a, j, i, s):
@@ -34,11 +41,15 @@ def _turning_inertia(a, j, i, s):
 
 
 def _hum(a, j, i, s):
-    return lambda q, qd, qdd, t, load, memory: a * 0.06 * s["torque"] * np.sin(2.0 * np.pi * 7.0 * t)
+    return lambda q, qd, qdd, t, load, memory: (
+        a * 0.06 * s["torque"] * np.sin(2.0 * np.pi * 7.0 * t)
+    )
 
 
 def _other_speed(a, j, i, s):
-    return lambda q, qd, qdd, t, load, memory: a * 0.25 * s["torque"] / s["speed"] ** 2 * qd[i] * abs(qd[j])
+    return lambda q, qd, qdd, t, load, memory: (
+        a * 0.25 * s["torque"] / s["speed"] ** 2 * qd[i] * abs(qd[j])
+    )
 
 
 def _creep(a, j, i, s):

@@ -28,13 +28,16 @@ _ASTRAY = 0.8  # of 0.2 rad and the range that a joint moves to either side: far
 @dataclass(frozen=True)
 class Loop:
     """The controller: computed torque `ahead` (n, dof) of the prior along the reference, and a PID law through the prior's
-    mass matrices (one every STRIDE periods), at least `stiffness` (dof,) strong."""
+    mass matrices (one every STRIDE periods), at least `stiffness` (dof,) strong. Where `closed` (n, dof), a joint is braked,
+    and its integral waits, as it does while more is asked for than the drive's `limits` (dof,) let act."""
 
     reference: motion.Reference
     ahead: np.ndarray
     masses: np.ndarray
     stiffness: np.ndarray
     period: float
+    closed: np.ndarray | None = None
+    limits: np.ndarray | None = None
 
     def gains(self, plant: Plant) -> tuple[np.ndarray, np.ndarray]:
         """Stiffness and damping matrices (n/STRIDE, dof, dof)."""
@@ -48,7 +51,7 @@ class Loop:
 
 def run(plant: Plant, inside, loop: Loop, steps, report):
     """x, v (n, coordinates), torque asked for, readings and sticking (n, dof) at every control period."""
-    reference, period = loop.reference, loop.period
+    reference, period, closed, limits = loop.reference, loop.period, loop.closed, loop.limits
     n, dof, motor = len(reference.t), plant.dof, plant.motor
     x, v, tau = np.zeros((n, plant.n)), np.zeros((n, plant.n)), np.zeros((n, dof))
     read, sticks = np.zeros((n, dof)), np.zeros((n, dof), dtype=bool)
@@ -80,7 +83,10 @@ def run(plant: Plant, inside, loop: Loop, steps, report):
         last = now
         wrong = reference.q[k] - now
         soon = min(k + 1, n - 1)
-        total = total + (period / _RESET) * wrong
+        more = wrong if closed is None else np.where(closed[k], 0.0, wrong)
+        if limits is not None:
+            more = np.where(np.abs(command) > limits, 0.0, more)
+        total = total + (period / _RESET) * more
         following = loop.ahead[soon] + kp[k // STRIDE].dot(wrong + total) + kd[k // STRIDE].dot(reference.qd[k] - speed)
         plant.freeze(reference.t[k] + half, half)
         plant.advance(command, half)

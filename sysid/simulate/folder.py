@@ -1,4 +1,4 @@
-"""A simulation as a folder: config.yaml, robot.urdf, train.csv, test.csv, truth.json.
+"""A simulation as a folder: config.yaml, robot.urdf, train.csv (or train_1.csv, train_2.csv, ...), test.csv, truth.json.
 
 config.yaml is what one would write who knows nothing of what is hidden. Everything is written under another name and
 renamed when it is whole.
@@ -7,6 +7,7 @@ renamed when it is whole.
 import io
 import json
 import os
+import re
 import shutil
 import uuid
 import warnings
@@ -21,7 +22,7 @@ from ..robot import Robot
 from ..robot import load as robot_of
 from .run import SimulatedLog, Simulation
 
-FILES = ("config.yaml", "robot.urdf", "train.csv", "test.csv", "truth.json")
+_LOG = re.compile(r"(train|train_[0-9]+|test)\.csv")
 
 
 def load(path: str | Path) -> tuple[Experiment, Robot, tuple[str, ...]]:
@@ -69,19 +70,23 @@ def write(simulation: Simulation, experiment: Experiment, out: str | Path) -> No
     """
     path = prepare(out)
     robot = simulation.robot
+    logs = {f"{name}.csv": log for name, log in simulation.logs.items()}
     texts = {
-        "config.yaml": _config(experiment, robot), "robot.urdf": "<?xml version=\"1.0\"?>\n" + robot.source.text + "\n",
-        "train.csv": _csv(simulation.train, robot), "test.csv": _csv(simulation.test, robot),
+        "config.yaml": _config(experiment, robot, list(logs)), "robot.urdf": "<?xml version=\"1.0\"?>\n" + robot.source.text + "\n",
+        **{name: _csv(log, robot) for name, log in logs.items()},
         "truth.json": json.dumps(simulation.truth, indent=1, allow_nan=False) + "\n",
     }  # fmt: skip
     temporary = path.absolute().parent / f".{path.name}.{uuid.uuid4().hex}"
     try:
         temporary.mkdir()
-        for name in FILES:
-            (temporary / name).write_text(texts[name], encoding="utf-8")
+        for name, text in texts.items():
+            (temporary / name).write_text(text, encoding="utf-8")
         if path.is_dir() and any(path.iterdir()):
-            for name in FILES:
+            for name in texts:
                 os.replace(temporary / name, path / name)
+            for old in path.iterdir():  # logs of the simulation that was there before
+                if _LOG.fullmatch(old.name) and old.name not in texts:
+                    old.unlink()
         else:
             if path.is_dir():
                 path.rmdir()
@@ -100,7 +105,7 @@ def _csv(log: SimulatedLog, robot: Robot) -> str:
     return pl.DataFrame(columns).write_csv()
 
 
-def _config(experiment: Experiment, robot: Robot) -> str:
+def _config(experiment: Experiment, robot: Robot, logs: list[str]) -> str:
     """The experiment as one would write it who knows nothing of what is hidden."""
     from ruamel.yaml import YAML
 
@@ -113,7 +118,7 @@ def _config(experiment: Experiment, robot: Robot) -> str:
     preprocess = experiment.preprocess if experiment.preprocess.filter != "none" else PreprocessSpec()
     tree = {
         "robot": {**spec, "urdf": "robot.urdf", "joints": list(robot.joints), "gravity": list(experiment.robot.gravity)},
-        "data": {"train": ["train.csv"], "test": ["test.csv"]},
+        "data": {"train": [name for name in logs if name != "test.csv"], "test": ["test.csv"]},
         "preprocess": preprocess.model_dump(exclude_none=True),
         "model": {"inertia": experiment.model.inertia, "effects": effects},
         "prior": {**experiment.prior.model_dump(exclude_none=True), "source": "urdf"},

@@ -14,6 +14,8 @@ from ..errors import SysidError
 from ..robot import Robot
 
 ROBOT = "*"  # the joint of an effect of the whole robot
+#: values that are words: what they may be, None where that depends on the robot
+WORDS: dict[str, tuple[str, ...] | None] = {"other": None, "reports": ("actual", "command")}
 
 
 @dataclass(frozen=True)
@@ -145,7 +147,7 @@ CATALOGUE: dict[str, Entry] = {
     "cogging": Entry(("k", "a", "phase"), _cogging, ("k",), also=("a1", "b1")),
     "torque_bias": Entry(("b",), lambda s, j, z, r: {"b": z * r.uniform(0.03, 0.07) * s.torque[j] * _sign(r)}),
     "torque_gain": Entry(("e",), lambda s, j, z, r: {"e": z * r.uniform(0.08, 0.16) * _sign(r)}),
-    "torque_saturation": Entry(("limit",), lambda s, j, z, r: {"limit": s.peak[j] * max(1.0 - z * r.uniform(0.25, 0.4), 0.2)}, ("limit",)),
+    "torque_saturation": Entry(("limit",), lambda s, j, z, r: {"limit": s.peak[j] * max(1.0 - z * r.uniform(0.25, 0.4), 0.2)}, ("limit",), also=("reports",)),
     "current_lag": Entry(("T",), lambda s, j, z, r: {"T": z * r.uniform(0.004, 0.009)}, ("T",)),
     "delay": Entry(("d",), lambda s, j, z, r: {"d": z * r.uniform(0.004, 0.009)}, ("d",)),
     "encoder_offset": Entry(("d",), lambda s, j, z, r: {"d": z * r.uniform(0.03, 0.06) * s.reach[j] * _sign(r)}),
@@ -187,7 +189,7 @@ def hidden(text: str) -> Hidden:
             raise SysidError(f"{word!r} in {text!r}", where="--hide", allowed="name=value", do=f"write {form}")
         if name in values:
             raise SysidError(f"{name!r} twice in {text!r}", where="--hide", do="give it once")
-        if name == "other":
+        if name in WORDS:
             values[name] = value
             continue
         try:
@@ -209,7 +211,10 @@ def _check_words(hide: Hidden) -> Entry:
         numbered = any(re.fullmatch(rf"{stem}[1-9][0-9]?", name) for stem in entry.numbered)
         if name not in known and not numbered:
             raise SysidError(f"{hide.effect} has no parameter {name!r}", where="--hide", allowed=", ".join(known))
-        if name == "other":
+        if name in WORDS:
+            allowed = WORDS[name]
+            if allowed is not None and value not in allowed:
+                raise SysidError(f"{hide.effect}: {name}={value}", where="--hide", allowed=" or ".join(allowed))
             continue
         if not isinstance(value, (int, float)) or not math.isfinite(value) or abs(value) > 1e9:
             raise SysidError(f"{hide.effect}: {name}={value}", where="--hide", allowed="a finite number, at most 1e9 in size")
@@ -259,6 +264,9 @@ def settled(hide: Hidden, robot: Robot, scales: Scales, rng: np.random.Generator
         # a sin(k q + phase) = a1 sin(k q) + b1 cos(k q)
         a1, b1 = float(given.pop("a1", 0.0)), float(given.pop("b1", 0.0))
         given = {"a": math.hypot(a1, b1), "phase": math.atan2(b1, a1), **given}
+    if given.get("reports") == "command":
+        # torque that is missing throws a robot off its motion, where a flat reading does not: a third of the depth
+        values["limit"] = float(2.0 * scales.peak[scales.joints.index(hide.joint)] + values["limit"]) / 3.0
     values |= given
     if "eta" in values:
         eta = float(values.pop("eta"))

@@ -82,6 +82,11 @@ def draw(robot: Robot, t, rng: np.random.Generator, *, speed: float | None = Non
     out = np.zeros((3, len(t), robot.dof))
     for j in range(robot.dof):
         out[:, :, j] = _joint(t, rng, top[j], half[j], band)
+    return faded(t, middle, out)
+
+
+def faded(t, middle, out) -> Reference:
+    """Motion out (3, n, dof), q, qd, qdd about a middle pose (dof,), begun from rest there at t[0]."""
     u = np.clip((t - t[0]) / FADE, 0.0, 1.0)[:, None]
     fade, fade1, fade2 = u**3 * (10 - 15 * u + 6 * u**2), 30 * u**2 * (1 - u) ** 2 / FADE, 60 * u * (1 - u) * (1 - 2 * u) / FADE**2
     q, qd, qdd = out

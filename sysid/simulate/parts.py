@@ -363,10 +363,19 @@ class TorqueGain(Part):
 
 
 class TorqueSaturation(Part):
-    """Torque beyond the limit reads flat."""
+    """Torque beyond the limit reads flat. (`reports: actual`)"""
 
     def sense(self, tau, period):
         return np.clip(tau, -self.limit, self.limit)
+
+
+class SaturatedDrive(Part):
+    """No torque beyond the limit acts, and what was asked for is logged. (`reports: command`)"""
+
+    def drive(self, command, duration):
+        command = command.copy()
+        command[self.j] = min(max(float(command[self.j]), -self.limit), self.limit)
+        return command
 
 
 class TorqueBias(Part):
@@ -435,5 +444,17 @@ def build(robot: Robot, hidden, bursts) -> list[Part]:
             values = {"body": last_link(robot), "box": box}
         elif hide.effect == "external_force":
             values = {"row": robot.bodies[last_link(robot)].row, "bursts": bursts}
-        out.append(PARTS[hide.effect](robot, joint, **values))
+        kind = PARTS[hide.effect]
+        if hide.effect == "torque_saturation" and values.pop("reports", "actual") == "command":
+            kind = SaturatedDrive
+        out.append(kind(robot, joint, **values))
     return out
+
+
+def limits(inside: list[Part], dof: int) -> np.ndarray | None:
+    """The most torque (dof,) that drives let act; None where none of them saturates."""
+    own = [part for part in inside if isinstance(part, SaturatedDrive)]
+    out = np.full(dof, np.inf)
+    for part in own:
+        out[part.j] = part.limit
+    return out if own else None

@@ -1,4 +1,4 @@
-"""Closed loop in time: the controller and its encoder, the true robot, the torque sensor; twice, for two logs.
+"""Closed loop in time: the controller and its encoder, the true robot, the torque sensor; once for each log.
 
 The control period is at most a millisecond; a slower log keeps every so many of its samples.
 """
@@ -14,11 +14,13 @@ import numpy as np
 from ..errors import SysidError
 from ..regressor import torque as inverse_dynamics
 from ..robot import Robot
-from . import control, motion, parts
+from . import control, disturbances, motions, nuisances, parts
 from . import truth as drawn
-from .hidden import CATALOGUE, Hidden, check, settled
+from .hidden import CATALOGUE, Hidden, Scales, check, settled
+from .nuisances import Nuisances
 from .plant import Plant, Truth
 
+USUAL = 20.0  # s of the motion that says what a robot's joints are like, where its logs are poor or short
 LEAD = 1.0  # s before logging starts: a robot at rest has no friction law
 _PERIOD = 1e-3  # s of the controller, at most
 _SOFT_SPEED = 0.05  # of the top speed, where the friction that the controller expects changes sign
@@ -40,31 +42,44 @@ class Clean:
 
 @dataclass(frozen=True)
 class SimulatedLog:
-    """t (n,), q and tau (n, dof) as logged; `clean` as they were; `noise` (dof,) RMS of what was added to the torque."""
+    """t (n,), q and tau (n, dof) as logged; `clean` as they were; `noise` (dof,) RMS of the noise, and of rounding, in the torque,
+    without `events`: knocks, spikes and closed brakes, {kind, start, stop, joints, ...}."""
 
     t: np.ndarray
     q: np.ndarray
     tau: np.ndarray
     clean: Clean
     noise: np.ndarray
+    events: tuple[dict, ...] = ()
 
 
 @dataclass(frozen=True)
 class Simulation:
-    """Two logs of two motions of one robot, and what is true of it."""
+    """Logs of different motions of one robot, and what is true of it. logs: by name, train or train_1, train_2, ..., then test."""
 
     robot: Robot
-    train: SimulatedLog
-    test: SimulatedLog
+    logs: dict[str, SimulatedLog]
     truth: dict
+
+    @property
+    def train(self) -> SimulatedLog:
+        """The first training log."""
+        return next(iter(self.logs.values()))
+
+    @property
+    def test(self) -> SimulatedLog:
+        """The log held out."""
+        return self.logs["test"]
 
 
 def simulate(
     robot: Robot, *, hide: Sequence[Hidden | Callable] = (), seed: int = 0, duration: float = 20.0, rate: float = 1000.0,
     noise: float | None = None, colour: float | None = None, share: float = 0.5, encoder: int | None = None,
     speed: float | None = None, band: tuple[float, float] | None = None, progress: Callable[[str, float], None] | None = None,
+    motion: str = "exciting", logs: int = 1, knocks: int = 0, spikes: float = 0.0, brakes: bool = False, jitter: float = 0.0,
+    current: float | str | None = None,
 ) -> Simulation:  # fmt: skip
-    """Simulate a training and a test log. Everything follows from the arguments.
+    """Simulate training logs and a test log. Everything follows from the arguments.
 
     Args:
         robot: its prior is what the controller believes; the truth is drawn about it.
@@ -75,41 +90,80 @@ def simulate(
         colour: time constant [s] of the coloured `share` of its variance; None: white.
         encoder: bits a turn of the motor, or of the joint where it has no rotor (a metre of a prismatic joint); 0: exact;
             None: 14 on the motor, behind a gear of 100 where it has no rotor.
-        speed: top speed [rad/s]; band: lowest and highest line [Hz]; None: by the robot's size.
+        speed: top speed [rad/s]; band: lowest and highest line [Hz] of the exciting motion; None: by the robot's size.
+        motion: exciting, moves (from point to point, with stops) or sines (one slow sine a joint).
+        logs: number of training logs.
+        knocks: on a link, in each log. spikes: wrong samples of the torque [1/s], on each joint.
+        brakes: joints that rest are braked: their torque reads nothing then, and their angle stands still.
+        jitter: standard deviation [ms] of the instants at which the logger samples.
+        current: step [N m] that the logged torque comes in, or a share of each joint's peak torque, as in "2%".
 
     Raises:
         SysidError: an argument that cannot be, or a robot that does not follow its reference.
     """
     _check(duration, rate, noise, colour, share, encoder, speed, band)
+    nuisance = nuisances.checked(motion, logs, rate, knocks, spikes, brakes, jitter, current)
     named, custom = [h for h in hide if isinstance(h, Hidden)], [h for h in hide if not isinstance(h, Hidden)]
     _check_hidden(named, custom, robot)
     keep = math.ceil(1.0 / (rate * _PERIOD) - 1e-9)
     period = 1.0 / (rate * keep)
-    t = period * np.arange(-math.ceil(LEAD / period / keep) * keep, round(duration / period) + 1)
-    streams = ("bodies", "friction", "hidden", "train motion", "train noise", "test motion", "test noise", "bursts")
-    random = lambda name: np.random.default_rng([seed, streams.index(name)])  # noqa: E731 - adding an effect changes nothing else
-    references = {part: motion.draw(robot, t, random(f"{part} motion"), speed=speed, band=band) for part in ("train", "test")}
+    times = lambda seconds: period * np.arange(-math.ceil(LEAD / period / keep) * keep, round(seconds / period) + 1)  # noqa: E731
+    random = _random(seed)
+    places = {"train": ("train", 0)} if logs == 1 else {f"train_{k + 1}": ("train", k) for k in range(logs)}
+    places["test"] = ("test", 0)
+    references = {
+        name: motions.draw(motion, robot, times(duration), random(f"{part} motion", k), speed=speed, band=band)
+        for name, (part, k) in places.items()
+    }  # fmt: skip
     rigid = {part: inverse_dynamics(robot, robot.prior, r.q, r.qd, r.qdd) for part, r in references.items()}
     masses = {part: drawn.mass_matrices(robot, r.q[:: control.STRIDE]) for part, r in references.items()}
-    scales, armature = drawn.measured(robot, references["train"], rigid["train"], masses["train"], random("friction"), duration)
+    if motion == "exciting" and logs == 1:
+        usual = references["train"], rigid["train"], masses["train"]
+    else:  # a robot is what it is, however poor its logs are
+        usual = _usual(robot, times(max(duration, USUAL)), random("usual motion"), speed, band)
+    scales, armature = drawn.measured(robot, *usual, random("friction"), duration)
     truth = Truth(drawn.true_bodies(robot, random("bodies")), np.array(robot.gravity), scales.viscous, scales.coulomb, armature)
     rng = random("hidden")
     named = [settled(h, robot, scales, rng) for h in named]
     std = drawn.noise_std(scales, random("friction"), noise)
     steps = drawn.encoder_steps(robot, encoder)
-    logs, bursts = {}, {}
-    for part, reference in references.items():
-        bursts[part] = drawn.draw_bursts(named, random("bursts"), part, duration)
-        inside = [*parts.build(robot, named, bursts[part]), *(parts.Custom(robot, -1, torque=f) for f in custom)]
+    sensor = _Sensor(scales, steps, keep, std, colour, share, nuisance)
+    found, bursts = {}, {}
+    for name, (part, k) in places.items():
+        reference, events = references[name], random(f"{part} events", k)
+        bursts[name] = drawn.draw_bursts(named, random("bursts"), 1 if part == "test" else k + (k > 0), duration)
+        inside = [*parts.build(robot, named, bursts[name]), *(parts.Custom(robot, -1, torque=f) for f in custom)]
+        closed = disturbances.closed_at(reference, period) if brakes else None
+        if closed is not None:
+            inside.append(disturbances.brakes(robot, closed, reference.t[0], period, scales))
+        if knocks:
+            pulses = disturbances.draw_knocks(knocks, robot, reference, scales, events)
+            inside.append(disturbances.Knocks(robot, -1, pulses=pulses))
         known = np.tanh(reference.qd / (_SOFT_SPEED * scales.speed))
-        ahead = rigid[part] + control.KNOWN * (armature * reference.qdd + scales.coulomb * known + scales.viscous * reference.qd)
-        loop = control.Loop(reference, ahead, masses[part] + control.KNOWN * np.diag(armature), control.STIFF * scales.torque / scales.reach, period)
-        report = (lambda done, part=part: progress(part, done)) if progress else None
-        logs[part] = _log(robot, truth, inside, loop, steps, keep, std, colour, share, random(f"{part} noise"), report)
-    return Simulation(robot, logs["train"], logs["test"], drawn.document(
-        robot, truth, scales, named, custom, logs, bursts, std, steps,
-        {"seed": seed, "duration": duration, "rate": rate, "control_period": period, "colour": colour, "coloured_share": share if colour else 0.0},
-    ))  # fmt: skip
+        ahead = rigid[name] + control.KNOWN * (armature * reference.qdd + scales.coulomb * known + scales.viscous * reference.qd)
+        stiffness = control.STIFF * scales.torque / scales.reach
+        loop = control.Loop(reference, ahead, masses[name] + control.KNOWN * np.diag(armature), stiffness, period, closed, parts.limits(inside, robot.dof))
+        report = (lambda done, name=name: progress(name, done)) if progress else None
+        found[name] = _log(robot, truth, inside, loop, sensor, random(f"{part} noise", k), events, report)
+    return Simulation(robot, found, drawn.document(robot, truth, scales, named, custom, found, bursts, std, steps, {
+        "seed": seed, "duration": duration, "rate": rate, "control_period": period, "colour": colour, "coloured_share": share if colour else 0.0,
+        "motion": motion, "knocks": knocks, "spikes": spikes, "brakes": brakes, "jitter": jitter, "current": current,
+    }))  # fmt: skip
+
+
+def _random(seed: int) -> Callable[..., np.random.Generator]:
+    """A generator for everything that is drawn, by its name and the number of the log: adding an effect changes nothing else."""
+    streams = (
+        "bodies", "friction", "hidden", "train motion", "train noise", "test motion", "test noise", "bursts",
+        "usual motion", "train events", "test events",
+    )  # fmt: skip
+    return lambda name, k=0: np.random.default_rng([seed, streams.index(name), *([k] if k else [])])
+
+
+def _usual(robot: Robot, t, rng, speed, band):
+    """The motion that a robot of this size makes, the torque of its prior and mass matrices."""
+    r = motions.draw("exciting", robot, t, rng, speed=speed, band=band)
+    return r, inverse_dynamics(robot, robot.prior, r.q, r.qd, r.qdd), drawn.mass_matrices(robot, r.q[:: control.STRIDE])
 
 
 def _check(duration, rate, noise, colour, share, encoder, speed, band) -> None:
@@ -138,24 +192,54 @@ def _check_hidden(named: list[Hidden], custom: list, robot: Robot) -> None:
         raise SysidError(f"cannot hide {strangers[0]!r}", allowed="Hidden, or a function of (q, qd, qdd, t, load, memory)")
 
 
-def _log(robot, truth, inside, loop: control.Loop, steps, keep, std, colour, share, rng, report) -> SimulatedLog:
+@dataclass(frozen=True)
+class _Sensor:
+    """What logs: `steps` (dof,) of the encoders, one of every `keep` control periods, torque noise of deviation `std` (dof,) [N m]
+    with a coloured `share` [s], and what else is in the logs."""
+
+    scales: Scales
+    steps: np.ndarray
+    keep: int
+    std: np.ndarray
+    colour: float | None
+    share: float
+    nuisance: Nuisances
+
+
+def _log(robot, truth, inside, loop: control.Loop, sensor: _Sensor, rng, events, report) -> SimulatedLog:
     plant = Plant(robot, truth, inside, loop.reference.q[0])
-    x, v, tau, read, sticks = control.run(plant, inside, loop, steps, report)
+    x, v, tau, read, sticks = control.run(plant, inside, loop, sensor.steps, report)
     sensed = tau.copy()
     for part in inside:
         if part.has("sense"):
             sensed[:, part.j] = part.sense(sensed[:, part.j], loop.period)
-    t = loop.reference.t
-    rows = np.flatnonzero(t > -0.5 * loop.period)[::keep]
+    t, std, nuisance = loop.reference.t, sensor.std, sensor.nuisance
+    rows = np.flatnonzero(t > -0.5 * loop.period)[:: sensor.keep]
+    stamps = np.round(t[rows] - t[rows[0]], 9)
+    if nuisance.jitter:
+        rows, stamps = nuisances.jittered(rows, t, sensor.keep, loop.period, nuisance.jitter, events)
     q, dof, motor = read[rows], robot.dof, plant.motor
     clean = Clean(x[rows][:, motor], v[rows][:, motor], x[rows, :dof], v[rows, :dof], tau[rows], sensed[rows], sticks[rows])
-    added = std * _unitnoise_std(rng, len(rows), dof, keep * loop.period, colour, share)
+    added = std * _unitnoise_std(rng, len(rows), dof, sensor.keep * loop.period, sensor.colour, sensor.share)
     with np.errstate(divide="ignore"):
         digit = np.where(std > 0.0, 10.0 ** np.floor(np.log10(np.maximum(std, 1e-300) / 10.0)), 0.0)
-    logged = clean.sensed + added
-    logged = np.where(digit > 0.0, np.round(logged / np.where(digit > 0.0, digit, 1.0)) * digit, logged)
+    coarse = nuisance.steps(sensor.scales)
+    digit = digit if coarse is None else coarse
+    rounded = lambda tau: np.where(digit > 0.0, np.round(tau / np.where(digit > 0.0, digit, 1.0)) * digit, tau)  # noqa: E731
+    noisy = clean.sensed + added
+    logged = rounded(noisy)
+    told = [event for part in inside if isinstance(part, disturbances.Knocks) for event in part.events(robot, std)]
     rms = np.sqrt(np.mean((logged - clean.sensed) ** 2, axis=0))
-    return SimulatedLog(np.round(t[rows] - t[rows[0]], 9), q, logged, clean, rms)
+    if nuisance.spikes:
+        wrong, spikes = nuisances.spiked(noisy, stamps, nuisance.spikes, nuisances.spike_scale(std, sensor.scales), events)
+        logged, told = rounded(wrong), told + spikes
+    if loop.closed is not None:
+        away, braked = nuisances.braked(loop.closed, sticks, rows, stamps)
+        logged = np.where(away, 0.0, logged)
+        told = [e for e in told if e["kind"] != "spike" or not away[slice(*e["rows"]), e["joints"][0]].all()] + braked
+        rms = np.sqrt(np.mean((rounded(noisy) - clean.sensed) ** 2, axis=0, where=~away))
+    named = tuple({**event, "joints": [robot.joints[j] for j in event["joints"]]} for event in sorted(told, key=lambda e: e["start"]))
+    return SimulatedLog(stamps, q, logged, clean, rms, named)
 
 
 def _unitnoise_std(rng, n: int, dof: int, step: float, colour: float | None, share: float) -> np.ndarray:

@@ -93,12 +93,12 @@ def encoder_steps(robot: Robot, bits: int | None) -> np.ndarray:
     return steps
 
 
-def draw_bursts(named: list[Hidden], rng, part: str, duration: float) -> list[tuple[float, float, np.ndarray]]:
-    """Windows and forces of the external force in one log."""
+def draw_bursts(named: list[Hidden], rng, place: int, duration: float) -> list[tuple[float, float, np.ndarray]]:
+    """Windows and forces of the external force in one log, by the log's place."""
     found = [h for h in named if h.effect == "external_force"]
     if not found:
         return []
-    rng = rng.spawn(2)[part == "test"]
+    rng = rng.spawn(place + 1)[place]
     count = max(1, round(float(found[0].values["windows"])))
     starts = duration * (np.arange(count) + rng.uniform(0.1, 0.7, count)) / count
     out = []
@@ -151,6 +151,7 @@ def document(robot, truth: Truth, scales: Scales, named, custom, logs, bursts, s
             part: {
                 "samples": len(log.t), "noise_rms": by_joint(log.noise), "torque_rms": by_joint(rms(log.clean.tau)),
                 "top_speed": by_joint(np.abs(log.clean.qd).max(axis=0)), "sticking": by_joint(log.clean.sticks.mean(axis=0)),
+                "events": list(log.events),
             }
             for part, log in logs.items()
         },
