@@ -199,6 +199,28 @@ def test_add_writes_refits_and_tells(experiment, cli):
     assert [s["added"] for s in loop.read_history(said.run)] == [None, "torque_bias"]
 
 
+CHEETAH = config.Path(__file__).resolve().parent.parent / "configs" / "cheetah3.yaml"
+
+
+def test_the_readme_s_example_reaches_its_floor(cli, tmp_path):
+    """The command that the diagnosis prints takes the error to the noise, and the friction that was hidden comes out as it is."""
+    folder = tmp_path / "hidden"
+    assert cli("simulate", CHEETAH, "--hide", "stribeck:hip", "--quiet", out=folder).status == 0
+    truth = json.loads((folder / "truth.json").read_text())
+    said = cli("add", folder, "stribeck", "--joint", "hip", "--json")
+    document = json.loads(said.out)
+    noise = truth["logs"]["test"]["noise_rms"]
+    assert document["rms_test_after"]["hip"] < 1.1 * noise["hip"] < document["rms_test_before"]["hip"]
+    for parameter in document["parameters"]:
+        true = truth["hidden"][0]["values"][parameter["name"].rpartition(".")[2]]
+        assert abs(parameter["value"] - true) < parameter["std"] < 0.05 * true
+    # and what is left out is said
+    counted = json.loads((said.run / "fit.json").read_text())
+    assert set(counted["left_out"]) == {"train", "test"} and all(0 < n < 0.3 * 20001 for n in counted["left_out"]["train"].values())
+    (notice,) = counted["notices"]
+    assert all(f"{joint} {100 * n / counted['samples']['train']:.0f} %" in notice for joint, n in counted["left_out"]["train"].items())
+
+
 def test_add_shows_before_and_after(experiment, cli):
     said = cli("add", experiment(), "torque_bias", "--joint", "elbow")
     assert said.status == 0
