@@ -232,13 +232,18 @@ def add(
     effect: Annotated[str, typer.Argument(help="A word of `sysid effects`, a class my_effects.py:Name, or formula.")],
     joint: Annotated[Optional[list[str]], typer.Option("--joint", help="The joint that has it; again for more. Default: every joint.")] = None,  # noqa: UP045
     option: Annotated[Optional[list[str]], typer.Option("--option", metavar="NAME=VALUE", help="An option of the effect, in YAML; again for more.")] = None,  # noqa: UP045
+    force: Annotated[bool, typer.Option("--force", help="Add it also where the held-out error rises by more than its standard error.")] = False,
     as_json: Json = False, out: Out = None, quiet: Quiet = False,
 ) -> None:  # fmt: skip
-    """Write an effect into the experiment file (comments kept), refit, and show the error before and after."""
+    """Write an effect into the experiment file (comments kept), refit, and show the error before and after.
+
+    Where the held-out error of its joint (over all joints for an effect of the whole robot) rises by more than its standard
+    error nothing is written, and the status is 1.
+    """
     from . import loop
 
     with _progress(quiet or as_json) as progress:
-        found = loop.add(experiment, effect, list(joint) if joint else None, loop.options(option or []), progress=progress, out=out)
+        found = loop.add(experiment, effect, list(joint) if joint else None, loop.options(option or []), force=force, progress=progress, out=out)
     said = loop.document(found)
     if as_json:
         print(json.dumps(said, allow_nan=False))
@@ -246,7 +251,9 @@ def add(
         from .terminal import show_added
 
         show_added(said)
-    if not found.after.solution.converged:
+    elif found.refused and not as_json:
+        print(f"sysid: {found.says}", file=sys.stderr)
+    if found.refused or not found.after.solution.converged:
         raise typer.Exit(1)
 
 

@@ -38,6 +38,28 @@ def compare(first: Fit, second: Fit, names: tuple[str, str] | None = None) -> li
         SysidError: they were tested on different logs, or share no joint.
     """
     names = names or (first.experiment.name, second.experiment.name)
+    sums, joints = _sums(first, second, names)
+    both = (sums[0][1] > 0) & (sums[1][1] > 0)  # a block counts where both models have rows in it
+    return [
+        Difference(*names, joint, *_jackknife(*((s[both[:, k], k], n[both[:, k], k]) for s, n in sums)))
+        for k, joint in enumerate(joints)
+    ]
+
+
+def together(first: Fit, second: Fit) -> Difference:
+    """Two fits compared over all joints, each joint's residual in units of its RMS under the first: `delta_rms` is a share of
+    what the error was. Raises SysidError, as `compare`."""
+    sums, _ = _sums(first, second, ("before", "after"))
+    (s1, n1), _ = sums
+    unit = s1.sum(0) / np.maximum(n1.sum(0), 1)
+    known = unit > 0
+    totals = [((s[:, known] / unit[known]).sum(1), n[:, known].sum(1)) for s, n in sums]
+    both = (totals[0][1] > 0) & (totals[1][1] > 0)
+    return Difference("before", "after", "*", *_jackknife(*((s[both], n[both]) for s, n in totals)))
+
+
+def _sums(first: Fit, second: Fit, names: tuple[str, str]):
+    """Sums of squares and counts of both over the same blocks and joints, and those joints."""
     logs = [[(log["sha256"], log["start"], log["stop"]) for log in fit.logs if log["part"] == "test"] for fit in (first, second)]
     if logs[0] != logs[1]:
         raise SysidError(
@@ -50,11 +72,7 @@ def compare(first: Fit, second: Fit, names: tuple[str, str] | None = None) -> li
     blocks = _block_width(first.predictions["test"], second.predictions["test"])
     span = tuple(end(np.concatenate([fit.predictions["test"].t for fit in (first, second)])) for end in (np.min, np.max))
     sums = [_block_sums(fit.predictions["test"], blocks, [fit.joints.index(j) for j in joints], span) for fit in (first, second)]
-    both = (sums[0][1] > 0) & (sums[1][1] > 0)  # a block counts where both models have rows in it
-    return [
-        Difference(*names, joint, *_jackknife(*((s[both[:, k], k], n[both[:, k], k]) for s, n in sums)))
-        for k, joint in enumerate(joints)
-    ]
+    return sums, joints
 
 
 def _block_width(first: Prediction, second: Prediction) -> float:

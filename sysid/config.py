@@ -56,11 +56,11 @@ def _auto_or_positive(value: Any) -> Any:
 
 
 def _standstill(value: Any) -> Any:
-    if value in ("keep", "mask"):
+    if value in ("auto", "keep", "mask"):
         return value
     if _is_number(value) and value >= 0:
         return float(value)
-    raise ValueError("must be keep, mask, or a speed [rad/s or m/s]")
+    raise ValueError("must be auto, keep, mask, or a speed [rad/s or m/s]")
 
 
 def _nonzero(value: float) -> float:
@@ -223,7 +223,7 @@ class PreprocessSpec(_Spec):
     window: Annotated[Any, BeforeValidator(_auto_or_positive)] = 0.1
     cutoff: Annotated[Any, BeforeValidator(_auto_or_positive)] = 10.0
     torque: Literal["raw", "same"] = "raw"
-    standstill: Annotated[Any, BeforeValidator(_standstill)] = "keep"
+    standstill: Annotated[Any, BeforeValidator(_standstill)] = "auto"
 
     def model_post_init(self, _context: Any) -> None:
         if self.filter == "savitzky-golay" and self.order < 2:

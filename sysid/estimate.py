@@ -92,6 +92,7 @@ class Fit:
     shape_std: np.ndarray = field(default_factory=lambda: np.zeros(0))
     predictions: dict[str, Prediction] = field(default_factory=dict)
     samples: dict[str, int] = field(default_factory=dict)
+    left_out: dict[str, dict[str, int]] = field(default_factory=dict)
     seconds: dict[str, float] = field(default_factory=dict)
     filters: dict = field(default_factory=dict)
     logs: tuple[dict, ...] = ()

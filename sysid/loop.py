@@ -25,12 +25,27 @@ _HISTORY, _STEPS = "history.json", "steps"
 @dataclass(frozen=True)
 class Added:
     """An effect that joined an experiment: the fits before and after, and on each joint the difference of the held-out RMS
-    with its standard error."""
+    with its standard error. `rises` are those of the effect's own joints, or `*` over all joints as a share of what the error
+    was, that rise by more than their standard error; `refused` says that for them nothing was written."""
 
     experiment: Experiment
     before: Fit
     after: Fit
     differences: tuple[comparison.Difference, ...]
+    rises: tuple[comparison.Difference, ...] = ()
+    refused: bool = False
+
+    @property
+    def says(self) -> str:
+        """Why it was refused, in one line; empty where nothing rises."""
+        if not self.rises:
+            return ""
+        risen = " and ".join(
+            f"over all joints by {100 * d.delta_rms:.2g} % (standard error {100 * d.se:.2g} %)" if d.joint == "*"
+            else f"on {d.joint} by {d.delta_rms:.3g} (standard error {d.se:.2g})" for d in self.rises
+        )  # fmt: skip
+        done = "not added" if self.refused else "added all the same"
+        return f"{done}: it makes the held-out error rise {risen}" + ("; --force adds it all the same" if self.refused else "")
 
 
 # ---- the experiment file
@@ -106,10 +121,16 @@ def grown(experiment: Experiment, effect: str, joints: list[str] | None, options
 # ---- one step
 
 
-def add(path: Path, effect: str, joints: list[str] | None, options: dict, *, progress=None, out: Path | None = None) -> Added:
+def add(
+    path: Path, effect: str, joints: list[str] | None, options: dict, *, force: bool = False, progress=None, out: Path | None = None
+) -> Added:  # fmt: skip
     """Write an effect into an experiment file, or into a folder's config.yaml, refit, and say what that changed.
 
-    The file is written last: where the effect cannot be, or the fit fails, it stays as it was.
+    The file is written last: where the effect cannot be, the fit fails, or the held-out error of the effect's joints (of all
+    joints where it has none of its own) rises by more than its standard error, everything stays as it was.
+
+    Args:
+        force: write it also where the error rises.
 
     Raises:
         SysidError: bad input.
@@ -122,6 +143,11 @@ def add(path: Path, effect: str, joints: list[str] | None, options: dict, *, pro
     pipeline.build(after)
     before_fit = pipeline.fit(experiment, progress=progress)
     after_fit = pipeline.fit(after, progress=progress)
+    differences = tuple(comparison.compare(before_fit, after_fit, ("before", "after")))
+    judged = (comparison.together(before_fit, after_fit),) if joints is None else tuple(d for d in differences if d.joint in joints)
+    rises = tuple(d for d in judged if d.delta_rms > d.se)
+    if rises and not force:
+        return Added(after, before_fit, after_fit, differences, rises, refused=True)
     history = read_history(run)
     if not history or history[-1]["rms_test"] != before_fit.rms("test"):
         history = [_record(run, 0, before_fit, None, None)]
@@ -130,7 +156,7 @@ def add(path: Path, effect: str, joints: list[str] | None, options: dict, *, pro
     results.write(after_fit, run)
     results.write_atomically(file, lambda p: p.write_text(text, encoding="utf-8"))
     _write_history(run, history)
-    return Added(after, before_fit, after_fit, tuple(comparison.compare(before_fit, after_fit, ("before", "after"))))
+    return Added(after, before_fit, after_fit, differences, rises)
 
 
 def _record(run: Path, number: int, fit: Fit, effect: str | None, joint: str | None) -> dict:
@@ -253,6 +279,7 @@ def document(added: Added) -> dict:
     found = results.document(added.after)
     return {
         "added": name, "experiment": str(added.experiment.path), "rms_test_before": added.before.rms("test"), "rms_test_after": added.after.rms("test"),
+        "refused": added.refused, "says": added.says,
         "differences": [{"joint": d.joint, "delta_rms": d.delta_rms, "se": results.number(d.se)} for d in added.differences],
         "parameters": [p for p in found["parameters"] if p["name"] not in before], "converged": found["converged"], "notices": found["notices"],
     }  # fmt: skip

@@ -71,6 +71,7 @@ def fit(experiment: Experiment, *, progress: Progress | None = None) -> Fit:
             motion = prepare(train, preprocess, machine.joints)
             del train  # the filtered motion holds all that is needed from here on
         _tell_still(motion)
+        _tell_left_out(motion, preprocess)
         with _timed(seconds, "shape"):
             structure, slopes = _settled(experiment, structure, motion, prior)
         with _timed(seconds, "compress"):  # the regressor is built and reduced chunk by chunk, never whole
@@ -83,7 +84,7 @@ def fit(experiment: Experiment, *, progress: Progress | None = None) -> Fit:
         _tell_undetermined(found, motion)
         with _timed(seconds, "predict"):
             predictions = {"train": predict(structure, found.x, motion)}
-            samples = {"train": motion.samples}
+            samples, left_out = {"train": motion.samples}, {"train": _left_out(motion)}
             del motion
         with _timed(seconds, "test"):
             _tell_overlap(experiment)
@@ -92,9 +93,9 @@ def fit(experiment: Experiment, *, progress: Progress | None = None) -> Fit:
             motion = prepare(held_out, preprocess, machine.joints)
             del held_out
             predictions["test"] = predict(structure, found.x, motion)
-            samples["test"] = motion.samples
+            samples["test"], left_out["test"] = motion.samples, _left_out(motion)
     return replace(
-        found, predictions=predictions, samples=samples, seconds=seconds, filters=chosen, logs=tuple(provenance),
+        found, predictions=predictions, samples=samples, left_out=left_out, seconds=seconds, filters=chosen, logs=tuple(provenance),
         notices=tuple(notices),
     )  # fmt: skip
 
@@ -199,7 +200,17 @@ def _tell_still(motion: Motion) -> None:
         if share > _MUCH_STANDING and joint not in motion.still:
             warnings.warn(SysidWarning(f"joint {joint!r} stands still in {100 * share:.0f} % of its rows, where friction is whatever balances the rest; preprocess.standstill: mask leaves them out"), stacklevel=2)
     for joint in motion.still:
-        warnings.warn(SysidWarning(f"joint {joint!r} never moves in the training logs; its friction is held at its prior, and its bodies are where the other joints' torque leaves them"), stacklevel=2)
+        warnings.warn(SysidWarning(f"joint {joint!r} never moves in the training logs, or never clear of a standstill; its friction is held at its prior, and its bodies are where the other joints' torque leaves them"), stacklevel=2)
+
+
+def _tell_left_out(motion: Motion, spec) -> None:
+    shares = [f"{joint} {100 * count / motion.samples:.0f} %" for joint, count in zip(motion.joints, motion.left_out) if count]
+    if spec.standstill == "auto" and shares:
+        warnings.warn(SysidWarning(f"rows around each joint's reversals and standstill, where the filter smears friction's jump, are left out of its fit and its error: {', '.join(shares)}; preprocess.standstill: keep uses every row"), stacklevel=2)
+
+
+def _left_out(motion: Motion) -> dict[str, int]:
+    return dict(zip(motion.joints, motion.left_out.tolist()))
 
 
 def _tell_overlap(experiment: Experiment) -> None:

@@ -23,6 +23,9 @@ _STANDSTILL_SHARE, _STANDSTILL_MOST = 0.05, 0.03
 # A joint never moves where its filtered angle travels less than its own noise would make it, or than this [rad or m].
 _NEVER_MOVES, _NOISE_TRAVEL = 1e-6, 6.0
 _ROUNDING = 1e-9  # share of a joint's top speed that is none
+# `standstill: auto` goes so far from a reversal that this share is left of the squared error which the angles' filter makes of
+# a jump in acceleration: 3 % of its RMS.
+_LEFT_OF_A_JUMP = 1e-3
 
 
 def savitzky_golay(length: int, order: int, derivative: int, step: float) -> np.ndarray:
@@ -79,6 +82,29 @@ class Smoother:
             self.reach = max(1, math.ceil(5.0 / (slowest * step)))
         else:
             self.reach = 0
+
+    def smear(self, both: bool) -> tuple[int, float]:
+        """What the filter makes of a joint's reversal: how far it carries it [samples], and the speed of a stop [s].
+
+        Friction changes sign with the speed and torque does not, so the acceleration jumps where qd = 0, which the filter
+        spreads. By M(q) dqdd = e_j jump it is joint j's own torque alone that this bends. Of an angle whose speed falls
+        to zero and rises again, qd = a |t|, the filter makes a speed that is never below a times the second number.
+
+        Args:
+            both: whether the filter also goes over torque and over what is predicted.
+        """
+        if not self.reach:
+            return 0, 0.0
+        t = self.step * np.arange(-6 * self.reach, 6 * self.reach + 1)[:, None]
+        middle = slice(3 * self.reach, -3 * self.reach)
+        _, qd, qdd = self.differentiate(0.5 * np.maximum(t, 0.0) ** 2)
+        error = qdd - np.heaviside(t, 0.5)
+        square = (self(error) if both else error)[middle, 0] ** 2
+        half = len(square) // 2
+        # by distance from the jump
+        beyond = np.cumsum(np.append(square[half], square[half + 1 :] + square[half - 1 :: -1])[::-1])[::-1]
+        most = _LEFT_OF_A_JUMP * np.sum(error[middle] ** 2)
+        return int(np.count_nonzero(beyond > most)), 2.0 * abs(float(qd[len(t) // 2, 0]))
 
     def differentiate(self, q) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """q, qd, qdd (n, dof) of measured angles (n, dof); the first and last `reach` rows are not to be used."""
@@ -162,13 +188,15 @@ class Piece:
 class Motion:
     """What identification works on: pieces of motion of the same joints.
 
-    still: joints that never move. standing (dof,): share of the rows that count in which a joint stands still.
+    still: joints that never move, or never clear of a standstill. standing (dof,): share of the rows that count in which
+    a joint stands still. left_out (dof,): rows that do not count.
     """
 
     joints: tuple[str, ...]
     pieces: tuple[Piece, ...]
     still: tuple[str, ...]
     standing: np.ndarray
+    left_out: np.ndarray
 
     @property
     def samples(self) -> int:
@@ -198,20 +226,39 @@ def prepare(logs: Sequence[Log], spec: PreprocessSpec, joints: tuple[str, ...]) 
             raise LogError(f"{log.samples} samples are fewer than the filter's window of {shortest}", where=str(log.path), do="give a longer log or narrow preprocess.window")
         if dropped := len(log.segments) - (len(pieces) - before):
             warnings.warn(SysidWarning(f"{log.path}: {dropped} segment(s) shorter than the filter's window were left out"), stacklevel=2)
+    if spec.standstill == "auto":
+        return assembled(joints, *_with_rows(clear_of_reversals(pieces, spec)))
     if spec.standstill != "keep":
         threshold = standstill_speed(pieces) if spec.standstill == "mask" else spec.standstill
         pieces = [without_standstill(piece, threshold, 0 if piece.smoother is None else piece.smoother.reach) for piece in pieces]
     return assembled(joints, pieces)
 
 
-def assembled(joints: tuple[str, ...], pieces: Sequence[Piece]) -> Motion:
-    """Pieces as one motion, which knows the speed that rounding makes of a constant angle and the joints that never move."""
+def assembled(joints: tuple[str, ...], pieces: Sequence[Piece], stuck=False) -> Motion:
+    """Pieces as one motion, which knows the speed that rounding makes of a constant angle and the joints that never move.
+
+    Args:
+        stuck: (dof,) bool, joints that are known not to.
+    """
     rest = _ROUNDING * np.max([np.abs(piece.qd).max(axis=0) for piece in pieces], axis=0)
     travel = np.ptp(np.concatenate([[p.q[p.core].min(0), p.q[p.core].max(0)] for p in pieces]), axis=0)
     noise = np.max([piece.noise for piece in pieces], axis=0)
-    never = travel < np.maximum(_NEVER_MOVES, _NOISE_TRAVEL * noise)
+    never = (travel < np.maximum(_NEVER_MOVES, _NOISE_TRAVEL * noise)) | stuck
     still = tuple(joint for joint, stays in zip(joints, never) if stays)
-    return Motion(joints, tuple(replace(piece, rest=rest) for piece in pieces), still, standing(pieces))
+    return Motion(joints, tuple(replace(piece, rest=rest) for piece in pieces), still, standing(pieces), sum(_left_out(piece) for piece in pieces))
+
+
+def _left_out(piece: Piece) -> np.ndarray:
+    return np.zeros(piece.q.shape[1], dtype=int) if piece.use is None else np.sum(~piece.use[piece.core], axis=0)
+
+
+def _with_rows(pieces: Sequence[Piece]) -> tuple[list[Piece], np.ndarray]:
+    """The pieces, a joint of which no row is left with all of its rows again, and which (dof,) those joints are.
+
+    Such a joint says nothing of its friction, which is then held; its torque is all that its rows can show.
+    """
+    stuck = sum(piece.use[piece.core].sum(axis=0) for piece in pieces) == 0
+    return [replace(piece, use=piece.use | stuck) for piece in pieces], stuck
 
 
 def _needs(spec: PreprocessSpec, step: float) -> int:
@@ -244,7 +291,7 @@ def _piece(number: int, segment: Segment, spec: PreprocessSpec) -> Piece | None:
 
 
 def without_standstill(piece: Piece, threshold, reach: int) -> Piece:
-    """The piece without the rows where a joint is slower than its threshold (dof,) [rad/s or m/s], or within `reach` rows of one.
+    """The piece without the rows where a joint is slower than its threshold (dof,) or (n, dof) [rad/s or m/s], or within `reach` rows of one.
 
     A filter that sees so far carries standstill into them.
     """
@@ -253,6 +300,44 @@ def without_standstill(piece: Piece, threshold, reach: int) -> Piece:
     rows = np.arange(len(still))
     low, high = np.maximum(rows - reach, 0), np.minimum(rows + reach + 1, len(still))
     return replace(piece, use=count[high] == count[low])
+
+
+def clear_of_reversals(pieces, spec: PreprocessSpec) -> list[Piece]:
+    """The pieces without each joint's rows that the filter has bent about its reversals, or in which it may stand still.
+
+    A joint may stand where its speed changes sign; where it is less than the filter makes of a stop amid accelerations as
+    large as those about it; and where the angle travels less, while the filter sees it, than its own noise would make it.
+    Where velocity was logged nobody knows how well: there it is as with `mask`.
+    """
+    if spec.filter == "none":
+        threshold = standstill_speed(pieces)
+        return [without_standstill(piece, np.where(_turns(piece.qd), np.inf, threshold), 0) for piece in pieces]
+    out = []
+    for piece in pieces:
+        smoother = Smoother(spec, piece.step)
+        reach, stop = smoother.smear(piece.smoother is not None)
+        seen = (2 * smoother.reach + 1) * piece.step
+        threshold = np.maximum(stop * _largest_about(piece.qdd, smoother.reach), _NOISE_TRAVEL * piece.noise / seen)
+        out.append(without_standstill(piece, np.where(_turns(piece.qd), np.inf, threshold), reach))
+    return out
+
+
+def _turns(qd) -> np.ndarray:
+    """(n, dof) bool: the speed has another sign in the row before or after."""
+    change = np.sign(qd[1:]) != np.sign(qd[:-1])
+    out = np.zeros(qd.shape, dtype=bool)
+    out[1:], out[:-1] = change, out[:-1] | change
+    return out
+
+
+def _largest_about(values, reach: int) -> np.ndarray:
+    """The largest size (n, dof) of the values within `reach` rows of each."""
+    n, width, span = len(values), 2 * reach + 1, 1
+    largest = np.pad(np.abs(values), ((reach, reach), (0, 0)))
+    while 2 * span <= width:  # of windows twice as long, time after time
+        largest[:-span] = np.maximum(largest[:-span], largest[span:])
+        span *= 2
+    return np.maximum(largest[:n], largest[width - span : width - span + n])
 
 
 def standstill_speed(pieces) -> np.ndarray:

@@ -64,6 +64,7 @@ def document(fit: Fit, run: str | Path = "") -> dict:
             "gap": number(certificate.gap), "at_zero": {coefficients[k].name: slope for k, slope in certificate.at_zero.items()},
         },
         "samples": fit.samples,
+        "left_out": fit.left_out,
         "parameters": parameters,
         "weights": None if fit.weights is None else dict(zip(fit.joints, fit.weights.tolist())),
         "filter": fit.filters,

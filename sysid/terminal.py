@@ -198,7 +198,10 @@ def show_added(document: dict) -> None:
     for parameter in document["parameters"]:
         std = "" if parameter["std"] is None else f" +- {parameter['std']:.2g}"
         console.print(f"{escape(parameter['name'])} = {parameter['value']:.4g}{std} {escape(parameter['unit'])}", soft_wrap=True, highlight=False)
-    print(f"written into {document['experiment']}")
+    if document["says"]:
+        Console().print(escape(document["says"]), soft_wrap=True, highlight=False)
+    if not document["refused"]:
+        print(f"written into {document['experiment']}")
     _show_notices(document)
 
 

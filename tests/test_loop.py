@@ -199,6 +199,28 @@ def test_add_writes_refits_and_tells(experiment, cli):
     assert [s["added"] for s in loop.read_history(said.run)] == [None, "torque_bias"]
 
 
+CHEETAH = config.Path(__file__).resolve().parent.parent / "configs" / "cheetah3.yaml"
+
+
+def test_the_readme_s_example_reaches_its_floor(cli, tmp_path):
+    """The command that the diagnosis prints takes the error to the noise, and the friction that was hidden comes out as it is."""
+    folder = tmp_path / "hidden"
+    assert cli("simulate", CHEETAH, "--hide", "stribeck:hip", "--quiet", out=folder).status == 0
+    truth = json.loads((folder / "truth.json").read_text())
+    said = cli("add", folder, "stribeck", "--joint", "hip", "--json")
+    document = json.loads(said.out)
+    noise = truth["logs"]["test"]["noise_rms"]
+    assert document["rms_test_after"]["hip"] < 1.1 * noise["hip"] < document["rms_test_before"]["hip"]
+    for parameter in document["parameters"]:
+        true = truth["hidden"][0]["values"][parameter["name"].rpartition(".")[2]]
+        assert abs(parameter["value"] - true) < parameter["std"] < 0.05 * true
+    # and what is left out is said
+    counted = json.loads((said.run / "fit.json").read_text())
+    assert set(counted["left_out"]) == {"train", "test"} and all(0 < n < 0.3 * 20001 for n in counted["left_out"]["train"].values())
+    (notice,) = counted["notices"]
+    assert all(f"{joint} {100 * n / counted['samples']['train']:.0f} %" in notice for joint, n in counted["left_out"]["train"].items())
+
+
 def test_add_shows_before_and_after(experiment, cli):
     said = cli("add", experiment(), "torque_bias", "--joint", "elbow")
     assert said.status == 0
@@ -208,14 +230,53 @@ def test_add_shows_before_and_after(experiment, cli):
 
 def test_add_takes_options_and_formulas(experiment, cli):
     folder = experiment()
-    said = cli("add", folder, "formula", "--joint", "elbow", "--option", "formula=a*sin(3*q)", "--option", "name=ripple", "--json")
+    said = cli("add", folder, "formula", "--joint", "elbow", "--option", "formula=a*sin(3*q)", "--option", "name=ripple", "--json", "--force")
     assert said.status == 0, said.err
     assert [p["name"] for p in json.loads(said.out)["parameters"]] == ["ripple.elbow.a"]
-    said = cli("add", folder, "joint_coupling", "--joint", "shoulder", "--option", "other=elbow", "--json")
+    said = cli("add", folder, "joint_coupling", "--joint", "shoulder", "--option", "other=elbow", "--json", "--force")
     assert said.status == 0, said.err
     assert effects_of((folder / "config.yaml").read_text())[2:] == [
         ("formula", ["elbow"], {"formula": "a*sin(3*q)", "name": "ripple"}), ("joint_coupling", ["shoulder"], {"other": "elbow"}),
     ]  # fmt: skip
+
+
+def reading(by: float):
+    """A log whose elbow reads another torque than it has."""
+    return lambda columns: {**columns, "tau_elbow": columns["tau_elbow"] + by}
+
+
+@pytest.mark.parametrize(("joints", "where"), [(("--joint", "elbow"), "on elbow by "), ((), "over all joints by ")])
+def test_what_makes_the_held_out_error_rise_is_not_added(experiment, cli, joints, where):
+    """The training log has a bias that the test log does not have: what it teaches makes the error worse."""
+    folder = experiment(train=reading(0.5))
+    before = (folder / "config.yaml").read_bytes()
+    refused = cli("add", folder, "torque_bias", *joints, "--json")
+    document = json.loads(refused.out)
+    assert refused.status == 1 and refused.err == "" and document["refused"] is True
+    assert (folder / "config.yaml").read_bytes() == before and not any(refused.run.iterdir())
+    assert document["says"].startswith("not added: it makes the held-out error rise " + where) and "--force" in document["says"]
+    (elbow,) = [d for d in document["differences"] if d["joint"] == "elbow"]
+    assert elbow["delta_rms"] > 3 * elbow["se"] > 0
+    assert document["rms_test_after"]["elbow"] == pytest.approx(document["rms_test_before"]["elbow"] + elbow["delta_rms"])
+    # one line, also where nothing else is said
+    quiet = cli("add", folder, "torque_bias", *joints, "--quiet")
+    assert quiet.status == 1 and quiet.out == "" and quiet.err == f"sysid: {document['says']}\n"
+    told = cli("add", folder, "torque_bias", *joints)
+    assert told.status == 1 and document["says"] in told.out and "written into" not in told.out
+    # and it is done where the user means it
+    forced = cli("add", folder, "torque_bias", *joints, "--json", "--force")
+    document = json.loads(forced.out)
+    assert forced.status == 0 and document["refused"] is False and document["says"].startswith("added all the same")
+    assert effects_of((folder / "config.yaml").read_text())[-1][0] == "torque_bias" and len(loop.read_history(forced.run)) == 2
+
+
+def test_another_joint_s_error_does_not_refuse(experiment, cli):
+    """A bias that both logs have is added to its joint, whatever the other joint does meanwhile."""
+    said = cli("add", experiment(train=reading(0.5), test=reading(0.5)), "torque_bias", "--joint", "elbow", "--json")
+    document = json.loads(said.out)
+    assert said.status == 0 and document["refused"] is False and document["says"] == ""
+    (elbow,) = [d for d in document["differences"] if d["joint"] == "elbow"]
+    assert elbow["delta_rms"] < -3 * elbow["se"]
 
 
 def test_a_fit_that_fails_leaves_the_file_alone(experiment, cli, monkeypatch):

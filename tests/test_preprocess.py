@@ -114,6 +114,70 @@ def test_standstill_leaves_out_rows_of_the_joint_that_stands():
     assert not wide.use[near, 1].any()
 
 
+AUTO = [PreprocessSpec(), PreprocessSpec(torque="same"), PreprocessSpec(filter="butterworth", cutoff=10.0)]
+
+
+@pytest.mark.parametrize("spec", AUTO, ids=lambda s: f"{s.filter}-{s.torque}")
+def test_what_the_filter_makes_of_friction_s_jump_is_left_out_and_little_else(spec):
+    """qd = sin wt, three times as fast one way as the other: the acceleration jumps at every reversal, nowhere else."""
+    t, w = STEP * np.arange(8000), 2 * np.pi
+    half = np.floor(2 * t + 1e-9)  # half periods behind it, each of a known travel
+    positive = half % 2 == 0
+    travel = 3.0 * np.ceil(half / 2) - np.floor(half / 2)
+    q = (travel * 2.0 + np.where(positive, 3.0, 1.0) * (np.where(positive, 1.0, -1.0) - np.cos(w * t))) / w
+    qdd = w * np.cos(w * t) * np.where(positive, 3.0, 1.0)
+    motion = prepare([log(q)], spec, ("a",))
+    (piece,) = motion.pieces
+    error = piece.qdd[:, 0] - np.interp(piece.t, t, qdd)
+    if piece.smoother is not None:
+        error = piece.smoother(error)
+    error, use = error[piece.core], piece.use[piece.core, 0]
+    rms = lambda e: np.sqrt(np.mean(e**2))  # noqa: E731
+    assert rms(error[use]) < 0.05 * rms(error[~use])
+    assert 2 * 14 * 0.02 / 8 < np.mean(~use) < 2 * 16 * (Smoother(spec, STEP).reach * STEP + 0.02) / 8
+    assert motion.left_out[0] == np.count_nonzero(~use)
+
+
+def test_a_stop_that_the_filter_hides_is_left_out_and_slow_motion_is_not():
+    """A joint that stops for an instant and goes on: its filtered speed never comes to zero. One that creeps is told from one that stands."""
+    t = STEP * np.arange(6000)
+    dips = 2.0 * np.abs(t - 3.0)  # the speed, zero at 3 s
+    q = np.cumsum(dips) * STEP
+    creeps = 0.01 * t
+    (piece,) = prepare([log(np.column_stack([q, creeps]))], PreprocessSpec(), ("a", "b")).pieces
+    assert piece.qd[:, 0].min() > 1e-3
+    assert not piece.use[np.abs(piece.t - 3.0) < 0.03, 0].any() and piece.use[np.abs(piece.t - 3.0) > 0.06, 0].all()
+    assert piece.use[:, 1].all()
+
+
+def test_encoder_noise_is_no_motion():
+    """Where an angle travels less than its noise while the filter looks, nobody can say that it moves."""
+    t = STEP * np.arange(8000)
+    q = np.where(t < 3, 0.0, 0.5 * (1 - np.cos(2 * (t - 3)))) + 1e-4 * np.random.default_rng(0).normal(size=8000)
+    (piece,) = prepare([log(q)], PreprocessSpec(), ("a",)).pieces
+    assert not piece.use[piece.t < 2.9, 0].any()
+    assert piece.use[np.abs(piece.qd[:, 0]) > 0.2, 0].all()
+
+
+def test_a_joint_without_a_row_left_keeps_them_and_its_friction_is_held():
+    """Rows that say nothing of friction still say what torque was needed."""
+    t = STEP * np.arange(3000)
+    rng = np.random.default_rng(1)
+    trembles = 1e-3 * np.sin(2 * np.pi * 8 * t) + 1e-5 * rng.normal(size=3000)  # every window has a reversal in it
+    motion = prepare([log(np.column_stack([np.sin(6 * t), trembles]))], PreprocessSpec(), ("a", "b"))
+    (piece,) = motion.pieces
+    assert motion.still == ("b",) and piece.use[:, 1].all() and motion.left_out[1] == 0
+    assert 0 < motion.left_out[0] < len(piece.t)
+
+
+def test_a_logged_velocity_is_taken_at_its_word():
+    t = STEP * np.arange(3000)
+    q, qd, qdd = np.sin(6 * t), 6 * np.cos(6 * t), -36 * np.sin(6 * t)
+    made = Log("made", Path("made"), "", (Segment(t, STEP, q[:, None], q[:, None], qd[:, None], qdd[:, None], {}),))
+    (piece,) = prepare([made], PreprocessSpec(filter="none"), ("a",)).pieces
+    assert 0 < np.count_nonzero(~piece.use) < 30 and np.all(np.abs(piece.qd[~piece.use]) < 0.1)
+
+
 def test_a_joint_that_never_moves_is_named():
     t = STEP * np.arange(1000)
     motion = prepare([log(np.column_stack([np.sin(6 * t), np.full(1000, 0.3)]))], PreprocessSpec(), ("a", "b"))
@@ -181,7 +245,7 @@ def test_a_standing_joint_has_no_direction():
     """A constant encoder leaves rounding in the filtered velocity; its sign is no friction."""
     t = STEP * np.arange(6000)
     q = np.where(t < 2, 0.3, 0.3 + 0.2 * np.sin(2 * np.pi * (t - 2)))
-    for spec in (PreprocessSpec(), PreprocessSpec(filter="butterworth", cutoff=20.0)):
+    for spec in (PreprocessSpec(standstill="keep"), PreprocessSpec(standstill="keep", filter="butterworth", cutoff=20.0)):
         motion = prepare([log(np.column_stack([q, np.sin(t)]))], spec, ("a", "b"))
         (piece,) = motion.pieces
         dwell = piece.t < 1.5

@@ -116,6 +116,8 @@ def _config(experiment: Experiment, robot: Robot, logs: list[str]) -> str:
         effects.append({"armature": {"joints": bare}} if rotors else "armature")
     spec = experiment.robot.model_dump(exclude_none=True, exclude_defaults=True)
     preprocess = experiment.preprocess if experiment.preprocess.filter != "none" else PreprocessSpec()
+    if preprocess.standstill == "keep":  # for the sake of what the source reproduces; a simulation reproduces nothing
+        preprocess = preprocess.model_copy(update={"standstill": "auto"})
     tree = {
         "robot": {**spec, "urdf": "robot.urdf", "joints": list(robot.joints), "gravity": list(experiment.robot.gravity)},
         "data": {"train": [name for name in logs if name != "test.csv"], "test": ["test.csv"]},
