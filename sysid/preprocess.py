@@ -311,18 +311,18 @@ def clear_of_reversals(pieces, spec: PreprocessSpec) -> list[Piece]:
     """
     if spec.filter == "none":
         threshold = standstill_speed(pieces)
-        return [without_standstill(piece, np.where(_turns(piece.qd), np.inf, threshold), 0) for piece in pieces]
+        return [without_standstill(piece, np.where(turns(piece.qd), np.inf, threshold), 0) for piece in pieces]
     out = []
     for piece in pieces:
         smoother = Smoother(spec, piece.step)
         reach, stop = smoother.smear(piece.smoother is not None)
         seen = (2 * smoother.reach + 1) * piece.step
         threshold = np.maximum(stop * _largest_about(piece.qdd, smoother.reach), _NOISE_TRAVEL * piece.noise / seen)
-        out.append(without_standstill(piece, np.where(_turns(piece.qd), np.inf, threshold), reach))
+        out.append(without_standstill(piece, np.where(turns(piece.qd), np.inf, threshold), reach))
     return out
 
 
-def _turns(qd) -> np.ndarray:
+def turns(qd) -> np.ndarray:
     """(n, dof) bool: the speed has another sign in the row before or after."""
     change = np.sign(qd[1:]) != np.sign(qd[:-1])
     out = np.zeros(qd.shape, dtype=bool)

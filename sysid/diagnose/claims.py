@@ -1,0 +1,208 @@
+"""What the search found, as `sysid add` gives it: each effect written into the experiment and fitted as the user's fit is.
+
+So the parameters, the command and the error that a diagnosis states are those that come of it. The test logs choose
+nothing here; they may only refuse what does not hold on them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .. import comparison, pipeline
+from ..addition import command, grown, spelled
+from ..estimate import Fit
+from ..model import ROBOT
+from .select import Step
+from .ties import Member
+from .view import View
+
+_NOTHING = 0.05  # probability: parameters that come by chance as often as this are nothing
+_FITTED = 3  # members of a set that are fitted; the rest is named with its probability
+
+
+@dataclass(frozen=True)
+class Finding:
+    """A candidate that these logs support.
+
+    joint: its name, or `*`. p: family-wise p-value of its set; probability: of being the best of its set.
+    rms_before, rms_after: on the test logs, on its joint (over all joints for `*`), of the fits without it and with it.
+    parameters: {name: (value, std or NaN, unit)} of the fit with it. tied_with: words of the others of its set, with their
+    joint where it is another. step: which step of the search it heads, or None. command: what adds it.
+    """
+
+    member: Member
+    joint: str
+    p: float
+    probability: float
+    rms_before: float
+    rms_after: float
+    fall_se: float
+    parameters: dict[str, tuple[float, float, str]]
+    tied_with: tuple[str, ...]
+    step: int | None
+    command: str
+
+    @property
+    def candidate(self):
+        """What would join."""
+        return self.member.candidate
+
+    @property
+    def effect(self) -> str:
+        """The effect's word."""
+        return self.candidate.name
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A step that stands: its findings, the head first; the fits before and after the head joined; what may stand in its place
+    with probabilities: [(effect, joint, probability)]."""
+
+    step: Step
+    findings: tuple[Finding, ...]
+    before: Fit
+    after: Fit
+    set: tuple[tuple[str, str, float], ...]
+
+    @property
+    def head(self) -> Finding:
+        """What is claimed."""
+        return self.findings[0]
+
+    def after_square(self, joints) -> float:
+        """Mean squared error on the test logs over joints, with the head in the model."""
+        return float(np.mean([self.after.rms("test")[joint] ** 2 for joint in joints]))
+
+
+@dataclass(frozen=True)
+class Refused:
+    """A step that does not stand, and why, in words."""
+
+    effect: str
+    joint: str
+    why: str
+
+
+def claimed(steps: list[Step], fit: Fit, tell: Callable[[str, float], None]) -> tuple[list[Claim], list[Refused]]:
+    """Fit each step's head, and the best of what is tied with it, on top of what stands before it.
+
+    Args:
+        fit: of the experiment as it is.
+    """
+    claims: list[Claim] = []
+    refused: list[Refused] = []
+    last = fit
+    for step in steps:
+        members = [(m, chance) for m, chance in step.choice.members]
+        head = step.choice.head
+        ordered = [next(pair for pair in members if pair[0] is head), *(pair for pair in members if pair[0] is not head)]
+        found = []
+        for member, chance in ordered[:_FITTED]:
+            after = _with(last, member, fit, tell)
+            why = _nothing(last, after, member) if member is head else None
+            if why is not None:
+                refused.append(Refused(member.candidate.name, _where(member, fit), why))
+                break
+            found.append((member, chance, after))
+        if not found:
+            continue
+        names = [(m.candidate.name, _where(m, fit), chance) for m, chance in members]
+        claims.append(Claim(
+            step, tuple(_finding(last, after, member, chance, step, names, len(claims)) for member, chance, after in found),
+            last, found[0][2], tuple(names),
+        ))  # fmt: skip
+        last = found[0][2]
+    return claims, refused
+
+
+def _where(member: Member, fit: Fit) -> str:
+    return "*" if member.candidate.joint == ROBOT else fit.joints[member.candidate.joint]
+
+
+def _with(last: Fit, member: Member, first: Fit, tell) -> Fit:
+    """The fit of the last experiment with a candidate in it, filtered as the first one was."""
+    name, joints, options = spelled(member.candidate, _where(member, first))
+    return pipeline.fit(grown(last.experiment, name, joints, options), filters=first.filters, progress=tell)
+
+
+def own_joints(member_or_candidate, dof: int) -> list[int]:
+    """The joints whose error an effect is judged by."""
+    candidate = getattr(member_or_candidate, "candidate", member_or_candidate)
+    return list(range(dof)) if candidate.joint == ROBOT else [candidate.joint]
+
+
+def _nothing(before: Fit, after: Fit, member: Member) -> str | None:
+    """Why an effect that the search found is not claimed, None where it is."""
+    if _chance_of_nothing(after, member) > _NOTHING:
+        return "its parameters are nothing beside their deviations once everything is fitted"
+    rise = _rise(before, after, member)
+    if rise is not None:
+        return f"with it the error on the test logs rises by {rise:.3g} N m, more than its standard error"
+    return None
+
+
+def _chance_of_nothing(after: Fit, member: Member) -> float:
+    """Probability of parameters as far from nothing as these, were they nothing (Wald); 1 where none is determined."""
+    from scipy.stats import chi2
+
+    first, key = 10 * after.model.bodies, member.candidate.key
+    own = [first + k for k, c in enumerate(after.model.coefficients) if (c.effect, c.joint) == key]
+    own = [k for k in own if np.isfinite(after.uncertainty.std[k]) and after.uncertainty.std[k] > 0]
+    if own:
+        std = after.uncertainty.std[own]
+        values, vectors = np.linalg.eigh(after.uncertainty.covariance[np.ix_(own, own)] / np.outer(std, std))
+        kept = values > 1e-9 * values[-1]
+        far = (vectors[:, kept].T @ (after.x[own] / std)) ** 2 / values[kept]
+        return float(chi2.sf(far.sum(), int(kept.sum())))
+    starts = [
+        (at - v.shape.start) / std
+        for v, at, std in zip(after.model.shape_values, after.model.shapes, after.shape_std)
+        if after.model.terms[v.term][0].name == key[0] and v.joint == key[1] and v.shape.start is not None and std > 0
+    ]  # fmt: skip
+    return float(chi2.sf(np.sum(np.square(starts)), len(starts))) if starts else 1.0
+
+
+def _rise(before: Fit, after: Fit, member: Member) -> float | None:
+    """By how much the held-out error rises, where it does by more than its standard error."""
+    own = {before.joints[j] for j in own_joints(member, len(before.joints))}
+    found = [d for d in comparison.compare(before, after, ("before", "after")) if d.joint in own]
+    worst = min(found, key=lambda d: d.delta_rms) if len(found) > 1 else found[0]
+    return worst.delta_rms if worst.delta_rms > 0 and not worst.delta_rms <= worst.se else None
+
+
+def _parameters(before: Fit, after: Fit, member: Member) -> dict[str, tuple[float, float, str]]:
+    model, first, key = after.model, 10 * after.model.bodies, member.candidate.key
+    joint = key[1]
+    out = {
+        c.name: (float(after.x[first + k]), float(after.uncertainty.std[first + k]), c.unit)
+        for k, c in enumerate(model.coefficients) if (c.effect, c.joint) == key
+    }  # fmt: skip
+    for value, at, std in zip(model.shape_values, model.shapes, after.shape_std):
+        effect = model.terms[value.term][0]
+        if effect.name == key[0] and value.joint == joint:
+            out[value.name] = (float(at), float(std), value.unit)
+    return out
+
+
+def _finding(before: Fit, after: Fit, member: Member, chance: float, step: Step, names, number: int) -> Finding:
+    own = own_joints(member, len(before.joints))
+    together = lambda fit: float(np.sqrt(np.mean([fit.rms("test")[fit.joints[j]] ** 2 for j in own])))  # noqa: E731
+    differences = {d.joint: d for d in comparison.compare(before, after, ("before", "after"))}
+    se = float(np.sqrt(np.nansum([differences[before.joints[j]].se ** 2 for j in own])) / np.sqrt(len(own)))
+    joint = _where(member, before)
+    others = [(n, j) for n, j, _ in names if (n, j) != (member.candidate.name, joint)]
+    words = tuple(n if j in (joint, "*") else f"{n} on {j}" for n, j in others)
+    heads = member is step.choice.head
+    path = before.experiment.path
+    return Finding(
+        member, joint, step.p, chance, together(before), together(after), se, _parameters(before, after, member), words,
+        number if heads else None, command(path, *spelled(member.candidate, joint)),
+    )  # fmt: skip
+
+
+def view_after(claims: list[Claim], first: View) -> View:
+    """The view of the model with all that is claimed."""
+    return replace(claims[-1].step.after) if claims else first

@@ -1,0 +1,139 @@
+"""Logs -> the domain in which a model is questioned: one low-pass over both sides, standstill left out.
+
+Whatever filter a fit uses, structure that only the filter made must not be taken for physics, and single samples
+of noise must not hide it. So angles are lightly smoothed and differentiated, and then torque and every predicted
+column go through one and the same zero-phase Gaussian low-pass, whose memory is short and finite; rows where a joint
+stands still, where friction is whatever balances the rest, are left out for that joint, widened by what the
+filters see of them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..log import Log
+from ..preprocess import Motion, Piece, assembled, differences, standstill_speed, turns, without_standstill
+
+LEAST = 15.0  # Hz: where friction's laws and ripple still show, several times what an arm moves at
+_MOTION = 4.0  # and this many times the motion's own bandwidth, if that is more
+_SHARE = 0.25  # of the residual's power may be made by the angles' noise at the end of the band
+_ANGLES = 4.0  # the angles' own low-pass, as a multiple of the cutoff: derivatives need some, laws of motion none
+_SIGHT = 1.25  # how far both low-passes see, as a multiple of the torque's own: the angles' sees a quarter as far
+_HIGHEST = 0.3  # of the sampling rate
+# Laws are evaluated at this many samples a cycle of the cutoff: what is steeper than that, friction at a reversal, is left
+# out anyway.
+_SAMPLES_PER_CYCLE = 16.0
+_ROWS_PER_CYCLE = 6.67  # 100 Hz at 15 Hz
+_WIDTH = 4.0  # standard deviations of the kernel that are kept
+MOST_ROWS = 12_000
+
+
+class Gaussian:
+    """A zero-phase low-pass with a Gaussian kernel: -3 dB at the cutoff, no ringing, a finite memory of `reach` samples."""
+
+    kind = "gaussian"
+
+    def __init__(self, cutoff: float, step: float):
+        sigma = math.sqrt(math.log(2.0)) / (2.0 * math.pi * cutoff * step)  # samples: |H| = exp(-(2 pi f sigma)^2 / 2)
+        self.cutoff, self.step = cutoff, step
+        self.reach = math.ceil(_WIDTH * sigma)
+        weights = np.exp(-0.5 * (np.arange(-self.reach, self.reach + 1) / sigma) ** 2)
+        self.weights = weights / weights.sum()
+
+    @property
+    def taken_of_noise(self) -> float:
+        """The share of white noise's root mean square that it takes away."""
+        rest = -self.weights
+        rest[self.reach] += 1.0
+        return float(np.sqrt(np.sum(rest**2)))
+
+    def at(self, values, rows: slice) -> np.ndarray:
+        """The filtered values (..., n) at some rows of the last axis; the edge's value goes on beyond the edge."""
+        n = values.shape[-1]
+        kept = np.arange(n)[rows]
+        out = np.zeros(values.shape[:-1] + (len(kept),))
+        inside = len(kept) and kept[0] >= self.reach and kept[-1] < n - self.reach
+        stride = rows.step or 1
+        for shift, weight in zip(range(-self.reach, self.reach + 1), self.weights):
+            taken = values[..., kept[0] + shift : kept[-1] + shift + 1 : stride] if inside else values[..., np.clip(kept + shift, 0, n - 1)]
+            out += weight * taken
+        return out
+
+    def __call__(self, values, axis: int = -1) -> np.ndarray:
+        """The filtered values, same shape."""
+        return np.moveaxis(self.at(np.moveaxis(values, axis, -1), slice(None)), -1, axis)
+
+
+def lowpassed(logs: Sequence[Log], joints: tuple[str, ...], cutoff: float) -> Motion | None:
+    """Logs as a motion under one low-pass on both sides; None where they are too short for it."""
+    pieces = []
+    for number, log in enumerate(logs):
+        pieces += [piece for segment in log.segments if (piece := _piece(number, log.name, segment, cutoff)) is not None]
+    if not pieces:
+        return None
+    threshold = standstill_speed(pieces)
+    # where the speed changes its sign between two samples, the angles' noise says in which: friction's jump is as uncertain
+    still = [np.where(turns(piece.qd), np.inf, threshold) for piece in pieces]
+    reach = [round(_SIGHT * piece.smoother.reach) for piece in pieces]
+    return assembled(joints, [without_standstill(*each) for each in zip(pieces, still, reach)])
+
+
+def widest(logs: Sequence[Log]) -> float:
+    """Cutoff [Hz] that the motion itself asks for: several times the frequency below which its speeds stay."""
+    bands = [0.0]
+    for segment in (s for log in logs for s in log.segments if len(s.t) > 50):
+        speed = np.diff(segment.q, axis=0)
+        speed = speed[:, np.ptp(segment.q, axis=0) > 1e-3 * np.ptp(segment.q, axis=0).max()]
+        power = np.cumsum(np.abs(np.fft.rfft(speed * np.hanning(len(speed))[:, None], axis=0)) ** 2, axis=0)
+        if speed.size and (power[-1] > 0).all():
+            bands.append(float((power < 0.99 * power[-1]).sum(axis=0).max() / (len(speed) * segment.step)))
+    return max(LEAST, _MOTION * float(np.median(bands[1:] or bands)))
+
+
+def narrowed(cutoff: float, share: float) -> float:
+    """The cutoff at which the angles' noise makes no more than a quarter of the residual's power, where at `cutoff` it makes
+    `share`: its density grows with the fourth power of frequency, as acceleration does."""
+    return cutoff * min(1.0, (_SHARE / max(share, 1e-12)) ** 0.25)
+
+
+def stride_of(motion: Motion, cutoff: float) -> int:
+    """Every how many samples a row is kept: several a cycle of the cutoff, and no more than fit in memory."""
+    step = float(np.median([piece.step for piece in motion.pieces]))
+    fine = max(1, round(1.0 / (step * cutoff * _ROWS_PER_CYCLE)))
+    return max(fine, -(-motion.samples // MOST_ROWS))
+
+
+def _piece(number: int, source: str, segment, cutoff: float) -> Piece | None:
+    rate = 1.0 / segment.step
+    every = max(1, int(rate / (_SAMPLES_PER_CYCLE * cutoff)))
+    both = Gaussian(min(cutoff, _HIGHEST * rate), segment.step)
+    settling = Gaussian(both.cutoff, every * segment.step)
+    angles = Gaussian(min(_ANGLES * cutoff, _HIGHEST * rate), segment.step)
+    edge = angles.reach + 2
+    rows = slice(edge, len(segment.t) - edge, every)
+    n = len(range(*rows.indices(len(segment.t))))
+    if n < 6 * settling.reach + 20:
+        return None
+    smooth = angles(segment.q, axis=0)
+    qd, qdd = differences(smooth, segment.step)
+    return Piece(
+        log=number, step=every * segment.step, t=segment.t[rows], q=smooth[rows], qd=qd[rows], qdd=qdd[rows], tau=both(segment.tau, axis=0)[rows],
+        measured=segment.tau[rows], signals={name: values[rows] for name, values in segment.signals.items()}, use=None, smoother=settling,
+        core=slice(settling.reach, n - settling.reach), rest=np.zeros(smooth.shape[1]), noise=_noise(segment.q[edge:-edge] - smooth[edge:-edge], segment.step) / angles.taken_of_noise,
+        source=source,
+    )  # fmt: skip
+
+
+_WINDOW = 0.1  # s
+
+
+def _noise(rest, step: float) -> np.ndarray:
+    """RMS (dof,) of what a low-pass took off the angles (n, dof), in the middle of all windows of time: about a reversal it took
+    more than noise."""
+    size = max(8, round(_WINDOW / step))
+    count = max(1, len(rest) // size)
+    windows = np.array_split(rest[: count * size] if len(rest) >= size else rest, count)
+    return np.sqrt(np.median([np.mean(own**2, axis=0) for own in windows], axis=0))
