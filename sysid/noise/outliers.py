@@ -1,0 +1,58 @@
+"""Rows of a residual that no noise makes: spikes, bursts, and what friction's jump leaves about reversals.
+
+Noise of any colour differs from one moment to the next as a Gaussian does, on every time scale. So means of L samples
+before and after each row are subtracted, for L from one sample to a share of the motion's quickest period; where the difference
+is an outlier among all of them, the rows are left out.
+"""
+
+import math
+
+import numpy as np
+
+from .stretches import bridged
+
+_OUTLYING = 5.0  # robust standard deviations: a Gaussian does that once in two million
+_SHARE = 0.25  # of the quickest period of the motion: beyond it misfit is no burst
+_MOST = 0.25  # of the rows; where more stand out, they are no exception
+_NORMAL = 0.6745  # median of a standard Gaussian's absolute value
+
+
+def without(values: list[np.ndarray], kept: list[np.ndarray], steps: list[float], bandwidth: float):
+    """Which rows (n,) of each run are kept, and the values with what is left out bridged."""
+    shortest = min(steps)
+    longest = max(1, int(_SHARE / (bandwidth * shortest))) if bandwidth > 0.0 else 1
+    kept, values, all_rows = list(kept), list(values), sum(int(k.sum()) for k in kept)
+    for level in range(int(math.log2(longest)) + 1):
+        width = 2**level
+        steps_of = [_step(v, k, width) for v, k in zip(values, kept)]
+        sizes = [np.abs(d[~np.isnan(d)]) for d in steps_of]
+        sizes = np.concatenate(sizes) if sizes else np.zeros(0)
+        if not len(sizes) or not (typical := float(np.median(sizes)) / _NORMAL) > 0.0:
+            continue
+        found = []
+        for d, k in zip(steps_of, kept):
+            hit = np.flatnonzero(np.nan_to_num(np.abs(d)) > _OUTLYING * typical)
+            turns = np.zeros(len(k) + 1, dtype=np.int64)  # both means are suspect
+            turns[hit] += 1
+            turns[hit + 2 * width] -= 1
+            out = np.cumsum(turns[:-1]) > 0
+            found.append(k & ~out)
+        if sum(int(k.sum()) for k in found) < (1.0 - _MOST) * all_rows:
+            continue
+        values = [bridged(v, f) if f.sum() > 2 else v for v, f in zip(values, found)]
+        kept = [f if f.sum() > 2 else k for f, k in zip(found, kept)]
+    return kept, values
+
+
+def _step(values: np.ndarray, counts: np.ndarray, width: int) -> np.ndarray:
+    """Mean of `width` samples less that of the `width` before them (n - 2 width + 1,), nan where a gap takes much of it."""
+    if len(values) < 2 * width + 1:
+        return np.full(0, np.nan)
+    total = np.concatenate([[0.0], np.cumsum(values)])
+    sums = total[width:] - total[:-width]
+    out = (sums[width:] - sums[:-width]) / width
+    if not counts.all():
+        number = np.concatenate([[0], np.cumsum(counts)])
+        whole = number[2 * width :] - number[: -2 * width]
+        out[whole < 1.5 * width] = np.nan
+    return out

@@ -1,0 +1,136 @@
+"""Noise from the spectrum of what is left of a residual.
+
+Above the motion's band it is noise; within it may hold misfit. The noise there is weighed over models of it (white, and
+white plus one coloured part), each band of frequencies being clean or misfit.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+_BANDS_PER_OCTAVE = 6
+_INDEPENDENT = 1.94  # ordinates of a Hann-windowed periodogram per independent one
+# In bandwidths: from here up the residual is noise as it is, hum and all; up to here the noise's colour is fitted,
+# farther up says nothing about the band; and the corner about which a coloured part ceases to look like misfit.
+_SAFE, _FIT, _DOUBT = 10.0, 30.0, 5.0
+# most ordinates that a band counts for, below and above `_SAFE`: no noise is quite the model's
+_VOTE, _VOTE_FAR = 4.0, 60.0
+_FARTHEST = math.log(1e4)  # misfit may lift a band by any factor up to this
+_SLOWEST = 0.3  # Hz, corner of the slowest noise; slower is drift
+_LEFT_BEHIND = 0.03  # of what functions of the motion took off, for want of a better function
+_TINY = 1e-300
+
+
+@dataclass(frozen=True)
+class Spectrum:
+    """A residual in bands of frequency: centre and width [Hz], mean density [(N m)^2/Hz], independent ordinates, all (bands,).
+    The first band lies below what was looked at: no ordinates."""
+
+    centre: np.ndarray
+    width: np.ndarray
+    density: np.ndarray
+    count: np.ndarray
+
+
+@dataclass(frozen=True)
+class Weighed:
+    """RMS of the noise, its standard error, words on its colour, and the largest part of its error."""
+
+    rms: float
+    std: float
+    colour: str
+    doubt: str
+
+
+def spectrum_of(values: list[np.ndarray], kept: list[np.ndarray], steps: list[float]) -> Spectrum:
+    """The Hann-windowed periodograms of all runs, averaged in bands of equal ratio.
+
+    Args:
+        values: (n,) of each run, bridged where not `kept` (n,): what is bridged has no noise.
+    """
+    frequency, density = [], []
+    for y, k, step in zip(values, kept, steps):
+        window = np.hanning(len(y) + 2)[1:-1]
+        square = float(np.sum((window**2)[k]))
+        # the first two hold the mean, the last is half an ordinate
+        power = np.abs(np.fft.rfft((y - y[k].mean()) * window)[2:-1]) ** 2
+        frequency.append(np.fft.rfftfreq(len(y), step)[2:-1])
+        density.append(2.0 * step * power / max(square, 0.1 * float(window @ window)))
+    frequency, density = np.concatenate(frequency), np.concatenate(density)
+    band = np.log2(frequency / frequency.min()) * _BANDS_PER_OCTAVE + 1e-9
+    _, band, count = np.unique(band.astype(np.int64), return_inverse=True, return_counts=True)
+    centre, mean = np.bincount(band, frequency) / count, np.bincount(band, density) / count
+    lowest = frequency.min() * 2.0 ** (-0.5 / _BANDS_PER_OCTAVE)
+    edges = np.concatenate([[0.0, lowest], 0.5 * (centre[1:] + centre[:-1]), [0.5 / min(steps)]])
+    mean = np.maximum(mean, 1e-12 * mean.max())
+    return Spectrum(
+        np.concatenate([[0.5 * lowest], centre]), np.diff(edges), np.concatenate([mean[:1], mean]),
+        np.concatenate([[0.0], np.maximum(count / _INDEPENDENT, 0.5)]),
+    )  # fmt: skip
+
+
+def weighed(spectrum: Spectrum, bandwidth: float, step: float, removed: float) -> Weighed:
+    """Noise power, the mean over models of the noise by their posterior probability.
+
+    A band that holds misfit lies above the noise by any factor, evenly in its logarithm, and never below. A coloured part
+    with its corner near the motion's band looks like misfit, the more so the more misfit was found: `removed` [(N m)^2].
+    """
+    from scipy.special import gammaln, ndtr
+
+    f, seen, width = spectrum.centre, spectrum.density, spectrum.width
+    looked, count = spectrum.count > 0.0, np.maximum(spectrum.count, 0.5)
+    corner, coloured = _models(f, bandwidth, step)
+    shape = 1.0 + coloured
+    # white is as likely as all colours
+    prior = np.concatenate([[0.5], np.full(len(corner) - 1, 0.5 / (len(corner) - 1))])
+    # near half the sampling rate filters bend the spectrum
+    use = looked & (f <= max(min(0.35 / step, _FIT * bandwidth), f[min(5, len(f) - 1)]))
+    # prior chance that a band holds misfit
+    suspect = np.maximum(0.5 / (1.0 + (f / (2.0 * bandwidth)) ** 2), 0.02)
+    weight = np.minimum(count, np.where(f < _SAFE * bandwidth, _VOTE, _VOTE_FAR))
+    clear = use & (f > min(2.0 * bandwidth, f[use][-1] / 2.0))
+    level = np.median((seen / shape)[:, clear], axis=1)  # of each model's white part
+    for _ in range(12):  # expectation-maximisation
+        z = seen / (level[:, None] * shape)
+        clean = np.log1p(-suspect) + weight * np.log(weight * z) - gammaln(weight) - weight * z
+        # the chance that clean ordinates would have come out lower than this (Wilson & Hilferty 1931)
+        lower = ndtr(3.0 * np.sqrt(count) * (np.cbrt(z) - 1.0 + 1.0 / (9.0 * count)))
+        lifted = np.log(suspect / _FARTHEST) + np.log(lower + _TINY)
+        share = looked / (1.0 + np.exp(np.clip(lifted - clean, -500.0, 500.0)))
+        votes = share * weight * use + 1e-12 * looked
+        level = np.sum(votes * seen / shape, axis=1) / np.sum(votes, axis=1)
+    evidence = np.logaddexp(clean, lifted)[:, use].sum(axis=1) + np.log(prior)
+    chance = np.exp(evidence - evidence.max())
+    chance /= chance.sum()
+    modelled = level[:, None] * shape
+    share = np.where(looked & (f > _SAFE * bandwidth), 1.0, share)
+    power = (share * seen + (1.0 - share) * modelled) @ width
+    sampling = ((modelled * width) ** 2 / count).sum(axis=1)
+    near = f <= _SAFE * bandwidth
+    doubtful = np.minimum((level[:, None] * coloured)[:, near] @ width[near], 0.98 * power)
+    doubt = 0.7 * removed / (removed + doubtful + _TINY) / (1.0 + (corner / (_DOUBT * bandwidth)) ** 2)
+    # the functions are many and rarely leave so much: doubt widens the error more than it moves the estimate
+    estimate = power - 0.25 * doubt * doubtful
+    mean = float(chance @ estimate)
+    parts = {
+        "its colour, which misfit may have made": float(chance @ ((estimate - mean) ** 2 + doubt * doubtful**2)),
+        "too short a log": float(chance @ sampling),
+        "misfit much larger than the noise": min(_LEFT_BEHIND * removed, mean) ** 2,
+    }
+    best = 1 + int(np.argmax(chance[1:]))
+    colour = "white" if chance[0] > 0.5 else f"white plus a coloured part with a corner of {corner[best]:.2g} Hz"
+    rms = math.sqrt(mean)
+    return Weighed(rms, math.sqrt(sum(parts.values())) / (2.0 * rms), colour, max(parts, key=parts.get))
+
+
+def _models(f: np.ndarray, bandwidth: float, step: float) -> tuple[np.ndarray, np.ndarray]:
+    """Corner [Hz] (models,) and spectrum of the coloured part over the white one (models, bands); the first has none."""
+    # heights are at the band's edge
+    corners = np.geomspace(max(_SLOWEST, f[1]), max(0.6 * f[-1], 2.0 * _SLOWEST), 30)
+    heights = np.geomspace(0.2, 1e4, 14)
+    corner, height = (x.ravel()[:, None] for x in np.meshgrid(corners, heights))
+    keep = np.exp(-2.0 * math.pi * corner * step)
+    first_order = lambda at: 1.0 / (1.0 - 2.0 * keep * np.cos(2.0 * math.pi * at * step) + keep**2)  # noqa: E731
+    coloured = height * first_order(f) / first_order(max(bandwidth, f[1]))
+    return np.concatenate([[np.inf], corner[:, 0]]), np.concatenate([np.zeros((1, len(f))), coloured])
