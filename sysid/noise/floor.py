@@ -13,7 +13,7 @@ import numpy as np
 from . import outliers, repeats
 from .motion_functions import Functions, Kinematics, kinematics
 from .spectrum import spectrum_of, weighed
-from .stretches import Run, bandwidth_of, runs_of
+from .stretches import Run, bandwidth_of, bridged, runs_of
 
 #: standard error over RMS beyond which a floor is not given: two of them are the 25 % that one can judge an error by
 UNSURE = 0.12
@@ -38,7 +38,7 @@ class NoiseFloor:
 @dataclass(frozen=True)
 class Estimate:
     """The floor as far as it can be estimated, however unsure: RMS, standard error [N m or N], how it was found, and what makes
-    it unsure. own: RMS of the residual itself, which is the most it can be."""
+    it unsure. least, own: RMS of what is noise in any case, and of the residual itself, which is the most it can be."""
 
     rms: float
     std: float
@@ -46,6 +46,7 @@ class Estimate:
     detail: str
     doubt: str
     own: float
+    least: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -95,7 +96,7 @@ def judged(found: Estimate) -> NoiseFloor:
         return NoiseFloor(None, None, "none", found.doubt, None, found.own)
     if found.std > UNSURE * found.rms:
         why = f"not determined: {found.doubt} ({found.detail})"
-        return NoiseFloor(None, None, "none", why, low, found.own)
+        return NoiseFloor(None, None, "none", why, min(low, found.least), found.own)
     return NoiseFloor(found.rms, found.std, found.method, found.detail, low, high)
 
 
@@ -127,9 +128,12 @@ def estimate(residual, measured, q, step, joint: int, *, use=None, memory=None) 
     asked = Functions(runs, shared.motion, [m - r for m, r in zip(torque, raw)], joint, shared.bandwidth)
     steps = [run.step for run in runs]
     rest, _, _ = asked.removed_from(raw, kept)
+    kept = outliers.away_from_reversals(runs, shared.motion.v, rest, kept)
+    rest = [bridged(v, k) for v, k in zip(rest, kept)]
     kept, _ = outliers.without(rest, kept, steps, shared.bandwidth)
     # once more, without what no noise does
-    rest, number, removed = asked.removed_from([_bridged(v, k) for v, k in zip(raw, kept)], kept)
+    rest, number, removed = asked.removed_from(raw, kept)
+    rest = [bridged(v, k) for v, k in zip(rest, kept)]
     if math.sqrt(max(np.mean(v**2) for v in rest)) <= 1e-12 * max(size, own):
         return Estimate(0.0, 0.0, "spectral", "the residual is a constant, or a function of the motion", "", own)
     if (found := repeats.scatter((rest, raw, torque), kept, shared.periods)) is not None:
@@ -142,14 +146,14 @@ def estimate(residual, measured, q, step, joint: int, *, use=None, memory=None) 
     spectrum.density[spectrum.centre < shared.bandwidth] /= 1.0 - min(0.5, number / max(freedom, 1.0))
     found = weighed(spectrum, shared.bandwidth, min(steps), removed)
     words = f"residual above {shared.bandwidth:.2g} Hz, {found.colour}"
-    return _bounded(found.rms, found.std, "spectral", words, found.doubt, own)
+    return _bounded(found.rms, found.std, "spectral", words, found.doubt, own, found.least)
 
 
-def _bounded(rms: float, std: float, method: str, detail: str, doubt: str, own: float) -> Estimate:
+def _bounded(rms: float, std: float, method: str, detail: str, doubt: str, own: float, least: float = 0.0) -> Estimate:
     """An estimate held below the residual's own RMS; by how much it had to be is an error of it."""
     if rms > own:
         rms, std = own, math.hypot(std, rms - own)
-    return Estimate(rms, std, method, detail, doubt, own)
+    return Estimate(rms, std, method, detail, doubt, own, min(least, own))
 
 
 def _columns(residual, joint: int, use) -> list[np.ndarray] | None:
@@ -168,8 +172,3 @@ def _shared(q, step, use, memory: dict) -> _Shared:
         memory[key] = _Shared(runs, motion, bandwidth_of(runs) if runs else 0.0, periods)
     return memory[key]
 
-
-def _bridged(values: np.ndarray, kept: np.ndarray) -> np.ndarray:
-    from .stretches import bridged
-
-    return bridged(values, kept)

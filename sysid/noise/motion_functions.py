@@ -67,7 +67,7 @@ class Functions:
         self.most = int(0.5 * bandwidth * seconds)  # leaves three quarters of the band's freedom
         # noise far above the band would hide what is in it
         self.thin = [max(1, int(1.0 / (r.step * _FUNCTION_RATE * bandwidth))) for r in runs]
-        self.motion = _motion(runs, at, predicted, joint)
+        self.motion = _motion(runs, at, predicted, joint, self.thin)
         centres = [
             rows.start + m // 2 + m * np.arange(len(run.q) // m)
             for rows, m, run in zip(at.rows, self.thin, runs)
@@ -86,7 +86,8 @@ class Functions:
             return y, 0, 0.0
         block = lambda v, m: v[: len(v) // m * m].reshape(-1, m).mean(1)  # noqa: E731
         weight = np.concatenate([block(k.astype(float), m) for k, m in zip(kept, self.thin)])
-        target = np.concatenate([block(v, m) for v, m in zip(y, self.thin)])
+        target = np.concatenate([block(v * k, m) for v, k, m in zip(y, kept, self.thin)])
+        target /= np.maximum(weight, _TINY)
         waves = _ripples(self.coarse.q[:, self.joint], target * weight)
         x = np.stack([f() for f in functions(self.coarse, self.joint, waves)], axis=1)
         root = np.sqrt(weight)[:, None]
@@ -121,7 +122,7 @@ def _pursuit(x: np.ndarray, target: np.ndarray, most: int) -> tuple[list[int], n
     return chosen, np.linalg.solve(gram[np.ix_(chosen, chosen)], product[chosen])
 
 
-def _motion(runs: list[Run], at: Kinematics, predicted: list[np.ndarray], joint: int) -> Motion:
+def _motion(runs: list[Run], at: Kinematics, predicted, joint: int, thin: list[int]) -> Motion:
     own = at.q[:, joint]
     span = float(np.ptp(own)) or 1.0
     speed = math.sqrt(float(np.mean(at.v[:, joint] ** 2))) or 1.0
@@ -134,7 +135,7 @@ def _motion(runs: list[Run], at: Kinematics, predicted: list[np.ndarray], joint:
         return np.concatenate(parts)
 
     lagging = [
-        np.concatenate([_lagging(run.q[:, joint], share * span) for run in runs])
+        np.concatenate([_lagging(run.q[:, joint], share * span, m) for run, m in zip(runs, thin)])
         for share in (0.01, 0.03, 0.1)
     ]
     # delays that are the same number of samples are one
@@ -190,10 +191,11 @@ def _ripples(q: np.ndarray, residual: np.ndarray) -> np.ndarray:
     return 2.0 * math.pi / (8.0 * span) * peaks[np.argsort(-power[peaks])[:_RIPPLES]]
 
 
-def _lagging(q: np.ndarray, distance: float) -> np.ndarray:
-    """The sign of motion (n,) as friction takes it up over a distance after each reversal. Source: Dahl 1968."""
-    out, state = [], 0.0
-    for moved in (np.diff(q, prepend=q[0]) / distance).tolist():
+def _lagging(q: np.ndarray, distance: float, thin: int) -> np.ndarray:
+    """The sign of motion (n,) as friction takes it up over a distance after each reversal, straight between every `thin`
+    samples. Source: Dahl 1968."""
+    out, state, every = [], 0.0, q[::thin]
+    for moved in (np.diff(every, prepend=every[0]) / distance).tolist():
         state = (state + moved) / (1.0 + abs(moved))
         out.append(state)
-    return np.array(out)
+    return np.interp(np.arange(len(q)), thin * np.arange(len(every)), out)

@@ -9,11 +9,14 @@ import math
 
 import numpy as np
 
-from .stretches import bridged
+from .stretches import Run, bridged, moving
 
 _OUTLYING = 5.0  # robust standard deviations: a Gaussian does that once in two million
 _SHARE = 0.25  # of the quickest period of the motion: beyond it misfit is no burst
 _MOST = 0.25  # of the rows; where more stand out, they are no exception
+# Reversals: share of its rms speed below which a joint is slow, of the time it may be, and the ratio of mean
+# squares, slow over fast, that noise does not have.
+_SLOW, _MOST_SLOW, _LARGER = 0.12, 0.25, 2.0
 _NORMAL = 0.6745  # median of a standard Gaussian's absolute value
 
 
@@ -56,3 +59,20 @@ def _step(values: np.ndarray, counts: np.ndarray, width: int) -> np.ndarray:
         whole = number[2 * width :] - number[: -2 * width]
         out[whole < 1.5 * width] = np.nan
     return out
+
+
+def away_from_reversals(runs: list[Run], v: np.ndarray, values: list[np.ndarray], kept: list[np.ndarray]):
+    """Which rows (n,) of each run are kept where those about any joint's reversals, `v` (n, dof) its speed, are left out if
+    the residual is much larger there. Sticking lasts a hundredth of the time and can hold most of the misfit."""
+    square, counts = np.concatenate(values) ** 2, np.concatenate(kept)
+    slowness = np.abs(v) / np.sqrt(np.mean(v**2, axis=0) + 1e-300)
+    left = counts.copy()
+    for k in np.flatnonzero(moving(np.concatenate([run.q for run in runs]))):
+        slow, fast = counts & (slowness[:, k] < _SLOW), counts & (slowness[:, k] >= _SLOW)
+        if not 0 < slow.sum() < _MOST_SLOW * counts.sum():
+            continue
+        fewer = left & fast
+        if square[slow].mean() > _LARGER * square[fast].mean() and fewer.sum() > 0.6 * counts.sum():
+            left = fewer
+    ends = np.cumsum([len(k) for k in kept])[:-1]
+    return [a if a.sum() > 2 else b for a, b in zip(np.split(left, ends), kept)]
