@@ -103,6 +103,20 @@ def test_two_repeats_suffice_and_drift_with_time_is_no_noise():
     assert result.method == "repeats" and result.rms == pytest.approx(e.std(), rel=0.05)
 
 
+def test_repeats_are_found_across_rows_that_do_not_count():
+    """Standstill parts the log into pieces shorter than a period."""
+    rng, step = np.random.default_rng(16), 0.008
+    q = periodic(30.0, step, 0.2137, rng)
+    e, speed = 0.3 * coloured(len(q), step, rng), np.abs(np.gradient(q[:, 1], step))
+    use = (speed > 0.15 * speed.std()) & holes(len(q), rng)
+    residual = np.zeros_like(q)
+    residual[:, 1] = e + 0.6 * load_friction(q, step) / load_friction(q, step).std() + np.where(use, 0.0, 1e3)
+    q[~use] = 77.0
+    result = floor([residual], [torque(q, step)], [q], [step], 1, use=[use])
+    assert result.method == "repeats" and "period of 4.679 s found, 6 repeats" in result.detail
+    assert result.rms == pytest.approx(e[use].std(), rel=0.1)
+
+
 def test_repeats_serve_a_model_that_is_nonsense():
     rng, step = np.random.default_rng(4), 0.004
     q = periodic(30.0, step, 0.2, rng)

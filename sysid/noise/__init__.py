@@ -1,7 +1,9 @@
-"""The noise floor of a joint's torque: the RMS [N m or N] that a perfect model would leave, found without a perfect model.
+"""The noise floor of a joint's torque: the RMS [N m or N] that a perfect model would leave, found
+without a perfect model.
 
     stretches.py         the rows that count, as contiguous runs; the bandwidth of the motion
-    motion_functions.py  what plain functions of the motion explain is taken off the residual
+    motion_functions.py  plain functions of the motion, of which missing effects are made
+    pursuit.py           what they explain is taken off the residual
     outliers.py          spikes, bursts and what friction leaves about reversals are taken out
     repeats.py           noise as the scatter between repeats of the motion
     spectrum.py          noise from the spectrum of the rest, weighed over models of its colour

@@ -1,8 +1,10 @@
-"""Rows of a residual that no noise makes: spikes, bursts, and what friction's jump leaves about reversals.
+"""Rows of a residual that no noise makes: spikes, bursts, and what friction's jump leaves about
+reversals.
 
-Noise of any colour differs from one moment to the next as a Gaussian does, on every time scale. So means of L samples
-before and after each row are subtracted, for L from one sample to a share of the motion's quickest period; where the difference
-is an outlier among all of them, the rows are left out.
+Noise of any colour differs from one moment to the next as a Gaussian does, on every time scale. So
+means of L samples before and after each row are subtracted, for L from one sample to a share of the
+motion's quickest period; where the difference is an outlier among all of them, the rows are left
+out.
 """
 
 import math
@@ -14,8 +16,8 @@ from .stretches import Run, bridged, moving
 _OUTLYING = 5.0  # robust standard deviations: a Gaussian does that once in two million
 _SHARE = 0.25  # of the quickest period of the motion: beyond it misfit is no burst
 _MOST = 0.25  # of the rows; where more stand out, they are no exception
-# Reversals: share of its rms speed below which a joint is slow, of the time it may be, and the ratio of mean
-# squares, slow over fast, that noise does not have.
+# Reversals: share of its rms speed below which a joint is slow, of the time it may be, and the
+# ratio of mean squares, slow over fast, that noise does not have.
 _SLOW, _MOST_SLOW, _LARGER = 0.12, 0.25, 2.0
 _NORMAL = 0.6745  # median of a standard Gaussian's absolute value
 
@@ -48,7 +50,8 @@ def without(values: list[np.ndarray], kept: list[np.ndarray], steps: list[float]
 
 
 def _step(values: np.ndarray, counts: np.ndarray, width: int) -> np.ndarray:
-    """Mean of `width` samples less that of the `width` before them (n - 2 width + 1,), nan where a gap takes much of it."""
+    """Mean of `width` samples less that of the `width` before them (n - 2 width + 1,), nan where a
+    gap takes much of it."""
     if len(values) < 2 * width + 1:
         return np.full(0, np.nan)
     total = np.concatenate([[0.0], np.cumsum(values)])
@@ -61,9 +64,12 @@ def _step(values: np.ndarray, counts: np.ndarray, width: int) -> np.ndarray:
     return out
 
 
-def away_from_reversals(runs: list[Run], v: np.ndarray, values: list[np.ndarray], kept: list[np.ndarray]):
-    """Which rows (n,) of each run are kept where those about any joint's reversals, `v` (n, dof) its speed, are left out if
-    the residual is much larger there. Sticking lasts a hundredth of the time and can hold most of the misfit."""
+def away_from_reversals(
+    runs: list[Run], v: np.ndarray, values: list[np.ndarray], kept: list[np.ndarray]
+) -> list[np.ndarray]:
+    """Which rows (n,) of each run are kept where those about any joint's reversals, `v` (n, dof)
+    its speed, are left out if the residual is much larger there. Sticking lasts a hundredth of the
+    time and can hold most of the misfit."""
     square, counts = np.concatenate(values) ** 2, np.concatenate(kept)
     slowness = np.abs(v) / np.sqrt(np.mean(v**2, axis=0) + 1e-300)
     left = counts.copy()

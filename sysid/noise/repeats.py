@@ -1,16 +1,18 @@
-"""Noise as the scatter between repeats of the motion, whatever its colour and whatever the model lacks.
+"""Noise as the scatter between repeats of the motion, whatever its colour and whatever the model
+lacks.
 
-Second differences over three repeats (first over two) leave out what drifts in step with time. Shifts are by whole
-samples, so that nothing is done to the noise.
+Second differences over three repeats (first over two) leave out what drifts in step with time.
+Shifts are by whole samples, so that nothing is done to the noise.
 """
 
 import math
 
 import numpy as np
 
-from .stretches import Run, moving
+from .stretches import moving
 
-# rms difference of each joint's positions, share of its range; and how far away it must have been in between
+# rms difference of each joint's positions, share of its range; and how far away it must have been
+# in between
 _TOLERANCE, _AWAY = 0.003, 0.05
 _BLOCKS = 30
 _INDEPENDENT = 1.94  # second differences of repeats per independent one
@@ -21,9 +23,10 @@ def scatter(signals, kept, periods) -> tuple[float, float] | None:
     """RMS of the noise and its standard error, None where nothing repeats.
 
     Args:
-        signals: several versions of the torque, (n,) of each run [N m or N]; each scatters by the noise or more.
-        kept: (n,) bool of each run, rows that count.
-        periods: [samples] of each run, or None.
+        signals: several versions of the torque, (n,) of each stretch [N m or N]; each scatters by
+            the noise or more.
+        kept: (n,) bool of each stretch, rows that count.
+        periods: [samples] of each stretch, or None.
     """
     found = []
     for values_of in signals:
@@ -55,25 +58,29 @@ def block_rms(squares: np.ndarray) -> tuple[float, float]:
     return rms, error / (2.0 * rms + _TINY)
 
 
-def period_of(run: Run) -> float | None:
-    """The samples, seldom whole, after which all joints come back, and have time to do so twice; None where they do not."""
-    q, n = run.q, len(run.q)
-    moves = moving(q)
-    if not moves.any():
+def period_of(q: np.ndarray, counts: np.ndarray) -> float | None:
+    """The samples, seldom whole, after which all joints come back, and have time to do so twice;
+    None where they do not.
+
+    Args:
+        q: (n, dof) positions [rad or m].
+        counts: (n,) bool, rows that count.
+    """
+    if counts.sum() < _BLOCKS or not (moves := moving(q[counts])).any():
         return None
-    x = (q[:, moves] - q[:, moves].mean(0)) / np.ptp(q[:, moves], axis=0)
+    rows = np.flatnonzero(counts)
+    q, counts = q[rows[0] : rows[-1] + 1], counts[rows[0] : rows[-1] + 1]
+    n = len(q)
+    inside = q[counts][:, moves]
+    x = np.where(counts[:, None], (q[:, moves] - inside.mean(0)) / np.ptp(inside, axis=0), 0.0)
     lag = np.arange(n // 2 + 1)
-    spectrum = np.fft.rfft(x, 1 << (2 * n - 1).bit_length(), axis=0)
-    products = np.fft.irfft(np.abs(spectrum) ** 2, axis=0)[lag]
-    before = np.concatenate([np.zeros((1, x.shape[1])), np.cumsum(x**2, axis=0)])
-    # mean squares, each joint's
-    distance = (before[n - lag] + before[n] - before[lag] - 2.0 * products) / (n - lag)[:, None]
+    distance = _distance(x, counts, lag)
     worst = distance.max(axis=1)
     away = np.flatnonzero(worst > _AWAY**2)
     if not len(away):
         return None
     # in one sample: a period that ends between two is missed by some of it
-    moves = np.mean(np.diff(x, axis=0) ** 2, axis=0)
+    moves = np.mean(np.diff(x, axis=0)[counts[1:] & counts[:-1]] ** 2, axis=0)
     near = (distance < _TOLERANCE**2 + 0.25 * moves).all(axis=1)
     last = 0
     for first in np.flatnonzero(near & (lag > away[0])):
@@ -89,3 +96,20 @@ def period_of(run: Run) -> float | None:
         if abs(offset) <= 1.0 and (distance[last] - moves * offset**2 < _TOLERANCE**2).all():
             return last + offset
     return None
+
+
+def _distance(x: np.ndarray, counts: np.ndarray, lag: np.ndarray) -> np.ndarray:
+    """Mean square (lags, joints) of x (n, joints), zero where it does not count, less itself later;
+    infinite where fewer than a third of the rows meet rows that count."""
+    n, size = len(x), 1 << (2 * len(x) - 1).bit_length()
+    spectrum = np.fft.rfft(x, size, axis=0)
+    products = np.fft.irfft(np.abs(spectrum) ** 2, axis=0)[lag]
+    if counts.all():
+        before = np.concatenate([np.zeros((1, x.shape[1])), np.cumsum(x**2, axis=0)])
+        return (before[n - lag] + before[n] - before[lag] - 2.0 * products) / (n - lag)[:, None]
+    mask, square = np.fft.rfft(counts.astype(float), size), np.fft.rfft(x**2, size, axis=0)
+    meet = np.fft.irfft(np.abs(mask) ** 2)[lag]
+    both = np.fft.irfft(2.0 * (square * mask.conj()[:, None]).real, axis=0)[lag]
+    enough = meet > (n - lag) / 3.0
+    mean = (both - 2.0 * products) / np.maximum(meet, 1.0)[:, None]
+    return np.where(enough[:, None], mean, np.inf)

@@ -1,7 +1,8 @@
 """Noise from the spectrum of what is left of a residual.
 
-Above the motion's band it is noise; within it may hold misfit. The noise there is weighed over models of it (white, and
-white plus one coloured part), each band of frequencies being clean or misfit.
+Above the motion's band it is noise; within it may hold misfit. The noise there is weighed over
+models of it (white, and white plus one coloured part), each band of frequencies being clean or
+misfit.
 """
 
 import math
@@ -12,15 +13,17 @@ import numpy as np
 _BANDS_PER_OCTAVE = 6
 _MANY_RUNS = 8  # take little of the first ordinate with their common mean
 _INDEPENDENT = 1.94  # ordinates of a Hann-windowed periodogram per independent one
-# In bandwidths: from here up the residual is noise as it is, hum and all; up to here the noise's colour is fitted,
-# farther up says nothing about the band; and the corner about which a coloured part ceases to look like misfit.
+# In bandwidths: from here up the residual is noise as it is, hum and all; up to here the noise's
+# colour is fitted, farther up says nothing about the band; and the corner about which a coloured
+# part ceases to look like misfit.
 _SAFE, _FIT, _DOUBT = 10.0, 30.0, 5.0
 # most ordinates that a band counts for, below and above `_SAFE`: no noise is quite the model's
 _VOTE, _VOTE_FAR = 4.0, 60.0
 _FARTHEST = math.log(1e4)  # misfit may lift a band by any factor up to this
 _SLOWEST = 0.3  # Hz, corner of the slowest noise; slower is drift
-# Of what functions of the motion took off, for want of a better one; most chance that a coloured part is misfit; and the
-# relative error of the RMS as no noise is quite the model's: calibrated on simulated residuals, so that two standard errors
+# Of what functions of the motion took off, for want of a better one; most chance that a coloured
+# part is misfit; and the relative error of the RMS as no noise is quite the model's: calibrated on
+# simulated residuals, so that two standard errors
 # cover nine in ten.
 _LEFT_BEHIND, _MISTAKEN, _COLOURS = 0.015, 0.25, 0.03
 _TINY = 1e-300
@@ -28,8 +31,9 @@ _TINY = 1e-300
 
 @dataclass(frozen=True)
 class Spectrum:
-    """A residual in bands of frequency: centre and width [Hz], mean density [(N m)^2/Hz], independent ordinates, all (bands,).
-    The first band lies below what was looked at: no ordinates."""
+    """A residual in bands of frequency: centre and width [Hz], mean density [(N m)^2/Hz],
+    independent ordinates, all (bands,). The first band lies below what was looked at: no
+    ordinates."""
 
     centre: np.ndarray
     width: np.ndarray
@@ -39,8 +43,8 @@ class Spectrum:
 
 @dataclass(frozen=True)
 class Weighed:
-    """RMS of the noise, its standard error, RMS of what is noise in any case, words on its colour, and the largest part of
-    its error."""
+    """RMS of the noise, its standard error, RMS of what is noise in any case, words on its colour,
+    and the largest part of its error."""
 
     rms: float
     std: float
@@ -56,7 +60,8 @@ def spectrum_of(values: list[np.ndarray], kept: list[np.ndarray], steps: list[fl
         values: (n,) of each run, bridged where not `kept` (n,): what is bridged has no noise.
     """
     frequency, density = [], []
-    # the first ordinate holds the mean, which spreads to the second; over many runs little of it was taken off
+    # the first ordinate holds the mean, which spreads to the second; over many runs little of it
+    # was taken off
     first = 2 if len(values) < _MANY_RUNS else 1
     for y, k, step in zip(values, kept, steps):
         window = np.hanning(len(y) + 2)[1:-1]
@@ -79,8 +84,8 @@ def spectrum_of(values: list[np.ndarray], kept: list[np.ndarray], steps: list[fl
 
 
 def _lost(kept: np.ndarray, weight: np.ndarray, frequency: np.ndarray) -> np.ndarray | float:
-    """Share of the noise power that bridging gaps loses, at frequencies [1/sample]: all of it within the gap where that is long
-    against a period, none where it is short."""
+    """Share of the noise power that bridging gaps loses, at frequencies [1/sample]: all of it
+    within the gap where that is long against a period, none where it is short."""
     if kept.all():
         return 0.0
     edges = np.flatnonzero(np.diff(np.concatenate([[True], kept, [True]]).astype(np.int8)))
@@ -95,8 +100,9 @@ def _lost(kept: np.ndarray, weight: np.ndarray, frequency: np.ndarray) -> np.nda
 def weighed(spectrum: Spectrum, bandwidth: float, step: float, removed: float) -> Weighed:
     """Noise power, the mean over models of the noise by their posterior probability.
 
-    A band that holds misfit lies above the noise by any factor, evenly in its logarithm, and never below. A coloured part
-    with its corner near the motion's band looks like misfit, the more so the more misfit was found: `removed` [(N m)^2].
+    A band that holds misfit lies above the noise by any factor, evenly in its logarithm, and never
+    below. A coloured part with its corner near the motion's band looks like misfit, the more so the
+    more misfit was found: `removed` [(N m)^2].
     """
     from scipy.special import gammaln, ndtr
 
@@ -116,7 +122,8 @@ def weighed(spectrum: Spectrum, bandwidth: float, step: float, removed: float) -
     for _ in range(12):  # expectation-maximisation
         z = seen / (level[:, None] * shape)
         clean = np.log1p(-suspect) + weight * np.log(weight * z) - gammaln(weight) - weight * z
-        # the chance that clean ordinates would have come out lower than this (Wilson & Hilferty 1931)
+        # the chance that clean ordinates would have come out lower than this (Wilson & Hilferty
+        # 1931)
         lower = ndtr(3.0 * np.sqrt(count) * (np.cbrt(z) - 1.0 + 1.0 / (9.0 * count)))
         lifted = np.log(suspect / _FARTHEST) + np.log(lower + _TINY)
         share = looked / (1.0 + np.exp(np.clip(lifted - clean, -500.0, 500.0)))
@@ -132,7 +139,8 @@ def weighed(spectrum: Spectrum, bandwidth: float, step: float, removed: float) -
     near = f <= _SAFE * bandwidth
     doubtful = np.minimum((level[:, None] * coloured)[:, near] @ width[near], 0.98 * power)
     # the chance that it is misfit: the functions are many and rarely leave so much
-    doubt = _MISTAKEN * removed / (removed + doubtful + _TINY) / (1.0 + (corner / (_DOUBT * bandwidth)) ** 2)
+    doubt = _MISTAKEN * removed / (removed + doubtful + _TINY)
+    doubt /= 1.0 + (corner / (_DOUBT * bandwidth)) ** 2
     estimate = power - doubt * doubtful
     mean = float(chance @ estimate)
     spread = (estimate - mean) ** 2 + doubt * (1.0 - doubt) * doubtful**2
@@ -142,7 +150,8 @@ def weighed(spectrum: Spectrum, bandwidth: float, step: float, removed: float) -
         "the misfit is much larger than the noise": min(_LEFT_BEHIND * removed, mean) ** 2,
     }
     best = 1 + int(np.argmax(chance[1:]))
-    colour = "white" if chance[0] > 0.5 else f"white plus a coloured part with a corner of {corner[best]:.2g} Hz"
+    colour = f"white plus a coloured part with a corner of {corner[best]:.2g} Hz"
+    colour = "white" if chance[0] > 0.5 else colour
     rms = math.sqrt(mean)
     least = math.sqrt(float(seen[~near] @ width[~near]))
     std = math.sqrt(sum(parts.values())) / (2.0 * rms)
@@ -150,12 +159,15 @@ def weighed(spectrum: Spectrum, bandwidth: float, step: float, removed: float) -
 
 
 def _models(f: np.ndarray, bandwidth: float, step: float) -> tuple[np.ndarray, np.ndarray]:
-    """Corner [Hz] (models,) and spectrum of the coloured part over the white one (models, bands); the first has none."""
+    """Corner [Hz] (models,) and spectrum of the coloured part over the white one (models, bands);
+    the first has none."""
     # heights are at the band's edge
     corners = np.geomspace(max(_SLOWEST, f[1]), max(0.6 * f[-1], 2.0 * _SLOWEST), 30)
     heights = np.geomspace(0.2, 1e4, 14)
     corner, height = (x.ravel()[:, None] for x in np.meshgrid(corners, heights))
     keep = np.exp(-2.0 * math.pi * corner * step)
-    first_order = lambda at: 1.0 / (1.0 - 2.0 * keep * np.cos(2.0 * math.pi * at * step) + keep**2)  # noqa: E731
+    turn = 2.0 * math.pi * step
+    first_order = lambda at: 1.0 / (1.0 - 2.0 * keep * np.cos(turn * at) + keep**2)  # noqa: E731
     coloured = height * first_order(f) / first_order(max(bandwidth, f[1]))
-    return np.concatenate([[np.inf], corner[:, 0]]), np.concatenate([np.zeros((1, len(f))), coloured])
+    none = np.zeros((1, len(f)))
+    return np.concatenate([[np.inf], corner[:, 0]]), np.concatenate([none, coloured])

@@ -1,7 +1,7 @@
 """The rows of a log that count, as contiguous runs, and the bandwidth of their motion.
 
-A gap shorter than a twentieth of the motion's period is bridged, as the motion hardly bends meanwhile; any other one
-parts two runs. What stands in a gap is never looked at.
+A gap shorter than a twentieth of the motion's period is bridged, as the motion hardly bends
+meanwhile; any other one parts two runs. What stands in a gap is never looked at.
 """
 
 import math
@@ -21,8 +21,8 @@ _TINY = 1e-300
 class Run:
     """Contiguous samples that count for a joint, but for bridged gaps.
 
-    stretch, rows: where they stand. counts (n,) bool: False in a bridged gap. q (n, dof) [rad or m], bridged by straight
-    lines. step [s]. time (n,): from 0 to 1 over the stretch.
+    stretch, rows: where they stand. counts (n,) bool: False in a bridged gap. q (n, dof) [rad or
+        m], bridged by straight lines. step [s]. time (n,): from 0 to 1 over the stretch.
     """
 
     stretch: int
@@ -109,8 +109,8 @@ def _straight(values: np.ndarray, counts: np.ndarray) -> np.ndarray:
 
 
 def bridged(values: np.ndarray, counts: np.ndarray) -> np.ndarray:
-    """Values (n,) with straight lines across gaps, between means of as many samples as the gap has on either side: the noise of
-    single samples must not stretch over a gap."""
+    """Values (n,) with straight lines across gaps, between means of as many samples as the gap has
+    on either side: the noise of single samples must not stretch over a gap."""
     if counts.all():
         return values
     kept = values[counts]
@@ -128,6 +128,14 @@ def bridged(values: np.ndarray, counts: np.ndarray) -> np.ndarray:
     rows = np.flatnonzero(~counts)
     share = (rows - first[gap] + 0.5) / length[gap]
     out[rows] = kept.mean() + left[gap] + (right - left)[gap] * share
+    return out
+
+
+def whole(runs: list[Run], values: list[np.ndarray], lengths: list[int]) -> list[np.ndarray]:
+    """Values (n,) of runs in their stretches, zero or False elsewhere."""
+    out = [np.zeros(n, dtype=values[0].dtype) for n in lengths]
+    for run, x in zip(runs, values):
+        out[run.stretch][run.rows] = x
     return out
 
 
