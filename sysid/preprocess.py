@@ -15,6 +15,7 @@ import numpy as np
 
 from .config import PreprocessSpec
 from .errors import ConfigError, LogError, SysidWarning
+from .events import Event, mended, usable
 from .log import Log, Segment
 
 # `standstill: mask` leaves a joint's rows out below this share of its own rms speed, at most 0.03 rad/s or m/s:
@@ -163,12 +164,15 @@ class Motion:
     """What identification works on: pieces of motion of the same joints.
 
     still: joints that never move. standing (dof,): share of the rows that count in which a joint stands still.
+    events: what disturbed the logs; `left_out` the share of all joints' rows that is left out for it.
     """
 
     joints: tuple[str, ...]
     pieces: tuple[Piece, ...]
     still: tuple[str, ...]
     standing: np.ndarray
+    events: tuple[Event, ...] = ()
+    left_out: float = 0.0
 
     @property
     def samples(self) -> int:
@@ -191,17 +195,20 @@ def prepare(logs: Sequence[Log], spec: PreprocessSpec, joints: tuple[str, ...]) 
     for number, log in enumerate(logs):
         before = len(pieces)
         for segment in log.segments:
-            if (piece := _piece(number, segment, spec)) is not None:
-                pieces.append(replace(piece, source=log.name))
+            clean = replace(segment, tau=mended(segment, log.events, joints)) if log.events else segment
+            if (piece := _piece(number, clean, spec)) is not None:
+                own = replace(piece, source=log.name)
+                pieces.append(without_events(own, log.events, joints, *_reaches(spec, segment.step)) if log.events else own)
         if len(pieces) == before:
             shortest = _needs(spec, log.segments[0].step) if log.segments else 2
             raise LogError(f"{log.samples} samples are fewer than the filter's window of {shortest}", where=str(log.path), do="give a longer log or narrow preprocess.window")
         if dropped := len(log.segments) - (len(pieces) - before):
             warnings.warn(SysidWarning(f"{log.path}: {dropped} segment(s) shorter than the filter's window were left out"), stacklevel=2)
+    left_out = share_left_out(pieces)
     if spec.standstill != "keep":
         threshold = standstill_speed(pieces) if spec.standstill == "mask" else spec.standstill
         pieces = [without_standstill(piece, threshold, 0 if piece.smoother is None else piece.smoother.reach) for piece in pieces]
-    return assembled(joints, pieces)
+    return replace(assembled(joints, pieces), events=tuple(event for log in logs for event in log.events), left_out=left_out)
 
 
 def assembled(joints: tuple[str, ...], pieces: Sequence[Piece]) -> Motion:
@@ -211,6 +218,8 @@ def assembled(joints: tuple[str, ...], pieces: Sequence[Piece]) -> Motion:
     noise = np.max([piece.noise for piece in pieces], axis=0)
     never = travel < np.maximum(_NEVER_MOVES, _NOISE_TRAVEL * noise)
     still = tuple(joint for joint, stays in zip(joints, never) if stays)
+    if any(piece.use is not None for piece in pieces):
+        pieces = [replace(p, use=np.ones(p.q.shape, dtype=bool)) if p.use is None else p for p in pieces]
     return Motion(joints, tuple(replace(piece, rest=rest) for piece in pieces), still, standing(pieces))
 
 
@@ -243,6 +252,27 @@ def _piece(number: int, segment: Segment, spec: PreprocessSpec) -> Piece | None:
     )  # fmt: skip
 
 
+def _reaches(spec: PreprocessSpec, step: float) -> tuple[float, float]:
+    """Seconds to either side that a row sees of the angles and of the torque; a filtered column sees filtered angles."""
+    reach = Smoother(spec, step).reach * step
+    both = spec.torque == "same" and spec.filter != "none"
+    return (2.0 * reach, reach) if both else (reach, 0.0)
+
+
+def without_events(piece: Piece, events: Sequence[Event], joints: Sequence[str], angles: float, torque: float) -> Piece:
+    """The piece without the rows that its log's events reach, whose angles and torque were seen over so many seconds to either side."""
+    use = usable(piece.t, joints, events, angles=angles, torque=torque)
+    if piece.use is not None:
+        use &= piece.use
+    return piece if use.all() else replace(piece, use=use)
+
+
+def share_left_out(pieces: Sequence[Piece]) -> float:
+    """The share of all joints' rows that does not count."""
+    lost = sum(0 if p.use is None else np.sum(~p.use[p.core]) for p in pieces)
+    return float(lost / sum(p.samples * p.q.shape[1] for p in pieces))
+
+
 def without_standstill(piece: Piece, threshold, reach: int) -> Piece:
     """The piece without the rows where a joint is slower than its threshold (dof,) [rad/s or m/s], or within `reach` rows of one.
 
@@ -252,7 +282,8 @@ def without_standstill(piece: Piece, threshold, reach: int) -> Piece:
     count = np.cumsum(np.concatenate([np.zeros((1, still.shape[1])), still]), axis=0)
     rows = np.arange(len(still))
     low, high = np.maximum(rows - reach, 0), np.minimum(rows + reach + 1, len(still))
-    return replace(piece, use=count[high] == count[low])
+    use = count[high] == count[low]
+    return replace(piece, use=use if piece.use is None else use & piece.use)
 
 
 def standstill_speed(pieces) -> np.ndarray:
