@@ -1,6 +1,7 @@
 """Is the missing effect found? Effects hidden in simulated robots, and what the diagnosis, told nothing, says of them.
 
     python scripts/blind_benchmark.py --seed 20261 --jobs 2                   # the whole benchmark
+    python scripts/blind_benchmark.py --seed 20261 --conditions nuisances     # on logs as labs have them; or sines, one a joint
     python scripts/blind_benchmark.py --cases small --seed 1                  # one case of each kind
     python scripts/blind_benchmark.py --seed 1 --only leg/stribeck            # cases whose key has these parts
     python scripts/blind_benchmark.py --seed 1 --only leg/stribeck/2 --verbose  # one case, told in full, its folder kept
@@ -36,7 +37,7 @@ import warnings
 import zlib
 from collections.abc import Callable
 from contextlib import contextmanager, nullcontext
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from unittest import mock
 
@@ -46,7 +47,9 @@ sys.path[:0] = [str(ROOT), str(HERE)]
 os.environ["PYTHONPATH"] = os.pathsep.join([str(ROOT), str(HERE), *filter(None, [os.environ.get("PYTHONPATH")])])  # of the processes that --jobs starts
 
 import numpy as np  # noqa: E402
-from benchmark_parts.new_laws import NEW  # noqa: E402 - beside this script
+from benchmark_parts import claims, conditions  # noqa: E402 - beside this script
+from benchmark_parts.claims import family, steps_on  # noqa: E402
+from benchmark_parts.new_laws import NEW  # noqa: E402
 from benchmark_parts.old_laws import OLD  # noqa: E402
 
 from sysid import config, loop, pipeline, results, terminal  # noqa: E402
@@ -106,7 +109,7 @@ class Case:
     """One simulation: what is hidden ({effect, joint, size}; outside the catalogue also `other`), and how it is logged.
 
     kind: one, two, outside or control. colour [s], encoder [bits], pace (of the robot's usual top speed): None is the
-    simulator's default. seed: the simulation's own.
+    simulator's default. seed: the simulation's own. nuisances: what more `simulate` is given.
     """
 
     key: str
@@ -117,10 +120,22 @@ class Case:
     colour: float | None = None
     encoder: int | None = None
     pace: float | None = None
+    nuisances: dict | None = None
 
 
-def cases(seed: int, which: str = "full") -> list[Case]:
-    """Every case of the benchmark, in an order in which each beginning is a fair sample. The small one is a subset."""
+def cases(seed: int, which: str = "full", under: str = "clean") -> list[Case]:
+    """Every case of the benchmark, in an order in which each beginning is a fair sample. The small one is a subset.
+
+    Args:
+        under: the conditions of the logs.
+    """
+    one, few = _clean(seed) if under == "clean" else _bothered(seed) if under == "nuisances" else _sines(seed)
+    chosen = one if which == "full" else few
+    order = np.random.default_rng([seed, 1]).permutation(len(chosen))
+    return [chosen[k] for k in order]
+
+
+def _clean(seed: int) -> tuple[list[Case], list[Case]]:
     one, few = [], []
     for n, effect in enumerate(EFFECTS):
         own = [_single(seed, robot if isinstance(robot, str) else robot[n % 2], effect, number) for number, robot in enumerate(SINGLES)]
@@ -141,9 +156,34 @@ def cases(seed: int, which: str = "full") -> list[Case]:
         own = [make(seed, robot, number) for number, robot in enumerate(robots)]
         one += own
         few += own[:: math.ceil(len(own) / most)]
-    chosen = one if which == "full" else few
-    order = np.random.default_rng([seed, 1]).permutation(len(chosen))
-    return [chosen[k] for k in order]
+    return one, few
+
+
+def _bothered(seed: int) -> tuple[list[Case], list[Case]]:
+    """About 200 cases of all kinds whose logs have nuisances."""
+    mark = conditions.MARKS["nuisances"]
+    own = [
+        _single(seed, robot if isinstance(robot, str) else robot[n % 2], effect, number, mark)
+        for n, effect in enumerate(EFFECTS)
+        for number, robot in enumerate(("planar", "leg", ("planar", "leg"), ("ur5", "panda")))
+    ]
+    for n, law in enumerate(OUTSIDE):
+        own += [_outside(seed, robot, law, number, mark) for number, robot in enumerate(("planar", ("leg", "ur5", "leg", "panda")[n % 4]))]
+    for counts, make in (({"planar": 10, "leg": 8, "ur5": 4, "panda": 2}, _pair), ({"planar": 20, "leg": 18, "ur5": 7, "panda": 5}, _control)):
+        robots = [robot for robot, count in counts.items() for _ in range(count)]
+        own += [make(seed, robot, number, mark) for number, robot in enumerate(robots)]
+    own = [replace(case, encoder=None, pace=None, nuisances=conditions.drawn(_rng(seed, f"{case.key}/nuisances"))[1]) for case in own]
+    return own, own[::5]
+
+
+def _sines(seed: int) -> tuple[list[Case], list[Case]]:
+    """60 cases of one large effect each, on the poorest of motions."""
+    places = [(effect, robot) for robot in ("planar", "leg") for effect in EFFECTS]
+    places += [(effect, ("ur5", "panda")[n % 2]) for n, effect in enumerate(EFFECTS[::2])]
+    # an odd number: the larger half of the sizes
+    own = [_single(seed, robot, effect, 1, conditions.MARKS["sines"]) for effect, robot in places]
+    own = [replace(case, nuisances={"motion": "sines"}) for case in own]
+    return own, own[::4]
 
 
 def _rng(seed: int, key: str) -> np.random.Generator:
@@ -168,22 +208,22 @@ def _joint(rng, robot: str, effect: str) -> str:
     return "*" if effect in ROBOT_WIDE else joint
 
 
-def _single(seed: int, robot: str, effect: str, number: int) -> Case:
-    key = f"{robot}/{effect}/{number}"
+def _single(seed: int, robot: str, effect: str, number: int, mark: str = "") -> Case:
+    key = f"{robot}/{effect}/{mark}{number}"
     rng = _rng(seed, key)
     return Case(key, robot, "one", ({"effect": effect, "joint": _joint(rng, robot, effect), "size": _size(rng, effect, number % 2)},), **_simulated(rng))
 
 
-def _outside(seed: int, robot: str, kind: str, number: int) -> Case:
-    key = f"{robot}/{kind}/{number}"
+def _outside(seed: int, robot: str, kind: str, number: int, mark: str = "") -> Case:
+    key = f"{robot}/{kind}/{mark}{number}"
     rng = _rng(seed, key)
     joint = _joint(rng, robot, kind)
     other = JOINTS[robot][(JOINTS[robot].index(joint) + 1 + int(rng.integers(len(JOINTS[robot]) - 1))) % len(JOINTS[robot])]
     return Case(key, robot, "outside", ({"effect": kind, "joint": joint, "size": _size(rng, kind, number % 2), "other": other},), **_simulated(rng))
 
 
-def _pair(seed: int, robot: str, number: int) -> Case:
-    key = f"{robot}/two/{number}"
+def _pair(seed: int, robot: str, number: int, mark: str = "") -> Case:
+    key = f"{robot}/two/{mark}{number}"
     rng = _rng(seed, key)
     together = number % 2 == 0  # on one joint
     while True:
@@ -198,8 +238,8 @@ def _pair(seed: int, robot: str, number: int) -> Case:
     return Case(key, robot, "two", tuple(hidden), **_simulated(rng))
 
 
-def _control(seed: int, robot: str, number: int) -> Case:
-    key = f"{robot}/control/{number}"
+def _control(seed: int, robot: str, number: int, mark: str = "") -> Case:
+    key = f"{robot}/control/{mark}{number}"
     rng = _rng(seed, key)
     bits = (None, None, 12, 10) if robot == "leg" else (None, None, 20, 17, 15)  # of the leg's motors, of the other robots' joints
     return Case(
@@ -257,7 +297,8 @@ def one(case: dict, keep: str | None = None) -> dict:
 
 
 def _conditions(case: Case) -> dict:
-    return {"seed": case.seed, "duration": SECONDS[case.robot], "rate": RATE[case.robot], "colour": case.colour, "encoder": case.encoder, "pace": case.pace}
+    usual = {"seed": case.seed, "duration": SECONDS[case.robot], "rate": RATE[case.robot], "colour": case.colour, "encoder": case.encoder, "pace": case.pace}
+    return usual | ({"nuisances": case.nuisances} if case.nuisances else {})
 
 
 @contextmanager
@@ -294,6 +335,7 @@ def _one(case: Case, folder: Path, found: dict, stage: list[str]) -> None:
     experiment, machine = timed("simulate", lambda: experiment_of(case.robot, folder))
     options = {"seed": case.seed, "duration": SECONDS[case.robot], "rate": RATE[case.robot], "colour": case.colour, "encoder": case.encoder}
     options["speed"] = None if case.pace is None else case.pace * float(motion.top_speeds(machine).max())
+    options |= case.nuisances or {}
     plain = None
     if case.kind in ("one", "outside"):  # the same logs without it
         plain = timed("simulate", lambda: _simulate(machine, [], options)[0])
@@ -331,16 +373,18 @@ def _one(case: Case, folder: Path, found: dict, stage: list[str]) -> None:
         discovery = timed("discover", lambda: loop.discover(blind, folder / "run", most=MOST_STEPS))
     first = json.loads(json.dumps(document(said[0])))
     found["rms"]["before"], found["rms"]["after"] = rms(discovery.fits[0]), rms(discovery.fits[-1])
-    found["floors"] = {joint: entry["noise_floor"] for joint, entry in first["joints"].items()}
+    found["floors"] = {joint: entry.get("noise_floor") for joint, entry in first["joints"].items()}
+    found["noise_seen"] = timed("noise", lambda: conditions.noise_seen(simulation, discovery.fits[0], folder))
+    found["events"] = {name: len(log["events"]) for name, log in simulation.truth["logs"].items()}
     found["verdict"] = [
         {k: v for k, v in entry.items() if k != "depends_on"} | {"depends_on": [d["variable"] for d in entry.get("depends_on", [])][:3]} for entry in first["verdict"]
     ]
     found["findings"] = [
-        {"effect": f["effect"], "joint": f["joint"], "tied_with": f["tied_with"], "step": f["joins_as_step"], "removed": f["misfit_removed"], "visible": f["visible"],
-         "parameters": {name: p["value"] for name, p in f["parameters"].items()}}
+        {"effect": f["effect"], "joint": f["joint"], "tied_with": f.get("tied_with", []), "step": f.get("joins_as_step"), "removed": f.get("misfit_removed"),
+         "visible": f.get("visible"), "probability": f.get("probability"), "parameters": {name: p["value"] for name, p in f.get("parameters", {}).items()}}
         for f in first["findings"]
     ]  # fmt: skip
-    unseen = {(entry["effect"], entry["joint"]) for entry in first["not_visible"]}
+    unseen = {(entry["effect"], entry["joint"]) for entry in first.get("not_visible", [])}
     found["said_not_visible"] = [(h["effect"], h["joint"]) in unseen for h in found["hidden"]]
     found["added"] = [[step["added"], step["joint"]] for step in discovery.steps[1:]]
     found["refused"] = [[entry["effect"], entry["joint"]] for entry in discovery.refused]
@@ -399,23 +443,13 @@ WITHIN = 0.05  # of the true model's held-out RMS
 EXPLAINED = 0.80  # of the misfit
 NAMED = ("alone", "head of family")
 #: what can become of a hidden effect, best first
-CATEGORIES = (*NAMED, "in family, not head", "named among also", "wrong", "unknown", "missed", "error")
+CATEGORIES = (*NAMED, "in family, not head", "named among also", "wrong", "unknown", "unresolved", "missed", "error")
 MEANS = {
     "alone": "the verdict on its joint is this effect, tied with none", "head of family": "the verdict, and tied with others",
     "in family, not head": "tied with the verdict, which is another", "named among also": "a later step on the joint, after a wrong one",
-    "wrong": "the verdict is another effect", "unknown": "structure that nothing explains", "missed": "the joint is called complete", "error": "a crash",
+    "wrong": "the verdict is another effect", "unknown": "structure that nothing explains",
+    "unresolved": "error above the floor, and the log does not say why", "missed": "the joint is called complete", "error": "a crash",
 }  # fmt: skip
-
-
-def steps_on(record: dict, joint: str) -> list[dict]:
-    """The effects that the first diagnosis says are missing on a joint, with their families, in its order."""
-    (verdict,) = [v for v in record["verdict"] if v["joint"] == joint]
-    if verdict["status"] != "missing":
-        return []
-    words = (verdict["effect"], *verdict["also"])
-    steps = sorted((f for f in record["findings"] if f["step"] is not None), key=lambda f: f["step"])
-    own = [f for f in steps if f["joint"] == joint or (f["joint"] == "*" and f["effect"] in words)]
-    return own or [{"effect": verdict["effect"], "joint": joint, "tied_with": verdict["tied_with"], "step": 1}]
 
 
 def category(record: dict, effect: str, joint: str, others: set[str]) -> tuple[str, str]:
@@ -436,6 +470,8 @@ def category(record: dict, effect: str, joint: str, others: set[str]) -> tuple[s
         return ("named among also" if any(effect in (s["effect"], *s["tied_with"]) for s in later) else "wrong"), head["effect"]
     if any(effect in s["tied_with"] for s in steps):
         return "in family, not head", steps[0]["effect"]
+    if verdict["status"] in ("unresolved", "explained"):  # explained: by an effect of another joint's equation
+        return ("unresolved" if verdict["status"] == "unresolved" else "missed"), verdict["status"]
     return ("unknown", "unknown") if verdict["status"] == "unknown" or (steps and "share_left" in verdict) else ("missed", "complete")
 
 
@@ -474,8 +510,10 @@ def score(record: dict) -> list[dict]:
             removed = (rms["before"][joint] ** 2 - rms["after"][joint] ** 2) / misfit if misfit > 0 else None
             (verdict,) = [v for v in record["verdict"] if v["joint"] == joint]
             status = verdict["status"]
-            called = {"unknown": "unknown", "complete": "missed"}.get(status, "explained" if removed is not None and removed >= EXPLAINED else "wrong")
+            called = {"unknown": "unknown", "unresolved": "unresolved", "complete": "missed"}.get(status, "explained" if removed is not None and removed >= EXPLAINED else "wrong")
             row |= {"category": called, "named": verdict.get("effect") or status, "removed": removed, "admits": "share_left" in verdict}
+        steps = steps_on(record, joint)
+        row["said"] = [[step["effect"], *step["tied_with"]] for step in steps]
         rows.append(row)
     return rows
 
@@ -496,8 +534,8 @@ def share(successes: int, count: int) -> dict:
     return {"count": successes, "of": count, "share": successes / count if count else None, "low": low, "high": high}
 
 
-def summary(records: list[dict]) -> dict:
-    """Everything that the page says, from the records."""
+def summary(records: list[dict], under: str = "clean") -> dict:
+    """Everything that the page says, from the records made under some conditions."""
     rows = [row for record in records for row in score(record)]
     known = [r for r in rows if r["kind"] in ("one", "two") and r["effect"] not in ABSORBED]
     seen, unseen = [r for r in known if r["visible"]], [r for r in known if not r["visible"]]
@@ -507,23 +545,35 @@ def summary(records: list[dict]) -> dict:
     controls = [r for r in records if r["kind"] == "control"]
     failed = [r for r in records if r["error"] is not None]
     count = lambda of, key, *values: sum(r[key] in values for r in of)  # noqa: E731
-    accused = [r for r in controls if r["error"] is not None or any(v["status"] == "missing" for v in r["verdict"])]
+    accused = [r for r in controls if r["error"] is not None or any(v["status"] in ("missing", "explained") for v in r["verdict"])]
     unknown = [r for r in controls if r["error"] is None and any(v["status"] == "unknown" for v in r["verdict"])]
     named = [r for r in seen if r["category"] in NAMED]
     whole = [r for r in rows if r["category"] != "error"]
+    unresolved = [r for r in controls if r["error"] is None and any(v["status"] == "unresolved" for v in r["verdict"])]
+    at_peace = [r for r in controls if r not in accused and r not in unknown]
+    said = claims.counts(records)
+    sets = [r for r in seen if r.get("said")]
+    held = [r for r in sets if any(r["effect"] in words for words in r["said"])]
+    ask = _ASKED[under]
     bars = [
-        _bar("cases", f"cases, controls included ({len(records) - len(controls)} with something hidden)", len(records), 300),
-        _bar("controls", "controls", len(controls), 100),
-        _bar("named", "visible effects named, alone or at the head of a family", share(len(named), len(seen)), 0.90),
-        _bar("alone", "visible effects named alone", share(count(seen, "category", "alone"), len(seen)), 0.80),
-        _bar("controls accused", "controls with any accusation", share(len(accused), len(controls)), 0.05, most=True),
+        _bar("cases", f"cases, controls included ({len(records) - len(controls)} with something hidden)", len(records), ask["cases"]),
+        _bar("controls", "controls", len(controls), ask["controls"]),
+        _bar("named", "visible effects named, alone or at the head of a family", share(len(named), len(seen)), ask["named"]),
+        _bar("alone", "visible effects named alone", share(count(seen, "category", "alone"), len(seen)), ask["alone"]),
+        _bar("false claims", "claims of the first verdict that are not there, of all claims", share(*said["false claims"]), ask["false"], most=True),
+        _bar("sets", "visible effects in the set (or family) of a verdict that names something on their joint", share(len(held), len(sets)), 0.87),
+        _bar("controls accused", "controls with any accusation", share(len(accused), len(controls)), ask["accused"], most=True),
+        _bar("controls unknown", "controls called unknown", share(len(unknown), len(controls)), ask["unknown"], most=True),
+        _bar("controls at peace", "controls neither accused nor unknown", share(len(at_peace), len(controls)), ask["at peace"]),
+        _bar("floors", "joints whose noise floor is within 25 % of the true noise, or null", share(*said["floors"]), 0.90),
         _bar("after discover", "named cases whose held-out RMS after discover is within 5 % of the true model's", share(sum(r["within"] for r in named), len(named)), 0.90),
         *(
             _bar(name, f"visible effects outside the catalogue, {says}, called unknown, or explained by 80 %",
                  share(count(own, "category", "unknown", "explained"), len(own)), bound)
             for name, says, laws, bound in _LAWS for own in [[r for r in out_seen if r["effect"] in laws]]
         ),
-    ]
+    ]  # fmt: skip
+    bars = [bar for bar in bars if bar["bound"] is not None]
     table = lambda of: {c: count(of, "category", c) for c in CATEGORIES}  # noqa: E731
     seconds = {robot: [r["seconds"]["all"] for r in records if r["robot"] == robot] for robot in JOINTS}
     return {
@@ -535,12 +585,18 @@ def summary(records: list[dict]) -> dict:
         "effects": {e: {"hidden": count(known, "effect", e), **table([r for r in seen if r["effect"] == e])} for e in EFFECTS},
         "absorbed": {e: table([r for r in absorbed if r["effect"] == e]) for e in ABSORBED},
         "outside": {
-            kind: {"hidden": count(outside, "effect", kind), "visible": len(own), **{c: count(own, "category", c) for c in ("unknown", "explained", "wrong", "missed", "error")},
+            kind: {"hidden": count(outside, "effect", kind), "visible": len(own), **{c: count(own, "category", c) for c in ("unknown", "explained", "wrong", "unresolved", "missed", "error")},
                    "admits": sum(bool(r.get("admits")) and r["category"] == "wrong" for r in own)}
             for kind in OUTSIDE for own in [[r for r in out_seen if r["effect"] == kind]]
         },
-        "controls": {"accused": share(len(accused), len(controls)), "unknown": share(len(unknown), len(controls)), "unknown_joints": share(
-            *(sum(v["status"] in said for r in controls for v in r.get("verdict", [])) for said in (("unknown",), ("unknown", "missing", "complete")))), "by_robot": {
+        "claims": {
+            "false": share(*said["false claims"]), "false_families_too": share(*said["false claims, families too"]), "list": said["false"],
+            "members": statistics.fmean(len(words) for r in sets for words in r["said"][:1]) if sets else None,
+        },
+        "floors": {"good": share(*said["floors"]), "null": share(*said["floors null"]), "ratio": said["ratios"]},
+        "controls": {"accused": share(len(accused), len(controls)), "unknown": share(len(unknown), len(controls)),
+            "unresolved": share(len(unresolved), len(controls)), "at_peace": share(len(at_peace), len(controls)), "unknown_joints": share(
+            *(sum(v["status"] in of for r in controls for v in r.get("verdict", [])) for of in (("unknown",), ("unknown", "missing", "complete", "explained", "unresolved")))), "by_robot": {
             robot: {"controls": count(controls, "robot", robot), "accused": count(accused, "robot", robot), "unknown": count(unknown, "robot", robot)} for robot in JOINTS}},
         "by_lowered": [
             {"from": low, "to": high, "named": share(sum(r["category"] in NAMED for r in own), len(own)), "alone": share(count(own, "category", "alone"), len(own)),
@@ -559,6 +615,12 @@ def summary(records: list[dict]) -> dict:
     }  # fmt: skip
 
 
+#: what is asked under each of the conditions; None: not asked
+_ASKED = {
+    "clean": {"cases": 300, "controls": 100, "named": 0.95, "alone": 0.87, "false": 0.03, "accused": 0.01, "unknown": 0.02, "at peace": 0.97},
+    "nuisances": {"cases": 200, "controls": 50, "named": 0.90, "alone": None, "false": 0.05, "accused": None, "unknown": None, "at peace": 0.95},
+    "sines": {"cases": 60, "controls": None, "named": None, "alone": None, "false": None, "accused": None, "unknown": None, "at peace": None},
+}
 _LAWS = (
     ("outside, old laws", "old laws (known while the method was tuned)", OLD, 0.80),
     ("outside, new laws", "new laws (no change of the method was made for them)", NEW, 0.85),
@@ -568,7 +630,7 @@ _LOWERED = (-1e9, 0.02, 0.05, 0.10, 0.20, 0.35, 0.50, 1.01)
 
 def _bar(name: str, says: str, reached, bound: float, most: bool = False) -> dict:
     value = reached if isinstance(reached, int) else reached["share"]
-    met = value is not None and (value <= bound if most else value >= bound)
+    met = value is not None and bound is not None and (value <= bound if most else value >= bound)
     return {"name": name, "says": says, "reached": reached, "bound": bound, "most": most, "met": met}
 
 
@@ -581,19 +643,19 @@ def confusion(rows: list[dict], controls: list[dict]) -> dict:
             table[row["effect"]][row["named"]] = table[row["effect"]].get(row["named"], 0) + 1
     for record in controls:
         for verdict in record.get("verdict", []):
-            named = verdict["effect"] if verdict["status"] == "missing" else verdict["status"]
+            named = verdict.get("effect") or verdict["status"]
             table["nothing"][named] = table["nothing"].get(named, 0) + 1
-    words = [*EFFECTS, *sorted({n for own in table.values() for n in own} - {*EFFECTS, "unknown", "complete", "error"}), "unknown", "complete", "error"]
+    words = [*EFFECTS, *sorted({n for own in table.values() for n in own} - {*EFFECTS, "unknown", "unresolved", "complete", "error"}), "unknown", "unresolved", "complete", "error"]
     return {"hidden": hidden, "named": words, "counts": [[table[h].get(n, 0) for n in words] for h in hidden]}
 
 
 # ---- figures
 
 _BLUE, _ORANGE, _GREEN, _RED, _GREY = "#0072B2", "#E69F00", "#009E73", "#D55E00", "#999999"
-_COLOURS = {"alone": _BLUE, "head of family": "#56B4E9", "in family, not head": _GREEN, "named among also": "#F0E442", "wrong": _RED, "unknown": _ORANGE, "missed": _GREY, "error": "black"}
+_COLOURS = {"alone": _BLUE, "head of family": "#56B4E9", "in family, not head": _GREEN, "named among also": "#F0E442", "wrong": _RED, "unknown": _ORANGE, "unresolved": "#CC79A7", "missed": _GREY, "error": "black"}
 
 
-def figures(found: dict, records: list[dict], out: Path) -> list[Path]:
+def figures(found: dict, records: list[dict], out: Path, name: str = "blind_benchmark") -> list[Path]:
     """Write the figures into a folder."""
     import matplotlib
 
@@ -605,8 +667,8 @@ def figures(found: dict, records: list[dict], out: Path) -> list[Path]:
     with matplotlib.rc_context(style):
         drawn = {"confusion": _draw_confusion(plt, found["confusion"]), "errors": _draw_errors(plt, found["rows"], records), "effects": _draw_effects(plt, found)}
         paths = []
-        for name, figure in drawn.items():
-            path = out / f"blind_benchmark_{name}.png"
+        for part, figure in drawn.items():
+            path = out / f"{name}_{part}.png"
             results.write_atomically(path, lambda p, f=figure: f.savefig(p, format="png"))
             plt.close(figure)
             paths.append(path)
@@ -719,6 +781,15 @@ def _table(heads: list[str], rows: list[list]) -> str:
     return "\n".join(lines + ["| " + " | ".join("·" if value == 0 and not isinstance(value, str) else str(value) for value in row) + " |" for row in rows])
 
 
+def _name(under: str) -> str:
+    return "blind_benchmark" + ("" if under == "clean" else f"_{under}")
+
+
+def _quantiles(values: list[float]) -> str:
+    low, middle, high = np.quantile(values, [0.05, 0.5, 0.95])
+    return f"median {middle:.2f}, 5 to 95 % {low:.2f} to {high:.2f}, largest {max(values):.2f}"
+
+
 def _listed(words) -> str:
     *most, last = (f"`{word}`" for word in words)
     return f"{', '.join(most)} and {last}"
@@ -726,9 +797,10 @@ def _listed(words) -> str:
 
 def page(found: dict, records: list[dict], settings: dict, notes: str = "") -> str:
     """The page of docs/, as Markdown."""
-    bars, cases_ = found["bars"], found["cases"]
+    bars, cases_, under = found["bars"], found["cases"], settings.get("conditions", "clean")
+    name, mark = _name(under), "" if under == "clean" else f" --conditions {under}"
     hidden = sum(n for kind, n in cases_.items() if kind != "control")
-    command = f"python scripts/blind_benchmark.py --cases {settings['cases']} --seed {settings['seed']}" + "".join(f" --only {w}" for w in settings["only"]) + (f" --limit {settings['limit']}" if settings["limit"] else "")
+    command = f"python scripts/blind_benchmark.py --cases {settings['cases']} --seed {settings['seed']}{mark}" + "".join(f" --only {w}" for w in settings["only"]) + (f" --limit {settings['limit']}" if settings["limit"] else "")
     met = [
         [b["says"], ("at most " if b["most"] else "at least ") + (f"{b['bound']}" if isinstance(b["reached"], int) else f"{100 * b['bound']:.0f} %"), b["reached"] if isinstance(b["reached"], int) else _percent(b["reached"]), "yes" if b["met"] else "**no**"]
         for b in bars
@@ -750,6 +822,7 @@ def page(found: dict, records: list[dict], settings: dict, notes: str = "") -> s
         f"that the catalogue does not have) and {cases_['control']} controls with nothing hidden; two logs of {min(SECONDS.values()):g} to {max(SECONDS.values()):g} s each, one to train and one held out; "
         f"base seed {settings['seed']}, from which every case draws a seed of its own. `sysid discover` sees the folder that `sysid simulate` writes and nothing of "
         "the truth. Joints, sizes (log-uniform from 0.3 to 3 times the simulator's default), masses, friction, motion and the colour of the noise are drawn.",
+        conditions.SAYS[under],
         "An effect is **visible** when the true model, refitted, lowers the held-out RMS of its joint by at least 10 % (of any joint for an effect of the whole robot; "
         "of two effects, against the model that has the other one). Intervals are Wilson's, 95 %.",
         "## What was asked and what was reached",
@@ -764,8 +837,8 @@ def page(found: dict, records: list[dict], settings: dict, notes: str = "") -> s
         f"{_percent(found['innocent_joints'])} of the cases accuse a joint in which nothing is hidden.",
         "### By effect",
         _table(["hidden", "cases", "visible", *short], [[e, entry["hidden"], total(entry), *by(entry)] for e, entry in found["effects"].items()]),
-        "![Naming by effect and by visibility](figures/blind_benchmark_effects.png)",
-        "![Confusion matrix](figures/blind_benchmark_confusion.png)",
+        f"![Naming by effect and by visibility](figures/{name}_effects.png)",
+        f"![Confusion matrix](figures/{name}_confusion.png)",
         "### By visibility",
         _table(["the true model takes away, of the RMS", "named", "alone", "another named"], [[_range(b), _percent(b["named"]), _percent(b["alone"]), _percent(b["wrong"])] for b in found["by_lowered"]]),
         f"Hidden and not visible: {len(invisible)}; of these " + ", ".join(f"{n} {c}" for c in CATEGORIES if (n := sum(r["category"] == c for r in invisible))) + "." if invisible else "",
@@ -780,16 +853,25 @@ def page(found: dict, records: list[dict], settings: dict, notes: str = "") -> s
         f"Accused: {_percent(found['controls']['accused'])}. Called unknown on some joint: {_percent(found['controls']['unknown'])}. White and coloured noise (5 to 300 ms), "
         "encoders from exact enough to coarse, speeds from half to 1.25 times the usual.",
         _table(["robot", "controls", "accused", "unknown"], [[robot, *entry.values()] for robot, entry in found["controls"]["by_robot"].items()]),
+        f"Unresolved on some joint, which is no accusation: {_percent(found['controls']['unresolved'])}.",
+        "## Claims that are not there, and the noise floor",
+        f"Claims are the (effect, joint) pairs that first verdicts name, on the joint of an outside law excepted. Not there: {_percent(found['claims']['false'])}; "
+        f"where the family or set is counted with it: {_percent(found['claims']['false_families_too'])}."
+        + (f" Effects in a set that names something: {found['claims']['members']:.1f} on average." if found["claims"]["members"] else ""),
+        f"Noise floor within 25 % of the true noise, or null: {_percent(found['floors']['good'])} of the joints; null: {_percent(found['floors']['null'])}."
+        + (f" Floor over true noise: {_quantiles(found['floors']['ratio'])}." if found["floors"]["ratio"] else ""),
+        _table(["case", "claimed", "on", "its family holds what is hidden"], [[f"`{c['key']}`", c["effect"], c["joint"], "yes" if c["held"] else "no"] for c in found["claims"]["list"]])
+        if found["claims"]["list"] else "",
         "## Effects outside the catalogue",
         f"{_listed(OLD)} are old: they were known when the method was last tuned. {_listed(NEW)} were written before the method was changed, which is never done for one of them.",
-        _table(["torque", "cases", "visible", "unknown", f"explained ({100 * EXPLAINED:.0f} % of the misfit)", "wrong", "of these, structure left is said", "missed"],
-               [[f"{kind}: {OUTSIDE[kind][0]}", e["hidden"], e["visible"], e["unknown"], e["explained"], e["wrong"], e["admits"], e["missed"]] for kind, e in found["outside"].items()]),
+        _table(["torque", "cases", "visible", "unknown", f"explained ({100 * EXPLAINED:.0f} % of the misfit)", "wrong", "of these, structure left is said", "unresolved", "missed"],
+               [[f"{kind}: {OUTSIDE[kind][0]}", e["hidden"], e["visible"], e["unknown"], e["explained"], e["wrong"], e["admits"], e["unresolved"], e["missed"]] for kind, e in found["outside"].items()]),
         f"To be read beside the controls, of whose joints {_percent(found['controls']['unknown_joints'])} are called unknown with nothing hidden: the word is worth what they leave of it.",
         "## The error before, after, and with the true model",
-        "![Held-out error](figures/blind_benchmark_errors.png)",
+        f"![Held-out error](figures/{name}_errors.png)",
         f"Discovered models that beat the true one, refitted, by more than 5 % of the RMS: {', '.join(f'`{k}`' for k in found['true_beaten']) or 'none'}.",
         "## What went wrong, case by case",
-        f"Each can be looked at again: `python scripts/blind_benchmark.py --seed {settings['seed']} --only KEY --verbose`.",
+        f"Each can be looked at again: `python scripts/blind_benchmark.py --seed {settings['seed']}{mark} --only KEY --verbose`.",
         "### Visible effects not named",
         _table(["case", "hidden", "on", "size", "RMS taken away by the true model", "outcome", "named", "RMS after / true"], [
             [f"`{r['key']}`", r["effect"], r["joint"], f"{r['size']:.2f}", _lowered(r), r["category"], r["named"], f"{r['after'] / r['true']:.2f}" if "after" in r else "–"] for r in misnamed
@@ -798,7 +880,7 @@ def page(found: dict, records: list[dict], settings: dict, notes: str = "") -> s
         _table(["case", "hidden", "on", "size", "RMS taken away by the true model", "RMS after / true"], [[f"`{r['key']}`", r["effect"], r["joint"], f"{r['size']:.2f}", _lowered(r), f"{r['after'] / r['true']:.2f}"] for r in far]) if far else "None.",
         "### Controls that are not complete",
         _table(["case", "joint", "verdict", "noise's colour [s]", "encoder [bits]", "pace"], [
-            [f"`{r['key']}`", v["joint"], " ".join([v["effect"], *(f"(or {t})" for t in v["tied_with"])]) if v["status"] == "missing" else "unknown", *(str(r["conditions"][k] or "–") for k in ("colour", "encoder", "pace"))]
+            [f"`{r['key']}`", v["joint"], " ".join([v["effect"], *(f"(or {t})" for t in family(v, v["joint"]))]) if v["status"] == "missing" else v["status"], *(str(r["conditions"][k] or "–") for k in ("colour", "encoder", "pace"))]
             for r, v in accused
         ]) if accused else "None.",
         "### Outside the catalogue, neither unknown nor explained",
@@ -834,12 +916,12 @@ def tell(record: dict, folder: Path) -> None:
         print(f"  {'joint':22s} {'noise':>9s} {'floor':>9s} {'before':>9s} {'after':>9s} {'true':>9s}   verdict")
         for v in record["verdict"]:
             j, rms = v["joint"], record["rms"]
-            said = v["status"] if v["status"] != "missing" else " ".join([v["effect"], f"tied {v['tied_with']}" if v["tied_with"] else "", f"also {v['also']}" if v["also"] else ""])
+            said = v["status"] if v["status"] != "missing" else " ".join([v["effect"], f"tied {family(v, v['joint'])}" if family(v, v["joint"]) else "", f"also {v['also']}" if v.get("also") else ""])
             left = f"  left {v['share_left']:.2f} by {v['depends_on']}" if "share_left" in v else ""
-            print(f"  {j:22s} {record['noise'][j]:9.4f} {record['floors'][j]:9.4f} {rms['before'][j]:9.4f} {rms['after'][j]:9.4f} {rms.get('true', {}).get(j, math.nan):9.4f}   {said}{left}")
+            print(f"  {j:22s} {record['noise_seen'][j]:9.4f} {math.nan if record['floors'][j] is None else record['floors'][j]:9.4f} {rms['before'][j]:9.4f} {rms['after'][j]:9.4f} {rms.get('true', {}).get(j, math.nan):9.4f}   {said}{left}")
         for f in record["findings"]:
             step = f"step {f['step']}" if f["step"] is not None else ""
-            print(f"  finding: {f['effect']}:{f['joint']} removes {f['removed']:.2f}, visible {f['visible']:.2f}, tied {f['tied_with']} {step} { {n: float(f'{v:.3g}') for n, v in f['parameters'].items() if v is not None} }")
+            print(f"  finding: {f['effect']}:{f['joint']} removes {f['removed']}, tied {f['tied_with']} {step} { {n: float(f'{v:.3g}') for n, v in f['parameters'].items() if v is not None} }")
         print(f"  discover added {record['added']}, refused {record['refused']}, ended {[(v['joint'], v['status']) for v in record['last'] if v['status'] != 'complete']}")
     for row in score(record):
         more = "" if row["lowered"] is None else f", the true model lowers the RMS by {100 * row['lowered']:.1f} %" + (f" (without the effect it is {100 * row['hurts']:.1f} % lower)" if "hurts" in row else "")
@@ -861,13 +943,14 @@ def source() -> str:
 
 def finish(records: list[dict], settings: dict, out: Path, publish: bool) -> dict:
     """Write results.json, the figures and the page; into docs/ too where they are to be published."""
-    found = summary(records)
+    under = settings.get("conditions", "clean")
+    found, name = summary(records, under), _name(under)
     results.write_json(out / "results.json", _plain({"settings": settings, "summary": found, "records": records}))
-    notes = ROOT / "docs" / "blind_benchmark_notes.md"
+    notes = ROOT / "docs" / f"{name}_notes.md"
     text = page(found, records, settings, notes.read_text(encoding="utf-8") if notes.exists() else "")
     for folder in [out, *([ROOT / "docs"] if publish else [])]:
-        figures(found, records, folder / "figures")
-        results.write_atomically(folder / "blind_benchmark.md", lambda p: p.write_text(text, encoding="utf-8"))
+        figures(found, records, folder / "figures", name)
+        results.write_atomically(folder / f"{name}.md", lambda p: p.write_text(text, encoding="utf-8"))
     return found
 
 
@@ -884,9 +967,10 @@ def main(arguments: list[str] | None = None) -> None:
     """Run the cases that the journal lacks, and write the results."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--cases", choices=["full", "small"], default="full")
+    parser.add_argument("--conditions", choices=conditions.CONDITIONS, default="clean", help="of the logs: clean, with what labs' logs have, or one slow sine a joint")
     parser.add_argument("--seed", type=int, default=1, help="base seed; 1 was used while developing (default)")
     parser.add_argument("--jobs", type=int, default=1)
-    parser.add_argument("--out", type=Path, default=Path("runs/blind_benchmark"))
+    parser.add_argument("--out", type=Path, help="default runs/blind_benchmark, with the conditions' name behind it")
     parser.add_argument("--only", action="append", default=[], metavar="ROBOT/WHAT/NUMBER", help="cases whose key has these parts; may be repeated; list with --list")
     parser.add_argument("--limit", type=int, default=0, help="at most so many cases")
     parser.add_argument("--list", action="store_true", help="print the cases and leave")
@@ -898,7 +982,8 @@ def main(arguments: list[str] | None = None) -> None:
         read = json.loads((options.report / "results.json").read_text())
         _tell_bars(finish(read["records"], read["settings"], options.report, options.publish))
         return
-    chosen = [c for c in cases(options.seed, options.cases) if not options.only or any(matches(c.key, w) for w in options.only)]
+    options.out = options.out or Path("runs") / _name(options.conditions)
+    chosen = [c for c in cases(options.seed, options.cases, options.conditions) if not options.only or any(matches(c.key, w) for w in options.only)]
     chosen = chosen[: options.limit or None]
     if not chosen:
         parser.error("no case has such a key; see --list")
@@ -914,14 +999,14 @@ def main(arguments: list[str] | None = None) -> None:
         return
     out = results.folder(options.out)
     state = source()
-    settings = {"seed": options.seed, "duration": SECONDS, "rate": RATE, "most": MOST_STEPS, "source": state, "versions": results.versions()}
-    journal = Journal(out / f"journal-{options.seed}-{state}.jsonl", settings)
+    settings = {"seed": options.seed, "conditions": options.conditions, "duration": SECONDS, "rate": RATE, "most": MOST_STEPS, "source": state, "versions": results.versions()}
+    journal = Journal(out / f"journal-{conditions.MARKS[options.conditions]}{options.seed}-{state}.jsonl", settings)
     with terminal.progress_bar() as progress:
         done = run(journal, [(case.key, (asdict(case),)) for case in chosen], one, jobs=options.jobs, progress=lambda s: progress(f"{len(chosen)} cases", s))
     records = sorted(done.values(), key=lambda r: r["key"])
     settings |= {"cases": options.cases, "only": options.only, "limit": options.limit}
     _tell_bars(finish(records, settings, out, options.publish))
-    print(f"results: {out}/results.json, {out}/blind_benchmark.md")
+    print(f"results: {out}/results.json, {out}/{_name(options.conditions)}.md")
 
 
 def _tell_bars(found: dict) -> None:

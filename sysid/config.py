@@ -224,6 +224,7 @@ class PreprocessSpec(_Spec):
     cutoff: Annotated[Any, BeforeValidator(_auto_or_positive)] = 10.0
     torque: Literal["raw", "same"] = "raw"
     standstill: Annotated[Any, BeforeValidator(_standstill)] = "auto"
+    events: Literal["mask", "keep"] = "mask"
 
     def model_post_init(self, _context: Any) -> None:
         if self.filter == "savitzky-golay" and self.order < 2:

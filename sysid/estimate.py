@@ -96,6 +96,7 @@ class Fit:
     seconds: dict[str, float] = field(default_factory=dict)
     filters: dict = field(default_factory=dict)
     logs: tuple[dict, ...] = ()
+    events: tuple[dict, ...] = ()
     notices: tuple[str, ...] = ()
 
     @property

@@ -16,6 +16,7 @@ from .compress import Compressed, compress
 from .config import Experiment, PreprocessSpec
 from .errors import SysidError, SysidWarning
 from .estimate import pose
+from .events import usable
 from .log import Log
 from .model import Model, moving_coefficients
 from .preprocess import Smoother, prepare
@@ -118,10 +119,14 @@ def _held_out(experiment: Experiment, spec: PreprocessSpec, model: Model, logs, 
     model = model.measured_by(motion)
     motion = replace(motion, pieces=tuple(_trimmed(piece, logs[piece.log].segments[0], edge) for piece in motion.pieces))
     # against the torque as logged, over every row: what a filter smooths away or masks it has not explained
-    raw = replace(motion, pieces=tuple(replace(piece, tau=piece.measured, use=None) for piece in motion.pieces))
+    # but for what disturbed the logs, as far as the widest candidate sees of it
+    calm = usable if motion.events else lambda *_, **__: None
+    raw = replace(motion, pieces=tuple(
+        replace(piece, tau=piece.measured, use=calm(piece.t, model.robot.joints, logs[piece.log].events, angles=edge, torque=edge)) for piece in motion.pieces
+    ))  # fmt: skip
     thin = max(1, motion.samples // _ROWS)
     data = compress(model, motion, thin=thin)
-    target = data if spec.torque == "raw" and spec.standstill == "keep" else compress(model, raw, thin=thin)
+    target = data if spec.torque == "raw" and spec.standstill == "keep" and not motion.events else compress(model, raw, thin=thin)
     moving = moving_coefficients(model, motion)
     folds = np.array_split(np.arange(data.blocks), min(_FOLDS, data.blocks))
     squares, rows, errors = np.zeros(model.robot.dof), np.zeros(model.robot.dof), []

@@ -14,6 +14,7 @@ import numpy as np
 from . import datasets, units
 from .config import DataSpec, LogSpec
 from .errors import LogError, SysidWarning
+from .events import Event
 from .readers import open_table
 from .readers.table import Table
 
@@ -41,12 +42,13 @@ class Segment:
 
 @dataclass(frozen=True)
 class Log:
-    """One log: where it came from, the SHA-256 of its file, its segments."""
+    """One log: where it came from, the SHA-256 of its file, its segments, and what disturbed them, where it was looked for."""
 
     name: str
     path: Path
     sha256: str
     segments: tuple[Segment, ...]
+    events: tuple[Event, ...] = ()
 
     @property
     def samples(self) -> int:

@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from . import config, model, robot, shape
+from . import config, events, model, robot, shape
 from . import filters as filtering
 from . import log as logs
 from .compress import Compressed, Linearised, compress
@@ -46,8 +46,11 @@ def build(experiment: Experiment) -> tuple[Robot, Model, np.ndarray]:
 
 
 def read(experiment: Experiment, machine: Robot, specs: list[LogSpec]) -> list[logs.Log]:
-    """The logs of an experiment's `data.train` or `data.test`. Raises LogError."""
-    return [logs.read(spec, experiment.data, machine.joints, machine.prismatic, experiment.folder) for spec in specs]
+    """The logs of an experiment's `data.train` or `data.test`, with their events where these are left out. Raises LogError."""
+    read = [logs.read(spec, experiment.data, machine.joints, machine.prismatic, experiment.folder) for spec in specs]
+    if experiment.preprocess.events == "keep":
+        return read
+    return [replace(log, events=tuple(e for s in log.segments for e in events.find(s, machine.joints, log=log.name))) for log in read]
 
 
 def fit(experiment: Experiment, *, filters: dict | None = None, progress: Progress | None = None) -> Fit:
@@ -76,6 +79,7 @@ def fit(experiment: Experiment, *, filters: dict | None = None, progress: Progre
             del train  # the filtered motion holds all that is needed from here on
         _tell_still(motion)
         _tell_left_out(motion, preprocess)
+        disturbed = _tell_events("train", motion)
         with _timed(seconds, "shape"):
             structure, slopes = _settled(experiment, structure, motion, prior)
         with _timed(seconds, "compress"):  # the regressor is built and reduced chunk by chunk, never whole
@@ -96,11 +100,12 @@ def fit(experiment: Experiment, *, filters: dict | None = None, progress: Progre
             provenance += [_provenance("test", log, spec) for log, spec in zip(held_out, experiment.data.test)]
             motion = prepare(held_out, preprocess, machine.joints)
             del held_out
+            disturbed += _tell_events("test", motion)
             predictions["test"] = predict(structure, found.x, motion)
             samples["test"], left_out["test"] = motion.samples, _left_out(motion)
     return replace(
         found, predictions=predictions, samples=samples, left_out=left_out, seconds=seconds, filters=chosen, logs=tuple(provenance),
-        notices=tuple(notices),
+        notices=tuple(notices), events=tuple(disturbed),
     )  # fmt: skip
 
 
@@ -215,6 +220,13 @@ def _tell_left_out(motion: Motion, spec) -> None:
 
 def _left_out(motion: Motion) -> dict[str, int]:
     return dict(zip(motion.joints, motion.left_out.tolist()))
+
+
+def _tell_events(part: str, motion: Motion) -> list[dict]:
+    """The events of a part as documents have them; the user is told."""
+    for notice in events.told(motion.events, motion.disturbed, {"train": "training"}.get(part, part)):
+        warnings.warn(SysidWarning(notice), stacklevel=2)
+    return [{"part": part, "kind": e.kind, "log": e.log, "start": e.start, "stop": e.stop, "joints": list(e.joints), "signal": e.signal} for e in motion.events]
 
 
 def _tell_overlap(experiment: Experiment) -> None:

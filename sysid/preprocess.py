@@ -15,6 +15,7 @@ import numpy as np
 
 from .config import PreprocessSpec
 from .errors import ConfigError, LogError, SysidWarning
+from .events import Event, mended, usable
 from .log import Log, Segment
 
 # `standstill: mask` leaves a joint's rows out below this share of its own rms speed, at most 0.03 rad/s or m/s:
@@ -190,6 +191,7 @@ class Motion:
 
     still: joints that never move, or never clear of a standstill. standing (dof,): share of the rows that count in which
     a joint stands still. left_out (dof,): rows that do not count.
+    events: what disturbed the logs; `disturbed` the share of all joints' rows that is left out for it.
     """
 
     joints: tuple[str, ...]
@@ -197,6 +199,8 @@ class Motion:
     still: tuple[str, ...]
     standing: np.ndarray
     left_out: np.ndarray
+    events: tuple[Event, ...] = ()
+    disturbed: float = 0.0
 
     @property
     def samples(self) -> int:
@@ -219,19 +223,22 @@ def prepare(logs: Sequence[Log], spec: PreprocessSpec, joints: tuple[str, ...]) 
     for number, log in enumerate(logs):
         before = len(pieces)
         for segment in log.segments:
-            if (piece := _piece(number, segment, spec)) is not None:
-                pieces.append(replace(piece, source=log.name))
+            clean = replace(segment, tau=mended(segment, log.events, joints)) if log.events else segment
+            if (piece := _piece(number, clean, spec)) is not None:
+                own = replace(piece, source=log.name)
+                pieces.append(without_events(own, log.events, joints, *_reaches(spec, segment.step)) if log.events else own)
         if len(pieces) == before:
             shortest = _needs(spec, log.segments[0].step) if log.segments else 2
             raise LogError(f"{log.samples} samples are fewer than the filter's window of {shortest}", where=str(log.path), do="give a longer log or narrow preprocess.window")
         if dropped := len(log.segments) - (len(pieces) - before):
             warnings.warn(SysidWarning(f"{log.path}: {dropped} segment(s) shorter than the filter's window were left out"), stacklevel=2)
+    disturbed, stuck = share_left_out(pieces), False
     if spec.standstill == "auto":
-        return assembled(joints, *_with_rows(clear_of_reversals(pieces, spec)))
-    if spec.standstill != "keep":
+        pieces, stuck = _with_rows(clear_of_reversals(pieces, spec), pieces)
+    elif spec.standstill != "keep":
         threshold = standstill_speed(pieces) if spec.standstill == "mask" else spec.standstill
         pieces = [without_standstill(piece, threshold, 0 if piece.smoother is None else piece.smoother.reach) for piece in pieces]
-    return assembled(joints, pieces)
+    return replace(assembled(joints, pieces, stuck), events=tuple(event for log in logs for event in log.events), disturbed=disturbed)
 
 
 def assembled(joints: tuple[str, ...], pieces: Sequence[Piece], stuck=False) -> Motion:
@@ -245,20 +252,24 @@ def assembled(joints: tuple[str, ...], pieces: Sequence[Piece], stuck=False) -> 
     noise = np.max([piece.noise for piece in pieces], axis=0)
     never = (travel < np.maximum(_NEVER_MOVES, _NOISE_TRAVEL * noise)) | stuck
     still = tuple(joint for joint, stays in zip(joints, never) if stays)
-    return Motion(joints, tuple(replace(piece, rest=rest) for piece in pieces), still, standing(pieces), sum(_left_out(piece) for piece in pieces))
+    if any(piece.use is not None for piece in pieces):
+        pieces = [replace(p, use=np.ones(p.q.shape, dtype=bool)) if p.use is None else p for p in pieces]
+    left_out = sum(_left_out(piece) for piece in pieces)
+    return Motion(joints, tuple(replace(piece, rest=rest) for piece in pieces), still, standing(pieces), left_out)
 
 
 def _left_out(piece: Piece) -> np.ndarray:
     return np.zeros(piece.q.shape[1], dtype=int) if piece.use is None else np.sum(~piece.use[piece.core], axis=0)
 
 
-def _with_rows(pieces: Sequence[Piece]) -> tuple[list[Piece], np.ndarray]:
-    """The pieces, a joint of which no row is left with all of its rows again, and which (dof,) those joints are.
+def _with_rows(pieces: Sequence[Piece], before: Sequence[Piece]) -> tuple[list[Piece], np.ndarray]:
+    """The pieces, a joint of which no row is left with the rows again that it had before, and which (dof,) those joints are.
 
     Such a joint says nothing of its friction, which is then held; its torque is all that its rows can show.
     """
     stuck = sum(piece.use[piece.core].sum(axis=0) for piece in pieces) == 0
-    return [replace(piece, use=piece.use | stuck) for piece in pieces], stuck
+    had = [True if piece.use is None else piece.use for piece in before]
+    return [replace(piece, use=piece.use | (stuck & own)) for piece, own in zip(pieces, had)], stuck
 
 
 def _needs(spec: PreprocessSpec, step: float) -> int:
@@ -290,6 +301,27 @@ def _piece(number: int, segment: Segment, spec: PreprocessSpec) -> Piece | None:
     )  # fmt: skip
 
 
+def _reaches(spec: PreprocessSpec, step: float) -> tuple[float, float]:
+    """Seconds to either side that a row sees of the angles and of the torque; a filtered column sees filtered angles."""
+    reach = Smoother(spec, step).reach * step
+    both = spec.torque == "same" and spec.filter != "none"
+    return (2.0 * reach, reach) if both else (reach, 0.0)
+
+
+def without_events(piece: Piece, events: Sequence[Event], joints: Sequence[str], angles: float, torque: float) -> Piece:
+    """The piece without the rows that its log's events reach, whose angles and torque were seen over so many seconds to either side."""
+    use = usable(piece.t, joints, events, angles=angles, torque=torque)
+    if piece.use is not None:
+        use &= piece.use
+    return piece if use.all() else replace(piece, use=use)
+
+
+def share_left_out(pieces: Sequence[Piece]) -> float:
+    """The share of all joints' rows that does not count."""
+    lost = sum(0 if p.use is None else np.sum(~p.use[p.core]) for p in pieces)
+    return float(lost / sum(p.samples * p.q.shape[1] for p in pieces))
+
+
 def without_standstill(piece: Piece, threshold, reach: int) -> Piece:
     """The piece without the rows where a joint is slower than its threshold (dof,) or (n, dof) [rad/s or m/s], or within `reach` rows of one.
 
@@ -299,7 +331,8 @@ def without_standstill(piece: Piece, threshold, reach: int) -> Piece:
     count = np.cumsum(np.concatenate([np.zeros((1, still.shape[1])), still]), axis=0)
     rows = np.arange(len(still))
     low, high = np.maximum(rows - reach, 0), np.minimum(rows + reach + 1, len(still))
-    return replace(piece, use=count[high] == count[low])
+    use = count[high] == count[low]
+    return replace(piece, use=use if piece.use is None else use & piece.use)
 
 
 def clear_of_reversals(pieces, spec: PreprocessSpec) -> list[Piece]:

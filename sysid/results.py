@@ -71,6 +71,7 @@ def document(fit: Fit, run: str | Path = "") -> dict:
         "robot": {"joints": list(fit.joints), "locked": fit.model.robot.locked},
         "notices": list(fit.notices),
         "logs": list(fit.logs),
+        "events": list(fit.events),
         "versions": versions(),
         "seeds": {},  # nothing in a fit is random
         "seconds": fit.seconds,
@@ -153,13 +154,14 @@ def _predictions(fit: Fit):
     import polars as pl
 
     frames = []
+    masked = any(prediction.use is not None for prediction in fit.predictions.values())
     for part, prediction in fit.predictions.items():
         columns = {"log": prediction.log, "t": prediction.t}
         for k, joint in enumerate(fit.joints):
             columns[f"measured_{joint}"] = prediction.measured[:, k]
             columns[f"predicted_{joint}"] = prediction.predicted[:, k]
-            if prediction.use is not None:
-                columns[f"used_{joint}"] = prediction.use[:, k]
+            if masked:
+                columns[f"used_{joint}"] = True if prediction.use is None else prediction.use[:, k]
         frames.append(pl.DataFrame(columns).select(pl.lit(part).alias("part"), pl.all()))
     return pl.concat(frames, rechunk=False)
 

@@ -17,13 +17,14 @@ ROOT = Path(__file__).resolve().parent.parent
 
 # The order of the method: a module imports only from modules above it.
 ORDER = [
-    "errors", "units", "inertia", "urdf", "readers", "datasets", "config", "prior", "robot", "regressor", "log", "preprocess",
+    "errors", "units", "inertia", "urdf", "readers", "datasets", "config", "prior", "robot", "regressor", "outliers", "knocks", "repeats",
+    "events", "log", "preprocess",
     "effect", "formula", "effects", "own_effects", "model", "rows", "compress", "objective", "interior", "certificate", "solve", "uncertainty", "estimate", "shape",
-    "filters", "results", "urdf_export", "pipeline", "simulate", "comparison", "diagnose", "loop", "report", "studies", "studio", "terminal", "cli", "__main__",
+    "filters", "results", "urdf_export", "pipeline", "simulate", "comparison", "noise", "diagnose", "loop", "report", "studies", "studio", "terminal", "cli", "__main__",
 ]  # fmt: skip
 # Late imports that close a loop on purpose: a path that names a data set, a prior that is a previous run, the effects
-# that an effect's contract finds, and what an experiment file may say of them.
-LATE = {("config", "effect"), ("config", "formula"), ("urdf", "datasets"), ("pipeline", "results"), ("results", "urdf_export"), ("effect", "effects")}
+# that an effect's contract finds, what an experiment file may say of them, and the segment that events are found in, a type.
+LATE = {("config", "effect"), ("config", "formula"), ("urdf", "datasets"), ("pipeline", "results"), ("results", "urdf_export"), ("effect", "effects"), ("events", "log")}
 
 
 def modules():

@@ -11,11 +11,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
+from ..events import mended
 from ..log import Log
-from ..preprocess import Motion, Piece, assembled, differences, standstill_speed, without_standstill
+from ..preprocess import Motion, Piece, assembled, differences, share_left_out, standstill_speed, without_events, without_standstill
 
 CUTOFFS = (15.0, 8.0)  # Hz: the verdict's own, and another one that it must survive
 _ANGLES = 4.0  # the angles' own low-pass, as a multiple of the cutoff: derivatives need some, laws of motion none
@@ -69,12 +71,19 @@ def questioned(logs: Sequence[Log], joints: tuple[str, ...], cutoff: float) -> M
     """Logs as a motion under one low-pass on both sides; None where they are too short for it."""
     pieces = []
     for number, log in enumerate(logs):
-        pieces += [piece for segment in log.segments if (piece := _piece(number, log.name, segment, cutoff)) is not None]
+        for segment in log.segments:
+            # spikes are mended before the low-pass, which would spread them; of the rest, rows see what both low-passes see
+            clean = replace(segment, tau=mended(segment, log.events, joints)) if log.events else segment
+            if (piece := _piece(number, log.name, clean, cutoff)) is not None:
+                torque = piece.smoother.reach * piece.step
+                pieces.append(without_events(piece, log.events, joints, _SIGHT * torque + 2.0 * segment.step, torque) if log.events else piece)
     if not pieces:
         return None
+    disturbed = share_left_out(pieces)
     threshold = standstill_speed(pieces)
     # a reversal that passes standstill between two samples stays: both sides see its jump alike, and slow friction lives there
-    return assembled(joints, [without_standstill(piece, threshold, round(_SIGHT * piece.smoother.reach)) for piece in pieces])
+    motion = assembled(joints, [without_standstill(piece, threshold, round(_SIGHT * piece.smoother.reach)) for piece in pieces])
+    return replace(motion, events=tuple(event for log in logs for event in log.events), disturbed=disturbed)
 
 
 def stride_of(motion: Motion, cutoff: float) -> int:

@@ -11,11 +11,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
+from ..events import mended
 from ..log import Log
-from ..preprocess import Motion, Piece, assembled, differences, standstill_speed, turns, without_standstill
+from ..preprocess import (
+    Motion,
+    Piece,
+    assembled,
+    differences,
+    share_left_out,
+    standstill_speed,
+    turns,
+    without_events,
+    without_standstill,
+)
 
 LEAST = 15.0  # Hz: where friction's laws and ripple still show, several times what an arm moves at
 _MOTION = 4.0  # and this many times the motion's own bandwidth, if that is more
@@ -71,14 +83,22 @@ def lowpassed(logs: Sequence[Log], joints: tuple[str, ...], cutoff: float) -> Mo
     """Logs as a motion under one low-pass on both sides; None where they are too short for it."""
     pieces = []
     for number, log in enumerate(logs):
-        pieces += [piece for segment in log.segments if (piece := _piece(number, log.name, segment, cutoff)) is not None]
+        for segment in log.segments:
+            # spikes are mended before the low-pass, which would spread them; of the rest, rows see what both low-passes see
+            clean = replace(segment, tau=mended(segment, log.events, joints)) if log.events else segment
+            if (piece := _piece(number, log.name, clean, cutoff)) is not None:
+                torque = piece.smoother.reach * piece.step
+                angles = _SIGHT * torque + 2.0 * segment.step
+                pieces.append(without_events(piece, log.events, joints, angles, torque) if log.events else piece)
     if not pieces:
         return None
+    disturbed = share_left_out(pieces)
     threshold = standstill_speed(pieces)
     # where the speed changes its sign between two samples, the angles' noise says in which: friction's jump is as uncertain
     still = [np.where(turns(piece.qd), np.inf, threshold) for piece in pieces]
     reach = [round(_SIGHT * piece.smoother.reach) for piece in pieces]
-    return assembled(joints, [without_standstill(*each) for each in zip(pieces, still, reach)])
+    motion = assembled(joints, [without_standstill(*each) for each in zip(pieces, still, reach)])
+    return replace(motion, events=tuple(event for log in logs for event in log.events), disturbed=disturbed)
 
 
 def widest(logs: Sequence[Log]) -> float:

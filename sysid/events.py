@@ -1,0 +1,162 @@
+"""Log -> events: what disturbed it and is no motion of its robot.
+
+Found before any model is fitted, told, and left out.
+
+knock       several joints pulsed or rang at once, for tens of milliseconds: a hit, a bump
+spike       a sample or a few of one joint's torque stand alone
+brake       one joint's torque repeats exactly while it rests: not the torque that holds it
+frozen      one joint's torque or angle repeats exactly while it moves: the reading stood still
+saturation  as frozen, at the highest or lowest torque of the log: told, but not left out
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .knocks import knocks
+from .outliers import spikes
+from .repeats import held_angle, held_torque, rests
+
+if TYPE_CHECKING:
+    from .log import Segment
+
+_WORDS = {
+    "knock": "knock", "spike": "torque spike", "brake": "closed brake", "frozen": "frozen value",
+    "saturation": "flat top",
+}  # fmt: skip
+KINDS = tuple(_WORDS)
+TOLD = ("saturation",)  # not left out
+_PASSES = 3  # over the spikes: without the largest, those beside them stand out
+_SHOWN = 4  # times of each kind and log that a notice gives
+
+
+@dataclass(frozen=True)
+class Event:
+    """What disturbed `joints` of `log`, from `start` to `stop` [s] on the log's own clock.
+
+    kind: one of KINDS. signal: "torque", "position" or "both".
+    """
+
+    kind: str
+    log: str
+    start: float
+    stop: float
+    joints: tuple[str, ...]
+    signal: str = "torque"
+
+
+def find(segment: Segment, joints: Sequence[str], *, log: str = "") -> tuple[Event, ...]:
+    """The events of a segment, in order of time.
+
+    Args:
+        segment: a stretch of a log. joints: its joints' names, in order. log: the log's name.
+    """
+    found: list[Event] = []
+
+    def tell(kind: str, first: int, last: int, members, signal: str = "torque") -> None:
+        start, stop = float(segment.t[first]), float(segment.t[last])
+        found.append(Event(kind, log, start, stop, tuple(joints[j] for j in members), signal))
+
+    calm = segment.tau
+    for _ in range(_PASSES):
+        more = [(j, *run) for j, own in enumerate(spikes(calm)) for run in own]
+        if not more:
+            break
+        for j, first, last in more:
+            tell("spike", first, last, [j])
+        calm = mended(segment, found, joints)
+    usual = float(np.sqrt(np.mean(np.diff(segment.q, axis=0) ** 2, axis=0)).max())
+    for j in range(len(joints)):
+        tau, q = segment.tau[:, j], segment.q[:, j]
+        for first, last in held_torque(tau):
+            extreme = tau[first] != 0.0 and tau[first] in (tau.min(), tau.max())  # no limit is 0
+            kind = "brake" if rests(q, first, last, usual) else "frozen"
+            kind = "saturation" if extreme else kind
+            tell(kind, first, last, [j])
+        if not tau.any() and segment.tau.any() and rests(q, 0, len(q) - 1, usual):
+            tell("brake", 0, len(q) - 1, [j])
+        for first, last in held_angle(q):
+            tell("frozen", first, last, [j], "position")
+    for first, last, members in knocks(segment.q, calm, segment.step):
+        tell("knock", first, last, members, "both")
+    return tuple(sorted(found, key=lambda event: (event.start, event.stop, event.kind)))
+
+
+def mended(segment: Segment, events: Sequence[Event], joints: Sequence[str]) -> np.ndarray:
+    """Torque (n, dof) with straight lines in place of its spikes: no low-pass spreads those."""
+    spiked = [event for event in events if event.kind == "spike"]
+    if not spiked:
+        return segment.tau
+    tau = segment.tau.copy()
+    good = usable(segment.t, joints, spiked)
+    for own, values in zip(good.T, tau.T):
+        values[~own] = np.interp(segment.t[~own], segment.t[own], values[own])
+    return tau
+
+
+def usable(
+    t, joints: Sequence[str], events: Sequence[Event], *, angles: float = 0.0, torque: float = 0.0
+) -> np.ndarray:
+    """Rows (n, dof) bool at times t (n,) that no event reaches, for each joint's equation.
+
+    A knock moves the whole arm: where most joints show it, no joint's row counts. A wrong angle is
+    in every joint's equation. Spikes are mended before any filter, and reach nothing beside them.
+
+    Args:
+        angles, torque: how far [s] the filters of the angles and of the torque see to either side.
+    """
+    use = np.ones((len(t), len(joints)), dtype=bool)
+    place = {joint: j for j, joint in enumerate(joints)}
+    for event in events:
+        if event.kind in TOLD:
+            continue
+        of_signal = {"torque": torque, "position": angles, "both": max(angles, torque)}
+        reach = 0.0 if event.kind == "spike" else of_signal[event.signal]
+        rounding = 1e-9 * max(abs(event.start), abs(event.stop), 1.0)
+        first = np.searchsorted(t, event.start - reach - rounding)
+        last = np.searchsorted(t, event.stop + reach + rounding, side="right")
+        most = event.kind == "knock" and 2 * len(event.joints) > len(joints)
+        own = joints if most or event.signal == "position" else event.joints
+        use[first:last, [place[joint] for joint in own]] = False
+    return use
+
+
+def told(events: Sequence[Event], left_out: float, part: str) -> list[str]:
+    """What a user is told of the events of a part, "training" or "test".
+
+    Args:
+        left_out: the share of the part's rows that does not count for them.
+    """
+    masked, kept = ([e for e in events if (e.kind in TOLD) == stays] for stays in (False, True))
+    out = []
+    if masked:
+        share = f"{100 * left_out:.1f} % of the {part} rows left out as disturbed"
+        out.append(f"{share}: {_summary(masked)}; preprocess.events: keep keeps them")
+    if kept:
+        out.append(f"flat tops of the torque on {part} logs, not left out: {_summary(kept)}")
+    return out
+
+
+def _summary(events: Sequence[Event]) -> str:
+    out = []
+    for kind in KINDS:
+        own = [e for e in events if e.kind == kind]
+        logs = list(dict.fromkeys(e.log for e in own))
+        where = [_where(log, [e for e in own if e.log == log]) for log in logs[:_SHOWN]]
+        more = [f"{len(logs) - _SHOWN} more logs"] if len(logs) > _SHOWN else []
+        if own:
+            words = _WORDS[kind] + "s" * (len(own) > 1)
+            out.append(f"{len(own)} {words} ({'; '.join(where + more)})")
+    return ", ".join(out)
+
+
+def _where(log: str, events: Sequence[Event]) -> str:
+    joints = list(dict.fromkeys(joint for e in events for joint in e.joints))
+    times = [f"{e.start:.4g}" for e in events[:_SHOWN]] + ["..."] * (len(events) > _SHOWN)
+    times, on = ", ".join(times), ", ".join(joints[:_SHOWN])
+    on += f" and {len(joints) - _SHOWN} more" if len(joints) > _SHOWN else ""
+    return f"{log} at {times} s on {on}"

@@ -1,0 +1,15 @@
+"""The noise floor of a joint's torque: the RMS [N m or N] that a perfect model would leave, found
+without a perfect model.
+
+    stretches.py         the rows that count, as contiguous runs; the bandwidth of the motion
+    motion_functions.py  plain functions of the motion, of which missing effects are made
+    pursuit.py           what they explain is taken off the residual
+    outliers.py          spikes, bursts and what friction leaves about reversals are taken out
+    repeats.py           noise as the scatter between repeats of the motion
+    spectrum.py          noise from the spectrum of the rest, weighed over models of its colour
+    floor.py             all of it, and whether the answer is sure enough to be given
+"""
+
+from .floor import NoiseFloor, floor, floors
+
+__all__ = ["NoiseFloor", "floor", "floors"]

@@ -1,0 +1,200 @@
+"""The noise floor of a joint's torque, or the reason why a log does not determine it.
+
+Where the motion repeats itself, the scatter between repeats is the noise. Elsewhere, what plain
+functions of the motion explain is first taken off the residual, then what no noise does, and the
+spectrum of the rest is weighed.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from . import outliers, repeats
+from .motion_functions import Kinematics, kinematics
+from .pursuit import Functions
+from .spectrum import spectrum_of, weighed
+from .stretches import FEWEST_SAMPLES, Run, bandwidth_of, bridged, runs_of, whole
+
+#: standard error over RMS beyond which a floor is not given: two of them are the 25 % that one can
+#: judge an error by
+UNSURE = 0.12
+
+
+@dataclass(frozen=True)
+class NoiseFloor:
+    """RMS of a joint's torque noise [N m or N] and its standard error, None where the log does not
+    determine them.
+
+    method: "repeats", "spectral" or "none". detail: how it was found, or why not. low, high: at
+        least and at most [N m or N], None where nothing is known.
+    """
+
+    rms: float | None
+    std: float | None
+    method: str
+    detail: str
+    low: float | None = None
+    high: float | None = None
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """The floor as far as it can be estimated, however unsure: RMS, standard error [N m or N], how
+    it was found, and what makes it unsure. least, own: RMS of what is noise in any case, and of the
+    residual itself, which is the most it can be."""
+
+    rms: float
+    std: float
+    method: str
+    detail: str
+    doubt: str
+    own: float
+    least: float = 0.0
+
+
+@dataclass(frozen=True)
+class _Shared:
+    """What joints have in common whose rows that count are the same."""
+
+    runs: list[Run]
+    motion: Kinematics | None
+    bandwidth: float
+    periods: list[float | None]  # of each stretch [samples]
+
+
+def floor(
+    residual: Sequence[np.ndarray], measured: Sequence[np.ndarray], q: Sequence[np.ndarray],
+    step: Sequence[float], joint: int, *, use: Sequence[np.ndarray] | None = None,
+) -> NoiseFloor:  # fmt: skip
+    """The noise floor of one joint's torque as logged; never above the residual's own RMS.
+
+    One entry per contiguous stretch of samples. Noise slower than 0.3 Hz counts as drift, not as
+    noise.
+
+    Args:
+        residual: (n, dof) measured minus predicted torque [N m or N], not filtered; the model may
+            be wrong.
+        measured: (n, dof) torque as logged [N m or N].
+        q: (n, dof) smoothed positions [rad or m].
+        step: [s].
+        joint: which column.
+        use: (n,) or (n, dof) bool, rows that count; what stands in others is not looked at. None:
+            all.
+    """
+    return judged(estimate(residual, measured, q, step, joint, use=use))
+
+
+def floors(
+    residual: Sequence[np.ndarray], measured: Sequence[np.ndarray], q: Sequence[np.ndarray],
+    step: Sequence[float], *, use: Sequence[np.ndarray] | None = None,
+) -> tuple[NoiseFloor, ...]:  # fmt: skip
+    """The noise floors of all joints' torques; what `floor` says of each, at less cost. See
+    there."""
+    memory: dict[bytes, _Shared] = {}
+    joints = range(residual[0].shape[1] if len(residual) else 0)
+    found = (estimate(residual, measured, q, step, j, use=use, memory=memory) for j in joints)
+    return tuple(judged(one) for one in found)
+
+
+def judged(found: Estimate) -> NoiseFloor:
+    """A floor where the estimate is sure enough to judge an error by, else None and the reason."""
+    low, high = max(found.rms - 2.0 * found.std, 0.0), min(found.rms + 2.0 * found.std, found.own)
+    if found.method == "none":
+        return NoiseFloor(None, None, "none", found.doubt, None, found.own)
+    if found.std > UNSURE * found.rms:
+        why = f"not determined: {found.doubt} ({found.detail})"
+        return NoiseFloor(None, None, "none", why, min(low, found.least), found.own)
+    return NoiseFloor(found.rms, found.std, found.method, found.detail, low, high)
+
+
+def estimate(residual, measured, q, step, joint: int, *, use=None, memory=None) -> Estimate:
+    """The floor of one joint and how sure it is. See `floor`."""
+    lengths = [len(r) for r in residual]
+    use = [np.ones(n, dtype=bool) for n in lengths] if use is None else _of_joint(use, joint)
+    columns, logged = (_of_joint(x, joint) for x in (residual, measured))
+    inside = np.concatenate([c[u] for c, u in zip(columns, use)]) if lengths else np.zeros(0)
+    size = max((float(np.abs(m[u]).max(initial=0.0)) for m, u in zip(logged, use)), default=0.0)
+    own = math.sqrt(float(np.mean(inside**2))) if len(inside) else 0.0
+    if not len(inside):
+        return Estimate(own, own, "none", "", "no sample counts", own)
+    if own <= 1e-12 * size:
+        return _certain(own, "the model leaves nothing of the torque", own)
+    shared = _shared(q, step, use, {} if memory is None else memory)
+    runs, bandwidth = shared.runs, shared.bandwidth
+    if not runs:
+        why = f"{len(inside)} samples are too few to tell noise from misfit"
+        if len(inside) >= FEWEST_SAMPLES:
+            why = f"of {len(inside)} samples no {FEWEST_SAMPLES} count without a gap: too few"
+        return Estimate(own, own, "none", "", why, own)
+    raw, torque = ([run.of(x[run.stretch]) for run in runs] for x in (columns, logged))
+    if bandwidth == 0.0:
+        mean = float(np.mean(np.concatenate([v[run.counts] for v, run in zip(raw, runs)])))
+        steps, counts = [run.step for run in runs], [run.counts for run in runs]
+        kept, rest = outliers.without([v - mean for v in raw], counts, steps, 0.0)
+        found = repeats.block_rms(np.concatenate([v[k] for v, k in zip(rest, kept)]) ** 2)
+        words = "nothing moves: all but the residual's mean"
+        return _bounded(*found, "spectral", words, "the log is too short", own)
+    rest, kept, number, removed = _rest(shared, raw, torque, joint)
+    if math.sqrt(max(np.mean(v**2) for v in rest)) <= 1e-12 * max(size, own):
+        return _certain(0.0, "the residual is a constant, or a function of the motion", own)
+    if any(period is not None for period in shared.periods):
+        signals = [whole(runs, v, lengths) for v in (rest, raw, torque)]
+        found = repeats.scatter(signals, whole(runs, kept, lengths), shared.periods)
+        if found is not None:
+            k = next(k for k, period in enumerate(shared.periods) if period is not None)
+            count = int(lengths[k] / shared.periods[k] + 0.01)
+            words = f"period of {shared.periods[k] * step[k]:.3f} s found, {count} repeats"
+            return _bounded(*found, "repeats", words, "the repeats differ", own)
+    spectrum = spectrum_of(rest, kept, [run.step for run in runs])
+    # what the functions took off was mostly in the band, noise as well as misfit
+    freedom = 2.0 * bandwidth * sum(len(run.q) * run.step for run in runs)
+    spectrum.density[spectrum.centre < bandwidth] /= 1.0 - min(0.5, number / max(freedom, 1.0))
+    found = weighed(spectrum, bandwidth, min(run.step for run in runs), removed)
+    words = f"residual above {bandwidth:.2g} Hz, {found.colour}"
+    return _bounded(found.rms, found.std, "spectral", words, found.doubt, own, found.least)
+
+
+def _rest(shared: _Shared, raw, torque, joint: int):
+    """A residual (n,) of each run without what functions of the motion explain and without what no
+    noise does; which rows (n,) are kept; how many functions there were and the power they took."""
+    runs, steps = shared.runs, [run.step for run in shared.runs]
+    predicted = [m - r for m, r in zip(torque, raw)]
+    asked = Functions(runs, shared.motion, predicted, joint, shared.bandwidth)
+    rest, _, _ = asked.removed_from(raw, [run.counts for run in runs])
+    kept = outliers.away_from_reversals(runs, shared.motion.v, rest, [run.counts for run in runs])
+    rest = [bridged(v, k) for v, k in zip(rest, kept)]
+    kept, _ = outliers.without(rest, kept, steps, shared.bandwidth)
+    # once more, without what no noise does
+    rest, number, removed = asked.removed_from(raw, kept)
+    return [bridged(v, k) for v, k in zip(rest, kept)], kept, number, removed
+
+
+def _bounded(
+    rms: float, std: float, method: str, detail: str, doubt: str, own: float, least: float = 0.0
+) -> Estimate:
+    """An estimate held below the residual's own RMS; by how much it had to be is an error of it."""
+    if rms > own:
+        rms, std = own, math.hypot(std, rms - own)
+    return Estimate(rms, std, method, detail, doubt, own, min(least, own))
+
+
+def _certain(rms: float, detail: str, own: float) -> Estimate:
+    return Estimate(rms, 0.0, "spectral", detail, "", own)
+
+
+def _of_joint(values, joint: int) -> list[np.ndarray]:
+    """A joint's column (n,) of each stretch; what has no columns is the same for all joints."""
+    return [x[:, joint] if x.ndim == 2 else x for x in map(np.asarray, values)]
+
+
+def _shared(q, step, use, memory: dict) -> _Shared:
+    key = b"".join(np.packbits(u).tobytes() for u in use)
+    if key not in memory:
+        runs = runs_of(q, step, use)
+        looked = whole(runs, [run.counts for run in runs], [len(x) for x in q]) if runs else []
+        periods = [repeats.period_of(x, counts) for x, counts in zip(q, looked)]
+        motion, bandwidth = (kinematics(runs), bandwidth_of(runs)) if runs else (None, 0.0)
+        memory[key] = _Shared(runs, motion, bandwidth, periods)
+    return memory[key]

@@ -1,0 +1,84 @@
+"""Rows of a residual that no noise makes: spikes, bursts, and what friction's jump leaves about
+reversals.
+
+Noise of any colour differs from one moment to the next as a Gaussian does, on every time scale. So
+means of L samples before and after each row are subtracted, for L from one sample to a share of the
+motion's quickest period; where the difference is an outlier among all of them, the rows are left
+out.
+"""
+
+import math
+
+import numpy as np
+
+from .stretches import Run, bridged, moving
+
+_OUTLYING = 5.0  # robust standard deviations: a Gaussian does that once in two million
+_SHARE = 0.25  # of the quickest period of the motion: beyond it misfit is no burst
+_MOST = 0.25  # of the rows; where more stand out, they are no exception
+# Reversals: share of its rms speed below which a joint is slow, of the time it may be, and the
+# ratio of mean squares, slow over fast, that noise does not have.
+_SLOW, _MOST_SLOW, _LARGER = 0.12, 0.25, 2.0
+_NORMAL = 0.6745  # median of a standard Gaussian's absolute value
+
+
+def without(values: list[np.ndarray], kept: list[np.ndarray], steps: list[float], bandwidth: float):
+    """Which rows (n,) of each run are kept, and the values with what is left out bridged."""
+    shortest = min(steps)
+    longest = max(1, int(_SHARE / (bandwidth * shortest))) if bandwidth > 0.0 else 1
+    kept, values, all_rows = list(kept), list(values), sum(int(k.sum()) for k in kept)
+    for level in range(int(math.log2(longest)) + 1):
+        width = 2**level
+        steps_of = [_step(v, k, width) for v, k in zip(values, kept)]
+        sizes = [np.abs(d[~np.isnan(d)]) for d in steps_of]
+        sizes = np.concatenate(sizes) if sizes else np.zeros(0)
+        if not len(sizes) or not (typical := float(np.median(sizes)) / _NORMAL) > 0.0:
+            continue
+        found = []
+        for d, k in zip(steps_of, kept):
+            hit = np.flatnonzero(np.nan_to_num(np.abs(d)) > _OUTLYING * typical)
+            turns = np.zeros(len(k) + 1, dtype=np.int64)  # both means are suspect
+            turns[hit] += 1
+            turns[hit + 2 * width] -= 1
+            out = np.cumsum(turns[:-1]) > 0
+            found.append(k & ~out)
+        if sum(int(k.sum()) for k in found) < (1.0 - _MOST) * all_rows:
+            continue
+        values = [bridged(v, f) if f.sum() > 2 else v for v, f in zip(values, found)]
+        kept = [f if f.sum() > 2 else k for f, k in zip(found, kept)]
+    return kept, values
+
+
+def _step(values: np.ndarray, counts: np.ndarray, width: int) -> np.ndarray:
+    """Mean of `width` samples less that of the `width` before them (n - 2 width + 1,), nan where a
+    gap takes much of it."""
+    if len(values) < 2 * width + 1:
+        return np.full(0, np.nan)
+    total = np.concatenate([[0.0], np.cumsum(values)])
+    sums = total[width:] - total[:-width]
+    out = (sums[width:] - sums[:-width]) / width
+    if not counts.all():
+        number = np.concatenate([[0], np.cumsum(counts)])
+        whole = number[2 * width :] - number[: -2 * width]
+        out[whole < 1.5 * width] = np.nan
+    return out
+
+
+def away_from_reversals(
+    runs: list[Run], v: np.ndarray, values: list[np.ndarray], kept: list[np.ndarray]
+) -> list[np.ndarray]:
+    """Which rows (n,) of each run are kept where those about any joint's reversals, `v` (n, dof)
+    its speed, are left out if the residual is much larger there. Sticking lasts a hundredth of the
+    time and can hold most of the misfit."""
+    square, counts = np.concatenate(values) ** 2, np.concatenate(kept)
+    slowness = np.abs(v) / np.sqrt(np.mean(v**2, axis=0) + 1e-300)
+    left = counts.copy()
+    for k in np.flatnonzero(moving(np.concatenate([run.q for run in runs]))):
+        slow, fast = counts & (slowness[:, k] < _SLOW), counts & (slowness[:, k] >= _SLOW)
+        if not 0 < slow.sum() < _MOST_SLOW * counts.sum():
+            continue
+        fewer = left & fast
+        if square[slow].mean() > _LARGER * square[fast].mean() and fewer.sum() > 0.6 * counts.sum():
+            left = fewer
+    ends = np.cumsum([len(k) for k in kept])[:-1]
+    return [a if a.sum() > 2 else b for a, b in zip(np.split(left, ends), kept)]

@@ -1,0 +1,115 @@
+"""Noise as the scatter between repeats of the motion, whatever its colour and whatever the model
+lacks.
+
+Second differences over three repeats (first over two) leave out what drifts in step with time.
+Shifts are by whole samples, so that nothing is done to the noise.
+"""
+
+import math
+
+import numpy as np
+
+from .stretches import moving
+
+# rms difference of each joint's positions, share of its range; and how far away it must have been
+# in between
+_TOLERANCE, _AWAY = 0.003, 0.05
+_BLOCKS = 30
+_INDEPENDENT = 1.94  # second differences of repeats per independent one
+_TINY = 1e-300
+
+
+def scatter(signals, kept, periods) -> tuple[float, float] | None:
+    """RMS of the noise and its standard error, None where nothing repeats.
+
+    Args:
+        signals: several versions of the torque, (n,) of each stretch [N m or N]; each scatters by
+            the noise or more.
+        kept: (n,) bool of each stretch, rows that count.
+        periods: [samples] of each stretch, or None.
+    """
+    found = []
+    for values_of in signals:
+        squares = []
+        for values, counts, period in zip(values_of, kept, periods):
+            if period is None:
+                continue
+            n, one, two = len(values), round(period), round(2 * period)
+            if n >= 3 * period:
+                a, b, c = (slice(k, k + n - two) for k in (0, one, two))
+                square = (values[a] - 2.0 * values[b] + values[c]) ** 2 / 6.0
+                both = counts[a] & counts[b] & counts[c]
+            else:
+                square = (values[one:] - values[:-one]) ** 2 / 2.0
+                both = counts[one:] & counts[:-one]
+            squares.append(square[both])
+        squares = np.concatenate(squares) if squares else np.zeros(0)
+        if len(squares) < _BLOCKS:
+            return None
+        found.append(block_rms(squares))
+    return min(found)
+
+
+def block_rms(squares: np.ndarray) -> tuple[float, float]:
+    """RMS and its standard error, from blocks of time."""
+    blocks = np.array([b.mean() for b in np.array_split(squares, min(_BLOCKS, len(squares)))])
+    rms = math.sqrt(squares.mean())
+    error = float(blocks.std(ddof=1)) * math.sqrt(_INDEPENDENT / len(blocks))
+    return rms, error / (2.0 * rms + _TINY)
+
+
+def period_of(q: np.ndarray, counts: np.ndarray) -> float | None:
+    """The samples, seldom whole, after which all joints come back, and have time to do so twice;
+    None where they do not.
+
+    Args:
+        q: (n, dof) positions [rad or m].
+        counts: (n,) bool, rows that count.
+    """
+    if counts.sum() < _BLOCKS or not (moves := moving(q[counts])).any():
+        return None
+    rows = np.flatnonzero(counts)
+    q, counts = q[rows[0] : rows[-1] + 1], counts[rows[0] : rows[-1] + 1]
+    n = len(q)
+    inside = q[counts][:, moves]
+    x = np.where(counts[:, None], (q[:, moves] - inside.mean(0)) / np.ptp(inside, axis=0), 0.0)
+    lag = np.arange(n // 2 + 1)
+    distance = _distance(x, counts, lag)
+    worst = distance.max(axis=1)
+    away = np.flatnonzero(worst > _AWAY**2)
+    if not len(away):
+        return None
+    # in one sample: a period that ends between two is missed by some of it
+    moves = np.mean(np.diff(x, axis=0)[counts[1:] & counts[:-1]] ** 2, axis=0)
+    near = (distance < _TOLERANCE**2 + 0.25 * moves).all(axis=1)
+    last = 0
+    for first in np.flatnonzero(near & (lag > away[0])):
+        if first <= last:
+            continue
+        last = int(first)
+        while last + 1 < len(lag) and worst[last + 1] < worst[last]:
+            last += 1
+        if last + 1 == len(lag):
+            break
+        below, here, above = distance[last - 1 : last + 2].sum(axis=1)
+        offset = 0.5 * (below - above) / max(below - 2.0 * here + above, _TINY)
+        if abs(offset) <= 1.0 and (distance[last] - moves * offset**2 < _TOLERANCE**2).all():
+            return last + offset
+    return None
+
+
+def _distance(x: np.ndarray, counts: np.ndarray, lag: np.ndarray) -> np.ndarray:
+    """Mean square (lags, joints) of x (n, joints), zero where it does not count, less itself later;
+    infinite where fewer than a third of the rows meet rows that count."""
+    n, size = len(x), 1 << (2 * len(x) - 1).bit_length()
+    spectrum = np.fft.rfft(x, size, axis=0)
+    products = np.fft.irfft(np.abs(spectrum) ** 2, axis=0)[lag]
+    if counts.all():
+        before = np.concatenate([np.zeros((1, x.shape[1])), np.cumsum(x**2, axis=0)])
+        return (before[n - lag] + before[n] - before[lag] - 2.0 * products) / (n - lag)[:, None]
+    mask, square = np.fft.rfft(counts.astype(float), size), np.fft.rfft(x**2, size, axis=0)
+    meet = np.fft.irfft(np.abs(mask) ** 2)[lag]
+    both = np.fft.irfft(2.0 * (square * mask.conj()[:, None]).real, axis=0)[lag]
+    enough = meet > (n - lag) / 3.0
+    mean = (both - 2.0 * products) / np.maximum(meet, 1.0)[:, None]
+    return np.where(enough[:, None], mean, np.inf)

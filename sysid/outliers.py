@@ -1,0 +1,127 @@
+"""How surprising a value is among others of a log; and spikes, samples of torque that stand alone.
+
+One rule gives every level. An exponential tail through a statistic's own median and upper quartile
+says how surprising a value z is,
+
+    s = ln 4 + (z - z75) ln 2 / (z75 - z50),    the chance of a greater one being exp(-s),
+
+and the largest of n is out of the ordinary above ln(n / chance). A tenth of the values that is
+disturbed cannot move these quantiles far. The tails of noise fall faster than that, so that a clean
+log gives fewer events than `CHANCE`; and z75 - z50 is never taken below what white noise gives, for
+a statistic of smooth or coarse values may have no spread.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.ndimage import median_filter
+
+CHANCE = 0.01  # of one event of a kind in a clean log
+SPIKE = 3  # samples: "one or a few"
+FEWEST = 7  # samples that a parabola and its rest need
+SHORT = 8 * FEWEST  # samples: a log with fewer has no usual
+RESTING = 0.05  # of the usual speed: what is slower rests
+_ABOUT = 4  # steps to either side of a spike that it is compared with
+_BLOCK = 64  # samples of which a median is the level thereabouts
+NOTHING = 1e-3  # share of a torque's spread that disturbs nothing
+# z75 - z50 of white noise, from 200 000 samples: 0.38 to 0.48, the wider the pulse the less
+_WHITE = 0.48
+
+
+def surprise(z, white: float, among=None) -> np.ndarray:
+    """s of values z, from the quantiles of z or of those `among` which they stand; see above."""
+    middle, high = np.quantile(z if among is None else among, [0.5, 0.75])
+    return np.log(4.0) + (z - high) * np.log(2.0) / max(high - middle, white)
+
+
+def quantum(values) -> float:
+    """The step in which values (n,) are told: the first percentile of the gaps between them."""
+    own = np.unique(values)
+    gaps = np.diff(own)
+    gaps = gaps[gaps > 1e-9 * np.abs(own).max(initial=0.0)]
+    return float(np.quantile(gaps, 0.01)) if len(gaps) else 0.0
+
+
+def runs(flags) -> list[tuple[int, int]]:
+    """First and last index of every run of true flags (n,)."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], np.asarray(flags, dtype=np.int8), [0]])))
+    return [(int(a), int(b) - 1) for a, b in zip(edges[::2], edges[1::2])]
+
+
+def spikes(tau) -> list[list[tuple[int, int]]]:
+    """First and last samples of the spikes of each joint's torque (n, dof).
+
+    Of up to `SPIKE` samples that are entered and left by steps of opposite sign, min(|in|, |out|)
+    over the usual step: the larger of the log's, of those thereabouts and of those next to it on
+    either side. So the peak of a fast smooth wave, entered and left by steps like its neighbours',
+    is none, nor is an edge. Where a log has k spikes, chance is allowed k times as many: no more
+    than a share `CHANCE` of what is found is false.
+
+    Source: Benjamini & Hochberg 1995.
+    """
+    n, dof = tau.shape
+    if n < SHORT:
+        return [[] for _ in range(dof)]
+    found = [pulses for j in range(dof) for pulses in _pulses(tau[:, j])]
+    hit = [np.zeros(len(z), dtype=bool) for _, z, _ in found]
+    while True:
+        pairs = zip((z for _, z, _ in found), hit)
+        s = [surprise(z, _WHITE, z[~own]) if len(z) else z for z, own in pairs]
+        ranked = np.sort(np.concatenate(s))[::-1]
+        allowed = CHANCE * np.arange(1, len(ranked) + 1)
+        enough = np.flatnonzero(ranked > np.log(SPIKE * n * dof / allowed))
+        least = ranked[enough[-1]] if len(enough) else np.inf
+        more = [own | (values >= least) for own, values in zip(hit, s)]
+        if all(map(np.array_equal, hit, more)):
+            break
+        hit = more
+    out = []
+    for j in range(dof):
+        own, taken = [], np.zeros(n, dtype=bool)
+        for k in range(SPIKE):
+            first, _, alone = found[SPIKE * j + k]
+            for a in first[hit[SPIKE * j + k] & alone].tolist():
+                if not taken[a : a + k + 1].any():
+                    taken[a : a + k + 1] = True
+                    own.append((a, a + k))
+        out.append(sorted(own))
+    return out
+
+
+def _pulses(tau):
+    """Pulses of tau (n,) of each width: first sample, size over the usual step, is it alone."""
+    step = np.diff(tau)
+    size = np.abs(step)
+    least = max(np.median(size), quantum(tau), NOTHING * np.std(tau))
+    usual = np.maximum(least, _thereabouts(size))
+    away = np.abs(tau - median_filter(tau, 4 * SPIKE + 1, mode="nearest"))
+    for width in range(1, SPIKE + 1):
+        into = np.arange(_ABOUT, len(tau) - 1 - width - _ABOUT)  # the step into sample into + 1
+        into = into[step[into] * step[into + width] < 0.0]
+        out = into + width
+        beside = np.maximum(_second(size, into, -1), _second(size, out, 1))
+        scale = np.maximum(usual[into], beside)
+        z = ratio(np.minimum(size[into], size[out]), scale)
+        # what lies between two spikes is nearer to the usual than they are
+        inside = np.min([away[into + k] for k in range(1, width + 1)], axis=0)
+        yield into + 1, z, inside > np.maximum(away[into], away[out + 1])
+
+
+def _second(size, at, way: int) -> np.ndarray:
+    """The second smallest of the four steps beside each: a spike nearby takes two of them."""
+    a, b, c, d = (size[at + way * k] for k in range(1, _ABOUT + 1))
+    smaller, larger = (np.minimum(a, b), np.minimum(c, d)), (np.maximum(a, b), np.maximum(c, d))
+    return np.minimum(np.maximum(*smaller), np.minimum(*larger))
+
+
+def ratio(values, scale) -> np.ndarray:
+    """values / scale (n,), zero where the scale is."""
+    return np.divide(values, scale, out=np.zeros(len(values)), where=scale > 0.0)
+
+
+def _thereabouts(values) -> np.ndarray:
+    """Running median (n,) of values, constant in blocks."""
+    blocks = -(-len(values) // _BLOCK)
+    padded = np.pad(values, (0, blocks * _BLOCK - len(values)), mode="reflect")
+    middle = median_filter(np.median(padded.reshape(blocks, _BLOCK), axis=1), 5, mode="nearest")
+    return np.repeat(middle, _BLOCK)[: len(values)]

@@ -1,0 +1,85 @@
+"""Readings that stood still: torque or angles that repeat longer than chance or motion has it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .outliers import CHANCE, RESTING, SHORT, quantum, runs
+
+_GRAINS = 2.5  # quanta: two and the rounding; less is how coarse values move
+_MOVING = 1.5  # quanta a sample: what moves as fast repeats no value
+_ABOUT = 4  # samples to either side whose speed is what the joint had
+_FEWEST = 4  # samples of torque: a shorter repeat is not worth a row, whatever made it
+_HELD = 10  # samples at least of an angle that froze and never caught up
+_OFTEN = 0.25  # of the rows: what comes more often is the logger's way, not an event
+
+
+def held_torque(tau) -> list[tuple[int, int]]:
+    """First and last samples of runs in which one joint's torque (n,) repeats beyond chance.
+
+    Where a share p of the samples repeats the one before, the longest of n runs of chance has
+    1 + ln(n / chance) / ln(1 / p) samples; p is that of the other runs. And a run is entered or
+    left by a jump that is none of the values' own grain: a coarse signal leaves its crest by one.
+    """
+    n = len(tau)
+    step = np.abs(np.diff(tau))
+    if n < SHORT or not step.any():
+        return []
+    every = np.array(runs(step == 0.0), dtype=int).reshape(-1, 2) + [0, 1]  # samples
+    long = np.zeros(len(every), dtype=bool)
+    length = every[:, 1] - every[:, 0] + 1
+    while True:
+        p = max(np.sum(length[~long] - 1), 1.0) / max(n - 1 - np.sum(length[long] - 1), 2.0)
+        longest = 1.0 + np.log(n / CHANCE) / np.log(1.0 / min(p, 1.0 - 1.0 / n))
+        more = long | (length > max(longest, _FEWEST))
+        if np.array_equal(more, long):
+            break
+        long = more
+    ends = np.concatenate([[0.0], step, [0.0]])
+    grain, usual = _GRAINS * quantum(tau), np.median(step[step > 0.0])
+    extreme = (tau == tau.min()) | (tau == tau.max())  # what clips gets there at any slope
+    least = np.where(extreme[every[:, 0]], grain, max(grain, usual))
+    jumps = np.maximum(ends[every[:, 0]], ends[every[:, 1] + 1]) > least
+    return [(int(a), int(b)) for a, b in every[long & jumps]]
+
+
+def rests(q, first: int, last: int, usual: float) -> bool:
+    """Whether an angle (n,) stays where it is from `first` to `last`, but for its noise and grain.
+
+    Args:
+        usual: the speed [a sample] of the joint that moves most; a small share of it is rest.
+    """
+    # white noise of deviation s leaves second differences of median 0.6745 sqrt(6) s, and two
+    # angles sqrt(2) s apart
+    noise = np.median(np.abs(np.diff(q, 2))) / (0.6745 * np.sqrt(6.0))
+    reach = max(RESTING * usual * (last - first), 3.0 * np.sqrt(2.0) * noise, _GRAINS * quantum(q))
+    return bool(abs(q[last] - q[first]) <= reach)
+
+
+def held_angle(q) -> list[tuple[int, int]]:
+    """First and last samples of runs in which one joint's angle (n,) repeats while the joint moves.
+
+    About the run the joint moves by more than the angle's grain in every sample, so that no repeat
+    is due to it; and what it missed meanwhile it makes up in one step, or it had moved as usual and
+    is held to the end.
+    """
+    n = len(q)
+    step = np.diff(q)
+    size = np.abs(step)
+    if n < SHORT or not size.any():
+        return []
+    grain, usual = quantum(q), np.sqrt(np.mean(step**2))
+    found = []
+    for a, b in runs(size == 0.0):  # steps; the samples are a to b + 1
+        before, after = size[max(a - _ABOUT, 0) : a], size[b + 2 : b + 2 + _ABOUT]
+        if not len(before) or not before.all() or not after.all():
+            continue
+        held, speed = b - a + 1, np.median(before)
+        if len(after):
+            speed = min(speed, np.median(after))
+            caught = size[b + 1] > 0.5 * (held + 1) * speed
+            if held > 1 and speed > max(_MOVING * grain, RESTING * usual) and caught:
+                found.append((a, b + 1))
+        elif held >= _HELD and speed > max(_MOVING * grain, 0.5 * usual):
+            found.append((a, b + 1))
+    return found if sum(b - a + 1 for a, b in found) < _OFTEN * n else []
