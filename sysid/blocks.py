@@ -85,12 +85,28 @@ def standard_error(values) -> float:
     return float(np.sqrt(count * np.var(values, ddof=1))) if count > 1 else float("nan")
 
 
+def away(differences) -> float:
+    """Standard errors that a sum over blocks stands from zero; neighbouring blocks count together. Zero where they are too few."""
+    d = np.asarray(differences)
+    if len(d) > 7:
+        d = d[: len(d) // 2 * 2].reshape(-1, 2).sum(1)
+    se = standard_error(d) if len(d) > 2 else 0.0
+    return float(d.sum() / se) if se > 0 else 0.0
+
+
+def jackknife(without) -> np.ndarray:
+    """Standard errors of estimates from those with one block left out each (blocks, ...)."""
+    without = np.asarray(without)
+    count = len(without)
+    return np.sqrt((count - 1) / count * ((without - without.mean(0)) ** 2).sum(0))
+
+
 def signs(count: int, draws: int, rng: np.random.Generator) -> np.ndarray:
     """Random signs (draws, count)."""
     return rng.integers(0, 2, (draws, count)) * 2.0 - 1.0
 
 
-def confidence_set(losses, level: float, rng: np.random.Generator, *, draws: int = 1000) -> np.ndarray:
+def confidence_set(losses, rng: np.random.Generator, *, draws: int = 1000) -> np.ndarray:
     """(models,) p-values of the model confidence set: a model belongs to the set of confidence 1 - a where its p is above a.
 
     The worst model is left out while the hypothesis of equal losses is rejected; a model's p is the greatest p of the tests
@@ -98,7 +114,6 @@ def confidence_set(losses, level: float, rng: np.random.Generator, *, draws: int
 
     Args:
         losses: (blocks, models), what each model loses in each block.
-        level: a below which models need not be kept apart any further.
 
     Source: Hansen, Lunde & Nason 2011, with the range statistic over single models (T_max).
     """
@@ -115,8 +130,6 @@ def confidence_set(losses, level: float, rng: np.random.Generator, *, draws: int
         found = float(np.mean((drawn / spread).max(1) >= (mean / spread).max()))
         greatest = max(greatest, found)
         p[left[worst]] = greatest
-        if greatest > level and len(left) == 2:
-            pass
         left.pop(worst)
     if left:
         p[left[0]] = 1.0

@@ -138,9 +138,10 @@ def _nothing(before: Fit, after: Fit, member: Member) -> str | None:
     """Why an effect that the search found is not claimed, None where it is."""
     if _chance_of_nothing(after, member) > _NOTHING:
         return "its parameters are nothing beside their deviations once everything is fitted"
-    rise = _rise(before, after, member)
-    if rise is not None:
-        return f"with it the error on the test logs rises by {rise:.3g} N m, more than its standard error"
+    joint = _where(member, before)
+    if rises := comparison.rises(before, after, None if joint == "*" else [joint]):
+        risen = f"{100 * rises[0].delta_rms:.2g} %" if joint == "*" else f"{rises[0].delta_rms:.3g}"
+        return f"with it the error on the test logs rises by {risen}, more than its standard error"
     return None
 
 
@@ -163,14 +164,6 @@ def _chance_of_nothing(after: Fit, member: Member) -> float:
         if after.model.terms[v.term][0].name == key[0] and v.joint == key[1] and v.shape.start is not None and std > 0
     ]  # fmt: skip
     return float(chi2.sf(np.sum(np.square(starts)), len(starts))) if starts else 1.0
-
-
-def _rise(before: Fit, after: Fit, member: Member) -> float | None:
-    """By how much the held-out error rises, where it does by more than its standard error."""
-    own = {before.joints[j] for j in own_joints(member, len(before.joints))}
-    found = [d for d in comparison.compare(before, after, ("before", "after")) if d.joint in own]
-    worst = min(found, key=lambda d: d.delta_rms) if len(found) > 1 else found[0]
-    return worst.delta_rms if worst.delta_rms > 0 and not worst.delta_rms <= worst.se else None
 
 
 def _parameters(before: Fit, after: Fit, member: Member) -> dict[str, tuple[float, float, str]]:

@@ -158,7 +158,7 @@ def _floors(experiment: Experiment, fit: Fit) -> list[NoiseFloor]:
     gain = float(np.sqrt(np.sum(smoother(impulse) ** 2)))
     scaled = lambda value: None if value is None else value * gain  # noqa: E731
     return [
-        replace(f, rms=scaled(f.rms), std=f.std * gain, low=scaled(f.low), high=scaled(f.high), detail=f"{f.detail}; carried through the fit's filter")
+        replace(f, rms=scaled(f.rms), std=scaled(f.std), low=scaled(f.low), high=scaled(f.high), detail=f"{f.detail}; carried through the fit's filter")
         for f in found
     ]  # fmt: skip
 

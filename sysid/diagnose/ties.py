@@ -102,7 +102,7 @@ def chosen(view: View, groups: list[Group], rng: np.random.Generator) -> Choice 
     base = losses(view, view.blocks).sum(1)
     table = np.stack([m.losses.sum(1) for m in members], axis=1)
     members, table = _least(members, table)
-    p = blocks.confidence_set(table, _OUTSIDE, rng)
+    p = blocks.confidence_set(table, rng)
     inside = [k for k in np.argsort(table.sum(0)) if p[k] >= _OUTSIDE]
     # of those within a standard error of the best, the one of fewest parameters (Breiman, Friedman, Olshen & Stone 1984)
     best = inside[0]

@@ -11,12 +11,12 @@ import numpy as np
 
 from .. import blocks
 from .. import rows as row
-from . import flexible
 from ..config import Experiment
 from ..estimate import inverse
 from ..model import Model
 from ..preprocess import Motion
 from ..shape import Settled, inverted, prior_hessian, settle
+from . import flexible
 
 
 @dataclass(frozen=True)
