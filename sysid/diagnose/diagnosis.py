@@ -12,6 +12,7 @@ The whole loop on one page:
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -86,8 +87,13 @@ def diagnose(experiment: Experiment, *, fit: Fit | None = None, level: float = s
         return Diagnosis(
             fit, found, tuple(claims), tuple(said), tuple(detectable(view, asked, candidates(view.model, extra))),
             tuple(regions.failures(first, fit.predictions["test"], levels)), _events(view, test), first, then,
-            tuple(refused), tuple(f"{r.effect} on {r.joint} is not claimed: {r.why}" for r in refused),
+            tuple(refused), tuple(_notices(claims, refused)),
         )  # fmt: skip
+
+
+def _notices(claims, refused) -> Iterator[str]:
+    yield from (f"{r.effect} on {r.joint} is not claimed: {r.why}" for r in refused)
+    yield from (words for c in claims if (words := claiming.hidden_by_weights(c.head, c.after)) is not None)
 
 
 def _read(experiment: Experiment, fit: Fit, part: str):
