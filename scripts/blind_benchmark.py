@@ -858,6 +858,7 @@ def page(found: dict, records: list[dict], settings: dict, notes: str = "") -> s
         f"Claims are the (effect, joint) pairs that first verdicts name, on the joint of an outside law excepted. Not there: {_percent(found['claims']['false'])}; "
         f"where the family or set is counted with it: {_percent(found['claims']['false_families_too'])}."
         + (f" Effects in a set that names something: {found['claims']['members']:.1f} on average." if found["claims"]["members"] else ""),
+        "True noise is what torque noise, encoder and clock add to the residual of the first fit, over all logs; spikes and closed brakes are none.",
         f"Noise floor within 25 % of the true noise, or null: {_percent(found['floors']['good'])} of the joints; null: {_percent(found['floors']['null'])}."
         + (f" Floor over true noise: {_quantiles(found['floors']['ratio'])}." if found["floors"]["ratio"] else ""),
         _table(["case", "claimed", "on", "its family holds what is hidden"], [[f"`{c['key']}`", c["effect"], c["joint"], "yes" if c["held"] else "no"] for c in found["claims"]["list"]])
@@ -918,7 +919,7 @@ def tell(record: dict, folder: Path) -> None:
             j, rms = v["joint"], record["rms"]
             said = v["status"] if v["status"] != "missing" else " ".join([v["effect"], f"tied {family(v, v['joint'])}" if family(v, v["joint"]) else "", f"also {v['also']}" if v.get("also") else ""])
             left = f"  left {v['share_left']:.2f} by {v['depends_on']}" if "share_left" in v else ""
-            print(f"  {j:22s} {record['noise_seen'][j]:9.4f} {math.nan if record['floors'][j] is None else record['floors'][j]:9.4f} {rms['before'][j]:9.4f} {rms['after'][j]:9.4f} {rms.get('true', {}).get(j, math.nan):9.4f}   {said}{left}")
+            print(f"  {j:22s} {record['noise_seen']['all'][j]:9.4f} {math.nan if record['floors'][j] is None else record['floors'][j]:9.4f} {rms['before'][j]:9.4f} {rms['after'][j]:9.4f} {rms.get('true', {}).get(j, math.nan):9.4f}   {said}{left}")
         for f in record["findings"]:
             step = f"step {f['step']}" if f["step"] is not None else ""
             print(f"  finding: {f['effect']}:{f['joint']} removes {f['removed']}, tied {f['tied_with']} {step} { {n: float(f'{v:.3g}') for n, v in f['parameters'].items() if v is not None} }")
