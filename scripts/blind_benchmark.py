@@ -781,6 +781,10 @@ def _table(heads: list[str], rows: list[list]) -> str:
     return "\n".join(lines + ["| " + " | ".join("·" if value == 0 and not isinstance(value, str) else str(value) for value in row) + " |" for row in rows])
 
 
+def _spelled(nuisances: dict | None) -> str:
+    return ", ".join(f"{word} {value}" for word, value in (nuisances or {}).items()) or "–"
+
+
 def _name(under: str) -> str:
     return "blind_benchmark" + ("" if under == "clean" else f"_{under}")
 
@@ -880,8 +884,8 @@ def page(found: dict, records: list[dict], settings: dict, notes: str = "") -> s
         "### Named, and yet farther than 5 % from the true model",
         _table(["case", "hidden", "on", "size", "RMS taken away by the true model", "RMS after / true"], [[f"`{r['key']}`", r["effect"], r["joint"], f"{r['size']:.2f}", _lowered(r), f"{r['after'] / r['true']:.2f}"] for r in far]) if far else "None.",
         "### Controls that are not complete",
-        _table(["case", "joint", "verdict", "noise's colour [s]", "encoder [bits]", "pace"], [
-            [f"`{r['key']}`", v["joint"], " ".join([v["effect"], *(f"(or {t})" for t in family(v, v["joint"]))]) if v["status"] == "missing" else v["status"], *(str(r["conditions"][k] or "–") for k in ("colour", "encoder", "pace"))]
+        _table(["case", "joint", "verdict", "noise's colour [s]", "encoder [bits]", "pace", "nuisances"], [
+            [f"`{r['key']}`", v["joint"], " ".join([v["effect"], *(f"(or {t})" for t in family(v, v["joint"]))]) if v["status"] == "missing" else v["status"], *(str(r["conditions"][k] or "–") for k in ("colour", "encoder", "pace")), _spelled(r["conditions"].get("nuisances"))]
             for r, v in accused
         ]) if accused else "None.",
         "### Outside the catalogue, neither unknown nor explained",

@@ -91,6 +91,7 @@ def test_new_statuses_are_scored(blind):  # noqa: F811
 def test_summary_and_page_under_each_of_the_conditions(blind):  # noqa: F811
     control = record(kind="control", key="leg/control/n0", knee=new("knee", "unresolved"))
     accused = record(kind="control", key="leg/control/n1", knee=new("knee", effect="cable"))
+    accused["conditions"]["nuisances"] = {"knocks": 3}
     named = record(
         KNEE, knee=verdict("knee", "stribeck"), findings=[finding("stribeck", "knee", 1)]
     )
@@ -113,6 +114,7 @@ def test_summary_and_page_under_each_of_the_conditions(blind):  # noqa: F811
         }
         text = blind.page(found, records, settings | {"conditions": under})
         assert ("--conditions" in text) == (under != "clean") and "unresolved" in text
+        assert "knocks 3" in text
         json.dumps(blind._plain(found), allow_nan=False)
 
 
