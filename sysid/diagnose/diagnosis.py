@@ -72,7 +72,7 @@ def diagnose(experiment: Experiment, *, fit: Fit | None = None, level: float = s
     fit = fit or pipeline.fit(experiment, progress=progress)
     extra = _own(experiment)
     with pipeline.noticed():
-        view = _view(experiment, fit)
+        view = first_view(experiment, fit)
         steps, asked, _, _ = select.search(view, extra, level=level, tell=tell)
         claims, refused = claiming.claimed(steps, fit, tell)
         after = claiming.view_after(claims, view)
@@ -100,7 +100,7 @@ def _read(experiment: Experiment, fit: Fit, part: str):
     return pipeline.read(experiment, fit.model.robot, getattr(experiment.data, part))
 
 
-def _view(experiment: Experiment, fit: Fit) -> View:
+def first_view(experiment: Experiment, fit: Fit) -> View:
     """The fitted model on the training logs, and on the same with the noise of the angles drawn once more; in the widest band
     that this noise leaves."""
     logs = _read(experiment, fit, "train")
