@@ -26,12 +26,18 @@ _BLOCK = 64  # samples of which a median is the level thereabouts
 NOTHING = 1e-3  # share of a torque's spread that disturbs nothing
 # z75 - z50 of white noise, from 200 000 samples: 0.42 to 0.53, the wider the pulse the less
 _WHITE = 0.53
+# how much steeper its tail is from there to one in 10 000, ln(2500) / 3.3 over ln(2) / 0.53
+_TAIL = 1.8
 
 
-def surprise(z, white: float, among=None) -> np.ndarray:
-    """s of values z, from the quantiles of z or of those `among` which they stand; see above."""
+def surprise(z, white: float, among=None, tail: float = 1.0) -> np.ndarray:
+    """s of values z, from the quantiles of z or of those `among` which they stand; see above.
+
+    Args:
+        white: z75 - z50 of white noise. tail: how much steeper than from z50 to z75 its tail is.
+    """
     middle, high = np.quantile(z if among is None else among, [0.5, 0.75])
-    return np.log(4.0) + (z - high) * np.log(2.0) / max(high - middle, white)
+    return np.log(4.0) + (z - high) * tail * np.log(2.0) / max(high - middle, white)
 
 
 def quantum(values) -> float:
@@ -53,9 +59,9 @@ def spikes(tau) -> list[list[tuple[int, int]]]:
 
     Of up to `SPIKE` samples that are entered and left by steps of opposite sign, min(|in|, |out|)
     over the usual step: the larger of the log's, of those thereabouts and of half of those next to
-    it on either side. So the peak of a fast smooth wave, entered and left by steps like its neighbours',
-    is none, nor is an edge. Where a log has k spikes, chance is allowed k times as many: no more
-    than a share `CHANCE` of what is found is false.
+    it on either side. So the peak of a fast smooth wave, entered and left by steps like those
+    beside it, is none, nor is an edge. Where a log has k spikes, chance is allowed k times as many:
+    no more than a share `CHANCE` of what is found is false.
 
     Source: Benjamini & Hochberg 1995.
     """
@@ -66,7 +72,7 @@ def spikes(tau) -> list[list[tuple[int, int]]]:
     hit = [np.zeros(len(z), dtype=bool) for _, z, _ in found]
     while True:
         pairs = zip((z for _, z, _ in found), hit)
-        s = [surprise(z, _WHITE, z[~own]) if len(z) else z for z, own in pairs]
+        s = [surprise(z, _WHITE, z[~own], _TAIL) if len(z) else z for z, own in pairs]
         ranked = np.sort(np.concatenate(s))[::-1]
         allowed = CHANCE * np.arange(1, len(ranked) + 1)
         enough = np.flatnonzero(ranked > np.log(SPIKE * n * dof / allowed))
