@@ -213,9 +213,9 @@ def test_frozen_torque_frozen_angles_and_flat_tops():
 
 def test_slow_loggers_and_coarse_signals_repeat_by_their_nature():
     made = segment(noise=0.0, grain=0.5)
-    assert held_torque(made.tau[:, 0]) == []
+    assert held_torque(made.tau[:, 0], STEP) == []
     every = np.repeat(segment().tau[::8, 0], 8)  # torque that comes at an eighth of the rate
-    assert held_torque(every) == []
+    assert held_torque(every, STEP) == []
     assert held_angle(np.repeat(made.q[::8, 0], 8)) == []
 
 
