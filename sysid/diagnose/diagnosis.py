@@ -106,7 +106,9 @@ def first_view(experiment: Experiment, fit: Fit) -> View:
     logs = _read(experiment, fit, "train")
     cutoff = widest(logs)
     view = _under(experiment, fit, logs, cutoff)
-    share = np.sum(view.design.rough_residual**2, axis=0) / np.maximum(np.sum(view.design.residual**2, axis=0), 1e-300)
+    # in the middle of the rows: about reversals, and where something is missing, there is more of either
+    square = lambda values: np.array([np.median(v[u] ** 2) if u.any() else 1.0 for v, u in zip(values.T, view.rows.use.T)])  # noqa: E731
+    share = square(view.design.rough_residual) / np.maximum(square(view.design.residual), 1e-300)
     lower = narrowed(cutoff, float(np.median(share)))
     return view if lower > 0.9 * cutoff else _under(experiment, fit, logs, lower)
 
