@@ -95,7 +95,7 @@ def test_stops_and_starts_of_all_joints_at_once_are_no_events():
     sides = np.array([1.0, 0.7, -1.2])
     rng = np.random.default_rng(3)
     tau = (
-        (2.0 * qdd + np.tanh(qd / 0.01))[:, None] * sides + 3.0 + 0.1 * rng.normal(size=(len(t), 3))
+        (2.0 * qdd + np.tanh(qd / 0.2))[:, None] * sides + 3.0 + 0.1 * rng.normal(size=(len(t), 3))
     )
     angles = q[:, None] * sides + 1e-5 * rng.normal(size=(len(t), 3))
     assert find(Segment(t, STEP, angles, tau, None, None, {}), JOINTS) == ()
@@ -106,7 +106,10 @@ def test_stops_and_starts_of_all_joints_at_once_are_no_events():
 )
 def test_knocks_are_found_where_they_are(conditions):
     bits = conditions.get("bits")
-    made = with_knock(with_knock(segment(**conditions), 3.3, bits=bits), 8.71, bits=bits)
+    size = 2.5 if bits is None else 5.0  # a coarse encoder leaves it to the torque to show it
+    made = segment(**conditions)
+    for at in (3.3, 8.71):
+        made = with_knock(made, at, size, bits)
     first, second = find(made, JOINTS)
     for event, at in ((first, 3.3), (second, 8.71)):
         assert event.kind == "knock" and event.joints == JOINTS
@@ -210,9 +213,9 @@ def test_frozen_torque_frozen_angles_and_flat_tops():
 
 def test_slow_loggers_and_coarse_signals_repeat_by_their_nature():
     made = segment(noise=0.0, grain=0.5)
-    assert held_torque(made.tau[:, 0]) == []
+    assert held_torque(made.tau[:, 0], STEP) == []
     every = np.repeat(segment().tau[::8, 0], 8)  # torque that comes at an eighth of the rate
-    assert held_torque(every) == []
+    assert held_torque(every, STEP) == []
     assert held_angle(np.repeat(made.q[::8, 0], 8)) == []
 
 
@@ -371,7 +374,8 @@ def test_kinova_s_currents_spike_on_the_first_joints():
     for one in real("kinova").values():
         spikes = [event for event in one.events if event.kind == "spike"]
         assert {"joint_1", "joint_2", "joint_3", "joint_4"} <= {event.joints[0] for event in spikes}
-        assert share(one, ("spike",), tuple(f"joint_{k}" for k in range(1, 8)), 0.0) < 0.02
+        # a sample or a few (three) every 0.3 s at 250 Hz
+        assert share(one, ("spike",), tuple(f"joint_{k}" for k in range(1, 8)), 0.0) < 0.04
 
 
 def test_schunk_s_brakes_close():
