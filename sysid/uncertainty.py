@@ -6,7 +6,7 @@ in for), with the products of neighbouring blocks, as correlation does not stop 
 what it claims to know:
 
     d_b = (H - 2 R_b'R_b)^-1 s_b,      H = 2 R'R + P,  P the prior's Hessian, s_b the block's score,
-    V = sum_b sum_l w_l d_b d_(b+l)',      w_l = 1 - l / 5 up to l = 4.
+    V = sum_b sum_l w_l d_b d_(b+l)',      w_l = 1 - l / (L + 1) up to l = L.
 
 A fit takes its own share out of the noise, so that the scores of neighbouring blocks are against each other even where the
 noise has no memory, while leaving blocks out exaggerates. What V is on average under white noise is known exactly, as is
@@ -17,7 +17,7 @@ what it should be, T = H^-1 M H^-1. So V is bent by the map A that takes E[V] to
 
 M_b the variance of block b's score under white noise of each joint's own size. And as few blocks leave V itself uncertain, t is
 what two deviations of Student's law are to two of the normal one, with B / (1 + 2 sum_l w_l^2) degrees of freedom for B blocks:
-two stated deviations hold 95 %.
+two stated deviations hold 95 %. Two blocks say nothing of the noise's memory: there it is taken as white.
 
 Source: Cameron & Miller 2015 (jackknife of clusters); Newey & West 1987 (neighbours); Bell & McCaffrey 2002 (the bias under
 white noise and the degrees of freedom, there of blocks alone).
@@ -71,12 +71,20 @@ def estimate(objective: Objective, compressed: Compressed, x: np.ndarray, fixed:
 _FLAT = 1e-12  # eigenvalues that are none, as a share of the largest
 # As the map keeps V right under white noise, more neighbours cost degrees of freedom alone, and noise whose memory is a block
 # long needs them: with two, `scripts/coverage.py --colour 0.3` finds 88 % of a planar arm's combinations within two deviations.
-_NEIGHBOURS = {lag: 1.0 - lag / 5.0 for lag in range(1, 5)}
+_MOST_NEIGHBOURS, _BLOCKS_FOR_ONE, _FEWEST = 4, 10, 3
+
+
+def _weights(blocks: int) -> dict[int, float]:
+    """The weight of each neighbour by its distance: at most four, and one for every ten blocks."""
+    most = min(_MOST_NEIGHBOURS, blocks // _BLOCKS_FOR_ONE)
+    return {lag: 1.0 - lag / (most + 1) for lag in range(1, most + 1)}
 
 
 def _noise(compressed: Compressed, x, weights, hessian, free) -> np.ndarray:
     """The covariance (free, free) that noise gives the estimate."""
     basis, moves, expected, right = _left_out(compressed, x, weights, hessian, free)
+    if compressed.blocks < _FEWEST:
+        return basis @ right @ basis.T
     bend = _map(expected, right)
     return basis @ bend @ _neighbours(moves) @ bend @ basis.T * _widening(compressed.blocks) ** 2
 
@@ -100,6 +108,7 @@ def _left_out(compressed: Compressed, x, weights, hessian, free):
         own[factor.block] += square
         spread[factor.block] += scale * noise[factor.joint] * square
     whole, shrink = spread.sum(axis=0), max(count - 1, 1) / count
+    neighbours = _weights(count)
     moves, expected, seen = np.zeros((count, size)), np.zeros((size, size)), []
     for b in range(count):
         without = _inverse(np.eye(size) - own[b])[0]
@@ -107,12 +116,12 @@ def _left_out(compressed: Compressed, x, weights, hessian, free):
         taken, given = without @ own[b], without @ spread[b]
         expected += given @ without
         seen.append((taken, given))
-        for lag, weight in {0: 1.0, **_NEIGHBOURS}.items():
+        for lag, weight in {0: 1.0, **neighbours}.items():
             if lag < len(seen):
                 other = seen[-1 - lag]
                 cross = (taken @ whole - given) @ other[0].T - taken @ other[1].T
                 expected += 0.5 * weight * (cross + cross.T) * (1.0 if lag == 0 else 2.0)
-        del seen[: -max(_NEIGHBOURS)]
+        seen = seen[-max(neighbours, default=0) :] if neighbours else []
     return basis, moves * np.sqrt(shrink), shrink * expected, whole
 
 
@@ -140,13 +149,13 @@ _TWO = 0.9772498680518208  # of the normal law lies below two deviations
 def _widening(blocks: int) -> float:
     from scipy.special import stdtrit
 
-    freedom = blocks / (1.0 + 2.0 * sum(weight**2 for weight in _NEIGHBOURS.values()))
+    freedom = blocks / (1.0 + 2.0 * sum(weight**2 for weight in _weights(blocks).values()))
     return float(stdtrit(max(freedom, 1.0), _TWO)) / 2.0
 
 
 def _neighbours(moves: np.ndarray) -> np.ndarray:
     total = moves.T @ moves
-    for lag, weight in _NEIGHBOURS.items():
+    for lag, weight in _weights(len(moves)).items():
         product = moves[:-lag].T @ moves[lag:]
         total = total + weight * (product + product.T)
     return total
