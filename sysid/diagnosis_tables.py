@@ -8,11 +8,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from .diagnosis_text import Told, listed, percent, wrapped
+from .events import WORDS
 
 _EVENTS = 20  # lines; the rest is counted
-_WORDS = {
-    "knock": "knock", "spike": "torque spike", "brake": "closed brake", "frozen": "frozen value", "saturation": "flat top"
-}  # fmt: skip
 
 
 def errors(of: Told, width: int) -> list[str]:
@@ -59,7 +57,7 @@ def events(document: dict, width: int) -> list[str]:
     for e in document["events"][:_EVENTS]:
         span = f"{e['start']:.2f} s" if e["stop"] - e["start"] < 0.01 else f"{e['start']:.2f} to {e['stop']:.2f} s"
         told = " (not left out)" if e["kind"] == "saturation" else ""
-        out += wrapped(f"  {_WORDS.get(e['kind'], e['kind'])}, {e['log']}, {span}: {', '.join(e['joints'])}{told}", width, "    ")
+        out += wrapped(f"  {WORDS.get(e['kind'], e['kind'])}, {e['log']}, {span}: {', '.join(e['joints'])}{told}", width, "    ")
     more = len(document["events"]) - _EVENTS
     if more > 0:
         out.append(f"  and {more} more: see diagnosis.json")

@@ -24,11 +24,11 @@ from .repeats import held_angle, held_torque, rests
 if TYPE_CHECKING:
     from .log import Segment
 
-_WORDS = {
+WORDS = {
     "knock": "knock", "spike": "torque spike", "brake": "closed brake", "frozen": "frozen value",
     "saturation": "flat top",
 }  # fmt: skip
-KINDS = tuple(_WORDS)
+KINDS = tuple(WORDS)
 TOLD = ("saturation",)  # not left out
 _PASSES = 3  # over the spikes: without the largest, those beside them stand out
 _SHOWN = 4  # times of each kind and log that a notice gives
@@ -149,7 +149,7 @@ def _summary(events: Sequence[Event]) -> str:
         where = [_where(log, [e for e in own if e.log == log]) for log in logs[:_SHOWN]]
         more = [f"{len(logs) - _SHOWN} more logs"] if len(logs) > _SHOWN else []
         if own:
-            words = _WORDS[kind] + "s" * (len(own) > 1)
+            words = WORDS[kind] + "s" * (len(own) > 1)
             out.append(f"{len(own)} {words} ({'; '.join(where + more)})")
     return ", ".join(out)
 
