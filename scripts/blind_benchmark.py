@@ -781,6 +781,10 @@ def _table(heads: list[str], rows: list[list]) -> str:
     return "\n".join(lines + ["| " + " | ".join("·" if value == 0 and not isinstance(value, str) else str(value) for value in row) + " |" for row in rows])
 
 
+def _spelled(nuisances: dict | None) -> str:
+    return ", ".join(f"{word} {value}" for word, value in (nuisances or {}).items()) or "–"
+
+
 def _name(under: str) -> str:
     return "blind_benchmark" + ("" if under == "clean" else f"_{under}")
 
@@ -858,6 +862,7 @@ def page(found: dict, records: list[dict], settings: dict, notes: str = "") -> s
         f"Claims are the (effect, joint) pairs that first verdicts name, on the joint of an outside law excepted. Not there: {_percent(found['claims']['false'])}; "
         f"where the family or set is counted with it: {_percent(found['claims']['false_families_too'])}."
         + (f" Effects in a set that names something: {found['claims']['members']:.1f} on average." if found["claims"]["members"] else ""),
+        "True noise is what torque noise, encoder and clock add to the residual of the first fit, over all logs; spikes and closed brakes are none.",
         f"Noise floor within 25 % of the true noise, or null: {_percent(found['floors']['good'])} of the joints; null: {_percent(found['floors']['null'])}."
         + (f" Floor over true noise: {_quantiles(found['floors']['ratio'])}." if found["floors"]["ratio"] else ""),
         _table(["case", "claimed", "on", "its family holds what is hidden"], [[f"`{c['key']}`", c["effect"], c["joint"], "yes" if c["held"] else "no"] for c in found["claims"]["list"]])
@@ -879,8 +884,8 @@ def page(found: dict, records: list[dict], settings: dict, notes: str = "") -> s
         "### Named, and yet farther than 5 % from the true model",
         _table(["case", "hidden", "on", "size", "RMS taken away by the true model", "RMS after / true"], [[f"`{r['key']}`", r["effect"], r["joint"], f"{r['size']:.2f}", _lowered(r), f"{r['after'] / r['true']:.2f}"] for r in far]) if far else "None.",
         "### Controls that are not complete",
-        _table(["case", "joint", "verdict", "noise's colour [s]", "encoder [bits]", "pace"], [
-            [f"`{r['key']}`", v["joint"], " ".join([v["effect"], *(f"(or {t})" for t in family(v, v["joint"]))]) if v["status"] == "missing" else v["status"], *(str(r["conditions"][k] or "–") for k in ("colour", "encoder", "pace"))]
+        _table(["case", "joint", "verdict", "noise's colour [s]", "encoder [bits]", "pace", "nuisances"], [
+            [f"`{r['key']}`", v["joint"], " ".join([v["effect"], *(f"(or {t})" for t in family(v, v["joint"]))]) if v["status"] == "missing" else v["status"], *(str(r["conditions"][k] or "–") for k in ("colour", "encoder", "pace")), _spelled(r["conditions"].get("nuisances"))]
             for r, v in accused
         ]) if accused else "None.",
         "### Outside the catalogue, neither unknown nor explained",
@@ -918,7 +923,7 @@ def tell(record: dict, folder: Path) -> None:
             j, rms = v["joint"], record["rms"]
             said = v["status"] if v["status"] != "missing" else " ".join([v["effect"], f"tied {family(v, v['joint'])}" if family(v, v["joint"]) else "", f"also {v['also']}" if v.get("also") else ""])
             left = f"  left {v['share_left']:.2f} by {v['depends_on']}" if "share_left" in v else ""
-            print(f"  {j:22s} {record['noise_seen'][j]:9.4f} {math.nan if record['floors'][j] is None else record['floors'][j]:9.4f} {rms['before'][j]:9.4f} {rms['after'][j]:9.4f} {rms.get('true', {}).get(j, math.nan):9.4f}   {said}{left}")
+            print(f"  {j:22s} {record['noise_seen']['all'][j]:9.4f} {math.nan if record['floors'][j] is None else record['floors'][j]:9.4f} {rms['before'][j]:9.4f} {rms['after'][j]:9.4f} {rms.get('true', {}).get(j, math.nan):9.4f}   {said}{left}")
         for f in record["findings"]:
             step = f"step {f['step']}" if f["step"] is not None else ""
             print(f"  finding: {f['effect']}:{f['joint']} removes {f['removed']}, tied {f['tied_with']} {step} { {n: float(f'{v:.3g}') for n, v in f['parameters'].items() if v is not None} }")

@@ -141,6 +141,7 @@ def chances(losses, rng: np.random.Generator, *, draws: int = 4000) -> np.ndarra
 
     Source: Yao, Vehtari, Simpson & Gelman 2018 (pseudo-BMA with the Bayesian bootstrap).
     """
-    weights = rng.dirichlet(np.ones(len(losses)), draws)
-    best = np.argmin(weights @ losses, axis=1)
-    return np.bincount(best, minlength=losses.shape[1]) / draws
+    drawn = rng.dirichlet(np.ones(len(losses)), draws) @ losses
+    least = drawn.min(1, keepdims=True)
+    best = drawn <= least + 1e-6 * np.abs(least)  # what is the same, but for rounding, shares
+    return (best / best.sum(1, keepdims=True)).mean(0)

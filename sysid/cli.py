@@ -79,7 +79,7 @@ def compare(
 def simulate(
     experiment: ExperimentPath,
     out: Annotated[Path, typer.Option("--out", help="The folder to write: config.yaml, robot.urdf, train.csv, test.csv, truth.json.")],
-    hide: Annotated[Optional[list[str]], typer.Option("--hide", metavar="EFFECT:JOINT[:name=value,...]", help="An effect that config.yaml does not list; may be given again. Values left out are drawn; size=2 doubles them.")] = None,  # noqa: UP045
+    hide: Annotated[Optional[list[str]], typer.Option("--hide", metavar="EFFECT:JOINT[:name=value,...]", help="An effect that config.yaml does not list; may be given again. Values left out are drawn; size=2 doubles them. torque_saturation takes reports=command: the log holds what was asked for, the limit acts.")] = None,  # noqa: UP045
     seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of everything random.")] = 0,
     duration: Annotated[float, typer.Option("--duration", help="Seconds of each log.")] = 20.0,
     rate: Annotated[float, typer.Option("--rate", help="Samples a second.")] = 1000.0,

@@ -72,7 +72,7 @@ def find(segment: Segment, joints: Sequence[str], *, log: str = "") -> tuple[Eve
     usual = float(np.sqrt(np.mean(np.diff(segment.q, axis=0) ** 2, axis=0)).max())
     for j in range(len(joints)):
         tau, q = segment.tau[:, j], segment.q[:, j]
-        for first, last in held_torque(tau):
+        for first, last in held_torque(tau, segment.step):
             extreme = tau[first] != 0.0 and tau[first] in (tau.min(), tau.max())  # no limit is 0
             kind = "brake" if rests(q, first, last, usual) else "frozen"
             kind = "saturation" if extreme else kind
@@ -147,7 +147,8 @@ def _summary(events: Sequence[Event]) -> str:
         own = [e for e in events if e.kind == kind]
         logs = list(dict.fromkeys(e.log for e in own))
         where = [_where(log, [e for e in own if e.log == log]) for log in logs[:_SHOWN]]
-        more = [f"{len(logs) - _SHOWN} more logs"] if len(logs) > _SHOWN else []
+        left = len(logs) - _SHOWN
+        more = [f"{left} more log{'s' * (left > 1)}"] if left > 0 else []
         if own:
             words = WORDS[kind] + "s" * (len(own) > 1)
             out.append(f"{len(own)} {words} ({'; '.join(where + more)})")

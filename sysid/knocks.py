@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from scipy.ndimage import median_filter
 
 from .outliers import CHANCE, FEWEST, NOTHING, RESTING, quantum, ratio, runs, surprise
 
 _BURST = 0.05  # s: a knock's time
-_NEARBY = 1.0  # s to either side whose level a burst must exceed
+_NEARBY = 0.3  # s to either side whose median level a burst must exceed: a knock rings for less
 _FINEST = 1e-5  # share of an angle's spread that no encoder tells
 # z75 - z50 of white noise in the shortest window, from 200 000 samples: 0.27 in 7, 0.08 in 51
 _WHITE = 0.27
@@ -20,8 +18,8 @@ def knocks(q, tau, step: float) -> list[tuple[int, int, list[int]]]:
     """First and last sample, and joints, of knocks in angles and torque (n, dof), `step` [s] apart.
 
     The level of what is unexplained in windows of `_BURST`, over the usual: the larger of the log's
-    own while the joint moves, of the seconds about it, and of the quantum. A knock is where it
-    surprises on two joints or more, be it in angle or torque; where there is one joint, in both.
+    own while the joint moves, of what is about it, and of the quantum. A knock is where it
+    surprises on two joints, be it in angle or torque; where there is one joint, in both.
     """
     n, dof = tau.shape
     length = max(FEWEST, 2 * round(0.5 * _BURST / step) + 1)
@@ -38,7 +36,7 @@ def knocks(q, tau, step: float) -> list[tuple[int, int, list[int]]]:
     )  # (dof, windows)
     own = np.maximum(angle, torque)
     level = np.log(len(first) * dof / CHANCE)
-    both = np.minimum(angle, torque)[0] if dof == 1 else _together(own, torque)
+    both = np.minimum(angle, torque)[0] if dof == 1 else np.sort(own, axis=0)[-2]
     found = []
     # a knock rings: it lasts as long as windows are unusual at all, on half the evidence
     for a, b in runs(both > 0.5 * level):
@@ -46,18 +44,6 @@ def knocks(q, tau, step: float) -> list[tuple[int, int, list[int]]]:
             members = np.flatnonzero(own[:, a : b + 1].max(axis=1) > 0.5 * level)
             found.append((int(first[a]), int(first[b]) + length - 1, members.tolist()))
     return found
-
-
-def _together(own, torque) -> np.ndarray:
-    """Surprise (windows,) that two joints or more share, of `own` and of `torque` (dof, windows).
-
-    The second largest, as it stands. Or, of torque, whose noise is each joint's own (an angle's grain
-    is not: it goes with the motion), k joints beyond s_k: chance has it C(dof, k) exp(-k s_k) times.
-    """
-    dof = len(own)
-    ranked = np.sort(torque, axis=0)[::-1]
-    shared = [k * ranked[k - 1] - np.log(math.comb(dof, k)) for k in range(2, dof + 1)]
-    return np.maximum(np.sort(own, axis=0)[-2], np.max(shared, axis=0))
 
 
 def _bursts(values, first, length: int, near: int, moves, nothing: float) -> np.ndarray:

@@ -24,14 +24,20 @@ RESTING = 0.05  # of the usual speed: what is slower rests
 _ABOUT = 4  # steps to either side of a spike that it is compared with
 _BLOCK = 64  # samples of which a median is the level thereabouts
 NOTHING = 1e-3  # share of a torque's spread that disturbs nothing
-# z75 - z50 of white noise, from 200 000 samples: 0.38 to 0.48, the wider the pulse the less
-_WHITE = 0.48
+# z75 - z50 of white noise, from 200 000 samples: 0.42 to 0.53, the wider the pulse the less
+_WHITE = 0.53
+# how much steeper its tail is from there to one in 10 000, ln(2500) / 3.3 over ln(2) / 0.53
+_TAIL = 1.8
 
 
-def surprise(z, white: float, among=None) -> np.ndarray:
-    """s of values z, from the quantiles of z or of those `among` which they stand; see above."""
+def surprise(z, white: float, among=None, tail: float = 1.0) -> np.ndarray:
+    """s of values z, from the quantiles of z or of those `among` which they stand; see above.
+
+    Args:
+        white: z75 - z50 of white noise. tail: how much steeper than from z50 to z75 its tail is.
+    """
     middle, high = np.quantile(z if among is None else among, [0.5, 0.75])
-    return np.log(4.0) + (z - high) * np.log(2.0) / max(high - middle, white)
+    return np.log(4.0) + (z - high) * tail * np.log(2.0) / max(high - middle, white)
 
 
 def quantum(values) -> float:
@@ -52,10 +58,10 @@ def spikes(tau) -> list[list[tuple[int, int]]]:
     """First and last samples of the spikes of each joint's torque (n, dof).
 
     Of up to `SPIKE` samples that are entered and left by steps of opposite sign, min(|in|, |out|)
-    over the usual step: the larger of the log's, of those thereabouts and of those next to it on
-    either side. So the peak of a fast smooth wave, entered and left by steps like its neighbours',
-    is none, nor is an edge. Where a log has k spikes, chance is allowed k times as many: no more
-    than a share `CHANCE` of what is found is false.
+    over the usual step: the larger of the log's, of those thereabouts and of half of those next to
+    it on either side. So the peak of a fast smooth wave, entered and left by steps like those
+    beside it, is none, nor is an edge. Where a log has k spikes, chance is allowed k times as many:
+    no more than a share `CHANCE` of what is found is false.
 
     Source: Benjamini & Hochberg 1995.
     """
@@ -66,7 +72,7 @@ def spikes(tau) -> list[list[tuple[int, int]]]:
     hit = [np.zeros(len(z), dtype=bool) for _, z, _ in found]
     while True:
         pairs = zip((z for _, z, _ in found), hit)
-        s = [surprise(z, _WHITE, z[~own]) if len(z) else z for z, own in pairs]
+        s = [surprise(z, _WHITE, z[~own], _TAIL) if len(z) else z for z, own in pairs]
         ranked = np.sort(np.concatenate(s))[::-1]
         allowed = CHANCE * np.arange(1, len(ranked) + 1)
         enough = np.flatnonzero(ranked > np.log(SPIKE * n * dof / allowed))
@@ -100,7 +106,7 @@ def _pulses(tau):
         into = into[step[into] * step[into + width] < 0.0]
         out = into + width
         beside = np.maximum(_second(size, into, -1), _second(size, out, 1))
-        scale = np.maximum(usual[into], beside)
+        scale = np.maximum(usual[into], 0.5 * beside)  # by which a wave's peak comes to 2 at most
         z = ratio(np.minimum(size[into], size[out]), scale)
         # what lies between two spikes is nearer to the usual than they are
         inside = np.min([away[into + k] for k in range(1, width + 1)], axis=0)

@@ -9,34 +9,35 @@ from .outliers import CHANCE, RESTING, SHORT, quantum, runs
 _GRAINS = 2.5  # quanta: two and the rounding; less is how coarse values move
 _MOVING = 1.5  # quanta a sample: what moves as fast repeats no value
 _ABOUT = 4  # samples to either side whose speed is what the joint had
-_FEWEST = 4  # samples of torque: a shorter repeat is not worth a row, whatever made it
+# samples and s of torque: a shorter repeat costs less than the rows that a filter's reach would
+_FEWEST, _SHORTEST = 4, 0.02
 _HELD = 10  # samples at least of an angle that froze and never caught up
 _OFTEN = 0.25  # of the rows: what comes more often is the logger's way, not an event
 
 
-def held_torque(tau) -> list[tuple[int, int]]:
-    """First and last samples of runs in which one joint's torque (n,) repeats beyond chance.
+def held_torque(tau, step: float) -> list[tuple[int, int]]:
+    """First and last samples of runs in which one joint's torque (n,), `step` [s] apart, is held.
 
     Where a share p of the samples repeats the one before, the longest of n runs of chance has
     1 + ln(n / chance) / ln(1 / p) samples; p is that of the other runs. And a run is entered or
     left by a jump that is none of the values' own grain: a coarse signal leaves its crest by one.
     """
     n = len(tau)
-    step = np.abs(np.diff(tau))
-    if n < SHORT or not step.any():
+    size = np.abs(np.diff(tau))
+    if n < SHORT or not size.any():
         return []
-    every = np.array(runs(step == 0.0), dtype=int).reshape(-1, 2) + [0, 1]  # samples
+    every = np.array(runs(size == 0.0), dtype=int).reshape(-1, 2) + [0, 1]  # samples
     long = np.zeros(len(every), dtype=bool)
     length = every[:, 1] - every[:, 0] + 1
     while True:
         p = max(np.sum(length[~long] - 1), 1.0) / max(n - 1 - np.sum(length[long] - 1), 2.0)
         longest = 1.0 + np.log(n / CHANCE) / np.log(1.0 / min(p, 1.0 - 1.0 / n))
-        more = long | (length > max(longest, _FEWEST))
+        more = long | (length > max(longest, _FEWEST, _SHORTEST / step))
         if np.array_equal(more, long):
             break
         long = more
-    ends = np.concatenate([[0.0], step, [0.0]])
-    grain, usual = _GRAINS * quantum(tau), np.median(step[step > 0.0])
+    ends = np.concatenate([[0.0], size, [0.0]])
+    grain, usual = _GRAINS * quantum(tau), np.median(size[size > 0.0])
     extreme = (tau == tau.min()) | (tau == tau.max())  # what clips gets there at any slope
     least = np.where(extreme[every[:, 0]], grain, max(grain, usual))
     jumps = np.maximum(ends[every[:, 0]], ends[every[:, 1] + 1]) > least

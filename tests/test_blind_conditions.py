@@ -67,7 +67,7 @@ def test_a_name_beside_an_outside_law_is_a_claim_on_other_joints_only(blind):  #
 def test_floors_count_within_a_quarter_or_null(blind):  # noqa: F811
     made = record(KNEE) | {
         "floors": {"hip": 1.25, "knee": None},
-        "noise_seen": {"hip": 1.0, "knee": 1.0},
+        "noise_seen": {"all": {"hip": 1.0, "knee": 1.0}},
     }
     found = blind.claims.counts([made, made | {"floors": {"hip": 0.7, "knee": 1.3}}])
     assert found["floors"] == (2, 4) and found["floors null"] == (1, 4)
@@ -91,6 +91,7 @@ def test_new_statuses_are_scored(blind):  # noqa: F811
 def test_summary_and_page_under_each_of_the_conditions(blind):  # noqa: F811
     control = record(kind="control", key="leg/control/n0", knee=new("knee", "unresolved"))
     accused = record(kind="control", key="leg/control/n1", knee=new("knee", effect="cable"))
+    accused["conditions"]["nuisances"] = {"knocks": 3}
     named = record(
         KNEE, knee=verdict("knee", "stribeck"), findings=[finding("stribeck", "knee", 1)]
     )
@@ -113,6 +114,7 @@ def test_summary_and_page_under_each_of_the_conditions(blind):  # noqa: F811
         }
         text = blind.page(found, records, settings | {"conditions": under})
         assert ("--conditions" in text) == (under != "clean") and "unresolved" in text
+        assert "knocks 3" in text
         json.dumps(blind._plain(found), allow_nan=False)
 
 
@@ -174,7 +176,8 @@ def test_a_case_with_nuisances_from_end_to_end(blind):  # noqa: F811
         "test",
     ]
     assert min(found["events"].values()) >= 1
-    for joint, noise in found["noise_seen"].items():
+    for joint, noise in found["noise_seen"]["torque"].items():
+        assert noise < found["noise_seen"]["all"][joint]
         # linear interpolation between uneven stamps takes a little off: 2/3 to all of its power
         assert 0.8 * found["noise"][joint] < noise < 1.1 * found["noise"][joint]
     assert set(found["floors"]) == set(blind.JOINTS["planar"])

@@ -95,7 +95,7 @@ def test_stops_and_starts_of_all_joints_at_once_are_no_events():
     sides = np.array([1.0, 0.7, -1.2])
     rng = np.random.default_rng(3)
     tau = (
-        (2.0 * qdd + np.tanh(qd / 0.01))[:, None] * sides + 3.0 + 0.1 * rng.normal(size=(len(t), 3))
+        (2.0 * qdd + np.tanh(qd / 0.2))[:, None] * sides + 3.0 + 0.1 * rng.normal(size=(len(t), 3))
     )
     angles = q[:, None] * sides + 1e-5 * rng.normal(size=(len(t), 3))
     assert find(Segment(t, STEP, angles, tau, None, None, {}), JOINTS) == ()
@@ -106,7 +106,10 @@ def test_stops_and_starts_of_all_joints_at_once_are_no_events():
 )
 def test_knocks_are_found_where_they_are(conditions):
     bits = conditions.get("bits")
-    made = with_knock(with_knock(segment(**conditions), 3.3, bits=bits), 8.71, bits=bits)
+    size = 2.5 if bits is None else 5.0  # a coarse encoder leaves it to the torque to show it
+    made = segment(**conditions)
+    for at in (3.3, 8.71):
+        made = with_knock(made, at, size, bits)
     first, second = find(made, JOINTS)
     for event, at in ((first, 3.3), (second, 8.71)):
         assert event.kind == "knock" and event.joints == JOINTS
@@ -210,9 +213,9 @@ def test_frozen_torque_frozen_angles_and_flat_tops():
 
 def test_slow_loggers_and_coarse_signals_repeat_by_their_nature():
     made = segment(noise=0.0, grain=0.5)
-    assert held_torque(made.tau[:, 0]) == []
+    assert held_torque(made.tau[:, 0], STEP) == []
     every = np.repeat(segment().tau[::8, 0], 8)  # torque that comes at an eighth of the rate
-    assert held_torque(every) == []
+    assert held_torque(every, STEP) == []
     assert held_angle(np.repeat(made.q[::8, 0], 8)) == []
 
 
@@ -232,15 +235,15 @@ def test_rows_that_events_reach_are_left_out():
         return piece.t[~piece.use[:, JOINTS.index(joint)]], piece
 
     t, piece = lost(
-        PreprocessSpec(window=0.1), "c"
+        PreprocessSpec(window=0.1, standstill="keep"), "c"
     )  # 50 ms to either side: the knock on most joints, the brake, the angle
     np.testing.assert_allclose([t[0], t[t < 5][-1]], [2.95, 3.25], atol=1e-9)
     np.testing.assert_allclose([t[(t > 5) & (t < 8.5)][0], t[t < 8.5][-1]], [7.0, 8.0], atol=1e-9)
     np.testing.assert_allclose([t[t > 8.5][0], t[-1]], [8.95, 9.15], atol=1e-9)
-    t, _ = lost(PreprocessSpec(window=0.1), "b")
+    t, _ = lost(PreprocessSpec(window=0.1, standstill="keep"), "b")
     np.testing.assert_allclose(t[(t > 4) & (t < 6)], [5.0, 5.001], atol=1e-9)
     t, _ = lost(
-        PreprocessSpec(window=0.1, torque="same"), "c"
+        PreprocessSpec(window=0.1, torque="same", standstill="keep"), "c"
     )  # columns see filtered angles, torque its own filter
     np.testing.assert_allclose([t[0], t[t < 5][-1]], [2.9, 3.3], atol=1e-9)
     np.testing.assert_allclose([t[(t > 5) & (t < 8.5)][0], t[t < 8.5][-1]], [6.95, 8.05], atol=1e-9)
@@ -256,7 +259,7 @@ def test_spikes_do_not_spread_through_a_filter():
     made = segment(noise=0.02)
     spiked = changed(made, tau=(slice(5000, 5001), 1, made.tau[5000, 1] + 30.0))
     (spike,) = find(spiked, JOINTS, log="made.csv")
-    spec = PreprocessSpec(window=0.1, torque="same")
+    spec = PreprocessSpec(window=0.1, torque="same", standstill="keep")
     clean, seen = (
         prepare([log(s, events=e)], spec, JOINTS).pieces[0]
         for s, e in ((made, ()), (spiked, (spike,)))
@@ -275,16 +278,16 @@ def test_the_view_of_the_diagnosis_leaves_events_out():
     plain, motion_ = (questioned([log(made, events=e)], JOINTS, 15.0) for e in ((), (knock,)))
     (before,), (piece,) = plain.pieces, motion_.pieces
     near = (piece.t > 2.99) & (piece.t < 3.21)
-    assert not piece.use[near].any() and motion_.events == (knock,) and motion_.left_out > 0
+    assert not piece.use[near].any() and motion_.events == (knock,) and motion_.disturbed > 0
     far = (piece.t < 2.7) | (piece.t > 3.5)
     np.testing.assert_array_equal(piece.use[far], before.use[far])
 
 
 def test_a_log_without_events_keeps_every_row_and_one_with_them_does_not_disturb_the_others():
-    assert prepare([log(segment())], PreprocessSpec(), JOINTS).pieces[0].use is None
+    assert prepare([log(segment())], PreprocessSpec(standstill="keep"), JOINTS).pieces[0].use is None
     spike = Event("spike", "made.csv", 5.0, 5.0, ("b",))
     one, two = prepare(
-        [log(segment(), events=[spike]), log(segment())], PreprocessSpec(), JOINTS
+        [log(segment(), events=[spike]), log(segment())], PreprocessSpec(standstill="keep"), JOINTS
     ).pieces
     assert np.sum(~one.use) == 1 and two.use.all()
 
@@ -371,7 +374,8 @@ def test_kinova_s_currents_spike_on_the_first_joints():
     for one in real("kinova").values():
         spikes = [event for event in one.events if event.kind == "spike"]
         assert {"joint_1", "joint_2", "joint_3", "joint_4"} <= {event.joints[0] for event in spikes}
-        assert share(one, ("spike",), tuple(f"joint_{k}" for k in range(1, 8)), 0.0) < 0.02
+        # a sample or a few (three) every 0.3 s at 250 Hz
+        assert share(one, ("spike",), tuple(f"joint_{k}" for k in range(1, 8)), 0.0) < 0.04
 
 
 def test_schunk_s_brakes_close():

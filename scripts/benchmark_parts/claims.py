@@ -69,8 +69,8 @@ def _is_hidden(effect: str, joint: str, hidden: set) -> bool:
 
 
 def floors(record: dict) -> list[dict]:
-    """Each joint's noise floor against its true noise."""
-    noise = record.get("noise_seen") or record.get("noise") or {}
+    """Each joint's noise floor against its true noise: of torque, encoder and clock."""
+    noise = (record.get("noise_seen") or {}).get("all") or record.get("noise") or {}
     out = []
     for joint, floor in (record.get("floors") or {}).items():
         ratio = None if floor is None or not noise.get(joint) else floor / noise[joint]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -47,38 +48,64 @@ def drawn(rng: np.random.Generator) -> tuple[list[str], dict]:
     return kinds, options
 
 
-def noise_seen(simulation, fit, folder: Path) -> dict[str, float]:
-    """RMS [N m] of each joint's random torque noise as a fit's preprocessing leaves it, over all
-    logs; spikes and closed brakes are no noise.
+def noise_seen(simulation, fit, folder: Path) -> dict[str, dict[str, float]]:
+    """RMS [N m] of each joint's noise as a fit sees it, over all logs: {"all": of torque, encoder
+    and clock, "torque": of the torque alone}. Spikes and closed brakes are no noise.
 
-    The noise alone is logged in place of the torque and read as every log is, so that what is
-    filtered or resampled of the torque is filtered and resampled of it.
+    What the sensors added is the difference of two residuals of the same fit: on the log, and on
+    what no sensor saw at the same times. So all that is filtered, resampled and left out of the
+    log is filtered, resampled and left out of its noise.
     """
-    from dataclasses import replace
+    joints = simulation.robot.joints
+    squares = {kind: np.zeros(len(joints)) for kind in ("all", "torque")}
+    rows = {kind: np.zeros(len(joints)) for kind in squares}
+    for log in simulation.logs.values():
+        clean, tau = log.clean, log.tau.copy()
+        away = []
+        for event in log.events:
+            if event["kind"] != "knock":
+                j = joints.index(event["joints"][0])
+                part = slice(*event["rows"])
+                tau[part, j] = clean.sensed[part, j]
+                if event["kind"] == "brake":
+                    away.append((j, event["start"], event["stop"]))
+        seen = {
+            "none": _residual(simulation, fit, log, clean.q, clean.sensed, folder),
+            "all": _residual(simulation, fit, log, log.q, tau, folder),
+            "torque": _residual(simulation, fit, log, clean.q, tau, folder),
+        }
+        for kind in squares:
+            noise, use, t = _difference(seen[kind], seen["none"])
+            for j, start, stop in away:
+                use[(t >= start) & (t <= stop), j] = False
+            squares[kind] += np.sum(np.where(use, noise, 0.0) ** 2, axis=0)
+            rows[kind] += use.sum(axis=0)
+    return {
+        kind: dict(zip(joints, np.sqrt(squares[kind] / np.maximum(rows[kind], 1)).tolist()))
+        for kind in squares
+    }
 
+
+def _residual(simulation, fit, log, q, tau, folder: Path):
+    """What a fit says of a log with angles q and torque tau (n, dof) in place of its own."""
     from sysid import pipeline
     from sysid.simulate.folder import _csv
 
-    joints = simulation.robot.joints
-    squares, rows = np.zeros(len(joints)), np.zeros(len(joints))
-    for name, log in simulation.logs.items():
-        noise = log.tau - log.clean.sensed
-        brakes = []
-        for event in log.events:
-            if event["kind"] == "knock":
-                continue
-            j = joints.index(event["joints"][0])
-            noise[slice(*event["rows"]), j] = 0.0
-            if event["kind"] == "brake":
-                brakes.append((j, event["start"], event["stop"]))
-        file = folder / f"noise_{name}.csv"
-        text = _csv(replace(log, tau=noise), simulation.robot)
-        file.write_text(text, encoding="utf-8")
-        seen = pipeline.predict_log(fit, str(file.resolve()))
-        use = np.ones(seen.measured.shape, dtype=bool) if seen.use is None else seen.use.copy()
-        for j, start, stop in brakes:
-            use[(seen.t >= start) & (seen.t <= stop), j] = False
-        squares += np.sum(np.where(use, seen.measured, 0.0) ** 2, axis=0)
-        rows += use.sum(axis=0)
-    rms = np.sqrt(squares / np.maximum(rows, 1))
-    return {joint: float(value) for joint, value in zip(joints, rms)}
+    file = folder / "noise.csv"
+    file.write_text(_csv(replace(log, q=q, tau=tau), simulation.robot), encoding="utf-8")
+    return pipeline.predict_log(fit, str(file.resolve()))
+
+
+def _difference(one, other) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Difference of two residuals (n, dof) at the times that both have, where both count (n, dof),
+    and the times (n,) [s]."""
+    t, first, second = np.intersect1d(np.round(one.t, 7), np.round(other.t, 7), return_indices=True)
+    use = np.ones((len(t), one.measured.shape[1]), dtype=bool)
+    for seen, rows in ((one, first), (other, second)):
+        if seen.use is not None:
+            use &= seen.use[rows]
+    return (
+        (one.measured - one.predicted)[first] - (other.measured - other.predicted)[second],
+        use,
+        t,
+    )

@@ -19,7 +19,7 @@ from .select import Step
 from .ties import Member
 from .view import View
 
-_NOTHING = 0.05  # probability: parameters that come by chance as often as this are nothing
+_CLEAR = 2.0  # standard deviations
 _FITTED = 3  # members of a set that are fitted; the rest is named with its probability
 
 
@@ -136,8 +136,9 @@ def own_joints(member_or_candidate, dof: int) -> list[int]:
 
 def _nothing(before: Fit, after: Fit, member: Member) -> str | None:
     """Why an effect that the search found is not claimed, None where it is."""
-    if _chance_of_nothing(after, member) > _NOTHING:
-        return "its parameters are nothing beside their deviations once everything is fitted"
+    own = [before.joints[j] for j in own_joints(member, len(before.joints))]
+    if not any(after.rms("train")[joint] < before.rms("train")[joint] for joint in own):
+        return "the fit's own error does not fall with it"
     joint = _where(member, before)
     if rises := comparison.rises(before, after, None if joint == "*" else [joint]):
         risen = f"{100 * rises[0].delta_rms:.2g} %" if joint == "*" else f"{rises[0].delta_rms:.3g}"
@@ -145,25 +146,15 @@ def _nothing(before: Fit, after: Fit, member: Member) -> str | None:
     return None
 
 
-def _chance_of_nothing(after: Fit, member: Member) -> float:
-    """Probability of parameters as far from nothing as these, were they nothing (Wald); 1 where none is determined."""
-    from scipy.stats import chi2
-
-    first, key = 10 * after.model.bodies, member.candidate.key
-    own = [first + k for k, c in enumerate(after.model.coefficients) if (c.effect, c.joint) == key]
-    own = [k for k in own if np.isfinite(after.uncertainty.std[k]) and after.uncertainty.std[k] > 0]
-    if own:
-        std = after.uncertainty.std[own]
-        values, vectors = np.linalg.eigh(after.uncertainty.covariance[np.ix_(own, own)] / np.outer(std, std))
-        kept = values > 1e-9 * values[-1]
-        far = (vectors[:, kept].T @ (after.x[own] / std)) ** 2 / values[kept]
-        return float(chi2.sf(far.sum(), int(kept.sum())))
-    starts = [
-        (at - v.shape.start) / std
-        for v, at, std in zip(after.model.shape_values, after.model.shapes, after.shape_std)
-        if after.model.terms[v.term][0].name == key[0] and v.joint == key[1] and v.shape.start is not None and std > 0
-    ]  # fmt: skip
-    return float(chi2.sf(np.sum(np.square(starts)), len(starts))) if starts else 1.0
+def hidden_by_weights(found: Finding, fit: Fit) -> str | None:
+    """What to know where the fit, in which all joints count alike, does not tell the size of an effect that is there."""
+    known = [abs(value) <= _CLEAR * std for value, std, _ in found.parameters.values() if np.isfinite(std)]
+    if fit.weights is not None or not known or not all(known):
+        return None
+    return (
+        f"{found.effect} on {found.joint} is there, but this fit tells its size badly: joints with more noise count as much as quiet "
+        "ones; solver.weighting: noise tells it better"
+    )  # fmt: skip
 
 
 def _parameters(before: Fit, after: Fit, member: Member) -> dict[str, tuple[float, float, str]]:

@@ -12,6 +12,7 @@ The whole loop on one page:
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -71,7 +72,7 @@ def diagnose(experiment: Experiment, *, fit: Fit | None = None, level: float = s
     fit = fit or pipeline.fit(experiment, progress=progress)
     extra = _own(experiment)
     with pipeline.noticed():
-        view = _view(experiment, fit)
+        view = first_view(experiment, fit)
         steps, asked, _, _ = select.search(view, extra, level=level, tell=tell)
         claims, refused = claiming.claimed(steps, fit, tell)
         after = claiming.view_after(claims, view)
@@ -86,21 +87,28 @@ def diagnose(experiment: Experiment, *, fit: Fit | None = None, level: float = s
         return Diagnosis(
             fit, found, tuple(claims), tuple(said), tuple(detectable(view, asked, candidates(view.model, extra))),
             tuple(regions.failures(first, fit.predictions["test"], levels)), _events(view, test), first, then,
-            tuple(refused), tuple(f"{r.effect} on {r.joint} is not claimed: {r.why}" for r in refused),
+            tuple(refused), tuple(_notices(claims, refused)),
         )  # fmt: skip
+
+
+def _notices(claims, refused) -> Iterator[str]:
+    yield from (f"{r.effect} on {r.joint} is not claimed: {r.why}" for r in refused)
+    yield from (words for c in claims if (words := claiming.hidden_by_weights(c.head, c.after)) is not None)
 
 
 def _read(experiment: Experiment, fit: Fit, part: str):
     return pipeline.read(experiment, fit.model.robot, getattr(experiment.data, part))
 
 
-def _view(experiment: Experiment, fit: Fit) -> View:
+def first_view(experiment: Experiment, fit: Fit) -> View:
     """The fitted model on the training logs, and on the same with the noise of the angles drawn once more; in the widest band
     that this noise leaves."""
     logs = _read(experiment, fit, "train")
     cutoff = widest(logs)
     view = _under(experiment, fit, logs, cutoff)
-    share = np.sum(view.design.rough_residual**2, axis=0) / np.maximum(np.sum(view.design.residual**2, axis=0), 1e-300)
+    # in the middle of the rows: about reversals, and where something is missing, there is more of either
+    square = lambda values: np.array([np.median(v[u] ** 2) if u.any() else 1.0 for v, u in zip(values.T, view.rows.use.T)])  # noqa: E731
+    share = square(view.design.rough_residual) / np.maximum(square(view.design.residual), 1e-300)
     lower = narrowed(cutoff, float(np.median(share)))
     return view if lower > 0.9 * cutoff else _under(experiment, fit, logs, lower)
 

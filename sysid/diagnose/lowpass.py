@@ -142,7 +142,7 @@ def _piece(number: int, source: str, segment, cutoff: float) -> Piece | None:
     return Piece(
         log=number, step=every * segment.step, t=segment.t[rows], q=smooth[rows], qd=qd[rows], qdd=qdd[rows], tau=both(segment.tau, axis=0)[rows],
         measured=segment.tau[rows], signals={name: values[rows] for name, values in segment.signals.items()}, use=None, smoother=settling,
-        core=slice(settling.reach, n - settling.reach), rest=np.zeros(smooth.shape[1]), noise=_noise(segment.q[edge:-edge] - smooth[edge:-edge], segment.step) / angles.taken_of_noise,
+        core=slice(settling.reach, n - settling.reach), rest=np.zeros(smooth.shape[1]), noise=_noise(segment.q[edge:-edge], smooth[edge:-edge], angles.taken_of_noise, segment.step),
         source=source,
     )  # fmt: skip
 
@@ -150,10 +150,12 @@ def _piece(number: int, source: str, segment, cutoff: float) -> Piece | None:
 _WINDOW = 0.1  # s
 
 
-def _noise(rest, step: float) -> np.ndarray:
-    """RMS (dof,) of what a low-pass took off the angles (n, dof), in the middle of all windows of time: about a reversal it took
-    more than noise."""
+def _noise(q, smooth, taken: float, step: float) -> np.ndarray:
+    """RMS (dof,) of white noise on angles q (n, dof): the lesser of what a low-pass took off and of what third differences show,
+    as either may hold motion too; each in the middle of all windows of time, as about a reversal there is more."""
     size = max(8, round(_WINDOW / step))
-    count = max(1, len(rest) // size)
-    windows = np.array_split(rest[: count * size] if len(rest) >= size else rest, count)
-    return np.sqrt(np.median([np.mean(own**2, axis=0) for own in windows], axis=0))
+    rest = [(q - smooth) / taken, np.diff(q, 3, axis=0) / np.sqrt(20.0)]  # 1 + 9 + 9 + 1
+    middle = lambda values: np.sqrt(np.median([  # noqa: E731
+        np.mean(own**2, axis=0) for own in np.array_split(values, max(1, len(values) // size))
+    ], axis=0))  # fmt: skip
+    return np.minimum(*(middle(values) for values in rest))

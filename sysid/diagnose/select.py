@@ -63,16 +63,22 @@ def ask(view: View, extra=(), tell: Callable[[float], None] = lambda share: None
     return Asked(found, null.statistics(found), np.array([gain(g).sum() for g in found]), null.maxima(found, rng))
 
 
-def search(view: View, extra=(), *, level: float = LEVEL, tell: Callable[[str, float], None] = lambda stage, share: None):
+def search(
+    view: View, extra=(), *, level: float = LEVEL, worth: float = WORTH, most: int = _MOST_STEPS,
+    tell: Callable[[str, float], None] = lambda stage, share: None,
+):  # fmt: skip
     """The effects that join, in order, and the answers under the first model and the last.
+
+    Args:
+        level: family-wise. worth: least share of a joint's squared residual that an effect must take. most: steps.
 
     Returns:
         (steps, asked first, asked last, last view)
     """
     steps: list[Step] = []
     first = asked = ask(view, extra, lambda share: tell("ask", share))
-    while len(steps) < _MOST_STEPS:
-        step = _next(view, asked, level)
+    while len(steps) < most:
+        step = _next(view, asked, level, worth)
         if step is None:
             break
         steps.append(step)
@@ -81,7 +87,7 @@ def search(view: View, extra=(), *, level: float = LEVEL, tell: Callable[[str, f
     return steps, first, asked, view
 
 
-def _next(view: View, asked: Asked, level: float) -> Step | None:
+def _next(view: View, asked: Asked, level: float, worth: float) -> Step | None:
     """The candidate that joins next, None where none is there and worth having."""
     threshold = np.quantile(asked.maxima, 1.0 - level) if len(asked.groups) else np.inf
     best: dict[tuple, int] = {}
@@ -105,18 +111,18 @@ def _next(view: View, asked: Asked, level: float) -> Step | None:
         # of all that cannot be told apart, one at least must be there
         there = {id(asked.groups[k]) for k in hopeful}
         if found is not None and any(id(m.group) in there for m, _ in found.members):
-            if (step := _joined(view, asked, found)) is not None:
+            if (step := _joined(view, asked, found, worth)) is not None:
                 return step
         hopeful = [k for k in hopeful if k not in short]
     return None
 
 
-def _joined(view: View, asked: Asked, found: Choice) -> Step | None:
+def _joined(view: View, asked: Asked, found: Choice, worth: float) -> Step | None:
     base, after = losses(view, view.blocks), found.head.losses
     whole = np.maximum(np.sum(view.design.residual**2, axis=0), 1e-300)
     shares = (base - after).sum(0) / whole
     joints = found.head.candidate.touches(view.model.robot.dof)
-    if shares[joints].max() < WORTH or found.gain.sum() <= 0.0:
+    if shares[joints].max() < worth or found.gain.sum() <= 0.0:
         return None
     inside = {id(member.group) for member, _ in found.members}
     p = min(asked.p(k) for k, group in enumerate(asked.groups) if id(group) in inside)

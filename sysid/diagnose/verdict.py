@@ -10,7 +10,7 @@ from scipy.stats import t as student
 
 from .. import blocks
 from ..estimate import Fit
-from .claims import Claim, own_joints
+from .claims import Claim
 from .flexible import Unknown
 from .select import LEVEL, WORTH
 
@@ -49,7 +49,7 @@ def verdicts(
     last = claims[-1].after if claims else fit
     out = []
     for j, joint in enumerate(fit.joints):
-        own = tuple(c for c in claims if j in own_joints(c.head, len(fit.joints)) and c.step.shares[j] >= WORTH)
+        own = tuple(c for c in claims if c.head.joint == joint or (c.head.joint == "*" and c.step.shares[j] >= WORTH))
         others = tuple(c for c in claims if c not in own and c.step.shares[j] >= WORTH)
         first, then, floor = fit.rms("test")[joint], last.rms("test")[joint], floors[j].rms
         misfit = first**2 - (floor if floor is not None else then) ** 2

@@ -100,6 +100,11 @@ def jittered(rows, t, keep: int, period: float, jitter: float, rng):
     return np.clip(found, 0, len(t) - 1), np.round(stamps, 9)
 
 
+def interpolated(t, values, stamps) -> np.ndarray:
+    """Values (n, dof) at times t (n,) as they were at stamps (m,) [s]."""
+    return np.stack([np.interp(stamps, t, column) for column in values.T], axis=1)
+
+
 def spike_scale(std, scales: Scales) -> np.ndarray:
     """What spikes (dof,) [N m] are counted in: the noise, or what stands for it."""
     return np.maximum(std, _SCALE * scales.torque)

@@ -219,17 +219,19 @@ def _log(robot, truth, inside, loop: control.Loop, sensor: _Sensor, rng, events,
     if nuisance.jitter:
         rows, stamps = nuisances.jittered(rows, t, sensor.keep, loop.period, nuisance.jitter, events)
     q, dof, motor = read[rows], robot.dof, plant.motor
-    clean = Clean(x[rows][:, motor], v[rows][:, motor], x[rows, :dof], v[rows, :dof], tau[rows], sensed[rows], sticks[rows])
+    found = sensed[rows]  # a slow logger's values are older than its stamps
+    at = (lambda values: values[rows]) if not nuisance.jitter else lambda values: nuisances.interpolated(t, values, stamps)
+    clean = Clean(at(x[:, motor]), at(v[:, motor]), at(x[:, :dof]), at(v[:, :dof]), at(tau), at(sensed), sticks[rows])
     added = std * _unitnoise_std(rng, len(rows), dof, sensor.keep * loop.period, sensor.colour, sensor.share)
     with np.errstate(divide="ignore"):
         digit = np.where(std > 0.0, 10.0 ** np.floor(np.log10(np.maximum(std, 1e-300) / 10.0)), 0.0)
     coarse = nuisance.steps(sensor.scales)
     digit = digit if coarse is None else coarse
     rounded = lambda tau: np.where(digit > 0.0, np.round(tau / np.where(digit > 0.0, digit, 1.0)) * digit, tau)  # noqa: E731
-    noisy = clean.sensed + added
+    noisy = found + added
     logged = rounded(noisy)
     told = [event for part in inside if isinstance(part, disturbances.Knocks) for event in part.events(robot, std)]
-    rms = np.sqrt(np.mean((logged - clean.sensed) ** 2, axis=0))
+    rms = np.sqrt(np.mean((logged - found) ** 2, axis=0))
     if nuisance.spikes:
         wrong, spikes = nuisances.spiked(noisy, stamps, nuisance.spikes, nuisances.spike_scale(std, sensor.scales), events)
         logged, told = rounded(wrong), told + spikes
@@ -237,7 +239,7 @@ def _log(robot, truth, inside, loop: control.Loop, sensor: _Sensor, rng, events,
         away, braked = nuisances.braked(loop.closed, sticks, rows, stamps)
         logged = np.where(away, 0.0, logged)
         told = [e for e in told if e["kind"] != "spike" or not away[slice(*e["rows"]), e["joints"][0]].all()] + braked
-        rms = np.sqrt(np.mean((rounded(noisy) - clean.sensed) ** 2, axis=0, where=~away))
+        rms = np.sqrt(np.mean((rounded(noisy) - found) ** 2, axis=0, where=~away))
     named = tuple({**event, "joints": [robot.joints[j] for j in event["joints"]]} for event in sorted(told, key=lambda e: e["start"]))
     return SimulatedLog(stamps, q, logged, clean, rms, named)
 
