@@ -16,13 +16,14 @@ _TOGETHER = "several variables together"
 
 @dataclass(frozen=True)
 class Told:
-    """A document with what else the lines need: {joint: N m or N}, {joint: held-out RMS with all that is claimed}, of each
-    command the set that its effect stands in, as (effect, joint, probability)."""
+    """A document with what else the lines need: {joint: N m or N}, {joint: held-out RMS with all that is named}, of each
+    command that adds what is named the set that this stands in, as (effect, joint, probability, command), the last empty
+    where it was not fitted."""
 
     document: dict
     units: dict[str, str]
     after: dict[str, float]
-    sets: dict[str, tuple[tuple[str, str, float], ...]]
+    sets: dict[str, tuple[tuple[str, str, float, str], ...]]
 
 
 def told(found: Diagnosis, document: dict) -> Told:
@@ -30,7 +31,11 @@ def told(found: Diagnosis, document: dict) -> Told:
     fit = found.fit
     last = found.claims[-1].after if found.claims else fit
     units = {joint: "N" if slides else "N m" for joint, slides in zip(fit.joints, fit.model.robot.prismatic)}
-    return Told(document, units, last.rms("test"), {claim.head.command: claim.set for claim in found.claims})
+    sets = {}
+    for claim in found.claims:
+        commands = {(f.effect, f.joint): f.command for f in claim.findings}
+        sets[claim.head.command] = tuple((*one, commands.get(one[:2], "")) for one in claim.set)
+    return Told(document, units, last.rms("test"), sets)
 
 
 def verdict(of: Told, width: int) -> list[tuple[str, list[str]]]:
@@ -46,9 +51,9 @@ def _joint(v: dict, of: Told, width: int, said: dict[str, str]) -> list[str]:
     named = listed([placed(f["effect"], f["joint"], joint) for f in heads], "and") if heads else ""
     first = {
         "complete": lambda: "no further effect is supported by these logs",
-        "explained": lambda: f"by {listed([placed(c['effect'], c['joint']) for c in v['by']], 'and')}; {_fall(v, of, len(v['by']))}",
+        "explained": lambda: f"by {listed([placed(c['effect'], c['joint']) for c in v['by']], 'and')}; {_fall(v, of)}",
         "unresolved": lambda: v["says"],
-        "missing": lambda: f"{named or v['effect']}; {_fall(v, of, len(heads))}",
+        "missing": lambda: f"{named or v['effect']}; {_fall(v, of)}",
         "unknown": lambda: "no effect of the catalogue explains what is left" + (f"; part of it looks like {named}" if named else ""),
     }[status]()
     lines = wrapped(f"{joint}: {status}: {first}", width, "  ")
@@ -56,33 +61,40 @@ def _joint(v: dict, of: Told, width: int, said: dict[str, str]) -> list[str]:
     if status == "unknown":
         lines += rest
     for head in heads:
-        lines += _head(head, of, joint, width, said, alone=len(heads) == 1)
+        lines += _head(head, of, joint, width, said)
     return lines + (rest if status != "unknown" else [])
 
 
-def _fall(v: dict, of: Told, count: int) -> str:
-    """Which share of the misfit some effects explain, where that is known, and what they make of the held-out error."""
-    joint, it, s = v["joint"], *(("it", "s") if count == 1 else ("together they", ""))
-    entry = of.document["joints"][joint]
-    known = entry["noise_floor"] is not None and v.get("explained") is not None
-    share = f"explain{s} {percent(min(max(v['explained'], 0.0), 1.0))} of the misfit and " if known else ""
-    return f"{it} {share}take{s} the held-out error from {entry['rms']['test']:.4g} to {of.after[joint]:.4g} {of.units[joint]}"
+def _fall(v: dict, of: Told) -> str:
+    """Which share of the misfit all that is named explains, where that is known, and what it makes of the held-out error."""
+    joint, entry = v["joint"], of.document["joints"][v["joint"]]
+    fall = f"the held-out error goes from {entry['rms']['test']:.4g} to {of.after[joint]:.4g} {of.units[joint]}"
+    it = "with it" if len(of.sets) == 1 else "with all that is named"
+    if entry["noise_floor"] is None or v.get("explained") is None:
+        return f"{it} {fall}"
+    return f"{it} {percent(min(max(v['explained'], 0.0), 1.0))} of the misfit is explained, {fall}"
 
 
-def _head(f: dict, of: Told, joint: str, width: int, said: dict[str, str], *, alone: bool) -> list[str]:
-    """One effect that is named: its parameters, what it cannot be told from, the command."""
+def _head(f: dict, of: Told, joint: str, width: int, said: dict[str, str]) -> list[str]:
+    """One effect that is named: what it takes, its parameters, what it cannot be told from, the command."""
     if f["command"] in said:
         return wrapped(f"  {f['effect']}: see {said[f['command']]}", width, "    ")
     said[f["command"]] = joint
-    values = ", ".join(_value(name, p) for name, p in f["parameters"].items() if p["value"] is not None)
-    word = "" if alone else f"{placed(f['effect'], f['joint'], joint)}: "
-    out = wrapped(f"  {word}{values}", width, "    ") if word or values else []
+    parts = [_value(name, p) for name, p in f["parameters"].items() if p["value"] is not None]
+    if len(of.sets) > 1:
+        where = "" if f["joint"] == joint else " on all joints"
+        parts.insert(0, f"{percent(min(max(f['misfit_removed'], 0.0), 1.0))} of what was left{where} before it")
+    out = wrapped(f"  {f['effect']}: {', '.join(parts)}", width, "    ") if parts else []
     others = [m for m in of.sets[f["command"]] if m[:2] != (f["effect"], f["joint"])]
     if others:
-        rest = listed([f"{placed(effect, where, f['joint'])} ({percent(p)})" for effect, where, p in others], "or")
+        rest = listed([f"{placed(effect, where, f['joint'])} ({percent(p)})" for effect, where, p, _ in others], "or")
         out += wrapped(f"  these logs cannot tell it ({percent(f['probability'])}) from {rest}", width, "    ")
         out += wrapped(f"  to separate them: {f['separate_by']}", width, "    ")
-    return [*out, "  add it with", f["command"]]
+    out += ["  add it with", f["command"]]
+    for effect, where, p, command in others:
+        if p > f["probability"] and command:  # what is named is the simplest that is as good
+            out += [*wrapped(f"  or, likelier but less simple, {placed(effect, where, f['joint'])} with", width, "    "), command]
+    return out
 
 
 def _left(v: dict) -> str:
@@ -115,9 +127,8 @@ def listed(words: Sequence[str], last: str) -> str:
 
 
 def percent(share: float) -> str:
-    """A share; nothing that is there is said to be nothing, nothing that lacks to be all."""
-    rounded = min(max(round(100 * share), 0 if share < 0.005 else 1), 100 if share > 0.9999 else 99)
-    return "less than 1 %" if 0 < share < 0.005 else f"{rounded} %"
+    """A share or a probability; what is small is not said to be nothing, nor what lacks little to be all."""
+    return "less than 1 %" if share < 0.005 else f"{100 if share > 0.9999 else min(round(100 * share), 99)} %"
 
 
 def wrapped(words: str, width: int, indent: str) -> list[str]:

@@ -215,7 +215,7 @@ LEFT = {"depends_on": [{"variable": f"qd_{EVIL}", "share": 0.3}, {"variable": "t
 
 @pytest.mark.parametrize("more, words", [
     ({"status": "complete"}, "No further effect is supported by these logs."),
-    ({"status": "explained", "by": [{"effect": "joint_coupling", "joint": "elbow"}], "explained": 0.93}, "joint_coupling on elbow. 93\u00a0% of the misfit is explained"),
+    ({"status": "explained", "by": [{"effect": "joint_coupling", "joint": "elbow"}], "explained": 0.93}, "joint_coupling on elbow. With all that is named 93\u00a0% of the misfit is explained"),
     ({"status": "unresolved", "says": "its noise floor is not known (<b>why</b>)"}, "Its noise floor is not known (<b>why</b>)."),
     ({"status": "unresolved", "says": "so it is", **LEFT}, f"The motion predicts 40\u00a0% of what is left (the speed of {EVIL} alone 30\u00a0%, time alone 10\u00a0%)."),
     ({"status": "unknown", "also": [], **LEFT}, "Structure is left that no effect of the catalogue explains. The motion predicts 40\u00a0% of what is left"),

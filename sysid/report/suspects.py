@@ -8,7 +8,7 @@ import numpy as np
 
 from ..diagnose.diagnosis import Diagnosis
 from .verdict import placed
-from .words import SPACE, empty, level, number, percentage, plus_minus, text, unit_of
+from .words import SPACE, chance, empty, level, number, percentage, plus_minus, text, unit_of
 
 
 def families(diagnosis: Diagnosis) -> list[list[int]]:
@@ -57,7 +57,7 @@ def _step_words(step: int, tied, findings: list[dict]) -> str:
     if len(tied) > 1:
         words += f": these {len(tied)} are tied, the logs cannot tell them apart"
     listed = {(f["effect"], f["joint"]) for f in findings}
-    rest = [f"{placed(e, j)} ({percentage(p)})" for e, j, p in tied if (e, j) not in listed]
+    rest = [f"{placed(e, j)} ({chance(p)})" for e, j, p in tied if (e, j) not in listed]
     return words + (f". Not fitted here: {', '.join(rest)}" if rest else "")
 
 
@@ -74,7 +74,7 @@ def _suspect(k: int, f: dict) -> str:
     return (
         f'<tr data-finding="{k}"><th scope="row">{text(f["effect"])}{f"<small>{small}</small>" if small else ""}{command}</th>'
         f"<td>{text(f['joint']) if f['joint'] != '*' else 'whole robot'}</td>"
-        f"<td data-label='probability'>{percentage(f['probability'])}</td>"
+        f"<td data-label='probability'>{chance(f['probability'])}</td>"
         f"<td>{_bar(f['misfit_removed'], f['misfit_removed_se'])}<span class='value'>{removed}</span></td>"
         f"<td data-label='held-out RMS'>{after}</td></tr>"
     )

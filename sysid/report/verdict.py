@@ -9,6 +9,7 @@ from ..effect import describe
 from ..estimate import Fit
 from .words import (
     SPACE,
+    chance,
     level,
     percentage,
     plus_minus,
@@ -97,7 +98,7 @@ def verdict_words(found: dict, diagnosis: Diagnosis, document: dict) -> str:
         return f"Structure is left that no effect of the catalogue explains. {left}.{also}"
     out = f"{named or text(found['effect'])} {'are' if len(heads) > 1 else 'is'} missing. {_fall(found, diagnosis, document)}."
     for claim in heads:
-        out += _claim(claim, joint, alone=len(heads) == 1)
+        out += _claim(claim, joint, len(diagnosis.claims) > 1, document)
     return out + (f" {left}." if left else "")
 
 
@@ -106,26 +107,34 @@ def _fall(found: dict, diagnosis: Diagnosis, document: dict) -> str:
     joint = found["joint"]
     entry, last = document["joints"][joint], diagnosis.claims[-1].after if diagnosis.claims else diagnosis.fit
     force = raised(units(diagnosis.fit)[joint][0])
-    fall = f"the held-out error goes from {level(entry['rms']['test'])} to {level(last.rms('test')[joint])}{SPACE}{force}"
+    it = "with it" if len(diagnosis.claims) == 1 else "with all that is named"
+    fall = f"{it} the held-out error goes from {level(entry['rms']['test'])} to {level(last.rms('test')[joint])}{SPACE}{force}"
     if entry["noise_floor"] is None or found.get("explained") is None:
         return fall[0].upper() + fall[1:]
-    return f"{percentage(min(max(found['explained'], 0.0), 1.0))} of the misfit is explained, {fall}"
+    share = percentage(min(max(found["explained"], 0.0), 1.0))
+    return f"{it[0].upper() + it[1:]} {share} of the misfit is explained, {fall.removeprefix(it + ' ')}"
 
 
-def _claim(claim, joint: str, *, alone: bool) -> str:
-    """One effect that is named: what it is, its parameters, what it cannot be told from."""
+def _claim(claim, joint: str, several: bool, document: dict) -> str:
+    """One effect that is named: what it takes, its parameters, what it is, what it cannot be told from."""
     head = claim.head
     known = [
         f"{text(name.split('.')[-1])}{SPACE}={SPACE}{plus_minus(value, std)}{unit_of(unit)}"
         for name, (value, std, unit) in head.parameters.items() if math.isfinite(value)
     ]  # fmt: skip
+    if several:
+        share = next(f["misfit_removed"] for f in document["findings"] if f["command"] == head.command)
+        where = "" if head.joint == joint else " on all joints"
+        known.insert(0, f"{percentage(min(max(share, 0.0), 1.0))} of what was left{where} before it")
     summary = describe(head.candidate.effect)["summary"].replace("`", "").split(". ")[0].rstrip(".")
-    out = (" " if alone else f" {text(head.effect)}: ") + (f"{', '.join(known)}. " if known else "")
+    out = f" <strong>{text(head.effect)}</strong>: {', '.join(known)}. " if known else " "
     out += f'<span class="quiet">{text(summary)}.</span>'
-    others = [(placed(e, j, head.joint), p) for e, j, p in claim.set if (e, j) != (head.effect, head.joint)]
+    others = [(e, j, p) for e, j, p in claim.set if (e, j) != (head.effect, head.joint)]
     if others:
-        words = " or ".join(f"{word}{SPACE}({percentage(p)})" for word, p in others)
-        out += f" These logs cannot tell it ({percentage(head.probability)}) from {words}."
+        words = " or ".join(f"{placed(e, j, head.joint)}{SPACE}({chance(p)})" for e, j, p in others)
+        out += f" These logs cannot tell it ({chance(head.probability)}) from {words}."
+        if any(p > head.probability for *_, p in others):
+            out += " It is named because it is the simplest of those that explain as much."
         out += f" To separate them: {text(head.candidate.effect.separate_by)}."
     return out
 

@@ -102,3 +102,8 @@ def percentage(share, se=None) -> str:
     places = 0 if abs(share) >= 0.0995 else 1
     said = lambda value: f"{round(100 * value, places) + 0.0:.{places}f}"  # noqa: E731 - no minus before a zero
     return f"{said(share)}{'' if se is None or not math.isfinite(se) else f'{SPACE}±{SPACE}{said(se)}'}{SPACE}%".replace("-", "−")
+
+
+def chance(probability: float) -> str:
+    """A probability, in per cent: as many draws tell it, it is never nothing."""
+    return f"&lt;{SPACE}1{SPACE}%" if probability < 0.005 else f"{round(100 * probability)}{SPACE}%"
