@@ -170,6 +170,18 @@ def test_quantised_torque():
     assert floor([residual], [logged], [q], [step], 1).rms == pytest.approx(np.hypot(0.2, 0.5 / np.sqrt(12.0)), rel=0.07)
 
 
+@pytest.mark.parametrize("digit", [1.0, 3.0])
+def test_a_torque_much_coarser_than_its_noise_has_the_noise_of_its_rounding(digit):
+    """Its jumps are no spikes."""
+    rng, step = np.random.default_rng(17), 0.002
+    q = wandering(20.0, step, rng)
+    predicted = torque(q, step)
+    exact = predicted + 0.1 * rng.normal(size=q.shape)
+    logged = np.round(exact / digit) * digit
+    for j, result in enumerate(floors([logged - predicted], [logged], [q], [step])):
+        assert result.rms == pytest.approx((logged - predicted)[:, j].std(), rel=0.1)
+
+
 def test_stretches_are_pooled_and_short_ones_left_out():
     rng, step = np.random.default_rng(7), 0.005
     qs = [wandering(seconds, step, rng) for seconds in (12.0, 20.0, 0.1)]

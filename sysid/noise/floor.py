@@ -94,8 +94,9 @@ def floors(
     there."""
     memory: dict[bytes, _Shared] = {}
     joints = range(residual[0].shape[1] if len(residual) else 0)
-    found = (estimate(residual, measured, q, step, j, use=use, memory=memory) for j in joints)
-    return tuple(judged(one) for one in found)
+    return tuple(
+        judged(estimate(residual, measured, q, step, j, use=use, memory=memory)) for j in joints
+    )
 
 
 def judged(found: Estimate) -> NoiseFloor:
@@ -124,14 +125,12 @@ def estimate(residual, measured, q, step, joint: int, *, use=None, memory=None) 
     shared = _shared(q, step, use, {} if memory is None else memory)
     runs, bandwidth = shared.runs, shared.bandwidth
     if not runs:
-        why = f"{len(inside)} samples are too few to tell noise from misfit"
-        if len(inside) >= FEWEST_SAMPLES:
-            why = f"of {len(inside)} samples no {FEWEST_SAMPLES} count without a gap: too few"
+        why = f"{len(inside)} samples, no {FEWEST_SAMPLES} of them together, are too few"
         return Estimate(own, own, "none", "", why, own)
     raw, torque = ([run.of(x[run.stretch]) for run in runs] for x in (columns, logged))
     if bandwidth == 0.0:
         mean = float(np.mean(np.concatenate([v[run.counts] for v, run in zip(raw, runs)])))
-        steps, counts = [run.step for run in runs], [run.counts for run in runs]
+        counts, steps = zip(*((run.counts, run.step) for run in runs))
         kept, rest = outliers.without([v - mean for v in raw], counts, steps, 0.0)
         found = repeats.block_rms(np.concatenate([v[k] for v, k in zip(rest, kept)]) ** 2)
         words = "nothing moves: all but the residual's mean"
@@ -165,7 +164,8 @@ def _rest(shared: _Shared, raw, torque, joint: int):
     rest, _, _ = asked.removed_from(raw, [run.counts for run in runs])
     kept = outliers.away_from_reversals(runs, shared.motion.v, rest, [run.counts for run in runs])
     rest = [bridged(v, k) for v, k in zip(rest, kept)]
-    kept, _ = outliers.without(rest, kept, steps, shared.bandwidth)
+    digit = outliers.digit_of(np.concatenate([m[run.counts] for m, run in zip(torque, runs)]))
+    kept, _ = outliers.without(rest, kept, steps, shared.bandwidth, digit)
     # once more, without what no noise does
     rest, number, removed = asked.removed_from(raw, kept)
     return [bridged(v, k) for v, k in zip(rest, kept)], kept, number, removed

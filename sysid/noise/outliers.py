@@ -14,6 +14,7 @@ import numpy as np
 from .stretches import Run, bridged, moving
 
 _OUTLYING = 5.0  # robust standard deviations: a Gaussian does that once in two million
+_DIGITS = 2.0  # digits of a coarse torque that it may jump by and be quiet
 _SHARE = 0.25  # of the quickest period of the motion: beyond it misfit is no burst
 _MOST = 0.25  # of the rows; where more stand out, they are no exception
 # Reversals: share of its rms speed below which a joint is slow, of the time it may be, and the
@@ -22,8 +23,14 @@ _SLOW, _MOST_SLOW, _LARGER = 0.12, 0.25, 2.0
 _NORMAL = 0.6745  # median of a standard Gaussian's absolute value
 
 
-def without(values: list[np.ndarray], kept: list[np.ndarray], steps: list[float], bandwidth: float):
-    """Which rows (n,) of each run are kept, and the values with what is left out bridged."""
+def without(
+    values: list[np.ndarray], kept: list[np.ndarray], steps: list[float], bandwidth: float,
+    digit: float = 0.0,
+) -> tuple[list[np.ndarray], list[np.ndarray]]:  # fmt: skip
+    """Which rows (n,) of each run are kept, and the values with what is left out bridged.
+
+    `digit` is the least difference of logged torques [N m or N]: that much is no outlier.
+    """
     shortest = min(steps)
     longest = max(1, int(_SHARE / (bandwidth * shortest))) if bandwidth > 0.0 else 1
     kept, values, all_rows = list(kept), list(values), sum(int(k.sum()) for k in kept)
@@ -34,9 +41,9 @@ def without(values: list[np.ndarray], kept: list[np.ndarray], steps: list[float]
         sizes = np.concatenate(sizes) if sizes else np.zeros(0)
         if not len(sizes) or not (typical := float(np.median(sizes)) / _NORMAL) > 0.0:
             continue
-        found = []
+        found, most = [], max(_OUTLYING * typical, _DIGITS * digit)
         for d, k in zip(steps_of, kept):
-            hit = np.flatnonzero(np.nan_to_num(np.abs(d)) > _OUTLYING * typical)
+            hit = np.flatnonzero(np.nan_to_num(np.abs(d)) > most)
             turns = np.zeros(len(k) + 1, dtype=np.int64)  # both means are suspect
             turns[hit] += 1
             turns[hit + 2 * width] -= 1
@@ -82,3 +89,10 @@ def away_from_reversals(
             left = fewer
     ends = np.cumsum([len(k) for k in kept])[:-1]
     return [a if a.sum() > 2 else b for a, b in zip(np.split(left, ends), kept)]
+
+
+def digit_of(torque: np.ndarray) -> float:
+    """The least difference [N m or N] of two torques (n,) as logged, rounding aside."""
+    apart = np.diff(np.unique(torque))
+    apart = apart[apart > 1e-9 * np.abs(torque).max(initial=0.0)]
+    return float(apart.min(initial=np.inf)) if len(apart) else 0.0

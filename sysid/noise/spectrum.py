@@ -144,9 +144,10 @@ def weighed(spectrum: Spectrum, bandwidth: float, step: float, removed: float) -
     estimate = power - doubt * doubtful
     mean = float(chance @ estimate)
     spread = (estimate - mean) ** 2 + doubt * (1.0 - doubt) * doubtful**2
+    sampled = float(chance @ sampling) + (2.0 * _COLOURS * mean) ** 2
     parts = {
         "noise slower than the motion cannot be told from misfit": float(chance @ spread),
-        "the log is too short": float(chance @ sampling) + (2.0 * _COLOURS * mean) ** 2,
+        "the log is too short for how slow its noise is": sampled,
         "the misfit is much larger than the noise": min(_LEFT_BEHIND * removed, mean) ** 2,
     }
     best = 1 + int(np.argmax(chance[1:]))
