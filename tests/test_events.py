@@ -235,15 +235,15 @@ def test_rows_that_events_reach_are_left_out():
         return piece.t[~piece.use[:, JOINTS.index(joint)]], piece
 
     t, piece = lost(
-        PreprocessSpec(window=0.1), "c"
+        PreprocessSpec(window=0.1, standstill="keep"), "c"
     )  # 50 ms to either side: the knock on most joints, the brake, the angle
     np.testing.assert_allclose([t[0], t[t < 5][-1]], [2.95, 3.25], atol=1e-9)
     np.testing.assert_allclose([t[(t > 5) & (t < 8.5)][0], t[t < 8.5][-1]], [7.0, 8.0], atol=1e-9)
     np.testing.assert_allclose([t[t > 8.5][0], t[-1]], [8.95, 9.15], atol=1e-9)
-    t, _ = lost(PreprocessSpec(window=0.1), "b")
+    t, _ = lost(PreprocessSpec(window=0.1, standstill="keep"), "b")
     np.testing.assert_allclose(t[(t > 4) & (t < 6)], [5.0, 5.001], atol=1e-9)
     t, _ = lost(
-        PreprocessSpec(window=0.1, torque="same"), "c"
+        PreprocessSpec(window=0.1, torque="same", standstill="keep"), "c"
     )  # columns see filtered angles, torque its own filter
     np.testing.assert_allclose([t[0], t[t < 5][-1]], [2.9, 3.3], atol=1e-9)
     np.testing.assert_allclose([t[(t > 5) & (t < 8.5)][0], t[t < 8.5][-1]], [6.95, 8.05], atol=1e-9)
@@ -259,7 +259,7 @@ def test_spikes_do_not_spread_through_a_filter():
     made = segment(noise=0.02)
     spiked = changed(made, tau=(slice(5000, 5001), 1, made.tau[5000, 1] + 30.0))
     (spike,) = find(spiked, JOINTS, log="made.csv")
-    spec = PreprocessSpec(window=0.1, torque="same")
+    spec = PreprocessSpec(window=0.1, torque="same", standstill="keep")
     clean, seen = (
         prepare([log(s, events=e)], spec, JOINTS).pieces[0]
         for s, e in ((made, ()), (spiked, (spike,)))
@@ -278,16 +278,16 @@ def test_the_view_of_the_diagnosis_leaves_events_out():
     plain, motion_ = (questioned([log(made, events=e)], JOINTS, 15.0) for e in ((), (knock,)))
     (before,), (piece,) = plain.pieces, motion_.pieces
     near = (piece.t > 2.99) & (piece.t < 3.21)
-    assert not piece.use[near].any() and motion_.events == (knock,) and motion_.left_out > 0
+    assert not piece.use[near].any() and motion_.events == (knock,) and motion_.disturbed > 0
     far = (piece.t < 2.7) | (piece.t > 3.5)
     np.testing.assert_array_equal(piece.use[far], before.use[far])
 
 
 def test_a_log_without_events_keeps_every_row_and_one_with_them_does_not_disturb_the_others():
-    assert prepare([log(segment())], PreprocessSpec(), JOINTS).pieces[0].use is None
+    assert prepare([log(segment())], PreprocessSpec(standstill="keep"), JOINTS).pieces[0].use is None
     spike = Event("spike", "made.csv", 5.0, 5.0, ("b",))
     one, two = prepare(
-        [log(segment(), events=[spike]), log(segment())], PreprocessSpec(), JOINTS
+        [log(segment(), events=[spike]), log(segment())], PreprocessSpec(standstill="keep"), JOINTS
     ).pieces
     assert np.sum(~one.use) == 1 and two.use.all()
 

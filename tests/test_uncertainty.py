@@ -3,8 +3,8 @@
 import numpy as np
 from scipy.signal import lfilter
 
-from sysid import estimate
-from sysid.compress import compress
+from sysid import estimate, uncertainty
+from sysid.compress import Compressed, Factor, compress, triangle
 from sysid.config import Experiment
 from sysid.inertia import LogCholesky
 from sysid.log import Log, Segment
@@ -87,3 +87,38 @@ def test_noise_weighting_gives_quiet_joints_their_say():
     weighted = experiment.model_copy(update={"solver": experiment.solver.model_copy(update={"weighting": "noise"})})
     fit = estimate.identify(weighted, structure, motion, data, prior)
     assert fit.weights is not None and fit.solution.converged and fit.certificate.globally_optimal
+
+
+def test_deviations_are_right_under_white_noise():
+    """Linear least squares on two joints of unequal noise, blocks of unequal weight: the covariance is known in closed form.
+
+    Neighbouring blocks' scores are against each other, as the fit has taken its share out; uncorrected, that bends them.
+    """
+    rng = np.random.default_rng(0)
+    blocks, rows, size, noise = 40, 8, 6, (1.0, 0.2)
+    slow = np.cumsum(rng.normal(size=(2, blocks * rows, size)), axis=1)
+    slow *= np.repeat(np.linspace(0.2, 3.0, blocks), rows)[:, None]
+    normal = sum(x.T @ x for x in slow)
+    inverse = np.linalg.inv(normal)
+    direction, along = np.linalg.eigh(inverse)[1][:, 0], np.zeros(200)  # what is known best, a combination of all
+    covariance = inverse @ sum(s**2 * x.T @ x for s, x in zip(noise, slow)) @ inverse
+    known = np.diagonal(covariance)
+    plain, corrected = np.zeros((2, 200, size))
+    for k in range(200):
+        factors = []
+        y = [x @ np.ones(size) + s * rng.normal(size=len(x)) for s, x in zip(noise, slow)]
+        for b in range(blocks):
+            own = slice(b * rows, (b + 1) * rows)
+            for j in range(2):
+                r = triangle(np.asfortranarray(np.column_stack([slow[j][own], y[j][own]])))
+                factors.append(Factor(j, b, np.arange(size), r, rows))
+        data = Compressed(size, 2, tuple(factors), blocks * rows)
+        x = inverse @ sum(a.T @ b for a, b in zip(slow, y))
+        basis, moves, *_ = uncertainty._left_out(data, x, None, 2.0 * normal, np.arange(size))
+        plain[k] = np.diagonal(basis @ uncertainty._neighbours(moves) @ basis.T)
+        found = uncertainty._noise(data, x, None, 2.0 * normal, np.arange(size)) / uncertainty._widening(blocks) ** 2
+        corrected[k], along[k] = np.diagonal(found), direction @ found @ direction
+    # 200 repeats know the mean to 5 %
+    np.testing.assert_allclose(corrected.mean(axis=0) / known, 1.0, atol=0.15)
+    np.testing.assert_allclose(along.mean() / (direction @ covariance @ direction), 1.0, atol=0.15)
+    assert np.abs(np.log(plain.mean(axis=0) / known)).max() > 0.2
