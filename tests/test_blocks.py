@@ -196,6 +196,19 @@ def test_p_values_grow_towards_the_best():
     assert p[0] == 1.0 and p[5] < 0.05
 
 
+def test_what_differs_by_rounding_is_the_same():
+    """A bias and friction of another size each way are one column: refitted, they differ by rounding, always on the same side."""
+    rng = np.random.default_rng(5)
+    first = rng.gamma(2.0, size=24)
+    losses = np.stack([first, first * (1.0 + 1e-13), first + 0.5 + rng.normal(size=24) * 0.1, first * (1.0 + 1e-13)], axis=1)
+    p = blocks.confidence_set(losses, np.random.default_rng(0))
+    np.testing.assert_array_equal(p[[0, 1, 3]], 1.0)
+    assert p[2] < 0.01
+    # a difference that is small but no rounding counts
+    assert blocks.confidence_set(losses[:, [0, 2]] * [1.0, 1.0] + [1e3, 1e3], np.random.default_rng(0))[1] < 0.01
+    np.testing.assert_allclose(blocks.chances(losses, rng), [1 / 3, 1 / 3, 0.0, 1 / 3])
+
+
 def test_the_set_holds_the_truth_nine_times_in_ten():
     """Two models that are equally good, one of them the truth, and one that is worse."""
     held, worse, draws = 0, 0, 200
