@@ -106,7 +106,8 @@ def chosen(view: View, groups: list[Group], rng: np.random.Generator) -> Choice 
     inside = [k for k in np.argsort(table.sum(0)) if p[k] >= _OUTSIDE]
     # of those within a standard error of the best, the one of fewest parameters (Breiman, Friedman, Olshen & Stone 1984)
     best = inside[0]
-    near = [k for k in inside if (table[:, k] - table[:, best]).sum() <= blocks.standard_error(table[:, k] - table[:, best])]
+    more, same = table - table[:, [best]], blocks.SAME * np.abs(table[:, best]).sum()
+    near = [k for k in inside if more[:, k].sum() <= max(blocks.standard_error(more[:, k]), same)]
     head = min([best, *near], key=lambda k: (members[k].candidate.simplicity[:2], table[:, k].sum()))
     inside = [k for k in inside if k == head or not holds(view, members[k], members[head])]
     chance = blocks.chances(table[:, inside], rng)
