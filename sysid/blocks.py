@@ -13,6 +13,7 @@ import numpy as np
 
 SHORTEST = 0.5  # s: several times the memory of the filters in use (0.05 to 0.1 s) and of a joint's friction loop
 FEWEST, MOST = 12, 60  # below, no spread can be told; above, nothing is gained
+SAME = 1e-6  # of a loss: a difference below it is how numbers are rounded, or a solver's tolerance
 _TIMES = 4.0  # memories in a block: of a first-order noise, what stands across two blocks is then an eighth of its variance
 
 
@@ -139,6 +140,9 @@ def confidence_set(losses, rng: np.random.Generator, *, draws: int = 1000) -> np
         own = losses[:, left]
         apart = own - own.mean(1, keepdims=True)
         mean = apart.mean(0)
+        if np.abs(mean).max() <= SAME * np.abs(own).mean():
+            p[left] = 1.0  # rounding is always on the same side, and no evidence
+            break
         drawn = weights @ apart - mean
         spread = np.sqrt(np.maximum((drawn**2).mean(0), 1e-300))
         worst = int(np.argmax(mean / spread))
@@ -158,5 +162,5 @@ def chances(losses, rng: np.random.Generator, *, draws: int = 4000) -> np.ndarra
     """
     drawn = rng.dirichlet(np.ones(len(losses)), draws) @ losses
     least = drawn.min(1, keepdims=True)
-    best = drawn <= least + 1e-6 * np.abs(least)  # what is the same, but for rounding, shares
+    best = drawn <= least + SAME * np.abs(least)  # what is the same, but for rounding, shares
     return (best / best.sum(1, keepdims=True)).mean(0)

@@ -232,5 +232,7 @@ def _sums(design: Design, spans: list[slice]) -> Sums:
 
 
 def _stacked(view: View) -> np.ndarray:
-    """The model's columns on the rough motion, where the rows of the view count."""
-    return row.stack(view.model, view.rough, view.stride).columns * view.rows.use.T[:, :, None]
+    """The model's columns on the rough motion, on the rows that count in the view: near a reversal the noise, drawn again, would
+    leave out others, and a row that is missing is no noise."""
+    pieces = [replace(rough, use=piece.use) for rough, piece in zip(view.rough.pieces, view.motion.pieces)]
+    return row.stack(view.model, replace(view.rough, pieces=tuple(pieces)), view.stride).columns
