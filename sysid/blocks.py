@@ -13,6 +13,7 @@ import numpy as np
 
 SHORTEST = 0.5  # s: several times the memory of the filters in use (0.05 to 0.1 s) and of a joint's friction loop
 FEWEST, MOST = 12, 60  # below, no spread can be told; above, nothing is gained
+SAME = 1e-6  # of a loss: a difference below it is how numbers are rounded, or a solver's tolerance
 _TIMES = 4.0  # memories in a block: of a first-order noise, what stands across two blocks is then an eighth of its variance
 
 
@@ -94,6 +95,21 @@ def away(differences) -> float:
     return float(d.sum() / se) if se > 0 else 0.0
 
 
+def slope_chance(told, values, number) -> float:
+    """Probability, were nothing there, of a slope of values (n,) on what was told of them (n,) as large as theirs: Student's t of
+    sums over blocks `number` (n,), with what the slope leaves as their noise."""
+    from scipy.stats import t as student
+
+    size = summed(number, told * told)
+    if not size.sum() > 0:
+        return 1.0
+    slope = float(told @ values / size.sum())
+    left = summed(number, told * (values - slope * told))
+    acting = size.sum() ** 2 / np.sum(size**2)
+    spread = np.sqrt(np.sum(left**2) * len(left) / max(len(left) - 1, 1))
+    return float(student.sf(slope * size.sum() / max(spread, 1e-300), max(acting - 1.0, 1.0)))
+
+
 def jackknife(without) -> np.ndarray:
     """Standard errors of estimates from those with one block left out each (blocks, ...)."""
     without = np.asarray(without)
@@ -124,6 +140,9 @@ def confidence_set(losses, rng: np.random.Generator, *, draws: int = 1000) -> np
         own = losses[:, left]
         apart = own - own.mean(1, keepdims=True)
         mean = apart.mean(0)
+        if np.abs(mean).max() <= SAME * np.abs(own).mean():
+            p[left] = 1.0  # rounding is always on the same side, and no evidence
+            break
         drawn = weights @ apart - mean
         spread = np.sqrt(np.maximum((drawn**2).mean(0), 1e-300))
         worst = int(np.argmax(mean / spread))
@@ -143,5 +162,5 @@ def chances(losses, rng: np.random.Generator, *, draws: int = 4000) -> np.ndarra
     """
     drawn = rng.dirichlet(np.ones(len(losses)), draws) @ losses
     least = drawn.min(1, keepdims=True)
-    best = drawn <= least + 1e-6 * np.abs(least)  # what is the same, but for rounding, shares
+    best = drawn <= least + SAME * np.abs(least)  # what is the same, but for rounding, shares
     return (best / best.sum(1, keepdims=True)).mean(0)

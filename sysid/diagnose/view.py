@@ -18,6 +18,8 @@ from ..preprocess import Motion
 from ..shape import Settled, inverted, prior_hessian, settle
 from . import flexible
 
+_FOLDS = 10
+
 
 @dataclass(frozen=True)
 class Source:
@@ -95,10 +97,12 @@ class View:
     @cached_property
     def unknown(self) -> tuple[flexible.Unknown, ...]:
         """What a flexible function of the motion takes of each joint."""
-        fold = blocks.numbered(self.rows.t, self.rows.piece, shortest=np.inf, fewest=10)
+        # three stretches a fold, so that what is left out is seldom a place where nothing else was
+        rows = self.rows
+        fold = blocks.numbered(rows.t, rows.piece, shortest=np.inf, fewest=3 * _FOLDS) % _FOLDS
         return tuple(
             flexible.unknown(
-                self.variables, name, self.design.residual[:, j], self.rows.use[:, j], fold, self.rows.piece, self.step,
+                self.variables, name, self.design.residual[:, j], rows.use[:, j], fold, rows.piece, self.step,
                 np.random.default_rng(j),
             )
             for j, name in enumerate(self.model.robot.joints)
@@ -228,5 +232,7 @@ def _sums(design: Design, spans: list[slice]) -> Sums:
 
 
 def _stacked(view: View) -> np.ndarray:
-    """The model's columns on the rough motion, where the rows of the view count."""
-    return row.stack(view.model, view.rough, view.stride).columns * view.rows.use.T[:, :, None]
+    """The model's columns on the rough motion, on the rows that count in the view: near a reversal the noise, drawn again, would
+    leave out others, and a row that is missing is no noise."""
+    pieces = [replace(rough, use=piece.use) for rough, piece in zip(view.rough.pieces, view.motion.pieces)]
+    return row.stack(view.model, replace(view.rough, pieces=tuple(pieces)), view.stride).columns
