@@ -98,7 +98,8 @@ def verdict_words(found: dict, diagnosis: Diagnosis, document: dict) -> str:
         return f"Structure is left that no effect of the catalogue explains. {left}.{also}"
     out = f"{named or text(found['effect'])} {'are' if len(heads) > 1 else 'is'} missing. {_fall(found, diagnosis, document)}."
     for claim in heads:
-        out += _claim(claim, joint, len(diagnosis.claims) > 1, document)
+        word = f"<strong>{text(claim.head.effect)}</strong>: " if len(heads) > 1 else ""
+        out += f" {word}{_claim(claim, joint, len(diagnosis.claims) > 1, document)}"
     return out + (f" {left}." if left else "")
 
 
@@ -127,7 +128,7 @@ def _claim(claim, joint: str, several: bool, document: dict) -> str:
         where = "" if head.joint == joint else " on all joints"
         known.insert(0, f"{percentage(min(max(share, 0.0), 1.0))} of what was left{where} before it")
     summary = describe(head.candidate.effect)["summary"].replace("`", "").split(". ")[0].rstrip(".")
-    out = f" <strong>{text(head.effect)}</strong>: {', '.join(known)}. " if known else " "
+    out = f"{', '.join(known)}. " if known else ""
     out += f'<span class="quiet">{text(summary)}.</span>'
     others = [(e, j, p) for e, j, p in claim.set if (e, j) != (head.effect, head.joint)]
     if others:
