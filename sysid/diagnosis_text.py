@@ -19,14 +19,13 @@ class Told:
     """A document with what else the lines need.
 
     units: {joint: N m or N}. after: {joint: held-out RMS with all that is named}. sets: of each
-    command that adds what is named, the set that this stands in: (effect, joint, probability,
-    command), the last empty where it was not fitted.
+    command that adds what is named, the set that this stands in: (effect, joint, probability).
     """
 
     document: dict
     units: dict[str, str]
     after: dict[str, float]
-    sets: dict[str, tuple[tuple[str, str, float, str], ...]]
+    sets: dict[str, tuple[tuple[str, str, float], ...]]
 
 
 def told(found: Diagnosis, document: dict) -> Told:
@@ -37,10 +36,7 @@ def told(found: Diagnosis, document: dict) -> Told:
         joint: "N" if slides else "N m"
         for joint, slides in zip(fit.joints, fit.model.robot.prismatic)
     }
-    sets = {}
-    for claim in found.claims:
-        commands = {(f.effect, f.joint): f.command for f in claim.findings}
-        sets[claim.head.command] = tuple((*one, commands.get(one[:2], "")) for one in claim.set)
+    sets = {claim.head.command: claim.set for claim in found.claims}
     return Told(document, units, last.rms("test"), sets)
 
 
@@ -88,7 +84,7 @@ def _fall(v: dict, of: Told) -> str:
     it = "with it" if len(of.sets) == 1 else "with all that is named"
     if entry["noise_floor"] is None or v.get("explained") is None:
         return f"{it} {fall}"
-    return f"{it} {percent(min(max(v['explained'], 0.0), 1.0))} of the misfit is explained, {fall}"
+    return f"{it} {percent(max(v['explained'], 0.0))} of the misfit is explained, {fall}"
 
 
 def _head(f: dict, of: Told, joint: str, width: int, said: dict[str, str]) -> list[str]:
@@ -96,39 +92,20 @@ def _head(f: dict, of: Told, joint: str, width: int, said: dict[str, str]) -> li
     if f["command"] in said:
         return wrapped(f"  {f['effect']}: see {said[f['command']]}", width, "    ")
     said[f["command"]] = joint
-    parts = [_value(name, p) for name, p in f["parameters"].items() if p["value"] is not None]
+    values = [_value(name, p) for name, p in f["parameters"].items() if p["value"] is not None]
+    takes = ""
     if len(of.sets) > 1:
         where = "" if f["joint"] == joint else " on all joints"
-        parts.insert(
-            0,
-            f"{percent(min(max(f['misfit_removed'], 0.0), 1.0))} of what was left{where} before it",
-        )
-    out = wrapped(f"  {f['effect']}: {', '.join(parts)}", width, "    ") if parts else []
+        takes = f" takes {percent(max(f['misfit_removed'], 0.0))} of what was left{where}"
+    words = f"  {f['effect']}{takes}" + (f": {', '.join(values)}" if values else "")
+    out = wrapped(words, width, "    ") if takes or values else []
     others = [m for m in of.sets[f["command"]] if m[:2] != (f["effect"], f["joint"])]
     if others:
-        rest = listed(
-            [
-                f"{placed(effect, where, f['joint'])} ({percent(p)})"
-                for effect, where, p, _ in others
-            ],
-            "or",
-        )
-        out += wrapped(
-            f"  these logs cannot tell it ({percent(f['probability'])}) from {rest}", width, "    "
-        )
+        rest = listed([f"{placed(e, j, f['joint'])} ({percent(p)})" for e, j, p in others], "or")
+        words = f"  these logs cannot tell it ({percent(f['probability'])}) from {rest}"
+        out += wrapped(words, width, "    ")
         out += wrapped(f"  to separate them: {f['separate_by']}", width, "    ")
-    out += ["  add it with", f["command"]]
-    for effect, where, p, command in others:
-        if p > f["probability"] and command:  # what is named is the simplest that is as good
-            out += [
-                *wrapped(
-                    f"  or, likelier but less simple, {placed(effect, where, f['joint'])} with",
-                    width,
-                    "    ",
-                ),
-                command,
-            ]
-    return out
+    return [*out, "  add it with", f["command"]]
 
 
 def _left(v: dict) -> str:

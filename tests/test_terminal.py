@@ -140,15 +140,8 @@ def document(**more):
 def of(said):
     units = dict.fromkeys(JOINTS, "N m") | {RAIL: "N"}
     sets = {
-        COMMAND: (
-            ("cogging", FIRST, 0.6, COMMAND),
-            ("spring", FIRST, 0.3, "sysid add x spring"),
-            ("payload", "*", 0.1, ""),
-        ),
-        "sysid add x payload": (
-            ("payload", "*", 0.6, "sysid add x payload"),
-            ("cable", "j3", 0.7, "sysid add x cable"),
-        ),
+        COMMAND: (("cogging", FIRST, 0.6), ("spring", FIRST, 0.3), ("payload", "*", 0.1)),
+        "sysid add x payload": (("payload", "*", 1.0),),
     }
     return text.Told(said, units, dict.fromkeys(JOINTS, 0.11), sets)
 
@@ -189,17 +182,9 @@ def test_each_joint_is_said_in_a_paragraph():
         f"{FIRST}: missing: cogging and payload of the whole robot; "
         "with all that is named 95 % of the misfit is explained"
     )
-    assert (
-        "from 0.4 to 0.11 N m" in first and "cogging: 94 % of what was left before it, a1" in first
-    )
-    assert "payload: 94 % of what was left on all joints before it" in first
-    # what is named is the simplest; what is likelier can be added as well
-    assert (
-        "sysid add x payload or, likelier but less simple, cable on j3 with sysid add x cable"
-        in first
-        and "add x spring" not in first
-        and "a1 = 1.235 +- 0.012 N m, k = 101 1/rad" in first
-    )
+    assert "from 0.4 to 0.11 N m" in first and "cogging takes 94 % of what was left: a1" in first
+    assert "payload takes 94 % of what was left on all joints add it with" in first
+    assert "add x spring" not in first and "a1 = 1.235 +- 0.012 N m, k = 101 1/rad" in first
     assert (
         "cannot tell it (60 %) from spring (30 %) or payload of the whole robot (10 %) "
         "to separate them: creep" in first

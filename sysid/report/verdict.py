@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from ..diagnose.diagnosis import Diagnosis
+from ..diagnosis_text import percent
 from ..effect import describe
 from ..estimate import Fit
 from .words import (
@@ -144,8 +145,13 @@ def _fall(found: dict, diagnosis: Diagnosis, document: dict) -> str:
     fall = f"the held-out error goes from {error} to {then}{SPACE}{force}"
     if entry["noise_floor"] is None or found.get("explained") is None:
         return f"{it} {fall}"
-    share = percentage(min(max(found["explained"], 0.0), 1.0))
+    share = _share(found["explained"])
     return f"{it} {share} of the misfit is explained, {fall}"
+
+
+def _share(value: float) -> str:
+    """A share of the misfit, as the terminal says it."""
+    return percent(max(value, 0.0)).replace(" ", SPACE)
 
 
 def _claim(claim, joint: str, several: bool, document: dict) -> str:
@@ -156,23 +162,19 @@ def _claim(claim, joint: str, several: bool, document: dict) -> str:
         for name, (value, std, unit) in head.parameters.items()
         if math.isfinite(value)
     ]
+    out, takes = "", ""
     if several:
-        share = next(
-            f["misfit_removed"] for f in document["findings"] if f["command"] == head.command
-        )
+        found = next(f for f in document["findings"] if f["command"] == head.command)
         where = "" if head.joint == joint else " on all joints"
-        known.insert(
-            0, f"{percentage(min(max(share, 0.0), 1.0))} of what was left{where} before it"
-        )
+        takes = f"It takes {_share(found['misfit_removed'])} of what was left{where}"
+    if takes or known:
+        out = ": ".join(part for part in (takes, ", ".join(known)) if part) + ". "
     summary = describe(head.candidate.effect)["summary"].replace("`", "").split(". ")[0].rstrip(".")
-    out = f"{', '.join(known)}. " if known else ""
     out += f'<span class="quiet">{text(summary)}.</span>'
     others = [(e, j, p) for e, j, p in claim.set if (e, j) != (head.effect, head.joint)]
     if others:
         words = " or ".join(f"{placed(e, j, head.joint)}{SPACE}({chance(p)})" for e, j, p in others)
         out += f" These logs cannot tell it ({chance(head.probability)}) from {words}."
-        if any(p > head.probability for *_, p in others):
-            out += " It is named because it is the simplest of those that explain as much."
         out += f" To separate them: {text(head.candidate.effect.separate_by)}."
     return out
 
