@@ -60,7 +60,7 @@ def _joint(v: dict, of: Told, width: int, said: dict[str, str]) -> list[str]:
             + listed([placed(c["effect"], c["joint"]) for c in v["by"]], "and")
             + f"; {_fall(v, of)}"
         ),
-        "unresolved": lambda: v["says"],
+        "unresolved": lambda: v["says"] + (f"; {_fall(v, of)}" if of.sets else ""),
         "missing": lambda: f"{named or v['effect']}; {_fall(v, of)}",
         "unknown": lambda: (
             "no effect of the catalogue explains what is left"

@@ -120,7 +120,8 @@ def verdict_words(found: dict, diagnosis: Diagnosis, document: dict) -> str:
         return f"Its error comes from elsewhere: {by}. {_fall(found, diagnosis, document)}."
     if status == "unresolved":
         says = text(found["says"])
-        return says[0].upper() + says[1:] + "." + (f" {left}." if left else "")
+        fall = f" {_fall(found, diagnosis, document)}." if diagnosis.claims else ""
+        return f"{says[0].upper()}{says[1:]}.{fall}" + (f" {left}." if left else "")
     if status == "unknown":
         also = f" Part of it looks like {named}." if named else ""
         return f"Structure is left that no effect of the catalogue explains. {left}.{also}"
