@@ -92,9 +92,10 @@ def _events(found: list[dict]) -> str:
     ]  # fmt: skip
     count = {kind: sum(e["kind"] == kind for e in found) for kind in dict.fromkeys(e["kind"] for e in found)}
     said = ", ".join(f"{n} {WORDS.get(kind, text(kind))}{'s' if n > 1 else ''}" for kind, n in count.items())
+    kept = "left out, but for flat tops" if "saturation" in count else "left out"
     heads = ["event", "log", "its own clock", "joints"]
     return (
-        f'<details class="events"><summary>{said} in these logs, shaded below; left out, but for flat tops</summary>'
+        f'<details class="events"><summary>{said} in these logs, shaded below; {kept}</summary>'
         f"{table(heads, rows, 'wrap', 'events in the logs')}</details>"
     )
 

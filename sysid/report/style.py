@@ -31,7 +31,7 @@ section { padding: 1.6rem 0 1.2rem; border-bottom: 1px solid var(--line); }
 .card { border: 1px solid var(--line); border-left: 5px solid var(--tone); border-radius: 4px; padding: .6rem .9rem; background: var(--raised); min-width: 0; }
 .card h3 { margin: 0 0 .3rem; } .card p { margin: .2rem 0; font-size: .95rem; } .card .numbers { color: var(--quiet); font-size: .85rem; font-variant-numeric: tabular-nums; }
 .card.complete { --tone: var(--good); } .card.missing { --tone: var(--bad); } .card.unknown { --tone: var(--odd); }
-.card.explained { --tone: var(--accent); } .card.unresolved { --tone: var(--quiet); } .card pre { white-space: pre-wrap; overflow-wrap: anywhere; padding: .35rem .6rem; margin: .3rem 0; background: var(--paper); }
+.card.explained { --tone: var(--accent); } .card.unresolved { --tone: var(--quiet); } .by-hand { overflow-x: auto; } .by-hand code { white-space: nowrap; } .card pre { padding: .35rem .6rem; margin: .3rem 0; background: var(--paper); }
 .sizes th, .sizes td { text-align: left; }
 .mark { display: inline-block; width: 1.4em; height: 1.4em; line-height: 1.4em; text-align: center; border-radius: 50%; color: var(--paper); background: var(--tone); margin-right: .4rem; font-size: .85em; }
 .status { color: var(--tone); font-weight: 600; font-size: .85rem; margin-left: .3rem; }
