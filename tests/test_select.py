@@ -164,6 +164,20 @@ def test_test_logs_choose_nothing(simulated):
     assert steps[0] == steps[1] and steps[0]
 
 
+def test_what_the_test_logs_refuse_is_not_claimed(simulated, tmp_path):
+    """The training log has a bias that the test log does not have: what it teaches makes the error there worse."""
+    folder, other = simulated(*BIAS), simulated("control")
+    (folder / "foreign.csv").write_bytes((other / log_of(other)).read_bytes())
+    experiment = pipeline.load(edited(folder, "foreign", data={"test": ["foreign.csv"]}))
+    found = loop.discover(experiment, tmp_path)
+    assert [step["added"] for step in found.steps] == [None]
+    (refused,) = found.refused
+    assert (refused["effect"], refused["joint"]) == ("torque_bias", "elbow") and "error on the test logs rises" in refused["why"]
+    own = verdict(found.diagnosis, "elbow")
+    assert own.status == "unresolved" and refused["why"] in own.says
+    assert any(refused["why"] in notice for notice in found.said["notices"])
+
+
 def log_of(folder) -> str:
     """The name of the test log."""
     (name,) = pipeline.load(folder).data.test
