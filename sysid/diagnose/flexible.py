@@ -13,8 +13,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .. import blocks
+
+_ALL = "*"
 _KNOTS, _PAIRS, _WAVES = 8, 6, 12  # of a spline; of variables drawn with; random cosines of each pair
 _MEMORIES = (0.05, 0.2, 0.5, 1.0)  # s
+_APART = 0.15  # s, several memories of the filters: what is predicted, and what it is predicted from
+TONE = 1e-4  # probability of a line that strong by chance
 _RIDGES = np.geomspace(1e-3, 30.0, 10)
 
 
@@ -22,12 +27,15 @@ _RIDGES = np.geomspace(1e-3, 30.0, 10)
 class Unknown:
     """What a flexible function takes of a joint: gain (folds,) of the weighted squared residual; told (n,) the torque that it
     predicts of folds that it was not fitted on, weighted; shares {variable: share of the squared residual that functions
-    of it alone, and of the direction of motion, predict}; total: the squared residual."""
+    of it alone, and of the direction of motion, predict}; total: the squared residual; chance: the probability of predictions
+    as good as these, were nothing there; tone: the share of a steady tone, zero where there is none."""
 
     gain: np.ndarray
     told: np.ndarray
     shares: dict[str, float]
     total: float
+    chance: float = 1.0
+    tone: float = 0.0
 
 
 def unknown(known: dict[str, np.ndarray], joint: str, residual, use, fold, piece, step: float, rng: np.random.Generator) -> Unknown:
@@ -35,32 +43,53 @@ def unknown(known: dict[str, np.ndarray], joint: str, residual, use, fold, piece
 
     Args:
         known: {q_joint, qd_joint, qdd_joint, load_joint of every joint, time: (n,)}. residual: (n,), zero where `use` (n,) is not set.
-        fold, piece: (n,) numbers, ascending.
+        fold: (n,) number of each row's fold. piece: (n,) of its piece, ascending.
     """
     parts = {name: _functions(name, values) for name, values in known.items()}
     speed = known[f"qd_{joint}"]
     direction = np.sign(speed)[:, None]
-    tones = _tones(residual, known["time"], step)
-    features = [parts[f"{kind}_{joint}"] for kind in ("q", "qd", "load", "qdd")] + [parts["time"], tones]
+    features = [parts[f"{kind}_{joint}"] for kind in ("q", "qd", "load", "qdd")] + [parts["time"]]
     features += [direction * parts[name] for name in (f"q_{joint}", f"load_{joint}", "time")]
     features += [speed[:, None] * parts[name] for name in (f"q_{joint}", "time")]
     features += [known[f"qdd_{joint}"][:, None] * parts[f"q_{joint}"], _remembered(speed, direction[:, 0], piece, step)]
     for other in (name[2:] for name in known if name.startswith("q_") and name[2:] != joint):
-        features += [parts[f"q_{other}"][:, ::2], parts[f"qd_{other}"][:, ::2], parts[f"qdd_{other}"][:, ::4]]
-        features += [direction * parts[f"q_{other}"][:, ::2], np.sign(known[f"qd_{other}"])[:, None]]
-        features += [known[f"q_{joint}"][:, None] * parts[f"q_{other}"][:, ::3]]
+        features += [parts[f"q_{other}"], parts[f"qd_{other}"][:, ::2], parts[f"qdd_{other}"][:, ::4]]
+        features += [direction * parts[f"q_{other}"], np.sign(known[f"qd_{other}"])[:, None]]
+        features += [known[f"{kind}_{joint}"][:, None] * parts[f"q_{other}"] for kind in ("q", "qd")]
     features += [_waves(known, joint, rng)]
-    spans = [slice(a, b) for a, b in zip(*(lambda c: (c[:-1], c[1:]))(np.searchsorted(fold, np.arange(fold.max() + 2))))]
-    told, gain = _predicted(np.concatenate(features, axis=1), residual, use, spans)
+    spans = _spans(fold, known["time"], piece)
+    tried = {_ALL: _predicted(np.concatenate(features, axis=1), residual, use, spans)}
+    for name in known:
+        if not name.startswith(("load_", "qdd_")):
+            values = np.concatenate([parts[name], direction * parts[name]], axis=1)
+            tried[name] = _predicted(values, residual, use, spans)
+    best = max(tried, key=lambda name: tried[name][1].sum())
+    told, gain = tried[best]
+    memory = blocks.memory((residual - told)[:, None], use[:, None], piece, step)
+    number = blocks.numbered(known["time"], piece, memory=memory)
+    # as many questions as groups of functions
+    chance = min(1.0, len(tried) * min(blocks.slope_chance(one, residual, number) for one, _ in tried.values()))
     total = max(float(np.sum(residual**2)), 1e-300)
-    alone = {
-        name: np.concatenate([parts[name], direction * parts[name]], axis=1)
-        for name in known if not name.startswith(("load_", "qdd_"))
-    }  # fmt: skip
-    if tones.size:
-        alone["a steady tone"] = tones
-    shares = {name: float(_predicted(values, residual, use, spans)[1].sum() / total) for name, values in alone.items()}
-    return Unknown(gain, told, shares, total)
+    shares = {name: float(one[1].sum() / total) for name, one in tried.items() if name != _ALL}
+    share, by_chance = _tone(residual, step)
+    if by_chance < TONE:
+        shares["a steady tone"] = share
+    return Unknown(gain, told, shares, total, chance, tone=share if by_chance < TONE else 0.0)
+
+
+def _spans(fold, t, piece) -> list[tuple[np.ndarray, np.ndarray]]:
+    """For each fold its rows, and these with all that stand within a while of them: what noise remembers must not tell what is
+    left out (Racine 2000)."""
+    apart = min(_APART, np.ptp(t) / 40.0)
+    out = []
+    for f in range(fold.max() + 1):
+        own = np.flatnonzero(fold == f)
+        near = np.zeros(len(fold), dtype=bool)
+        for stretch in np.split(own, np.flatnonzero(np.diff(own) > 1) + 1):
+            here = piece == piece[stretch[0]]
+            near |= here & (t >= t[stretch[0]] - apart) & (t <= t[stretch[-1]] + apart)
+        out.append((own, np.flatnonzero(near)))
+    return out
 
 
 def _functions(name: str, values: np.ndarray) -> np.ndarray:
@@ -76,20 +105,19 @@ def _functions(name: str, values: np.ndarray) -> np.ndarray:
     return out
 
 
-def _tones(residual, t, step: float) -> np.ndarray:
-    """Sine and cosine (n, 6) of the three strongest tones of a residual: what comes in time and not with the motion."""
-    n = 1 << (2 * len(residual)).bit_length()
-    power = np.abs(np.fft.rfft(residual, n)) ** 2
-    power[: int(n * step)] = 0.0  # slower than one hertz is drift
-    out = []
-    for _ in range(3):
-        at = int(np.argmax(power))
-        if not power[at] > 0:
-            break
-        angle = 2.0 * np.pi * at / (n * step) * t
-        out += [np.sin(angle), np.cos(angle)]
-        power[max(0, at - 8) : at + 9] = 0.0
-    return np.stack(out, axis=1) if out else np.zeros((len(t), 0))
+def _tone(residual, step: float) -> tuple[float, float]:
+    """The share of a residual's square that its strongest line holds, and the probability of such a line above the spectrum about
+    it, were it noise of any smooth colour (Fisher 1929, against a local median)."""
+    from scipy.ndimage import median_filter
+
+    n = len(residual)
+    power = np.abs(np.fft.rfft(residual * np.hanning(n))) ** 2
+    width = max(9, int(2.0 * n * step) | 1)  # two hertz
+    level = median_filter(power, width) / np.log(2.0)
+    ratio = np.where(np.arange(len(power)) > n * step, power / np.maximum(level, 1e-300), 0.0)  # slower than 1 Hz is drift
+    at = int(np.argmax(ratio))
+    near = slice(max(0, at - 2), at + 3)
+    return float(power[near].sum() / max(power.sum(), 1e-300)), float(min(1.0, len(power) * np.exp(-min(ratio[at], 700.0))))
 
 
 def _remembered(speed, direction, piece, step: float) -> np.ndarray:
@@ -122,24 +150,25 @@ def _waves(known: dict, own: str, rng: np.random.Generator) -> np.ndarray:
     return np.concatenate(out, axis=1)
 
 
-def _predicted(features, y, use, spans: list[slice]) -> tuple[np.ndarray, np.ndarray]:
-    """What ridge regression predicts (n,) of the rows of each fold from the others, and its gain (folds,)."""
+def _predicted(features, y, use, spans) -> tuple[np.ndarray, np.ndarray]:
+    """What ridge regression predicts (n,) of the rows of each fold from rows apart from it, and its gain (folds,)."""
     kept = np.where(use[:, None], features, 0.0)
     kept = kept[:, kept.std(0) > 1e-9]
     if not kept.shape[1]:
         return np.zeros(len(y)), np.zeros(len(spans))
     scaled = kept / np.sqrt(np.mean(kept**2, axis=0))
-    grams = [(scaled[s].T @ scaled[s], scaled[s].T @ y[s]) for s in spans]
-    system, right = sum(g for g, _ in grams), sum(r for _, r in grams)
+    system, right = scaled.T @ scaled, scaled.T @ y
     # the ridge of a fold is the one that serves the other folds best
     gains, all_told = np.zeros((len(_RIDGES), len(spans))), np.zeros((len(_RIDGES), len(y)))
-    for f, ((g, r), rows) in enumerate(zip(grams, spans)):
-        values, vectors = np.linalg.eigh(system - g)
-        turned, seen = vectors.T @ (right - r), scaled[rows] @ vectors
+    for f, (rows, near) in enumerate(spans):
+        values, vectors = np.linalg.eigh(system - scaled[near].T @ scaled[near])
+        turned, seen = vectors.T @ (right - scaled[near].T @ y[near]), scaled[rows] @ vectors
         for i, ridge in enumerate(_RIDGES):
             told = seen @ (turned / (np.clip(values, 0.0, None) + ridge * len(y) / len(_RIDGES)))
             all_told[i, rows] = told
             gains[i, f] = np.sum(2.0 * told * y[rows] - told**2)
     chosen = [int(np.argmax(gains.sum(1) - gains[:, f])) for f in range(len(spans))]
-    told = np.concatenate([all_told[i, rows] for i, rows in zip(chosen, spans)])
+    told = np.zeros(len(y))
+    for i, (rows, _) in zip(chosen, spans):
+        told[rows] = all_told[i, rows]
     return told, np.array([gains[i, f] for f, i in enumerate(chosen)])

@@ -104,17 +104,13 @@ def chosen(view: View, groups: list[Group], rng: np.random.Generator) -> Choice 
     members, table = _least(members, table)
     p = blocks.confidence_set(table, rng)
     inside = [k for k in np.argsort(table.sum(0)) if p[k] >= _OUTSIDE]
-    # of those within a standard error of the best, the one of fewest parameters (Breiman, Friedman, Olshen & Stone 1984)
-    best = inside[0]
-    more, same = table - table[:, [best]], blocks.SAME * np.abs(table[:, best]).sum()
-    near = [k for k in inside if more[:, k].sum() <= max(blocks.standard_error(more[:, k]), same)]
-    head = min([best, *near], key=lambda k: (members[k].candidate.simplicity[:2], table[:, k].sum()))
+    # the likeliest, and of two that are as likely the one of fewer parameters
+    chance = dict(zip(inside, blocks.chances(table[:, inside], rng)))
+    head = max(inside, key=lambda k: (round(chance[k], 2), -members[k].candidate.parameters, -table[:, k].sum()))
     inside = [k for k in inside if k == head or not holds(view, members[k], members[head])]
-    chance = blocks.chances(table[:, inside], rng)
-    order = np.argsort(-chance)
-    return Choice(
-        members[head], tuple((members[inside[k]], float(chance[k])) for k in order), base - table[:, head]
-    )  # fmt: skip
+    chance = dict(zip(inside, blocks.chances(table[:, inside], rng)))
+    order = sorted(inside, key=lambda k: (k != head, -chance[k]))
+    return Choice(members[head], tuple((members[k], float(chance[k])) for k in order), base - table[:, head])
 
 
 def _least(members: list[Member], table: np.ndarray):

@@ -6,9 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import t as student
 
-from .. import blocks
 from ..estimate import Fit
 from .claims import Claim
 from .flexible import Unknown
@@ -73,9 +71,8 @@ def verdicts(
 
 def predictable(found: Unknown, joints: int) -> bool:
     """Whether functions of the motion predict a part worth having of what is left, at the same family-wise level."""
-    se = blocks.standard_error(found.gain)
-    far = float(student.isf(LEVEL / joints, len(found.gain) - 1))
-    return bool(found.gain.sum() > far * se and found.gain.sum() > WORTH * found.total)
+    functions = found.chance < LEVEL / joints and found.gain.sum() > WORTH * found.total
+    return bool(functions or found.tone > WORTH)
 
 
 def _why(fit: Fit, j: int, floor, error: float, last: Fit, refused) -> str:

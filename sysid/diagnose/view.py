@@ -18,6 +18,8 @@ from ..preprocess import Motion
 from ..shape import Settled, inverted, prior_hessian, settle
 from . import flexible
 
+_FOLDS = 10
+
 
 @dataclass(frozen=True)
 class Source:
@@ -95,10 +97,12 @@ class View:
     @cached_property
     def unknown(self) -> tuple[flexible.Unknown, ...]:
         """What a flexible function of the motion takes of each joint."""
-        fold = blocks.numbered(self.rows.t, self.rows.piece, shortest=np.inf, fewest=10)
+        # three stretches a fold, so that what is left out is seldom a place where nothing else was
+        rows = self.rows
+        fold = blocks.numbered(rows.t, rows.piece, shortest=np.inf, fewest=3 * _FOLDS) % _FOLDS
         return tuple(
             flexible.unknown(
-                self.variables, name, self.design.residual[:, j], self.rows.use[:, j], fold, self.rows.piece, self.step,
+                self.variables, name, self.design.residual[:, j], rows.use[:, j], fold, rows.piece, self.step,
                 np.random.default_rng(j),
             )
             for j, name in enumerate(self.model.robot.joints)
