@@ -111,7 +111,7 @@ def test_every_step_is_there_and_worth_having(diagnosed, case):
         assert any(member is claim.step.choice.head for member, _ in claim.step.choice.members)
     # each is asked with all before it in
     names = [[e.name for e in c.before.experiment.model.effects] for c in found.claims]
-    for k, claim in enumerate(found.claims[1:], 1):
+    for k in range(1, len(found.claims)):
         assert names[k] == [*names[k - 1], found.claims[k - 1].head.effect]
 
 
