@@ -115,6 +115,17 @@ def test_every_step_is_there_and_worth_having(diagnosed, case):
         assert names[k] == [*names[k - 1], found.claims[k - 1].head.effect]
 
 
+def test_what_is_there_and_not_worth_having_does_not_join(simulated):
+    """A bias that makes most of the error is there; where more is asked for than it takes, it does not join."""
+    experiment = pipeline.load(simulated(*BIAS))
+    view = first_view(experiment, pipeline.fit(experiment))
+    (step,), first, *_ = search(view, most=1)
+    assert search(view, worth=1.01 * step.shares.max(), most=1)[0] == []
+    assert [s.candidate.key for s in search(view, worth=0.99 * step.shares.max(), most=1)[0]] == [step.candidate.key]
+    (bias,) = [k for k, g in enumerate(first.groups) if g.candidate.key == ("torque_bias", 1)]
+    assert first.p(bias) <= LEVEL
+
+
 # ---- what is said holds when it is done
 
 
