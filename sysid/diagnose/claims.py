@@ -20,7 +20,7 @@ from .ties import Member
 from .view import View
 
 _CLEAR = 2.0  # standard deviations
-_FITTED = 3  # members of a set that are fitted; the rest is named with its probability
+_FITTED, _LIKELY = 3, 0.1  # members of a set that are fitted, and how likely they must be; the rest is named
 
 
 @dataclass(frozen=True)
@@ -100,7 +100,7 @@ def claimed(steps: list[Step], fit: Fit, tell: Callable[[str, float], None]) -> 
         head = step.choice.head
         ordered = [next(pair for pair in members if pair[0] is head), *(pair for pair in members if pair[0] is not head)]
         found = []
-        for member, chance in ordered[:_FITTED]:
+        for member, chance in [ordered[0], *(pair for pair in ordered[1:_FITTED] if pair[1] >= _LIKELY)]:
             after = _with(last, member, fit, tell)
             why = _nothing(last, after, member) if member is head else None
             if why is not None:
@@ -140,10 +140,20 @@ def _nothing(before: Fit, after: Fit, member: Member) -> str | None:
     if not any(after.rms("train")[joint] < before.rms("train")[joint] for joint in own):
         return "the fit's own error does not fall with it"
     joint = _where(member, before)
-    if rises := comparison.rises(before, after, None if joint == "*" else [joint]):
-        risen = f"{100 * rises[0].delta_rms:.2g} %" if joint == "*" else f"{rises[0].delta_rms:.3g}"
-        return f"with it the error on the test logs rises by {risen}, more than its standard error"
-    return None
+    if joint == "*":
+        change = comparison.together(before, after)
+        return None if change.delta_rms < 0.0 else f"with it the error on the test logs does not fall ({100 * change.delta_rms:+.2g} % over all joints)"
+    (change,) = (d for d in comparison.compare(before, after) if d.joint == joint)
+    return None if change.delta_rms < 0.0 else f"with it the error on the test logs does not fall ({change.delta_rms:+.3g})"
+
+
+def undecided(choice, fit: Fit) -> Refused:
+    """What is there and cannot be told from effects on other joints."""
+    names = [f"{m.candidate.name} on {_where(m, fit)} ({100 * chance:.0f} %)" for m, chance in choice.members if chance >= 0.05]
+    head = choice.head
+    return Refused(
+        head.candidate.name, _where(head, fit), f"something is there, and these logs cannot tell which: {', '.join(names)}"
+    )  # fmt: skip
 
 
 def hidden_by_weights(found: Finding, fit: Fit) -> str | None:

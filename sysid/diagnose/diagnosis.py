@@ -73,8 +73,9 @@ def diagnose(experiment: Experiment, *, fit: Fit | None = None, level: float = s
     extra = _own(experiment)
     with pipeline.noticed():
         view = first_view(experiment, fit)
-        steps, asked, _, _ = select.search(view, extra, level=level, tell=tell)
+        steps, asked, _, undecided = select.search(view, extra, level=level, tell=tell)
         claims, refused = claiming.claimed(steps, fit, tell)
+        refused += [claiming.undecided(choice, fit) for choice in undecided[-1:]]
         after = claiming.view_after(claims, view)
         last = claims[-1].after if claims else fit
         found = dict(zip(fit.joints, _floors(experiment, last)))

@@ -79,7 +79,7 @@ def _finding(f: Finding, claim: Claim, found: Diagnosis) -> dict:
     names = found.fit.joints if f.joint == "*" else [f.joint]
     levels = [found.floors[j].rms for j in names]
     floor = np.mean([level**2 for level in levels]) if None not in levels else min(after, claim.after_square(names))
-    misfit = max(before - floor, before - after, 1e-300)
+    misfit = max(before - floor, abs(before - after), 1e-9 * before, 1e-300)
     return {
         "effect": f.effect, "joint": f.joint, "options": dict(f.candidate.options), "probability": f.probability, "q_value": f.p,
         "rms_test_before": f.rms_before, "rms_test_after": f.rms_after, "misfit_removed": float((before - after) / misfit),

@@ -73,21 +73,22 @@ def search(
         level: family-wise. worth: least share of a joint's squared residual that an effect must take. most: steps.
 
     Returns:
-        (steps, asked first, asked last, last view)
+        (steps, asked first, last view, what is there and cannot be told from effects elsewhere)
     """
     steps: list[Step] = []
+    open_: list[Choice] = []
     first = asked = ask(view, extra, lambda share: tell("ask", share))
     while len(steps) < most:
-        step = _next(view, asked, level, worth)
+        step = _next(view, asked, level, worth, open_)
         if step is None:
             break
         steps.append(step)
         view = step.after
         asked = ask(view, extra, lambda share, word=step.candidate.name: tell(f"ask, with {word}", share))
-    return steps, first, asked, view
+    return steps, first, view, open_
 
 
-def _next(view: View, asked: Asked, level: float, worth: float) -> Step | None:
+def _next(view: View, asked: Asked, level: float, worth: float, open_: list[Choice]) -> Step | None:
     """The candidate that joins next, None where none is there and worth having."""
     threshold = np.quantile(asked.maxima, 1.0 - level) if len(asked.groups) else np.inf
     best: dict[tuple, int] = {}
@@ -111,8 +112,11 @@ def _next(view: View, asked: Asked, level: float, worth: float) -> Step | None:
         # of all that cannot be told apart, one at least must be there
         there = {id(asked.groups[k]) for k in hopeful}
         if found is not None and any(id(m.group) in there for m, _ in found.members):
-            if (step := _joined(view, asked, found, worth)) is not None:
+            step = _joined(view, asked, found, worth)
+            if step is not None and found.decided:
                 return step
+            if step is not None:
+                open_.append(found)
         hopeful = [k for k in hopeful if k not in short]
     return None
 

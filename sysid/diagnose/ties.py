@@ -17,6 +17,7 @@ from .evidence import Group
 from .view import View, by_block, looked_at
 
 _OUTSIDE = 0.10  # a model is outside the set of 90 % where its p-value is below
+_COMPARED = 1e-4  # share of the objective: finer than rivals are ever told apart by
 _SAME = 0.99  # share of a candidate's torque that another one's columns hold
 
 
@@ -42,6 +43,12 @@ class Choice:
     head: Member
     members: tuple[tuple[Member, float], ...]
     gain: np.ndarray
+
+    @property
+    def decided(self) -> bool:
+        """Whether the log says which joint it is, or at least which is likelier than all others together."""
+        joints = {member.candidate.joint for member, _ in self.members}
+        return len(joints) == 1 or self.members[0][1] >= 0.5
 
 
 def losses(view: View, number: np.ndarray) -> np.ndarray:
@@ -76,7 +83,8 @@ def refitted(view: View, group: Group) -> Member | None:
             shapes[shape.name] = float(np.clip(shapes[shape.name] + step, *limits[shape.name]))
     model = grown(view.source, candidate, shapes)
     found = looked_at(
-        view.experiment, model, view.motion, view.rough, view.prior, stride=view.stride, weights=view.weights, grid=False
+        view.experiment, model, view.motion, view.rough, view.prior, stride=view.stride, weights=view.weights, grid=False,
+        tolerance=_COMPARED,
     )  # fmt: skip
     if not _allowed(found, candidate):
         return None

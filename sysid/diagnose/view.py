@@ -170,17 +170,18 @@ class Sums:
 
 def looked_at(
     experiment: Experiment, model: Model, motion: Motion, rough: Motion, prior, *, stride: int,
-    weights=None, grid: bool = True,
+    weights=None, grid: bool = True, tolerance: float = 1e-7,
 ) -> View:  # fmt: skip
     """Settle a model on a motion.
 
     Args:
         weights: (dof,); None: the inverse RMS that the joints are left with when all count alike.
         grid: search the grids of shape values; without it, from those that the model has.
+        tolerance: share of the objective by which a step of the shape values must lower it for another to follow.
     """
     model = model if model.scales else model.scaled_by(motion)
     ones = np.ones(model.robot.dof)
-    make = lambda w, m, g: settle(experiment, m, motion, prior, weights=w, stride=stride, grid=g)  # noqa: E731
+    make = lambda w, m, g: settle(experiment, m, motion, prior, weights=w, stride=stride, grid=g, tolerance=tolerance)  # noqa: E731
     if weights is None:
         first = make(ones, model, grid)
         left = first.rows.residual(first.x)
