@@ -12,7 +12,7 @@ import pytest
 from ruamel.yaml import YAML
 
 from sysid import loop, pipeline, results
-from sysid.addition import grown, spelled
+from sysid.addition import command, grown, spelled
 from sysid.diagnose.diagnosis import diagnose, first_view
 from sysid.diagnose.document import document
 from sysid.diagnose.select import LEVEL, WORTH, search
@@ -183,7 +183,7 @@ def test_what_the_test_logs_refuse_is_not_claimed(simulated, tmp_path):
     found = loop.discover(experiment, tmp_path)
     assert [step["added"] for step in found.steps] == [None]
     (refused,) = found.refused
-    assert (refused["effect"], refused["joint"]) == ("torque_bias", "elbow") and "error on the test logs rises" in refused["why"]
+    assert (refused["effect"], refused["joint"]) == ("torque_bias", "elbow") and "error on the test logs" in refused["why"]
     assert verdict(found.diagnosis, "elbow").status in ("unknown", "unresolved")  # functions of the motion may tell it too
     assert any(refused["why"] in notice for notice in found.said["notices"])
 
@@ -267,6 +267,9 @@ def test_an_option_survives_its_discovery(simulated, tmp_path):
     (step,), *_ = search(first_view(experiment, fit), most=1)
     name, joints, options = spelled(step.candidate, "elbow")
     assert (name, joints, options) == ("position_friction", ["elbow"], {"times": "speed"})
+    # the command that is printed says the same
+    words = shlex.split(command(experiment.path, name, joints, options))
+    assert words[3:] == ["position_friction", "--joint", "elbow", "--option", "times=speed"] and loop.options(words[-1:]) == options
     after = pipeline.fit(grown(experiment, name, joints, options))
     results.write(after, tmp_path / "step")
     again = pipeline.load(tmp_path / "step" / "experiment.yaml").model.effects[-1]
