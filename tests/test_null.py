@@ -11,7 +11,7 @@ from sysid.diagnose.detectable import _size
 from sysid.diagnose.evidence import normal_scores
 from tests.evidences import grouped, posed, viewed
 
-N, BLOCKS, DRAWS, LEVEL = 400, 40, 300, 0.05
+N, BLOCKS, DRAWS, LEVEL = 400, 40, 200, 0.05
 
 
 def white(rng, number):
@@ -144,7 +144,7 @@ def test_a_draw_is_a_refit_of_its_own():
 def test_the_size_told_is_seen_nine_times_in_ten():
     """Of one group alone, worth having whatever its size: planted at the size that is told, it stands above the null."""
     p, one, _ = problem()
-    seen, draws = 0, 400
+    seen, draws = 0, 300
     for seed in range(draws):
         rng = np.random.default_rng(5000 + seed)
         p.tau = rng.normal(size=(N, 2))

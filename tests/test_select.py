@@ -1,6 +1,6 @@
 """From a folder to a verdict: robots with something hidden, and what a diagnosis says of them.
 
-The robots are simulated: a planar arm of two joints, logs of 12 to 20 s, sizes and seeds fixed. What is hidden is compared
+The robots are simulated: a planar arm of two joints, logs of 12 to 14 s, sizes and seeds fixed. What is hidden is compared
 with the simulator's truth.json, which the diagnosis does not read.
 """
 
@@ -209,7 +209,7 @@ PRODUCT = ("product", product)
 
 
 def test_an_effect_outside_the_catalogue_is_not_named(diagnosed):
-    found = diagnosed(*PRODUCT, seed=2, duration=20.0)
+    found = diagnosed(*PRODUCT, seed=2, duration=14.0)
     own = verdict(found, "elbow")
     assert own.status in ("unknown", "unresolved")
     said = next(v for v in document(found)["verdict"] if v["joint"] == "elbow")
@@ -235,7 +235,7 @@ class Crosstalk(TorqueEffect):
 
 
 def test_an_effect_from_a_file_takes_part(simulated):
-    folder = simulated("other_angle", by_other_angle, duration=20.0)
+    folder = simulated("other_angle", by_other_angle, duration=14.0)
     (folder / "my_effects.py").write_text(OWN)
     found = diagnose(pipeline.load(edited(folder, "own", model={"candidates": ["my_effects.py:Crosstalk"]})))
     own = verdict(found, "elbow")
@@ -246,7 +246,7 @@ def test_an_effect_from_a_file_takes_part(simulated):
 
 
 def test_a_formula_takes_part_and_survives_its_discovery(simulated, tmp_path):
-    folder = simulated(*PRODUCT, seed=2, duration=20.0)
+    folder = simulated(*PRODUCT, seed=2, duration=14.0)
     file = edited(folder, "formula", model={"candidates": [{"formula": "a*q*q_shoulder", "name": "product"}]})
     found = loop.discover(pipeline.load(file), tmp_path, most=1)
     assert [step["added"] for step in found.steps] == [None, "formula"] and found.steps[1]["joint"] == "elbow"
