@@ -241,3 +241,19 @@ def test_chances_of_two_in_closed_form(far):
     d = (d - d.mean()) / d.std() + far / np.sqrt(n + 1)
     found = blocks.chances(np.stack([np.zeros(n), d], axis=1), rng, draws=20_000)
     assert found[0] == pytest.approx(norm.cdf(far), abs=0.015)
+
+
+def test_slopes_of_noise_are_as_likely_as_they_are_told():
+    """Something told beforehand, uneven over the blocks, against noise of some colour; and a slope that is there."""
+    rng = np.random.default_rng(6)
+    n, draws = 3000, 1000
+    t = np.arange(n) * 0.01
+    told = np.sin(2.0 * np.pi * 0.37 * t) * (1.0 + (np.sin(0.9 * t) > 0.3))
+    noise = coloured(rng, n, 0.05, 0.01, k=draws)
+    number = blocks.numbered(t, np.zeros(n, int), memory=0.05)
+    p = np.array([blocks.slope_chance(told, own, number) for own in noise.T])
+    for share in (0.01, 0.05, 0.25, 0.75):
+        low, high = binom.ppf([1e-3, 1.0 - 1e-3], draws, share) / draws
+        assert low <= np.mean(p <= share) <= high, (share, np.mean(p <= share))
+    assert blocks.slope_chance(told, noise[:, 0] + told, number) < 1e-6 < 0.999 < blocks.slope_chance(told, noise[:, 0] - told, number)
+    assert blocks.slope_chance(0.0 * told, noise[:, 0], number) == 1.0

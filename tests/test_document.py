@@ -57,7 +57,7 @@ CASES = {"control": ("control",), "bias": BIAS, "two": TWO, "product": PRODUCT}
 
 @pytest.fixture(params=CASES)
 def found(request, diagnosed):
-    more = {"seed": 2, "duration": 20.0} if request.param == "product" else {}
+    more = {"seed": 2, "duration": 14.0} if request.param == "product" else {}
     return diagnosed(*CASES[request.param], **more)
 
 

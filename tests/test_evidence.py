@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 from scipy.stats import f as fisher
 from scipy.stats import norm
 from scipy.stats import t as student
@@ -171,12 +172,13 @@ def test_normal_scores_are_normal_quantiles_of_f_ratios(d1, d2):
 SECONDS, RATE, ANGLE, NOISE = 12.0, 250.0, 2e-4, 0.15  # rad, N m: the angles' noise makes most of the residual
 
 
-def view_of(planar, effects: list[str], seed: int):
+def view_of(planar, effects: list[str], seed: int, *, noise=None, seconds: float = SECONDS):
     """A view of a control whose angles are measured with noise, drawn once more for the rough motion; its torque is the model's
     own and white noise."""
-    t, q, qd, qdd = fourier_motion(np.random.default_rng(0), SECONDS, RATE, 2)
+    t, q, qd, qdd = fourier_motion(np.random.default_rng(0), seconds, RATE, 2)
     rng = np.random.default_rng(seed)
-    tau = regressor.torque(planar, planar.prior, q, qd, qdd) + 0.3 * qd + NOISE * rng.normal(size=q.shape)
+    tau = regressor.torque(planar, planar.prior, q, qd, qdd) + 0.3 * qd
+    tau += NOISE * rng.normal(size=q.shape) if noise is None else noise(rng, len(t))
     experiment = config.Experiment(robot=config.RobotSpec(urdf="planar.urdf"), model={"effects": effects})
     structure = model.build(planar, experiment.model.effects)
     seen = q + ANGLE * rng.normal(size=q.shape)
@@ -226,3 +228,17 @@ def test_the_noise_of_the_angles_is_taken_off(views):
     # Student's, eleven degrees of freedom, six questions: one in a thousand in all
     assert max(abs(corrected) for _, corrected in away.values()) < student.isf(0.5e-3 / 6, 11), away
     assert min(abs(plain) for plain, _ in away.values()) > 2.0 and abs(away["encoder_offset", 0][0]) > 8.0, away
+
+
+@pytest.mark.parametrize("slow", [0.05, 0.3])
+def test_blocks_are_long_against_what_noise_remembers(planar, slow):
+    """Four memories of a noise that no motion predicts, where half a second is less."""
+    keep = np.exp(-1.0 / (RATE * slow))
+
+    def coloured(rng, n):
+        return lfilter([np.sqrt(1.0 - keep**2)], [1.0, -keep], rng.normal(size=(n, 2)), axis=0)
+
+    view = view_of(planar, ["viscous"], 3, noise=coloured, seconds=30.0)
+    del vars(view)["blocks"]
+    length = np.ptp(view.rows.t) / (view.blocks.max() + 1)
+    assert length == pytest.approx(max(0.5, 4.0 * 0.9 * slow), rel=0.4)

@@ -5,10 +5,13 @@ import pytest
 from scipy.signal import lfilter
 from scipy.stats import binom
 
+from sysid import blocks
 from sysid.diagnose import null
+from sysid.diagnose.detectable import _size
+from sysid.diagnose.evidence import normal_scores
 from tests.evidences import grouped, posed, viewed
 
-N, BLOCKS, DRAWS, LEVEL = 400, 40, 300, 0.05
+N, BLOCKS, DRAWS, LEVEL = 400, 40, 200, 0.05
 
 
 def white(rng, number):
@@ -115,3 +118,41 @@ def test_more_candidates_make_the_null_higher():
 
 def test_no_candidates_no_accusation():
     assert (null.maxima([], np.random.default_rng(0), draws=7) == -np.inf).all() and null.statistics([]).shape == (0,)
+
+
+def test_a_draw_is_a_refit_of_its_own():
+    """By hand: what each block moves, with a random sign, as scores; coefficients and moves of these; the ratio, told as a normal
+    variable. The effect itself is not in it: a strong one makes the null no wider."""
+    p, one, two = problem()
+    p.number = np.sort(np.random.default_rng(5).integers(0, 12, N))  # few and uneven
+    for strength in (0.0, 30.0):
+        p.tau = np.random.default_rng(1).normal(size=(N, 2)) + strength * two[0].sum(2).T
+        groups = grouped(viewed(p), two[:1])
+        (group,) = groups
+        sign = blocks.signs(12, 50, np.random.default_rng(2))
+        told = []
+        for e in sign:
+            scores = e[:, None] * group.moves
+            c = scores.sum(0)
+            moves = [np.linalg.solve(np.eye(2) - g, s - g @ c) for g, s in zip(group.squares, scores, strict=True)]
+            directions, rest = group.freedom
+            told.append(normal_scores(c @ c / np.sum(np.square(moves)), directions, directions * (rest - 1.0)))
+        np.testing.assert_allclose(null.maxima(groups, np.random.default_rng(2), draws=50), told, rtol=1e-8)
+    assert null.statistics(groups)[0] > max(told)
+
+
+def test_the_size_told_is_seen_nine_times_in_ten():
+    """Of one group alone, worth having whatever its size: planted at the size that is told, it stands above the null."""
+    p, one, _ = problem()
+    seen, draws = 0, 300
+    for seed in range(draws):
+        rng = np.random.default_rng(5000 + seed)
+        p.tau = rng.normal(size=(N, 2))
+        (group,) = grouped(viewed(p), one[2:3])
+        threshold = np.quantile(null.maxima([group], rng, draws=400), 0.99)
+        size = _size(group, threshold, np.zeros(2))
+        p.tau = rng.normal(size=(N, 2)) + size * one[2, :, :, 0].T  # another log
+        (group,) = grouped(viewed(p), one[2:3])
+        seen += null.statistics([group])[0] > threshold
+    low, high = binom.ppf([1e-3, 1.0 - 1e-3], draws, 0.9) / draws
+    assert low <= seen / draws <= high, seen / draws

@@ -57,6 +57,15 @@ def test_no_module_is_a_drawer():
         assert not {"utils", "helpers", "core", "base", "misc", "common"} & set(parts)
 
 
+def test_the_diagnosis_can_be_read():
+    """No module of it over 200 lines or 100 columns, all together under 1500 lines."""
+    texts = {path.name: path.read_text().splitlines() for path in sorted((ROOT / "sysid" / "diagnose").glob("*.py"))}
+    long = {name: len(lines) for name, lines in texts.items() if len(lines) > 200}
+    wide = {name: sum(len(line) > 100 for line in lines) for name, lines in texts.items() if max(map(len, lines), default=0) > 100}
+    total = sum(map(len, texts.values()))
+    assert not long and not wide and total < 1500, (long, wide, total)
+
+
 def test_only_the_command_line_prints():
     for parts, tree in modules():
         if parts[0] in ("cli", "terminal"):

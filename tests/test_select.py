@@ -1,6 +1,6 @@
 """From a folder to a verdict: robots with something hidden, and what a diagnosis says of them.
 
-The robots are simulated: a planar arm of two joints, logs of 12 to 20 s, sizes and seeds fixed. What is hidden is compared
+The robots are simulated: a planar arm of two joints, logs of 12 to 14 s, sizes and seeds fixed. What is hidden is compared
 with the simulator's truth.json, which the diagnosis does not read.
 """
 
@@ -12,7 +12,7 @@ import pytest
 from ruamel.yaml import YAML
 
 from sysid import loop, pipeline, results
-from sysid.addition import grown, spelled
+from sysid.addition import command, grown, spelled
 from sysid.diagnose.diagnosis import diagnose, first_view
 from sysid.diagnose.document import document
 from sysid.diagnose.select import LEVEL, WORTH, search
@@ -111,8 +111,19 @@ def test_every_step_is_there_and_worth_having(diagnosed, case):
         assert any(member is claim.step.choice.head for member, _ in claim.step.choice.members)
     # each is asked with all before it in
     names = [[e.name for e in c.before.experiment.model.effects] for c in found.claims]
-    for k, claim in enumerate(found.claims[1:], 1):
+    for k in range(1, len(found.claims)):
         assert names[k] == [*names[k - 1], found.claims[k - 1].head.effect]
+
+
+def test_what_is_there_and_not_worth_having_does_not_join(simulated):
+    """A bias that makes most of the error is there; where more is asked for than it takes, it does not join."""
+    experiment = pipeline.load(simulated(*BIAS))
+    view = first_view(experiment, pipeline.fit(experiment))
+    (step,), first, *_ = search(view, most=1)
+    assert search(view, worth=1.01 * step.shares.max(), most=1)[0] == []
+    assert [s.candidate.key for s in search(view, worth=0.99 * step.shares.max(), most=1)[0]] == [step.candidate.key]
+    (bias,) = [k for k, g in enumerate(first.groups) if g.candidate.key == ("torque_bias", 1)]
+    assert first.p(bias) <= LEVEL
 
 
 # ---- what is said holds when it is done
@@ -164,6 +175,19 @@ def test_test_logs_choose_nothing(simulated):
     assert steps[0] == steps[1] and steps[0]
 
 
+def test_what_the_test_logs_refuse_is_not_claimed(simulated, tmp_path):
+    """The training log has a bias that the test log does not have: what it teaches makes the error there worse."""
+    folder, other = simulated(*BIAS), simulated("control")
+    (folder / "foreign.csv").write_bytes((other / log_of(other)).read_bytes())
+    experiment = pipeline.load(edited(folder, "foreign", data={"test": ["foreign.csv"]}))
+    found = loop.discover(experiment, tmp_path)
+    assert [step["added"] for step in found.steps] == [None]
+    (refused,) = found.refused
+    assert (refused["effect"], refused["joint"]) == ("torque_bias", "elbow") and "error on the test logs" in refused["why"]
+    assert verdict(found.diagnosis, "elbow").status in ("unknown", "unresolved")  # functions of the motion may tell it too
+    assert any(refused["why"] in notice for notice in found.said["notices"])
+
+
 def log_of(folder) -> str:
     """The name of the test log."""
     (name,) = pipeline.load(folder).data.test
@@ -185,7 +209,7 @@ PRODUCT = ("product", product)
 
 
 def test_an_effect_outside_the_catalogue_is_not_named(diagnosed):
-    found = diagnosed(*PRODUCT, seed=2, duration=20.0)
+    found = diagnosed(*PRODUCT, seed=2, duration=14.0)
     own = verdict(found, "elbow")
     assert own.status in ("unknown", "unresolved")
     said = next(v for v in document(found)["verdict"] if v["joint"] == "elbow")
@@ -211,7 +235,7 @@ class Crosstalk(TorqueEffect):
 
 
 def test_an_effect_from_a_file_takes_part(simulated):
-    folder = simulated("other_angle", by_other_angle, duration=20.0)
+    folder = simulated("other_angle", by_other_angle, duration=14.0)
     (folder / "my_effects.py").write_text(OWN)
     found = diagnose(pipeline.load(edited(folder, "own", model={"candidates": ["my_effects.py:Crosstalk"]})))
     own = verdict(found, "elbow")
@@ -222,7 +246,7 @@ def test_an_effect_from_a_file_takes_part(simulated):
 
 
 def test_a_formula_takes_part_and_survives_its_discovery(simulated, tmp_path):
-    folder = simulated(*PRODUCT, seed=2, duration=20.0)
+    folder = simulated(*PRODUCT, seed=2, duration=14.0)
     file = edited(folder, "formula", model={"candidates": [{"formula": "a*q*q_shoulder", "name": "product"}]})
     found = loop.discover(pipeline.load(file), tmp_path, most=1)
     assert [step["added"] for step in found.steps] == [None, "formula"] and found.steps[1]["joint"] == "elbow"
@@ -243,6 +267,9 @@ def test_an_option_survives_its_discovery(simulated, tmp_path):
     (step,), *_ = search(first_view(experiment, fit), most=1)
     name, joints, options = spelled(step.candidate, "elbow")
     assert (name, joints, options) == ("position_friction", ["elbow"], {"times": "speed"})
+    # the command that is printed says the same
+    words = shlex.split(command(experiment.path, name, joints, options))
+    assert words[3:] == ["position_friction", "--joint", "elbow", "--option", "times=speed"] and loop.options(words[-1:]) == options
     after = pipeline.fit(grown(experiment, name, joints, options))
     results.write(after, tmp_path / "step")
     again = pipeline.load(tmp_path / "step" / "experiment.yaml").model.effects[-1]

@@ -1,12 +1,14 @@
 """Which explanations logs cannot tell apart: losses are those of refits without each fold, and the set holds the truth."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from sysid import blocks, pipeline
 from sysid.diagnose.diagnosis import first_view
 from sysid.diagnose.select import ask
-from sysid.diagnose.ties import chosen, holds, losses, refitted
+from sysid.diagnose.ties import Choice, chosen, holds, losses, refitted
 from tests.evidences import posed, stacked, viewed
 
 
@@ -81,3 +83,12 @@ def test_a_size_that_may_not_be_negative_is_no_member(simulated):
     drag = of(ask(view).groups, "quadratic_drag", 1)
     assert drag.coefficients[0] == pytest.approx(-0.05, rel=0.2)
     assert refitted(view, drag) is None and chosen(view, [drag], np.random.default_rng(0)) is None
+
+
+@pytest.mark.parametrize(("members", "told"), [
+    ([(0, 0.4), (0, 0.6)], True), ([(0, 1.0)], True), ([(0, 0.6), (1, 0.4)], True), ([(0, 0.4), (1, 0.35), (-1, 0.25)], False),
+])  # fmt: skip
+def test_a_log_decides_where_it_says_which_joint(members, told):
+    """All of one joint, or one likelier than all others together."""
+    made = tuple((SimpleNamespace(candidate=SimpleNamespace(joint=joint)), chance) for joint, chance in members)
+    assert Choice(made[0][0], made, np.zeros(3)).decided is told

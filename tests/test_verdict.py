@@ -1,5 +1,6 @@
 """The verdict on each joint, from small made inputs; and the size that a log would have shown, from logs with and without it."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,7 +12,7 @@ from sysid.diagnose.detectable import detectable
 from sysid.diagnose.diagnosis import first_view
 from sysid.diagnose.document import _verdict, dependences
 from sysid.diagnose.flexible import Unknown
-from sysid.diagnose.select import WORTH, ask, search
+from sysid.diagnose.select import LEVEL, WORTH, ask, search
 from sysid.diagnose.verdict import predictable, verdicts
 from sysid.effect import Linear, TorqueEffect
 from sysid.noise import NoiseFloor
@@ -25,7 +26,7 @@ NOISE = Unknown(np.array([3.0, -4.0, 1.0, -2.0, 2.0, -3.0, 1.0, -1.0, 0.0, 1.0])
 def left(share: float) -> Unknown:
     """Functions of the motion predict a share of what is left, evenly over folds."""
     gain = 100.0 * share * (1.0 + 0.1 * np.array([1, -1, 2, -2, 0, 1, -1, 0, 1, -1]))
-    return Unknown(gain, np.zeros(0), {"q_elbow": share, "time": 0.01}, 1000.0)
+    return Unknown(gain, np.zeros(0), {"q_elbow": share, "time": 0.01}, 1000.0, chance=1e-6)
 
 
 def fitted(elbow: float, shoulder: float = 1.0, train: float | None = None):
@@ -150,8 +151,20 @@ def test_dependences_are_sorted_and_say_something():
 
 def test_predictable_is_a_level_and_a_share():
     assert predictable(left(0.3), 2) and not predictable(NOISE, 2) and not predictable(left(0.9 * WORTH), 2)
-    loud = Unknown(np.array([900.0, *[-20.0] * 9]), np.zeros(0), {}, 1000.0)  # one fold says it all
-    assert not predictable(loud, 2)
+    by_chance = replace(left(0.3), chance=0.6 * LEVEL)
+    assert predictable(by_chance, 1) and not predictable(by_chance, 2)  # a level for all joints together
+    assert predictable(replace(NOISE, tone=2.0 * WORTH), 2) and not predictable(replace(NOISE, tone=0.9 * WORTH), 2)
+
+
+def test_a_tone_alone_is_unknown_and_its_share_is_said():
+    hum = replace(NOISE, tone=0.4, shares={"a steady tone": 0.4})
+    found = elbow(2.0, rest=hum)
+    assert found.status == "unknown"
+    said = _verdict(found)
+    assert said["depends_on"] == [{"variable": "a steady tone", "share": 0.4}] and said["share_left"] == pytest.approx(0.4)
+    # and it is weighed against what effects took
+    assert elbow(3.0, [claim("cogging", "elbow", [0.0, 0.1], fitted(2.0))], rest=hum).status == "unknown"
+    assert elbow(3.0, [claim("cogging", "elbow", [0.0, 0.6], fitted(2.0))], rest=hum).status == "missing"
 
 
 # ---- what a log could have shown
@@ -206,7 +219,7 @@ def test_every_effect_has_its_size_or_is_absorbed(control):
     assert len(known) > 20 and np.isfinite(known).all() and min(known) > 0
 
 
-@pytest.mark.parametrize(("effect", "joint", "values"), [("torque_bias", 1, "b={}"), ("quadratic_drag", 0, "c={}"), ("spring", 1, "k={},q0=0")])
+@pytest.mark.parametrize(("effect", "joint", "values"), [("quadratic_drag", 0, "c={}"), ("spring", 1, "k={},q0=0")])
 def test_twice_the_size_is_found_and_a_fifth_is_not(control, simulated, effect, joint, values):
     """The set holds it: at that size more than one effect may explain it."""
     size, named = sizes(control)[effect, joint].size, {}

@@ -110,7 +110,7 @@ def _verdict(v: Verdict) -> dict:
     if v.says:
         out["says"] = v.says
     if v.left is not None:
-        out |= {"depends_on": dependences(v.left), "share_left": float(v.left.gain.sum() / v.left.total)}
+        out |= {"depends_on": dependences(v.left), "share_left": v.left.share}
     return out
 
 
@@ -119,7 +119,7 @@ def dependences(found: Unknown) -> list[dict]:
     none does, all of them together."""
     alone = sorted(((share, name) for name, share in found.shares.items() if share > 0.02), reverse=True)
     out = [{"variable": name, "share": float(share)} for share, name in alone[:4]]
-    return out or [{"variable": "several variables together", "share": float(found.gain.sum() / found.total)}]
+    return out or [{"variable": "several variables together", "share": found.share}]
 
 
 def plain(values):

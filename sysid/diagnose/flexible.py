@@ -37,6 +37,11 @@ class Unknown:
     chance: float = 1.0
     tone: float = 0.0
 
+    @property
+    def share(self) -> float:
+        """Of the squared residual: what functions of the motion predict, or a tone holds, whichever is more."""
+        return max(float(self.gain.sum() / self.total), self.tone)
+
 
 def unknown(known: dict[str, np.ndarray], joint: str, residual, use, fold, piece, step: float, rng: np.random.Generator) -> Unknown:
     """What a flexible function of the motion takes of a joint's residual, over folds that it was not fitted on.

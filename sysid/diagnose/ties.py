@@ -112,9 +112,9 @@ def chosen(view: View, groups: list[Group], rng: np.random.Generator) -> Choice 
     members, table = _least(members, table)
     p = blocks.confidence_set(table, rng)
     inside = [k for k in np.argsort(table.sum(0)) if p[k] >= _OUTSIDE]
-    # the likeliest, and of two that are as likely the one of fewer parameters
+    # the likeliest, and of two that are as likely the simplest: not what rounding left with less
     chance = dict(zip(inside, blocks.chances(table[:, inside], rng)))
-    head = max(inside, key=lambda k: (round(chance[k], 2), -members[k].candidate.parameters, -table[:, k].sum()))
+    head = min(inside, key=lambda k: (-round(chance[k], 2), *members[k].candidate.simplicity))
     inside = [k for k in inside if k == head or not holds(view, members[k], members[head])]
     chance = dict(zip(inside, blocks.chances(table[:, inside], rng)))
     order = sorted(inside, key=lambda k: (k != head, -chance[k]))

@@ -56,7 +56,7 @@ def verdicts(
         reached = floor is not None and max(then, last.rms("train")[joint]) <= (1.0 + _FLOOR) * floor + 2.0 * floors[j].std
         if own:
             taken = sum(c.step.shares[j] for c in own)
-            much = remains is not None and remains.gain.sum() / remains.total * max(1.0 - taken, 0.0) > _MOST * taken
+            much = remains is not None and remains.share * max(1.0 - taken, 0.0) > _MOST * taken
             out.append(Verdict(joint, "unknown" if much else "missing", own, explained, remains))
         elif remains is not None and not reached:
             out.append(Verdict(joint, "unknown", others, explained, remains))
