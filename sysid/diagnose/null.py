@@ -17,7 +17,6 @@ import numpy as np
 from .. import blocks
 from .evidence import Group, left_out, normal_scores
 
-
 # Noise that was low-passed and had a model projected off it is so much louder than signs of its blocks make it: what stands
 # across two blocks, and what the model's own parameters took. Measured with white and coloured noise through the same steps.
 _LOUDER = 1.03

@@ -123,7 +123,7 @@ def _next(view: View, asked: Asked, level: float, worth: float, open_: list[Choi
 
 def _joined(view: View, asked: Asked, found: Choice, worth: float) -> Step | None:
     base, after = losses(view, view.blocks), found.head.losses
-    whole = np.maximum(np.sum(view.design.residual**2, axis=0), 1e-300)
+    whole = np.maximum(base.sum(0) + np.sum(view.design.rough_residual**2, axis=0), 1e-300)
     shares = (base - after).sum(0) / whole
     joints = found.head.candidate.touches(view.model.robot.dof)
     if shares[joints].max() < worth or found.gain.sum() <= 0.0:
