@@ -231,7 +231,8 @@ def test_every_status_has_its_card(clean, more, words):
 def test_a_floor_that_is_not_known_is_said_so(missing):
     found, said = missing
     said = copy.deepcopy(said)
-    said["joints"][EVIL].update(noise_floor=None, noise_floor_se=None, floor_detail="not determined: it is <i>too</i> short")
+    for entry in said["joints"].values():
+        entry.update(noise_floor=None, noise_floor_se=None, floor_detail="not determined: it is <i>too</i> short")
     made = sections(found.fit, found, said, [])
     card, steps = ("".join(Elements(made[name]["html"]).texts) for name in ("verdict", "steps"))
     assert "noise floor not known" in card and "of the misfit is explained" not in card  # a share of what nobody knows

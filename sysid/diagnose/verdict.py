@@ -62,8 +62,8 @@ def verdicts(
             out.append(Verdict(joint, "unknown", others, explained, remains))
         elif reached:
             at_floor = first <= (1.0 + _FLOOR) * floor + 2.0 * floors[j].std
-            by = others and not at_floor
-            out.append(Verdict(joint, "explained" if by else "complete", others if by else (), explained if by else float("nan")))
+            by = () if at_floor or not claims else others or (max(claims, key=lambda c, j=j: c.step.shares[j]),)
+            out.append(Verdict(joint, "explained" if by else "complete", by, explained if by else float("nan")))
         else:
             out.append(Verdict(joint, "unresolved", others, explained, remains, _why(fit, j, floors[j], then, last, refused)))
     return out
