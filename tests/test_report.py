@@ -398,8 +398,10 @@ def test_figures_on_paper(missing, tmp_path):
 
 def test_command_writes_the_page(clean, tmp_path, monkeypatch, capsys):
     """The command, with the diagnosis at hand."""
-    from sysid import cli
-    from sysid import loop  # noqa: F401 - which keeps the true one, imported before it is replaced
+    from sysid import (
+        cli,
+        loop,  # noqa: F401 - which keeps the true one, imported before it is replaced
+    )
     from sysid.diagnose import diagnosis
 
     found, _ = clean
