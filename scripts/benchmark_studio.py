@@ -24,7 +24,7 @@ import numpy as np
 import polars as pl
 
 from sysid import config, regressor, robot
-from sysid.diagnose import candidate, diagnosis
+from sysid.diagnose import candidates, diagnosis, select
 from sysid.studio.app import application
 from sysid.studio.bench import Bench
 from sysid.studio.serve import responsive
@@ -92,8 +92,10 @@ def main() -> int:
     words.add_argument("--whole", action="store_true", help="ask the whole vocabulary")
     given = words.parse_args()
     if not given.whole:
-        every = candidate.candidates
-        diagnosis.candidates = lambda model, extra=(): [c for c in every(model, extra) if c.name in ASKED]
+        every = candidates.candidates
+        diagnosis.candidates = select.candidates = lambda model, extra=(): [
+            c for c in every(model, extra) if c.name in ASKED
+        ]
     responsive()  # as `sysid studio` sets it
     with tempfile.TemporaryDirectory() as folder:
         start = time.perf_counter()

@@ -52,7 +52,7 @@ from benchmark_parts.claims import family, steps_on  # noqa: E402
 from benchmark_parts.new_laws import NEW  # noqa: E402
 from benchmark_parts.old_laws import OLD  # noqa: E402
 
-from sysid import config, loop, pipeline, results, terminal  # noqa: E402
+from sysid import addition, config, loop, pipeline, results, terminal  # noqa: E402
 from sysid.errors import SysidError  # noqa: E402
 from sysid.studies.journal import Journal, run  # noqa: E402
 
@@ -384,7 +384,7 @@ def _one(case: Case, folder: Path, found: dict, stage: list[str]) -> None:
          "visible": f.get("visible"), "probability": f.get("probability"), "parameters": {name: p["value"] for name, p in f.get("parameters", {}).items()}}
         for f in first["findings"]
     ]  # fmt: skip
-    unseen = {(entry["effect"], entry["joint"]) for entry in first.get("not_visible", [])}
+    unseen = {(entry["effect"], entry["joint"]) for entry in first.get("absorbed", [])}
     found["said_not_visible"] = [(h["effect"], h["joint"]) in unseen for h in found["hidden"]]
     found["added"] = [[step["added"], step["joint"]] for step in discovery.steps[1:]]
     found["refused"] = [[entry["effect"], entry["joint"]] for entry in discovery.refused]
@@ -432,7 +432,7 @@ def _grown(experiment, hidden: list[dict]):
     """The experiment with the hidden effects in its model."""
     for entry in hidden:
         options = {"other": entry["values"]["other"]} if entry["effect"] == "joint_coupling" else {}
-        experiment = loop.grown(experiment, entry["effect"], None if entry["joint"] == "*" else [entry["joint"]], options)
+        experiment = addition.grown(experiment, entry["effect"], None if entry["joint"] == "*" else [entry["joint"]], options)
     return experiment
 
 

@@ -278,7 +278,7 @@ def discover(
     elif not quiet:
         from .terminal import show_discovery
 
-        show_discovery(said, found.said)
+        show_discovery(said, found.diagnosis, found.said)
 
 
 @app.command()

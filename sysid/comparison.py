@@ -9,10 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .blocks import jackknife, summed
 from .errors import SysidError
 from .estimate import Fit, Prediction
 from .results import number
-from .rows import summed
 
 _BLOCKS, _SHORTEST = 40, 0.5  # blocks over the held-out data; s
 
@@ -56,6 +56,12 @@ def together(first: Fit, second: Fit) -> Difference:
     totals = [((s[:, known] / unit[known]).sum(1), n[:, known].sum(1)) for s, n in sums]
     both = (totals[0][1] > 0) & (totals[1][1] > 0)
     return Difference("before", "after", "*", *_jackknife(*((s[both], n[both]) for s, n in totals)))
+
+
+def rises(first: Fit, second: Fit, joints: list[str] | None) -> tuple[Difference, ...]:
+    """Where the held-out error of some joints (None: over all together) rises by more than its standard error."""
+    judged = (together(first, second),) if joints is None else compare(first, second, ("before", "after"))
+    return tuple(d for d in judged if d.delta_rms > d.se and (joints is None or d.joint in joints))
 
 
 def _sums(first: Fit, second: Fit, names: tuple[str, str]):
@@ -104,7 +110,7 @@ def _jackknife(first, second) -> tuple[float, float]:
     if blocks < 3:
         return delta, float("nan")
     without = rms(s2.sum() - s2, n2.sum() - n2) - rms(s1.sum() - s1, n1.sum() - n1)
-    return delta, float(np.sqrt((blocks - 1) / blocks * np.sum((without - without.mean()) ** 2)))
+    return delta, float(jackknife(without))
 
 
 def document(fits: list[Fit], names: list[str]) -> dict:

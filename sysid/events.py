@@ -24,11 +24,11 @@ from .repeats import held_angle, held_torque, rests
 if TYPE_CHECKING:
     from .log import Segment
 
-_WORDS = {
+WORDS = {
     "knock": "knock", "spike": "torque spike", "brake": "closed brake", "frozen": "frozen value",
     "saturation": "flat top",
 }  # fmt: skip
-KINDS = tuple(_WORDS)
+KINDS = tuple(WORDS)
 TOLD = ("saturation",)  # not left out
 _PASSES = 3  # over the spikes: without the largest, those beside them stand out
 _SHOWN = 4  # times of each kind and log that a notice gives
@@ -150,7 +150,7 @@ def _summary(events: Sequence[Event]) -> str:
         left = len(logs) - _SHOWN
         more = [f"{left} more log{'s' * (left > 1)}"] if left > 0 else []
         if own:
-            words = _WORDS[kind] + "s" * (len(own) > 1)
+            words = WORDS[kind] + "s" * (len(own) > 1)
             out.append(f"{len(own)} {words} ({'; '.join(where + more)})")
     return ", ".join(out)
 

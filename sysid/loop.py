@@ -14,7 +14,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from . import comparison, config, pipeline, results
-from .config import EffectSpec, Experiment
+from .addition import spelled
+from .config import Experiment
 from .diagnose.diagnosis import Diagnosis, diagnose
 from .errors import ConfigError
 from .estimate import Fit
@@ -111,13 +112,6 @@ def _flow(own: dict):
     return out
 
 
-def grown(experiment: Experiment, effect: str, joints: list[str] | None, options: dict) -> Experiment:
-    """The experiment with one more effect, as its file would say it."""
-    spec = EffectSpec(name=effect, joints=joints, options=options)
-    model = experiment.model.model_copy(update={"effects": [*experiment.model.effects, spec]})
-    return experiment.model_copy(update={"model": model})
-
-
 # ---- one step
 
 
@@ -144,8 +138,7 @@ def add(
     before_fit = pipeline.fit(experiment, progress=progress)
     after_fit = pipeline.fit(after, progress=progress)
     differences = tuple(comparison.compare(before_fit, after_fit, ("before", "after")))
-    judged = (comparison.together(before_fit, after_fit),) if joints is None else tuple(d for d in differences if d.joint in joints)
-    rises = tuple(d for d in judged if d.delta_rms > d.se)
+    rises = comparison.rises(before_fit, after_fit, joints)
     if rises and not force:
         return Added(after, before_fit, after_fit, differences, rises, refused=True)
     history = read_history(run)
@@ -187,7 +180,7 @@ def _write_history(run: Path, steps: list[dict], **more) -> None:
 @dataclass(frozen=True)
 class Discovery:
     """The steps that held-out data support, as the history has them; the fits; the last diagnosis, and its document as `said`;
-    candidates that the diagnosis named and the fit's own held-out error did not support, with the rise."""
+    what the search found and was not claimed, with why."""
 
     steps: list[dict]
     experiment: Experiment
@@ -198,7 +191,7 @@ class Discovery:
 
 
 def discover(experiment: Experiment, run: Path, *, most: int = 10, progress=None, each: Callable[[dict], None] | None = None) -> Discovery:
-    """Diagnose, add, refit, until the verdict is complete or nothing helps. The experiment's file stays as it is.
+    """Diagnose, add what is claimed, and again, until nothing more is. The experiment's file stays as it is.
 
     Args:
         most: effects to add at most. each: called with each step as it is made.
@@ -206,55 +199,24 @@ def discover(experiment: Experiment, run: Path, *, most: int = 10, progress=None
     shutil.rmtree(run / _STEPS, ignore_errors=True)
     tell = each or (lambda step: None)
     found = diagnose(experiment, progress=progress)
-    fits, steps, refused = [found.fit], [_record(run, 0, found.fit, None, None)], []
+    fits, steps = [found.fit], [_record(run, 0, found.fit, None, None)]
+    refused = {(r.effect, r.joint): r for r in found.refused}
     tell(steps[0])
-    again = True
-    while again and len(steps) <= most:
-        again = False
-        for step in found.steps:
-            if len(steps) > most:
-                break
-            candidate = step.head.candidate
-            joint = "*" if candidate.joint < 0 else found.fit.joints[candidate.joint]
-            name, joints, options = spelled(candidate, joint)
-            if any((r["effect"], r["joint"]) == (name, joint) for r in refused):
-                continue
-            tried = grown(experiment, name, joints, options)
-            fit = pipeline.fit(tried, progress=progress)
-            rise = _rise(fits[-1], fit, None if candidate.joint < 0 else joint)
-            if rise >= 0:
-                refused.append({"effect": name, "joint": joint, "delta_rms": rise})
-                continue
-            experiment, again = tried, True
-            fits.append(fit)
-            steps.append(_record(run, len(steps), fit, name, joint))
+    while found.claims and len(steps) <= most:
+        for claim in found.claims[: most + 1 - len(steps)]:
+            fits.append(claim.after)
+            steps.append(_record(run, len(steps), claim.after, spelled(claim.head.candidate, claim.head.joint)[0], claim.head.joint))
             tell(steps[-1])
-        if again:
-            found = diagnose(experiment, fit=fits[-1], progress=progress)
+        found = diagnose(fits[-1].experiment, fit=fits[-1], progress=progress)
+        refused |= {(r.effect, r.joint): r for r in found.refused}
     results.write(fits[-1], run)
     from .diagnose.document import document
 
     said = document(found, run)
     results.write_json(run / "diagnosis.json", said)
-    _write_history(run, steps, verdict=said["verdict"], refused=refused)
-    return Discovery(steps, experiment, fits, found, said, refused)
-
-
-def spelled(candidate, joint: str) -> tuple[str, list[str] | None, dict]:
-    """A candidate as an experiment file names it: word, joints, options."""
-    spec = getattr(candidate.effect, "spelled", None)
-    name, own = (candidate.name, {}) if spec is None else spec
-    return name, None if joint == "*" else [joint], {**own, **dict(candidate.options)}
-
-
-def _rise(before: Fit, after: Fit, joint: str | None) -> float:
-    """Change of the held-out RMS on a joint; where it falls there and yet rises over all joints, or where there is no joint, the
-    change over all joints, each in units of what it was."""
-    first, second = before.rms("test"), after.rms("test")
-    together = sum(second[j] ** 2 / max(first[j] ** 2, 1e-300) for j in first) - len(first)
-    if joint is None or (together > 0 and second[joint] < first[joint]):
-        return together
-    return second[joint] - first[joint]
+    left = [{"effect": r.effect, "joint": r.joint, "why": r.why} for r in refused.values()]
+    _write_history(run, steps, verdict=said["verdict"], refused=left)
+    return Discovery(steps, fits[-1].experiment, fits, found, said, left)
 
 
 # ---- what the commands say

@@ -17,7 +17,8 @@ from pathlib import Path
 
 import numpy as np
 
-from . import config, events, filters, model, robot, shape
+from . import config, events, model, robot, shape
+from . import filters as filtering
 from . import log as logs
 from .compress import Compressed, Linearised, compress
 from .config import Experiment, LogSpec
@@ -52,8 +53,11 @@ def read(experiment: Experiment, machine: Robot, specs: list[LogSpec]) -> list[l
     return [replace(log, events=tuple(e for s in log.segments for e in events.find(s, machine.joints, log=log.name))) for log in read]
 
 
-def fit(experiment: Experiment, *, progress: Progress | None = None) -> Fit:
+def fit(experiment: Experiment, *, filters: dict | None = None, progress: Progress | None = None) -> Fit:
     """Identify an experiment: everything from its logs to its errors on held-out data.
+
+    Args:
+        filters: what an earlier fit of the same logs chose, `Fit.filters`; by default the filters are compared again.
 
     Raises:
         SysidError: bad input, with the one line that says so. A search that does not converge does not raise; it
@@ -68,8 +72,8 @@ def fit(experiment: Experiment, *, progress: Progress | None = None) -> Fit:
             train = read(experiment, machine, experiment.data.train)
         provenance = [_provenance("train", log, spec) for log, spec in zip(train, experiment.data.train)]
         with _timed(seconds, "filters"):
-            chosen = filters.compare(experiment, structure, train, prior)
-            preprocess = filters.settled(experiment.preprocess, chosen)
+            chosen = filtering.compare(experiment, structure, train, prior) if filters is None else filters
+            preprocess = filtering.settled(experiment.preprocess, chosen)
         with _timed(seconds, "preprocess"):
             motion = prepare(train, preprocess, machine.joints)
             del train  # the filtered motion holds all that is needed from here on
@@ -109,7 +113,7 @@ def predict_log(found: Fit, log: str | LogSpec) -> Prediction:
     """What a fitted model predicts on another log, read and filtered as the experiment says. Raises LogError."""
     spec = LogSpec(file=str(log)) if isinstance(log, (str, Path)) else log
     machine = found.model.robot
-    motion = prepare(read(found.experiment, machine, [spec]), filters.settled(found.experiment.preprocess, found.filters), machine.joints)
+    motion = prepare(read(found.experiment, machine, [spec]), filtering.settled(found.experiment.preprocess, found.filters), machine.joints)
     return predict(found.model, found.x, motion)
 
 
@@ -134,7 +138,7 @@ def prepared(experiment: Experiment) -> Prepared:
         train = read(experiment, machine, experiment.data.train)
         preprocess = experiment.preprocess
         if _automatic(experiment):
-            preprocess = filters.settled(preprocess, filters.compare(experiment, structure, train, prior))
+            preprocess = filtering.settled(preprocess, filtering.compare(experiment, structure, train, prior))
         motion = prepare(train, preprocess, machine.joints)
         _tell_still(motion)
         structure, _ = _settled(experiment, structure, motion, prior)

@@ -73,16 +73,6 @@ def stack(model: Model, motion: Motion, stride: int) -> Rows:
     )  # fmt: skip
 
 
-def summed(blocks, values, size: int | None = None) -> np.ndarray:
-    """Sums (blocks, columns) of values (n, columns) over rows whose block is `blocks` (n,).
-
-    Args:
-        size: how many blocks; by default as many as the highest number says.
-    """
-    size = int(blocks.max()) + 1 if size is None else size
-    return np.stack([np.bincount(blocks, v, minlength=size) for v in values.T], 1) if values.shape[1] else np.zeros((size, 0))
-
-
 def predicted(model: Model, motion: Motion, x, stride: int) -> np.ndarray:
     """Torque (n, dof) that parameters x (size,) predict at the rows that a stride keeps."""
     count = 10 * model.bodies

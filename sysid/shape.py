@@ -49,7 +49,7 @@ def condensed(model: Model, rows: row.Rows) -> Compressed:
     return Compressed(model.size, model.robot.dof, tuple(factors), len(rows.t))
 
 
-def settle(experiment: Experiment, model: Model, motion: Motion, prior: np.ndarray, *, weights=None, stride: int | None = None, grid: bool = True, hold: bool = False) -> Settled:
+def settle(experiment: Experiment, model: Model, motion: Motion, prior: np.ndarray, *, weights=None, stride: int | None = None, grid: bool = True, hold: bool = False, tolerance: float = _SETTLED) -> Settled:
     """Find a model's shape values and its load on a motion.
 
     Args:
@@ -57,6 +57,7 @@ def settle(experiment: Experiment, model: Model, motion: Motion, prior: np.ndarr
         stride: which rows; by default as many as suffice.
         grid: search grids of values that have no start; without it the model's own values are where the search begins.
         hold: leave the shape values and the load as the model has them.
+        tolerance: share of the objective by which a step must lower it for another to follow.
     """
     stride = stride or row.stride_for(motion, _MOST_ROWS)
     lighter = experiment.model_copy(update={"prior": experiment.prior.model_copy(update={"weight": experiment.prior.weight / stride})})
@@ -79,7 +80,7 @@ def settle(experiment: Experiment, model: Model, motion: Motion, prior: np.ndarr
             if isinstance(effect, TorqueEffect) and not value.held and value.shape.start is None:
                 if (tried := _from_grid(best, motion, k, weights)) is not None:
                     best = min(best, solved(tried), key=lambda s: s.objective)
-    return _descended(best, motion, solved, weights)
+    return _descended(best, motion, solved, weights, tolerance)
 
 
 def correction(fit: Fit, data: Compressed) -> np.ndarray:
@@ -218,7 +219,7 @@ def inverted(system: np.ndarray) -> np.ndarray:
     return (vectors[:, keep] / values[keep]) @ vectors[:, keep].T / np.outer(scale, scale)
 
 
-def _descended(best: Settled, motion: Motion, solved, weights) -> Settled:
+def _descended(best: Settled, motion: Motion, solved, weights, tolerance: float) -> Settled:
     """Damped Gauss-Newton over all shape values that are not held."""
     damping, scale = 1e-3, np.ones(best.model.robot.dof) if weights is None else np.asarray(weights)
     values = best.model.shape_values
@@ -240,7 +241,7 @@ def _descended(best: Settled, motion: Motion, solved, weights) -> Settled:
                     best, damping = tried, max(damping * 0.1, 1e-9)
                     break
                 damping *= 10.0
-        if not abs(before - best.objective) > _SETTLED * abs(before):
+        if not abs(before - best.objective) > tolerance * abs(before):
             break
     return best
 

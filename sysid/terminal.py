@@ -1,11 +1,15 @@
 """What the commands print for a person: tables, notices, a progress bar. Computes nothing."""
 
+import shutil
 from contextlib import contextmanager
 
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
+from rich.text import Text
 
+from . import diagnosis_tables as tables
+from . import diagnosis_text as text
 from .estimate import Fit
 
 _LOW = 0.1  # below this share the prior, not the data, gave a parameter
@@ -34,7 +38,7 @@ def show_fit(fit: Fit, document: dict) -> None:
     robot = fit.model.robot
     table = Table(title=f"{escape(fit.experiment.name)}: residual by joint", title_justify="left")
     for heading in ("joint", "", "RMS train", "RMS test", "relative test", "R2 test"):
-        table.add_column(heading, justify="left" if heading == "joint" else "right")
+        table.add_column(heading, justify="left" if heading == "joint" else "right", overflow="fold")
     for joint, prismatic in zip(fit.joints, robot.prismatic):
         table.add_row(
             escape(joint), "N" if prismatic else "N m", f"{document['rms']['train'][joint]:.4g}", f"{document['rms']['test'][joint]:.4g}",
@@ -73,10 +77,10 @@ def show_comparison(document: dict) -> None:
     console = Console()
     joints = list(dict.fromkeys(joint for entry in document["experiments"] for joint in entry["rms_test"]))
     table = Table(title="held-out RMS [N m, or N on a prismatic joint]", title_justify="left")
-    table.add_column("experiment")
+    table.add_column("experiment", overflow="fold")
     for joint in joints:
-        table.add_column(escape(joint), justify="right")
-    table.add_column("relative", justify="right")
+        table.add_column(escape(joint), justify="right", overflow="fold")
+    table.add_column("relative", justify="right", overflow="fold")
     for entry in document["experiments"]:
         cells = [f"{entry['rms_test'][joint]:.4g}" if joint in entry["rms_test"] else "" for joint in joints]
         table.add_row(escape(entry["name"]), *cells, _percent(entry["relative_error"]["*"]))
@@ -97,71 +101,31 @@ def _four(value: float | None) -> str:
 
 def show_diagnosis(found, document: dict) -> None:
     """The verdict in words, then what it rests on."""
-    console = Console()
-    for entry in document["verdict"]:
-        console.print(f"[bold]{escape(entry['joint'])}[/bold]: {escape(_verdict_words(entry, document))}", soft_wrap=True, highlight=False)
-    table = Table(title="held-out error against the noise floor", title_justify="left")
-    for heading in ("joint", "RMS train", "RMS test", "noise floor", "+-", "found by"):
-        table.add_column(heading, justify="left" if heading in ("joint", "found by") else "right")
-    for joint, entry in document["joints"].items():
-        se = "" if entry["noise_floor_se"] is None else f"{entry['noise_floor_se']:.2g}"
-        table.add_row(escape(joint), f"{entry['rms']['train']:.4g}", f"{entry['rms']['test']:.4g}", f"{entry['noise_floor']:.4g}", se, escape(entry["floor_detail"]))
-    console.print(table)
-    if document["findings"]:
-        table = Table(title="suspects: each alone added to the model, everything refitted", title_justify="left")
-        for heading in ("effect", "joint", "misfit removed", "RMS test", "visible", "q", "tied with"):
-            table.add_column(heading, justify="left" if heading in ("effect", "joint", "tied with") else "right")
-        for f in document["findings"]:
-            se = "" if f["misfit_removed_se"] is None else f" +- {100 * f['misfit_removed_se']:.0f}"
-            table.add_row(
-                ("* " if f["joins_as_step"] else "  ") + escape(f["effect"]), escape(f["joint"]), f"{100 * f['misfit_removed']:.0f}{se} %",
-                f"{f['rms_test_before']:.4g} -> {f['rms_test_after']:.4g}", f"{f['visible']:.2f}", f"{f['q_value']:.0e}", escape(", ".join(f["tied_with"])),
-            )  # fmt: skip
-        console.print(table)
-        print("* joined the model in the search; the others explain part of the same error")
-    for entry in document["fails_where"]:
-        if entry["words"] and document["joints"][entry["joint"]]["status"] != "complete":
-            console.print(f"where {escape(entry['joint'])} fails: {escape('; '.join(entry['words']))}", soft_wrap=True, highlight=False)
-    unseen: dict[str, list[str]] = {}
-    for entry in document["not_visible"]:
-        unseen.setdefault(f"{entry['effect']}\0{entry['separate_by']}", []).append(entry["joint"])
-    if unseen:
-        print("this log cannot show (the model absorbs it):")
-        for key, joints in unseen.items():
-            effect, by = key.split("\0")
-            console.print(f"  {escape(effect)} on {escape(', '.join(joints))}; to see it: {escape(by)}", soft_wrap=True, highlight=False)
+    of, width = text.told(found, document), _width()
+    _show_verdict(of, width)
+    parts = [tables.errors(of, width), tables.suspects(document), tables.events(document, width), tables.fails(document, width)]
+    for lines in [*parts, tables.shown(document, found.fit.joints, width)]:
+        if lines:
+            print("\n" + "\n".join(lines))
+    print()
     _show_notices(document)
     print(f"run folder: {document['run']}")
 
 
-def _follows(dependence: dict) -> str:
-    if dependence["variable"] == "time, in bursts":
-        return f"it comes in bursts: a tenth of the rows holds {100 * dependence['share']:.0f} % of its square"
-    if dependence["variable"] == "nothing that was tried":
-        return "it stands far above the noise floor, and nothing that was tried foretells it"
-    return f"{dependence['variable']} foretells {100 * dependence['share']:.0f} % of it"
+def _width() -> int:
+    return shutil.get_terminal_size().columns
 
 
-def _verdict_words(entry: dict, document: dict) -> str:
-    if entry["status"] == "complete":
-        return "complete: nothing is left that held-out data support"
-    left = ""
-    if "depends_on" in entry:
-        left = "; ".join(_follows(d) for d in entry["depends_on"][:3])
-    if entry["status"] == "unknown":
-        also = f"; part of it looks like {', '.join(entry['also'])}" if entry["also"] else ""
-        return f"unknown: structure is left that no effect of the vocabulary explains ({left}){also}"
-    words = f"missing: {entry['effect']}"
-    head = next((f for f in document["findings"] if f["effect"] == entry["effect"] and f["joint"] in (entry["joint"], "*")), None)
-    if head:
-        words += f", removes {100 * head['misfit_removed']:.0f} % of the misfit"
-        shown = [f"{name.split('.')[-1]} = {p['value']:.4g}" + (f" +- {p['std']:.1g}" if p["std"] is not None else "") + f" {p['unit']}" for name, p in head["parameters"].items() if p["value"] is not None]
-        words += f" ({', '.join(shown)})"
-    if entry["tied_with"]:
-        words += f"; this log cannot tell it from {', '.join(entry['tied_with'])}" + (f"; to separate them: {head['separate_by']}" if head else "")
-    if entry["also"]:
-        words += f"; also missing: {', '.join(entry['also'])}"
-    return words + (f"; structure is left beside it ({left})" if left else "")
+def _show_verdict(of, width: int) -> None:
+    """A paragraph a joint, what it begins with in bold."""
+    console = Console()
+    for lead, lines in text.verdict(of, width):
+        whole = "\n".join(lines)
+        # a name with spaces may be cut by the end of a line
+        start = len(lead) if whole.startswith(lead) else 0
+        words = Text(whole)
+        words.stylize("bold", 0, start)
+        console.print(words, soft_wrap=True, highlight=False)
 
 
 def show_changed(document: dict) -> None:
@@ -169,7 +133,7 @@ def show_changed(document: dict) -> None:
     console = Console()
     table = Table(title="the held model on the new log, low-passed at 15 Hz [N m or N]", title_justify="left")
     for heading in ("joint", "RMS held", "RMS with the changes"):
-        table.add_column(heading, justify="left" if heading == "joint" else "right")
+        table.add_column(heading, justify="left" if heading == "joint" else "right", overflow="fold")
     for joint, entry in document["joints"].items():
         table.add_row(escape(joint), f"{entry['rms']['held']:.4g}", f"{entry['rms']['after']:.4g}")
     console.print(table)
@@ -189,7 +153,7 @@ def show_added(document: dict) -> None:
     console = Console()
     table = Table(title=f"held-out RMS without and with {escape(document['added'])}", title_justify="left")
     for heading in ("joint", "before", "after", "change", "standard error"):
-        table.add_column(heading, justify="left" if heading == "joint" else "right")
+        table.add_column(heading, justify="left" if heading == "joint" else "right", overflow="fold")
     for entry in document["differences"]:
         se = "-" if entry["se"] is None else f"{entry['se']:.2g}"
         joint = entry["joint"]
@@ -212,12 +176,11 @@ def show_step(step: dict) -> None:
     Console().print(f"{escape(what)}: held-out RMS {escape(rms)}", soft_wrap=True, highlight=False)
 
 
-def show_discovery(said: dict, document: dict) -> None:
+def show_discovery(said: dict, found, document: dict) -> None:
     """Where a discovery ended."""
     for entry in said["refused"]:
-        print(f"not kept: {entry['effect']} on {entry['joint']}, held-out RMS {entry['delta_rms']:+.3g}")
-    for entry in document["verdict"]:
-        Console().print(f"{escape(entry['joint'])}: {escape(_verdict_words(entry, document))}", soft_wrap=True, highlight=False)
+        print(f"not claimed: {entry['effect']} on {entry['joint']}: {entry['why']}")
+    _show_verdict(text.told(found, document), _width())
     print(f"steps and experiment files: {said['run']}/steps")
 
 
@@ -225,9 +188,9 @@ def show_history(steps: list[dict]) -> None:
     """The steps, one a line, and the error of each joint as a falling row of bars."""
     joints = list(steps[0]["rms_test"])
     table = Table(title="held-out RMS [N m, or N on a prismatic joint]", title_justify="left")
-    table.add_column("step")
+    table.add_column("step", overflow="fold")
     for joint in joints:
-        table.add_column(escape(joint), justify="right")
+        table.add_column(escape(joint), justify="right", overflow="fold")
     first = steps[0]["rms_test"]
     for number, step in enumerate(steps):
         what = "start" if step["added"] is None else f"+ {step['added']} on {step['joint']}"
@@ -274,7 +237,7 @@ def show_bodies(document: dict, run) -> None:
     )
     table = Table(title="iterations until convergence", title_justify="left")
     for heading in ("parameterization", "median", "5 % to 95 %", "not converged", "s per iteration", "own solver: median"):
-        table.add_column(heading, justify="left" if heading == "parameterization" else "right")
+        table.add_column(heading, justify="left" if heading == "parameterization" else "right", overflow="fold")
     for name, entry in document["parameterizations"].items():
         low, high = entry["range_90"]
         table.add_row(name, f"{entry['median_iterations']:g}", f"{low:g} to {high:g}", str(entry["failures"]), f"{entry['seconds_per_iteration']:.1e}", f"{entry['newton']['median_iterations']:g}")

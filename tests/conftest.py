@@ -176,6 +176,61 @@ def cli(monkeypatch, capfd, tmp_path):
     return run
 
 
+# ---- robots with something hidden, simulated once
+
+
+@pytest.fixture(scope="session")
+def planar(tmp_path_factory) -> robot.Robot:
+    """The planar arm of the blind benchmark: shoulder and elbow."""
+    return robot.load(config.RobotSpec(urdf=str(_planar(tmp_path_factory))))
+
+
+def _planar(tmp_path_factory) -> Path:
+    from scripts.blind_benchmark import PLANAR
+
+    file = tmp_path_factory.getbasetemp() / "planar.urdf"
+    file.write_text(PLANAR)
+    return file
+
+
+@pytest.fixture(scope="session")
+def simulated(tmp_path_factory, planar):
+    """Writes a folder with something hidden in the planar arm, once for each name; returns it.
+
+    hide: EFFECT:JOINT:VALUES, or the torque of an effect that no catalogue has.
+    """
+    from sysid import simulate
+
+    made = {}
+
+    def make(name: str, *hide, seed: int = 1, duration: float = 12.0, **more) -> Path:
+        if name not in made:
+            told = [simulate.hidden(h) if isinstance(h, str) else h for h in hide]
+            found = simulate.simulate(planar, hide=told, seed=seed, duration=duration, rate=500.0, **more)
+            made[name] = tmp_path_factory.mktemp("simulated") / name
+            spec = config.RobotSpec(urdf=str(_planar(tmp_path_factory)))
+            simulate.write(found, config.Experiment(robot=spec), made[name])
+        return made[name]
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def diagnosed(simulated):
+    """The diagnosis of a simulated folder, made once; takes what `simulated` takes."""
+    from sysid import pipeline
+    from sysid.diagnose.diagnosis import diagnose
+
+    made = {}
+
+    def make(name: str, *hide, **more):
+        if name not in made:
+            made[name] = diagnose(pipeline.load(simulated(name, *hide, **more)))
+        return made[name]
+
+    return make
+
+
 def matrices(columns: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     """t (n,), q and tau (n, 2) of a log's columns."""
     return {"t": columns["t"], **{name: np.column_stack([columns[f"{name}_{joint}"] for joint in JOINTS]) for name in ("q", "tau")}}

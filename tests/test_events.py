@@ -12,7 +12,7 @@ from scipy.signal import lfilter
 
 from sysid import config, pipeline
 from sysid.config import PreprocessSpec
-from sysid.diagnose.domain import questioned
+from sysid.diagnose.lowpass import lowpassed
 from sysid.events import Event, find, mended, told, usable
 from sysid.log import Log, Segment
 from sysid.preprocess import prepare
@@ -267,7 +267,7 @@ def test_spikes_do_not_spread_through_a_filter():
     np.testing.assert_allclose(seen.tau, clean.tau, atol=0.02)
     assert np.sum(~seen.use) == 1
     clean, seen = (
-        questioned([log(s, events=e)], JOINTS, 15.0) for s, e in ((made, ()), (spiked, (spike,)))
+        lowpassed([log(s, events=e)], JOINTS, 15.0) for s, e in ((made, ()), (spiked, (spike,)))
     )
     np.testing.assert_allclose(seen.pieces[0].tau, clean.pieces[0].tau, atol=0.02)
 
@@ -275,7 +275,7 @@ def test_spikes_do_not_spread_through_a_filter():
 def test_the_view_of_the_diagnosis_leaves_events_out():
     made = segment()
     knock = Event("knock", "made.csv", 3.0, 3.2, JOINTS, "both")
-    plain, motion_ = (questioned([log(made, events=e)], JOINTS, 15.0) for e in ((), (knock,)))
+    plain, motion_ = (lowpassed([log(made, events=e)], JOINTS, 15.0) for e in ((), (knock,)))
     (before,), (piece,) = plain.pieces, motion_.pieces
     near = (piece.t > 2.99) & (piece.t < 3.21)
     assert not piece.use[near].any() and motion_.events == (knock,) and motion_.disturbed > 0

@@ -114,6 +114,10 @@ def test_from_open_to_the_floor_by_clicks_alone(opened):
     expect(page.locator("#look-figure .legend")).to_contain_text("explained by stribeck")
     # what is missed in a stretch of time?
     for _ in range(6):  # a chart that is being drawn anew loses a drag, as it would a hand's
+        # the page scrolls to it smoothly; a drag that begins outside of the window would scroll it away
+        page.locator("#look-figure").scroll_into_view_if_needed()
+        page.wait_for_function("() => { const box = document.querySelector('#look-figure').getBoundingClientRect(); return box.top >= 0 && box.bottom <= innerHeight; }")
+        page.wait_for_timeout(1000)
         box = page.locator("#look-figure .plot").bounding_box()
         page.mouse.move(box["x"] + 300, box["y"] + 150)
         page.mouse.down()

@@ -14,20 +14,21 @@ from pathlib import Path
 import numpy as np
 
 from .. import datasets, pipeline, rows
+from ..blocks import away, jackknife, summed
 from ..config import Experiment, LogSpec
 from ..effect import MotionEffect, find
 from ..errors import ConfigError, LogError
 from ..inertia import DIVERGENCES, PARAMETERIZATIONS, pseudo
 from ..model import ROBOT, Model
+from ..noise import floors
 from ..objective import Objective
 from ..results import number, read_fit
 from ..shape import inverted
 from ..solve import Coordinates, solve
-from .domain import CUTOFFS, questioned, stride_of
-from .noise import floor
-from .search import SUPPORT, away
+from .lowpass import LEAST, lowpassed, stride_of
 
 _BLOCKS, _MOST = 24, 12
+_SUPPORT = 3.0  # standard errors
 _WORTH = 0.1  # of the squared residual: below it, a held model's own errors on another motion look like changes
 _PER_JOINT = ("coulomb", "viscous", "torque_bias")
 _WEAK = 1e-2  # of the noise's square: the weight of the payload's prior, a ball of a kilogram
@@ -90,11 +91,11 @@ def changed(experiment: Experiment, run: Path, logs: list[str]) -> Changed:
     robot = structure.robot
     specs = [LogSpec(file=_located(log)) for log in logs]
     with pipeline.noticed():
-        motion = questioned(pipeline.read(experiment, robot, specs), robot.joints, CUTOFFS[0])
+        motion = lowpassed(pipeline.read(experiment, robot, specs), robot.joints, LEAST)
     if motion is None or motion.duration < 4.0:
         raise LogError("the log is too short to say what changed", where=", ".join(logs), allowed="4 s or more of motion", do="give a longer log")
     structure = structure.scaled_by(motion)
-    stride = stride_of(motion, CUTOFFS[0])
+    stride = stride_of(motion, LEAST)
     data = rows.stack(structure, motion, stride)
     residual = data.residual(x)
     counts = np.maximum(data.use.sum(0), 1)
@@ -150,9 +151,9 @@ def _chosen(tried, residual, weights, blocks) -> list[tuple]:
                 continue
             after = _halves(tried, [*chosen, key], residual, weights, halves)
             own = slice(None) if key[1] == ROBOT else [key[1]]
-            fall = rows.summed(blocks, ((current**2 - after**2) * weights**2)[:, own]).sum(1)
+            fall = summed(blocks, ((current**2 - after**2) * weights**2)[:, own]).sum(1)
             share, far = float(fall.sum() / max(np.sum((current * weights)[:, own] ** 2), 1e-300)), away(fall)
-            if share >= _WORTH and far >= SUPPORT and (best is None or share > best[0]):
+            if share >= _WORTH and far >= _SUPPORT and (best is None or share > best[0]):
                 best = (share, key, after)
         if best is None:
             return chosen
@@ -188,14 +189,14 @@ def _settled(structure: Model, tried, chosen, residual, weights, blocks) -> tupl
     fitted = lambda kept: _possible(columns[:, kept], residual[kept], weights, own)  # noqa: E731
     c = fitted(np.ones(len(residual), dtype=bool))
     without = np.array([fitted(blocks != b) for b in range(_BLOCKS)])
-    std = np.sqrt((_BLOCKS - 1) / _BLOCKS * ((without - without.mean(0)) ** 2).sum(0))
+    std = jackknife(without)
     after = residual - np.einsum("jnk,k->nj", columns, c)
     halves, out = blocks < _BLOCKS // 2, []
     with_all = _halves(tried, chosen, residual, weights, halves)
     for k, (name, joint) in enumerate(chosen):
         rest = _halves(tried, [key for key in chosen if key != (name, joint)], residual, weights, halves)
         own = slice(None) if joint == ROBOT else [joint]
-        fall = rows.summed(blocks, ((rest**2 - with_all**2) * weights**2)[:, own]).sum(1)
+        fall = summed(blocks, ((rest**2 - with_all**2) * weights**2)[:, own]).sum(1)
         share = float(fall.sum() / max(np.sum((rest * weights)[:, own] ** 2), 1e-300))
         span = slice(int(ends[k]) - tried[name, joint].shape[2], int(ends[k]))
         out.append(Change(name, "*" if joint == ROBOT else structure.robot.joints[joint], share, away(fall), _parameters(structure, name, joint, c[span], std[span], without[:, span])))
@@ -225,10 +226,9 @@ def _parameters(structure: Model, name: str, joint: int, c, std, without) -> dic
     listed = [*grown.coefficients[len(structure.coefficients) :], *grown.shape_values[grown.last_shapes]]
     out = {p.name: (float(value), float(s), p.unit) for p, value, s in zip(listed, c, std)}
     if name == "payload":
-        blocks = len(without)
         for axis, word in enumerate("xyz"):
             each = without[:, 1 + axis] / without[:, 0]
-            out[f"payload.*.com_{word}"] = (float(c[1 + axis] / c[0]), float(np.sqrt((blocks - 1) / blocks * ((each - each.mean()) ** 2).sum())), "m")
+            out[f"payload.*.com_{word}"] = (float(c[1 + axis] / c[0]), float(jackknife(each)), "m")
     return out
 
 
@@ -236,7 +236,8 @@ def _floors(structure: Model, x, motion) -> tuple:
     count = 10 * structure.bodies
     residuals = [piece.measured[piece.core] - structure.torque(piece, x[:count].reshape(-1, 10), x[count:]) for piece in motion.pieces]
     measured, q = [p.measured[p.core] for p in motion.pieces], [p.q[p.core] for p in motion.pieces]
-    return tuple(floor(residuals, measured, q, [p.step for p in motion.pieces], j) for j in range(structure.robot.dof))
+    use = [p.use[p.core] for p in motion.pieces]
+    return floors(residuals, measured, q, [p.step for p in motion.pieces], use=use)
 
 
 def _notes(experiment: Experiment, changes) -> tuple[str, ...]:
@@ -258,7 +259,7 @@ def document(found: Changed, run="") -> dict:
         "joints": {
             joint: {
                 "rms": {"held": float(found.rms_held[j]), "after": float(found.rms_after[j])}, "noise_floor": found.floors[j].rms,
-                "noise_floor_se": number(found.floors[j].std), "floor_method": found.floors[j].method, "status": "missing" if touched(joint) else "complete",
+                "noise_floor_se": None if found.floors[j].std is None else number(found.floors[j].std), "floor_method": found.floors[j].method, "status": "missing" if touched(joint) else "complete",
             }
             for j, joint in enumerate(found.joints)
         },

@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from .ground import Ground
-from .structure import variables
+from ..estimate import Prediction
+from .held_out import HeldOut
 
 _CUTS, _HALF = 10, 0.5  # quantiles a region may begin or end at; of the squared error
 _MAP, _WINDOW = 12, 0.5  # cells of a map along a side; s
@@ -52,20 +52,21 @@ class Failure:
         return [region.words() for region in self.regions]
 
 
-def failures(ground: Ground, raw, levels) -> list[Failure]:
+def failures(held_out: HeldOut, raw: Prediction, levels) -> list[Failure]:
     """Where each joint's test residual is.
 
     Args:
-        raw: (residuals of test pieces (n, dof), their steps [s]) as the fit sees them, for the frequencies.
+        raw: measured and predicted torque of the test logs as the fit sees them, for the frequencies.
         levels: (dof,) noise floors, in which the joints' errors are compared.
     """
-    robot, rows = ground.model.robot, ground.held_out
-    known = variables(ground, "test")
-    weighted = (ground.rms("test") / np.maximum(levels, 1e-9 * max(np.max(levels), 1e-300))) ** 2
+    robot, rows, known = held_out.model.robot, held_out.rows, held_out.variables
+    weighted = (held_out.rms() / np.maximum(levels, 1e-9 * max(np.max(levels), 1e-300))) ** 2
+    stretches = _stretches(raw)
     out = []
     for j, joint in enumerate(robot.joints):
         use = rows.use[:, j]
-        square = ground.residual_test[use, j] ** 2
+        left = held_out.residual[use, j]
+        square = left**2
         regions = []
         if square.sum() > 0:
             for name in ("q", "qd"):
@@ -73,12 +74,22 @@ def failures(ground: Ground, raw, levels) -> list[Failure]:
                 regions.append(_crowded(name, unit, values[use], square))
             regions.append(_crowded("time", "s", rows.t[use], square))
         regions = sorted((r for r in regions if r is not None and r.error - r.rows > 0.1), key=lambda r: r.rows - r.error)
+        q, qd = (known[f"{name}_{joint}"][1][use] for name in ("q", "qd"))
+        residuals, steps = [raw.residual[s, j] for s in stretches], [raw.t[s.start + 1] - raw.t[s.start] for s in stretches]
         out.append(Failure(
-            joint, float(weighted[j] / max(weighted.sum(), 1e-300)), tuple(regions),
-            _map(known[f"q_{joint}"][1][use], known[f"qd_{joint}"][1][use], ground.residual_test[use, j]),
-            _windows(rows.t[use], rows.log[use], square), _bands([r[:, j] for r in raw[0]], raw[1]),
+            joint, float(weighted[j] / max(weighted.sum(), 1e-300)), tuple(regions), _map(q, qd, left),
+            _windows(rows.t[use], rows.log[use], square), _bands(residuals, steps),
         ))  # fmt: skip
     return out
+
+
+def _stretches(raw: Prediction) -> list[slice]:
+    """Contiguous rows, longer than a few samples."""
+    step = np.diff(raw.t)
+    usual = np.median(step) if len(step) else 1.0
+    cuts = np.flatnonzero((np.diff(raw.log) != 0) | (step > 1.5 * usual) | (step <= 0)) + 1
+    edges = np.concatenate([[0], cuts, [len(raw.t)]])
+    return [slice(a, b) for a, b in zip(edges, edges[1:]) if b - a > 8]
 
 
 def _crowded(name: str, unit: str, values, square) -> Region | None:
@@ -102,6 +113,8 @@ def _crowded(name: str, unit: str, values, square) -> Region | None:
 
 
 def _map(q, qd, residual) -> dict:
+    if not len(q):
+        q = qd = residual = np.zeros(1)
     edges = [np.linspace(v.min(), v.max() if np.ptp(v) > 0 else v.min() + 1.0, _MAP + 1) for v in (q, qd)]
     rows, *_ = np.histogram2d(q, qd, bins=edges)
     total, *_ = np.histogram2d(q, qd, bins=edges, weights=residual)

@@ -24,7 +24,8 @@ class Warmup(TorqueEffect):
     signal = None
     dFv = Linear("N m s/rad", says="change of the viscous coefficient")
     dFc = Linear("N m", says="change of Coulomb friction")
-    T = Shape("s", 0.03, 2.0, of="duration", says="time constant of warming up")
+    # quicker than a fifth of the log is no warmth, but what its start was like
+    T = Shape("s", 0.2, 2.0, of="duration", says="time constant of warming up")
 
     def given(self, **options):
         chosen = super().given(**options)

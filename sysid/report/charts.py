@@ -12,7 +12,6 @@ import math
 import numpy as np
 
 from .decimate import broken
-from .words import raised
 
 INK, GREY, BLUE, VERMILLION, GREEN, ORANGE, PURPLE, SKY = "#000000", "#999999", "#0072B2", "#D55E00", "#009E73", "#E69F00", "#CC79A7", "#56B4E9"
 MIDDLE, EMPTY = "#FDFDFD", "#DCDCDC"  # of a map's scale; cells where no row is
@@ -73,11 +72,12 @@ def timeline(parts: dict) -> dict:
     return out
 
 
-def torque(name: str, joint: str, unit: str, line: dict, series: dict, joints: int) -> dict:
+def torque(name: str, joint: str, unit: str, line: dict, series: dict, joints: int, events=()) -> dict:
     """Measured and predicted torque over the logs laid end to end, the residual below on the same axis.
 
     Args:
-        line: of `timeline`. series: {part: (measured (n,), predicted (n,), residual (n,))}.
+        line: of `timeline`. series: {part: (measured (n,), predicted (n,), residual (n,))}. events: (begin, end) on the
+            same axis of what disturbed this joint's log, shaded.
     """
     most = int(np.clip(_BUDGET // (6 * max(joints, 1)), 300, _MOST))
     data = []
@@ -98,12 +98,32 @@ def torque(name: str, joint: str, unit: str, line: dict, series: dict, joints: i
             word = "train" if part == "train" else "test (held out)"
             notes.append({"text": f"<b>{word}</b>", "xref": "x", "yref": "paper", "x": own["spans"][0][0], "y": 0.995, "xanchor": "left", "yanchor": "top", "showarrow": False, "font": {"size": 11}})
     end = max((span[1] for own in line.values() for span in own["spans"]), default=1.0)
+    shapes += [
+        {
+            "type": "rect", "xref": "x", "yref": "paper", "x0": float(f"{low:.6g}"), "x1": float(f"{high:.6g}"), "y0": 0, "y1": 1,
+            "fillcolor": ORANGE, "opacity": 0.35, "line": {"width": 0}, "layer": "below",
+        }
+        for low, high in joined(events, 0.002 * end)
+    ]  # fmt: skip
     layout = {
         "xaxis": axis("time, logs end to end [s]", anchor="y2", range=[0.0, float(f"{end:.6g}")]), "yaxis": axis(f"torque [{unit}]" if unit == "N m" else f"force [{unit}]", domain=[0.38, 1.0]),
         "yaxis2": axis(f"residual [{unit}]", domain=[0.0, 0.30], zeroline=True), "shapes": shapes, "annotations": notes, "showlegend": True,
         "legend": LEGEND, "hovermode": "x", "dragmode": "zoom", "margin": {"l": 66, "r": 14, "t": 34, "b": 46},
     }  # fmt: skip
     return chart(name, f"Measured and predicted {'torque' if unit == 'N m' else 'force'} of {joint} over time, and the residual", data, layout, height=380, link="time")
+
+
+def joined(spans, least: float) -> list[tuple[float, float]]:
+    """Spans of time in order, none shorter than `least`, those that then touch as one."""
+    out: list[tuple[float, float]] = []
+    for low, high in sorted(spans):
+        middle, half = (low + high) / 2, max(high - low, least) / 2
+        low, high = middle - half, middle + half
+        if out and low <= out[-1][1]:
+            out[-1] = out[-1][0], max(out[-1][1], high)
+        else:
+            out.append((low, high))
+    return out
 
 
 # ---- the staircase
@@ -191,22 +211,6 @@ def residual_bands(name: str, joint: str, found: dict) -> dict:
         "title": {"text": "over frequency", "x": 0.01, "y": 0.99, "yanchor": "top", "font": {"size": 13}}, "margin": {"l": 60, "r": 10, "t": 34, "b": 46},
     }  # fmt: skip
     return chart(name, f"Share of the squared residual of {joint} in bands of frequency", data, layout, height=300)
-
-
-def dependence(name: str, joint: str, unit: str, what: str, found: dict) -> dict:
-    """The curve of the mean residual over a variable that it follows, `what` in words, with two standard errors."""
-    curve = found["curve"]
-    clean = lambda values: np.array([np.nan if v is None else v for v in values], dtype=float)  # noqa: E731
-    at, mean, se = (clean(curve[key]) for key in ("at", "mean", "se"))
-    variable = f"{plain(what)} [{plain(raised(found['unit']))}]" if found["unit"] else plain(what)
-    data = [
-        {"type": "scatter", "mode": "lines+markers", "x": rounded(at), "y": rounded(mean, 4), "error_y": {"type": "data", "array": rounded(2 * se, 3), "thickness": 1, "width": 2, "color": VERMILLION}, "line": {"color": VERMILLION, "width": 1.6}, "marker": {"size": 5}, "hovertemplate": f"%{{x:.3g}}: %{{y:.3g}} {unit}<extra></extra>"},
-    ]  # fmt: skip
-    layout = {
-        "xaxis": axis(variable), "yaxis": axis(f"mean residual [{unit}]", zeroline=True), "margin": {"l": 60, "r": 10, "t": 34, "b": 46},
-        "title": {"text": f"foretells {100 * found['share']:.0f} %", "x": 0.01, "y": 0.99, "yanchor": "top", "font": {"size": 13}},
-    }  # fmt: skip
-    return chart(name, f"Mean residual of {joint} over {what}", data, layout, height=280)
 
 
 # ---- parameters

@@ -20,7 +20,7 @@ from .script import SCRIPT
 from .style import STYLE
 
 _SHORT = {
-    "verdict": "Verdict", "torque": "Torque", "steps": "Steps", "failures": "Where", "suspects": "Suspects", "unseen": "Not seen", "parameters": "Parameters",
+    "verdict": "Verdict", "torque": "Torque", "steps": "Steps", "failures": "Where", "suspects": "Suspects", "detectable": "Could show", "parameters": "Parameters",
     "bodies": "Bodies", "provenance": "Provenance",
 }  # fmt: skip
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from ..diagnose.diagnosis import Diagnosis
 from ..estimate import Fit
-from . import fitted, identified, verdict
+from . import detectable, fitted, identified, suspects, verdict
 
 
 def sections(fit: Fit, diagnosis: Diagnosis, document: dict, history: list[dict]) -> dict[str, dict]:
@@ -19,11 +19,11 @@ def sections(fit: Fit, diagnosis: Diagnosis, document: dict, history: list[dict]
     """
     made = {
         "verdict": verdict.verdict(fit, diagnosis, document),
-        "torque": fitted.torque(fit),
+        "torque": fitted.torque(fit, document),
         "steps": fitted.steps(fit, diagnosis, document, history),
         "failures": fitted.failures(fit, document),
-        "suspects": verdict.suspects(diagnosis, document),
-        "unseen": verdict.unseen(fit, diagnosis, document),
+        "suspects": suspects.suspects(diagnosis, document),
+        "detectable": detectable.detectable(fit, document),
         "parameters": identified.parameters(fit),
         "bodies": identified.bodies(fit, diagnosis),
         "provenance": identified.provenance(fit, document),

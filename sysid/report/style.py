@@ -31,6 +31,8 @@ section { padding: 1.6rem 0 1.2rem; border-bottom: 1px solid var(--line); }
 .card { border: 1px solid var(--line); border-left: 5px solid var(--tone); border-radius: 4px; padding: .6rem .9rem; background: var(--raised); min-width: 0; }
 .card h3 { margin: 0 0 .3rem; } .card p { margin: .2rem 0; font-size: .95rem; } .card .numbers { color: var(--quiet); font-size: .85rem; font-variant-numeric: tabular-nums; }
 .card.complete { --tone: var(--good); } .card.missing { --tone: var(--bad); } .card.unknown { --tone: var(--odd); }
+.card.explained { --tone: var(--accent); } .card.unresolved { --tone: var(--quiet); } .by-hand { overflow-x: auto; } .by-hand code { white-space: nowrap; } .card pre { padding: .35rem .6rem; margin: .3rem 0; background: var(--paper); }
+.sizes th, .sizes td { text-align: left; }
 .mark { display: inline-block; width: 1.4em; height: 1.4em; line-height: 1.4em; text-align: center; border-radius: 50%; color: var(--paper); background: var(--tone); margin-right: .4rem; font-size: .85em; }
 .status { color: var(--tone); font-weight: 600; font-size: .85rem; margin-left: .3rem; }
 .scroll { overflow-x: auto; max-width: 100%; margin: .4rem 0 .8rem; }
@@ -56,6 +58,7 @@ button:hover { border-color: var(--accent); }
 .key { white-space: nowrap; margin-right: 1.2rem; } .key i { display: inline-block; width: 1.8rem; height: .55rem; margin-right: .4rem; border-bottom: 2px solid var(--bar); vertical-align: .15rem; }
 .key .broken { border-bottom-style: dashed; } .key .floor { border-bottom: 2px dotted var(--good); background: color-mix(in srgb, var(--good) 22%, transparent); }
 .suspects td:nth-of-type(1), .suspects thead th:nth-child(2) { text-align: left; } .suspects td:nth-of-type(2), .suspects thead th:nth-child(3) { text-align: left; }
+.suspects td:nth-of-type(3), .suspects thead th:nth-child(4) { text-align: left; }
 .suspects .value { margin-left: .5rem; } .bar { width: 9rem; height: 14px; vertical-align: -2px; }
 .bar .ground { fill: var(--bar-ground); } .bar .fill { fill: var(--bar); } .bar .whisker { stroke: var(--ink); stroke-width: 1.5; fill: none; vector-effect: non-scaling-stroke; }
 .suspects .family th { border-bottom: 0; color: var(--quiet); font-weight: normal; font-size: .82rem; padding-top: .8rem; white-space: normal; }

@@ -1,220 +1,205 @@
-"""What the diagnosis says: the verdict on each joint, the suspects with their ties, and what the logs cannot show."""
+"""What the diagnosis says: the verdict on each joint."""
 
 from __future__ import annotations
 
 import math
-import shlex
-
-import numpy as np
 
 from ..diagnose.diagnosis import Diagnosis
+from ..diagnosis_text import percent
 from ..effect import describe
 from ..estimate import Fit
-from ..loop import spelled
-from ..model import ROBOT
-from . import charts
-from .words import SPACE, breaking, drawing, either, empty, level, number, percentage, plus_minus, quantity, raised, table, text, unit_of, units
+from .words import (
+    SPACE,
+    chance,
+    level,
+    percentage,
+    plus_minus,
+    quantity,
+    raised,
+    text,
+    unit_of,
+    units,
+)
 
-_MARK = {"complete": "✓", "missing": "+", "unknown": "?"}
-_SAID = {"complete": "complete", "missing": "missing physics", "unknown": "unknown structure"}
-
+_MARK = {"complete": "✓", "missing": "+", "explained": "→", "unknown": "?", "unresolved": "…"}
+_SAID = {
+    "complete": "complete",
+    "missing": "missing physics",
+    "explained": "explained elsewhere",
+    "unknown": "unknown structure",
+    "unresolved": "unresolved",
+}
+_LEAD = {
+    "missing": "physics is missing",
+    "unknown": "structure that no known effect explains is left",
+    "unresolved": "error is left that these logs do not explain",
+    "explained": "what is missing on another joint explains the error",
+}
 
 
 def verdict(fit: Fit, diagnosis: Diagnosis, document: dict) -> tuple[str, str, list]:
     """What the diagnosis says of each joint, in words."""
-    count = {status: sum(v["status"] == status for v in document["verdict"]) for status in _MARK}
-    total, unit = len(document["verdict"]), units(fit)
-    if count["complete"] == total:
-        lead = f"The model says all that these logs can tell, on {'the joint' if total == 1 else f'all {total} joints'}."
-    else:
-        parts = []
-        if count["missing"]:
-            parts.append("physics is missing" + (f" on {count['missing']} of {total} joints" if total > 1 else ""))
-        if count["unknown"]:
-            parts.append("structure that no known effect explains is left" + (f" on {count['unknown']} of {total} joints" if total > 1 else ""))
-        if count["complete"]:
-            parts.append(f"{count['complete']} {'is' if count['complete'] == 1 else 'are'} complete")
-        lead = "; ".join(parts) + "."
-        lead = lead[0].upper() + lead[1:]
-    cards = []
-    for found in document["verdict"]:
-        joint, entry = found["joint"], document["joints"][found["joint"]]
-        floor, error, force = entry["noise_floor"], entry["rms"]["test"], raised(unit[joint][0])
-        ratio = f" ({error / floor:#.3g} times the floor)" if floor and error is not None else ""
-        cards.append(
-            f'<article class="card {found["status"]}"><h3><span class="mark" aria-hidden="true">{_MARK[found["status"]]}</span>{text(joint)} <span class="status">{_SAID[found["status"]]}</span></h3>'
-            f"<p>{verdict_words(found, document, diagnosis)}</p>"
-            f'<p class="numbers">held-out error {level(error)}{SPACE}{force}, noise floor {plus_minus(floor, entry["noise_floor_se"])}{SPACE}{force}{ratio}</p></article>'
-        )
-    notes = "".join(f"<li>{text(n)}</li>" for n in document["notices"])
-    proof = "The fit is proven to be the global optimum." if fit.certificate.globally_optimal else "The fit is not proven to be the global optimum."
+    cards = "".join(_card(found, fit, diagnosis, document) for found in document["verdict"])
+    proven = (
+        "proven to be the global optimum"
+        if fit.certificate.globally_optimal
+        else "not proven to be the global optimum"
+    )
+    proof = f"The fit is {proven}."
     if not fit.solution.converged:
         proof = "<strong>The fit did not converge: nothing below is to be trusted.</strong>"
-    bodies = "Every body is physically possible." if fit.physically_consistent else "<strong>Not every body is physically possible.</strong>"
-    body = f'<p class="lead">{lead}</p><div class="cards">{"".join(cards)}</div><p>{proof} {bodies}</p>'
-    return "Verdict", body + (f'<details class="notes"><summary>{len(document["notices"])} note{"s" if len(document["notices"]) > 1 else ""} on the data and the fit</summary><ul>{notes}</ul></details>' if notes else ""), []
+    bodies = (
+        "Every body is physically possible."
+        if fit.physically_consistent
+        else "<strong>Not every body is physically possible.</strong>"
+    )
+    body = f'<p class="lead">{_lead(document)}</p><div class="cards">{cards}</div>'
+    body += f"<p>{proof} {bodies}</p>"
+    if notes := "".join(f"<li>{text(n)}</li>" for n in document["notices"]):
+        count = len(document["notices"])
+        said = f"{count} note{'s' if count > 1 else ''} on the data and the fit"
+        body += f'<details class="notes"><summary>{said}</summary><ul>{notes}</ul></details>'
+    return "Verdict", body, []
 
 
-def verdict_words(found: dict, document: dict, diagnosis: Diagnosis) -> str:
-    """One joint's verdict as a sentence of HTML."""
-    if found["status"] == "complete":
-        return "Nothing is left that held-out data support."
-    left = structure_words(found, diagnosis)
-    if found["status"] == "unknown":
-        also = f" Part of it looks like {text(', '.join(found['also']))}." if found["also"] else ""
-        return f"Structure is left that no effect of the vocabulary explains: {left or 'the held-out error is far above the noise floor, and nothing in the motion foretells it'}.{also}"
-    joint, word = found["joint"], found["effect"]
-    places = [k for k, f in enumerate(document["findings"]) if f["effect"] == word and f["joint"] in (joint, "*")]
-    at = next((k for k in places if document["findings"][k]["joins_as_step"]), places[0] if places else None)
-    out = f"<strong>{text(word)}</strong> is missing"
-    if at is None:
-        return out + "."
-    head, finding = document["findings"][at], diagnosis.findings[at]
-    out += f": it removes {removed(head)} of the misfit"
-    known = [f"{text(name.split('.')[-1])}{SPACE}={SPACE}{plus_minus(p['value'], p['std'])}{unit_of(p['unit'])}" for name, p in head["parameters"].items() if p["value"] is not None]
-    out += f" ({', '.join(known)})." if known else "."
-    summary = describe(finding.answer.candidate.effect)["summary"].replace("`", "").split(". ")[0].rstrip(".")
-    out += f' <span class="quiet">{text(summary)}.</span>'
-    if found["tied_with"]:
-        out += f" These logs cannot tell it from {either(found['tied_with'])}. To separate them: {text(head['separate_by'])}."
-    if found["also"]:
-        out += f" Also missing: {text(', '.join(found['also']))}."
-    if left:
-        out += f" Structure is left beside it: {left}."
-    return out
+def _lead(document: dict) -> str:
+    statuses = [v["status"] for v in document["verdict"]]
+    total, count = len(statuses), {status: statuses.count(status) for status in _MARK}
+    if count["complete"] == total:
+        where = "the joint" if total == 1 else f"all {total} joints"
+        return f"No further effect is supported by these logs, on {where}."
+    on = lambda n: f" on {n} of {total} joints" if total > 1 else ""  # noqa: E731
+    parts = [words + on(count[status]) for status, words in _LEAD.items() if count[status]]
+    if count["complete"]:
+        parts.append(f"{count['complete']} {'is' if count['complete'] == 1 else 'are'} complete")
+    lead = "; ".join(parts) + "."
+    return lead[0].upper() + lead[1:]
 
 
-def structure_words(found: dict, diagnosis: Diagnosis) -> str:
-    """What the structure left on a joint follows; nothing where nothing is left, or nothing foretells it."""
-    said = [f"{_named(d, diagnosis.fit)} foretells {percentage(d['share'])} of it" for d in found.get("depends_on", [])[:3] if d["share"] >= 0.01 and d["variable"] != "time, in bursts"]
-    structure = next((v.structure for v in diagnosis.verdict if v.joint == found["joint"]), None)
-    if structure is not None and structure.bursts:
-        said.append(f"it comes in bursts, its largest tenth of rows holds {percentage(structure.crowded)} of its square")
-    return "; ".join(said)
-
-
-def _named(entry: dict, fit: Fit) -> str:
-    """A variable that a residual follows, escaped, with the article that a sentence needs."""
-    words = quantity(entry["variable"], fit)
-    return text(words if words == entry["variable"] else f"the {words}")
-
-
-def removed(finding: dict) -> str:
-    """The misfit that a finding removes, in per cent."""
-    return percentage(finding["misfit_removed"], finding["misfit_removed_se"])
-
-
-# ---- the suspects
-
-
-
-def families(diagnosis: Diagnosis, document: dict) -> list[list[int]]:
-    """Places in the document's findings, those that the logs cannot tell apart together, in its order."""
-    out, at = [], 0
-    for step in diagnosis.steps:
-        out.append(list(range(at, at + len(step.family))))
-        at += len(step.family)
-    return out + [[k] for k in range(at, len(document["findings"]))]
-
-
-def suspects(diagnosis: Diagnosis, document: dict) -> tuple[str, str, list]:
-    """The effects that held-out data support, with the misfit that each removes; ties in one bracket."""
-    found = document["findings"]
-    if not found:
-        return "Suspects", empty("No effect of the vocabulary is supported by held-out data: there is nothing to add."), []
-    groups, path = [], text(shlex.quote(str(diagnosis.fit.experiment.path or "EXPERIMENT")))
-    for family in families(diagnosis, document):
-        tied = len(family) > 1
-        rows = "".join(_suspect(k, found[k]) for k in family)
-        head = found[family[0]]
-        word = f"step {head['joins_as_step']}" if head["joins_as_step"] else ""
-        if tied:
-            word += f": these {len(family)} are tied, the logs cannot tell them apart"
-        named = f'<tr class="family"><th colspan="6" scope="rowgroup"><span>{word}</span></th></tr>' if word else ""
-        groups.append((head["joins_as_step"] is not None, f'<tbody class="{"tied" if tied else "alone"}">{named}{rows}</tbody>'))
-    steps_, others = [g for joined, g in groups if joined], [g for joined, g in groups if not joined]
-    head = "<thead><tr><th scope='col'>effect</th><th scope='col'>joint</th><th scope='col'>misfit removed, ± 1 standard error</th><th scope='col'>held-out RMS</th><th scope='col'>visible</th><th scope='col'>q-value</th></tr></thead>"
-    make = lambda parts, label: f'<div class="scroll" tabindex="0" role="region" aria-label="{label}"><table class="suspects">{head}{"".join(parts)}</table></div>'  # noqa: E731
-    body = '<p class="quiet">Each added to the model alone, everything refitted, judged on the test logs. Misfit is the squared error above the noise floor. q-value: expected share of false finds. Visible: the share of the signature that the model cannot absorb.</p>'
-    if steps_:
-        body += make(steps_, "effects that join the model, with their ties")
-    commands = []
-    for step in diagnosis.steps:
-        candidate = step.head.candidate
-        name, joints, options = spelled(candidate, "*" if candidate.joint == ROBOT else diagnosis.fit.joints[candidate.joint])
-        words = ["sysid add", path, text(shlex.quote(name)), *(f"--joint {text(shlex.quote(j))}" for j in joints or []), *(f"--option {text(shlex.quote(f'{k}={v}'))}" for k, v in options.items())]
-        commands.append(" ".join(words))
-    if commands:
-        body += f"<div class='by-hand'><p>To add what comes first of each step:</p><pre>{chr(10).join(commands)}</pre></div>"
-    if others:
-        after = "none is needed once the steps are in the model" if steps_ else "none is sure enough to join the model"
-        body += f"<h3>Others that were tried</h3><p class='quiet'>Alone, each of these explains some of the same error, or hardly any; {after}.</p>{make(others, 'other effects that explain part of the error')}"
-    separate = {f["separate_by"]: None for f in found if f["tied_with"] and f["separate_by"]}
-    if separate:
-        body += "<h3>To separate the ties</h3><ul>" + "".join(f"<li>{text(s)}</li>" for s in separate) + "</ul>"
-    return "Suspects", body, []
-
-
-def _suspect(k: int, f: dict) -> str:
-    known = [f"{text(name.split('.')[-1])}{SPACE}={SPACE}{plus_minus(p['value'], p['std'])}{unit_of(p['unit'])}" for name, p in f["parameters"].items() if p["value"] is not None]
-    options = ", ".join(f"{text(k)} = {text(v)}" for k, v in f["options"].items())
-    small = "; ".join(w for w in (", ".join(known), options) if w)
-    after = f"{level(f['rms_test_before'])} → {level(f['rms_test_after'])}"
+def _card(found: dict, fit: Fit, diagnosis: Diagnosis, document: dict) -> str:
+    joint, status = found["joint"], found["status"]
+    entry = document["joints"][joint]
+    floor, error, force = entry["noise_floor"], entry["rms"]["test"], raised(units(fit)[joint][0])
+    ratio = f" ({error / floor:#.3g} times the floor)" if floor and error is not None else ""
+    known = (
+        "not known"
+        if floor is None
+        else f"{plus_minus(floor, entry['noise_floor_se'])}{SPACE}{force}{ratio}"
+    )
+    commands = "\n".join(text(command) for command in found.get("commands", []))
+    typed = f'<div class="by-hand"><pre>{commands}</pre></div>' if commands else ""
     return (
-        f'<tr data-finding="{k}"><th scope="row">{text(f["effect"])}{f"<small>{small}</small>" if small else ""}</th><td>{text(f["joint"]) if f["joint"] != "*" else "whole robot"}</td>'
-        f"<td>{_bar(f['misfit_removed'], f['misfit_removed_se'])}<span class='value'>{removed(f)}</span></td><td data-label='held-out RMS'>{after}</td>"
-        f"<td data-label='visible'>{number(f['visible'], 2)}</td><td data-label='q'>{_q(f['q_value'])}</td></tr>"
+        f'<article class="card {status}"><h3>'
+        f'<span class="mark" aria-hidden="true">{_MARK[status]}</span>{text(joint)} '
+        f'<span class="status">{_SAID[status]}</span></h3>'
+        f"<p>{verdict_words(found, diagnosis, document)}</p>{typed}"
+        f'<p class="numbers">held-out error {level(error)}{SPACE}{force}, noise floor {known}</p>'
+        "</article>"
     )
 
 
-def _q(value) -> str:
-    return "–" if value is None or not math.isfinite(value) else "&lt; 1e−16" if value < 1e-16 else number(value, 2)
-
-
-def _bar(share, se) -> str:
-    """A bar of the misfit removed with its standard error, drawn without a script."""
-    share = float(np.clip(share, 0.0, 1.0)) if math.isfinite(share) else 0.0
-    whisker = ""
-    if se is not None and math.isfinite(se):
-        low, high = (float(np.clip(v, 0.0, 1.0)) for v in (share - se, share + se))
-        whisker = f'<path class="whisker" d="M{100 * low:.2f} 7H{100 * high:.2f}M{100 * low:.2f} 4V10M{100 * high:.2f} 4V10"/>'
-    return f'<svg class="bar" viewBox="0 0 100 14" preserveAspectRatio="none" aria-hidden="true"><rect class="ground" width="100" height="14"/><rect class="fill" y="2" width="{100 * share:.2f}" height="10"/>{whisker}</svg>'
-
-
-# ---- what cannot be seen
-
-
-
-def _trace(share: float) -> str:
-    return percentage(share) if share >= 0.001 else "&lt; 0.1 %"
-
-
-def unseen(fit: Fit, diagnosis: Diagnosis, document: dict) -> tuple[str, str, list]:
-    """Effects that the model absorbs on these logs, with the experiment that would show them; what unknown structure follows."""
-    groups: dict[tuple[str, str], list[dict]] = {}
-    for entry in document["not_visible"]:
-        groups.setdefault((entry["effect"], entry["separate_by"]), []).append(entry)
-    rows = [
-        [breaking(effect), ", ".join("whole robot" if e["joint"] == "*" else breaking(e["joint"]) for e in own), _trace(max(e["visible"] for e in own)), text(by)]
-        for (effect, by), own in groups.items()
+def verdict_words(found: dict, diagnosis: Diagnosis, document: dict) -> str:
+    """One joint's verdict as sentences of HTML."""
+    joint, status = found["joint"], found["status"]
+    left = left_words(found, diagnosis.fit)
+    heads = [
+        c
+        for command in found.get("commands", [])
+        for c in diagnosis.claims
+        if c.head.command == command
     ]
-    body = "<p>Of these the model absorbs all but a trace on these logs: whether they are there cannot be said.</p>" + table(
-        ["effect", "on", "left visible", "the experiment that would show it"], rows, "wrap", "effects that these logs cannot show"
-    ) if rows else empty("Every effect of the vocabulary would show on these logs, were it there.")  # fmt: skip
-    drawn, unit = [], units(fit)
-    for j, found in enumerate(document["verdict"]):
-        if "depends_on" not in found:
-            continue
-        beside = " beside what is named" if found["status"] == "missing" else ""
-        own = []
-        for k, entry in enumerate(found["depends_on"]):
-            if entry.get("curve"):
-                own.append(charts.dependence(f"depends{j}x{k}", found["joint"], unit[found["joint"]][0], quantity(entry["variable"], fit), entry))
-        drawn += own
-        rows = [[text(quantity(d["variable"], fit)), percentage(d["share"], d["se"])] for d in found["depends_on"]]
-        words = structure_words(found, diagnosis)
-        body += f"<h3>What the residual of {text(found['joint'])} follows{beside}</h3><p>{words[0].upper() + words[1:] if words else 'Nothing in the motion foretells it'}.</p>"
-        if any(d["share"] >= 0.01 for d in found["depends_on"]):
-            body += table(["variable", "share foretold"], rows, label=f"what the residual of {found['joint']} follows")
-        body += f'<div class="grid three">{"".join(drawing(c) for c in own)}</div><p class="quiet">Mean residual in bins of equal numbers of rows, ± 2 standard errors.</p>' if own else ""
-    return "What these logs cannot show", body, drawn
+    named = " and ".join(
+        f"<strong>{placed(c.head.effect, c.head.joint, joint)}</strong>" for c in heads
+    )
+    if status == "complete":
+        return "No further effect is supported by these logs."
+    if status == "explained":
+        by = " and ".join(
+            f"<strong>{placed(c['effect'], c['joint'])}</strong>" for c in found["by"]
+        )
+        return f"Its error comes from elsewhere: {by}. {_fall(found, diagnosis, document)}."
+    if status == "unresolved":
+        says = text(found["says"])
+        fall = f" {_fall(found, diagnosis, document)}." if diagnosis.claims else ""
+        return f"{says[0].upper()}{says[1:]}.{fall}" + (f" {left}." if left else "")
+    if status == "unknown":
+        also = f" Part of it looks like {named}." if named else ""
+        return f"Structure is left that no effect of the catalogue explains. {left}.{also}"
+    out = f"{named or text(found['effect'])} {'are' if len(heads) > 1 else 'is'} missing."
+    out += f" {_fall(found, diagnosis, document)}."
+    for claim in heads:
+        word = f"<strong>{text(claim.head.effect)}</strong>: " if len(heads) > 1 else ""
+        out += f" {word}{_claim(claim, joint, len(diagnosis.claims) > 1, document)}"
+    return out + (f" {left}." if left else "")
+
+
+def _fall(found: dict, diagnosis: Diagnosis, document: dict) -> str:
+    """What the held-out error does with all that is claimed, and the share of the misfit."""
+    joint = found["joint"]
+    entry, last = (
+        document["joints"][joint],
+        diagnosis.claims[-1].after if diagnosis.claims else diagnosis.fit,
+    )
+    force = raised(units(diagnosis.fit)[joint][0])
+    it = "With it" if len(diagnosis.claims) == 1 else "With all that is named"
+    error, then = level(entry["rms"]["test"]), level(last.rms("test")[joint])
+    fall = f"the held-out error goes from {error} to {then}{SPACE}{force}"
+    if entry["noise_floor"] is None or found.get("explained") is None:
+        return f"{it} {fall}"
+    share = _share(found["explained"])
+    return f"{it} {share} of the misfit is explained, {fall}"
+
+
+def _share(value: float) -> str:
+    """A share of the misfit, as the terminal says it."""
+    return percent(max(value, 0.0)).replace(" ", SPACE)
+
+
+def _claim(claim, joint: str, several: bool, document: dict) -> str:
+    """One effect that is named: what it takes and is, its parameters, what is tied with it."""
+    head = claim.head
+    known = [
+        f"{text(name.split('.')[-1])}{SPACE}={SPACE}{plus_minus(value, std)}{unit_of(unit)}"
+        for name, (value, std, unit) in head.parameters.items()
+        if math.isfinite(value)
+    ]
+    out, takes = "", ""
+    if several:
+        found = next(f for f in document["findings"] if f["command"] == head.command)
+        where = "" if head.joint == joint else " on all joints"
+        takes = f"It takes {_share(found['misfit_removed'])} of what was left{where}"
+    if takes or known:
+        out = ": ".join(part for part in (takes, ", ".join(known)) if part) + ". "
+    summary = describe(head.candidate.effect)["summary"].replace("`", "").split(". ")[0].rstrip(".")
+    out += f'<span class="quiet">{text(summary)}.</span>'
+    others = [(e, j, p) for e, j, p in claim.set if (e, j) != (head.effect, head.joint)]
+    if others:
+        words = " or ".join(f"{placed(e, j, head.joint)}{SPACE}({chance(p)})" for e, j, p in others)
+        out += f" These logs cannot tell it ({chance(head.probability)}) from {words}."
+        out += f" To separate them: {text(head.candidate.effect.separate_by)}."
+    return out
+
+
+def placed(effect: str, joint: str, here: str = "") -> str:
+    """An effect with its joint, where that is not `here`, escaped."""
+    where = "" if joint == here else " of the whole robot" if joint == "*" else f" on {joint}"
+    return text(effect + where)
+
+
+def left_words(found: dict, fit: Fit) -> str:
+    """How much of what is left the motion predicts, and which variables; empty where nothing."""
+    if "depends_on" not in found:
+        return ""
+    alone = [
+        f"{_named(d['variable'], fit)} alone {percentage(d['share'])}"
+        for d in found["depends_on"][:3]
+        if d["variable"] != "several variables together"
+    ]
+    whole = f"The motion predicts {percentage(found['share_left'])} of what is left"
+    return whole + (f" ({', '.join(alone)})" if alone else "")
+
+
+def _named(variable: str, fit: Fit) -> str:
+    """A variable that a residual follows, escaped, with the article that a sentence needs."""
+    words = quantity(variable, fit)
+    return text(words if words == variable else f"the {words}")

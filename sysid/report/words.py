@@ -59,19 +59,13 @@ def raised(unit: str) -> str:
 
 
 def quantity(variable: str, fit: Fit) -> str:
-    """Variables of the diagnosis (`qd_hip`, `q_hip and q_knee`, `qd_hip of the last 0.4 s`) in words; themselves where they are
-    none of the motion's."""
-    known = {}
+    """A variable of the diagnosis (`qd_hip`) in words; itself where it is none of the motion's."""
     for joint, slides in zip(fit.joints, fit.model.robot.prismatic):
-        known |= {f"q_{joint}": f"{'position' if slides else 'angle'} of {joint}", f"qd_{joint}": f"speed of {joint}", f"qdd_{joint}": f"acceleration of {joint}"}
-        known |= {f"tau_{joint}": f"predicted {'force' if slides else 'torque'} of {joint}"}
-    said = []
-    for part in variable.split(" and "):
-        name, of_the_last, span = part.partition(" of the last ")
-        if name not in known:
-            return variable
-        said.append(known[name] + (f" over the last {span}" if of_the_last else ""))
-    return " and ".join(said)
+        known = {"q": "position" if slides else "angle", "qd": "speed", "qdd": "acceleration", "load": "load"}
+        for symbol, word in known.items():
+            if variable == f"{symbol}_{joint}":
+                return f"{word} of {joint}"
+    return variable
 
 
 def units(fit: Fit) -> dict[str, tuple[str, str]]:
@@ -101,12 +95,6 @@ def empty(words: str) -> str:
     return f'<p class="empty">{words}</p>'
 
 
-def either(words) -> str:
-    """Words as 'a, b or c', escaped."""
-    words = [text(w) for w in words]
-    return words[0] if len(words) == 1 else ", ".join(words[:-1]) + " or " + words[-1]
-
-
 def percentage(share, se=None) -> str:
     """A share, with its standard error, in per cent."""
     if share is None or not math.isfinite(share):
@@ -114,3 +102,8 @@ def percentage(share, se=None) -> str:
     places = 0 if abs(share) >= 0.0995 else 1
     said = lambda value: f"{round(100 * value, places) + 0.0:.{places}f}"  # noqa: E731 - no minus before a zero
     return f"{said(share)}{'' if se is None or not math.isfinite(se) else f'{SPACE}±{SPACE}{said(se)}'}{SPACE}%".replace("-", "−")
+
+
+def chance(probability: float) -> str:
+    """A probability, in per cent: as many draws tell it, it is never nothing."""
+    return f"&lt;{SPACE}1{SPACE}%" if probability < 0.005 else f"{round(100 * probability)}{SPACE}%"

@@ -116,8 +116,9 @@ def _config(experiment: Experiment, robot: Robot, logs: list[str]) -> str:
         effects.append({"armature": {"joints": bare}} if rotors else "armature")
     spec = experiment.robot.model_dump(exclude_none=True, exclude_defaults=True)
     preprocess = experiment.preprocess if experiment.preprocess.filter != "none" else PreprocessSpec()
-    if preprocess.standstill == "keep":  # for the sake of what the source reproduces; a simulation reproduces nothing
-        preprocess = preprocess.model_copy(update={"standstill": "auto"})
+    # what a source keeps for the sake of what it reproduces: a simulation reproduces nothing
+    usual = {"standstill": "auto", "events": "mask"}
+    preprocess = preprocess.model_copy(update={k: v for k, v in usual.items() if getattr(preprocess, k) == "keep"})
     tree = {
         "robot": {**spec, "urdf": "robot.urdf", "joints": list(robot.joints), "gravity": list(experiment.robot.gravity)},
         "data": {"train": [name for name in logs if name != "test.csv"], "test": ["test.csv"]},

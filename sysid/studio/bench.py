@@ -8,10 +8,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 from .. import comparison, loop, pipeline, results
+from ..addition import spelled
 from ..diagnose.diagnosis import diagnose
 from ..effect import find, vocabulary
 from ..errors import ConfigError, SysidError
-from ..model import ROBOT
 from ..report import page as report
 from ..report.sections import sections
 from .desk import Changed, Desk, hashed
@@ -101,8 +101,8 @@ class Bench:
         found = self.view(seen)
         if not 0 <= number < len(found.diagnosis.findings):
             raise SysidError("there is no such suspect", do="reload")
-        candidate = found.diagnosis.findings[number].answer.candidate
-        name, joints, options = loop.spelled(candidate, "*" if candidate.joint == ROBOT else found.fit.joints[candidate.joint])
+        finding = found.diagnosis.findings[number]
+        name, joints, options = spelled(finding.candidate, finding.joint)
         return self._grow(seen, name, joints, options)
 
     def add_effect(self, seen: str, effect: str, joint: str | None) -> dict:

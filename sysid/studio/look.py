@@ -10,9 +10,8 @@ from functools import cached_property
 
 import numpy as np
 
-from .. import rows
 from ..diagnose.diagnosis import Diagnosis
-from ..diagnose.ground import Ground
+from ..diagnose.held_out import HeldOut
 from ..errors import SysidError
 from ..model import ROBOT
 from ..report import charts
@@ -26,24 +25,25 @@ class Looks:
     """A diagnosis, ready to answer."""
 
     def __init__(self, diagnosis: Diagnosis):
-        self.diagnosis, self.ground = diagnosis, diagnosis.first
+        self.diagnosis, self.first = diagnosis, diagnosis.first
         self._removed: dict[int, np.ndarray] = {}
         self._lock = threading.Lock()
 
     @cached_property
     def line(self) -> dict:
         """The test logs end to end."""
-        held_out = self.ground.held_out
-        return charts.timeline({"test": (held_out.log, held_out.t, [])})["test"]
+        rows = self.first.rows
+        return charts.timeline({"test": (rows.log, rows.t, [])})["test"]
 
     @cached_property
-    def _columns(self) -> np.ndarray:
-        """Everything in the model on the test rows, with the slopes of its shape values."""
-        ground = self.ground
-        columns = ground.held_out.columns
-        if not ground.model.shape_values:
-            return columns
-        return np.concatenate([columns, rows.tangents(ground.model, ground.test, ground.settled.x, ground.stride, ground.held_out.use)], axis=2)
+    def _before(self) -> list[HeldOut]:
+        """Of each suspect, the model that it joins: the first one, with the steps before it."""
+        out = []
+        for claim in self.diagnosis.claims:
+            view = claim.step.before
+            own = self.first if view is self.first.view else HeldOut(view, self.first.test)
+            out += [own] * len(claim.findings)
+        return out
 
     def warm(self, tell=lambda share: None) -> None:
         """Prepare the answers on every suspect."""
@@ -52,7 +52,8 @@ class Looks:
             tell((k + 1) / len(self.diagnosis.findings))
 
     def removed(self, k: int) -> np.ndarray:
-        """(n, dof) what the suspect with a number would take of the residual, everything else refitted."""
+        """(n, dof) what the suspect with a number takes of the residual, everything else refitted: on top of the steps
+        before its own."""
         if not 0 <= k < len(self.diagnosis.findings):
             raise SysidError("there is no such suspect", do="reload")
         with self._lock:
@@ -61,27 +62,12 @@ class Looks:
             return self._removed[k]
 
     def _explained(self, k: int) -> np.ndarray:
-        ground, finding = self.ground, self.diagnosis.findings[k]
-        candidate, shapes = finding.answer.candidate, finding.answer.shapes
-        use = ground.held_out.use
-        if finding.step == 0:
-            grown = self.diagnosis.steps[0].ground
-            return (ground.residual_test - grown.residual_test) * use
-        if candidate.effect.shapes():  # the answer stands at a point of a grid: from there to the best
-            grown = Ground(ground.experiment, ground.grown(candidate, shapes), ground.train, ground.test, ground.prior, stride=ground.stride, weights=ground.weights, grid=False)
-            return (ground.residual_test - grown.residual_test) * use
-        c, change, *_ = ground.projection.step(ground.signature(candidate, shapes, "train"), candidate.joint)
-        held_out = ground.signature(candidate, shapes, "test")
-        told = np.einsum("jnk,k->nj", self._columns, change)
-        if held_out.ndim == 3:
-            told += np.einsum("jnk,k->nj", held_out, c)
-        else:
-            told[:, candidate.joint] += held_out @ c
-        return told * use
+        after = HeldOut(self.diagnosis.findings[k].member.view, self.first.test)
+        return (self._before[k].residual - after.residual) * self.first.rows.use
 
     def own(self, k: int) -> list[int]:
         """The joints that a suspect is judged by."""
-        joint = self.diagnosis.findings[k].answer.candidate.joint
+        joint = self.diagnosis.findings[k].candidate.joint
         return list(range(len(self.diagnosis.fit.joints))) if joint == ROBOT else [joint]
 
     # ---- a joint's residual over time, with what a suspect would explain
@@ -92,10 +78,10 @@ class Looks:
         if not 0 <= joint < len(fit.joints):
             raise SysidError("there is no such joint", do="reload")
         name, unit = fit.joints[joint], units(fit)[fit.joints[joint]][0]
-        values = {"residual": self.ground.residual_test[:, joint]}
+        values = {"residual": self.first.residual[:, joint]}
         if k is not None:
             values[f"explained by {self.diagnosis.findings[k].effect}" if 0 <= k < len(self.diagnosis.findings) else ""] = self.removed(k)[:, joint]
-        use = self.ground.held_out.use[:, joint]
+        use = self.first.rows.use[:, joint]
         data = []
         for (word, own), colour, width in zip(values.items(), (charts.VERMILLION, charts.BLUE), (1.1, 1.8)):
             t, y = broken(self.line["t"], np.where(use, own, np.nan), self.line["breaks"], _MOST)
@@ -114,8 +100,8 @@ class Looks:
         return {"chart": chart, **said}
 
     def _rms(self, joint: int, removed: np.ndarray | None) -> float:
-        left = self.ground.residual_test[:, joint] - (0.0 if removed is None else removed[:, joint])
-        return float(np.sqrt((left**2).sum() / max(self.ground.held_out.use[:, joint].sum(), 1)))
+        left = self.first.residual[:, joint] - (0.0 if removed is None else removed[:, joint])
+        return float(np.sqrt((left**2).sum() / max(self.first.rows.use[:, joint].sum(), 1)))
 
     # ---- a stretch of time
 
@@ -130,7 +116,7 @@ class Looks:
             raise SysidError("a stretch of time needs two numbers")
         low, high = min(low, high), max(low, high)
         inside = (self.line["t"] >= low) & (self.line["t"] <= high)
-        fit, residual, use = self.diagnosis.fit, self.ground.residual_test, self.ground.held_out.use
+        fit, residual, use = self.diagnosis.fit, self.first.residual, self.first.rows.use
         unit = units(fit)
         rms = lambda which: np.sqrt((residual[which] ** 2).sum(0) / np.maximum(use[which].sum(0), 1))  # noqa: E731
         here, whole = rms(inside), rms(slice(None))

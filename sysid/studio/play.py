@@ -18,11 +18,11 @@ def play(looks: Looks) -> dict:
         {"chart", "time": (f,) [s], "links": (f, 3, k) with None between links, "joints": (f, 3, dof), "levels": (f, dof) RMS
         of the residual around the moment over that of the whole log, None where no row counts}.
     """
-    ground, fit = looks.ground, looks.diagnosis.fit
-    held_out, robot = ground.held_out, fit.model.robot
-    q = np.concatenate([piece.q[held_out.index[held_out.piece == k]] for k, piece in enumerate(ground.test.pieces)])
+    first, fit = looks.first, looks.diagnosis.fit
+    rows_, robot = first.rows, fit.model.robot
+    q = np.concatenate([piece.q[rows_.index[rows_.piece == k]] for k, piece in enumerate(first.test.pieces)])
     edges = np.linspace(0, len(q), min(_FRAMES, len(q)) + 1).astype(int)
-    squares, use = ground.residual_test**2, held_out.use
+    squares, use = first.residual**2, rows_.use
     around = [slice(a, max(b, a + 1)) for a, b in zip(edges, edges[1:])]
     whole = np.sqrt(squares.sum(0) / np.maximum(use.sum(0), 1))
     levels = np.array([np.where(use[s].any(0), np.sqrt(squares[s].sum(0) / np.maximum(use[s].sum(0), 1)), np.nan) for s in around]) / np.maximum(whole, 1e-300)

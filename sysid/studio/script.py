@@ -5,7 +5,7 @@ SCRIPT = r"""
 "use strict";
 const at = id => document.getElementById(id);
 const CSRF = document.querySelector('meta[name="sysid-csrf"]').content;
-const SHORT = {verdict: "Verdict", steps: "Steps", suspects: "Suspects", look: "Residual", torque: "Torque", failures: "Where", unseen: "Not seen", parameters: "Parameters", bodies: "Bodies", provenance: "Provenance"};
+const SHORT = {verdict: "Verdict", steps: "Steps", suspects: "Suspects", look: "Residual", torque: "Torque", failures: "Where", detectable: "Could show", parameters: "Parameters", bodies: "Bodies", provenance: "Provenance"};
 // looking: hash of the experiment file that this page is about; shown: that of the results in it; page: these
 let looking = null, shown = null, page = null, last = null, busy = false, said = "", told = null;
 let joint = 0, finding = null, asked = 0;

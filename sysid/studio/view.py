@@ -17,7 +17,7 @@ from ..report.words import units
 from .look import Looks
 from .play import play
 
-ORDER = ("verdict", "steps", "suspects", "look", "torque", "failures", "unseen", "parameters", "bodies", "provenance")
+ORDER = ("verdict", "steps", "suspects", "look", "torque", "failures", "detectable", "parameters", "bodies", "provenance")
 
 
 class View:

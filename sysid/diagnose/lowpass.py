@@ -17,9 +17,21 @@ import numpy as np
 
 from ..events import mended
 from ..log import Log
-from ..preprocess import Motion, Piece, assembled, differences, share_left_out, standstill_speed, without_events, without_standstill
+from ..preprocess import (
+    Motion,
+    Piece,
+    assembled,
+    differences,
+    share_left_out,
+    standstill_speed,
+    turns,
+    without_events,
+    without_standstill,
+)
 
-CUTOFFS = (15.0, 8.0)  # Hz: the verdict's own, and another one that it must survive
+LEAST = 15.0  # Hz: where friction's laws and ripple still show, several times what an arm moves at
+_MOTION = 4.0  # and this many times the motion's own bandwidth, if that is more
+_SHARE = 0.25  # of the residual's power may be made by the angles' noise at the end of the band
 _ANGLES = 4.0  # the angles' own low-pass, as a multiple of the cutoff: derivatives need some, laws of motion none
 _SIGHT = 1.25  # how far both low-passes see, as a multiple of the torque's own: the angles' sees a quarter as far
 _HIGHEST = 0.3  # of the sampling rate
@@ -67,7 +79,7 @@ class Gaussian:
         return np.moveaxis(self.at(np.moveaxis(values, axis, -1), slice(None)), -1, axis)
 
 
-def questioned(logs: Sequence[Log], joints: tuple[str, ...], cutoff: float) -> Motion | None:
+def lowpassed(logs: Sequence[Log], joints: tuple[str, ...], cutoff: float) -> Motion | None:
     """Logs as a motion under one low-pass on both sides; None where they are too short for it."""
     pieces = []
     for number, log in enumerate(logs):
@@ -76,14 +88,35 @@ def questioned(logs: Sequence[Log], joints: tuple[str, ...], cutoff: float) -> M
             clean = replace(segment, tau=mended(segment, log.events, joints)) if log.events else segment
             if (piece := _piece(number, log.name, clean, cutoff)) is not None:
                 torque = piece.smoother.reach * piece.step
-                pieces.append(without_events(piece, log.events, joints, _SIGHT * torque + 2.0 * segment.step, torque) if log.events else piece)
+                angles = _SIGHT * torque + 2.0 * segment.step
+                pieces.append(without_events(piece, log.events, joints, angles, torque) if log.events else piece)
     if not pieces:
         return None
     disturbed = share_left_out(pieces)
     threshold = standstill_speed(pieces)
-    # a reversal that passes standstill between two samples stays: both sides see its jump alike, and slow friction lives there
-    motion = assembled(joints, [without_standstill(piece, threshold, round(_SIGHT * piece.smoother.reach)) for piece in pieces])
+    # where the speed changes its sign between two samples, the angles' noise says in which: friction's jump is as uncertain
+    still = [np.where(turns(piece.qd), np.inf, threshold) for piece in pieces]
+    reach = [round(_SIGHT * piece.smoother.reach) for piece in pieces]
+    motion = assembled(joints, [without_standstill(*each) for each in zip(pieces, still, reach)])
     return replace(motion, events=tuple(event for log in logs for event in log.events), disturbed=disturbed)
+
+
+def widest(logs: Sequence[Log]) -> float:
+    """Cutoff [Hz] that the motion itself asks for: several times the frequency below which its speeds stay."""
+    bands = [0.0]
+    for segment in (s for log in logs for s in log.segments if len(s.t) > 50):
+        speed = np.diff(segment.q, axis=0)
+        speed = speed[:, np.ptp(segment.q, axis=0) > 1e-3 * np.ptp(segment.q, axis=0).max()]
+        power = np.cumsum(np.abs(np.fft.rfft(speed * np.hanning(len(speed))[:, None], axis=0)) ** 2, axis=0)
+        if speed.size and (power[-1] > 0).all():
+            bands.append(float((power < 0.99 * power[-1]).sum(axis=0).max() / (len(speed) * segment.step)))
+    return max(LEAST, _MOTION * float(np.median(bands[1:] or bands)))
+
+
+def narrowed(cutoff: float, share: float) -> float:
+    """The cutoff at which the angles' noise makes no more than a quarter of the residual's power, where at `cutoff` it makes
+    `share`: its density grows with the fourth power of frequency, as acceleration does."""
+    return cutoff * min(1.0, (_SHARE / max(share, 1e-12)) ** 0.25)
 
 
 def stride_of(motion: Motion, cutoff: float) -> int:
@@ -109,6 +142,20 @@ def _piece(number: int, source: str, segment, cutoff: float) -> Piece | None:
     return Piece(
         log=number, step=every * segment.step, t=segment.t[rows], q=smooth[rows], qd=qd[rows], qdd=qdd[rows], tau=both(segment.tau, axis=0)[rows],
         measured=segment.tau[rows], signals={name: values[rows] for name, values in segment.signals.items()}, use=None, smoother=settling,
-        core=slice(settling.reach, n - settling.reach), rest=np.zeros(smooth.shape[1]), noise=np.sqrt(np.mean((segment.q[rows] - smooth[rows]) ** 2, axis=0)) / angles.taken_of_noise,
+        core=slice(settling.reach, n - settling.reach), rest=np.zeros(smooth.shape[1]), noise=_noise(segment.q[edge:-edge], smooth[edge:-edge], angles.taken_of_noise, segment.step),
         source=source,
     )  # fmt: skip
+
+
+_WINDOW = 0.1  # s
+
+
+def _noise(q, smooth, taken: float, step: float) -> np.ndarray:
+    """RMS (dof,) of white noise on angles q (n, dof): the lesser of what a low-pass took off and of what third differences show,
+    as either may hold motion too; each in the middle of all windows of time, as about a reversal there is more."""
+    size = max(8, round(_WINDOW / step))
+    rest = [(q - smooth) / taken, np.diff(q, 3, axis=0) / np.sqrt(20.0)]  # 1 + 9 + 9 + 1
+    middle = lambda values: np.sqrt(np.median([  # noqa: E731
+        np.mean(own**2, axis=0) for own in np.array_split(values, max(1, len(values) // size))
+    ], axis=0))  # fmt: skip
+    return np.minimum(*(middle(values) for values in rest))

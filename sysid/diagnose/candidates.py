@@ -1,0 +1,157 @@
+"""What could be missing: every effect of the vocabulary on every joint, with its variants; and the columns that it would add."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .. import rows as row
+from ..effect import Effect, MotionEffect, SensorEffect, WrenchEffect, find, vocabulary
+from ..model import ROBOT, Model
+
+# What every model has to begin with is added first where it lacks; then what has a law; then what can bend to anything.
+_PLAIN = ("viscous", "coulomb", "armature", "torque_bias")
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """An effect that is not in the model, on a joint (-1: the robot), with the options of a variant."""
+
+    effect: Effect
+    joint: int
+    options: tuple[tuple[str, object], ...]
+
+    @property
+    def name(self) -> str:
+        """The effect's word."""
+        return self.effect.name
+
+    @property
+    def key(self) -> tuple[str, int]:
+        """Its word and its joint: variants share it."""
+        return self.effect.name, self.joint
+
+    @property
+    def parameters(self) -> int:
+        """How many numbers it brings."""
+        return len(self.effect.coefficients()) + len(self.effect.shapes())
+
+    @property
+    def nonlinear(self) -> bool:
+        """Whether it has no columns of its own, only slopes."""
+        return isinstance(self.effect, (MotionEffect, SensorEffect))
+
+    def touches(self, dof: int) -> list[int]:
+        """The joints whose torque it changes."""
+        everywhere = self.joint == ROBOT or isinstance(self.effect, (MotionEffect, WrenchEffect))
+        return list(range(dof)) if everywhere else [self.joint]
+
+    @property
+    def simplicity(self) -> tuple:
+        """Sorts the simplest first."""
+        return (self.parameters, self.name not in _PLAIN, self.name)
+
+
+def candidates(model: Model, extra=()) -> list[Candidate]:
+    """Every effect that a model lacks, joint by joint; `extra` effects of the user's own come with the vocabulary."""
+    robot = model.robot
+    there = {(effect.name, joint) for effect, joints in model.terms for joint in joints}
+    out = []
+    for effect in [*(find(name) for name in vocabulary()), *extra]:
+        for joint in [ROBOT] if effect.scope == "robot" else range(robot.dof):
+            if (effect.name, joint) in there:
+                continue
+            for options in _variants(effect, robot, joint):
+                out.append(Candidate(effect.given(**options).bound(robot, joint), joint, tuple(options.items())))
+    return out
+
+
+def _variants(effect: Effect, robot, joint: int) -> list[dict]:
+    if effect.name == "joint_coupling" and robot.dof < 2:
+        return []
+    return effect.variants(robot, joint)
+
+
+# ---- columns
+
+
+def tried(view, candidate: Candidate) -> list[dict[str, float]]:
+    """Sets of shape values to try: a grid over each value in turn, the others midway; where an effect does nothing yet, that."""
+    bounds = bounds_of(view.model, candidate)
+    if candidate.nonlinear:
+        starts = [s.start if s.start is not None else float(np.sqrt(low * high)) for s, low, high, _ in bounds]
+        return [{s.name: at for (s, *_), at in zip(bounds, starts)}]
+    if not candidate.effect.coefficients():
+        return []
+    if not bounds:
+        return [{}]
+    middle = {s.name: float(np.median(s.values(low, high))) for s, low, high, _ in bounds}
+    return [
+        {**middle, shape.name: float(at)}
+        for shape, low, high, angle in bounds
+        for at in shape.values(low, high, angle)
+    ]  # fmt: skip
+
+
+def bounds_of(model: Model, candidate: Candidate) -> list[tuple]:
+    """(shape, low, high, angle travelled) of a candidate's shape values."""
+    scales, joint = model.scales, candidate.joint
+    angle = None if joint == ROBOT else float(scales.angle[joint])
+    of = lambda s: scales.of(s.of, joint)  # noqa: E731
+    return [(s, s.low * of(s), s.high * of(s), angle) for s in candidate.effect.shapes()]
+
+
+def grown(source, candidate: Candidate, shapes: dict[str, float]) -> Model:
+    """A source's model with a candidate at shape values."""
+    model = source.model.with_effect(candidate.effect, (candidate.joint,))
+    if candidate.effect.uses_load and model.reference is None:
+        model = model.with_reference(source.x[: 10 * model.bodies].reshape(-1, 10))
+    own = model.last_shapes
+    asked = [shapes.get(v.shape.name, at) for v, at in zip(model.shape_values[own], model.shapes[own])]
+    return model.with_shapes([*model.shapes[: own.start], *asked])
+
+
+def columns_of(source, candidate: Candidate, shapes: list[dict[str, float]]) -> np.ndarray:
+    """Columns (shapes, joints, n, k) that a candidate would add to a source's rows, its own joint's or every joint's.
+
+    Of an effect that is no column, the slopes of the predicted torque in its values.
+    """
+    if isinstance(candidate.effect, SensorEffect):
+        return np.stack([_sensed(source, candidate, own)[None] for own in shapes])
+    if candidate.nonlinear:
+        return np.stack([_slopes(source, candidate, own) for own in shapes])
+    found = row.signatures(
+        source.model, source.motion, source.pieces, candidate.effect, candidate.joint, shapes, source.stride, source.use
+    )  # fmt: skip
+    return np.stack([values[None] if values.ndim == 2 else values for values in found])
+
+
+def _slopes(source, candidate: Candidate, shapes: dict[str, float]) -> np.ndarray:
+    model = grown(source, candidate, shapes)
+    own = model.last_shapes
+    starts = {s.name: s.start for s in candidate.effect.shapes()}
+    at_start = all(shapes[name] == start for name, start in starts.items() if start is not None)
+    # where an effect does nothing yet, a value that only says how it does it changes nothing
+    idle = [*model.shape_values[: own.start], *(v for v in model.shape_values[own] if at_start and v.shape.start is None)]
+    held = tuple(((v.term, v.joint, v.shape.name), 0.0) for v in idle)
+    held_model = replace(model, held=(*model.held, *held))
+    slopes = row.tangents(
+        held_model, source.motion, source.x, source.stride, source.use, source.predicted if at_start else None
+    )[:, :, own]  # fmt: skip
+    free = [k for k, v in enumerate(model.shape_values[own]) if not (at_start and v.shape.start is None)]
+    return slopes[:, :, free]
+
+
+def _sensed(source, candidate: Candidate, shapes: dict[str, float]) -> np.ndarray:
+    """Slopes (n, k) of a sensor effect: what it makes of the predicted torque of its joint, by differences."""
+    out = []
+    for piece, torque, kept in zip(source.motion.pieces, source.unfiltered, row.starts(source.motion, source.stride)):
+        base, own = torque[None, candidate.joint], []
+        for shape, low, high, _ in bounds_of(source.model, candidate):
+            step = 1e-4 * (high - low)
+            read = [candidate.effect.sensed(base, piece.step, **{**shapes, shape.name: shapes[shape.name] + h}) for h in (0.0, step)]
+            slope = (read[1] - read[0])[0] / step
+            own.append(slope[kept] if piece.smoother is None else piece.smoother.at(slope, kept))
+        out.append(np.stack(own, axis=1))
+    return np.concatenate(out) * source.use[:, [candidate.joint]]

@@ -1,0 +1,75 @@
+"""What these logs could have shown: the smallest size of every effect on every joint that they would have named.
+
+A group is named where its statistic stands above the null's threshold and where it is worth having. Its coefficient is
+known to a standard deviation that the blocks tell; the size is the one that passes both in nine of ten logs.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import ndtri
+
+from ..model import ROBOT
+from .candidates import Candidate
+from .evidence import Group, normal_scores
+from .select import LEVEL, WORTH, Asked
+from .view import View
+
+POWER = 0.9
+
+
+@dataclass(frozen=True)
+class Detectable:
+    """The smallest `size` of an effect's leading parameter that these logs would have named with probability `power`; None
+    where the model absorbs it whatever its size."""
+
+    candidate: Candidate
+    parameter: str
+    unit: str
+    size: float | None = None
+    power: float = POWER
+
+
+def detectable(view: View, asked: Asked, candidates) -> list[Detectable]:
+    """For every candidate's best set of shape values and variant."""
+    threshold = float(np.quantile(asked.maxima, 1.0 - LEVEL)) if len(asked.groups) else np.inf
+    loss = np.maximum(np.sum(view.design.residual**2, axis=0), 1e-300)
+    best: dict[tuple, Detectable] = {}
+    for candidate in candidates:
+        if candidate.parameters:  # a force from outside has none until somebody says when it acts
+            best.setdefault(candidate.key, Detectable(candidate, *_leading(view, candidate)))
+    for group in asked.groups:
+        size = _size(group, threshold, loss)
+        there = best[group.candidate.key]
+        if np.isfinite(size) and (there.size is None or size < there.size):
+            best[group.candidate.key] = Detectable(group.candidate, *_leading(view, group.candidate), size)
+    return list(best.values())
+
+
+def _leading(view: View, candidate: Candidate) -> tuple[str, str]:
+    effect = candidate.effect
+    listed = [s for s in effect.shapes() if s.start is not None] if candidate.nonlinear else effect.coefficients()
+    grown = view.model.with_effect(effect, (candidate.joint,))
+    units = [c.unit for c in grown.coefficients[len(view.model.coefficients) :]] or [
+        v.unit for v in grown.shape_values[grown.last_shapes] if v.shape.start is not None
+    ]  # fmt: skip
+    return listed[0].name, units[0]
+
+
+def _size(group: Group, threshold: float, loss: np.ndarray) -> float:
+    """Of the first own coefficient, the others zero."""
+    if not (group.sizes[0] > 0 and group.testable):
+        return np.inf
+    directions, rest = group.freedom
+    spread = float(np.sum(group.moves**2))
+    grid = np.geomspace(0.1, 1e4, 400)
+    passes = np.flatnonzero(normal_scores(grid, directions, directions * (rest - 1.0)) > threshold)
+    if not len(passes):
+        return np.inf  # it rests on too few blocks to stand out, whatever its size
+    needed = np.sqrt(grid[passes[0]] * spread) + ndtri(POWER) * np.sqrt(spread / directions)
+    joints = slice(None) if group.candidate.joint == ROBOT else [group.candidate.joint]
+    # what it takes, of the residual and of what it adds to it, must be worth having
+    worth = np.sqrt(WORTH / (1.0 - WORTH) * loss[joints].min()) + ndtri(POWER) * np.sqrt(spread / directions)
+    return float(max(needed, worth) / group.sizes[0])

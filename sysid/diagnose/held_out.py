@@ -1,0 +1,53 @@
+"""A view's model on the test logs: opened once, after everything is chosen."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from .. import rows as row
+from ..model import Model
+from ..preprocess import Motion
+from .view import View
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """A view and the test motion under the same low-pass."""
+
+    view: View
+    test: Motion
+
+    @property
+    def model(self) -> Model:
+        """The view's model."""
+        return self.view.model
+
+    @cached_property
+    def rows(self) -> row.Rows:
+        """Test rows."""
+        return row.stack(self.model, self.test, self.view.stride)
+
+    @cached_property
+    def residual(self) -> np.ndarray:
+        """(n, dof) on the test rows."""
+        return self.rows.residual(self.view.settled.x)
+
+    def rms(self) -> np.ndarray:
+        """(dof,) root mean square of the residual on the test rows that count."""
+        return np.sqrt((self.residual**2).sum(0) / np.maximum(self.rows.use.sum(0), 1))
+
+    @cached_property
+    def variables(self) -> dict[str, tuple[str, np.ndarray]]:
+        """{q_joint, qd_joint: (unit, (n,))} and time on the test rows."""
+        rows, robot = self.rows, self.model.robot
+        pieces = [(piece, rows.index[rows.piece == k]) for k, piece in enumerate(self.test.pieces)]
+        out = {}
+        for j, joint in enumerate(robot.joints):
+            unit = "m" if robot.prismatic[j] else "rad"
+            for name, what in (("q", unit), ("qd", f"{unit}/s")):
+                values = np.concatenate([getattr(piece, name)[own, j] for piece, own in pieces])
+                out[f"{name}_{joint}"] = (what, values)
+        return out | {"time": ("s", rows.t)}

@@ -1,0 +1,142 @@
+"""One effect after another joins the model, each asked anew with all that joined before it, and each looked at once more at the
+end, with all the others in. Only training logs are looked at.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from . import null
+from .candidates import Candidate, candidates
+from .evidence import Group, gain, groups
+from .ties import Choice, chosen, losses, weighed
+from .view import View
+
+LEVEL = 0.01  # family-wise: how often anything is accused where nothing is there
+WORTH = 0.03  # of a joint's squared residual under the low-pass: 1.5 % of its root mean square
+_ALONE = 1.645  # standard errors: five per cent, were it the only question
+_MOST_STEPS, _SHORTLIST, _NEAR = 8, 8, 0.4
+
+
+@dataclass(frozen=True)
+class Step:
+    """An effect that joined: the choice, its family-wise p-value, the view before and after, and the share (dof,) of each
+    joint's loss that it took."""
+
+    choice: Choice
+    p: float
+    before: View
+    after: View
+    shares: np.ndarray
+
+    @property
+    def candidate(self) -> Candidate:
+        """The head's."""
+        return self.choice.head.candidate
+
+
+@dataclass(frozen=True)
+class Asked:
+    """The answer of all candidates under one model: groups, statistics and gains (groups,), null maxima (draws,)."""
+
+    groups: list[Group]
+    statistics: np.ndarray
+    gains: np.ndarray
+    maxima: np.ndarray
+
+    def p(self, k: int) -> float:
+        """Family-wise p-value of a group."""
+        return float((1 + np.sum(self.maxima >= self.statistics[k])) / (1 + len(self.maxima)))
+
+
+def ask(view: View, extra=(), tell: Callable[[float], None] = lambda share: None) -> Asked:
+    """Every candidate that a view's model lacks."""
+    found, all_ = [], candidates(view.model, extra)
+    joints = sorted({c.joint for c in all_})
+    for number, joint in enumerate(joints):  # a joint at a time: its columns stand in memory together
+        found += groups(view, [c for c in all_ if c.joint == joint])
+        tell((number + 1) / len(joints))
+    rng = np.random.default_rng(0)
+    return Asked(found, null.statistics(found), np.array([gain(g).sum() for g in found]), null.maxima(found, rng))
+
+
+def search(
+    view: View, extra=(), *, level: float = LEVEL, worth: float = WORTH, most: int = _MOST_STEPS,
+    tell: Callable[[str, float], None] = lambda stage, share: None,
+):  # fmt: skip
+    """The effects that join, in order, and the answers under the first model and the last.
+
+    Args:
+        level: family-wise. worth: least share of a joint's squared residual that an effect must take. most: steps.
+
+    Returns:
+        (steps, asked first, last view, what is there and cannot be told from effects elsewhere)
+    """
+    steps: list[Step] = []
+    open_: list[Choice] = []
+    first = asked = ask(view, extra, lambda share: tell("ask", share))
+    while len(steps) < most:
+        step = _next(view, asked, level, worth, open_)
+        if step is None:
+            break
+        steps.append(step)
+        view = step.after
+        asked = ask(view, extra, lambda share, word=step.candidate.name: tell(f"ask, with {word}", share))
+    return steps, first, view, open_
+
+
+def _next(view: View, asked: Asked, level: float, worth: float, open_: list[Choice]) -> Step | None:
+    """The candidate that joins next, None where none is there and worth having."""
+    threshold = np.quantile(asked.maxima, 1.0 - level) if len(asked.groups) else np.inf
+    best: dict[tuple, int] = {}
+    for k in np.flatnonzero(~(asked.statistics <= _ALONE) & (asked.gains > 0)):
+        key = (*asked.groups[k].candidate.key, asked.groups[k].candidate.options)
+        if _sign(asked.groups[k]) and (key not in best or asked.gains[k] > asked.gains[best[key]]):
+            best[key] = k
+    # whoever takes as much as one that is there may be what is there
+    rivals = sorted(best.values(), key=lambda k: -asked.gains[k])
+    hopeful = [k for k in rivals if asked.statistics[k] > threshold]
+    dof = view.model.robot.dof
+    while hopeful:
+        top = hopeful[0]
+        where = set(asked.groups[top].candidate.touches(dof))
+        short = [
+            k for k in rivals
+            if asked.gains[k] >= _NEAR * asked.gains[top] and where & set(asked.groups[k].candidate.touches(dof))
+        ]  # fmt: skip
+        short = [top, *(k for k in short if k != top)][:_SHORTLIST]
+        found = chosen(view, [asked.groups[k] for k in short], np.random.default_rng(1))
+        # of all that cannot be told apart, one at least must be there
+        there = {id(asked.groups[k]) for k in hopeful}
+        if found is not None and any(id(m.group) in there for m, _ in found.members):
+            step = _joined(view, asked, found, worth)
+            if step is not None and found.decided:
+                return step
+            if step is not None:
+                open_.append(found)
+        hopeful = [k for k in hopeful if k not in short]
+    return None
+
+
+def _joined(view: View, asked: Asked, found: Choice, worth: float) -> Step | None:
+    base, after = losses(view, view.blocks), found.head.losses
+    whole = np.maximum(base.sum(0) + np.sum(view.design.rough_residual**2, axis=0), 1e-300)
+    shares = (base - after).sum(0) / whole
+    joints = found.head.candidate.touches(view.model.robot.dof)
+    if shares[joints].max() < worth or found.gain.sum() <= 0.0:
+        return None
+    inside = {id(member.group) for member, _ in found.members}
+    p = min(asked.p(k) for k, group in enumerate(asked.groups) if id(group) in inside)
+    return Step(found, p, view, weighed(found.head.view), shares)
+
+
+def _sign(group: Group) -> bool:
+    """Whether the coefficients have the signs that the effect allows."""
+    if group.candidate.nonlinear:
+        free = [s for s in group.candidate.effect.shapes() if s.start is not None]
+        return all(not (s.low == 0.0 and c < 0) for s, c in zip(free, group.coefficients))
+    linear = group.candidate.effect.coefficients()
+    return len(linear) > 1 or all(not (one.lower == 0 and c < 0) for one, c in zip(linear, group.coefficients))

@@ -1,0 +1,92 @@
+"""The verdict on each joint: complete, missing, explained, unknown or unresolved."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..estimate import Fit
+from .claims import Claim
+from .flexible import Unknown
+from .select import LEVEL, WORTH
+
+_FLOOR = 0.1  # of the floor: what a floor may be in doubt by and still be called reached
+_MOST = 0.5  # of what effects took and functions of the motion still predict together: the greater part names the joint
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """One joint's verdict.
+
+    status: complete (nothing is left above the noise), missing (`claims`: what is claimed, first the first), explained (by
+    the claims of other joints' equations), unknown (the motion predicts what is left, and no effect does), unresolved
+    (error stands above the floor, or the floor is not known, and these logs do not say why).
+    explained: share of the joint's misfit on the test logs that all claims take, NaN where the misfit is not known.
+    left: what functions of the motion predict of the rest; None where nothing. says: why it is unresolved.
+    """
+
+    joint: str
+    status: str
+    claims: tuple[Claim, ...] = ()
+    explained: float = float("nan")
+    left: Unknown | None = None
+    says: str = ""
+
+
+def verdicts(
+    fit: Fit, claims: Sequence[Claim], left: Sequence[Unknown], before: Sequence[Unknown], floors: Sequence, refused: Sequence = ()
+) -> list[Verdict]:  # fmt: skip
+    """The verdict on every joint.
+
+    Args:
+        fit: of the experiment as it is. left, before: what functions of the motion predict with all claims in the model, and
+            without. floors: noise floor of each joint.
+    """
+    last = claims[-1].after if claims else fit
+    out = []
+    for j, joint in enumerate(fit.joints):
+        own = tuple(c for c in claims if c.head.joint == joint or (c.head.joint == "*" and c.step.shares[j] >= WORTH))
+        others = tuple(c for c in claims if c not in own and c.step.shares[j] >= WORTH)
+        first, then, floor = fit.rms("test")[joint], last.rms("test")[joint], floors[j].rms
+        misfit = first**2 - (floor if floor is not None else then) ** 2
+        explained = (first**2 - then**2) / misfit if misfit > 0 and claims else float("nan")
+        remains = left[j] if predictable(left[j], len(fit.joints)) else None
+        reached = floor is not None and max(then, last.rms("train")[joint]) <= (1.0 + _FLOOR) * floor + 2.0 * floors[j].std
+        if own:
+            taken = sum(c.step.shares[j] for c in own)
+            much = remains is not None and remains.share * max(1.0 - taken, 0.0) > _MOST * taken
+            out.append(Verdict(joint, "unknown" if much else "missing", own, explained, remains))
+        elif remains is not None and not reached:
+            out.append(Verdict(joint, "unknown", others, explained, remains))
+        elif reached:
+            at_floor = first <= (1.0 + _FLOOR) * floor + 2.0 * floors[j].std
+            by = () if at_floor or not claims else others or (max(claims, key=lambda c, j=j: c.step.shares[j]),)
+            out.append(Verdict(joint, "explained" if by else "complete", by, explained if by else float("nan")))
+        else:
+            out.append(Verdict(joint, "unresolved", others, explained, remains, _why(fit, j, floors[j], then, last, refused)))
+    return out
+
+
+def predictable(found: Unknown, joints: int) -> bool:
+    """Whether functions of the motion predict a part worth having of what is left, at the same family-wise level."""
+    functions = found.chance < LEVEL / joints and found.gain.sum() > WORTH * found.total
+    return bool(functions or found.tone > WORTH)
+
+
+def _why(fit: Fit, j: int, floor, error: float, last: Fit, refused) -> str:
+    joint = fit.joints[j]
+    words = [f"{r.effect} was looked at and is not claimed: {r.why}" for r in refused if r.joint in (joint, "*")]
+    if floor.rms is None:
+        return "; ".join([f"its noise floor is not known ({floor.detail}), so nobody can say what error is left above it", *words])
+    train = last.rms("train")[joint]
+    if train <= (1.0 + _FLOOR) * floor.rms + 2.0 * floor.std:
+        return "; ".join(["the training logs are explained and the test logs are not: the model does not carry over to them", *words])
+    said = f"its error is {error / max(floor.rms, 1e-300):.2g} times the noise floor, and nothing in the motion of these logs predicts the rest"
+    return "; ".join([said, *words])
+
+
+def finite(value: float) -> float | None:
+    """A number, None where there is none."""
+    return float(value) if np.isfinite(value) else None

@@ -1,0 +1,168 @@
+"""What a verdict rests on, as tables of plain text: errors, suspects, events, detectable sizes.
+
+A table is as wide as what stands in it: no name is ever cut.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from .diagnosis_text import Told, listed, percent, wrapped
+from .events import WORDS
+
+_EVENTS = 20  # lines; the rest is counted
+
+
+def errors(of: Told, width: int) -> list[str]:
+    """Errors against the noise floors, and how these were found or why they were not."""
+    named = bool(of.document["findings"])
+    heads = [
+        "joint",
+        "",
+        "train",
+        "test",
+        *(["test, all added"] if named else []),
+        "noise floor",
+        "+-",
+    ]
+    rows, how = [], {}
+    for joint, entry in of.document["joints"].items():
+        floor, se = entry["noise_floor"], entry["noise_floor_se"]
+        added = [f"{of.after[joint]:.4g}"] if named else []
+        rows.append(
+            [
+                joint,
+                of.units[joint],
+                f"{entry['rms']['train']:.4g}",
+                f"{entry['rms']['test']:.4g}",
+                *added,
+                "not known" if floor is None else f"{floor:.4g}",
+                "" if se is None else f"{se:.2g}",
+            ]
+        )
+        how.setdefault(entry["floor_detail"], []).append(joint)
+    out = ["RMS error against the noise floor", *columns(heads, rows, 2)]
+    for detail, joints in how.items():
+        out += wrapped(f"  noise floor of {listed(joints, 'and')}: {detail}", width, "    ")
+    return out
+
+
+def suspects(document: dict) -> list[str]:
+    """What is named, step by step, each with what could stand in its place."""
+    rows, step = [], 0
+    for f in document["findings"]:
+        step = f["joins_as_step"] or step
+        joint = "robot" if f["joint"] == "*" else f["joint"]
+        rows.append(
+            [
+                str(step),
+                ("* " if f["joins_as_step"] else "  ") + f["effect"],
+                joint,
+                percent(f["probability"]),
+                f"{f['rms_test_before']:.4g}",
+                f"{f['rms_test_after']:.4g}",
+            ]
+        )
+    if not rows:
+        return []
+    heads = ["step", "suspect", "joint", "probability", "test before", "after"]
+    return [
+        "suspects, step by step: * joins the model, and the next step is asked with it in",
+        *columns(heads, rows, 3),
+    ]
+
+
+def events(document: dict, width: int) -> list[str]:
+    """What disturbed the logs, a line each."""
+    out = []
+    for e in document["events"][:_EVENTS]:
+        span = (
+            f"{e['start']:.2f} s"
+            if e["stop"] - e["start"] < 0.01
+            else f"{e['start']:.2f} to {e['stop']:.2f} s"
+        )
+        told = " (not left out)" if e["kind"] == "saturation" else ""
+        out += wrapped(
+            f"  {WORDS.get(e['kind'], e['kind'])}, {e['log']}, {span}: "
+            f"{', '.join(e['joints'])}{told}",
+            width,
+            "    ",
+        )
+    more = len(document["events"]) - _EVENTS
+    if more > 0:
+        out.append(f"  and {more} more: see diagnosis.json")
+    return ["events in the logs, left out", *out] if out else []
+
+
+def fails(document: dict, width: int) -> list[str]:
+    """Where the joints that are not done with hold most of their error."""
+    status = {v["joint"]: v["status"] for v in document["verdict"]}
+    out = []
+    for entry in document["fails_where"]:
+        if entry["words"] and status[entry["joint"]] not in ("complete", "explained"):
+            out += wrapped(
+                f"where {entry['joint']} fails: {'; '.join(entry['words'])}", width, "  "
+            )
+    return out
+
+
+def shown(document: dict, joints: Sequence[str], width: int) -> list[str]:
+    """The smallest sizes that the logs would have named, effects down and joints across."""
+    sizes: dict[tuple[str, str, str], dict[str, str]] = {}
+    for d in document["detectable"]:
+        sizes.setdefault((d["effect"], d["parameter"], d["unit"]), {})[d["joint"]] = size(d["size"])
+    absorbed = {(a["effect"], a["joint"]): "-" for a in document["absorbed"]}
+    if not sizes and not absorbed:
+        return []
+    out = ["what these logs could have shown: the smallest size named nine times in ten"]
+    own = {
+        # no cell: the effect is in the model already
+        _label(key): [cells.get(j, absorbed.get((key[0], j), "")) for j in joints]
+        for key, cells in sizes.items()
+        if set(cells) != {"*"}
+    }
+    for some in _parts(own, joints, width):
+        rows = [[effect, *(cells[k] for k in some)] for effect, cells in own.items()]
+        out += columns(["", *(joints[k] for k in some)], [r for r in rows if any(r[1:])], 1)
+    if whole := [f"{_label(key)} {cells['*']}" for key, cells in sizes.items() if "*" in cells]:
+        out += wrapped(f"  of the whole robot: {'; '.join(whole)}", width, "    ")
+    if any("-" in cells for cells in own.values()):
+        words = "-: at no size, as other parameters take its place; "
+        words += "`sysid effects NAME` says what shows it"
+        out += wrapped(f"  {words}", width, "    ")
+    somewhere = {effect for effect, *_ in sizes}
+    if never := [e for e in dict.fromkeys(e for e, _ in absorbed) if e not in somewhere]:
+        out += wrapped(f"  at no size on any joint: {', '.join(never)}", width, "    ")
+    return out
+
+
+def _label(key: tuple[str, str, str]) -> str:
+    effect, parameter, unit = key
+    return f"{effect} {parameter}" + ("" if unit in ("", "1") else f" [{unit}]")
+
+
+def _parts(rows: dict, joints: Sequence[str], width: int) -> list[list[int]]:
+    """Places of joints, as many together as stand in the width beside the names of the rows."""
+    first = 2 + max(map(len, rows), default=0)
+    parts: list[list[int]] = [[]] if rows else []
+    for k in range(len(joints) if rows else 0):
+        if parts[-1] and first + sum(2 + max(len(joints[i]), 6) for i in [*parts[-1], k]) > width:
+            parts.append([])
+        parts[-1].append(k)
+    return parts
+
+
+def size(value: float) -> str:
+    """Two digits, without an exponent where that is short."""
+    return f"{value:.2g}" if not 10 <= abs(value) < 1e5 else f"{float(f'{value:.2g}'):.0f}"
+
+
+def columns(heads: Sequence[str], rows: Sequence[Sequence[str]], left: int) -> list[str]:
+    """A table as wide as its cells, its first `left` columns ranged left, the others right."""
+    wide = [max(len(row[k]) for row in [heads, *rows]) for k in range(len(heads))]
+
+    def cell(k: int, word: str) -> str:
+        return word.ljust(wide[k]) if k < left else word.rjust(wide[k])
+
+    lines = ("  ".join(cell(k, word) for k, word in enumerate(row)) for row in [heads, *rows])
+    return [f"  {line}".rstrip() for line in lines]

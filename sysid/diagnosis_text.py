@@ -1,0 +1,171 @@
+"""The verdict on each joint as lines of plain text. A name or a command is never cut."""
+
+from __future__ import annotations
+
+import re
+import textwrap
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from .diagnose.diagnosis import Diagnosis
+
+_TOGETHER = "several variables together"
+
+
+@dataclass(frozen=True)
+class Told:
+    """A document with what else the lines need.
+
+    units: {joint: N m or N}. after: {joint: held-out RMS with all that is named}. sets: of each
+    command that adds what is named, the set that this stands in: (effect, joint, probability).
+    """
+
+    document: dict
+    units: dict[str, str]
+    after: dict[str, float]
+    sets: dict[str, tuple[tuple[str, str, float], ...]]
+
+
+def told(found: Diagnosis, document: dict) -> Told:
+    """A diagnosis and its document."""
+    fit = found.fit
+    last = found.claims[-1].after if found.claims else fit
+    units = {
+        joint: "N" if slides else "N m"
+        for joint, slides in zip(fit.joints, fit.model.robot.prismatic)
+    }
+    sets = {claim.head.command: claim.set for claim in found.claims}
+    return Told(document, units, last.rms("test"), sets)
+
+
+def verdict(of: Told, width: int) -> list[tuple[str, list[str]]]:
+    """What is said of each joint: [(joint and status, lines that begin with these)]."""
+    said: dict[str, str] = {}  # under which joint a command stands already
+    return [
+        (f"{v['joint']}: {v['status']}", _joint(v, of, width, said)) for v in of.document["verdict"]
+    ]
+
+
+def _joint(v: dict, of: Told, width: int, said: dict[str, str]) -> list[str]:
+    joint, status = v["joint"], v["status"]
+    known = {f["command"]: f for f in of.document["findings"]}
+    heads = [known[command] for command in v.get("commands", []) if command in known]
+    named = listed([placed(f["effect"], f["joint"], joint) for f in heads], "and") if heads else ""
+    first = {
+        "complete": lambda: "no further effect is supported by these logs",
+        "explained": lambda: (
+            "by "
+            + listed([placed(c["effect"], c["joint"]) for c in v["by"]], "and")
+            + f"; {_fall(v, of)}"
+        ),
+        "unresolved": lambda: v["says"] + (f"; {_fall(v, of)}" if of.sets else ""),
+        "missing": lambda: f"{named or v['effect']}; {_fall(v, of)}",
+        "unknown": lambda: (
+            "no effect of the catalogue explains what is left"
+            + (f"; part of it looks like {named}" if named else "")
+        ),
+    }[status]()
+    lines = wrapped(f"{joint}: {status}: {first}", width, "  ")
+    rest = wrapped(f"  {_left(v)}", width, "    ") if "depends_on" in v else []
+    if status == "unknown":
+        lines += rest
+    for head in heads:
+        lines += _head(head, of, joint, width, said)
+    return lines + (rest if status != "unknown" else [])
+
+
+def _fall(v: dict, of: Told) -> str:
+    """Which share of the misfit all that is named explains, and what the held-out error does."""
+    joint, entry = v["joint"], of.document["joints"][v["joint"]]
+    error = f"{entry['rms']['test']:.4g} to {of.after[joint]:.4g} {of.units[joint]}"
+    fall = f"the held-out error goes from {error}"
+    it = "with it" if len(of.sets) == 1 else "with all that is named"
+    if entry["noise_floor"] is None or v.get("explained") is None:
+        return f"{it} {fall}"
+    return f"{it} {percent(max(v['explained'], 0.0))} of the misfit is explained, {fall}"
+
+
+def _head(f: dict, of: Told, joint: str, width: int, said: dict[str, str]) -> list[str]:
+    """One effect that is named: what it takes, its parameters, its ties, the command."""
+    if f["command"] in said:
+        return wrapped(f"  {f['effect']}: see {said[f['command']]}", width, "    ")
+    said[f["command"]] = joint
+    values = [_value(name, p) for name, p in f["parameters"].items() if p["value"] is not None]
+    takes = ""
+    if len(of.sets) > 1:
+        where = "" if f["joint"] == joint else " on all joints"
+        takes = f" takes {percent(max(f['misfit_removed'], 0.0))} of what was left{where}"
+    words = f"  {f['effect']}{takes}" + (f": {', '.join(values)}" if values else "")
+    out = wrapped(words, width, "    ") if takes or values else []
+    others = [m for m in of.sets[f["command"]] if m[:2] != (f["effect"], f["joint"])]
+    if others:
+        rest = listed([f"{placed(e, j, f['joint'])} ({percent(p)})" for e, j, p in others], "or")
+        words = f"  these logs cannot tell it ({percent(f['probability'])}) from {rest}"
+        out += wrapped(words, width, "    ")
+        out += wrapped(f"  to separate them: {f['separate_by']}", width, "    ")
+    return [*out, "  add it with", f["command"]]
+
+
+def _left(v: dict) -> str:
+    """What of the rest of a joint's error the motion predicts."""
+    whole = f"the motion predicts {percent(v['share_left'])} of what is left"
+    alone = [
+        f"{quantity(d['variable'])} alone {percent(d['share'])}"
+        for d in v["depends_on"][:3]
+        if d["variable"] != _TOGETHER
+    ]
+    return whole + (f" ({', '.join(alone)})" if alone else "")
+
+
+def quantity(variable: str) -> str:
+    """A variable of the motion in words."""
+    kind, _, joint = variable.partition("_")
+    word = {"q": "position", "qd": "speed", "qdd": "acceleration", "load": "load"}.get(kind)
+    return f"the {word} of {joint}" if word and joint else variable
+
+
+def _value(name: str, p: dict) -> str:
+    std = "" if p["std"] is None else f" +- {p['std']:.2g}"
+    return f"{name.rpartition('.')[2]} = {p['value']:.4g}{std}" + (
+        "" if p["unit"] in ("", "1") else f" {p['unit']}"
+    )
+
+
+def placed(effect: str, joint: str, here: str = "") -> str:
+    """An effect with its joint, where that is not `here`."""
+    return (
+        effect
+        if joint == here
+        else f"{effect} of the whole robot"
+        if joint == "*"
+        else f"{effect} on {joint}"
+    )
+
+
+def listed(words: Sequence[str], last: str) -> str:
+    """Words as 'a, b or c'."""
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} {last} {words[-1]}"
+
+
+def percent(share: float) -> str:
+    """A share or a probability; little is not said to be nothing, nor nearly all to be all."""
+    return (
+        "less than 1 %"
+        if share < 0.005
+        else f"{100 if share > 0.9999 else min(round(100 * share), 99)} %"
+    )
+
+
+def wrapped(words: str, width: int, indent: str) -> list[str]:
+    """Lines of at most `width`; no word is broken, and no number stands away from its unit."""
+    tied = re.sub(r"(?<=\d) (?=%|N\b|s\b|rad|Hz)|(?<=N) (?=m\b)", "\u00a0", words)
+    lines = textwrap.wrap(
+        tied,
+        max(width, 40),
+        subsequent_indent=indent,
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
+    return [line.replace("\u00a0", " ") for line in lines]

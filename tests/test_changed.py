@@ -1,0 +1,110 @@
+"""A fitted model, held, and a new log: what changed on it, and nothing where nothing did."""
+
+import json
+
+import numpy as np
+import pytest
+
+from scripts.blind_benchmark import PLANAR
+from sysid import pipeline, regressor, results
+from sysid.diagnose import changed
+from sysid.diagnose.changed import document as changes_document
+from sysid.errors import ConfigError, LogError, SysidError
+from tests.conftest import csv
+from tests.test_lowpass import smooth
+
+CHANGED_CONFIG = "robot: {urdf: robot.urdf}\ndata: {train: [train.csv], test: [test.csv]}\nmodel: {effects: [viscous, coulomb]}\n"
+LOAD = np.array([0.8, 0.8 * 0.32, 0.0, 0.8 * 0.02, 0.002, 0.8 * 0.32**2 + 0.003, 0.8 * 0.32**2 + 0.003, 0.0, 0.0, 0.0])  # of the fore link's frame
+
+
+def written(arm, path, seed: int, *, load=None, coulomb=(0.5, 0.3), bias=0.0, seconds: float = 12.0):
+    """A log of the planar arm, with a body on its last link or other friction."""
+    t = np.arange(int(seconds * 250)) / 250.0
+    q, qd, qdd = smooth(t, seed, 1.2)
+    pi = np.array(arm.prior) * 1.1
+    if load is not None:
+        pi[-1] += load
+    tau = regressor.torque(arm, pi, q, qd, qdd) + 0.3 * qd + np.array(coulomb) * np.sign(qd) + [0.0, bias]
+    tau += np.random.default_rng(seed).normal(0.0, 0.1, q.shape)
+    columns = {"t": t} | {f"q_{joint}": q[:, j] for j, joint in enumerate(arm.joints)} | {f"tau_{joint}": tau[:, j] for j, joint in enumerate(arm.joints)}
+    path.write_text(csv(columns))
+
+
+@pytest.fixture(scope="module")
+def fitted(tmp_path_factory, planar):
+    """An experiment, its run folder, and new logs of the robot: the same, with a payload, with more friction."""
+    folder = tmp_path_factory.mktemp("changed")
+    (folder / "config.yaml").write_text(CHANGED_CONFIG)
+    (folder / "robot.urdf").write_text(PLANAR)
+    written(planar, folder / "train.csv", 1)
+    written(planar, folder / "test.csv", 2)
+    written(planar, folder / "same.csv", 3)
+    written(planar, folder / "loaded.csv", 4, load=LOAD)
+    written(planar, folder / "rough.csv", 5, coulomb=(0.5, 0.9))
+    written(planar, folder / "short.csv", 6, seconds=2.0)
+    run = folder / "run"
+    results.write(pipeline.fit(pipeline.load(folder)), run)
+    return folder
+
+
+def what_changed(folder, log: str) -> dict:
+    said = changes_document(changed.changed(pipeline.load(folder), folder / "run", [str(folder / log)]))
+    json.dumps(said, allow_nan=False)
+    assert [v["joint"] for v in said["verdict"]] == ["shoulder", "elbow"] == list(said["joints"])
+    return said
+
+
+def verdict(said: dict, joint: str) -> dict:
+    (own,) = [v for v in said["verdict"] if v["joint"] == joint]
+    return own
+
+
+def test_no_change_no_finding(fitted):
+    said = what_changed(fitted, "same.csv")
+    assert said["findings"] == [] and {v["status"] for v in said["verdict"]} == {"complete"}
+
+
+def test_a_payload_is_found_with_its_mass(fitted):
+    said = what_changed(fitted, "loaded.csv")
+    assert [f["effect"] for f in said["findings"]] == ["payload"]
+    values = said["findings"][0]["parameters"]
+    mass = values["payload.*.m"]
+    assert mass["unit"] == "kg" and mass["std"] < 0.1 and abs(mass["value"] - LOAD[0]) < 3.0 * mass["std"] + 0.005
+    for axis, true in zip("xz", (0.32, 0.02)):
+        entry = values[f"payload.*.com_{axis}"]
+        assert abs(entry["value"] - true) < 4.0 * entry["std"] + 0.01
+    assert any("torque sensors" in notice for notice in said["notices"])
+    assert {v["effect"] for v in said["verdict"]} == {"payload"}
+    for entry in said["joints"].values():
+        assert entry["rms"]["after"] < 0.3 * entry["rms"]["held"]
+
+
+def test_friction_that_grew_is_named_on_its_joint(fitted):
+    said = what_changed(fitted, "rough.csv")
+    assert [(f["effect"], f["joint"]) for f in said["findings"]] == [("coulomb", "elbow")]
+    value = said["findings"][0]["parameters"]["coulomb.elbow.Fc"]
+    assert abs(value["value"] - 0.6) < 4.0 * value["std"] + 0.02
+    assert verdict(said, "shoulder")["status"] == "complete" and verdict(said, "elbow")["effect"] == "coulomb"
+
+
+def test_questions_about_a_change_that_cannot_be_asked(fitted, tmp_path):
+    experiment = pipeline.load(fitted)
+    log = [str(fitted / "same.csv")]
+    other = tmp_path / "other"
+    other.mkdir()
+    (other / "robot.urdf").write_text(PLANAR.replace('"elbow"', '"wrist"'))
+    (other / "config.yaml").write_text(CHANGED_CONFIG)
+    for name in ("train", "test"):
+        (other / f"{name}.csv").write_text((fitted / f"{name}.csv").read_text().replace("_elbow", "_wrist"))
+    (tmp_path / "broken").mkdir()
+    (tmp_path / "broken" / "fit.json").write_text("[]")
+    for kind, asked, words in (
+        (ConfigError, (experiment, tmp_path / "nothing", log), "run folder"),
+        (ConfigError, (experiment, tmp_path / "broken", log), "no run folder"),
+        (ConfigError, (pipeline.load(other), fitted / "run", log), "the run moved shoulder, elbow"),
+        (SysidError, (experiment, fitted / "run", [str(fitted / "absent.csv")]), "absent.csv"),
+        (LogError, (experiment, fitted / "run", [str(fitted / "short.csv")]), "too short"),
+    ):
+        with pytest.raises(kind, match=words) as caught:
+            changed.changed(*asked)
+        assert "\n" not in str(caught.value)

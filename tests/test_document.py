@@ -1,0 +1,135 @@
+"""The document of `sysid diagnose` keeps the shape that is promised, whatever is found."""
+
+import json
+
+import numpy as np
+import pytest
+
+from sysid.diagnose import regions
+from sysid.diagnose.document import document
+from sysid.diagnose.lowpass import LEAST
+from tests.test_select import BIAS, PRODUCT, TWO
+
+NUMBER, OR_NONE = (int, float), (int, float, type(None))
+DIAGNOSE = {
+    "joints": {str: {"rms": {"train": NUMBER, "test": NUMBER}, "noise_floor": OR_NONE, "floor_method": str, "status": str}},
+    "findings": [{
+        "effect": str, "joint": str, "q_value": NUMBER, "rms_test_before": NUMBER, "rms_test_after": NUMBER, "misfit_removed": NUMBER,
+        "misfit_removed_se": NUMBER, "parameters": {str: {"value": NUMBER, "unit": str}}, "tied_with": [str], "separate_by": str,
+        "probability": NUMBER, "command": str,
+    }],
+    "verdict": [{"joint": str, "status": str}],
+    "detectable": [{"effect": str, "joint": str, "parameter": str, "size": NUMBER, "unit": str, "power": NUMBER}],
+    "events": [{"kind": str, "log": str, "start": NUMBER, "stop": NUMBER, "joints": [str]}],
+    "absorbed": [{"effect": str, "joint": str, "separate_by": str}],
+    "fails_where": [{"joint": str, "share_of_error": NUMBER, "words": [str], "regions": list, "map": dict, "time": dict, "frequency": dict}],
+    "not_claimed": [{"effect": str, "joint": str, "why": str}], "notices": [str], "run": str,
+}  # fmt: skip
+NAMED = {"effect": str, "set": [{"effect": str, "probability": NUMBER}], "command": str, "explained": NUMBER, "tied_with": [str], "also": [str]}
+STATUS = ("complete", "missing", "unknown", "unresolved", "explained")
+MORE = {
+    "missing": NAMED, "unknown": {"depends_on": [{"variable": str, "share": NUMBER}], "share_left": NUMBER, "also": [str]},
+    "explained": {"by": [{"effect": str, "joint": str}]}, "unresolved": {"says": str}, "complete": {},
+}  # fmt: skip
+
+
+def keeps(said, shape, at: str = "$") -> None:
+    """A document has the keys and kinds of a shape: {str: shape} is a map, [shape] a list."""
+    if isinstance(shape, dict):
+        assert isinstance(said, dict), at
+        if set(shape) == {str}:
+            for key, value in said.items():
+                keeps(value, shape[str], f"{at}.{key}")
+            return
+        for key, own in shape.items():
+            assert key in said, f"{at} lacks {key}"
+            keeps(said[key], own, f"{at}.{key}")
+    elif isinstance(shape, list):
+        assert isinstance(said, list), at
+        for i, value in enumerate(said):
+            keeps(value, shape[0], f"{at}[{i}]")
+    else:
+        assert isinstance(said, shape) and not isinstance(said, bool), f"{at} is {said!r}"
+
+
+CASES = {"control": ("control",), "bias": BIAS, "two": TWO, "product": PRODUCT}
+
+
+@pytest.fixture(params=CASES)
+def found(request, diagnosed):
+    more = {"seed": 2, "duration": 14.0} if request.param == "product" else {}
+    return diagnosed(*CASES[request.param], **more)
+
+
+def test_the_document_keeps_its_shape(found):
+    said = document(found, "runs/x")
+    assert json.loads(json.dumps(said, allow_nan=False)) == said and said["run"] == "runs/x"
+    keeps(said, DIAGNOSE)
+    joints = list(found.fit.joints)
+    assert list(said["joints"]) == joints == [v["joint"] for v in said["verdict"]]  # every joint once
+    for v in said["verdict"]:
+        assert v["status"] in STATUS and v["status"] == said["joints"][v["joint"]]["status"]
+        keeps(v, MORE[v["status"]], f"verdict of {v['joint']}")
+        if v["status"] == "missing":
+            assert sum(e["probability"] for e in v["set"]) == pytest.approx(1.0)
+            assert v["effect"] in [e["effect"] for e in v["set"]] and v["commands"][0] == v["command"]
+            assert any((f["effect"], f["command"]) == (v["effect"], v["command"]) for f in said["findings"])
+    for joint, entry in said["joints"].items():
+        assert entry["rms"] == {part: found.fit.rms(part)[joint] for part in ("train", "test")}
+
+
+def test_findings_stand_in_their_order(found):
+    said = document(found)
+    steps = [f["joins_as_step"] for f in said["findings"]]
+    assert [s for s in steps if s] == list(range(1, len(found.claims) + 1)) and steps[:1] in ([], [1])
+    for f in said["findings"]:
+        assert 0 < f["q_value"] <= 1 and 0 <= f["probability"] <= 1 and f["command"].startswith("sysid add ")
+        assert f["parameters"] and all(set(entry) == {"value", "std", "unit"} for entry in f["parameters"].values())
+        assert f["joint"] in (*found.fit.joints, "*") and f["misfit_removed"] <= 1.0
+
+
+def test_every_effect_is_detectable_or_absorbed_and_not_both(found):
+    said = document(found)
+    seen, absorbed = ([(e["effect"], e["joint"]) for e in said[key]] for key in ("detectable", "absorbed"))
+    assert not set(seen) & set(absorbed) and len(set(seen)) == len(seen) and ("payload", "*") in absorbed
+    assert all(e["size"] > 0 and e["power"] == 0.9 for e in said["detectable"])
+
+
+def test_where_it_fails_is_all_of_the_error(found):
+    said = document(found)["fails_where"]
+    assert sorted(f["joint"] for f in said) == sorted(found.fit.joints)
+    assert sum(f["share_of_error"] for f in said) == pytest.approx(1.0)
+    for f in said:
+        assert sum(f["frequency"]["share"]) == pytest.approx(1.0, abs=1e-6)
+        assert len(f["frequency"]["edges"]) == len(f["frequency"]["share"]) + 1
+        assert len(f["map"]["mean"]) == len(f["map"]["q"]) - 1
+        for r in f["regions"]:
+            assert 0 < r["share_of_rows"] < 1 and r["low"] < r["high"] and r["share_of_error"] > r["share_of_rows"]
+
+
+def test_the_low_pass_is_said(found):
+    said = document(found)["low_pass"]
+    assert 0 < said["cutoff_hz"] <= 4 * LEAST
+    # what is claimed takes error away under the low-pass too, on logs that nothing was fitted on
+    joints = {c.head.joint for c in found.claims}
+    assert joints or said["rms_test_after"] == said["rms_test_before"]
+    for joint in joints:
+        assert said["rms_test_after"][joint] < said["rms_test_before"][joint]
+
+
+def test_a_region_in_words():
+    words = regions.Region("qd", "rad/s", -0.1, 0.05, 0.62, 0.11).words()
+    assert words == "62 % of the squared error lies in the 11 % of the rows with speed -0.1 to 0.05 rad/s"
+
+
+def test_no_number_is_left_out_where_it_is_not_known(diagnosed):
+    """NaN is null, and a floor that nobody knows is null too."""
+    from dataclasses import replace
+
+    from sysid.noise import NoiseFloor
+
+    made = diagnosed("control")
+    said = document(replace(made, floors={j: NoiseFloor(None, None, "spectral", "too short") for j in made.fit.joints}))
+    assert {entry["noise_floor"] for entry in said["joints"].values()} == {None} == {e["noise_floor_se"] for e in said["joints"].values()}
+    json.dumps(said, allow_nan=False)
+    assert np.isfinite(made.fit.rms("test")["elbow"])

@@ -1,0 +1,244 @@
+"""One statistic for every candidate: its sums are exact least squares with the prior, and refits without blocks."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+from scipy.stats import f as fisher
+from scipy.stats import norm
+from scipy.stats import t as student
+
+from sysid import blocks, config, model, regressor
+from sysid.diagnose import evidence, null
+from sysid.diagnose.candidates import candidates
+from sysid.diagnose.lowpass import lowpassed, stride_of
+from sysid.diagnose.view import looked_at
+from sysid.log import Log, Segment
+from tests.evidences import grouped, posed, stacked, viewed
+from tests.problems import fourier_motion
+
+
+def made(seed: int, k: int = 2, joints=(0, 1)):
+    """A problem, its view, columns that are partly the model's own, and their group."""
+    rng = np.random.default_rng(seed)
+    p = posed(rng)
+    own = rng.normal(size=(len(joints), p.a.shape[1], k)) + p.a[list(joints)][:, :, :k]
+    view = viewed(p)
+    (group,) = grouped(view, own[None], joints)
+    return p, view, own, group
+
+
+def directions(p, view, own, joints, back) -> tuple[np.ndarray, np.ndarray]:
+    """Orthonormal columns by hand: weighted rows of all joints, the prior's last; and the block of each, -1 of the prior's."""
+    k = own.shape[2]
+    m, _ = stacked(p, own, joints)
+    base, more = m[:, :-k], m[:, -k:]
+    q = (more - base @ np.linalg.lstsq(base, more, rcond=None)[0]) @ back
+    return q, np.concatenate([np.tile(p.number, p.a.shape[0]), np.full(len(p.root), -1)])
+
+
+@pytest.mark.parametrize("joints", [(0, 1), (0,), (1,)])
+@pytest.mark.parametrize("seed", range(3))
+def test_coefficients_are_least_squares_with_the_prior(seed, joints):
+    p, view, own, group = made(seed, joints=joints)
+    m, y = stacked(p, own, joints)
+    best = np.linalg.lstsq(m, y, rcond=None)[0]
+    np.testing.assert_allclose(group.coefficients, best[-2:], rtol=1e-8, atol=1e-10)
+    before, after = (np.sum((m @ x - y) ** 2) for x in (np.append(view.x, [0, 0]), best))
+    assert group.c @ group.c == pytest.approx(before - after, rel=1e-8)
+    # what the model leaves of each own column
+    base = m[:, :-2]
+    for i in range(2):
+        column = m[:, -2 + i]
+        rest = column - base @ np.linalg.lstsq(base, column, rcond=None)[0]
+        assert group.sizes[i] == pytest.approx(np.linalg.norm(rest), rel=1e-8)
+
+
+@pytest.mark.parametrize("joints", [(0, 1), (1,)])
+def test_groups_are_orthonormal(joints):
+    p, view, own, group = made(3, joints=joints)
+    q, number = directions(p, view, own, joints, group.back)
+    np.testing.assert_allclose(q.T @ q, np.eye(2), atol=1e-10)
+    for b in range(p.number.max() + 1):
+        np.testing.assert_allclose(group.squares[b], q[number == b].T @ q[number == b], atol=1e-10)
+    prior = q[number == -1].T @ q[number == -1]
+    assert 1e-4 < np.trace(prior) < 1.0  # the prior is a block of its own
+    np.testing.assert_allclose(group.squares.sum(0) + prior, np.eye(2), atol=1e-10)
+
+
+def left_out_refits(p, view, own, joints, group, number_of):
+    """Coefficients of the orthonormal columns fitted without each number, what the model had absorbed being theirs."""
+    q, number = directions(p, view, own, joints, group.back)
+    m, y = stacked(p, own, joints)
+    rest = y - m[:, :-2] @ view.x
+    own_number = np.where(number >= 0, number_of[np.maximum(number, 0)], -1)
+    out = []
+    for b in range(number_of.max() + 1):
+        keep = own_number != b
+        out.append((np.linalg.lstsq(q[keep], rest[keep], rcond=None)[0], q[~keep], rest[~keep]))
+    return out
+
+
+@pytest.mark.parametrize("joints", [(0, 1), (0,)])
+def test_moves_are_refits_without_a_block(joints):
+    p, view, own, group = made(4, joints=joints)
+    refits = left_out_refits(p, view, own, joints, group, np.arange(20))
+    for move, (c, *_) in zip(group.moves, refits, strict=True):
+        np.testing.assert_allclose(group.c - move, c, atol=1e-9)
+
+
+def test_gain_is_what_refits_take_of_the_fold_they_did_not_see():
+    p, view, own, group = made(5)
+    refits = left_out_refits(p, view, own, (0, 1), group, blocks.folds(20))
+    told = [np.sum(r**2) - np.sum((r - q @ c) ** 2) for c, q, r in refits]
+    np.testing.assert_allclose(evidence.gain(group), told, rtol=1e-7, atol=1e-8)
+
+
+def test_what_the_model_has_already_makes_no_group():
+    rng = np.random.default_rng(6)
+    p = posed(rng, prior=0.0)
+    view = viewed(p)
+    mix = p.a @ rng.normal(size=(5, 2))
+    assert grouped(view, mix[None]) == []
+    assert grouped(view, np.zeros((1, 2, 240, 2))) == []
+    # one new direction beside one that is there: one direction, whose coefficient is found all the same
+    new = rng.normal(size=(2, 240, 1))
+    (group,) = grouped(view, np.concatenate([mix[:, :, :1], new], axis=2)[None])
+    assert group.squares.shape[1:] == (1, 1)
+    m, y = stacked(p, new)
+    # of the two own columns the new one alone is determined, up to what the old one shares with the model
+    assert group.c @ group.c == pytest.approx(
+        np.sum((m[:, :-1] @ view.x - y) ** 2) - np.sum((m @ np.linalg.lstsq(m, y, rcond=None)[0] - y) ** 2)
+    )
+
+
+def test_what_only_the_prior_tells_makes_no_group():
+    """Columns that the model could absorb but for the prior, which holds it: the data do not tell of them."""
+    rng = np.random.default_rng(7)
+    p = posed(rng)
+    p.root = 1e4 * np.eye(5)
+    view = viewed(p)
+    assert len(grouped(view, p.a[None, :, :, :1] + 0.1 * rng.normal(size=(1, 2, 240, 1)))) == 1
+    p.root = 3.0 * np.eye(5)  # little beside 480 rows: what is left of a column is the prior's
+    assert grouped(viewed(p), p.a[None, :, :, :1] + 0.02 * rng.normal(size=(1, 2, 240, 1))) == []
+
+
+def test_columns_that_are_mostly_noise_make_no_group():
+    rng = np.random.default_rng(8)
+    p = posed(rng)
+    view = viewed(p)
+    own = rng.normal(size=(1, 2, 240, 1))
+    candidate = grouped(view, own)[0].candidate
+    group = lambda share: evidence._made(view, [(candidate, {})], [0, 1], own, own + share * rng.normal(size=own.shape))  # noqa: E731
+    assert len(group(0.3)) == 1 and group(0.8) == []
+
+
+def test_a_scale_of_the_columns_changes_coefficients_alone():
+    p, view, own, group = made(9)
+    (other,) = grouped(view, 1e5 * own[None])
+    np.testing.assert_allclose(other.coefficients, 1e-5 * group.coefficients, rtol=1e-6)
+    np.testing.assert_allclose(evidence.gain(other), evidence.gain(group), rtol=1e-6)
+    np.testing.assert_allclose(null.statistics([other]), null.statistics([group]), rtol=1e-6)
+
+
+def test_what_rests_on_few_blocks_is_not_tested():
+    rng = np.random.default_rng(10)
+    p = posed(rng)
+    for count, told in ((2, False), (15, True)):
+        own = rng.normal(size=(1, 2, 240, 1)) * (p.number < count)[None, None, :, None]
+        (group,) = grouped(viewed(p), own)
+        assert group.testable is told and evidence.resting(group.squares) == pytest.approx(count, rel=0.15)
+        assert np.isnan(null.statistics([group])[0]) is np.bool_(not told)
+
+
+# ---- the scale of a normal variable
+
+
+@pytest.mark.parametrize("d1", [1.0, 2.0, 5.0])
+@pytest.mark.parametrize("d2", [8.0, 20.0, 60.0])
+def test_normal_scores_are_normal_quantiles_of_f_ratios(d1, d2):
+    for p in (0.2, 0.05, 0.01, 1e-3, 1e-4):
+        ratio = fisher.isf(p, d1, d2)
+        assert evidence.normal_scores(ratio, d1, d2) == pytest.approx(norm.isf(p), rel=0.05), p
+    grid = evidence.normal_scores(np.linspace(0.0, 50.0, 500), d1, d2)
+    assert (np.diff(grid) > 0).all()
+
+
+# ---- the noise of the angles
+
+
+SECONDS, RATE, ANGLE, NOISE = 12.0, 250.0, 2e-4, 0.15  # rad, N m: the angles' noise makes most of the residual
+
+
+def view_of(planar, effects: list[str], seed: int, *, noise=None, seconds: float = SECONDS):
+    """A view of a control whose angles are measured with noise, drawn once more for the rough motion; its torque is the model's
+    own and white noise."""
+    t, q, qd, qdd = fourier_motion(np.random.default_rng(0), seconds, RATE, 2)
+    rng = np.random.default_rng(seed)
+    tau = regressor.torque(planar, planar.prior, q, qd, qdd) + 0.3 * qd
+    tau += NOISE * rng.normal(size=q.shape) if noise is None else noise(rng, len(t))
+    experiment = config.Experiment(robot=config.RobotSpec(urdf="planar.urdf"), model={"effects": effects})
+    structure = model.build(planar, experiment.model.effects)
+    seen = q + ANGLE * rng.normal(size=q.shape)
+    again = seen + ANGLE * rng.normal(size=q.shape)
+    plain, rough = (
+        lowpassed([Log("made", Path("made"), "", (Segment(t, 1.0 / RATE, q, tau, None, None, {}),))], planar.joints, 15.0) for q in (seen, again)
+    )  # fmt: skip
+    view = looked_at(experiment, structure, plain, rough, np.array(planar.prior), stride=stride_of(plain, 15.0))
+    return in_blocks(view)
+
+
+def in_blocks(view):
+    """The view with blocks of half a second: how long its noise remembers is not what is asked here, and takes long."""
+    vars(view)["blocks"] = blocks.numbered(view.rows.t, view.rows.piece)
+    return view
+
+
+def test_what_does_not_depend_on_the_motion_has_no_noise(planar):
+    """The second draw leaves out other rows near a reversal; that is no noise, and a constant column has none."""
+    view = view_of(planar, ["viscous", "torque_bias"], 0)
+    assert any((one.use != other.use).any() for one, other in zip(view.motion.pieces, view.rough.pieces, strict=True))
+    bias = [10 * view.model.bodies + k for k, c in enumerate(view.model.coefficients) if c.effect == "torque_bias"]
+    assert len(bias) == 2 and not view.design.rough_columns[:, :, bias].any()
+
+
+@pytest.fixture(scope="module")
+def views(planar):
+    """Twelve draws."""
+    return [view_of(planar, ["viscous"], seed) for seed in range(12)]
+
+
+def test_the_noise_of_the_angles_is_taken_off(views):
+    """Nothing is hidden; the angles' noise stands in columns and residual alike, and parameters that take it up bend
+    others. With the noise drawn once more and taken off, the mean of every coefficient is nothing within its error."""
+    # what the second draw makes is as large as what the first one did
+    share = [np.sum(v.design.rough_residual**2, axis=0) / np.sum(v.design.residual**2, axis=0) for v in views]
+    assert 0.8 < np.mean(share) < 1.0
+    away = {}
+    for name, joint in (("encoder_offset", 0), ("torque_bias", 0), ("torque_bias", 1), ("spring", 1), ("armature", 1), ("coulomb", 0)):
+        plain, corrected = [], []
+        for view in views:
+            (candidate,) = [c for c in candidates(view.model) if (c.name, c.joint) == (name, joint)]
+            for out, own in ((plain, in_blocks(replace(view, rough=view.motion))), (corrected, view)):
+                (group,) = evidence.groups(own, [candidate])
+                out.append(group.coefficients[0])
+        away[name, joint] = [np.sqrt(len(own)) * np.mean(own) / np.std(own, ddof=1) for own in (plain, corrected)]
+    # Student's, eleven degrees of freedom, six questions: one in a thousand in all
+    assert max(abs(corrected) for _, corrected in away.values()) < student.isf(0.5e-3 / 6, 11), away
+    assert min(abs(plain) for plain, _ in away.values()) > 2.0 and abs(away["encoder_offset", 0][0]) > 8.0, away
+
+
+@pytest.mark.parametrize("slow", [0.05, 0.3])
+def test_blocks_are_long_against_what_noise_remembers(planar, slow):
+    """Four memories of a noise that no motion predicts, where half a second is less."""
+    keep = np.exp(-1.0 / (RATE * slow))
+
+    def coloured(rng, n):
+        return lfilter([np.sqrt(1.0 - keep**2)], [1.0, -keep], rng.normal(size=(n, 2)), axis=0)
+
+    view = view_of(planar, ["viscous"], 3, noise=coloured, seconds=30.0)
+    del vars(view)["blocks"]
+    length = np.ptp(view.rows.t) / (view.blocks.max() + 1)
+    assert length == pytest.approx(max(0.5, 4.0 * 0.9 * slow), rel=0.4)

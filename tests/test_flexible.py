@@ -1,0 +1,125 @@
+"""What a flexible function predicts of a residual: laws that it was never told, and nothing of noise."""
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+from scipy.stats import binom
+
+from sysid import blocks
+from sysid.diagnose.flexible import Unknown, unknown
+from sysid.diagnose.select import LEVEL
+from sysid.diagnose.verdict import predictable
+
+STEP, N = 0.01, 2500
+RNG = np.random.default_rng(0)
+
+
+def _motion():
+    t = np.arange(N) * STEP
+    w = 2.0 * np.pi * RNG.uniform(0.1, 0.9, (5, 1, 2))
+    phase = w * t[None, :, None] + RNG.uniform(0, 6, (5, 1, 2))
+    a = RNG.uniform(0.1, 0.4, (5, 1, 2))
+    q, qd, qdd = (a * np.sin(phase)).sum(0), (a * w * np.cos(phase)).sum(0), -(a * w**2 * np.sin(phase)).sum(0)
+    known = {}
+    for j, joint in enumerate(("shoulder", "elbow")):
+        known |= {f"q_{joint}": q[:, j], f"qd_{joint}": qd[:, j], f"qdd_{joint}": qdd[:, j]}
+        known[f"load_{joint}"] = 5.0 * np.cos(q[:, j]) + qdd[:, j]
+    return known | {"time": t}
+
+
+KNOWN = _motion()
+FOLD = blocks.numbered(KNOWN["time"], np.zeros(N, int), shortest=np.inf, fewest=30) % 10  # as a view has them
+
+
+def asked(law, *, noise: float = 0.3, seed: int = 1, use=None) -> Unknown:
+    """What is found of a law on the elbow, of unit size under noise."""
+    values = law(KNOWN) if callable(law) else law
+    values = values / np.std(values) if np.std(values) > 0 else values
+    rng = np.random.default_rng(seed)
+    slow = lfilter([0.6], [1.0, -0.8], rng.normal(size=N))
+    use = np.ones(N, bool) if use is None else use
+    residual = np.where(use, values + noise * slow, 0.0)
+    return unknown(KNOWN, "elbow", residual, use, FOLD, np.zeros(N, int), STEP, np.random.default_rng(0))
+
+
+def lagged(span: float):
+    keep = np.exp(-STEP / span)
+    return lambda known: lfilter([1.0 - keep], [1.0, -keep], known["qd_elbow"])
+
+
+LAWS = {
+    "an angle": (lambda v: np.sin(5.0 * v["q_elbow"]), "q_elbow"),
+    "another joint's angle": (lambda v: np.sin(3.0 * v["q_shoulder"]), "q_shoulder"),
+    "another joint's speed": (lambda v: np.abs(v["qd_shoulder"]), "qd_shoulder"),
+    "the past speed": (lagged(0.3), None),
+    "friction that follows an angle": (lambda v: np.sign(v["qd_elbow"]) * (1.0 + np.sin(3.0 * v["q_elbow"])), None),
+    "friction that follows another angle": (lambda v: np.sign(v["qd_elbow"]) * np.sin(3.0 * v["q_shoulder"]), None),
+    "a product of two angles": (lambda v: v["q_elbow"] * v["q_shoulder"], None),
+}
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_a_law_of_the_motion_is_predicted(name):
+    law, variable = LAWS[name]
+    found = asked(law)
+    own = law(KNOWN) / np.std(law(KNOWN))
+    assert found.gain.sum() > 0.5 * np.sum(own**2) and predictable(found, 2), found.gain.sum() / np.sum(own**2)
+    # what is told is the law, on folds that it was not fitted on
+    assert np.corrcoef(found.told, own)[0, 1] > 0.8
+    assert found.gain.sum() <= found.total
+    if variable is not None:
+        assert max(found.shares, key=found.shares.get) == variable and found.shares[variable] > 0.4
+
+
+@pytest.mark.parametrize("hertz", [2.7, 6.3, 13.0])
+def test_a_steady_tone_is_told(hertz):
+    """What comes in time and not with the motion."""
+    found = asked(lambda v: np.sin(2.0 * np.pi * hertz * v["time"]))
+    assert found.tone > 0.8 and found.shares["a steady tone"] == found.tone and predictable(found, 2)
+    assert found.gain.sum() < 0.1 * found.total  # functions of the motion do not predict it
+    assert asked(LAWS["an angle"][0]).tone == 0.0
+
+
+def test_gain_is_what_the_prediction_takes():
+    found = asked(LAWS["an angle"][0], seed=7)
+    law = LAWS["an angle"][0](KNOWN)
+    slow = lfilter([0.6], [1.0, -0.8], np.random.default_rng(7).normal(size=N))
+    residual = law / np.std(law) + 0.3 * slow
+    taken = blocks.summed(FOLD, residual**2 - (residual - found.told) ** 2)
+    np.testing.assert_allclose(found.gain, taken, atol=1e-8)
+    assert found.total == pytest.approx(np.sum(residual**2))
+
+
+def test_nothing_is_predicted_of_noise():
+    """Over noises of some colour the gain stands about zero or below it, and as few are called predictable as the level says."""
+    draws = 24
+    found = [asked(np.zeros(N), noise=1.0, seed=seed) for seed in range(draws)]
+    shares = np.array([f.gain.sum() / f.total for f in found])
+    assert shares.mean() < 0.01 and shares.max() < 0.05, shares
+    assert sum(predictable(f, 2) for f in found) <= binom.ppf(1.0 - 1e-3, draws, LEVEL / 2)
+    assert 0.2 < np.mean([f.chance > 0.5 for f in found])  # as many questions as groups: a bound, and no certainty
+
+
+def test_what_stands_beside_a_fold_does_not_predict_it():
+    """Noise remembers: so a fold is predicted from rows apart from it. Wild ones next to it change nothing in it."""
+    slow = lfilter([0.6], [1.0, -0.8], np.random.default_rng(0).normal(size=N))
+    own = FOLD == 3
+    beside = ~own & (np.convolve(own, np.ones(21), "same") > 0)  # a tenth of a second
+    assert beside.sum() > 30
+    spoilt = np.where(beside, 1e6, slow)
+    found = unknown(KNOWN, "elbow", spoilt, np.ones(N, bool), FOLD, np.zeros(N, int), STEP, np.random.default_rng(0))
+    assert np.abs(found.told[own]).max() < 5.0 < 1e4 < np.abs(found.told[~own]).max()
+
+
+def test_rows_left_out_are_not_predicted():
+    use = np.sin(KNOWN["time"]) > -0.5
+    found = asked(LAWS["an angle"][0], use=use)
+    assert not found.told[~use].any() and predictable(found, 2)
+
+
+def test_a_motion_that_stands_has_no_functions():
+    """A joint that never moves gives no splines, and nothing breaks."""
+    still = {**KNOWN, "q_shoulder": np.zeros(N), "qd_shoulder": np.zeros(N), "qdd_shoulder": np.zeros(N)}
+    law = np.sin(5.0 * KNOWN["q_elbow"])
+    found = unknown(still, "elbow", law, np.ones(N, bool), FOLD, np.zeros(N, int), STEP, np.random.default_rng(0))
+    assert found.gain.sum() > 0.8 * found.total and np.isfinite(found.told).all()

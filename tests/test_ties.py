@@ -1,0 +1,94 @@
+"""Which explanations logs cannot tell apart: losses are those of refits without each fold, and the set holds the truth."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from sysid import blocks, pipeline
+from sysid.diagnose.diagnosis import first_view
+from sysid.diagnose.select import ask
+from sysid.diagnose.ties import Choice, chosen, holds, losses, refitted
+from tests.evidences import posed, stacked, viewed
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_losses_are_what_refits_leave_of_the_fold_they_did_not_see(seed):
+    p = posed(np.random.default_rng(seed))
+    found = losses(viewed(p), p.number)
+    fold, none = blocks.folds(20), np.zeros((*p.a.shape[:2], 0))
+    assert found.shape == (20, 2)
+    for f in range(fold.max() + 1):
+        m, y = stacked(p, none, keep=fold[p.number] != f)
+        x = np.linalg.lstsq(m, y, rcond=None)[0]
+        left = (p.tau - np.einsum("jnk,k->nj", p.a, x)) * p.weights
+        for b in np.flatnonzero(fold == f):
+            np.testing.assert_allclose(found[b], np.sum(left[p.number == b] ** 2, axis=0), rtol=1e-7)
+
+
+def test_what_the_angles_noise_makes_is_taken_off_the_losses():
+    p = posed(np.random.default_rng(4))
+    view = viewed(p)
+    plain = losses(view, p.number)
+    view.design.rough_residual[:] = 0.3
+    np.testing.assert_allclose(losses(view, p.number), plain - 12 * 0.09)  # twelve rows a block
+
+
+@pytest.fixture(scope="module")
+def biased(simulated):
+    """The view of an arm with a bias in its elbow, and what is asked of it."""
+    experiment = pipeline.load(simulated("bias", "torque_bias:elbow:b=0.4"))
+    view = first_view(experiment, pipeline.fit(experiment))
+    return view, ask(view).groups
+
+
+def of(groups, name: str, joint: int):
+    return next(g for g in groups if g.candidate.key == (name, joint))
+
+
+def test_a_refit_has_the_effect_in_it_and_loses_less(biased):
+    view, groups = biased
+    member = refitted(view, of(groups, "torque_bias", 1))
+    own = [10 * member.view.model.bodies + k for k, c in enumerate(member.view.model.coefficients) if c.effect == "torque_bias"]
+    assert member.view.settled.x[own] == pytest.approx([0.4], rel=0.1)
+    assert member.losses.sum() < 0.7 * losses(view, view.blocks).sum()
+    assert member.losses.shape == (view.blocks.max() + 1, 2)
+
+
+def test_the_set_holds_the_truth_and_its_twin_and_not_the_rest(biased):
+    view, groups = biased
+    asked = [of(groups, *key) for key in (("asymmetric_coulomb", 1), ("torque_bias", 1), ("torque_bias", 0), ("quadratic_drag", 1))]
+    found = chosen(view, asked, np.random.default_rng(0))
+    assert found.head.candidate.name == "torque_bias"
+    assert {m.candidate.key for m, _ in found.members} == {("torque_bias", 1), ("asymmetric_coulomb", 1)}
+    assert [p for _, p in found.members] == pytest.approx([0.5, 0.5], abs=0.01)  # one column: nobody can tell
+    assert found.gain.sum() == pytest.approx((losses(view, view.blocks) - found.head.losses).sum())
+
+
+def test_what_only_adds_freedom_is_told(biased):
+    """A spring is a bias and a slope, and holds a bias; the other way round it does not, and of twins neither does."""
+    view, groups = biased
+    bias, spring, twin = (refitted(view, of(groups, name, 1)) for name in ("torque_bias", "spring", "asymmetric_coulomb"))
+    assert holds(view, spring, bias) and not holds(view, bias, spring)
+    assert not holds(view, bias, twin) and not holds(view, twin, bias)
+    drag = refitted(view, of(groups, "position_friction", 1))
+    assert not holds(view, drag, bias)  # more numbers, and another torque
+
+
+def test_a_size_that_may_not_be_negative_is_no_member(simulated):
+    """A bias in a robot whose friction falls with speed: a drag of that sign there is not."""
+    law = lambda q, qd, qdd, t, load, memory: np.array([0.0, -0.05 * qd[1] * abs(qd[1])])  # noqa: E731
+    experiment = pipeline.load(simulated("less_drag", law))
+    view = first_view(experiment, pipeline.fit(experiment))
+    drag = of(ask(view).groups, "quadratic_drag", 1)
+    assert drag.coefficients[0] == pytest.approx(-0.05, rel=0.2)
+    assert refitted(view, drag) is None and chosen(view, [drag], np.random.default_rng(0)) is None
+
+
+@pytest.mark.parametrize(("members", "told"), [
+    ([(0, 0.4), (0, 0.6)], True), ([(0, 1.0)], True), ([(0, 0.6), (1, 0.4)], True), ([(0, 0.4), (1, 0.35), (-1, 0.25)], False),
+])  # fmt: skip
+def test_a_log_decides_where_it_says_which_joint(members, told):
+    """All of one joint, or one likelier than all others together."""
+    made = tuple((SimpleNamespace(candidate=SimpleNamespace(joint=joint)), chance) for joint, chance in members)
+    assert Choice(made[0][0], made, np.zeros(3)).decided is told

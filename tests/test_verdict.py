@@ -1,0 +1,231 @@
+"""The verdict on each joint, from small made inputs; and the size that a log would have shown, from logs with and without it."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from sysid import pipeline
+from sysid.diagnose.candidates import candidates
+from sysid.diagnose.detectable import detectable
+from sysid.diagnose.diagnosis import first_view
+from sysid.diagnose.document import _verdict, dependences
+from sysid.diagnose.flexible import Unknown
+from sysid.diagnose.select import LEVEL, WORTH, ask, search
+from sysid.diagnose.verdict import predictable, verdicts
+from sysid.effect import Linear, TorqueEffect
+from sysid.noise import NoiseFloor
+
+# ---- verdicts, by hand
+
+JOINTS = ("shoulder", "elbow")
+NOISE = Unknown(np.array([3.0, -4.0, 1.0, -2.0, 2.0, -3.0, 1.0, -1.0, 0.0, 1.0]), np.zeros(0), {"q_elbow": 0.001}, 1000.0)
+
+
+def left(share: float) -> Unknown:
+    """Functions of the motion predict a share of what is left, evenly over folds."""
+    gain = 100.0 * share * (1.0 + 0.1 * np.array([1, -1, 2, -2, 0, 1, -1, 0, 1, -1]))
+    return Unknown(gain, np.zeros(0), {"q_elbow": share, "time": 0.01}, 1000.0, chance=1e-6)
+
+
+def fitted(elbow: float, shoulder: float = 1.0, train: float | None = None):
+    rms = {"test": {"shoulder": shoulder, "elbow": elbow}}
+    rms["train"] = rms["test"] if train is None else {"shoulder": shoulder, "elbow": train}
+    return SimpleNamespace(joints=JOINTS, rms=rms.get)
+
+
+def claim(effect: str, joint: str, shares, after):
+    number = -1 if joint == "*" else JOINTS.index(joint)
+    head = SimpleNamespace(effect=effect, joint=joint, candidate=SimpleNamespace(joint=number), tied_with=(), command=f"sysid add x {effect}")
+    return SimpleNamespace(head=head, step=SimpleNamespace(shares=np.array(shares)), after=after, set=((effect, joint, 1.0),))
+
+
+def floor(value: float | None = 1.0, std: float = 0.02) -> NoiseFloor:
+    return NoiseFloor(value, None if value is None else std, "spectral", "the band is narrow")
+
+
+def elbow(first: float, claims=(), *, rest=NOISE, before=NOISE, level=None, refused=(), train=None):
+    """The elbow's verdict; the noise floor is one."""
+    found = verdicts(fitted(first, train=train), claims, [NOISE, rest], [NOISE, before], [floor(), level or floor()], refused)
+    assert [v.joint for v in found] == list(JOINTS) and found[0].status in ("complete", "explained")
+    return found[1]
+
+
+def test_at_the_floor_it_is_complete():
+    found = elbow(1.05)
+    assert found.status == "complete" and not found.claims and found.left is None and found.says == ""
+    # a floor in doubt counts to its doubt: a tenth, and two deviations
+    assert elbow(1.139).status == "complete" and elbow(1.141).status == "unresolved"
+    assert elbow(1.3, level=floor(std=0.11)).status == "complete"
+
+
+def test_an_effect_on_it_is_missing():
+    bias = claim("torque_bias", "elbow", [0.0, 0.8], fitted(1.1))
+    found = elbow(2.0, [bias])
+    assert found.status == "missing" and found.claims == (bias,)
+    # of 3 above the floor's square, 4 - 1.21 is taken
+    assert found.explained == pytest.approx(2.79 / 3.0)
+    said = _verdict(found)
+    assert said["effect"] == "torque_bias" and said["set"] == [{"effect": "torque_bias", "joint": "elbow", "probability": 1.0}]
+    assert said["command"] == "sysid add x torque_bias" and said["also"] == [] and said["explained"] == found.explained
+
+
+def test_two_effects_stand_in_their_order():
+    first, second = claim("torque_bias", "elbow", [0.0, 0.5], fitted(1.5)), claim("spring", "elbow", [0.0, 0.3], fitted(1.0))
+    found = elbow(2.0, [first, second])
+    assert found.claims == (first, second) and _verdict(found)["also"] == ["spring"] and len(_verdict(found)["commands"]) == 2
+    assert found.explained == pytest.approx(1.0)
+
+
+def test_what_another_joint_s_effect_explains_is_explained():
+    """The elbow's error falls to its floor with an effect of the shoulder: the elbow lacks nothing of its own."""
+    other = claim("stribeck", "shoulder", [0.9, 0.3], fitted(1.02, 1.0))
+    found = verdicts(fitted(1.5, 3.0), [other], [NOISE] * 2, [NOISE] * 2, [floor()] * 2)
+    assert [v.status for v in found] == ["missing", "explained"]
+    assert found[1].claims == (other,) and found[1].explained == pytest.approx((1.5**2 - 1.02**2) / (1.5**2 - 1.0))
+    assert _verdict(found[1])["by"] == [{"effect": "stribeck", "joint": "shoulder"}]
+    # one that was at its floor before is complete, whatever else joined
+    found = verdicts(fitted(1.05, 3.0), [other], [NOISE] * 2, [NOISE] * 2, [floor()] * 2)
+    assert [v.status for v in found] == ["missing", "complete"]
+
+
+def test_an_effect_of_the_robot_is_missing_where_it_matters():
+    tilt = claim("gravity_tilt", "*", [0.8, 0.5 * WORTH], fitted(1.0, 1.0))
+    found = verdicts(fitted(1.02, 3.0), [tilt], [NOISE] * 2, [NOISE] * 2, [floor()] * 2)
+    assert [v.status for v in found] == ["missing", "complete"]
+
+
+def test_what_the_motion_predicts_and_no_effect_does_is_unknown():
+    found = elbow(2.0, rest=left(0.6))
+    assert found.status == "unknown" and found.left is not None
+    said = _verdict(found)
+    assert said["depends_on"] == [{"variable": "q_elbow", "share": 0.6}] and said["share_left"] == pytest.approx(0.6) and said["also"] == []
+    # nothing above the floor is left: it predicts the noise's own colour at most
+    assert elbow(1.0, rest=left(0.6)).status == "complete"
+    assert elbow(2.0, rest=left(0.6 * WORTH)).status == "unresolved"
+
+
+@pytest.mark.parametrize(("taken", "share", "status"), [(0.2, 0.5, "unknown"), (0.6, 0.5, "missing"), (0.2, 0.05, "missing")])
+def test_the_greater_part_gives_the_name(taken, share, status):
+    """An effect took a share of all; of the rest functions of the motion predict a share still."""
+    found = elbow(3.0, [claim("cogging", "elbow", [0.0, taken], fitted(2.0))], rest=left(share))
+    assert found.status == status and found.left is not None
+    said = _verdict(found)
+    assert (said["effect"] == "cogging") if status == "missing" else (said["also"] == ["cogging"] and "effect" not in said)
+
+
+def test_error_above_the_floor_that_nothing_predicts_is_unresolved():
+    found = elbow(2.0)
+    assert found.status == "unresolved" and "2 times the noise floor" in found.says
+    refused = SimpleNamespace(effect="backlash", joint="elbow", why="its parameters are nothing")
+    assert "backlash was looked at and is not claimed: its parameters are nothing" in elbow(2.0, refused=[refused]).says
+    assert "backlash" not in elbow(2.0, refused=[SimpleNamespace(effect="backlash", joint="shoulder", why="x")]).says
+
+
+def test_a_floor_that_nobody_knows_leaves_it_unresolved():
+    found = elbow(1.0, level=floor(None))
+    assert found.status == "unresolved" and "noise floor is not known (the band is narrow)" in found.says
+    # what is there is named all the same, and what it explains is told of what can be known
+    found = elbow(2.0, [claim("torque_bias", "elbow", [0.0, 0.8], fitted(1.2))], level=floor(None))
+    assert found.status == "missing" and found.explained == pytest.approx(1.0)
+    assert elbow(2.0, rest=left(0.6), level=floor(None)).status == "unknown"
+
+
+def test_training_logs_explained_and_test_logs_not():
+    found = elbow(2.0, train=1.0)
+    assert found.status == "unresolved" and "does not carry over" in found.says
+
+
+def test_an_error_at_the_floor_on_test_logs_alone_is_not_complete():
+    """The training logs fail, so the floor is not reached."""
+    assert elbow(1.0, train=2.0).status == "unresolved"
+
+
+def test_dependences_are_sorted_and_say_something():
+    found = Unknown(np.full(10, 20.0), np.zeros(0), {"a": 0.05, "b": 0.3, "c": 0.01}, 1000.0)
+    assert dependences(found) == [{"variable": "b", "share": 0.3}, {"variable": "a", "share": 0.05}]
+    alone = Unknown(np.full(10, 20.0), np.zeros(0), {"a": 0.0}, 1000.0)
+    assert dependences(alone) == [{"variable": "several variables together", "share": pytest.approx(0.2)}]
+
+
+def test_predictable_is_a_level_and_a_share():
+    assert predictable(left(0.3), 2) and not predictable(NOISE, 2) and not predictable(left(0.9 * WORTH), 2)
+    by_chance = replace(left(0.3), chance=0.6 * LEVEL)
+    assert predictable(by_chance, 1) and not predictable(by_chance, 2)  # a level for all joints together
+    assert predictable(replace(NOISE, tone=2.0 * WORTH), 2) and not predictable(replace(NOISE, tone=0.9 * WORTH), 2)
+
+
+def test_a_tone_alone_is_unknown_and_its_share_is_said():
+    hum = replace(NOISE, tone=0.4, shares={"a steady tone": 0.4})
+    found = elbow(2.0, rest=hum)
+    assert found.status == "unknown"
+    said = _verdict(found)
+    assert said["depends_on"] == [{"variable": "a steady tone", "share": 0.4}] and said["share_left"] == pytest.approx(0.4)
+    # and it is weighed against what effects took
+    assert elbow(3.0, [claim("cogging", "elbow", [0.0, 0.1], fitted(2.0))], rest=hum).status == "unknown"
+    assert elbow(3.0, [claim("cogging", "elbow", [0.0, 0.6], fitted(2.0))], rest=hum).status == "missing"
+
+
+# ---- what a log could have shown
+
+
+class Crosstalk(TorqueEffect):
+    """The first joint's angle pulls."""
+
+    name = "crosstalk"
+    c = Linear("N m", says="size")
+    times = 1.0
+
+    def columns(self, motion, joint):
+        return self.times * np.sin(2.0 * motion.q[None, :, 0])
+
+
+class Doubled(Crosstalk):
+    """Twice the same."""
+
+    name = "doubled"
+    times = 2.0
+
+
+@pytest.fixture(scope="module")
+def control(simulated):
+    """The view of a robot in which nothing is hidden, and its answers."""
+    experiment = pipeline.load(simulated("control"))
+    view = first_view(experiment, pipeline.fit(experiment))
+    extra = [Crosstalk().bound(view.model.robot, 1), Doubled().bound(view.model.robot, 1)]
+    return view, extra, ask(view, extra)
+
+
+def sizes(control) -> dict:
+    view, extra, asked = control
+    return {d.candidate.key: d for d in detectable(view, asked, candidates(view.model, extra))}
+
+
+def test_the_smallest_size_is_as_the_inverse_of_the_column(control):
+    found = sizes(control)
+    for joint in range(2):
+        one, two = found["crosstalk", joint], found["doubled", joint]
+        assert one.size == pytest.approx(2.0 * two.size, rel=1e-6) and one.size > 0
+        assert (one.parameter, one.unit, one.power) == ("c", "N m", 0.9)
+
+
+def test_every_effect_has_its_size_or_is_absorbed(control):
+    view, extra, _ = control
+    found = sizes(control)
+    assert set(found) == {c.key for c in candidates(view.model, extra) if c.parameters}
+    assert found["payload", -1].size is None  # the last link's own inertia is a payload
+    known = [d.size for d in found.values() if d.size is not None]
+    assert len(known) > 20 and np.isfinite(known).all() and min(known) > 0
+
+
+@pytest.mark.parametrize(("effect", "joint", "values"), [("quadratic_drag", 0, "c={}"), ("spring", 1, "k={},q0=0")])
+def test_twice_the_size_is_found_and_a_fifth_is_not(control, simulated, effect, joint, values):
+    """The set holds it: at that size more than one effect may explain it."""
+    size, named = sizes(control)[effect, joint].size, {}
+    for times in (0.2, 2.0):
+        hide = f"{effect}:{JOINTS[joint]}:{values.format(f'{times * size:.6g}')}"
+        experiment = pipeline.load(simulated(f"{effect}-{times}", hide))
+        steps, *_ = search(first_view(experiment, pipeline.fit(experiment)), most=1)
+        named[times] = [(m.candidate.name, m.candidate.joint) for s in steps for m, _ in s.choice.members]
+    assert named[0.2] == [] and (effect, joint) in named[2.0], (size, named)
