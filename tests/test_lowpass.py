@@ -212,3 +212,18 @@ def test_the_angles_noise_is_read_off_the_log(planar):
     noisy = q + rng.normal(size=q.shape) * [1e-4, 5e-4]
     (piece,) = lowpassed([a_log(t, noisy, noisy)], planar.joints, 15.0).pieces
     np.testing.assert_allclose(piece.noise, [1e-4, 5e-4], rtol=0.05)
+
+
+def test_noise_drawn_again_is_as_loud_as_the_noise_is_there():
+    """White noise whose size follows the speed, as jittered stamps make it: the second draw has the same size in each stretch."""
+    from types import SimpleNamespace
+
+    from sysid.diagnose.lowpass import rougher
+
+    rng = np.random.default_rng(3)
+    t = np.arange(0.0, 20.0, 0.01)
+    size = 1e-3 * (0.2 + np.abs(np.sin(0.5 * t)))[:, None]
+    q = np.sin(0.5 * t)[:, None] + size * rng.normal(size=(len(t), 1))
+    drawn = rougher(SimpleNamespace(q=q, step=0.01), np.median(size, axis=0), rng) - q
+    for part in np.array_split(np.arange(len(t)), 10):
+        assert np.sqrt(np.mean(drawn[part] ** 2)) == pytest.approx(np.sqrt(np.mean(size[part] ** 2)), rel=0.35)

@@ -299,3 +299,13 @@ def test_words_of_a_hidden_effect_are_checked():
     for wrong in ("torque_saturation:elbow:reports=loudly", "stribeck:elbow:reports=command"):
         with pytest.raises(SysidError):
             hidden(wrong)
+
+
+def test_a_brake_that_never_opens_leaves_a_truth_that_json_can_hold(leg):
+    """Short logs of moves, in some of which a joint never leaves its place: nothing of it is noisy."""
+    silent = 0
+    for seed in range(6):
+        told = simulate(leg, seed=seed, duration=1.0, rate=200.0, motion="moves", brakes=True).truth
+        json.dumps(told, allow_nan=False)
+        silent += sum(0.0 in log["noise_rms"].values() for log in told["logs"].values())
+    assert silent

@@ -7,7 +7,7 @@ nothing here; they may only refuse what does not hold on them.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -199,4 +199,4 @@ def _finding(before: Fit, after: Fit, member: Member, chance: float, step: Step,
 
 def view_after(claims: list[Claim], first: View) -> View:
     """The view of the model with all that is claimed."""
-    return replace(claims[-1].step.after) if claims else first
+    return claims[-1].step.after if claims else first

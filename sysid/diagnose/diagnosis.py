@@ -31,7 +31,7 @@ from .candidates import candidates
 from .claims import Claim, Finding, Refused
 from .detectable import Detectable, detectable
 from .held_out import HeldOut
-from .lowpass import lowpassed, narrowed, stride_of, widest
+from .lowpass import lowpassed, narrowed, rougher, stride_of, widest
 from .verdict import Verdict, verdicts
 from .view import View, looked_at
 
@@ -120,10 +120,7 @@ def _under(experiment: Experiment, fit: Fit, logs, cutoff: float) -> View:
         raise _short()
     rng = np.random.default_rng(0)
     noise = np.max([piece.noise for piece in motion.pieces], axis=0)
-    again = [
-        replace(log, segments=tuple(replace(s, q=s.q + noise * rng.normal(size=s.q.shape)) for s in log.segments))
-        for log in logs
-    ]  # fmt: skip
+    again = [replace(log, segments=tuple(replace(s, q=rougher(s, noise, rng)) for s in log.segments)) for log in logs]
     return looked_at(
         experiment, fit.model, motion, lowpassed(again, fit.joints, cutoff), fit.prior, stride=stride_of(motion, cutoff)
     )  # fmt: skip

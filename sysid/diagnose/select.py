@@ -1,6 +1,4 @@
-"""One effect after another joins the model, each asked anew with all that joined before it, and each looked at once more at the
-end, with all the others in. Only training logs are looked at.
-"""
+"""One effect after another joins the model, each asked anew with all that joined before it. Only training logs are looked at."""
 
 from __future__ import annotations
 

@@ -7,12 +7,13 @@ The set of explanations is the model confidence set of these losses.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from .. import blocks
-from .candidates import Candidate, bounds_of, grown
+from ..estimate import inverse
+from .candidates import Candidate, bounds_of, columns_of, grown
 from .evidence import Group
 from .view import View, by_block, looked_at
 
@@ -137,8 +138,6 @@ def holds(view: View, general: Member, special: Member) -> bool:
     one, other = general.candidate, special.candidate
     if one.nonlinear or one.parameters <= other.parameters or one.joint != other.joint:
         return False
-    from .candidates import columns_of
-
     shapes = {v.shape.name: at for v, at in zip(*_own(general.view))}
     columns = columns_of(view.source, one, [shapes])[0]
     joints = one.touches(view.model.robot.dof)
@@ -158,8 +157,7 @@ def _own(view: View):
 
 def weighed(view: View) -> View:
     """The view with every joint weighted by what the model now leaves it."""
-    from ..estimate import inverse
-
-    return replace(looked_at(
-        view.experiment, view.model, view.motion, view.rough, view.prior, stride=view.stride, weights=inverse(view.rms()), grid=False
-    ))  # fmt: skip
+    return looked_at(
+        view.experiment, view.model, view.motion, view.rough, view.prior, stride=view.stride,
+        weights=inverse(view.rms()), grid=False,
+    )  # fmt: skip

@@ -239,7 +239,8 @@ def _log(robot, truth, inside, loop: control.Loop, sensor: _Sensor, rng, events,
         away, braked = nuisances.braked(loop.closed, sticks, rows, stamps)
         logged = np.where(away, 0.0, logged)
         told = [e for e in told if e["kind"] != "spike" or not away[slice(*e["rows"]), e["joints"][0]].all()] + braked
-        rms = np.sqrt(np.mean((rounded(noisy) - found) ** 2, axis=0, where=~away))
+        # of a joint whose brake is closed throughout nothing is noisy
+        rms = np.sqrt(np.sum((rounded(noisy) - found) ** 2, axis=0, where=~away) / np.maximum(np.sum(~away, axis=0), 1))
     named = tuple({**event, "joints": [robot.joints[j] for j in event["joints"]]} for event in sorted(told, key=lambda e: e["start"]))
     return SimulatedLog(stamps, q, logged, clean, rms, named)
 
