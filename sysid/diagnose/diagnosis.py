@@ -72,14 +72,15 @@ def diagnose(experiment: Experiment, *, fit: Fit | None = None, level: float = s
     fit = fit or pipeline.fit(experiment, progress=progress)
     extra = _own(experiment)
     with pipeline.noticed():
-        view = first_view(experiment, fit)
+        logs = {part: _read(experiment, fit, part) for part in ("train", "test")}
+        view = first_view(experiment, fit, logs["train"])
         steps, asked, _, undecided = select.search(view, extra, level=level, tell=tell)
         claims, refused = claiming.claimed(steps, fit, tell)
         refused += [claiming.undecided(choice, fit) for choice in undecided[-1:]]
         after = claiming.view_after(claims, view)
         last = claims[-1].after if claims else fit
-        found = dict(zip(fit.joints, _floors(experiment, last)))
-        test = lowpassed(_read(experiment, fit, "test"), fit.joints, view.motion.pieces[0].smoother.cutoff)
+        found = dict(zip(fit.joints, _floors(experiment, last, logs)))
+        test = lowpassed(logs["test"], fit.joints, view.motion.pieces[0].smoother.cutoff)
         if test is None:
             raise _short()
         first, then = HeldOut(view, test), HeldOut(after, test)
@@ -101,10 +102,14 @@ def _read(experiment: Experiment, fit: Fit, part: str):
     return pipeline.read(experiment, fit.model.robot, getattr(experiment.data, part))
 
 
-def first_view(experiment: Experiment, fit: Fit) -> View:
+def first_view(experiment: Experiment, fit: Fit, logs=None) -> View:
     """The fitted model on the training logs, and on the same with the noise of the angles drawn once more; in the widest band
-    that this noise leaves."""
-    logs = _read(experiment, fit, "train")
+    that this noise leaves.
+
+    Args:
+        logs: the training logs, where they are at hand.
+    """
+    logs = _read(experiment, fit, "train") if logs is None else logs
     cutoff = widest(logs)
     view = _under(experiment, fit, logs, cutoff)
     # in the middle of the rows: about reversals, and where something is missing, there is more of either
@@ -142,12 +147,12 @@ def _own(experiment: Experiment) -> list:
     return [effect for name, effect in found.items() if name not in vocabulary()]
 
 
-def _floors(experiment: Experiment, fit: Fit) -> list[NoiseFloor]:
+def _floors(experiment: Experiment, fit: Fit, logs: dict) -> list[NoiseFloor]:
     """The noise floor of each joint, as the fit sees its torque: of what the model with all claims leaves."""
     spec = settled(experiment.preprocess, fit.filters)
     pieces, residuals = [], []
     for part in ("train", "test"):
-        motion, predicted, at = prepare(_read(experiment, fit, part), spec, fit.joints), fit.predictions[part].predicted, 0
+        motion, predicted, at = prepare(logs[part], spec, fit.joints), fit.predictions[part].predicted, 0
         for piece in motion.pieces:
             pieces.append(piece)
             residuals.append(piece.measured[piece.core] - predicted[at : at + piece.samples])
