@@ -107,10 +107,23 @@ def widest(logs: Sequence[Log]) -> float:
     for segment in (s for log in logs for s in log.segments if len(s.t) > 50):
         speed = np.diff(segment.q, axis=0)
         speed = speed[:, np.ptp(segment.q, axis=0) > 1e-3 * np.ptp(segment.q, axis=0).max()]
-        power = np.cumsum(np.abs(np.fft.rfft(speed * np.hanning(len(speed))[:, None], axis=0)) ** 2, axis=0)
+        power = np.abs(np.fft.rfft(speed * np.hanning(len(speed))[:, None], axis=0)) ** 2
+        power = np.cumsum(np.stack([_without_noise(one) for one in power.T], axis=1), axis=0) if speed.size else power
         if speed.size and (power[-1] > 0).all():
-            bands.append(float((power < 0.99 * power[-1]).sum(axis=0).max() / (len(speed) * segment.step)))
+            # at the first frequency below which 99 % stand: noise that was taken off leaves sums that rise and fall
+            bands.append(float(np.argmax(power >= 0.99 * power[-1], axis=0).max() / (len(speed) * segment.step)))
     return max(LEAST, _MOTION * float(np.median(bands[1:] or bands)))
+
+
+def _without_noise(power: np.ndarray) -> np.ndarray:
+    """A spectrum (frequencies,) of an angle's differences, less what noise makes of it: white noise on the angle grows with the
+    square of frequency, stamps that jitter make white noise of the speed. The upper half of the band, where no arm moves, tells."""
+    from scipy.optimize import nnls
+
+    shape = np.stack([np.ones(len(power)), 4.0 * np.sin(0.5 * np.pi * np.linspace(0.0, 1.0, len(power))) ** 2], axis=1)
+    upper = slice(len(power) // 2, None)
+    scale = max(float(power[upper].max()), 1e-300)
+    return power - shape @ nnls(shape[upper], power[upper] / scale)[0] * scale
 
 
 def narrowed(cutoff: float, share: float) -> float:
