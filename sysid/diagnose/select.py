@@ -10,7 +10,7 @@ import numpy as np
 from . import null
 from .candidates import Candidate, candidates
 from .evidence import Group, gain, groups, groups_at
-from .ties import Choice, chosen, joined, losses, weighed
+from .ties import Choice, alike, chosen, joined, losses, weighed
 from .view import View
 
 LEVEL = 0.01  # family-wise: how often anything is accused where nothing is there
@@ -102,9 +102,11 @@ def _next(view: View, asked: Asked, level: float, worth: float, open_: list[Choi
     while hopeful:
         top = hopeful[0]
         where = set(asked.groups[top].candidate.touches(dof))
+        near = [k for k in rivals if asked.gains[k] >= _NEAR * asked.gains[top]]
+        # who acts on the same joints, and who takes the same thing through bodies that bend
         short = [
-            k for k in rivals
-            if asked.gains[k] >= _NEAR * asked.gains[top] and where & set(asked.groups[k].candidate.touches(dof))
+            k for k in near
+            if where & set(asked.groups[k].candidate.touches(dof)) or alike(view, asked.groups[k], asked.groups[top])
         ]  # fmt: skip
         short = [top, *(k for k in short if k != top)][:_SHORTLIST]
         found = chosen(view, [asked.groups[k] for k in short], np.random.default_rng(1))

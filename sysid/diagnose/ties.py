@@ -181,6 +181,23 @@ def holds(view: View, general: Member, special: Member) -> bool:
     return bool(alone > 0 and np.sum(rest(np.concatenate([base, flat], axis=1)) ** 2) < (1.0 - _SAME) * alone)
 
 
+def alike(view: View, one: Group, other: Group) -> bool:
+    """Whether two candidates take the same part of what a model leaves, the greater half of it at least: then one of them in
+    the model leaves the other little to do, on whichever joints they stand."""
+    first, second = _taken(view, one), _taken(view, other)
+    return bool(np.sum(first * second) ** 2 > 0.5 * np.sum(first**2) * np.sum(second**2))
+
+
+def _taken(view: View, group: Group) -> np.ndarray:
+    """(dof, n) weighted torque that a group takes of the residual, the model's own columns refitted."""
+    design, joints = view.design, group.candidate.touches(view.model.robot.dof)
+    own = columns_of(view.source, group.candidate, [group.shapes])[0] @ group.coefficients * view.weights[joints, None]
+    out = np.zeros(design.columns.shape[:2])
+    out[joints] = own
+    absorbed = design.inverse @ np.einsum("jnk,jn->k", design.columns, out)
+    return out - np.einsum("jnk,k->jn", design.columns, absorbed)
+
+
 def _own(view: View):
     own = view.model.last_shapes
     return view.model.shape_values[own], view.model.shapes[own]
