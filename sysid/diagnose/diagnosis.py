@@ -125,7 +125,7 @@ def _under(experiment: Experiment, fit: Fit, logs, cutoff: float) -> View:
         raise _short()
     rng = np.random.default_rng(0)
     noise = np.max([piece.noise for piece in motion.pieces], axis=0)
-    again = [replace(log, segments=tuple(replace(s, q=rougher(s, noise, rng)) for s in log.segments)) for log in logs]
+    again = [replace(log, segments=tuple(replace(s, q=rougher(s, noise, cutoff, rng)) for s in log.segments)) for log in logs]
     return looked_at(
         experiment, fit.model, motion, lowpassed(again, fit.joints, cutoff), fit.prior, stride=stride_of(motion, cutoff)
     )  # fmt: skip

@@ -181,9 +181,13 @@ def _windows(values, step: float) -> np.ndarray:
     return np.sqrt([np.mean(own**2, axis=0) for own in parts])
 
 
-def rougher(segment, noise, rng: np.random.Generator) -> np.ndarray:
-    """The angles (n, dof) of a segment with noise drawn once more, of RMS `noise` (dof,) in the middle of the log and elsewhere as
-    much more or less as third differences say: stamps that jitter make it grow with the speed."""
+def rougher(segment, noise, cutoff: float, rng: np.random.Generator) -> np.ndarray:
+    """The angles (n, dof) of a segment with their noise once more.
+
+    White noise of RMS `noise` (dof,) in the middle of the log and elsewhere as much more or less as third differences say: stamps
+    that jitter make it grow with the speed. Of an angle that its encoder rounds, what rounding makes of the smoothed angle,
+    and of the noise before it, on a grid shifted by a random part of its grain: in slow motion that is no white noise.
+    """
     from scipy.ndimage import median_filter
 
     q = segment.q
@@ -192,4 +196,23 @@ def rougher(segment, noise, rng: np.random.Generator) -> np.ndarray:
     at = np.linspace(0, len(q) - 1, len(local) + 1)
     at = 0.5 * (at[1:] + at[:-1])
     profile = np.stack([np.interp(np.arange(len(q)), at, one) for one in (local / np.where(middle > 0, middle, 1.0)).T], axis=1)
-    return q + noise * profile * rng.normal(size=q.shape)
+    out = q + noise * profile * rng.normal(size=q.shape)
+    smooth = Gaussian(min(cutoff, _HIGHEST / segment.step), segment.step)(q, axis=0)
+    for j, grain in enumerate(grains(q)):
+        if grain:
+            before = np.sqrt(max(noise[j] ** 2 - grain**2 / 12.0, 0.0))
+            truly = smooth[:, j] + grain * rng.uniform()
+            out[:, j] = q[:, j] + grain * np.round((truly + before * rng.normal(size=len(q))) / grain) - truly
+    return out
+
+
+def grains(q) -> np.ndarray:
+    """(dof,) what angles q (n, dof) are rounded to, zero where they are not."""
+    out = np.zeros(q.shape[1])
+    for j, steps in enumerate(np.abs(np.diff(q, axis=0)).T):
+        steps = steps[steps > 1e-9 * np.ptp(q[:, j])]
+        counts = steps / steps.min() if len(steps) else np.zeros(1)
+        # files round the rounded: to a hundredth of a grain, by chance one in fifty would pass
+        if len(steps) > 50 and np.mean(np.abs(counts - np.round(counts)) < 0.01 * np.maximum(counts, 1.0)) > 0.99 and np.mean(counts < 50) > 0.5:
+            out[j] = np.median(steps / np.round(counts))
+    return out

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
+from ..model import ROBOT
 from . import null
 from .candidates import Candidate, candidates
 from .evidence import Group, gain, groups, groups_at
@@ -38,27 +40,47 @@ class Step:
 
 @dataclass(frozen=True)
 class Asked:
-    """The answer of all candidates under one model: groups, statistics and gains (groups,), null maxima (draws,)."""
+    """The answer of all candidates under one model: groups, statistics and gains (groups,), null maxima of the groups of each
+    joint {joint: (draws,)}."""
 
     groups: list[Group]
     statistics: np.ndarray
     gains: np.ndarray
-    maxima: np.ndarray
+    null: dict[int, np.ndarray]
+
+    @cached_property
+    def maxima(self) -> np.ndarray:
+        """(draws,) the greatest of all groups."""
+        return np.max([*self.null.values()], axis=0)
 
     def p(self, k: int) -> float:
         """Family-wise p-value of a group."""
         return float((1 + np.sum(self.maxima >= self.statistics[k])) / (1 + len(self.maxima)))
 
 
-def ask(view: View, extra=(), tell: Callable[[float], None] = lambda share: None) -> Asked:
-    """Every candidate that a view's model lacks."""
-    found, all_ = [], candidates(view.model, extra)
+def ask(view: View, extra=(), tell: Callable[[float], None] = lambda share: None, *, before: Asked | None = None, anew=None) -> Asked:
+    """Every candidate that a view's model lacks.
+
+    Args:
+        before: answers under the model that this one grew from. anew: the joints where it changed something: of all others the
+            answers stand.
+    """
+    all_ = candidates(view.model, extra)
     joints = sorted({c.joint for c in all_})
+    groups_, statistics, gains, nulls = [], [], [], {}
     for number, joint in enumerate(joints):  # a joint at a time: its columns stand in memory together
-        found += groups(view, [c for c in all_ if c.joint == joint])
+        if before is not None and joint not in anew:
+            own = [k for k, g in enumerate(before.groups) if g.candidate.joint == joint]
+            groups_ += [before.groups[k] for k in own]
+            statistics, gains = [*statistics, before.statistics[own]], [*gains, before.gains[own]]
+            nulls[joint] = before.null[joint]
+        else:
+            found = groups(view, [c for c in all_ if c.joint == joint])
+            groups_ += found
+            statistics, gains = [*statistics, null.statistics(found)], [*gains, np.array([gain(g).sum() for g in found])]
+            nulls[joint] = null.maxima(found, np.random.default_rng(0))  # the same signs for all: draws of one residual
         tell((number + 1) / len(joints))
-    rng = np.random.default_rng(0)
-    return Asked(found, null.statistics(found), np.array([gain(g).sum() for g in found]), null.maxima(found, rng))
+    return Asked(groups_, np.concatenate(statistics), np.concatenate(gains), nulls)
 
 
 def search(
@@ -81,9 +103,14 @@ def search(
         step = _next(view, asked, level, worth, open_)
         if step is None:
             break
-        steps = revised(first_view, [*steps, step], worth)
+        joined_ = [*steps, step]
+        steps = revised(first_view, joined_, worth)
         view = steps[-1].after
-        asked = ask(view, extra, lambda share, word=step.candidate.name: tell(f"ask, with {word}", share))
+        anew = _changed(step) if [s.candidate for s in steps] == [s.candidate for s in joined_] else None
+        asked = ask(
+            view, extra, lambda share, word=step.candidate.name: tell(f"ask, with {word}", share),
+            before=asked if anew is not None else None, anew=anew,
+        )  # fmt: skip
     return steps, first, view, open_
 
 
@@ -122,6 +149,11 @@ def _next(view: View, asked: Asked, level: float, worth: float, open_: list[Choi
                 open_.append(found)
         hopeful = [k for k in hopeful if k not in short]
     return None
+
+
+def _changed(step: Step) -> set[int]:
+    """The joint of a step, the robot as a whole, and the joints whose residual the step changed by more than a hundredth."""
+    return {ROBOT, step.candidate.joint, *np.flatnonzero(np.abs(step.shares) > 0.01)}
 
 
 def revised(first: View, steps: list[Step], worth: float) -> list[Step]:

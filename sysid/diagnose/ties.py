@@ -102,7 +102,7 @@ def joined(view: View, candidate: Candidate, shapes: dict[str, float]) -> View:
     """A view's model with a candidate, everything settled again from shape values on."""
     return looked_at(
         view.experiment, grown(view.source, candidate, shapes), view.motion, view.rough, view.prior, stride=view.stride,
-        weights=view.weights, grid=False, tolerance=_COMPARED,
+        weights=view.weights, grid=False, tolerance=_COMPARED, inherited=view.blocks,
     )  # fmt: skip
 
 
@@ -207,5 +207,5 @@ def weighed(view: View) -> View:
     """The view with every joint weighted by what the model now leaves it."""
     return looked_at(
         view.experiment, view.model, view.motion, view.rough, view.prior, stride=view.stride,
-        weights=inverse(view.rms()), grid=False,
+        weights=inverse(view.rms()), grid=False, inherited=view.blocks,
     )  # fmt: skip

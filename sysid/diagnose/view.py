@@ -58,7 +58,8 @@ class View:
     """A model settled on the training motion.
 
     motion: training logs under one low-pass; rough: the same with the angles' noise once more.
-    weights: (dof,) inverse RMS by which joints count. prior: (bodies, 10).
+    weights: (dof,) inverse RMS by which joints count. prior: (bodies, 10). inherited: (n,) blocks of the model that this one
+    grew from, so that both lose in the same blocks.
     """
 
     experiment: Experiment
@@ -68,6 +69,7 @@ class View:
     stride: int
     weights: np.ndarray
     settled: Settled
+    inherited: np.ndarray | None = None
 
     @property
     def model(self) -> Model:
@@ -111,6 +113,8 @@ class View:
     @cached_property
     def blocks(self) -> np.ndarray:
         """(n,) the block of each row, long against the memory of what no function of the motion predicts."""
+        if self.inherited is not None:
+            return self.inherited
         rows = self.rows
         left = self.design.residual - np.stack([found.told for found in self.unknown], axis=1)
         return blocks.numbered(rows.t, rows.piece, memory=blocks.memory(left, rows.use, rows.piece, self.step))
@@ -170,7 +174,7 @@ class Sums:
 
 def looked_at(
     experiment: Experiment, model: Model, motion: Motion, rough: Motion, prior, *, stride: int,
-    weights=None, grid: bool = True, tolerance: float = 1e-7,
+    weights=None, grid: bool = True, tolerance: float = 1e-7, inherited=None,
 ) -> View:  # fmt: skip
     """Settle a model on a motion.
 
@@ -178,6 +182,7 @@ def looked_at(
         weights: (dof,); None: the inverse RMS that the joints are left with when all count alike.
         grid: search the grids of shape values; without it, from those that the model has.
         tolerance: share of the objective by which a step of the shape values must lower it for another to follow.
+        inherited: (n,) blocks, where the model grew from another one's.
     """
     model = model if model.scales else model.scaled_by(motion)
     ones = np.ones(model.robot.dof)
@@ -187,7 +192,7 @@ def looked_at(
         left = first.rows.residual(first.x)
         weights = inverse(np.sqrt((left**2).sum(0) / np.maximum(first.rows.use.sum(0), 1)))
         model, grid = first.model, False
-    return View(experiment, motion, rough, prior, stride, np.asarray(weights), make(weights, model, grid))
+    return View(experiment, motion, rough, prior, stride, np.asarray(weights), make(weights, model, grid), inherited)
 
 
 def by_block(number: np.ndarray) -> list[slice]:
