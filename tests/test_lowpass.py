@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from sysid import regressor
-from sysid.diagnose.lowpass import Gaussian, lowpassed, narrowed, stride_of, widest
 from sysid.events import Event
 from sysid.log import Log, Segment
+from sysid.lowpass import Gaussian, lowpassed, narrowed, stride_of, widest
 from sysid.preprocess import standstill_speed
 
 STEP = 1e-3
@@ -218,7 +218,7 @@ def test_noise_drawn_again_is_as_loud_as_the_noise_is_there():
     """White noise whose size follows the speed, as jittered stamps make it: the second draw has the same size in each stretch."""
     from types import SimpleNamespace
 
-    from sysid.diagnose.lowpass import rougher
+    from sysid.lowpass import rougher
 
     rng = np.random.default_rng(3)
     t = np.arange(0.0, 20.0, 0.01)

@@ -22,32 +22,33 @@ from ..config import Experiment, is_own
 from ..effect import vocabulary
 from ..errors import LogError
 from ..estimate import Fit
+from ..failures import Failure, HeldOut, failures
 from ..filters import settled
+from ..lowpass import lowpassed, narrowed, rougher, stride_of, widest
 from ..noise import NoiseFloor, floors
 from ..preprocess import prepare
 from . import claims as claiming
-from . import regions, select
+from . import select
 from .candidates import candidates
 from .claims import Claim, Finding, Refused
 from .detectable import Detectable, detectable
-from .held_out import HeldOut
-from .lowpass import lowpassed, narrowed, rougher, stride_of, widest
 from .verdict import Verdict, verdicts
 from .view import View, looked_at
 
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """Everything that `sysid diagnose` says. first, last: the model before and after all claims, on the test logs; notices: what to
-    know beside it."""
+    """Everything that `sysid diagnose` says. view: the model before all claims; first, last: before and after them, on the test logs;
+    notices: what to know beside it."""
 
     fit: Fit
     floors: dict[str, NoiseFloor]
     claims: tuple[Claim, ...]
     verdict: tuple[Verdict, ...]
     detectable: tuple[Detectable, ...]
-    failures: tuple[regions.Failure, ...]
+    failures: tuple[Failure, ...]
     events: tuple
+    view: View
     first: HeldOut
     last: HeldOut
     refused: tuple[Refused, ...] = ()
@@ -83,12 +84,12 @@ def diagnose(experiment: Experiment, *, fit: Fit | None = None, level: float = s
         test = lowpassed(logs["test"], fit.joints, view.motion.pieces[0].smoother.cutoff)
         if test is None:
             raise _short()
-        first, then = HeldOut(view, test), HeldOut(after, test)
+        first, then = (HeldOut(one.settled, test, one.stride) for one in (view, after))
         said = verdicts(fit, claims, after.unknown, view.unknown, list(found.values()), refused)
         levels = np.array([floor.rms if floor.rms is not None else last.rms("test")[j] for j, floor in found.items()])
         return Diagnosis(
             fit, found, tuple(claims), tuple(said), tuple(detectable(view, asked, candidates(view.model, extra))),
-            tuple(regions.failures(first, fit.predictions["test"], levels)), _events(view, test), first, then,
+            tuple(failures(first, fit.predictions["test"], levels)), _events(view, test), view, first, then,
             tuple(refused), tuple(_notices(claims, refused)),
         )  # fmt: skip
 

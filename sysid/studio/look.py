@@ -11,8 +11,8 @@ from functools import cached_property
 import numpy as np
 
 from ..diagnose.diagnosis import Diagnosis
-from ..diagnose.held_out import HeldOut
 from ..errors import SysidError
+from ..failures import HeldOut
 from ..model import ROBOT
 from ..report import charts
 from ..report.decimate import broken
@@ -41,7 +41,7 @@ class Looks:
         out = []
         for claim in self.diagnosis.claims:
             view = claim.step.before
-            own = self.first if view is self.first.view else HeldOut(view, self.first.test)
+            own = self.first if view is self.diagnosis.view else self._on_test(view)
             out += [own] * len(claim.findings)
         return out
 
@@ -62,8 +62,11 @@ class Looks:
             return self._removed[k]
 
     def _explained(self, k: int) -> np.ndarray:
-        after = HeldOut(self.diagnosis.findings[k].member.view, self.first.test)
+        after = self._on_test(self.diagnosis.findings[k].member.view)
         return (self._before[k].residual - after.residual) * self.first.rows.use
+
+    def _on_test(self, view) -> HeldOut:
+        return HeldOut(view.settled, self.first.test, view.stride)
 
     def own(self, k: int) -> list[int]:
         """The joints that a suspect is judged by."""

@@ -1,4 +1,4 @@
-"""A view's model on the test logs: opened once, after everything is chosen."""
+"""A settled model on the test logs: opened once, after everything is chosen."""
 
 from __future__ import annotations
 
@@ -10,30 +10,31 @@ import numpy as np
 from .. import rows as row
 from ..model import Model
 from ..preprocess import Motion
-from .view import View
+from ..shape import Settled
 
 
 @dataclass(frozen=True)
 class HeldOut:
-    """A view and the test motion under the same low-pass."""
+    """A model settled on the training motion, and the test motion under the same low-pass."""
 
-    view: View
+    settled: Settled
     test: Motion
+    stride: int
 
     @property
     def model(self) -> Model:
-        """The view's model."""
-        return self.view.model
+        """The model, with its shape values found."""
+        return self.settled.model
 
     @cached_property
     def rows(self) -> row.Rows:
         """Test rows."""
-        return row.stack(self.model, self.test, self.view.stride)
+        return row.stack(self.model, self.test, self.stride)
 
     @cached_property
     def residual(self) -> np.ndarray:
         """(n, dof) on the test rows."""
-        return self.rows.residual(self.view.settled.x)
+        return self.rows.residual(self.settled.x)
 
     def rms(self) -> np.ndarray:
         """(dof,) root mean square of the residual on the test rows that count."""
