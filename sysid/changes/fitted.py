@@ -7,13 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..blocks import away, jackknife, summed
+from ..blocks import away, folds, jackknife, summed
 from ..effect import find
 from ..inertia import DIVERGENCES, PARAMETERIZATIONS, pseudo
 from ..model import ROBOT, Model
 from ..objective import Objective
 from ..solve import Coordinates, solve
-from .halves import BLOCKS, across, least_squares
+from .halves import across, least_squares
 
 _WEAK = 1e-2  # of the noise's square: the weight of the payload's prior, a ball of a kilogram
 
@@ -43,10 +43,10 @@ def together(
     own = None if body is None else slice(int(ends[body]) - 10, int(ends[body]))
     fitted = lambda kept: _possible(columns[:, kept], residual[kept], weights, own)  # noqa: E731
     c = fitted(np.ones(len(residual), dtype=bool))
-    without = np.array([fitted(blocks != b) for b in range(BLOCKS)])
+    without = np.array([fitted(blocks != b) for b in range(blocks.max() + 1)])
     std = jackknife(without)
     after = residual - np.einsum("jnk,k->nj", columns, c)
-    halves, out = blocks < BLOCKS // 2, []
+    halves, out = folds(blocks.max() + 1, 2)[blocks] == 0, []
     with_all = across(tried, chosen, residual, weights, halves)
     for k, (name, joint) in enumerate(chosen):
         rest = across(

@@ -5,11 +5,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..blocks import away, summed
+from ..blocks import away, folds, summed
 from ..model import ROBOT
 from ..shape import inverted
 
-BLOCKS, _MOST = 24, 12
+BLOCKS, _MOST = 24, 12  # blocks, over the whole log; changes
 _SUPPORT = 3.0  # standard errors
 # of the squared residual: below it, a held model's errors on another motion look like changes
 _WORTH = 0.1
@@ -18,7 +18,7 @@ _WORTH = 0.1
 def chosen_of(tried, residual, weights, blocks) -> list[tuple]:
     """The changes that the halves of the log support, each fitted on one and judged on the
     other."""
-    halves = blocks < BLOCKS // 2
+    halves = folds(blocks.max() + 1, 2)[blocks] == 0
     chosen: list[tuple] = []
     current = across(tried, chosen, residual, weights, halves)
     while len(chosen) < _MOST:

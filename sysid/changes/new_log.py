@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from .. import datasets, pipeline, rows
+from ..blocks import numbered
 from ..config import Experiment, LogSpec
 from ..errors import LogError
 from ..lowpass import LEAST, lowpassed, stride_of
@@ -61,7 +62,7 @@ def changed(experiment: Experiment, run: Path, logs: list[str]) -> Changed:
     counts = np.maximum(data.use.sum(0), 1)
     by_size = lambda left: 1.0 / np.maximum(np.sqrt((left**2).sum(0) / counts), 1e-12)  # noqa: E731
     weights = by_size(residual)
-    blocks = np.minimum(np.arange(len(data.t)) * BLOCKS // len(data.t), BLOCKS - 1)
+    blocks = numbered(data.t, data.piece, shortest=np.inf, fewest=BLOCKS)
     tried = {
         key: columns
         for key, columns in signatures(structure, x, motion, stride, data.use).items()
