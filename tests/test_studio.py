@@ -406,7 +406,7 @@ def test_preview_is_what_the_suspect_removes(arm):
     claims = view.diagnosis.claims
     assert len(view.diagnosis.findings) == sum(len(claim.findings) for claim in claims) >= 1
     # the first step's head added, the residual is that of the model that it made
-    grown = HeldOut(view.diagnosis.findings[0].member.view.settled, view.diagnosis.first.test, view.diagnosis.view.stride)
+    grown = HeldOut(view.diagnosis.findings[0].member.view.settled, view.diagnosis.first.test)
     np.testing.assert_allclose(looks.first.residual - looks.removed(0), grown.residual * looks.first.rows.use, atol=1e-9)
     for k, finding in enumerate(view.diagnosis.findings):
         own = looks.own(k)

@@ -12,8 +12,7 @@ from ..blocks import numbered
 from ..config import Experiment, LogSpec
 from ..errors import LogError
 from ..lowpass import LEAST, lowpassed, stride_of
-from ..model import Model
-from ..noise import floors
+from ..noise import floors_of
 from .fitted import Change, together
 from .halves import BLOCKS, chosen_of
 from .held import read_run
@@ -50,17 +49,14 @@ def changed(experiment: Experiment, run: Path, logs: list[str]) -> Changed:
         motion = lowpassed(pipeline.read(experiment, robot, specs), robot.joints, LEAST)
     if motion is None or motion.duration < 4.0:
         raise LogError(
-            "the log is too short to say what changed",
-            where=", ".join(logs),
-            allowed="4 s or more of motion",
-            do="give a longer log",
-        )
+            "the log is too short to say what changed", where=", ".join(logs),
+            allowed="4 s or more of motion", do="give a longer log",
+        )  # fmt: skip
     structure = structure.scaled_by(motion)
     stride = stride_of(motion, LEAST)
     data = rows.stack(structure, motion, stride)
     residual = data.residual(x)
-    counts = np.maximum(data.use.sum(0), 1)
-    by_size = lambda left: 1.0 / np.maximum(np.sqrt((left**2).sum(0) / counts), 1e-12)  # noqa: E731
+    by_size = lambda left: 1.0 / np.maximum(data.rms(left), 1e-12)  # noqa: E731
     weights = by_size(residual)
     blocks = numbered(data.t, data.piece, shortest=np.inf, fewest=BLOCKS)
     tried = {
@@ -72,38 +68,18 @@ def changed(experiment: Experiment, run: Path, logs: list[str]) -> Changed:
     changes, after = together(structure, tried, chosen, residual, weights, blocks)
     if changes:  # a joint counts by what is left of it, not by what the changes made of it
         weights = by_size(after)
-        changes, after = together(
-            structure,
-            tried,
-            chosen_of(tried, residual, weights, blocks) or chosen,
-            residual,
-            weights,
-            blocks,
-        )
-    floors = _floors(structure, x, motion)
-    return Changed(
-        robot.joints,
-        np.sqrt((residual**2).sum(0) / counts),
-        np.sqrt((after**2).sum(0) / counts),
-        floors,
-        changes,
-        _notes(experiment, changes),
-    )
+        chosen = chosen_of(tried, residual, weights, blocks) or chosen
+        changes, after = together(structure, tried, chosen, residual, weights, blocks)
+    count = 10 * structure.bodies
+    bodies, rest = x[:count].reshape(-1, 10), x[count:]
+    predicted = np.concatenate([structure.torque(piece, bodies, rest) for piece in motion.pieces])
+    found = floors_of(motion.pieces, predicted)
+    notes = _notes(experiment, changes)
+    return Changed(robot.joints, data.rms(residual), data.rms(after), found, changes, notes)
 
 
 def _located(log: str) -> str:
     return log if datasets.reference(log) is not None else str(Path(log).resolve())
-
-
-def _floors(structure: Model, x, motion) -> tuple:
-    count = 10 * structure.bodies
-    residuals = [
-        piece.measured[piece.core] - structure.torque(piece, x[:count].reshape(-1, 10), x[count:])
-        for piece in motion.pieces
-    ]
-    measured, q = [p.measured[p.core] for p in motion.pieces], [p.q[p.core] for p in motion.pieces]
-    use = [p.use[p.core] for p in motion.pieces]
-    return floors(residuals, measured, q, [p.step for p in motion.pieces], use=use)
 
 
 def _notes(experiment: Experiment, changes) -> tuple[str, ...]:

@@ -19,7 +19,6 @@ class HeldOut:
 
     settled: Settled
     test: Motion
-    stride: int
 
     @property
     def model(self) -> Model:
@@ -29,7 +28,7 @@ class HeldOut:
     @cached_property
     def rows(self) -> row.Rows:
         """Test rows."""
-        return row.stack(self.model, self.test, self.stride)
+        return row.stack(self.model, self.test, self.settled.stride)
 
     @cached_property
     def residual(self) -> np.ndarray:
@@ -38,17 +37,15 @@ class HeldOut:
 
     def rms(self) -> np.ndarray:
         """(dof,) root mean square of the residual on the test rows that count."""
-        return np.sqrt((self.residual**2).sum(0) / np.maximum(self.rows.use.sum(0), 1))
+        return self.rows.rms(self.residual)
 
     @cached_property
     def variables(self) -> dict[str, tuple[str, np.ndarray]]:
         """{q_joint, qd_joint: (unit, (n,))} and time on the test rows."""
-        rows, robot = self.rows, self.model.robot
-        pieces = [(piece, rows.index[rows.piece == k]) for k, piece in enumerate(self.test.pieces)]
-        out = {}
-        for j, joint in enumerate(robot.joints):
-            unit = "m" if robot.prismatic[j] else "rad"
-            for name, what in (("q", unit), ("qd", f"{unit}/s")):
-                values = np.concatenate([getattr(piece, name)[own, j] for piece, own in pieces])
-                out[f"{name}_{joint}"] = (what, values)
-        return out | {"time": ("s", rows.t)}
+        robot, out = self.model.robot, {"time": ("s", self.rows.t)}
+        for name, per in (("q", ""), ("qd", "/s")):
+            values = self.rows.of(self.test, name)
+            for j, joint in enumerate(robot.joints):
+                unit = ("m" if robot.prismatic[j] else "rad") + per
+                out[f"{name}_{joint}"] = (unit, values[:, j])
+        return out

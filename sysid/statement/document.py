@@ -6,8 +6,8 @@ import numpy as np
 
 from ..diagnose.claims import Claim, Finding
 from ..diagnose.diagnosis import Diagnosis
-from ..diagnose.flexible import Unknown
 from ..diagnose.verdict import Verdict
+from ..flexible import Unknown
 from ..model import ROBOT
 from ..results import number, versions
 
@@ -81,7 +81,7 @@ def document(found: Diagnosis, run="") -> dict:
             for f in found.failures
         ],
         "low_pass": {
-            "cutoff_hz": found.view.motion.pieces[0].smoother.cutoff,
+            "cutoff_hz": found.view.cutoff,
             "rms_test_before": dict(zip(joints, found.first.rms().tolist())),
             "rms_test_after": dict(zip(joints, found.last.rms().tolist())),
         },

@@ -41,7 +41,7 @@ class Looks:
         out = []
         for claim in self.diagnosis.claims:
             view = claim.step.before
-            own = self.first if view is self.diagnosis.view else self._on_test(view)
+            own = self.first if view is self.diagnosis.view else HeldOut(view.settled, self.first.test)
             out += [own] * len(claim.findings)
         return out
 
@@ -62,11 +62,8 @@ class Looks:
             return self._removed[k]
 
     def _explained(self, k: int) -> np.ndarray:
-        after = self._on_test(self.diagnosis.findings[k].member.view)
+        after = HeldOut(self.diagnosis.findings[k].member.view.settled, self.first.test)
         return (self._before[k].residual - after.residual) * self.first.rows.use
-
-    def _on_test(self, view) -> HeldOut:
-        return HeldOut(view.settled, self.first.test, view.stride)
 
     def own(self, k: int) -> list[int]:
         """The joints that a suspect is judged by."""
