@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from sysid import regressor
-from sysid.diagnose.lowpass import Gaussian, lowpassed, narrowed, stride_of, widest
 from sysid.events import Event
 from sysid.log import Log, Segment
+from sysid.lowpass import Gaussian, lowpassed, narrowed, stride_of, widest
 from sysid.preprocess import standstill_speed
 
 STEP = 1e-3
@@ -229,7 +229,7 @@ def test_noise_drawn_again_is_as_loud_as_the_noise_is_there():
     """White noise whose size follows the speed, as jittered stamps make it: the second draw has the same size in each stretch."""
     from types import SimpleNamespace
 
-    from sysid.diagnose.lowpass import rougher
+    from sysid.lowpass import rougher
 
     rng = np.random.default_rng(3)
     t = np.arange(0.0, 20.0, 0.01)
@@ -245,7 +245,7 @@ def test_rounding_is_drawn_again_as_rounding(grain):
     """Where an arm moves slowly, rounding makes slow errors, not white ones: those drawn have their size in each band."""
     from types import SimpleNamespace
 
-    from sysid.diagnose.lowpass import grains, rougher
+    from sysid.lowpass.angles import grains, rougher
 
     t = np.arange(0.0, 40.0, 1e-3)
     truly = 250.0 * grain * np.sin(0.7 * t)[:, None] + 100.0 * grain * np.sin(2.1 * t + 1.0)[:, None]

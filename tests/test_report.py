@@ -18,12 +18,12 @@ from hypothesis.extra.numpy import arrays
 
 from sysid import config, pipeline, regressor, robot
 from sysid.diagnose.diagnosis import diagnose
-from sysid.diagnose.document import document
 from sysid.report import charts, page, solids
 from sysid.report.decimate import broken, kept
 from sysid.report.failures import failures
 from sysid.report.sections import sections
 from sysid.report.words import quantity
+from sysid.statement.document import document
 from tests.conftest import CONFIG, URDF, csv, dump, motion, put
 
 EVIL = "<script>alert(1)</script>"
