@@ -35,7 +35,7 @@ def slope_chance(told, values, number) -> float:
     """Probability, were nothing there, of a slope of values (n,) on what was told of them (n,) as
     large as theirs: Student's t of sums over blocks `number` (n,), with what the slope leaves as
     their noise."""
-    from scipy.stats import t as student
+    from scipy.special import stdtr  # not scipy.stats, whose import alone takes longer than a fit
 
     size = summed(number, told * told)
     if not size.sum() > 0:
@@ -44,7 +44,7 @@ def slope_chance(told, values, number) -> float:
     left = summed(number, told * (values - slope * told))
     acting = size.sum() ** 2 / np.sum(size**2)
     spread = np.sqrt(np.sum(left**2) * len(left) / max(len(left) - 1, 1))
-    return float(student.sf(slope * size.sum() / max(spread, 1e-300), max(acting - 1.0, 1.0)))
+    return float(stdtr(max(acting - 1.0, 1.0), -slope * size.sum() / max(spread, 1e-300)))
 
 
 def jackknife(without) -> np.ndarray:

@@ -28,7 +28,8 @@ class View:
     """A model settled on the training motion.
 
     motion: training logs under one low-pass; rough: the same with the angles' noise once more.
-    weights: (dof,) inverse RMS by which joints count. prior: (bodies, 10).
+    weights: (dof,) inverse RMS by which joints count. prior: (bodies, 10). inherited: (n,) blocks
+    of the model that this one grew from, so that both lose in the same blocks.
     """
 
     experiment: Experiment
@@ -38,6 +39,7 @@ class View:
     stride: int
     weights: np.ndarray
     settled: Settled
+    inherited: np.ndarray | None = None
 
     @property
     def model(self) -> Model:
@@ -85,6 +87,8 @@ class View:
     def blocks(self) -> np.ndarray:
         """(n,) the block of each row, long against the memory of what no function of the motion
         predicts."""
+        if self.inherited is not None:
+            return self.inherited
         rows = self.rows
         left = self.design.residual - np.stack([found.told for found in self.unknown], axis=1)
         memory = blocks.memory(left, rows.use, rows.piece, self.step)
@@ -117,7 +121,7 @@ class View:
 
 def looked_at(
     experiment: Experiment, model: Model, motion: Motion, rough: Motion, prior, *, stride: int,
-    weights=None, grid: bool = True, tolerance: float = 1e-7,
+    weights=None, grid: bool = True, tolerance: float = 1e-7, inherited=None,
 ) -> View:  # fmt: skip
     """Settle a model on a motion.
 
@@ -126,12 +130,13 @@ def looked_at(
         grid: search the grids of shape values; without it, from those that the model has.
         tolerance: share of the objective by which a step of the shape values must lower it for
             another to follow.
+        inherited: (n,) blocks, where the model grew from another one's.
     """
 
     def view(weights, model: Model, grid: bool) -> View:
         options = {"weights": weights, "stride": stride, "grid": grid, "tolerance": tolerance}
         found = settle(experiment, model, motion, prior, **options)
-        return View(experiment, motion, rough, prior, stride, np.asarray(weights), found)
+        return View(experiment, motion, rough, prior, stride, np.asarray(weights), found, inherited)
 
     model = model if model.scales else model.scaled_by(motion)
     if weights is not None:
@@ -168,7 +173,7 @@ def _under(experiment: Experiment, fit: Fit, logs, cutoff: float) -> View:
         raise too_short()
     rng, noise = np.random.default_rng(0), np.max([piece.noise for piece in motion.pieces], axis=0)
     again = [
-        replace(log, segments=tuple(replace(s, q=rougher(s, noise, rng)) for s in log.segments))
+        replace(log, segments=tuple(replace(s, q=rougher(s, noise, cutoff, rng)) for s in log.segments))
         for log in logs
     ]
     rough = lowpassed(again, fit.joints, cutoff)

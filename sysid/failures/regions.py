@@ -159,16 +159,12 @@ def _windows(t, log, square) -> dict:
 
 
 def _bands(residuals, steps) -> dict:
-    from scipy.signal import periodogram
-
     edges = np.array(_BANDS)
     total = np.zeros(len(edges) - 1)
     for residual, step in zip(residuals, steps):
-        frequency, power = periodogram(residual, fs=1.0 / step, window="hann")
-        total += np.histogram(
-            frequency,
-            bins=edges,
-            weights=power * (frequency[1] if len(frequency) > 1 else 1.0) * len(residual),
-        )[0]
+        frequency = np.fft.rfftfreq(len(residual), step)
+        windowed = (residual - residual.mean()) * np.hanning(len(residual))
+        power = np.abs(np.fft.rfft(windowed)) ** 2
+        total += np.histogram(frequency, bins=edges, weights=power)[0]
     last = int(np.flatnonzero(total > 0).max(initial=0)) + 1
     return {"edges": edges[: last + 1], "share": total[:last] / max(total.sum(), 1e-300)}

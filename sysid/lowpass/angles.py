@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from .gaussian import HIGHEST, Gaussian
+
 _WINDOW = 0.1  # s
+_FEWEST = 50  # steps; and counts of a grain beyond which any number is near a whole one
 
 
 def noise_of(q, smooth, taken: float, step: float) -> np.ndarray:
@@ -26,10 +29,17 @@ def _by_window(values, step: float) -> np.ndarray:
     return np.sqrt([np.mean(own**2, axis=0) for own in parts])
 
 
-def rougher(segment, noise, rng: np.random.Generator) -> np.ndarray:
-    """The angles (n, dof) of a segment with noise drawn once more, of RMS `noise` (dof,) in the
-    middle of the log and elsewhere as much more or less as third differences say: stamps that
-    jitter make it grow with the speed."""
+def rougher(segment, noise, cutoff: float, rng: np.random.Generator) -> np.ndarray:
+    """The angles (n, dof) of a segment with their noise once more.
+
+    White noise of RMS `noise` (dof,) in the middle of the log and elsewhere as much more or less
+    as third differences say: stamps that jitter make it grow with the speed. Of an angle that its
+    encoder rounds, what rounding makes of the smoothed angle, and of the noise before it, on a grid
+    shifted by a random part of its grain: in slow motion that is no white noise.
+
+    Args:
+        cutoff: [Hz] above which the angle holds no motion.
+    """
     from scipy.ndimage import median_filter
 
     q = segment.q
@@ -44,4 +54,26 @@ def rougher(segment, noise, rng: np.random.Generator) -> np.ndarray:
         ],
         axis=1,
     )
-    return q + noise * profile * rng.normal(size=q.shape)
+    out = q + noise * profile * rng.normal(size=q.shape)
+    smooth = Gaussian(min(cutoff, HIGHEST / segment.step), segment.step)(q, axis=0)
+    for j, grain in enumerate(grains(q)):
+        if grain:
+            before = np.sqrt(max(noise[j] ** 2 - grain**2 / 12.0, 0.0)) * rng.normal(size=len(q))
+            truly = smooth[:, j] + grain * rng.uniform()
+            out[:, j] = q[:, j] + grain * np.round((truly + before) / grain) - truly
+    return out
+
+
+def grains(q) -> np.ndarray:
+    """(dof,) what angles q (n, dof) are rounded to, zero where they are not."""
+    out = np.zeros(q.shape[1])
+    for j, steps in enumerate(np.abs(np.diff(q, axis=0)).T):
+        steps = steps[steps > 1e-9 * np.ptp(q[:, j])]
+        if len(steps) <= _FEWEST:
+            continue
+        counts = steps / steps.min()
+        # files round what is rounded; of any other numbers one in fifty comes that near to a count
+        near = np.abs(counts - np.round(counts)) < 0.01 * np.maximum(counts, 1.0)
+        if np.mean(near) > 0.99 and np.mean(counts < _FEWEST) > 0.5:
+            out[j] = np.median(steps / np.round(counts))
+    return out

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 _WIDTH = 4.0  # standard deviations of the kernel that are kept
+HIGHEST = 0.3  # of the sampling rate: the last cutoff at which the kernel still has a shape
 
 
 class Gaussian:

@@ -21,7 +21,7 @@ from ..preprocess import (
     without_standstill,
 )
 from .angles import noise_of
-from .gaussian import Gaussian
+from .gaussian import HIGHEST, Gaussian
 
 LEAST = 15.0  # Hz: where friction's laws and ripple still show, several times what an arm moves at
 _MOTION = 4.0  # and this many times the motion's own bandwidth, if that is more
@@ -30,7 +30,6 @@ _SHARE = 0.25  # of the residual's power may be made by the angles' noise at the
 _ANGLES = 4.0
 # how far both low-passes see, as a multiple of the torque's own: the angles' sees a quarter as far
 _SIGHT = 1.25
-_HIGHEST = 0.3  # of the sampling rate
 # Laws are evaluated at this many samples a cycle of the cutoff: what is steeper than that, friction
 # at a reversal, is left out anyway.
 _SAMPLES_PER_CYCLE = 16.0
@@ -77,14 +76,28 @@ def widest(logs: Sequence[Log]) -> float:
     for segment in (s for log in logs for s in log.segments if len(s.t) > 50):
         speed = np.diff(segment.q, axis=0)
         speed = speed[:, np.ptp(segment.q, axis=0) > 1e-3 * np.ptp(segment.q, axis=0).max()]
-        power = np.cumsum(
-            np.abs(np.fft.rfft(speed * np.hanning(len(speed))[:, None], axis=0)) ** 2, axis=0
-        )
-        if speed.size and (power[-1] > 0).all():
-            bands.append(
-                float((power < 0.99 * power[-1]).sum(axis=0).max() / (len(speed) * segment.step))
-            )
+        if not speed.size:
+            continue
+        power = np.abs(np.fft.rfft(speed * np.hanning(len(speed))[:, None], axis=0)) ** 2
+        power = np.cumsum([_without_noise(one) for one in power.T], axis=1)
+        if (power[:, -1] > 0).all():
+            # the first frequency below which 99 % stand: less the noise, sums rise and fall
+            last = np.argmax(power >= 0.99 * power[:, -1:], axis=1).max()
+            bands.append(float(last / (len(speed) * segment.step)))
     return max(LEAST, _MOTION * float(np.median(bands[1:] or bands)))
+
+
+def _without_noise(power: np.ndarray) -> np.ndarray:
+    """A spectrum (frequencies,) of an angle's differences, less what noise makes of it: white noise
+    on the angle grows with the square of frequency, stamps that jitter make white noise of the
+    speed. The upper half of the band, where no arm moves, tells."""
+    from scipy.optimize import nnls
+
+    angle = np.sin(0.5 * np.pi * np.linspace(0.0, 1.0, len(power))) ** 2
+    shape = np.stack([np.ones(len(power)), angle], axis=1)
+    upper = slice(len(power) // 2, None)
+    scale = max(float(power[upper].max()), 1e-300)
+    return power - shape @ nnls(shape[upper], power[upper] / scale)[0] * scale
 
 
 def narrowed(cutoff: float, share: float) -> float:
@@ -105,9 +118,9 @@ def stride_of(motion: Motion, cutoff: float) -> int:
 def _piece(number: int, source: str, segment, cutoff: float) -> Piece | None:
     rate = 1.0 / segment.step
     every = max(1, int(rate / (_SAMPLES_PER_CYCLE * cutoff)))
-    both = Gaussian(min(cutoff, _HIGHEST * rate), segment.step)
+    both = Gaussian(min(cutoff, HIGHEST * rate), segment.step)
     settling = Gaussian(both.cutoff, every * segment.step)
-    angles = Gaussian(min(_ANGLES * cutoff, _HIGHEST * rate), segment.step)
+    angles = Gaussian(min(_ANGLES * cutoff, HIGHEST * rate), segment.step)
     edge = angles.reach + 2
     rows = slice(edge, len(segment.t) - edge, every)
     n = len(range(*rows.indices(len(segment.t))))
