@@ -67,6 +67,13 @@ def test_the_diagnosis_can_be_read():
     assert not long and not wide and total < 1500, (long, wide, total)
 
 
+@pytest.mark.parametrize("room", ["blocks", "changes", "failures", "flexible", "lowpass", "noise", "statement"])
+def test_what_stands_beside_the_diagnosis_can_be_read(room):
+    """No module of it over 200 lines or 100 columns."""
+    texts = {path.name: path.read_text().splitlines() for path in sorted((ROOT / "sysid" / room).glob("*.py"))}
+    assert texts and not {name: len(lines) for name, lines in texts.items() if len(lines) > 200 or max(map(len, lines), default=0) > 100}
+
+
 def test_only_the_command_line_prints():
     for parts, tree in modules():
         if parts[0] in ("cli", "terminal"):

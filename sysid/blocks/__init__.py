@@ -9,7 +9,7 @@ Which rows stand together (`numbering`), how sure a sum or an estimate is (`devi
 the parameters of a fit are together (`parameters`), and which model loses least (`rivals`).
 """
 
-from .deviations import away, jackknife, signs, slope_chance, standard_error
+from .deviations import jackknife, signs, slope_chance, standard_error, z_score
 from .numbering import FEWEST, MOST, SHORTEST, divided, folds, memory, numbered, summed
 from .parameters import covariance
 from .rivals import SAME, chances, confidence_set
@@ -19,7 +19,6 @@ __all__ = [
     "MOST",
     "SAME",
     "SHORTEST",
-    "away",
     "chances",
     "confidence_set",
     "covariance",
@@ -32,4 +31,5 @@ __all__ = [
     "slope_chance",
     "standard_error",
     "summed",
+    "z_score",
 ]

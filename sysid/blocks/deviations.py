@@ -21,7 +21,7 @@ def standard_error(values):
     return np.sqrt(count * np.var(values, axis=0, ddof=1))
 
 
-def away(differences) -> float:
+def z_score(differences) -> float:
     """Standard errors that a sum over blocks stands from zero; neighbouring blocks count together.
     Zero where they are too few."""
     d = np.asarray(differences)

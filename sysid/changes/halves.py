@@ -3,9 +3,13 @@ other."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
 import numpy as np
 
-from ..blocks import away, folds, summed
+from ..blocks import folds, summed, z_score
 from ..model import ROBOT
 from ..shape import inverted
 
@@ -14,43 +18,66 @@ _SUPPORT = 3.0  # standard errors
 # of the squared residual: below it, a held model's errors on another motion look like changes
 _WORTH = 0.1
 
-
-def chosen_of(tried, residual, weights, blocks) -> list[tuple]:
-    """The changes that the halves of the log support, each fitted on one and judged on the
-    other."""
-    halves = folds(blocks.max() + 1, 2)[blocks] == 0
-    chosen: list[tuple] = []
-    current = across(tried, chosen, residual, weights, halves)
-    while len(chosen) < _MOST:
-        best = None
-        for key in tried:
-            if key in chosen:
-                continue
-            after = across(tried, [*chosen, key], residual, weights, halves)
-            own = slice(None) if key[1] == ROBOT else [key[1]]
-            fall = summed(blocks, ((current**2 - after**2) * weights**2)[:, own]).sum(1)
-            share, far = (
-                float(fall.sum() / max(np.sum((current * weights)[:, own] ** 2), 1e-300)),
-                away(fall),
-            )
-            if share >= _WORTH and far >= _SUPPORT and (best is None or share > best[0]):
-                best = (share, key, after)
-        if best is None:
-            return chosen
-        chosen, current = [*chosen, best[1]], best[2]
-    return chosen
+Key = tuple[str, int]  # an effect's word and its joint
 
 
-def across(tried, keys, residual, weights, halves) -> np.ndarray:
-    """The residual of each half after what the other half says of the changes."""
-    if not keys:
-        return residual
-    columns = np.concatenate([tried[key] for key in keys], axis=2)
-    out = np.empty_like(residual)
-    for half in (halves, ~halves):
-        c = least_squares(columns[:, ~half], residual[~half], weights)
-        out[half] = residual[half] - np.einsum("jnk,k->nj", columns[:, half], c)
-    return out
+@dataclass(frozen=True)
+class Question:
+    """A held model on a new log, and what each change would add to it.
+
+    columns: {change: (dof, n, k)}; residual: (n, dof) of the held model; weights: (dof,) by which
+    joints count; blocks: (n,) the block of each row.
+    """
+
+    columns: dict[Key, np.ndarray]
+    residual: np.ndarray
+    weights: np.ndarray
+    blocks: np.ndarray
+
+    def stacked(self, keys: Sequence[Key]) -> np.ndarray:
+        """Columns (dof, n, k) of some changes, one after the other."""
+        return np.concatenate([self.columns[key] for key in keys], axis=2)
+
+    @cached_property
+    def halves(self) -> np.ndarray:
+        """(n,) bool, the rows of the first half."""
+        return folds(self.blocks.max() + 1, 2)[self.blocks] == 0
+
+    def across(self, keys: Sequence[Key]) -> np.ndarray:
+        """The residual (n, dof) of each half after what the other half says of some changes."""
+        if not keys:
+            return self.residual
+        columns, out = self.stacked(keys), np.empty_like(self.residual)
+        for half in (self.halves, ~self.halves):
+            c = least_squares(columns[:, ~half], self.residual[~half], self.weights)
+            out[half] = self.residual[half] - np.einsum("jnk,k->nj", columns[:, half], c)
+        return out
+
+    def taken(self, key: Key, before, after) -> tuple[float, float]:
+        """The share that a change takes of a residual's weighted square on its joints, and how many
+        standard errors it stands from zero."""
+        joints = slice(None) if key[1] == ROBOT else [key[1]]
+        fall = summed(self.blocks, ((before**2 - after**2) * self.weights**2)[:, joints]).sum(1)
+        whole = max(np.sum((before * self.weights)[:, joints] ** 2), 1e-300)
+        return float(fall.sum() / whole), z_score(fall)
+
+    def supported(self) -> list[Key]:
+        """The changes that the halves support, the one that takes most first, each beside those."""
+        chosen: list[Key] = []
+        current = self.residual
+        while len(chosen) < _MOST:
+            found = {}
+            for key in self.columns:
+                if key not in chosen:
+                    after = self.across([*chosen, key])
+                    share, z = self.taken(key, current, after)
+                    if share >= _WORTH and z >= _SUPPORT:
+                        found[key] = (share, after)
+            if not found:
+                break
+            best = max(found, key=lambda key: found[key][0])
+            chosen, current = [*chosen, best], found[best][1]
+        return chosen
 
 
 def least_squares(columns, residual, weights) -> np.ndarray:

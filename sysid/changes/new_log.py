@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +14,7 @@ from ..errors import LogError
 from ..lowpass import LEAST, lowpassed, stride_of
 from ..noise import floors_of
 from .fitted import Change, together
-from .halves import BLOCKS, chosen_of
+from .halves import BLOCKS, Question
 from .held import read_run
 from .signatures import signatures
 
@@ -57,19 +57,15 @@ def changed(experiment: Experiment, run: Path, logs: list[str]) -> Changed:
     data = rows.stack(structure, motion, stride)
     residual = data.residual(x)
     by_size = lambda left: 1.0 / np.maximum(data.rms(left), 1e-12)  # noqa: E731
-    weights = by_size(residual)
     blocks = numbered(data.t, data.piece, shortest=np.inf, fewest=BLOCKS)
-    tried = {
-        key: columns
-        for key, columns in signatures(structure, x, motion, stride, data.use).items()
-        if np.any(columns)
-    }
-    chosen = chosen_of(tried, residual, weights, blocks)
-    changes, after = together(structure, tried, chosen, residual, weights, blocks)
+    tried = signatures(structure, x, motion, stride, data.use)
+    tried = {key: columns for key, columns in tried.items() if np.any(columns)}
+    question = Question(tried, residual, by_size(residual), blocks)
+    chosen = question.supported()
+    changes, after = together(structure, question, chosen)
     if changes:  # a joint counts by what is left of it, not by what the changes made of it
-        weights = by_size(after)
-        chosen = chosen_of(tried, residual, weights, blocks) or chosen
-        changes, after = together(structure, tried, chosen, residual, weights, blocks)
+        question = replace(question, weights=by_size(after))
+        changes, after = together(structure, question, question.supported() or chosen)
     count = 10 * structure.bodies
     bodies, rest = x[:count].reshape(-1, 10), x[count:]
     predicted = np.concatenate([structure.torque(piece, bodies, rest) for piece in motion.pieces])

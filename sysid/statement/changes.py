@@ -27,7 +27,7 @@ def document(found: Changed, run="") -> dict:
                 "effect": c.effect,
                 "joint": c.joint,
                 "misfit_removed": c.removed,
-                "misfit_removed_se": number(c.removed / c.away if c.away else float("nan")),
+                "misfit_removed_se": number(c.removed_se),
                 "parameters": {
                     name: {"value": v, "std": number(s), "unit": u}
                     for name, (v, s, u) in c.parameters.items()
