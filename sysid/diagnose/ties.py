@@ -110,7 +110,7 @@ def chosen(view: View, groups: list[Group], rng: np.random.Generator) -> Choice 
         return None
     base = losses(view, view.blocks).sum(1)
     table = np.stack([m.losses.sum(1) for m in members], axis=1)
-    members, table = _least(members, table)
+    members, table = _least(members, table, rng)
     p = blocks.confidence_set(table, rng)
     inside = [k for k in np.argsort(table.sum(0)) if p[k] >= _OUTSIDE]
     # the likeliest, and of two that are as likely the simplest: not what rounding left with less
@@ -122,14 +122,16 @@ def chosen(view: View, groups: list[Group], rng: np.random.Generator) -> Choice 
     return Choice(members[head], tuple((members[k], float(chance[k])) for k in order), base - table[:, head])
 
 
-def _least(members: list[Member], table: np.ndarray):
-    """Of the variants of one candidate, the one that loses least."""
+def _least(members: list[Member], table: np.ndarray, rng: np.random.Generator):
+    """Of each candidate the simplest variant that the log cannot tell from the best of them; of several, what loses least."""
     kept: dict = {}
     for k, member in enumerate(members):
-        key = member.candidate.key
-        if key not in kept or table[:, k].sum() < table[:, kept[key]].sum():
-            kept[key] = k
-    at = list(kept.values())
+        kept.setdefault(member.candidate.key, []).append(k)
+    at = []
+    for own in kept.values():
+        p = blocks.confidence_set(table[:, own], rng) if len(own) > 1 else np.ones(1)
+        inside = [k for k, chance in zip(own, p) if chance >= _OUTSIDE]
+        at.append(min(inside, key=lambda k: (members[k].candidate.parameters, table[:, k].sum())))
     return [members[k] for k in at], table[:, at]
 
 
