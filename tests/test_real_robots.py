@@ -84,6 +84,14 @@ def test_odrive_ripples_at_7_14_and_28_periods_a_turn():
         assert own == pytest.approx(0.04 * ampere, rel=0.15)
 
 
+def test_kr300_has_no_warmth_in_ten_seconds():
+    """It stands, breaks away and stops: friction at low speed, which friction that falls with time can imitate."""
+    said, _ = diagnosed("kr300")
+    named = {f["effect"] for f in said["findings"] if f["joins_as_step"]}
+    assert not named - {"stribeck", "presliding"}
+    assert "warmup" not in {m["effect"] for v in said["verdict"] for m in v.get("set", [])}
+
+
 def log(name: str):
     from sysid.config import LogSpec
 
