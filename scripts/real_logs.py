@@ -70,6 +70,8 @@ def told(found: dict, known: str) -> str:
             )  # fmt: skip
             options = "".join(f", {name}: {value}" for name, value in f["options"].items())
             lines.append(f"- `{f['effect']}` on {f['joint']}{options}: RMS on the test logs {f['rms_test_before']:.4g} → {f['rms_test_after']:.4g}; {values}")
+    if said := [f"- {v['joint']}: {v['says']}" for v in found["verdict"] if v.get("says")]:
+        lines += ["", "Of single joints:", "", *said]
     lines += ["", _events(found["fit_events"]), "", f"CPU: fit {found['cpu']['fit']:.1f} s, diagnosis {found['cpu']['diagnose']:.1f} s."]
     return "\n".join(lines)
 

@@ -79,7 +79,10 @@ def _joint(v: dict, of: Told, width: int, said: dict[str, str]) -> list[str]:
         lines += rest
     for head in heads:
         lines += _head(head, of, joint, width, said)
-    return lines + (rest if status != "unknown" else [])
+    lines += rest if status != "unknown" else []
+    if status != "unresolved" and v.get("says"):
+        lines += wrapped(f"  {v['says']}", width, "    ")
+    return lines
 
 
 def _fall(v: dict, of: Told) -> str:

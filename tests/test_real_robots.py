@@ -92,6 +92,15 @@ def test_kr300_has_no_warmth_in_ten_seconds():
     assert "warmup" not in {m["effect"] for v in said["verdict"] for m in v.get("set", [])}
 
 
+def test_schunk_s_short_runs_do_not_carry_the_model_over():
+    said, fit = diagnosed("schunk")
+    brakes = {joint for event in fit.events if event["kind"] == "brake" for joint in event["joints"]}
+    assert {"j2", "j3", "j4", "j5"} <= brakes
+    words = {v["joint"]: v.get("says", "") for v in said["verdict"]}
+    carried = [joint for joint, says in words.items() if "do not carry the model" in says]
+    assert {"j2", "j5"} <= set(carried) and all("the training logs (10 of 2" in words[joint] for joint in carried)
+
+
 def log(name: str):
     from sysid.config import LogSpec
 

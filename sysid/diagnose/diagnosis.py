@@ -25,6 +25,7 @@ from ..estimate import Fit
 from ..filters import settled
 from ..noise import NoiseFloor, floors
 from ..preprocess import prepare
+from ..transfer import transfers
 from . import claims as claiming
 from . import regions, select
 from .candidates import candidates
@@ -84,7 +85,7 @@ def diagnose(experiment: Experiment, *, fit: Fit | None = None, level: float = s
         if test is None:
             raise _short()
         first, then = HeldOut(view, test), HeldOut(after, test)
-        said = verdicts(fit, claims, after.unknown, view.unknown, list(found.values()), refused)
+        said = verdicts(fit, claims, after.unknown, view.unknown, list(found.values()), refused, transfers(last))
         levels = np.array([floor.rms if floor.rms is not None else last.rms("test")[j] for j, floor in found.items()])
         return Diagnosis(
             fit, found, tuple(claims), tuple(said), tuple(detectable(view, asked, candidates(view.model, extra))),

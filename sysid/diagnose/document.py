@@ -107,8 +107,8 @@ def _verdict(v: Verdict) -> dict:
         out["explained"] = 0.0
     if v.status == "explained":
         out |= {"by": [{"effect": c.head.effect, "joint": c.head.joint} for c in v.claims], "explained": number(v.explained)}
-    if v.says:
-        out["says"] = v.says
+    if v.says or v.carries:
+        out["says"] = "; ".join(words for words in (v.says, v.carries) if words)
     if v.left is not None:
         out |= {"depends_on": dependences(v.left), "share_left": v.left.share}
     return out
