@@ -68,7 +68,10 @@ def told(found: dict, known: str) -> str:
                 f"{name.split('.')[-1]} = {p['value']:.3g}" + (f" ± {p['std']:.1g}" if p["std"] is not None else "") + f" {p['unit']}"
                 for name, p in f["parameters"].items() if p["value"] is not None
             )  # fmt: skip
-            lines.append(f"- `{f['effect']}` on {f['joint']}: RMS on the test logs {f['rms_test_before']:.4g} → {f['rms_test_after']:.4g}; {values}")
+            options = "".join(f", {name}: {value}" for name, value in f["options"].items())
+            lines.append(f"- `{f['effect']}` on {f['joint']}{options}: RMS on the test logs {f['rms_test_before']:.4g} → {f['rms_test_after']:.4g}; {values}")
+    if said := [f"- {v['joint']}: {v['says']}" for v in found["verdict"] if v.get("says")]:
+        lines += ["", "Of single joints:", "", *said]
     lines += ["", _events(found["fit_events"]), "", f"CPU: fit {found['cpu']['fit']:.1f} s, diagnosis {found['cpu']['diagnose']:.1f} s."]
     return "\n".join(lines)
 
@@ -76,7 +79,7 @@ def told(found: dict, known: str) -> str:
 def _verdict(v: dict) -> str:
     words = v["status"]
     if v.get("effect"):
-        words += f": `{v['effect']}`" + "".join(f", `{e}`" for e in v.get("also", []))
+        words += f": `{v['effect']}`" + "".join(f", `{e}`" for e in dict.fromkeys(v.get("also", [])) if e != v["effect"])
         rest = [f"{s['effect']} on {s['joint']} {100 * s['probability']:.0f} %" for s in v["set"][1:] if s["probability"] >= 0.05]
         words += f" ({100 * v['set'][0]['probability']:.0f} %; or {', '.join(rest)})" if rest else ""
     elif v.get("also"):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+from collections.abc import Sequence
 
 from .config import EffectSpec, Experiment
 
@@ -14,11 +15,35 @@ def spelled(candidate, joint: str) -> tuple[str, list[str] | None, dict]:
     return name, None if joint == "*" else [joint], {**own, **dict(candidate.options)}
 
 
-def grown(experiment: Experiment, effect: str, joints: list[str] | None, options: dict) -> Experiment:
-    """The experiment with one more effect, as its file would say it."""
+def grown(
+    experiment: Experiment, effect: str, joints: list[str] | None, options: dict, *, every: Sequence[str] = ()
+) -> Experiment:  # fmt: skip
+    """The experiment with one more effect, as its file would say it; with options, in the place of
+    the same effect with others on these joints.
+
+    Args:
+        every: the robot's joints, which an entry without `joints` stands for.
+    """
     spec = EffectSpec(name=effect, joints=joints, options=options)
-    model = experiment.model.model_copy(update={"effects": [*experiment.model.effects, spec]})
+    rest = [one for old in experiment.model.effects if (one := _apart(old, spec, every)) is not None]
+    model = experiment.model.model_copy(update={"effects": [*rest, spec]})
     return experiment.model_copy(update={"model": model})
+
+
+def _apart(old: EffectSpec, new: EffectSpec, every: Sequence[str]) -> EffectSpec | None:
+    if old.name != new.name or "formula" in new.options:
+        return old
+    there = list(every) if old.joints is None else old.joints
+    left = remaining(there, old.options, new.joints, new.options)
+    return old if left is None else old.model_copy(update={"joints": left}) if left else None
+
+
+def remaining(there: Sequence[str], had: dict, joints: Sequence[str] | None, options: dict) -> list[str] | None:
+    """The joints that keep an effect as it is where it comes again with other options; None where it does not take
+    its place: it has no options, the same ones, or other joints."""
+    if not options or options == had or joints is None or not set(joints) & set(there):
+        return None
+    return [joint for joint in there if joint not in joints]
 
 
 def command(path, effect: str, joints: list[str] | None, options: dict) -> str:

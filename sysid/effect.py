@@ -143,6 +143,14 @@ class Effect(ABC):
         """The options under which it is worth trying on a joint (-1 where its scope is the robot), simplest first."""
         return [{}]
 
+    def richer(self, **shapes: float) -> list[tuple[dict, dict[str, float]]]:
+        """What may take its place where the model has it: options, with the shape values at which to try these.
+
+        Args:
+            shapes: its shape values as the model has them.
+        """
+        return []
+
 
 class TorqueEffect(Effect):
     """An effect that adds torque to one joint."""

@@ -19,7 +19,8 @@ def knocks(q, tau, step: float) -> list[tuple[int, int, list[int]]]:
 
     The level of what is unexplained in windows of `_BURST`, over the usual: the larger of the log's
     own while the joint moves, of what is about it, and of the quantum. A knock is where it
-    surprises on two joints, be it in angle or torque; where there is one joint, in both.
+    surprises on two joints, be it in angle or torque, or half as much on most of four or more;
+    where there is one joint, in both.
     """
     n, dof = tau.shape
     length = max(FEWEST, 2 * round(0.5 * _BURST / step) + 1)
@@ -36,7 +37,11 @@ def knocks(q, tau, step: float) -> list[tuple[int, int, list[int]]]:
     )  # (dof, windows)
     own = np.maximum(angle, torque)
     level = np.log(len(first) * dof / CHANCE)
-    both = np.minimum(angle, torque)[0] if dof == 1 else np.sort(own, axis=0)[-2]
+    ranked = np.sort(own, axis=0)
+    both = np.minimum(angle, torque)[0] if dof == 1 else ranked[-2]
+    if dof > 3:
+        # of most joints at once half of it is enough: were but two of them independent
+        both = np.maximum(both, 2.0 * ranked[-(dof // 2 + 1)])
     found = []
     # a knock rings: it lasts as long as windows are unusual at all, on half the evidence
     for a, b in runs(both > 0.5 * level):

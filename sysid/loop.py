@@ -9,12 +9,12 @@ from __future__ import annotations
 import io
 import json
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from . import comparison, config, pipeline, results
-from .addition import spelled
+from .addition import remaining, spelled
 from .config import Experiment
 from .diagnose.diagnosis import Diagnosis, diagnose
 from .errors import ConfigError
@@ -52,11 +52,14 @@ class Added:
 # ---- the experiment file
 
 
-def with_effect(text: str, effect: str, joints: list[str] | None, options: dict, where: str = "") -> str:
-    """The text of an experiment file with one more effect, its comments kept.
+def with_effect(
+    text: str, effect: str, joints: list[str] | None, options: dict, where: str = "", *, every: Sequence[str] = ()
+) -> str:  # fmt: skip
+    """The text of an experiment file with one more effect, its comments kept. With options, it takes the place of the same
+    effect with others on these joints.
 
     Args:
-        joints: None for every joint, or for an effect of the whole robot.
+        joints: None for every joint, or for an effect of the whole robot. every: the robot's joints.
 
     Raises:
         ConfigError: the effect is there already.
@@ -75,15 +78,26 @@ def with_effect(text: str, effect: str, joints: list[str] | None, options: dict,
     listed = model["effects"]
     formula = options.get("formula") if effect == "formula" else None
     own = {**({"joints": list(joints)} if joints is not None else {}), **options}
-    for entry in listed:
+    for entry in list(listed):
         if formula is not None or _word(entry) != effect:
             continue
         there = entry[effect] if isinstance(entry, dict) else {}
+        had = {k: v for k, v in there.items() if k != "joints"}
+        stands = there.get("joints")
+        left = remaining(every if stands is None else stands, had, joints, options)
+        if left is not None:
+            at = listed.index(entry)
+            if left:
+                listed[at] = CommentedMap({effect: _flow({"joints": left, **had})})
+                listed[at].fa.set_flow_style()
+            else:
+                del listed[at]
+            continue
         taken = set(there.get("joints") or []) if there.get("joints") is not None else None
         if taken is None or joints is None or taken & set(joints):
             said = "" if not taken or joints is None else f" on {', '.join(sorted(taken & set(joints)))}"
             raise ConfigError(f"{effect} is in the model already{said}", where=where, do="add another effect, or another joint")
-        if {k: v for k, v in there.items() if k != "joints"} == options:
+        if had == options:
             there["joints"].extend(joints)
             break
     else:
@@ -132,7 +146,8 @@ def add(
     experiment = pipeline.load(path)
     run = results.folder(out or Path("runs") / experiment.name)
     file = experiment.path
-    text = with_effect(file.read_text(encoding="utf-8-sig"), effect, joints, options, str(file))
+    every = pipeline.build(experiment)[0].joints
+    text = with_effect(file.read_text(encoding="utf-8-sig"), effect, joints, options, str(file), every=every)
     after = config.loads(text, file)
     pipeline.build(after)
     before_fit = pipeline.fit(experiment, progress=progress)

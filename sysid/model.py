@@ -148,6 +148,15 @@ class Model:
         grown = replace(self, terms=(*self.terms, (effect, joints)))
         return replace(grown, shapes=(*self.shapes, *initial(grown)[len(self.shapes) :]))
 
+    def without(self, name: str, joint: int) -> Model:
+        """The model without an effect on a joint."""
+        kept = [(effect, tuple(j for j in joints if (effect.name, j) != (name, joint))) for effect, joints in self.terms]
+        place = {term: k for k, term in enumerate(t for t, (_, joints) in enumerate(kept) if joints)}
+        own = lambda term, j: (self.terms[term][0].name, j) == (name, joint)  # noqa: E731
+        shapes = tuple(at for v, at in zip(self.shape_values, self.shapes) if not own(v.term, v.joint))
+        held = tuple(((place[term], j, word), at) for (term, j, word), at in self.held if not own(term, j))
+        return replace(self, terms=tuple(k for k in kept if k[1]), shapes=shapes, held=held)
+
     def with_shapes(self, values) -> Model:
         """The model with other shape values."""
         return replace(self, shapes=tuple(float(v) for v in values))

@@ -105,6 +105,16 @@ def test_grid_of_cogging_misses_no_line():
     assert len(k.values(k.low, k.high)) == k.grid and np.diff(k.values(k.low, k.high)).max() < 0.25
 
 
+def test_a_ripple_that_is_there_may_have_more_lines():
+    found = effect.find("cogging").richer(k=14.0)
+    for lines, k in ((4, 14.0), (4, 7.0), (2, 7.0)):
+        assert ({"lines": lines}, {"k": k}) in found
+    # the line that is there stays, and does not come alone
+    assert min(options["lines"] * at["k"] for options, at in found) == 14.0 and all(options["lines"] > 1 for options, _ in found)
+    assert all(at["k"] >= 1.0 for _, at in effect.find("cogging").richer(k=2.5))
+    assert not effect.find("cogging").given(lines=8).richer(k=14.0) and not effect.find("spring").richer(q0=0.0)
+
+
 @pytest.mark.parametrize("name", MOVERS + SENSORS)
 @pytest.mark.parametrize("make", [moving, arm_moving])
 def test_start_changes_nothing(name, make):
@@ -122,8 +132,7 @@ def test_start_changes_nothing(name, make):
 @pytest.mark.parametrize("name", [*MOVERS, *SENSORS, "presliding", "warmup", "joint_coupling"])
 @pytest.mark.parametrize("filtered", ["raw", "same"])
 def test_columns_of_a_stretch_are_those_of_the_whole(name, filtered):
-    from sysid.model import chunks
-    from sysid.model import ROBOT, Model, initial
+    from sysid.model import ROBOT, Model, chunks, initial
     from sysid.preprocess import prepare
     from tests.problems import arm_log
 

@@ -116,6 +116,19 @@ def test_knocks_are_found_where_they_are(conditions):
         assert at - 0.1 < event.start <= at + 0.02 and at + 0.02 < event.stop < at + 0.3
 
 
+def test_a_knock_that_most_joints_show_a_little_is_one():
+    """Seven joints; what is too little on any two of them is a knock where most show it, and none on three."""
+    parts = [segment(seed=seed) for seed in range(3)]
+    q, tau = (np.concatenate([getattr(p, name) for p in parts], axis=1)[:, :7] for name in ("q", "tau"))
+    made = replace(parts[0], q=q, tau=tau)
+    names = tuple("abcdefg")
+    assert find(made, names) == ()
+    ring = with_knock(segment(), 5.0, 1.0).tau[:, 0] - segment().tau[:, 0]
+    for count, found in ((6, 1), (3, 0), (1, 0)):
+        shaken = replace(made, tau=tau + 2.0 * ring[:, None] * (np.arange(7) < count))
+        assert [event.kind for event in find(shaken, names)] == ["knock"] * found
+
+
 def test_a_disturbance_of_one_joint_alone_is_no_knock():
     """A motor's own ripple or a gear's impact is what a model may have to explain."""
     made = segment()

@@ -118,6 +118,25 @@ def test_what_is_there_already_is_refused(effect, joints, words):
         with_effect(BLOCK, effect, joints, {})
 
 
+def test_other_options_take_the_place_of_what_is_there():
+    """As the file would say it, and as the experiment is."""
+    from sysid.addition import grown
+
+    every = ["abad", "hip", "knee"]
+    for before, added, after in (
+        ("{stribeck: {joints: [hip, knee]}}", ["hip"], [("stribeck", ["knee"], {}), ("stribeck", ["hip"], {"vs": 0.2})]),
+        ("stribeck", ["hip"], [("stribeck", ["abad", "knee"], {}), ("stribeck", ["hip"], {"vs": 0.2})]),
+        ("{stribeck: {joints: [hip], vs: 0.1}}", ["hip"], [("stribeck", ["hip"], {"vs": 0.2})]),
+    ):
+        text = f"model:\n  effects: [viscous, {before}]  # kept\n"
+        made = with_effect(text, "stribeck", added, {"vs": 0.2}, every=every)
+        assert effects_of(made) == [("viscous", None, {}), *after] and "# kept" in made
+        model = grown(config.loads(text, config.Path("e.yaml")), "stribeck", added, {"vs": 0.2}, every=every).model
+        assert [(e.name, e.joints, e.options) for e in model.effects] == effects_of(made)
+    with pytest.raises(ConfigError, match="already on hip"):
+        with_effect("model: {effects: [{stribeck: {joints: [hip], vs: 0.2}}]}", "stribeck", ["hip"], {"vs": 0.2}, every=every)
+
+
 @pytest.mark.parametrize("text", ["", "# nothing yet\n", "model: {}\n", "model: {inertia: linear}\n", "robot: {urdf: r.urdf}\n", "model:\n  effects:\n"])
 def test_what_the_file_does_not_say_is_written_out(text):
     """The effects that hold by default would be gone if the list began with the new one."""

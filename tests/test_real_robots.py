@@ -3,6 +3,7 @@
 import functools
 import hashlib
 import http.server
+import os
 import threading
 from dataclasses import replace
 from pathlib import Path
@@ -57,6 +58,47 @@ def test_panda_is_within_its_published_error():
     assert relative_error(fit, "train") <= 0.0141
     # a half that the fit never saw
     assert relative_error(fit, "test") <= 0.0141
+
+
+def diagnosed(name: str):
+    """The document of a diagnosis of an experiment folder of the data, and its fit."""
+    from sysid.diagnose.diagnosis import diagnose
+    from sysid.statement.document import document
+
+    folder = Path(os.environ.get("SYSID_DATA_DIR") or "nowhere") / name
+    if not (folder / "config.yaml").exists():
+        pytest.skip(f"{name} is not in the folder that SYSID_DATA_DIR names")
+    found = diagnose(sysid.load(folder))
+    return document(found), found.fit
+
+
+def test_odrive_ripples_at_7_14_and_28_periods_a_turn():
+    """Known of the motor from static maps: 0.87, 0.29 and 0.46 A at 0.03 turns/s, at 0.04 N m/A."""
+    said, _ = diagnosed("odrive")
+    last = [f for f in said["findings"] if f["joins_as_step"]][-1]
+    assert last["effect"] == "cogging" and "lines=" in last["command"]
+    values = {name.split(".")[-1]: p["value"] for name, p in last["parameters"].items()}
+    size = {round(line * values["k"], 1): np.hypot(values[f"a{line}"], values[f"b{line}"]) for line in range(1, last["options"]["lines"] + 1)}
+    for periods, ampere in ((7, 0.87), (14, 0.29), (28, 0.46)):
+        (own,) = [a for k, a in size.items() if abs(k - periods) < 0.1 * periods / 7]
+        assert own == pytest.approx(0.04 * ampere, rel=0.15)
+
+
+def test_kr300_has_no_warmth_in_ten_seconds():
+    """It stands, breaks away and stops: friction at low speed, which friction that falls with time can imitate."""
+    said, _ = diagnosed("kr300")
+    named = {f["effect"] for f in said["findings"] if f["joins_as_step"]}
+    assert not named - {"stribeck", "presliding"}
+    assert "warmup" not in {m["effect"] for v in said["verdict"] for m in v.get("set", [])}
+
+
+def test_schunk_s_short_runs_do_not_carry_the_model_over():
+    said, fit = diagnosed("schunk")
+    brakes = {joint for event in fit.events if event["kind"] == "brake" for joint in event["joints"]}
+    assert {"j2", "j3", "j4", "j5"} <= brakes
+    words = {v["joint"]: v.get("says", "") for v in said["verdict"]}
+    carried = [joint for joint, says in words.items() if "do not carry the model" in says]
+    assert {"j2", "j5"} <= set(carried) and all("the training logs (10 of 2" in words[joint] for joint in carried)
 
 
 def log(name: str):

@@ -259,6 +259,34 @@ def test_a_formula_takes_part_and_survives_its_discovery(simulated, tmp_path):
     assert value["value"] == pytest.approx(3.0, rel=0.1)
 
 
+def test_a_ripple_of_several_lines_is_named_with_them(simulated, tmp_path):
+    """k = 9 with its double and its fourth multiple, made by a formula: no sine of the angle is left out, none is put in."""
+
+    def ripple(q, qd, qdd, t, load, memory):
+        return np.array([0.0, 0.8 * np.sin(9.0 * q[1]) + 0.5 * np.sin(18.0 * q[1] + 0.4) + 0.6 * np.cos(36.0 * q[1])])
+
+    folder = simulated("lines", ripple, seed=3, duration=14.0)
+    found = diagnose(pipeline.load(folder))
+    own = verdict(found, "elbow")
+    assert own.status == "missing" and {c.head.effect for c in own.claims} == {"cogging"}
+    last = own.claims[-1].head
+    assert dict(last.candidate.options) == {"lines": 4} and not [c for c in found.claims if c.head.joint != "elbow"]
+    near(last, folder, "k", 9.0, 0.01)
+    values = {name.split(".")[-1]: value for name, (value, *_) in last.parameters.items()}
+    for line, truly in ((1, 0.8), (2, 0.5), (3, 0.0), (4, 0.6)):
+        assert np.hypot(values[f"a{line}"], values[f"b{line}"]) == pytest.approx(truly, abs=0.1)
+
+
+def test_friction_that_falls_at_low_speed_only_is_no_warmth(simulated):
+    """What a joint has beyond its friction while it breaks away, once, at the start: less at speed is no part of warmth."""
+
+    def breaking_away(q, qd, qdd, t, load, memory):
+        return np.array([0.0, 1.5 * np.sign(qd[1]) * np.exp(-t / 4.0) * (1.0 - abs(qd[1]))])
+
+    found = diagnose(pipeline.load(simulated("breaking_away", breaking_away, seed=3, duration=14.0)))
+    assert "warmup" not in {c.head.effect for c in found.claims}
+
+
 def test_an_option_survives_its_discovery(simulated, tmp_path):
     """Friction that follows the angle in proportion to speed is `position_friction` with an option."""
     law = lambda q, qd, qdd, t, load, memory: np.array([0.0, 0.3 * qd[1] * (1.0 + np.sin(3.0 * q[1]))])  # noqa: E731

@@ -16,6 +16,7 @@ from sysid.effect import Linear, TorqueEffect
 from sysid.flexible import Unknown
 from sysid.noise import NoiseFloor
 from sysid.statement.document import _verdict, dependences
+from sysid.transfer import Transfer
 
 # ---- verdicts, by hand
 
@@ -50,6 +51,17 @@ def elbow(first: float, claims=(), *, rest=NOISE, before=NOISE, level=None, refu
     found = verdicts(fitted(first, train=train), claims, [NOISE, rest], [NOISE, before], [floor(), level or floor()], refused)
     assert [v.joint for v in found] == list(JOINTS) and found[0].status in ("complete", "explained")
     return found[1]
+
+
+@pytest.mark.parametrize("error", [1.0, 1.3])
+def test_what_does_not_carry_over_is_said_whatever_the_verdict(error):
+    found = verdicts(
+        fitted(error, train=1.0), (), [NOISE, NOISE], [NOISE, NOISE], [floor(), floor()],
+        carried=[Transfer("shoulder", 1.2, 0.1, (3.0,)), Transfer("elbow", 1.5, 0.1, (2.0, 4.0))],
+    )  # fmt: skip
+    shoulder, own = (_verdict(v) for v in found)
+    assert "says" not in shoulder and own["status"] == ("complete" if error == 1.0 else "unresolved")
+    assert own["says"].endswith("(places, motions, forces): its error there is 1.50 +- 0.1 times as large")
 
 
 def test_at_the_floor_it_is_complete():

@@ -16,11 +16,13 @@ _PLAIN = ("viscous", "coulomb", "armature", "torque_bias")
 
 @dataclass(frozen=True)
 class Candidate:
-    """An effect that is not in the model, on a joint (-1: the robot), with the options of a variant."""
+    """An effect that is not in the model, on a joint (-1: the robot), with the options of a variant. begins: shape values
+    to try in place of a grid, of one that takes the place of what the model has of it."""
 
     effect: Effect
     joint: int
     options: tuple[tuple[str, object], ...]
+    begins: tuple[tuple[tuple[str, float], ...], ...] = ()
 
     @property
     def name(self) -> str:
@@ -61,10 +63,23 @@ def candidates(model: Model, extra=()) -> list[Candidate]:
     for effect in [*(find(name) for name in vocabulary()), *extra]:
         for joint in [ROBOT] if effect.scope == "robot" else range(robot.dof):
             if (effect.name, joint) in there:
+                out += _richer(model, effect.name, joint)
                 continue
             for options in _variants(effect, robot, joint):
                 out.append(Candidate(effect.given(**options).bound(robot, joint), joint, tuple(options.items())))
     return out
+
+
+def _richer(model: Model, name: str, joint: int) -> list[Candidate]:
+    """What may take the place of an effect that the model has; nothing where the user holds its shape values."""
+    ((term, effect),) = [(k, e) for k, (e, joints) in enumerate(model.terms) if e.name == name and joint in joints]
+    own = [(v, at) for v, at in zip(model.shape_values, model.shapes) if (v.term, v.joint) == (term, joint)]
+    if any(v.held for v, _ in own):
+        return []
+    return [
+        Candidate(effect.given(**options).bound(model.robot, joint), joint, tuple(options.items()), (tuple(at.items()),))
+        for options, at in effect.richer(**{v.shape.name: at for v, at in own})
+    ]  # fmt: skip
 
 
 def _variants(effect: Effect, robot, joint: int) -> list[dict]:
@@ -78,6 +93,8 @@ def _variants(effect: Effect, robot, joint: int) -> list[dict]:
 
 def tried(view, candidate: Candidate) -> list[dict[str, float]]:
     """Sets of shape values to try: a grid over each value in turn, the others midway; where an effect does nothing yet, that."""
+    if candidate.begins:
+        return [dict(at) for at in candidate.begins]
     bounds = bounds_of(view.model, candidate)
     if candidate.nonlinear:
         starts = [s.start if s.start is not None else float(np.sqrt(low * high)) for s, low, high, _ in bounds]
@@ -103,8 +120,8 @@ def bounds_of(model: Model, candidate: Candidate) -> list[tuple]:
 
 
 def grown(source, candidate: Candidate, shapes: dict[str, float]) -> Model:
-    """A source's model with a candidate at shape values."""
-    model = source.model.with_effect(candidate.effect, (candidate.joint,))
+    """A source's model with a candidate at shape values, in the place of what it has of the same effect on that joint."""
+    model = source.model.without(*candidate.key).with_effect(candidate.effect, (candidate.joint,))
     if candidate.effect.uses_load and model.reference is None:
         model = model.with_reference(source.x[: 10 * model.bodies].reshape(-1, 10))
     own = model.last_shapes

@@ -125,7 +125,7 @@ def _where(member: Member, fit: Fit) -> str:
 def _with(last: Fit, member: Member, first: Fit, tell) -> Fit:
     """The fit of the last experiment with a candidate in it, filtered as the first one was."""
     name, joints, options = spelled(member.candidate, _where(member, first))
-    return pipeline.fit(grown(last.experiment, name, joints, options), filters=first.filters, progress=tell)
+    return pipeline.fit(grown(last.experiment, name, joints, options, every=first.joints), filters=first.filters, progress=tell)
 
 
 def own_joints(member_or_candidate, dof: int) -> list[int]:

@@ -40,9 +40,9 @@ def detectable(view: View, asked: Asked, candidates) -> list[Detectable]:
     loss = np.maximum(np.sum(view.design.residual**2, axis=0), 1e-300)
     best: dict[tuple, Detectable] = {}
     for candidate in candidates:
-        if candidate.parameters:  # a force from outside has none until somebody says when it acts
+        if candidate.parameters and not candidate.begins:  # a force from outside has none until somebody says when it acts
             best.setdefault(candidate.key, Detectable(candidate, *_leading(view, candidate)))
-    for group in asked.groups:
+    for group in (g for g in asked.groups if not g.candidate.begins):
         size = _size(group, threshold, loss)
         there = best[group.candidate.key]
         if np.isfinite(size) and (there.size is None or size < there.size):

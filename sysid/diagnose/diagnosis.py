@@ -27,6 +27,7 @@ from ..filters import settled
 from ..lowpass import lowpassed
 from ..noise import NoiseFloor, filtered, floors_of
 from ..preprocess import prepare
+from ..transfer import transfers
 from . import claims as claiming
 from . import select
 from .candidates import candidates
@@ -91,7 +92,7 @@ def diagnose(
             raise too_short()
         first, then = (HeldOut(one.settled, test) for one in (view, after))
         found = _floors(experiment, last, logs)
-        said = verdicts(fit, claims, after.unknown, view.unknown, found, refused)
+        said = verdicts(fit, claims, after.unknown, view.unknown, found, refused, transfers(last))
         errors = last.rms("test").values()
         levels = np.array([e if f.rms is None else f.rms for f, e in zip(found, errors)])
         where = failures(first, fit.predictions["test"], levels)

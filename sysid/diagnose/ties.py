@@ -124,10 +124,11 @@ def chosen(view: View, groups: list[Group], rng: np.random.Generator) -> Choice 
         return None
     base = losses(view, view.blocks).sum(1)
     table = np.stack([m.losses.sum(1) for m in members], axis=1)
-    members, table = _least(members, table)
+    priced = table + _price(members, int(np.argmin(table.sum(0))))
+    kept = _least(members, priced.sum(0))
+    members, table, priced = [members[k] for k in kept], table[:, kept], priced[:, kept]
     p = blocks.confidence_set(table, rng)
     inside = [k for k in np.argsort(table.sum(0)) if p[k] >= _OUTSIDE]
-    priced = table + _price(members, int(np.argmin(table.sum(0))))
     # the best, and of two that are the same the simplest: not what rounding left with less
     best = priced[:, inside].sum(0).min() + blocks.SAME * np.abs(table).sum(0).min()
     head = min((k for k in inside if priced[:, k].sum() <= best), key=lambda k: members[k].candidate.simplicity)
@@ -154,15 +155,14 @@ def _price(members: list[Member], best: int) -> np.ndarray:
     return np.array([m.group.numbers for m in members]) * one * max(np.log(count) - 2.0, 0.0) / count
 
 
-def _least(members: list[Member], table: np.ndarray):
-    """Of the variants of one candidate, the one that loses least."""
+def _least(members: list[Member], lost: np.ndarray) -> list[int]:
+    """Of the variants of each candidate, the one that lost least."""
     kept: dict = {}
     for k, member in enumerate(members):
         key = member.candidate.key
-        if key not in kept or table[:, k].sum() < table[:, kept[key]].sum():
+        if key not in kept or lost[k] < lost[kept[key]]:
             kept[key] = k
-    at = list(kept.values())
-    return [members[k] for k in at], table[:, at]
+    return list(kept.values())
 
 
 def holds(view: View, general: Member, special: Member) -> bool:

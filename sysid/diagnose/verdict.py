@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..estimate import Fit
 from ..flexible import Unknown
+from ..transfer import Transfer
 from .claims import Claim
 from .select import LEVEL, WORTH
 
@@ -24,7 +25,8 @@ class Verdict:
     the claims of other joints' equations), unknown (the motion predicts what is left, and no effect does), unresolved
     (error stands above the floor, or the floor is not known, and these logs do not say why).
     explained: share of the joint's misfit on the test logs that all claims take, NaN where the misfit is not known.
-    left: what functions of the motion predict of the rest; None where nothing. says: why it is unresolved.
+    left: what functions of the motion predict of the rest; None where nothing. says: why it is unresolved. carries: that the
+    training logs do not carry the model over to the test logs, where they do not.
     """
 
     joint: str
@@ -33,16 +35,18 @@ class Verdict:
     explained: float = float("nan")
     left: Unknown | None = None
     says: str = ""
+    carries: str = ""
 
 
 def verdicts(
-    fit: Fit, claims: Sequence[Claim], left: Sequence[Unknown], before: Sequence[Unknown], floors: Sequence, refused: Sequence = ()
+    fit: Fit, claims: Sequence[Claim], left: Sequence[Unknown], before: Sequence[Unknown], floors: Sequence, refused: Sequence = (),
+    carried: Sequence[Transfer] = (),
 ) -> list[Verdict]:  # fmt: skip
     """The verdict on every joint.
 
     Args:
         fit: of the experiment as it is. left, before: what functions of the motion predict with all claims in the model, and
-            without. floors: noise floor of each joint.
+            without. floors: noise floor of each joint. carried: whether the model with all claims carries over, of each joint.
     """
     last = claims[-1].after if claims else fit
     out = []
@@ -66,7 +70,8 @@ def verdicts(
             out.append(Verdict(joint, "explained" if by else "complete", by, explained if by else float("nan")))
         else:
             out.append(Verdict(joint, "unresolved", others, explained, remains, _why(fit, j, floors[j], then, last, refused)))
-    return out
+    said = {found.joint: found.says for found in carried}
+    return [replace(one, carries=said.get(one.joint, "")) for one in out]
 
 
 def predictable(found: Unknown, joints: int) -> bool:

@@ -21,12 +21,23 @@ class Cogging(TorqueEffect):
     options = {"lines": "how many multiples of k, from 1 (default 1)"}
 
     lines = 1
+    _most, _under = 8, 4  # lines; a part of k that may be the pitch, of which k is a multiple
     k = Shape("1/rad", 1.0, 120.0, grid=480, even=True, spacing=np.pi / 2, says="periods in 2 pi rad")
 
     def given(self, **options):
         chosen = super().given(**options)
-        whole(chosen, "lines", 8)
+        whole(chosen, "lines", self._most)
         return chosen
+
+    def richer(self, **shapes):
+        """More multiples of the same pitch, or of one of which the lines that are there are multiples: torque that repeats
+        with the angle is seldom one sine."""
+        return [
+            ({"lines": lines}, {"k": shapes["k"] / part})
+            for part in range(1, self._under + 1)
+            for lines in range(self.lines * part + (part == 1), self._most + 1)
+            if shapes["k"] / part >= self.k.low
+        ]
 
     def coefficients(self):
         part = {"a": "sine", "b": "cosine"}

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..effect import Linear, Shape, TorqueEffect
+from ..effect import Linear, Shape, TorqueEffect, called
 from ..errors import ConfigError
 
 
@@ -10,7 +10,8 @@ class Warmup(TorqueEffect):
     """Grease gets thinner as it warms, so that friction falls over minutes, or follows a logged temperature.
 
     With a logged temperature x [deg C] the coefficients are what 20 degrees above 20 deg C add. Without one they are
-    what the start of the log's clock had more than its end.
+    what the start of the log's clock had more than its end, and neither less: friction that was higher at low speed and lower
+    at high speed is what a joint has that breaks away, and no grease.
     """
 
     name = "warmup"
@@ -32,6 +33,10 @@ class Warmup(TorqueEffect):
         if not (chosen.signal is None or isinstance(chosen.signal, str)):
             raise ConfigError(f"warmup.signal is {chosen.signal!r}", where="model.effects", allowed="the name of a logged signal")
         return chosen
+
+    def coefficients(self):
+        lower = None if self.signal else 0
+        return tuple(called(Linear(c.unit, lower=lower, says=c.says), c.name) for c in super().coefficients())
 
     def shapes(self):
         return () if self.signal else (type(self).T,)

@@ -100,6 +100,13 @@ def _card(found: dict, fit: Fit, diagnosis: Diagnosis, document: dict) -> str:
 
 def verdict_words(found: dict, diagnosis: Diagnosis, document: dict) -> str:
     """One joint's verdict as sentences of HTML."""
+    words, says = _verdict_words(found, diagnosis, document), found.get("says")
+    if not says or found["status"] == "unresolved":
+        return words
+    return f"{words} {text(says[0].upper() + says[1:])}."
+
+
+def _verdict_words(found: dict, diagnosis: Diagnosis, document: dict) -> str:
     joint, status = found["joint"], found["status"]
     left = left_words(found, diagnosis.fit)
     heads = [

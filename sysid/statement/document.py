@@ -167,8 +167,8 @@ def _verdict(v: Verdict) -> dict:
             "by": [{"effect": c.head.effect, "joint": c.head.joint} for c in v.claims],
             "explained": number(v.explained),
         }
-    if v.says:
-        out["says"] = v.says
+    if v.says or v.carries:
+        out["says"] = "; ".join(words for words in (v.says, v.carries) if words)
     if v.left is not None:
         out |= {"depends_on": dependences(v.left), "share_left": v.left.share}
     return out

@@ -52,7 +52,13 @@ def _joint(v: dict, of: Told, width: int, said: dict[str, str]) -> list[str]:
     joint, status = v["joint"], v["status"]
     known = {f["command"]: f for f in of.document["findings"]}
     heads = [known[command] for command in v.get("commands", []) if command in known]
-    named = listed([placed(f["effect"], f["joint"], joint) for f in heads], "and") if heads else ""
+    words = [placed(f["effect"], f["joint"], joint) for f in heads]
+    # what comes in the place of the same effect with other options is named by these
+    words = [
+        word + (f" with {_options(f)}" if word in words[:k] else "")
+        for k, (word, f) in enumerate(zip(words, heads))
+    ]
+    named = listed(words, "and") if heads else ""
     first = {
         "complete": lambda: "no further effect is supported by these logs",
         "explained": lambda: (
@@ -73,7 +79,10 @@ def _joint(v: dict, of: Told, width: int, said: dict[str, str]) -> list[str]:
         lines += rest
     for head in heads:
         lines += _head(head, of, joint, width, said)
-    return lines + (rest if status != "unknown" else [])
+    lines += rest if status != "unknown" else []
+    if status != "unresolved" and v.get("says"):
+        lines += wrapped(f"  {v['says']}", width, "    ")
+    return lines
 
 
 def _fall(v: dict, of: Told) -> str:
@@ -106,6 +115,10 @@ def _head(f: dict, of: Told, joint: str, width: int, said: dict[str, str]) -> li
         out += wrapped(words, width, "    ")
         out += wrapped(f"  to separate them: {f['separate_by']}", width, "    ")
     return [*out, "  add it with", f["command"]]
+
+
+def _options(f: dict) -> str:
+    return listed([f"{name} {value}" for name, value in f["options"].items()] or ["none"], "and")
 
 
 def _left(v: dict) -> str:

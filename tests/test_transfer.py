@@ -1,0 +1,59 @@
+"""Whether a model carries over to the test logs: residuals of known size and memory, and what is said of them."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from sysid.estimate import Prediction
+from sysid.transfer import Transfer, transfers
+
+STEP = 0.01
+
+
+def part(rng: np.random.Generator, sizes, *, spans=(20.0,), memory=0.0, use=None) -> Prediction:
+    """Residuals of RMS `sizes`, one a joint, with `memory` [s], in logs of `spans` seconds."""
+    counts = [round(span / STEP) for span in spans]
+    pole = np.exp(-STEP / memory) if memory else 0.0
+    noise = lfilter([np.sqrt(1.0 - pole**2)], [1.0, -pole], rng.normal(size=(sum(counts), len(sizes))), axis=0)
+    log = np.repeat(np.arange(len(counts)), counts)
+    t = np.concatenate([STEP * np.arange(n) for n in counts])
+    return Prediction(log, t, noise * sizes, np.zeros_like(noise), use)
+
+
+def of(train: Prediction, test: Prediction) -> list[Transfer]:
+    joints = tuple(f"j{k}" for k in range(train.measured.shape[1]))
+    return transfers(SimpleNamespace(joints=joints, predictions={"train": train, "test": test}))
+
+
+def test_the_ratio_is_that_of_the_errors():
+    rng = np.random.default_rng(0)
+    same, half, more = of(part(rng, (1.0, 2.0, 1.0)), part(rng, (1.0, 1.0, 1.6)))
+    for found, truly, fails in ((same, 1.0, False), (half, 0.5, False), (more, 1.6, True)):
+        assert found.ratio == pytest.approx(truly, rel=0.06) and found.fails is fails and bool(found.says) is fails
+    assert "(20 s)" in more.says and f"{more.ratio:.2f} +- {more.se:.2g} times" in more.says
+
+
+@pytest.mark.parametrize("memory", [0.0, 0.1])
+def test_the_standard_error_is_how_much_the_ratio_varies(memory):
+    rng = np.random.default_rng(1)
+    found = [of(part(rng, np.ones(8), memory=memory), part(rng, np.ones(8), memory=memory)) for _ in range(12)]
+    ratios, stated = (np.array([[getattr(t, name) for t in one] for one in found]).ravel() for name in ("ratio", "se"))
+    assert 0.7 < np.std(np.log(ratios)) / np.sqrt(np.mean(stated**2)) < 1.3
+    assert not any(t.fails for one in found for t in one)
+
+
+def test_short_logs_are_told_with_their_lengths():
+    rng = np.random.default_rng(2)
+    (found,) = of(part(rng, [1.0], spans=(2.0, 3.0, 4.0)), part(rng, [1.8], spans=(3.0, 3.0)))
+    assert found.fails and "the training logs (3 of 2 to 4 s) do not carry the model" in found.says
+
+
+def test_where_nothing_tells_nothing_is_said():
+    rng = np.random.default_rng(3)
+    few = part(rng, [1.0])
+    use = np.zeros((2000, 1), dtype=bool)
+    use[:10] = True
+    (found,) = of(few, part(rng, [9.0], use=use))
+    assert np.isnan(found.ratio) and not found.fails and found.says == ""
