@@ -1,8 +1,8 @@
 """Model against measurement, and models against each other, on held-out data, with standard errors.
 
-Residuals are correlated over time, so a difference is judged over blocks of time: both models' squared residuals
-are summed block by block over the same blocks, and the standard error of the difference of their RMS is that of
-leaving one block out (jackknife).
+Residuals are correlated over time, so a difference is judged over blocks of time: both models'
+squared residuals are summed block by block over the same blocks, and the standard error of the
+difference of their RMS is that of leaving one block out (jackknife).
 """
 
 from dataclasses import dataclass
@@ -17,7 +17,8 @@ from .results import number
 
 @dataclass(frozen=True)
 class Difference:
-    """RMS of `to` minus RMS of `from_` on a joint, negative where `to` is better; se NaN where blocks are too few."""
+    """RMS of `to` minus RMS of `from_` on a joint, negative where `to` is better; se NaN where
+    blocks are too few."""
 
     from_: str
     to: str
@@ -45,8 +46,8 @@ def compare(first: Fit, second: Fit, names: tuple[str, str] | None = None) -> li
 
 
 def together(first: Fit, second: Fit) -> Difference:
-    """Two fits compared over all joints, each joint's residual in units of its RMS under the first: `delta_rms` is a share of
-    what the error was. Raises SysidError, as `compare`."""
+    """Two fits compared over all joints, each joint's residual in units of its RMS under the first:
+    `delta_rms` is a share of what the error was. Raises SysidError, as `compare`."""
     sums, _ = _sums(first, second, ("before", "after"))
     (s1, n1), _ = sums
     unit = s1.sum(0) / np.maximum(n1.sum(0), 1)
@@ -57,7 +58,8 @@ def together(first: Fit, second: Fit) -> Difference:
 
 
 def rises(first: Fit, second: Fit, joints: list[str] | None) -> tuple[Difference, ...]:
-    """Where the held-out error of some joints (None: over all together) rises by more than its standard error."""
+    """Where the held-out error of some joints (None: over all together) rises by more than its
+    standard error."""
     judged = (together(first, second),) if joints is None else compare(first, second, ("before", "after"))
     return tuple(d for d in judged if d.delta_rms > d.se and (joints is None or d.joint in joints))
 
@@ -73,20 +75,25 @@ def _sums(first: Fit, second: Fit, names: tuple[str, str]):
     joints = [joint for joint in first.joints if joint in second.joints]
     if not joints:
         raise SysidError(f"{names[0]} and {names[1]} share no joint", where="compare")
-    return _block_sums([fit.predictions["test"] for fit in (first, second)], [[fit.joints.index(j) for j in joints] for fit in (first, second)]), joints
+    predictions = [fit.predictions["test"] for fit in (first, second)]
+    columns = [[fit.joints.index(joint) for joint in joints] for fit in (first, second)]
+    return _block_sums(predictions, columns), joints
 
 
 def _block_sums(predictions: list[Prediction], columns) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Of each prediction, sums of squares and counts (blocks, joints) over the same blocks of each log's own clock.
+    """Of each prediction, sums of squares and counts (blocks, joints) over the same blocks of each
+    log's own clock.
 
-    Blocks are of all rows together: a filter that leaves out more at the ends of a log must not shift them.
+    Blocks are of all rows together: a filter that leaves out more at the ends of a log must not
+    shift them.
     """
     t, log = (np.concatenate([getattr(p, name) for p in predictions]) for name in ("t", "log"))
     number = numbered(t, log, fewest=1)
     size, out = int(number.max()) + 1, []
-    for prediction, index, own in zip(predictions, np.split(number, [len(predictions[0].t)]), columns):
+    numbers = np.split(number, [len(predictions[0].t)])
+    for prediction, index, own in zip(predictions, numbers, columns):
         residual = prediction.residual[:, own]
-        use = np.ones_like(residual) if prediction.use is None else prediction.use[:, own].astype(float)
+        use = np.ones(residual.shape) if prediction.use is None else prediction.use[:, own]
         out.append((summed(index, residual**2, size), summed(index, use, size)))
     return out
 
@@ -103,7 +110,8 @@ def _jackknife(first, second) -> tuple[float, float]:
 
 
 def document(fits: list[Fit], names: list[str]) -> dict:
-    """The JSON document of `sysid compare`: every experiment, then every pair in the order given."""
+    """The JSON document of `sysid compare`: every experiment, then every pair in the order
+    given."""
     experiments, notices = [], []
     for fit, name in zip(fits, names):
         errors = fit.predictions["test"].errors()

@@ -1,8 +1,9 @@
 """Any number of samples -> small triangles that hold all the data say.
 
 The rows of one joint over one stretch of time, [A | tau], are reduced by QR to a triangle R with
-||A x - tau|| = ||R [x; -1]|| for every x. Triangles stack: over time, logs, machines, joints (with a weight), and
-leaving one out is leaving it out of the stack. Every solve, restart, fold, score and certificate works on them.
+||A x - tau|| = ||R [x; -1]|| for every x. Triangles stack: over time, logs, machines, joints (with
+a weight), and leaving one out is leaving it out of the stack. Every solve, restart, fold, score and
+certificate works on them.
 """
 
 from collections.abc import Callable, Sequence
@@ -16,7 +17,8 @@ from .model import Model
 from .preprocess import Motion
 from .rows import difference_step
 
-_SHORTEST_BLOCK = 200  # samples: with fewer rows than columns a triangle would be no smaller than they are
+# samples: with fewer rows than columns a triangle would be no smaller than they are
+_SHORTEST_BLOCK = 200
 _FILTERED_STRETCH = 16384  # samples
 
 
@@ -32,7 +34,8 @@ def triangle(rows: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Linearised:
-    """A model at parameters x (size,) with one more column for each free shape value: the slope of its torque there."""
+    """A model at parameters x (size,) with one more column for each free shape value: the slope of
+    its torque there."""
 
     model: Model
     x: np.ndarray
@@ -80,7 +83,8 @@ class Linearised:
 
 @dataclass(frozen=True)
 class Factor:
-    """The triangle of one joint over one block: R (r, k + 1) for the k parameters `columns`, then torque."""
+    """The triangle of one joint over one block: R (r, k + 1) for the k parameters `columns`, then
+    torque."""
 
     joint: int
     block: int
@@ -95,7 +99,8 @@ class Factor:
 
 @dataclass(frozen=True)
 class Compressed:
-    """A log's, or several logs', triangles by joint and block. `size` is the number of parameters."""
+    """A log's, or several logs', triangles by joint and block. `size` is the number of
+    parameters."""
 
     size: int
     joints: int
@@ -145,7 +150,8 @@ class Compressed:
         return out
 
     def first(self, size: int) -> "Compressed":
-        """The same data with the first `size` parameters alone: the columns of a triangle are a smaller problem's."""
+        """The same data with the first `size` parameters alone: the columns of a triangle are a
+        smaller problem's."""
         factors = []
         for factor in self.factors:
             kept = np.flatnonzero(factor.columns < size)
@@ -177,8 +183,9 @@ def merge(parts: Sequence[Compressed]) -> Compressed:
 
 def _edges(motion: Motion) -> list[np.ndarray]:
     """Of each piece, the rows at which its blocks begin, and its end."""
-    counts = divided([piece.samples for piece in motion.pieces], shortest=_SHORTEST_BLOCK, fewest=1)
-    return [piece.core.start + np.arange(n + 1) * piece.samples // n for piece, n in zip(motion.pieces, counts)]
+    pieces = motion.pieces
+    counts = divided([p.samples for p in pieces], shortest=_SHORTEST_BLOCK, fewest=1)
+    return [p.core.start + np.arange(n + 1) * p.samples // n for p, n in zip(pieces, counts)]
 
 
 def compress(model: Model | Linearised, motion: Motion, *, thin: int = 1, progress: Callable[[float], None] | None = None) -> Compressed:
@@ -193,13 +200,14 @@ def compress(model: Model | Linearised, motion: Motion, *, thin: int = 1, progre
     factors, block, done = [], 0, 0
     for piece, edges in zip(motion.pieces, _edges(motion)):
         # a filter needs margins on each stretch, so a filtered stretch holds many blocks
-        filtered = piece.smoother is not None
-        many = max(1, _FILTERED_STRETCH * (len(edges) - 1) // max(piece.samples, 1)) if filtered else 1
+        filtered, length = piece.smoother is not None, max(1, piece.samples // (len(edges) - 1))
+        many = max(1, _FILTERED_STRETCH // length) if filtered else 1
         remembered = model.remembered(piece)
         for first in range(0, len(edges) - 1, many):
             within = edges[first : first + many + 1].tolist()
             # rows that are not wanted need no columns, unless a filter runs over them
-            columns = model.columns(piece, slice(within[0], within[-1], 1 if filtered else thin), remembered)
+            wanted = slice(within[0], within[-1], 1 if filtered else thin)
+            columns = model.columns(piece, wanted, remembered)
             for start, stop in zip(within, within[1:]):
                 own = slice(start, stop, thin)
                 part = slice(start - within[0], stop - within[0], thin) if filtered else slice(None)

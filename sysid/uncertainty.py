@@ -16,9 +16,10 @@ from .objective import Objective, add_blocks
 
 @dataclass(frozen=True)
 class Uncertainty:
-    """covariance (size, size) in the parameters' units; std (size,), NaN where nothing determines a parameter;
-    from_data (size,), the share of a parameter's variance that is measurement noise rather than the prior's
-    width: 1 where the data alone determine it, 0 where only the prior does."""
+    """covariance (size, size) in the parameters' units; std (size,), NaN where nothing determines a
+    parameter; from_data (size,), the share of a parameter's variance that is measurement noise
+    rather than the prior's width: 1 where the data alone determine it, 0 where only the prior
+    does."""
 
     covariance: np.ndarray
     std: np.ndarray
@@ -61,8 +62,9 @@ def _noise(compressed: Compressed, x, weights, hessian, free) -> np.ndarray:
 
 
 def _by_block(compressed: Compressed, x, weights, basis, free):
-    """In coordinates z, parameters = basis @ z, where the Hessian is one: each block's score (blocks, z) and share of the
-    Hessian (blocks, z, z), and the variance of its score under white noise of each joint's own size."""
+    """In coordinates z, parameters = basis @ z, where the Hessian is one: each block's score
+    (blocks, z) and share of the Hessian (blocks, z, z), and the variance of its score under white
+    noise of each joint's own size."""
     scores = compressed.scores(x, weights)[:, free] @ basis
     noise = compressed.squares(x) / np.maximum(compressed.rows, 1)
     own, spread = np.zeros((2, compressed.blocks, basis.shape[1], basis.shape[1]))
@@ -87,7 +89,8 @@ def _whitening(hessian) -> np.ndarray:
 
 
 def _inverse(hessian):
-    """Inverse of a scaled positive semidefinite matrix on its range, and which parameters leave that range."""
+    """Inverse of a scaled positive semidefinite matrix on its range, and which parameters leave
+    that range."""
     scale = np.sqrt(np.where(np.diagonal(hessian) > 0.0, np.diagonal(hessian), 1.0))
     values, vectors = np.linalg.eigh(hessian / np.outer(scale, scale))
     flat = values < _FLAT * values[-1]

@@ -5,53 +5,12 @@ angles adds to it; and their sums over blocks. Frozen data; the functions stand 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 
 from .. import rows as row
-from ..model import Model
-from ..preprocess import Motion
 from ..shape import Settled, inverted, prior_hessian
-
-
-@dataclass(frozen=True)
-class Source:
-    """One motion under one model at parameters x (size,): what candidates make their columns of.
-
-    use: (n, dof) bool of the rows that a stride keeps.
-    """
-
-    model: Model
-    x: np.ndarray
-    motion: Motion
-    stride: int
-    use: np.ndarray
-
-    @cached_property
-    def pieces(self) -> list:
-        """Whole pieces as effects see them."""
-        return row.seen(self.model, self.motion)
-
-    @cached_property
-    def predicted(self) -> np.ndarray:
-        """Torque (n, dof), low-passed as the columns are."""
-        return row.predicted(self.model, self.motion, self.x, self.stride)
-
-    @cached_property
-    def unfiltered(self) -> list[np.ndarray]:
-        """Torque (dof, n) over whole pieces, before the low-pass."""
-        bodies, rest = np.split(self.x, [10 * self.model.bodies])
-        whole = (replace(p, smoother=None, core=slice(0, len(p.t))) for p in self.motion.pieces)
-        return [self.model.torque(piece, bodies.reshape(-1, 10), rest).T for piece in whole]
-
-    def full(self, columns: np.ndarray) -> np.ndarray:
-        """The model's columns with the slopes of its free shape values after them."""
-        slopes = row.tangents(
-            self.model, self.motion, self.x, self.stride, self.use, self.predicted
-        )
-        free = [k for k, value in enumerate(self.model.shape_values) if not value.held]
-        return np.concatenate([columns, slopes[:, :, free]], axis=2)
+from ..source import Source
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,8 @@ from ..lowpass import lowpassed, narrowed, rougher, stride_of, widest
 from ..model import Model
 from ..preprocess import Motion
 from ..shape import Settled, settle
-from .design import Design, Source, Sums, by_block, designed, summed
+from ..source import Source
+from .design import Design, Sums, by_block, designed, summed
 
 _FOLDS = 10
 
@@ -172,10 +173,8 @@ def _under(experiment: Experiment, fit: Fit, logs, cutoff: float) -> View:
     if motion is None or motion.samples < 50:
         raise too_short()
     rng, noise = np.random.default_rng(0), np.max([piece.noise for piece in motion.pieces], axis=0)
-    again = [
-        replace(log, segments=tuple(replace(s, q=rougher(s, noise, cutoff, rng)) for s in log.segments))
-        for log in logs
-    ]
+    drawn = lambda s: replace(s, q=rougher(s, noise, cutoff, rng))  # noqa: E731
+    again = [replace(log, segments=tuple(map(drawn, log.segments))) for log in logs]
     rough = lowpassed(again, fit.joints, cutoff)
     stride = stride_of(motion, cutoff)
     return looked_at(experiment, fit.model, motion, rough, fit.prior, stride=stride)

@@ -41,7 +41,8 @@ class Looks:
         out = []
         for claim in self.diagnosis.claims:
             view = claim.step.before
-            own = self.first if view is self.diagnosis.view else HeldOut(view.settled, self.first.test)
+            first = view is self.diagnosis.view
+            own = self.first if first else HeldOut(view.settled, self.first.test)
             out += [own] * len(claim.findings)
         return out
 
