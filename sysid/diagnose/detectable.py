@@ -12,7 +12,7 @@ import numpy as np
 from scipy.special import ndtri
 
 from ..model import ROBOT
-from .candidates import Candidate
+from .candidates import Candidate, at_start
 from .evidence import Group, normal_scores
 from .select import LEVEL, WORTH, Asked
 from .view import View
@@ -42,6 +42,10 @@ def detectable(view: View, asked: Asked, candidates) -> list[Detectable]:
             best.setdefault(candidate.key, Detectable(candidate, *_leading(view, candidate)))
     for group in asked.groups:
         size = _size(group, threshold, loss)
+        if group.candidate.nonlinear and not at_start(group.candidate, group.shapes):
+            # its torque is no multiple of another size's: this one is seen or it is not
+            own = group.shapes[_leading(view, group.candidate)[0]]
+            size = own if size <= own else np.inf
         there = best[group.candidate.key]
         if np.isfinite(size) and (there.size is None or size < there.size):
             best[group.candidate.key] = Detectable(group.candidate, *_leading(view, group.candidate), size)
