@@ -171,6 +171,11 @@ class Model:
         """Whether an effect looks at the load."""
         return any(effect.uses_load for effect, _ in self.terms)
 
+    @property
+    def deflects(self) -> bool:
+        """Whether a link stands apart from its motor."""
+        return any(isinstance(effect, Deflection) for effect, _ in self.terms)
+
     def support(self, joint: int) -> np.ndarray:
         """Indices of the parameters that can enter the torque of a joint, ascending."""
         robot = self.robot

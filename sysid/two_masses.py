@@ -18,7 +18,7 @@ from . import regressor
 from .preprocess import Piece
 from .robot import Robot
 
-_LOST = 0.5  # damping of the teeth, a share of the critical one: a sixth of a blow's speed comes back
+_FORGOTTEN = 4.0  # times of decay: two per cent are left
 _TURN = 0.25  # rad of the swing on the teeth in a step, at most
 
 
@@ -44,7 +44,8 @@ def sprung(load, inertia, step: float, *, compliance: float, damping: float) -> 
         compliance inertia d'' + 2 damping sqrt(compliance inertia) d' + d = compliance load
 
     The recursion has the equation's own poles and answers a load that is quadratic in time exactly, whatever the step; where
-    a step holds no sixth of a cycle, the resonance is beyond what the samples show and only that answer is left.
+    a step holds no sixth of a cycle, the resonance is beyond what the samples show and only that answer is left. Nobody knows
+    how the link swung when the log began: so that it rings least until that is forgotten.
 
     Args:
         load: (n,) [N m]. inertia: (n,) [kg m²] of the link. step: seconds. compliance: [rad/(N m)]. damping: share of the
@@ -56,6 +57,7 @@ def sprung(load, inertia, step: float, *, compliance: float, damping: float) -> 
         return compliance * np.asarray(load)
     from scipy.linalg.lapack import dtbtrs
 
+    still = np.broadcast_to(still, len(load))
     turn = 1.0 / np.maximum(still, 1e-3)
     share = np.minimum(np.maximum(damping, turn - 1.0), 0.999)
     kept = np.exp(-share * turn)
@@ -73,16 +75,23 @@ def sprung(load, inertia, step: float, *, compliance: float, damping: float) -> 
     band = np.zeros((3, len(load)))
     band[0] = 1.0
     band[1, 1:-1], band[2, :-2] = -one[1:-1], -two[1:-1]
-    return dtbtrs(band, right[:, None], uplo="L")[0][:, 0]
+    begun = np.stack([right, np.zeros(len(load)), np.zeros(len(load))], axis=1)
+    begun[0, 1] = begun[1, 2] = 1.0  # from any other first two samples
+    found = dtbtrs(band, begun, uplo="L")[0]
+    early = max(5, math.ceil(_FORGOTTEN * float(np.median(still)) / max(damping, 1e-3)))
+    rings = np.diff(found[:early], 2, axis=0)
+    change = np.linalg.lstsq(rings[:, 1:], -rings[:, 0], rcond=1e-9)[0]
+    return found[:, 0] + found[:, 1:] @ change
 
 
 def played(load, inertia, step: float, *, b: float, teeth: float) -> np.ndarray:
     """How far (n,) a link stands behind its motor through teeth with play.
 
-        inertia d'' + K (d -+ b/2) + D d' = load where the teeth touch, |d| > b/2, and never pull; inertia d'' = load between
+        d'' + omega² (d -+ b/2) + omega d' = load / inertia where the teeth touch, |d| > b/2, and never pull
+        d'' = load / inertia between
 
-    Without inertia the link lies at the teeth that the load presses. K and D are what makes the link swing on the teeth
-    `teeth` times a second, losing most of a blow: of them only how long a blow takes is seen at lower frequencies.
+    Without inertia the link lies at the teeth that the load presses. On them it swings `teeth` times a second, omega / 2 pi,
+    and loses most of a blow: of teeth only how long a blow takes is seen at lower frequencies.
 
     Args:
         load: (n,) [N m]. inertia: (n,) [kg m²] of the link. step: seconds. b: [rad]. teeth: [Hz].
@@ -90,24 +99,24 @@ def played(load, inertia, step: float, *, b: float, teeth: float) -> np.ndarray:
     Source: Nordin & Gutman 2002.
     """
     load, half = np.asarray(load, dtype=float), 0.5 * b
-    if half <= 0.0 or not np.any(inertia):
+    if half <= 0.0 or not np.all(inertia):
         return half * np.sign(load)
-    omega, mass = 2.0 * math.pi * teeth, float(np.mean(inertia))
-    stiff, damper = omega**2 * mass, 2.0 * _LOST * omega * mass
+    driven, omega = load / inertia, 2.0 * math.pi * teeth
     fine = max(1, math.ceil(step * omega / _TURN))
     h = step / fine
-    d, v = half * math.copysign(1.0, load[0]) + load[0] / stiff, 0.0
+    spring, damper = h * omega**2, h * omega
+    d, v = half * math.copysign(1.0, driven[0]) + driven[0] / omega**2, 0.0
     out = [d]
-    for push, more, per in zip(load.tolist(), (np.diff(load) / fine).tolist(), (h / np.broadcast_to(inertia, load.shape)).tolist()):
+    for push, more in zip((h * driven[:-1]).tolist(), (h / fine * np.diff(driven)).tolist()):
         for _ in range(fine):
             if d > half:
-                held = stiff * (d - half) + damper * v
-                v += per * (push - held if held > 0.0 else push)
+                held = spring * (d - half) + damper * v
+                v += push - held if held > 0.0 else push
             elif d < -half:
-                held = stiff * (d + half) + damper * v
-                v += per * (push - held if held < 0.0 else push)
+                held = spring * (d + half) + damper * v
+                v += push - held if held < 0.0 else push
             else:
-                v += per * push
+                v += push
             d += h * v
             push += more
         out.append(d)

@@ -64,6 +64,7 @@ def _leading(view: View, candidate: Candidate) -> tuple[str, str]:
 
 def _size(group: Group, threshold: float, loss: np.ndarray) -> float:
     """Of the first own coefficient, the others zero."""
+    group = group.tested
     if not (group.sizes[0] > 0 and group.testable):
         return np.inf
     directions, rest = group.freedom
