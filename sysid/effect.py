@@ -43,8 +43,8 @@ class Linear:
 class Shape:
     """A value that the columns are not linear in, from `low` to `high`.
 
-    of: what `low` and `high` are shares of: the joint's top "speed", its greatest "torque", the "angle" it travels, the
-        "duration" of a log, or "" for plain units. start: the value at which the effect does nothing, from which a
+    of: what `low` and `high` are shares of: the joint's top "speed", its greatest "torque", the "angle" it travels, its
+        "softness", which is that angle per greatest torque, the "duration" of a log, or "" for plain units. start: the value at which the effect does nothing, from which a
         search begins; None where there is none, and values between the bounds are tried: `grid` of them, in equal
         ratios, or in equal steps where `even` or where a bound is not positive. spacing: the widest step between
         tried values that misses nothing, as a share of 1 / (angle travelled); 0 where `grid` values suffice.
@@ -183,6 +183,14 @@ class MotionEffect(Effect):
     def moved(self, motion: Piece, joint: int, **shapes: float) -> Piece:
         """The motion that the bodies made where `motion` was measured; `joint` is -1 where its scope is the robot."""
 
+    def tries(self, bounds: dict[str, tuple[float, float]]) -> list[dict[str, float]]:
+        """Sets of shape values worth trying beside the start, where a search that begins there may lose its way.
+
+        Args:
+            bounds: (low, high) of each shape value here.
+        """
+        return []
+
 
 class SensorEffect(Effect):
     """A linear operator on the predicted torque of a joint. It has shape values alone, each with a `start`."""
@@ -216,11 +224,13 @@ class Deflection(MotionEffect):
 
     encoder: "motor" where the encoder turns with the motor: the link is behind what was measured;
         "joint" where it turns with the link: the motor is ahead of what was measured.
+    blows: the link is stopped by what it strikes.
     """
 
     options = {"encoder": "motor where the encoder turns with the motor, joint where it turns with the link (default motor)"}
-    reach = 4
+    memory = True
     uses_load = True
+    blows: ClassVar[bool] = False
 
     encoder = "motor"
 
@@ -233,11 +243,39 @@ class Deflection(MotionEffect):
         return [{"encoder": "motor"}, {"encoder": "joint"}]
 
     @abstractmethod
-    def behind(self, load: np.ndarray, step: float, **shapes: float) -> np.ndarray:
-        """How far the link stands behind its motor under load (n,) sampled every `step` seconds: (3, n) in q, qd and qdd."""
+    def behind(self, load: np.ndarray, inertia: np.ndarray, step: float, **shapes: float) -> np.ndarray:
+        """How far (n,) the link stands behind its motor.
 
-    def moved(self, motion, joint, **shapes):
-        behind = self.behind(motion.load[:, joint], motion.step, **shapes)
+        Args:
+            load: (n,) what the link would need of its drive did it follow what was measured, every `step` seconds.
+            inertia: (n,) of the link about the joint, zero where what was measured is the link.
+        """
+
+    def apart(self, load: np.ndarray, inertia: np.ndarray, motion: Piece, **shapes: float) -> np.ndarray:
+        """`behind` with its first two derivatives (3, n), as the encoder sees it.
+
+        Of a link that is measured nothing is left to move by itself. The load is that of angles seen through a filter: what is
+        linear in it has been seen through it too, and blows, which are not, must be, as the motor's answer to them was.
+        """
+        behind = self.behind(load, inertia if self.encoder == "motor" else 0.0 * inertia, motion.step, **shapes)
+        return rates(motion.sight.smoothed(behind) if self.blows and motion.sight is not None else behind, motion.step)
+
+    def tries(self, bounds):
+        return self.flights(bounds) if self.encoder == "motor" else []
+
+    def flights(self, bounds: dict[str, tuple[float, float]]) -> list[dict[str, float]]:
+        """`tries` of a link that moves by itself."""
+        return []
+
+    def moved(self, motion, joint, *, behind=None, **shapes):
+        """As `MotionEffect.moved`.
+
+        Args:
+            behind: (3, n) `apart` on these rows, which looks back to the start of the log; None: without the link's inertia.
+        """
+        if behind is None:
+            load = motion.load[:, joint]
+            behind = self.apart(load, 0.0 * load, motion, **shapes)
         deflection = np.zeros((3, *motion.q.shape)) if motion.deflection is None else motion.deflection.copy()
         deflection[:, :, joint] += behind
         if self.encoder == "motor":

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
-from . import own_effects, regressor, units
+from . import own_effects, regressor, two_masses, units
 from .config import is_own
-from .effect import Effect, MotionEffect, SensorEffect, Shape, TorqueEffect, WrenchEffect, find
+from .effect import Deflection, Effect, MotionEffect, SensorEffect, Shape, TorqueEffect, WrenchEffect, find
 from .errors import ConfigError
 from .formula import Formula
 from .inertia import PARAMETERS, UNITS
@@ -60,7 +60,7 @@ class Scales:
         """What bounds that are shares of `word` are multiplied with."""
         if word == "":
             return 1.0
-        value = getattr(self, word)
+        value = self.angle / self.torque if word == "softness" else getattr(self, word)
         return float(value) if word == "duration" else float(value.max() if joint == ROBOT else value[joint])
 
 
@@ -88,6 +88,7 @@ class Model:
     held: tuple[tuple[tuple[int, int, str], float], ...] = ()
     reference: np.ndarray | None = None
     scales: Scales | None = None
+    _links: dict = field(default_factory=dict, repr=False, compare=False)  # what no shape value changes
 
     @property
     def bodies(self) -> int:
@@ -163,7 +164,7 @@ class Model:
 
     def with_reference(self, pi) -> Model:
         """The model with other bodies behind its `load`."""
-        return replace(self, reference=np.array(pi))
+        return replace(self, reference=np.array(pi), _links={})
 
     def scaled_by(self, motion: Motion) -> Model:
         """The model with shape bounds as wide as this motion is; its shape values stay, within them or not."""
@@ -178,6 +179,11 @@ class Model:
     def uses_load(self) -> bool:
         """Whether an effect looks at the load."""
         return any(effect.uses_load for effect, _ in self.terms)
+
+    @property
+    def deflects(self) -> bool:
+        """Whether a link stands apart from its motor."""
+        return any(isinstance(effect, Deflection) for effect, _ in self.terms)
 
     def support(self, joint: int) -> np.ndarray:
         """Indices of the parameters that can enter the torque of a joint, ascending."""
@@ -198,30 +204,51 @@ class Model:
         return max([effect.reach for effect, _ in self.terms], default=0)
 
     def remembered(self, piece: Piece) -> dict:
-        """Columns of the effects that look back to the start of a log, over a whole piece, by (term, joint)."""
+        """What effects that look back to the start of a log make of a whole piece, by (term, joint): columns of those that add
+        torque, how far a link stands behind its motor."""
         if not any(effect.memory for effect, _ in self.terms):
             return {}
-        part = self._seen(piece.part(slice(0, len(piece.t))))
-        return {
-            (term, joint): effect.columns(part, joint, **self._of(term, joint))
+        whole = piece.part(slice(0, len(piece.t)))
+        out = {
+            (term, joint): effect.apart(*self._link_side(piece, joint), whole, **self._of(term, joint))
             for term, (effect, joints) in enumerate(self.terms)
-            if effect.memory
+            if isinstance(effect, Deflection)
             for joint in joints
         }
+        columns = [term for term, (effect, _) in enumerate(self.terms) if effect.memory and not isinstance(effect, Deflection)]
+        part = self.seen(piece, out) if columns else None
+        return out | {(term, joint): self.terms[term][0].columns(part, joint, **self._of(term, joint)) for term in columns for joint in self.terms[term][1]}
 
-    def _seen(self, part: Piece) -> Piece:
-        """A part with the load that effects look at, and moved as the motion effects say."""
-        if self.uses_load:
-            reference = self.robot.prior if self.reference is None else self.reference
-            part = replace(part, load=regressor.torque(self.robot, reference, part.q, part.qd, part.qdd))
-        return self.moved(part)
+    def _link_side(self, piece: Piece, joint: int) -> tuple[np.ndarray, np.ndarray]:
+        """Load and inertia of a joint's link over a whole piece."""
+        key = (id(piece.q), joint)
+        if key not in self._links:  # with the angles themselves, so that no others come to their place
+            self._links[key] = (piece.q, two_masses.link_side(self.robot, self._bodies, piece, joint))
+        return self._links[key][1]
 
-    def moved(self, part: Piece) -> Piece:
-        """A part moved as the motion effects say; its load is there where they look at it."""
+    @property
+    def _bodies(self) -> np.ndarray:
+        return self.robot.prior if self.reference is None else self.reference
+
+    def seen(self, piece: Piece, remembered: dict | None = None) -> Piece:
+        """A whole piece as effects see it: with the load that its bodies need, and moved as the motion effects say.
+
+        Args:
+            remembered: `remembered(piece)`, where it is at hand.
+        """
+        known = self.remembered(piece) if remembered is None else remembered
+        return self._seen(piece, slice(0, len(piece.t)), known, True)
+
+    def _seen(self, piece: Piece, rows: slice, remembered: dict, loaded: bool = False) -> Piece:
+        """Rows of a piece with the load that effects look at, and moved as the motion effects say."""
+        part = piece.part(rows)
+        if loaded or any(effect.uses_load and not effect.memory for effect, _ in self.terms):
+            part = replace(part, load=regressor.torque(self.robot, self._bodies, part.q, part.qd, part.qdd))
         for term, (effect, joints) in enumerate(self.terms):
             if isinstance(effect, MotionEffect):
                 for joint in joints:
-                    part = effect.moved(part, joint, **self._of(term, joint))
+                    known = {"behind": remembered[term, joint][:, rows]} if isinstance(effect, Deflection) else {}
+                    part = effect.moved(part, joint, **known, **self._of(term, joint))
         return part
 
     def columns(self, piece: Piece, rows: slice, remembered: dict | None = None) -> list[np.ndarray]:
@@ -231,14 +258,14 @@ class Model:
             remembered: `remembered(piece)`, where it is at hand.
         """
         wide, inner = self._widened(piece, rows)
-        part = self._seen(piece.part(wide))
-        inertial = regressor.columns(self.robot, part.q, part.qd, part.qdd, gravity=part.gravity, deflection=part.deflection)
-        by_joint: list[list[np.ndarray]] = [[] for _ in self.robot.joints]
         if remembered is None:
             remembered = self.remembered(piece)
+        part = self._seen(piece, wide, remembered)
+        inertial = regressor.columns(self.robot, part.q, part.qd, part.qdd, gravity=part.gravity, deflection=part.deflection)
+        by_joint: list[list[np.ndarray]] = [[] for _ in self.robot.joints]
         for term, (effect, joints) in enumerate(self.terms):
             for joint in joints:
-                if effect.memory:
+                if isinstance(effect, TorqueEffect) and effect.memory:
                     by_joint[joint].append(remembered[term, joint][:, wide])
                 elif isinstance(effect, TorqueEffect):
                     by_joint[joint].append(effect.columns(part, joint, **self._of(term, joint)))
@@ -263,14 +290,14 @@ class Model:
         remembered = self.remembered(piece)
         for rows in chunks(piece, stride * max(1, (_CHUNK if piece.smoother is None else 4 * _CHUNK) // stride)):
             wide, inner = self._widened(piece, slice(rows.start, rows.stop, stride))
-            part = self._seen(piece.part(wide))
+            part = self._seen(piece, wide, remembered)
             predicted = regressor.torque(self.robot, pi, part.q, part.qd, part.qdd, gravity=part.gravity, deflection=part.deflection).T
             k = 0
             for term, (effect, joints) in enumerate(self.terms):
                 size = len(effect.coefficients())
                 for joint in joints:
                     own = np.asarray(c)[k : k + size]
-                    if effect.memory:
+                    if isinstance(effect, TorqueEffect) and effect.memory:
                         predicted[joint] += own @ remembered[term, joint][:, wide]
                     elif isinstance(effect, TorqueEffect):
                         predicted[joint] += own @ effect.columns(part, joint, **self._of(term, joint))

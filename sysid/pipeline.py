@@ -160,9 +160,13 @@ def _settled(experiment: Experiment, structure: Model, motion: Motion, prior) ->
     structure, slopes = found.model, Linearised(found.model, found.x)
     if not slopes.free:
         return structure, None
+    best = None
     for _ in range(_PASSES):
         data = compress(slopes, motion)
         fit = identify(experiment, structure, motion, data, prior)
+        if best is not None and structure.deflects and fit.objective > best[0]:
+            return best[1:]  # blows make valleys narrower than a step: the last one is taken back
+        best = fit.objective, structure, slopes
         change = shape.correction(fit, data)
         values = np.array(structure.shapes)
         low, high = (np.array([getattr(v, end) for v in structure.shape_values]) for end in ("low", "high"))

@@ -115,6 +115,13 @@ class Smoother:
         smooth = self(q)
         return smooth, *differences(smooth, self.step)
 
+    def smoothed(self, values) -> np.ndarray:
+        """Values (n,) filtered to their very ends, beyond which they go on as they came."""
+        reach = min(self.reach, len(values) - 1)
+        if reach < 1:
+            return np.array(values)
+        return self(np.pad(values, reach, mode="reflect", reflect_type="odd"))[reach:-reach]
+
     def __call__(self, values, axis: int = 0) -> np.ndarray:
         """The filtered values, same shape; samples along `axis`."""
         if self.kind == "savitzky-golay":
@@ -139,7 +146,7 @@ class Piece:
     `smoother` filters columns where torque was filtered, else None; then `margin` extra rows stand before and
     after `core`, whose filtered values the filter needs but which are not used. `rest` (dof,) [rad/s or m/s] is the
     speed that rounding makes of a constant angle; `noise` (dof,) [rad or m] what the filter took off the angles, RMS, or an
-    estimate of their noise from that.
+    estimate of their noise from that. `sight` is the filter that the angles were seen through, where it matters: torque was not.
 
     What a model adds: `load` (n, dof) the torque that its bodies alone need; `gravity` (3,) or None for the robot's own;
     `deflection` (3, n, dof), how far each link is behind its motor in q, qd and qdd, or None.
@@ -160,6 +167,7 @@ class Piece:
     rest: np.ndarray
     noise: np.ndarray
     source: str = ""
+    sight: Smoother | None = None
     load: np.ndarray | None = None
     gravity: np.ndarray | None = None
     deflection: np.ndarray | None = None
@@ -297,7 +305,7 @@ def _piece(number: int, segment: Segment, spec: PreprocessSpec) -> Piece | None:
         log=number, step=segment.step, t=segment.t[rows], q=q[rows], qd=qd[rows], qdd=qdd[rows], tau=tau[rows],
         measured=segment.tau[rows], signals={name: values[rows] for name, values in segment.signals.items()}, use=None,
         smoother=smoother if both else None, core=slice(margin, n - margin), rest=np.zeros(q.shape[1]),
-        noise=np.sqrt(np.mean((segment.q[rows] - q[rows]) ** 2, axis=0)),
+        noise=np.sqrt(np.mean((segment.q[rows] - q[rows]) ** 2, axis=0)), sight=None if both or spec.filter == "none" else smoother,
     )  # fmt: skip
 
 

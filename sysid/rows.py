@@ -10,8 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from . import regressor
 from .model import Model, chunks
 from .preprocess import Motion
+from .two_masses import link_side
 
 _STRETCH = 16384  # samples whose columns are computed at once
 
@@ -120,17 +122,36 @@ def difference_step(value, at: float) -> float:
 
 def seen(model: Model, motion: Motion) -> list:
     """Each whole piece as the effects of a model see it: moved, with the load that its bodies need."""
-    from dataclasses import replace
+    return [model.seen(piece) for piece in motion.pieces]
 
-    from . import regressor
 
+_NUDGES = (1e-4, 1e-3, 1e-1)  # rad, rad/s, rad/s²: torque bends little over them
+
+
+def secants(model: Model, motion: Motion, x, effect, joint: int, tried: list[dict], stride: int, use: np.ndarray) -> np.ndarray:
+    """What a link's standing apart from its motor would change of the predicted torque, (tried, dof, n), at several sets of
+    shape values: as torque's slopes in the link's angle, speed and acceleration have it, once for all sets.
+
+    Args:
+        effect: a Deflection that the model lacks, or that does nothing in it. x: (size,) parameters. use: (n, dof) bool.
+    """
+    pi = np.asarray(x)[: 10 * model.bodies].reshape(-1, 10)
     out = []
-    for piece in motion.pieces:
-        part = piece.part(slice(0, len(piece.t)))
-        reference = model.robot.prior if model.reference is None else model.reference
-        part = replace(part, load=regressor.torque(model.robot, reference, part.q, part.qd, part.qdd))
-        out.append(model.moved(part))
-    return out
+    for piece, rows in zip(motion.pieces, starts(motion, stride)):
+        part = model.seen(piece)
+        load, inertia = link_side(model.robot, pi, part, joint)
+        still = np.zeros((3, *part.q.shape)) if part.deflection is None else part.deflection
+        torque = lambda behind, part=part: regressor.torque(model.robot, pi, part.q, part.qd, part.qdd, gravity=part.gravity, deflection=behind)  # noqa: E731
+        base, slopes = torque(still), []
+        for order, nudge in enumerate(_NUDGES):
+            behind = still.copy()
+            behind[order, :, joint] += nudge
+            slopes.append((torque(behind) - base).T / nudge)
+        apart = [effect.apart(load, inertia, part, **shapes) for shapes in tried]
+        change = np.einsum("ojn,ton->jtn", slopes, apart)
+        read = [model.sensed(entry, piece.step, j) for j, entry in enumerate(change)]
+        out.append(np.stack([entry[..., rows] if piece.smoother is None else piece.smoother.at(entry, rows) for entry in read], axis=1))
+    return np.concatenate(out, axis=-1) * use.T
 
 
 def signature(model: Model, motion: Motion, pieces: list, effect, joint: int, shapes: dict, stride: int, use: np.ndarray) -> np.ndarray:

@@ -16,7 +16,7 @@ import numpy as np
 from . import rows as row
 from .compress import Compressed, Factor, triangle
 from .config import Experiment
-from .effect import TorqueEffect
+from .effect import Deflection, TorqueEffect
 from .estimate import Fit, Problem, pose
 from .inertia import DIVERGENCES
 from .model import Model, moving_coefficients
@@ -24,6 +24,7 @@ from .objective import add_blocks
 from .preprocess import Motion
 
 _MOST_ROWS, _STEPS, _SETTLED = 6000, 12, 1e-7
+_SHARES = (1.0, 0.5, 0.25)
 
 
 @dataclass(frozen=True)
@@ -80,6 +81,10 @@ def settle(experiment: Experiment, model: Model, motion: Motion, prior: np.ndarr
             if isinstance(effect, TorqueEffect) and not value.held and value.shape.start is None:
                 if (tried := _from_grid(best, motion, k, weights)) is not None:
                     best = min(best, solved(tried), key=lambda s: s.objective)
+        for term, (effect, joints) in enumerate(best.model.terms):
+            for joint in joints if isinstance(effect, Deflection) else ():
+                if (tried := _from_tries(best, motion, term, joint, weights)) is not None:
+                    best = min(best, solved(tried), key=lambda s: s.objective)
     return _descended(best, motion, solved, weights, tolerance)
 
 
@@ -130,6 +135,29 @@ def _from_grid(found: Settled, motion: Motion, k: int, weights) -> Model | None:
     if not max(gains) > 0:
         return None
     return model.with_shapes([tried[int(np.argmax(gains))] if i == k else s for i, s in enumerate(model.shapes)])
+
+
+def _from_tries(found: Settled, motion: Motion, term: int, joint: int, weights) -> Model | None:
+    """The model with the best of the values that a deflection says to try, where it does nothing yet and none is held: on the
+    other side of a resonance no step from there arrives."""
+    model, rows = found.model, found.rows
+    effect = model.terms[term][0]
+    own = {v.shape.name: k for k, v in enumerate(model.shape_values) if (v.term, v.joint) == (term, joint)}
+    values = [model.shape_values[k] for k in own.values()]
+    tried = effect.tries({v.shape.name: (v.low, v.high) for v in values})
+    busy = any(v.held or model.shapes[k] != v.shape.start for k, v in zip(own.values(), values) if v.held or v.shape.start is not None)
+    if busy or not tried:
+        return None
+    scale = np.ones(model.robot.dof) if weights is None else np.asarray(weights)
+    projection = Projection(rows.columns, rows.residual(found.x), prior_hessian(found), scale)
+    gains = []
+    for change in row.secants(model, motion, found.x, effect, joint, tried, found.stride, rows.use):
+        c, _, _, gain, _ = projection.step(change[:, :, None], joint)
+        gains.append(gain if c[0] > 0 else 0.0)
+    if not max(gains) > 0:
+        return None
+    best = {own[name]: at for name, at in tried[int(np.argmax(gains))].items()}
+    return model.with_shapes([best.get(k, s) for k, s in enumerate(model.shapes)])
 
 
 def _without(columns, tau, hessian, weights) -> np.ndarray:
@@ -228,7 +256,7 @@ def _descended(best: Settled, motion: Motion, solved, weights, tolerance: float)
     for _ in range(_STEPS):
         before = best.objective
         if best.model.uses_load:
-            best = solved(best.model.with_reference(_bodies(best)))
+            best = _renewed(best, solved)
         if free:
             system, right = _normal(best, motion, free, scale)
             for _ in range(6):
@@ -243,6 +271,22 @@ def _descended(best: Settled, motion: Motion, solved, weights, tolerance: float)
                 damping *= 10.0
         if not abs(before - best.objective) > tolerance * abs(before):
             break
+    return best
+
+
+def _renewed(best: Settled, solved) -> Settled:
+    """The model with the load of the bodies found so far.
+
+    A link that moves by itself answers other bodies' load with blows at other times: there only as much of a step is taken
+    as does not raise the objective.
+    """
+    new, old = _bodies(best), best.model.reference
+    if old is None or not best.model.deflects:
+        return solved(best.model.with_reference(new))
+    for share in _SHARES:
+        tried = solved(best.model.with_reference(old + share * (new - old)))
+        if tried.objective <= best.objective:
+            return tried
     return best
 
 

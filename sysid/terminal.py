@@ -215,7 +215,7 @@ def show_effects(found: list[dict]) -> None:
         print(f"  source       {effect['source']}")
 
 
-_SHARES = {"speed": "times the joint's top speed", "torque": "times its greatest torque", "angle": "times the angle it travels", "duration": "times the longest log"}
+_SHARES = {"speed": "times the joint's top speed", "torque": "times its greatest torque", "angle": "times the angle it travels", "softness": "times the angle it travels over its greatest torque", "duration": "times the longest log"}
 
 
 def _bounds(parameter: dict) -> str:

@@ -18,7 +18,7 @@ ROOT = Path(__file__).resolve().parent.parent
 # The order of the method: a module imports only from modules above it.
 ORDER = [
     "errors", "units", "inertia", "urdf", "readers", "datasets", "config", "prior", "robot", "regressor", "outliers", "knocks", "repeats",
-    "events", "log", "preprocess", "blocks", "lowpass", "flexible",
+    "events", "log", "preprocess", "blocks", "two_masses", "lowpass", "flexible",
     "effect", "formula", "effects", "own_effects", "model", "rows", "source", "compress", "objective", "interior", "certificate", "solve", "uncertainty", "estimate", "shape",
     "filters", "results", "urdf_export", "pipeline", "simulate", "comparison", "transfer", "noise", "addition", "failures", "diagnose", "changes", "statement", "loop", "report", "studies", "studio", "terminal", "cli", "__main__",
 ]  # fmt: skip
@@ -106,7 +106,7 @@ def test_every_effect_keeps_its_contract(name):
     for value in said["parameters"]:
         assert value["says"] and value["unit"] and ("upper" in value or value["lower"] in (0, None))
     for shape in found.shapes():
-        assert shape.low < shape.high and shape.of in ("", "speed", "torque", "angle", "duration")
+        assert shape.low < shape.high and shape.of in ("", "speed", "torque", "angle", "softness", "duration")
         assert shape.start is None or shape.low <= shape.start <= shape.high
     robot, piece = moving()
     before = {key: np.array(getattr(piece, key)) for key in ("t", "q", "qd", "qdd", "tau", "load")}

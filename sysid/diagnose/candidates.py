@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .. import rows as row
-from ..effect import Effect, MotionEffect, SensorEffect, WrenchEffect, find, vocabulary
+from ..effect import Deflection, Effect, MotionEffect, SensorEffect, WrenchEffect, find, vocabulary
 from ..model import ROBOT, Model
 
 # What every model has to begin with is added first where it lacks; then what has a law; then what can bend to anything.
@@ -92,13 +92,14 @@ def _variants(effect: Effect, robot, joint: int) -> list[dict]:
 
 
 def tried(view, candidate: Candidate) -> list[dict[str, float]]:
-    """Sets of shape values to try: a grid over each value in turn, the others midway; where an effect does nothing yet, that."""
+    """Sets of shape values to try: a grid over each value in turn, the others midway; where an effect does nothing yet, that,
+    and what it says to try beside it."""
     if candidate.begins:
         return [dict(at) for at in candidate.begins]
     bounds = bounds_of(view.model, candidate)
     if candidate.nonlinear:
         starts = [s.start if s.start is not None else float(np.sqrt(low * high)) for s, low, high, _ in bounds]
-        return [{s.name: at for (s, *_), at in zip(bounds, starts)}]
+        return [{s.name: at for (s, *_), at in zip(bounds, starts)}, *further(view.model, candidate)]
     if not candidate.effect.coefficients():
         return []
     if not bounds:
@@ -119,6 +120,18 @@ def bounds_of(model: Model, candidate: Candidate) -> list[tuple]:
     return [(s, s.low * of(s), s.high * of(s), angle) for s in candidate.effect.shapes()]
 
 
+def further(model: Model, candidate: Candidate) -> list[dict[str, float]]:
+    """Sets of shape values to try beyond an effect's start, at which its torque is no multiple of its slope there."""
+    if not isinstance(candidate.effect, Deflection):
+        return []
+    return candidate.effect.tries({s.name: (low, high) for s, low, high, _ in bounds_of(model, candidate)})
+
+
+def at_start(candidate: Candidate, shapes: dict[str, float]) -> bool:
+    """Whether an effect does nothing at shape values."""
+    return all(shapes[s.name] == s.start for s in candidate.effect.shapes() if s.start is not None)
+
+
 def grown(source, candidate: Candidate, shapes: dict[str, float]) -> Model:
     """A source's model with a candidate at shape values, in the place of what it has of the same effect on that joint."""
     model = source.model.without(*candidate.key).with_effect(candidate.effect, (candidate.joint,))
@@ -132,31 +145,44 @@ def grown(source, candidate: Candidate, shapes: dict[str, float]) -> Model:
 def columns_of(source, candidate: Candidate, shapes: list[dict[str, float]]) -> np.ndarray:
     """Columns (shapes, joints, n, k) that a candidate would add to a source's rows, its own joint's or every joint's.
 
-    Of an effect that is no column, the slopes of the predicted torque in its values.
+    Of an effect that is no column, the slopes of the predicted torque in its values; away from its start the change of the torque
+    as a share of its first value.
     """
     if isinstance(candidate.effect, SensorEffect):
         return np.stack([_sensed(source, candidate, own)[None] for own in shapes])
     if candidate.nonlinear:
-        return np.stack([_slopes(source, candidate, own) for own in shapes])
+        apart = [own for own in shapes if isinstance(candidate.effect, Deflection) and not at_start(candidate, own)]
+        changes = iter(_changes(source, candidate, apart))
+        return np.stack([next(changes) if own in apart else _slopes(source, candidate, own) for own in shapes])
     found = row.signatures(
         source.model, source.motion, source.pieces, candidate.effect, candidate.joint, shapes, source.stride, source.use
     )  # fmt: skip
     return np.stack([values[None] if values.ndim == 2 else values for values in found])
 
 
+def _changes(source, candidate: Candidate, shapes: list[dict[str, float]]) -> list[np.ndarray]:
+    """Of each set (dof, n, 1)."""
+    if not shapes:
+        return []
+    leading = next(s.name for s in candidate.effect.shapes() if s.start is not None)
+    found = row.secants(
+        source.model, source.motion, source.x, candidate.effect, candidate.joint, shapes, source.stride, source.use
+    )  # fmt: skip
+    return [change[:, :, None] / own[leading] for change, own in zip(found, shapes)]
+
+
 def _slopes(source, candidate: Candidate, shapes: dict[str, float]) -> np.ndarray:
     model = grown(source, candidate, shapes)
     own = model.last_shapes
-    starts = {s.name: s.start for s in candidate.effect.shapes()}
-    at_start = all(shapes[name] == start for name, start in starts.items() if start is not None)
+    idle_yet = at_start(candidate, shapes)
     # where an effect does nothing yet, a value that only says how it does it changes nothing
-    idle = [*model.shape_values[: own.start], *(v for v in model.shape_values[own] if at_start and v.shape.start is None)]
+    idle = [*model.shape_values[: own.start], *(v for v in model.shape_values[own] if idle_yet and v.shape.start is None)]
     held = tuple(((v.term, v.joint, v.shape.name), 0.0) for v in idle)
     held_model = replace(model, held=(*model.held, *held))
     slopes = row.tangents(
-        held_model, source.motion, source.x, source.stride, source.use, source.predicted if at_start else None
+        held_model, source.motion, source.x, source.stride, source.use, source.predicted if idle_yet else None
     )[:, :, own]  # fmt: skip
-    free = [k for k, v in enumerate(model.shape_values[own]) if not (at_start and v.shape.start is None)]
+    free = [k for k, v in enumerate(model.shape_values[own]) if not (idle_yet and v.shape.start is None)]
     return slopes[:, :, free]
 
 

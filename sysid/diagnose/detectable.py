@@ -14,7 +14,7 @@ import numpy as np
 from scipy.special import ndtri
 
 from ..model import ROBOT
-from .candidates import Candidate
+from .candidates import Candidate, at_start
 from .evidence import Group, normal_scores
 from .select import LEVEL, WORTH, Asked
 from .view import View
@@ -44,6 +44,10 @@ def detectable(view: View, asked: Asked, candidates) -> list[Detectable]:
             best.setdefault(candidate.key, Detectable(candidate, *_leading(view, candidate)))
     for group in (g for g in asked.groups if not g.candidate.begins):
         size = _size(group, threshold, loss)
+        if group.candidate.nonlinear and not at_start(group.candidate, group.shapes):
+            # its torque is no multiple of another size's: this one is seen or it is not
+            own = group.shapes[_leading(view, group.candidate)[0]]
+            size = own if size <= own else np.inf
         there = best[group.candidate.key]
         if np.isfinite(size) and (there.size is None or size < there.size):
             best[group.candidate.key] = Detectable(
@@ -68,6 +72,7 @@ def _leading(view: View, candidate: Candidate) -> tuple[str, str]:
 
 def _size(group: Group, threshold: float, loss: np.ndarray) -> float:
     """Of the first own coefficient, the others zero."""
+    group = group.tested
     if not (group.sizes[0] > 0 and group.testable):
         return np.inf
     directions, rest = group.freedom

@@ -21,7 +21,8 @@ and is taken off (simulation extrapolation: Cook & Stefanski 1994).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -73,6 +74,25 @@ class Group:
     def testable(self) -> bool:
         """Whether it rests on enough blocks to be told from chance; if not, it may still be a rival of one that is."""
         return resting(self.squares) >= _FEWEST and float(np.linalg.eigvalsh(self.squares).max()) <= _LEVERAGE
+
+    @cached_property
+    def tested(self) -> Group:
+        """The group by which it is told whether it is there: of an effect that comes in blows, a few of which outweigh all
+        others, one in which no block counts more than the rest allows.
+
+        Weights that look at columns alone leave scores of noise as they are, without a sign; blows are as good as orthogonal
+        to the model, in each block. What it takes, and its coefficients, are the group's own.
+        """
+        if not getattr(self.candidate.effect, "blows", False):
+            return self
+        share = np.einsum("bkk->b", self.squares)
+        weight = np.minimum(1.0, _most(share) / np.maximum(share, 1e-300))
+        squares = self.squares * weight[:, None, None]
+        values, vectors = np.linalg.eigh(squares.sum(0))
+        turn = vectors / np.sqrt(np.maximum(values, 1e-300))
+        sizes = self.sizes * float(np.sqrt(values.min()))
+        scores = weight[:, None] * self.scores @ turn
+        return replace(self, scores=scores, squares=turn.T @ squares @ turn, kept=self.kept @ turn, back=self.back @ turn, sizes=sizes)
 
     @property
     def numbers(self) -> int:
@@ -188,6 +208,20 @@ def resting(squares: np.ndarray) -> float:
     """On how many blocks a group rests: the inverse of the sum of squared shares (blocks, k, k)."""
     share = np.einsum("bkk->b", squares)
     return float(share.sum() ** 2 / max(np.sum(share**2), 1e-300))
+
+
+def _most(share: np.ndarray) -> float:
+    """What no block's share (blocks,) may pass for no block to hold more than an even part of twice the fewest blocks."""
+    ascending = np.sort(share)
+    below = np.concatenate([[0.0], np.cumsum(ascending)])
+    count = len(share) - np.arange(len(share))
+    capped = below[:-1] + count * ascending  # of all, where each in turn is the most
+    fits = ascending <= capped / (2.0 * _FEWEST)
+    if fits.all():
+        return float(ascending[-1])
+    k = int(np.argmin(fits))  # the first that is too much: between its neighbour below and it
+    rest = 2.0 * _FEWEST - count[k]
+    return float(below[k] / rest) if rest > 0 else float(ascending[k])
 
 
 def left_out(squares: np.ndarray) -> np.ndarray:

@@ -24,6 +24,7 @@ _LOUDER = 1.03
 
 def statistics(groups: Sequence[Group]) -> np.ndarray:
     """(groups,) T of each, on the scale of a normal variable; NaN where it cannot be tested."""
+    groups = [g.tested for g in groups]
     ratio = np.array([g.c @ g.c / max(np.sum(g.moves**2), 1e-300) for g in groups])
     directions, rest = np.array([g.freedom for g in groups]).T if groups else np.zeros((2, 0))
     found = normal_scores(ratio, directions, directions * np.maximum(rest - 1.0, 1.0))
@@ -33,7 +34,7 @@ def statistics(groups: Sequence[Group]) -> np.ndarray:
 def maxima(groups: Sequence[Group], rng: np.random.Generator, *, draws: int = 1000) -> np.ndarray:
     """(draws,) the greatest statistic over all groups where nothing is there; minus infinity where there are none."""
     out = np.full(draws, -np.inf)
-    groups = [g for g in groups if g.testable]
+    groups = [g.tested for g in groups if g.tested.testable]
     if not groups:
         return out
     sign = blocks.signs(len(groups[0].scores), draws, rng)

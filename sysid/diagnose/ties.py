@@ -13,7 +13,7 @@ import numpy as np
 
 from .. import blocks
 from ..estimate import inverse
-from .candidates import Candidate, bounds_of, columns_of, grown
+from .candidates import Candidate, at_start, bounds_of, columns_of, grown
 from .evidence import Group
 from .view import View, by_block, looked_at
 
@@ -89,7 +89,7 @@ def refitted(view: View, group: Group) -> Member | None:
     """A group's candidate in the model, everything settled again; None where its sign or its bounds forbid it."""
     candidate = group.candidate
     shapes = dict(group.shapes)
-    if candidate.nonlinear:
+    if candidate.nonlinear and at_start(candidate, shapes):
         free = [s for s, *_ in bounds_of(view.model, candidate) if s.start is not None]
         limits = {s.name: (low, high) for s, low, high, _ in bounds_of(view.model, candidate)}
         for shape, step in zip(free, group.coefficients):

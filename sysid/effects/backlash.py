@@ -2,21 +2,37 @@
 
 import numpy as np
 
-from ..effect import Deflection, Shape, rates
+from ..effect import Deflection, Shape
+from ..two_masses import played
 
 
 class Backlash(Deflection):
-    """Teeth have play: the link lies half of it behind the motor or ahead of it, whichever way the load presses."""
+    """Teeth have play: the link lies half of it behind the motor or ahead of it, whichever way the load presses, and flies between.
+
+    Where the encoder turns with the link, the link does not fly: it is the motor that crosses the play.
+    """
 
     name = "backlash"
-    equation = "q_link = q_motor - b/2 tanh(tau_load/soft)"
-    looks_like = "impulses where the load torque changes sign"
+    equation = "q_link = q_motor - d, M d'' = tau_load while |d| < b/2, then teeth; where motion is slow d = b/2 sign(tau_load)"
+    looks_like = "no torque, then a blow, where the load torque changes sign"
     tied_with = ("presliding", "elasticity", "coulomb")
     separate_by = "the same motion in a pose that preloads the gear and in one that balances it"
     source = "Nordin & Gutman 2002"
+    blows = True
 
-    b = Shape("rad", 0.0, 0.1, start=0.0, says="width of the play")
-    soft = Shape("N m", 0.01, 0.3, of="torque", says="load torque over which the link crosses the play")
+    b = Shape("rad", 0.0, 0.05, of="angle", start=0.0, says="width of the play")
+    teeth = Shape("Hz", 15.0, 80.0, grid=3, says="what the link swings at where the teeth touch (encoder: motor)")
+    soft = Shape("N m", 0.003, 0.3, of="torque", says="load torque over which the motor crosses the play (encoder: joint)")
 
-    def behind(self, load, step, b, soft):
-        return rates(0.5 * b * np.tanh(load / soft), step)
+    def shapes(self):
+        return (self.b, self.teeth if self.encoder == "motor" else self.soft)
+
+    def behind(self, load, inertia, step, b, teeth=None, soft=None):
+        if self.encoder == "joint":
+            return 0.5 * b * np.tanh(load / soft)
+        return played(load, inertia, step, b=b, teeth=teeth)
+
+    def flights(self, bounds):
+        # the time of flight grows with the cube root of the play: neighbours' are a sixth apart
+        most, (low, high) = bounds["b"][1], bounds["teeth"]
+        return [{"b": float(b), "teeth": float(np.sqrt(low * high))} for b in np.geomspace(most / 500.0, most, 14)]

@@ -1,22 +1,28 @@
 """A joint that gives."""
 
-from ..effect import Deflection, Shape, rates
+import numpy as np
+
+from ..effect import Deflection, Shape
+from ..two_masses import sprung
 
 
 class Elasticity(Deflection):
-    """A harmonic drive or belt is a spring between motor and link: under load they stand at different angles.
-
-    Valid for motion well below the resonance that the spring makes with the link.
-    """
+    """A harmonic drive or belt is a damped spring between motor and link: under load they stand at different angles, and the link rings."""
 
     name = "elasticity"
-    equation = "q_link = q_motor - compliance tau_load, compliance = 1/K"
-    looks_like = "residual in proportion to the second derivative of the torque"
+    equation = "q_link = q_motor - d, M d'' + K (2 damping / omega d' + d) = tau_load, K = 1/compliance, omega = sqrt(K/M)"
+    looks_like = "residual in proportion to the second derivative of the torque; ringing at the link's resonance"
     tied_with = ("delay", "current_lag", "encoder_eccentricity", "backlash")
     separate_by = "a chirp past the resonance, or the output locked and the motor pushing"
     source = "Spong 1987"
 
-    compliance = Shape("rad/(N m)", 0.0, 0.02, start=0.0, says="angle that the joint gives per torque")
+    compliance = Shape("rad/(N m)", 0.0, 0.1, of="softness", start=0.0, says="angle that the joint gives per torque")
+    damping = Shape("1", 0.02, 0.7, says="of the link on its spring, as a share of the critical one")
 
-    def behind(self, load, step, compliance):
-        return compliance * rates(load, step)
+    def behind(self, load, inertia, step, compliance, damping):
+        return sprung(load, inertia, step, compliance=compliance, damping=damping)
+
+    def flights(self, bounds):
+        # neighbours' resonances lie an eighth apart, within the width of a well damped one
+        most, (low, high) = bounds["compliance"][1], bounds["damping"]
+        return [{"compliance": float(c), "damping": float(np.clip(0.25, low, high))} for c in np.geomspace(most / 300.0, most, 24)]

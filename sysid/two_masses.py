@@ -1,0 +1,123 @@
+"""A drive's two masses: where the link of a joint stands when its motor's motion is known.
+
+Of one soft joint among joints whose motion is measured, the link's equation has a single unknown, how far the link
+stands behind its motor, and what drives it is the torque that the link would need did it follow the motor:
+
+    M(q) d'' + torque of the drive (d, d') = load(q, qd, qdd of the motors)
+
+Far below the resonance d'' does not matter, and the drive carries the load itself.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from . import regressor
+from .preprocess import Piece
+from .robot import Robot
+
+_FORGOTTEN = 4.0  # times of decay: two per cent are left
+_TURN = 0.25  # rad of the swing on the teeth in a step, at most
+
+
+def link_side(robot: Robot, pi, motion: Piece, joint: int) -> tuple[np.ndarray, np.ndarray]:
+    """Torque and inertia (n,) that a joint's link has for its drive, its own rotor not among them.
+
+    Args:
+        pi: (bodies, 10). motion: q, qd, qdd (n, dof).
+    """
+    carried = np.array(pi, dtype=float)
+    for b, body in enumerate(robot.bodies):
+        if body.kind == "rotor" and robot.transmission[body.row, joint]:
+            carried[b] = 0.0
+    alone = np.zeros_like(motion.q)
+    alone[:, joint] = 1.0
+    load = regressor.torque(robot, carried, motion.q, motion.qd, motion.qdd)[:, joint]
+    return load, regressor.torque(robot, carried, motion.q, 0.0 * motion.q, alone, gravity=np.zeros(3))[:, joint]
+
+
+def sprung(load, inertia, step: float, *, compliance: float, damping: float) -> np.ndarray:
+    """How far (n,) a link stands behind its motor through a damped spring.
+
+        compliance inertia d'' + 2 damping sqrt(compliance inertia) d' + d = compliance load
+
+    The recursion has the equation's own poles and answers a load that is quadratic in time exactly, whatever the step; where
+    a step holds no sixth of a cycle, the resonance is beyond what the samples show and only that answer is left. Nobody knows
+    how the link swung when the log began: so that it rings least until that is forgotten.
+
+    Args:
+        load: (n,) [N m]. inertia: (n,) [kg m²] of the link. step: seconds. compliance: [rad/(N m)]. damping: share of the
+            critical one.
+    """
+    # seconds in steps: the period of the resonance over two pi, and the lag
+    still = np.sqrt(np.maximum(compliance * np.asarray(inertia), 0.0)) / step
+    if compliance <= 0.0 or len(load) < 3 or not still.any():
+        return compliance * np.asarray(load)
+    from scipy.linalg.lapack import dtbtrs
+
+    still = np.broadcast_to(still, len(load))
+    turn = 1.0 / np.maximum(still, 1e-3)
+    share = np.minimum(np.maximum(damping, turn - 1.0), 0.999)
+    kept = np.exp(-share * turn)
+    one, two = 2.0 * kept * np.cos(np.sqrt(1.0 - share**2) * turn), -(kept**2)
+    lag = 2.0 * damping * still
+    curved = 2.0 * (lag**2 - still**2)
+    zeroth = 1.0 - one - two
+    first = 1.0 - lag + one * lag + two * (1.0 + lag)
+    second = 1.0 - 2.0 * lag + curved - one * curved - two * (1.0 + 2.0 * lag + curved)
+    asked = compliance * np.asarray(load)
+    right = asked.copy()
+    right[2:] = (
+        0.5 * (first + second)[1:-1] * asked[2:] + (zeroth - second)[1:-1] * asked[1:-1] + 0.5 * (second - first)[1:-1] * asked[:-2]
+    )  # fmt: skip
+    band = np.zeros((3, len(load)))
+    band[0] = 1.0
+    band[1, 1:-1], band[2, :-2] = -one[1:-1], -two[1:-1]
+    begun = np.stack([right, np.zeros(len(load)), np.zeros(len(load))], axis=1)
+    begun[0, 1] = begun[1, 2] = 1.0  # from any other first two samples
+    found = dtbtrs(band, begun, uplo="L")[0]
+    early = max(5, math.ceil(_FORGOTTEN * float(np.median(still)) / max(damping, 1e-3)))
+    rings = np.diff(found[:early], 2, axis=0)
+    change = np.linalg.lstsq(rings[:, 1:], -rings[:, 0], rcond=1e-9)[0]
+    return found[:, 0] + found[:, 1:] @ change
+
+
+def played(load, inertia, step: float, *, b: float, teeth: float) -> np.ndarray:
+    """How far (n,) a link stands behind its motor through teeth with play.
+
+        d'' + omega² (d -+ b/2) + omega d' = load / inertia where the teeth touch, |d| > b/2, and never pull
+        d'' = load / inertia between
+
+    Without inertia the link lies at the teeth that the load presses. On them it swings `teeth` times a second, omega / 2 pi,
+    and loses most of a blow: of teeth only how long a blow takes is seen at lower frequencies.
+
+    Args:
+        load: (n,) [N m]. inertia: (n,) [kg m²] of the link. step: seconds. b: [rad]. teeth: [Hz].
+
+    Source: Nordin & Gutman 2002.
+    """
+    load, half = np.asarray(load, dtype=float), 0.5 * b
+    if half <= 0.0 or not np.all(inertia):
+        return half * np.sign(load)
+    driven, omega = load / inertia, 2.0 * math.pi * teeth
+    fine = max(1, math.ceil(step * omega / _TURN))
+    h = step / fine
+    spring, damper = h * omega**2, h * omega
+    d, v = half * math.copysign(1.0, driven[0]) + driven[0] / omega**2, 0.0
+    out = [d]
+    for push, more in zip((h * driven[:-1]).tolist(), (h / fine * np.diff(driven)).tolist()):
+        for _ in range(fine):
+            if d > half:
+                held = spring * (d - half) + damper * v
+                v += push - held if held > 0.0 else push
+            elif d < -half:
+                held = spring * (d + half) + damper * v
+                v += push - held if held < 0.0 else push
+            else:
+                v += push
+            d += h * v
+            push += more
+        out.append(d)
+    return np.array(out)

@@ -1,0 +1,142 @@
+"""A link behind its motor, against integrations of the same law, closed forms and the simulator's link, which no sensor sees."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from sysid.diagnose.lowpass import Gaussian
+
+from sysid import config, regressor, robot, two_masses
+from sysid.preprocess import Smoother
+from sysid.simulate import hidden, simulate
+from tests.conftest import URDF
+from tests.test_effects import piece_of
+
+
+def load(t):
+    return 3.0 * np.sin(2 * np.pi * 1.1 * t) + np.sin(2 * np.pi * 3.3 * t + 0.3)
+
+
+def inertia(t):
+    return 0.15 * (1.0 + 0.3 * np.sin(2.0 * t))
+
+
+@pytest.mark.parametrize("compliance, damping", [(0.01, 0.3), (2e-3, 0.08), (1e-4, 0.1)])
+def test_a_spring_against_an_integration(compliance, damping):
+    """Resonances from 4 to 41 Hz, sampled at up to 1000 Hz and below their double. What the start leaves has died away by 1.5 s."""
+
+    def law(t, y):
+        M = inertia(t)
+        return [y[1], (compliance * load(t) - y[0]) / (compliance * M) - 2 * damping / np.sqrt(compliance * M) * y[1]]
+
+    t = np.arange(0.0, 2.5, 0.001)
+    truth = solve_ivp(law, (0.0, t[-1]), [compliance * load(0.0), 0.0], t_eval=t, rtol=1e-7, atol=1e-11, method="LSODA").y[0]
+    for every in (1, 4, 10):
+        t_, wanted = t[::every], truth[::every]
+        found = two_masses.sprung(load(t_), inertia(t_), 0.001 * every, compliance=compliance, damping=damping)
+        late = t_ > 1.5
+        assert np.std((found - wanted)[late]) < 2e-3 * np.std(wanted[late])
+
+
+def test_a_stiff_or_slow_spring_carries_the_load_itself():
+    t = np.arange(0.0, 4.0, 0.002)
+    found = two_masses.sprung(load(t), 0.0 * t, 0.002, compliance=0.01, damping=0.1)
+    np.testing.assert_array_equal(found, 0.01 * load(t))
+    assert not two_masses.sprung(load(t), inertia(t), 0.002, compliance=0.0, damping=0.1).any()
+    slow = two_masses.sprung(load(0.02 * t), 0.15 + 0.0 * t, 0.002, compliance=0.002, damping=0.1)
+    lag = 2 * 0.1 * np.sqrt(0.002 * 0.15)
+    np.testing.assert_allclose(slow[500:], 0.002 * load(0.02 * (t - lag))[500:], atol=1e-4 * np.ptp(slow))
+
+
+def test_a_link_flies_between_the_teeth():
+    """The load grows from zero at the back teeth: d = slope t^3 / (6 M) - b/2, until it strikes, and there it stays."""
+    step, M, b, slope = 1e-3, 0.2, 0.02, 20.0
+    t = np.arange(-0.2, 0.6, step)
+    found = two_masses.played(slope * t, np.full(len(t), M), step, b=b, teeth=80.0)
+    arrives = np.cbrt(6 * M * b / slope)
+    flies = (t > 0.02) & (t < arrives)
+    assert 0.1 < arrives < 0.2
+    np.testing.assert_allclose(found[flies], slope * t[flies] ** 3 / (6 * M) - 0.5 * b, atol=0.02 * b)
+    late = t > arrives + 0.1
+    np.testing.assert_allclose(found[late], 0.5 * b + slope * t[late] / (M * (2 * np.pi * 80.0) ** 2), rtol=0.02)
+
+
+def test_play_against_an_integration():
+    """Blows included; a longer step brings a little of itself into the time of a blow."""
+    M, b, teeth = 0.2, 0.006, 40.0
+    omega = 2 * np.pi * teeth
+
+    def law(t, y):
+        beyond = y[0] - np.clip(y[0], -0.5 * b, 0.5 * b)
+        held = omega**2 * M * beyond + omega * M * y[1] if beyond else 0.0
+        return [y[1], (load(t) - (held if held * beyond > 0 else 0.0)) / M]
+
+    t = np.arange(0.0, 2.0, 0.001)
+    start = [0.5 * b + load(0.0) / M / omega**2, 0.0]
+    truth = solve_ivp(law, (0.0, 2.0), start, t_eval=t, rtol=1e-6, atol=1e-9, max_step=2e-3).y[0]
+    for every, most in ((1, 0.05), (4, 0.1)):
+        found = two_masses.played(load(t[::every]), np.full(len(t[::every]), M), 0.001 * every, b=b, teeth=teeth)
+        assert np.std(found - truth[::every]) < most * np.std(truth)
+
+
+def test_play_without_inertia_follows_the_load():
+    t = np.arange(0.0, 2.0, 0.002)
+    still = two_masses.played(load(t), 0.0 * t, 0.002, b=0.01, teeth=40.0)
+    np.testing.assert_array_equal(still, 0.005 * np.sign(load(t)))
+    assert not two_masses.played(load(t), inertia(t), 0.002, b=0.0, teeth=40.0).any()
+
+
+@pytest.fixture(scope="module")
+def arm(tmp_path_factory):
+    file = tmp_path_factory.mktemp("planar") / "robot.urdf"
+    file.write_text(URDF)
+    return robot.load(config.RobotSpec(urdf=str(file)))
+
+
+@pytest.mark.parametrize("what", ["elasticity:elbow:K=60,D=0.3", "elasticity:elbow:K=200,D=1", "backlash:elbow:b=0.01", "backlash:elbow:b=0.004"])
+def test_the_simulator_s_link_is_where_it_is_said_to_be(arm, what):
+    """True bodies, the motors' true motion; the simulator integrates motor and link under true torque. What counts is torque: the
+    link's acceleration below 15 Hz. The teeth, which are others here, cost some of it."""
+    told = simulate(arm, hide=[hidden(what)], seed=2, duration=4.0, encoder=0)
+    clean, step = told.train.clean, told.truth["run"]["control_period"]
+    qdd = np.zeros_like(clean.q)
+    qdd[1:-1] = np.diff(clean.q, 2, axis=0) / step**2
+    motion = piece_of(arm, step * np.arange(len(clean.q)), clean.q, clean.qd, qdd)
+    push, mass = two_masses.link_side(arm, np.array(list(told.truth["inertias"].values())), motion, 1)
+    values = told.truth["hidden"][0]["values"]
+    if "K" in values:
+        found = two_masses.sprung(push, mass, step, compliance=1 / values["K"], damping=0.5 * values["D"] / np.sqrt(values["K"] * mass.mean()))
+        still, most = push / values["K"], 0.06
+    else:
+        found = two_masses.played(push, mass, step, b=values["b"], teeth=40.0)
+        still, most = 0.5 * values["b"] * np.sign(push), 0.3
+    apart, smooth = (clean.q - clean.link_q)[:, 1], Gaussian(15.0, step)
+    acceleration = lambda d: smooth(np.diff(d, 2) / step**2)[1500:-100]  # noqa: E731
+    error = lambda guess: np.std(acceleration(guess - apart)) / np.std(acceleration(apart))  # noqa: E731
+    assert error(found) < most and error(still) > 1.0
+
+
+def test_rotors_are_no_load_of_their_own_gear():
+    """The leg's own rotor turns with the motor; the rotors that a link carries are its load."""
+    leg = config.load(config.Path(__file__).resolve().parent.parent / "configs/cheetah3.yaml")
+    machine = robot.load(leg.robot, leg.folder)
+    rng = np.random.default_rng(0)
+    q, qd, qdd = rng.normal(size=(3, 5, machine.dof))
+    motion = piece_of(machine, 0.01 * np.arange(5), q, qd, qdd)
+    for joint in range(machine.dof):
+        push, mass = two_masses.link_side(machine, machine.prior, motion, joint)
+        own = [b for b, body in enumerate(machine.bodies) if body.kind == "rotor" and machine.transmission[body.row, joint]]
+        assert len(own) == 1
+        without = np.array(machine.prior)
+        without[own] = 0.0
+        np.testing.assert_allclose(push, regressor.torque(machine, without, q, qd, qdd)[:, joint])
+        heavier = regressor.torque(machine, without, q, qd, qdd + np.eye(machine.dof)[joint])[:, joint]
+        np.testing.assert_allclose(mass, heavier - push, atol=1e-9)
+        assert np.all(mass > 0)
+
+
+def test_a_filter_reaches_the_ends():
+    """Of a straight line, as of anything that it leaves alone, nothing changes, up to the last sample."""
+    smoother = Smoother(config.PreprocessSpec(window=0.1), 0.01)
+    line = np.linspace(-1.0, 2.0, 60)
+    np.testing.assert_allclose(smoother.smoothed(line), line, atol=1e-12)
+    np.testing.assert_array_equal(smoother.smoothed(line[:1]), line[:1])
