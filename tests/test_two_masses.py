@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from sysid.diagnose.lowpass import Gaussian
+from sysid.lowpass import Gaussian
 
 from sysid import config, regressor, robot, two_masses
 from sysid.preprocess import Smoother
