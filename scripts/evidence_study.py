@@ -74,11 +74,12 @@ def _view(case: dict, folder: Path, hide=()):
 def size(case: dict, level: float, worth: float) -> dict:
     """What the search accuses where nothing is hidden."""
     from sysid.diagnose import select
+    from sysid.diagnose.ask import ask
 
     with warnings.catch_warnings(), tempfile.TemporaryDirectory() as folder:
         warnings.simplefilter("ignore")
         view = _view(case, Path(folder))
-        asked = select.ask(view)
+        asked = ask(view)
         best = int(np.nanargmax(asked.statistics)) if len(asked.groups) else -1
         steps, *_ = select.search(view, level=level, worth=worth, most=1)
         first = [] if best < 0 else [asked.groups[best].candidate.name, asked.p(best)]
@@ -88,6 +89,7 @@ def size(case: dict, level: float, worth: float) -> dict:
 def power(case: dict, level: float, worth: float) -> dict:
     """Whether an effect of the smallest detectable size is named."""
     from sysid.diagnose import select
+    from sysid.diagnose.ask import ask
     from sysid.diagnose.candidates import candidates
     from sysid.diagnose.detectable import detectable
     from sysid.simulate import hidden
@@ -97,7 +99,7 @@ def power(case: dict, level: float, worth: float) -> dict:
         warnings.simplefilter("ignore")
         view = _view(case, Path(folder) / "plain")
         joints = JOINTS[case["robot"]]
-        found = [d for d in detectable(view, select.ask(view), candidates(view.model)) if d.size and d.candidate.name in HIDDEN]
+        found = [d for d in detectable(view, ask(view), candidates(view.model)) if d.size and d.candidate.name in HIDDEN]
         for pick in rng.permutation(len(found)):
             one = found[pick]
             joint, sign = joints[one.candidate.joint], 1.0

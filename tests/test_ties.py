@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from sysid import blocks, pipeline
+from sysid.diagnose.ask import ask
 from sysid.diagnose.diagnosis import first_view
-from sysid.diagnose.select import ask
-from sysid.diagnose.ties import Choice, chosen, holds, losses, refitted
+from sysid.diagnose.refits import losses, refitted
+from sysid.diagnose.ties import Choice, chosen, holds
 from tests.evidences import posed, stacked, viewed
 
 

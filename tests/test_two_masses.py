@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from sysid.lowpass import Gaussian
 
 from sysid import config, regressor, robot, two_masses
+from sysid.lowpass import Gaussian
 from sysid.preprocess import Smoother
 from sysid.simulate import hidden, simulate
 from tests.conftest import URDF

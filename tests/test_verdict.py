@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 from sysid import pipeline
+from sysid.diagnose.ask import ask
 from sysid.diagnose.candidates import candidates
 from sysid.diagnose.detectable import detectable
 from sysid.diagnose.diagnosis import first_view
-from sysid.diagnose.select import LEVEL, WORTH, ask, search
+from sysid.diagnose.select import LEVEL, WORTH, search
 from sysid.diagnose.verdict import predictable, verdicts
 from sysid.effect import Linear, TorqueEffect
 from sysid.flexible import Unknown

@@ -15,8 +15,8 @@ from .. import comparison, pipeline
 from ..addition import command, grown, spelled
 from ..estimate import Fit
 from ..model import ROBOT
-from .select import Step
-from .ties import Member
+from .refits import Member
+from .steps import Step
 from .view import View
 
 _CLEAR = 2.0  # standard deviations

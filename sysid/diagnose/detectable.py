@@ -14,9 +14,10 @@ import numpy as np
 from scipy.special import ndtri
 
 from ..model import ROBOT
+from .ask import Asked
 from .candidates import Candidate, at_start
 from .evidence import Group, normal_scores
-from .select import LEVEL, WORTH, Asked
+from .select import LEVEL, WORTH
 from .view import View
 
 POWER = 0.9

@@ -1,0 +1,131 @@
+"""Candidates refitted exactly: each joins the model and everything is settled again, its shape
+values and the load included.
+
+What each model leaves of blocks that it was not fitted on is one loss a block; what the angles'
+noise alone makes of that is taken off.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .. import blocks
+from ..estimate import inverse
+from .candidates import Candidate, at_start, bounds_of, grown
+from .evidence import Group
+from .view import View, by_block, looked_at
+
+_COMPARED = 1e-4  # share of the objective: finer than rivals are ever told apart by
+
+
+@dataclass(frozen=True)
+class Member:
+    """A candidate refitted: the view of the model with it, and its losses (blocks, dof)."""
+
+    group: Group
+    view: View
+    losses: np.ndarray
+
+    @property
+    def candidate(self) -> Candidate:
+        """What joined."""
+        return self.group.candidate
+
+    @property
+    def asked(self) -> dict[str, float]:
+        """Shape values at which to ask for it again: its own, and of an effect without columns
+        those where it does nothing."""
+        return self.group.shapes if self.candidate.nonlinear else self.shapes
+
+    @property
+    def shapes(self) -> dict[str, float]:
+        """Its shape values, refitted."""
+        return {value.shape.name: at for value, at in zip(*_own(self.view))}
+
+
+def losses(view: View, number: np.ndarray) -> np.ndarray:
+    """(blocks, dof) weighted squares that a model leaves in each block `number` (n,), fitted on the
+    other folds, less what the angles' noise makes."""
+    design, spans = view.design, by_block(number)
+    fold = blocks.folds(len(spans))
+    out = np.zeros((len(spans), len(view.weights)))
+    for f in range(fold.max() + 1):
+        own = [span for b, span in enumerate(spans) if fold[b] == f]
+        rows = slice(own[0].start, own[-1].stop)
+        a, r = design.columns[:, rows], design.residual[rows]
+        pull = np.einsum("jnk,nj->k", a, r)
+        squares = np.einsum("jnk,jnl->kl", a, a, optimize=True)
+        change = np.linalg.lstsq(design.system - squares, pull, rcond=1e-10)[0]
+        left = r + np.einsum("jnk,k->nj", a, change)
+        for b, span in enumerate(spans):
+            if fold[b] == f:
+                part = slice(span.start - rows.start, span.stop - rows.start)
+                out[b] = np.sum(left[part] ** 2 - design.rough_residual[span] ** 2, axis=0)
+    return out
+
+
+def refitted(view: View, group: Group) -> Member | None:
+    """A group's candidate in the model, everything settled again; None where its sign or its bounds
+    forbid it."""
+    candidate = group.candidate
+    shapes = dict(group.shapes)
+    if candidate.nonlinear and at_start(candidate, shapes):
+        free = [s for s, *_ in bounds_of(view.model, candidate) if s.start is not None]
+        limits = {s.name: (low, high) for s, low, high, _ in bounds_of(view.model, candidate)}
+        for shape, step in zip(free, group.coefficients):
+            shapes[shape.name] = float(np.clip(shapes[shape.name] + step, *limits[shape.name]))
+    found = joined(view, candidate, shapes)
+    return Member(group, found, losses(found, view.blocks)) if _allowed(found, candidate) else None
+
+
+def joined(view: View, candidate: Candidate, shapes: dict[str, float]) -> View:
+    """A view's model with a candidate, everything settled again from shape values on."""
+    return looked_at(
+        view.experiment,
+        grown(view.source, candidate, shapes),
+        view.motion,
+        view.rough,
+        view.prior,
+        stride=view.stride,
+        weights=view.weights,
+        grid=False,
+        tolerance=_COMPARED,
+        inherited=view.blocks,
+    )
+
+
+def _allowed(view: View, candidate: Candidate) -> bool:
+    """Whether the coefficients that may not be negative are not."""
+    model, first = view.model, 10 * view.model.bodies
+    x = view.settled.x + view.design.change[: model.size]
+    own = [k for k, c in enumerate(model.coefficients) if (c.effect, c.joint) == candidate.key]
+    if any(model.coefficients[k].positive and x[first + k] <= 0.0 for k in own):
+        return False
+    starts = [
+        (v, at)
+        for v, at in zip(model.shape_values[model.last_shapes], model.shapes[model.last_shapes])
+        if v.shape.start is not None
+    ]
+    return not starts or any(at != v.shape.start for v, at in starts)
+
+
+def weighed(view: View) -> View:
+    """The view with every joint weighted by what the model now leaves it."""
+    return looked_at(
+        view.experiment,
+        view.model,
+        view.motion,
+        view.rough,
+        view.prior,
+        stride=view.stride,
+        weights=inverse(view.rms()),
+        grid=False,
+        inherited=view.blocks,
+    )
+
+
+def _own(view: View):
+    own = view.model.last_shapes
+    return view.model.shape_values[own], view.model.shapes[own]

@@ -1,0 +1,98 @@
+"""Effects that joined the model one after another, and how they are chosen again with the
+others."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..model import ROBOT
+from .candidates import Candidate
+from .evidence import groups_at
+from .refits import joined, losses, weighed
+from .ties import Choice, chosen
+from .view import View
+
+
+@dataclass(frozen=True)
+class Step:
+    """An effect that joined: the choice, its family-wise p-value, the view before and after, and
+    the share (dof,) of each joint's loss that it took."""
+
+    choice: Choice
+    p: float
+    before: View
+    after: View
+    shares: np.ndarray
+
+    @property
+    def candidate(self) -> Candidate:
+        """The head's."""
+        return self.choice.head.candidate
+
+    @property
+    def changed(self) -> set[int]:
+        """Its joint, the robot as a whole, and the joints whose residual it changed by more than a
+        hundredth."""
+        return {ROBOT, self.candidate.joint, *np.flatnonzero(np.abs(self.shares) > 0.01)}
+
+
+def step_of(view: View, p: float, found: Choice, worth: float) -> Step | None:
+    """The step that a choice makes, None where it takes too little to be worth having."""
+    shares = _shares(view, found.head.losses)
+    joints = found.head.candidate.touches(view.model.robot.dof)
+    if shares[joints].max() < worth or found.gain.sum() <= 0.0:
+        return None
+    return Step(found, p, view, weighed(found.head.view), shares)
+
+
+def _shares(view: View, after: np.ndarray) -> np.ndarray:
+    base = losses(view, view.blocks).sum(0)
+    whole = np.maximum(base + np.sum(view.design.rough_residual**2, axis=0), 1e-300)
+    return (base - after.sum(0)) / whole
+
+
+def revised(first: View, steps: list[Step], worth: float) -> list[Step]:
+    """Steps, each chosen again among what it was tied with, now that all the others are in the
+    model: what still acted on the motion when it was chosen may have spoken for another. One that
+    the others leave nothing to do goes.
+
+    Args:
+        first: the view before all steps.
+    """
+    for _ in range(2 * len(steps)):  # two that speak for each other could take turns for ever
+        steps, changed = _revised_once(first, steps, worth)
+        if not changed:
+            break
+    return steps
+
+
+def _revised_once(first: View, steps: list[Step], worth: float) -> tuple[list[Step], bool]:
+    """Steps up to the first that is another one now, or goes; and whether there was one."""
+    for number, step in enumerate(steps[:-1]):
+        if len(step.choice.members) < 2:
+            continue
+        before, later = steps[:number], steps[number + 1 :]
+        others = _rejoined(first, [*before, *later])
+        without = others[-1].after
+        groups = groups_at(without, [(m.candidate, m.asked) for m, _ in step.choice.members])
+        found = chosen(without, groups, np.random.default_rng(1))
+        again = None if found is None else step_of(without, step.p, found, worth)
+        if again is None:
+            return others, True
+        if again.candidate.key != step.candidate.key:
+            return _rejoined(first, [*before, again, *later]), True
+        steps = [*before, replace(step, choice=found), *later]
+    return steps, False
+
+
+def _rejoined(first: View, steps: list[Step]) -> list[Step]:
+    """The heads of steps, joined one after another anew."""
+    out: list[Step] = []
+    for step in steps:
+        view = out[-1].after if out else first
+        after = joined(view, step.candidate, step.choice.head.shapes)
+        shares = _shares(view, losses(after, view.blocks))
+        out.append(Step(step.choice, step.p, view, weighed(after), shares))
+    return out
