@@ -42,6 +42,11 @@ class Candidate:
         """Whether it has no columns of its own, only slopes."""
         return isinstance(self.effect, (MotionEffect, SensorEffect))
 
+    @property
+    def blows(self) -> bool:
+        """Whether what it does comes in blows, a few of which may outweigh all others."""
+        return isinstance(self.effect, Deflection) and self.effect.blows
+
     def touches(self, dof: int) -> list[int]:
         """The joints whose torque it changes."""
         everywhere = self.joint == ROBOT or isinstance(self.effect, (MotionEffect, WrenchEffect))
