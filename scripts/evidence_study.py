@@ -133,7 +133,8 @@ def drawn(seed: int, number: int, effects: tuple[str, ...]) -> dict:
     if effect == "control":
         case = benchmark._control(seed, robot, number, "s")
     else:
-        case = benchmark._single(seed, robot, effect, place, "s")
+        # a stiff joint's elasticity never matters by a tenth: of the sizes the larger half
+        case = benchmark._single(seed, robot, effect, 2 * place + 1 if effect == "elasticity" else place, "s")
     return {"robot": robot, "seed": case.seed, "colour": case.colour, "encoder": case.encoder, "pace": case.pace, "hidden": list(case.hidden)}
 
 

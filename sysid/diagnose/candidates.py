@@ -153,9 +153,8 @@ def _changes(source, candidate: Candidate, shapes: list[dict[str, float]]) -> li
     if not shapes:
         return []
     leading = next(s.name for s in candidate.effect.shapes() if s.start is not None)
-    found = row.secants(
-        source.model, source.motion, source.x, candidate.effect, candidate.joint, shapes, source.stride, source.use
-    )  # fmt: skip
+    known = source.bent(candidate.joint)
+    found = row.secants(source.model, source.motion, known, candidate.effect, shapes, source.stride, source.use)
     return [change[:, :, None] / own[leading] for change, own in zip(found, shapes)]
 
 
