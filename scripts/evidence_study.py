@@ -1,7 +1,8 @@
-"""Does the evidence keep its word? Two studies of the diagnosis on simulated logs.
+"""Does the evidence keep its word? Three studies of the diagnosis on simulated logs.
 
     python scripts/evidence_study.py size --logs 400 --seed 31 --jobs 2     # nothing hidden: how often is anything accused?
     python scripts/evidence_study.py power --logs 200 --seed 31 --jobs 2    # effects of the detectable size: how many are named?
+    python scripts/evidence_study.py soft --logs 80 --seed 31 --jobs 2      # elasticity and play: how many are named where they matter?
 
 size: robots with nothing hidden, noise white or coloured, encoders fine or coarse. The search runs at a family-wise level of
 5 %; what it accuses is an error of the first kind, worth having or not (`--worth 0`, the default), so the share must be
@@ -10,7 +11,11 @@ about 5 %.
 power: of such a robot's log the smallest detectable sizes are taken; an effect is hidden at that size on a second robot of the
 same seed, and the search of its log is asked at the diagnosis's own level.
 
-Both resume: finished logs stand in a journal in --out, named after the seed and the state of the package's source.
+soft: elasticity and backlash in turn, of the benchmark's sizes. Counted are the logs whose fit, on the test log, has an error a
+tenth lower on some joint where the same robot is simulated without the effect: there it is to be named, alone or in a set of
+two. `others`: the same robots with a delay, a current's lag, or nothing, in which neither may be named.
+
+All resume: finished logs stand in a journal in --out, named after the seed and the state of the package's source.
 """
 
 from __future__ import annotations
@@ -33,6 +38,7 @@ os.environ["PYTHONPATH"] = os.pathsep.join([str(ROOT), *filter(None, [os.environ
 
 import numpy as np  # noqa: E402
 
+from scripts import blind_benchmark as benchmark  # noqa: E402
 from scripts.blind_benchmark import JOINTS, RATE, SECONDS, experiment_of  # noqa: E402
 from sysid import pipeline, results, terminal  # noqa: E402
 from sysid.studies.journal import Journal, run  # noqa: E402
@@ -117,6 +123,62 @@ def power(case: dict, level: float, worth: float) -> dict:
     return {**case, "hidden": None}
 
 
+SOFT, OTHERS = ("elasticity", "backlash"), ("control", "delay", "control", "control", "current_lag", "control")
+ARMS = ("planar", "leg", "planar", "leg", "planar", "leg", "ur5")
+_MATTERS = 0.9  # times the error with it
+
+
+def drawn(seed: int, number: int, effects: tuple[str, ...]) -> dict:
+    """A case of the benchmark's: effects in turn, on robots in turn."""
+    effect, place = effects[number % len(effects)], number // len(effects)
+    robot = ARMS[(place + number) % len(ARMS)]
+    if effect == "control":
+        case = benchmark._control(seed, robot, number, "s")
+    else:
+        # a stiff joint's elasticity never matters by a tenth: of the sizes the larger half
+        case = benchmark._single(seed, robot, effect, 2 * place + 1 if effect == "elasticity" else place, "s")
+    return {"robot": robot, "seed": case.seed, "colour": case.colour, "encoder": case.encoder, "pace": case.pace, "hidden": list(case.hidden)}
+
+
+def soft(case: dict, level: float, worth: float) -> dict:
+    """What the diagnosis claims of a log, where what is hidden matters; without anything hidden, or with something else, always."""
+    from sysid.diagnose.diagnosis import diagnose
+    from sysid.simulate import motion, write
+
+    def fitted(simulation, name: str):
+        write(simulation, experiment, folder / name)
+        return pipeline.fit(pipeline.load(folder / name))
+
+    with warnings.catch_warnings(), tempfile.TemporaryDirectory() as where:
+        warnings.simplefilter("ignore")
+        folder = Path(where)
+        experiment, machine = experiment_of(case["robot"], folder)
+        options = {"seed": case["seed"], "duration": SECONDS[case["robot"]], "rate": RATE[case["robot"]], "colour": case["colour"], "encoder": case["encoder"]}
+        options["speed"] = None if case["pace"] is None else case["pace"] * float(motion.top_speeds(machine).max())
+        simulation, softer = benchmark._simulate(machine, case["hidden"], options)
+        fit = fitted(simulation, "case")
+        case = {**case, "softer": softer, "error": fit.rms("test")}
+        (hidden,) = case["hidden"] or [None]
+        asked = hidden is None or hidden["effect"] not in SOFT
+        if not asked:
+            case["plain"] = fitted(benchmark._simulate(machine, [], options)[0], "plain").rms("test")
+            case["matters"] = any(case["plain"][joint] <= _MATTERS * error for joint, error in case["error"].items())
+        if asked or case["matters"]:
+            found = diagnose(fit.experiment, fit=fit)
+            case["sets"] = [[[effect, joint, chance] for effect, joint, chance in claim.set] for claim in found.claims]
+            case["heads"] = [[claim.head.effect, claim.head.joint] for claim in found.claims]
+            case["refused"] = [[r.effect, r.joint, r.why] for r in found.refused]
+            case["after"] = found.claims[-1].after.rms("test") if found.claims else case["error"]
+            case["soft"] = any(effect in SOFT for effect, _ in case["heads"])
+            if hidden is not None:
+                wanted = (hidden["effect"], hidden["joint"])
+                own = [s for s in case["sets"] if wanted in [(effect, joint) for effect, joint, _ in s]]
+                case["head"] = list(wanted) in case["heads"]
+                case["named"] = any(len(s) <= 2 for s in own)
+                case["in_set"] = bool(own)
+    return case
+
+
 def told(kind: str, records: list[dict]) -> dict:
     """The shares with their intervals (Wilson 1927)."""
     from scipy.stats import binomtest
@@ -127,6 +189,18 @@ def told(kind: str, records: list[dict]) -> dict:
         low, high = binomtest(count, of).proportion_ci(method="wilson")
         return {"count": count, "of": of, "share": count / of, "low": float(low), "high": float(high)}
 
+    if kind == "soft":
+        out = {"logs": len(records)}
+        for effect in SOFT:
+            own = [r for r in records if r.get("matters") and r["hidden"][0]["effect"] == effect]
+            out[effect] = {key: share(sum(r[key] for r in own), len(own)) for key in ("named", "head", "in_set")}
+            claims = [tuple(head) for r in own for head in r["heads"]]
+            right = sum(list((r["hidden"][0]["effect"], r["hidden"][0]["joint"])) in r["heads"] for r in own)
+            out[effect]["other_claims"] = share(len(claims) - right, len(claims))
+        return out
+    if kind == "others":
+        groups = {"control": [r for r in records if not r["hidden"]], "delay and current_lag": [r for r in records if r["hidden"]]}
+        return {name: {"called_soft": share(sum(r["soft"] for r in own), len(own))} for name, own in groups.items()}
     if kind == "size":
         by = {name: [r for r in records if r["robot"] == name] for name in dict.fromkeys(ROBOTS)}
         return {"accused": share(sum(bool(r["accused"]) for r in records), len(records))} | {
@@ -139,7 +213,7 @@ def told(kind: str, records: list[dict]) -> dict:
 def main() -> None:
     """Run what the journal lacks and print the shares."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("study", choices=["size", "power"])
+    parser.add_argument("study", choices=["size", "power", "soft", "others"])
     parser.add_argument("--logs", type=int, default=400)
     parser.add_argument("--seed", type=int, default=1, help="base seed; 1 was used while developing")
     parser.add_argument("--jobs", type=int, default=1)
@@ -155,9 +229,10 @@ def main() -> None:
     out = results.folder(options.out)
     settings = {"study": options.study, "seed": options.seed, "level": level, "worth": worth, "source": digest}
     journal = Journal(out / f"{options.study}-{options.seed}-{level:g}-{worth:g}-{digest}.jsonl", settings)
-    tasks = [(str(k), (conditions(options.seed, k), level, worth)) for k in range(options.logs)]
+    draw = {"soft": lambda s, k: drawn(s, k, SOFT), "others": lambda s, k: drawn(s, k, OTHERS)}.get(options.study, conditions)
+    tasks = [(str(k), (draw(options.seed, k), level, worth)) for k in range(options.logs)]
     with terminal.progress_bar() as progress:
-        done = run(journal, tasks, {"size": size, "power": power}[options.study], jobs=options.jobs, progress=lambda s: progress(options.study, s))
+        done = run(journal, tasks, {"size": size, "power": power, "soft": soft, "others": soft}[options.study], jobs=options.jobs, progress=lambda s: progress(options.study, s))
     found = told(options.study, list(done.values()))
     results.write_json(out / f"{options.study}.json", {"settings": settings, **found, "records": list(done.values())})
     print(json.dumps(found, indent=1))

@@ -12,7 +12,7 @@ import numpy as np
 
 from . import regressor
 from .model import Model, chunks
-from .preprocess import Motion
+from .preprocess import Motion, Piece
 from .two_masses import link_side
 
 _STRETCH = 16384  # samples whose columns are computed at once
@@ -128,18 +128,23 @@ def seen(model: Model, motion: Motion) -> list:
 _NUDGES = (1e-4, 1e-3, 1e-1)  # rad, rad/s, rad/s²: torque bends little over them
 
 
-def secants(model: Model, motion: Motion, x, effect, joint: int, tried: list[dict], stride: int, use: np.ndarray) -> np.ndarray:
-    """What a link's standing apart from its motor would change of the predicted torque, (tried, dof, n), at several sets of
-    shape values: as torque's slopes in the link's angle, speed and acceleration have it, once for all sets.
+@dataclass(frozen=True)
+class Bent:
+    """What a link that stands apart from its motor changes, over a whole piece: slopes (3, dof, n) of the torque in its angle, speed
+    and acceleration behind the motor; load and inertia (n,) of the link; the piece as effects see it."""
 
-    Args:
-        effect: a Deflection that the model lacks, or that does nothing in it. x: (size,) parameters. use: (n, dof) bool.
-    """
+    slopes: np.ndarray
+    load: np.ndarray
+    inertia: np.ndarray
+    seen: Piece
+
+
+def bent(model: Model, motion: Motion, x, joint: int) -> list[Bent]:
+    """Of each piece, at parameters x (size,)."""
     pi = np.asarray(x)[: 10 * model.bodies].reshape(-1, 10)
     out = []
-    for piece, rows in zip(motion.pieces, starts(motion, stride)):
+    for piece in motion.pieces:
         part = model.seen(piece)
-        load, inertia = link_side(model.robot, pi, part, joint)
         still = np.zeros((3, *part.q.shape)) if part.deflection is None else part.deflection
         torque = lambda behind, part=part: regressor.torque(model.robot, pi, part.q, part.qd, part.qdd, gravity=part.gravity, deflection=behind)  # noqa: E731
         base, slopes = torque(still), []
@@ -147,9 +152,23 @@ def secants(model: Model, motion: Motion, x, effect, joint: int, tried: list[dic
             behind = still.copy()
             behind[order, :, joint] += nudge
             slopes.append((torque(behind) - base).T / nudge)
-        apart = [effect.apart(load, inertia, part, **shapes) for shapes in tried]
-        change = np.einsum("ojn,ton->jtn", slopes, apart)
-        read = [model.sensed(entry, piece.step, j) for j, entry in enumerate(change)]
+        out.append(Bent(np.stack(slopes), *link_side(model.robot, pi, part, joint), part))
+    return out
+
+
+def secants(model: Model, motion: Motion, known: list[Bent], effect, tried: list[dict], stride: int, use: np.ndarray) -> np.ndarray:
+    """What a link's standing apart from its motor would change of the predicted torque, (tried, dof, n), at several sets of
+    shape values: as torque's slopes have it.
+
+    Args:
+        known: `bent` of its joint. effect: a Deflection that the model lacks, or that does nothing in it. use: (n, dof) bool.
+    """
+    out = []
+    for piece, rows, one in zip(motion.pieces, starts(motion, stride), known):
+        apart = np.stack([effect.apart(one.load, one.inertia, one.seen, **shapes) for shapes in tried])
+        read = [
+            model.sensed(np.einsum("on,ton->tn", one.slopes[:, j], apart), piece.step, j) for j in range(model.robot.dof)
+        ]  # fmt: skip
         out.append(np.stack([entry[..., rows] if piece.smoother is None else piece.smoother.at(entry, rows) for entry in read], axis=1))
     return np.concatenate(out, axis=-1) * use.T
 

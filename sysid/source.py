@@ -31,6 +31,17 @@ class Source:
         return row.seen(self.model, self.motion)
 
     @cached_property
+    def _bent(self) -> dict:
+        return {}
+
+    def bent(self, joint: int) -> list:
+        """What a joint's link would change if it stood apart from its motor: the same for whatever
+        parts them."""
+        if joint not in self._bent:
+            self._bent[joint] = row.bent(self.model, self.motion, self.x, joint)
+        return self._bent[joint]
+
+    @cached_property
     def predicted(self) -> np.ndarray:
         """Torque (n, dof), low-passed as the columns are."""
         return row.predicted(self.model, self.motion, self.x, self.stride)

@@ -19,7 +19,7 @@ from .preprocess import Piece
 from .robot import Robot
 
 _FORGOTTEN = 4.0  # times of decay: two per cent are left
-_TURN = 0.25  # rad of the swing on the teeth in a step, at most
+_TURN = 0.5  # rad of the swing on the teeth in a step, at most
 
 
 def link_side(robot: Robot, pi, motion: Piece, joint: int) -> tuple[np.ndarray, np.ndarray]:

@@ -39,7 +39,7 @@ def stacked(p, own, joints=(0, 1), keep=None):
     return m, np.concatenate([*(p.weights[j] * p.tau[keep, j] for j in range(dof)), p.root @ p.target])
 
 
-def grouped(view, sets, joints=(0, 1)):
+def grouped(view, sets, joints=(0, 1), blows=False):
     """The groups of sets of columns (sets, joints, n, k)."""
-    candidate = SimpleNamespace(name="made", joint=-1 if len(joints) > 1 else joints[0])
+    candidate = SimpleNamespace(name="made", joint=-1 if len(joints) > 1 else joints[0], blows=blows)
     return _made(view, [(candidate, {"at": float(s)}) for s in range(len(sets))], list(joints), sets, sets)

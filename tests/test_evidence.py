@@ -242,3 +242,47 @@ def test_blocks_are_long_against_what_noise_remembers(planar, slow):
     del vars(view)["blocks"]
     length = np.ptp(view.rows.t) / (view.blocks.max() + 1)
     assert length == pytest.approx(max(0.5, 4.0 * 0.9 * slow), rel=0.4)
+
+
+# ---- blows
+
+
+def struck(seed: int, size: float, blows: bool = True):
+    """A group whose column is twenty times as large in one block of twenty as in the others, `size` of it in the torque."""
+    rng = np.random.default_rng(seed)
+    p = posed(rng)
+    own = rng.normal(size=(2, p.a.shape[1], 1)) * np.where(p.number == 7, 20.0, 1.0)[None, :, None]
+    p.tau += size * own[:, :, 0].T
+    (group,) = grouped(viewed(p), own[None], blows=blows)
+    return group
+
+
+def chance(group) -> float:
+    (statistic,) = null.statistics([group])
+    return float(np.mean(null.maxima([group], np.random.default_rng(0), draws=400) >= statistic))
+
+
+def test_one_blow_does_not_outweigh_all_others():
+    """No block holds more than a tenth in what is tested, all together are one again, and what it takes is what it was."""
+    group, plain = struck(0, 0.3), struck(0, 0.3, blows=False)
+    assert not plain.testable and np.isnan(null.statistics([plain])[0]) and plain.tested is plain
+    told = group.tested
+    share = np.einsum("bkk->b", told.squares)
+    assert told.testable and share.sum() == pytest.approx(1.0) and share.max() <= 0.1 + 1e-9
+    assert told.coefficients == pytest.approx(group.coefficients, abs=0.1) and group.coefficients == pytest.approx(0.3, abs=0.05)
+    assert evidence.gain(group).sum() == pytest.approx(evidence.gain(plain).sum())
+
+
+def test_blows_that_are_even_are_left_as_they_are():
+    rng = np.random.default_rng(1)
+    p = posed(rng)
+    own = rng.normal(size=(2, p.a.shape[1], 2))
+    (group,) = grouped(viewed(p), own[None], blows=True)
+    assert group.testable and group.tested is group
+
+
+def test_blows_told_evenly_keep_the_level():
+    """Of noise alone one in twenty stands out at 5 %; of a column that is there all do."""
+    p = np.array([chance(struck(seed, 0.0)) for seed in range(200)])
+    assert 0.01 <= np.mean(p < 0.05) <= 0.10 and 0.38 < np.mean(p < 0.5) < 0.62
+    assert all(chance(struck(seed, 0.3)) < 0.01 for seed in range(10))

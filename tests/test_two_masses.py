@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from sysid import config, regressor, robot, two_masses
+from sysid import config, pipeline, regressor, robot, two_masses
+from sysid.addition import grown
 from sysid.lowpass import Gaussian
 from sysid.preprocess import Smoother
 from sysid.simulate import hidden, simulate
@@ -113,6 +114,21 @@ def test_the_simulator_s_link_is_where_it_is_said_to_be(arm, what):
     acceleration = lambda d: smooth(np.diff(d, 2) / step**2)[1500:-100]  # noqa: E731
     error = lambda guess: np.std(acceleration(guess - apart)) / np.std(acceleration(apart))  # noqa: E731
     assert error(found) < most and error(still) > 1.0
+
+
+@pytest.mark.parametrize("effect, hide, word, truly, most", [
+    ("elasticity", "elasticity:elbow:K=250,D=0.8", "compliance", 1 / 250, 1.15), ("backlash", "backlash:elbow:b=0.004", "b", 0.004, 1.5),
+])  # fmt: skip
+def test_a_fit_finds_it_from_nothing(simulated, effect, hide, word, truly, most):
+    """The law begins where it does nothing, across a resonance or far from the blows. The error falls to about that of the same robot
+    without it: of blows, which come a little early or late, less than of a spring."""
+    folder = simulated(f"soft-{effect}", hide, seed=2)
+    plain = pipeline.fit(pipeline.load(folder))
+    found = pipeline.fit(grown(pipeline.load(folder), effect, ["elbow"], {}))
+    at = dict(zip((v.name for v in found.model.shape_values), found.model.shapes))
+    assert at[f"{effect}.elbow.{word}"] == pytest.approx(truly, rel=0.05)
+    error, without = found.rms("test")["elbow"], pipeline.fit(pipeline.load(simulated("soft-nothing", seed=2))).rms("test")["elbow"]
+    assert without < 0.8 * plain.rms("test")["elbow"] and error < most * without
 
 
 def test_rotors_are_no_load_of_their_own_gear():

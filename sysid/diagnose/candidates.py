@@ -44,6 +44,11 @@ class Candidate:
         """Whether it has no columns of its own, only slopes."""
         return isinstance(self.effect, (MotionEffect, SensorEffect))
 
+    @property
+    def blows(self) -> bool:
+        """Whether what it does comes in blows, a few of which may outweigh all others."""
+        return isinstance(self.effect, Deflection) and self.effect.blows
+
     def touches(self, dof: int) -> list[int]:
         """The joints whose torque it changes."""
         everywhere = self.joint == ROBOT or isinstance(self.effect, (MotionEffect, WrenchEffect))
@@ -165,9 +170,8 @@ def _changes(source, candidate: Candidate, shapes: list[dict[str, float]]) -> li
     if not shapes:
         return []
     leading = next(s.name for s in candidate.effect.shapes() if s.start is not None)
-    found = row.secants(
-        source.model, source.motion, source.x, candidate.effect, candidate.joint, shapes, source.stride, source.use
-    )  # fmt: skip
+    known = source.bent(candidate.joint)
+    found = row.secants(source.model, source.motion, known, candidate.effect, shapes, source.stride, source.use)
     return [change[:, :, None] / own[leading] for change, own in zip(found, shapes)]
 
 

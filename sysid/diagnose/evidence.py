@@ -83,10 +83,12 @@ class Group:
         Weights that look at columns alone leave scores of noise as they are, without a sign; blows are as good as orthogonal
         to the model, in each block. What it takes, and its coefficients, are the group's own.
         """
-        if not getattr(self.candidate.effect, "blows", False):
+        if not self.candidate.blows:
             return self
         share = np.einsum("bkk->b", self.squares)
         weight = np.minimum(1.0, _most(share) / np.maximum(share, 1e-300))
+        if weight.min() == 1.0:
+            return self
         squares = self.squares * weight[:, None, None]
         values, vectors = np.linalg.eigh(squares.sum(0))
         turn = vectors / np.sqrt(np.maximum(values, 1e-300))
