@@ -318,8 +318,8 @@ def _limited(seconds: int):
 
 
 def _one(case: Case, folder: Path, found: dict, stage: list[str]) -> None:
-    from sysid.diagnose.document import document
     from sysid.simulate import motion, write
+    from sysid.statement.document import document
 
     def timed(name: str, work: Callable):
         stage[0] = name

@@ -22,7 +22,7 @@ sys.path.insert(0, str(ROOT))
 
 from sysid import pipeline, results  # noqa: E402
 from sysid.diagnose.diagnosis import diagnose  # noqa: E402
-from sysid.diagnose.document import document  # noqa: E402
+from sysid.statement.document import document  # noqa: E402
 
 #: name, experiment (a config, or a folder of the data), what its source and others know of it
 ROBOTS = (

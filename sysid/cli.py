@@ -159,7 +159,7 @@ def _diagnosed(spec, out: Path | None, silent: bool) -> tuple:
     """The diagnosis of an experiment, its document and its run folder, where both it and its fit were written."""
     from . import results
     from .diagnose.diagnosis import diagnose as work
-    from .diagnose.document import document
+    from .statement.document import document
 
     run = results.folder(out or Path("runs") / spec.name)
     with _progress(silent) as progress:
@@ -172,7 +172,8 @@ def _diagnosed(spec, out: Path | None, silent: bool) -> tuple:
 
 def _changed(spec, model: Path, logs: list[str], as_json: bool, out: Path | None, quiet: bool) -> None:
     from . import results
-    from .diagnose.changed import changed, document
+    from .changes import changed
+    from .statement.changes import document
 
     run = results.folder(out or Path("runs") / f"{spec.name}-changed")
     said = document(changed(spec, model, logs), run)

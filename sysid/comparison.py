@@ -9,12 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .blocks import jackknife, summed
+from .blocks import jackknife, numbered, summed
 from .errors import SysidError
 from .estimate import Fit, Prediction
 from .results import number
-
-_BLOCKS, _SHORTEST = 40, 0.5  # blocks over the held-out data; s
 
 
 @dataclass(frozen=True)
@@ -75,31 +73,22 @@ def _sums(first: Fit, second: Fit, names: tuple[str, str]):
     joints = [joint for joint in first.joints if joint in second.joints]
     if not joints:
         raise SysidError(f"{names[0]} and {names[1]} share no joint", where="compare")
-    blocks = _block_width(first.predictions["test"], second.predictions["test"])
-    span = tuple(end(np.concatenate([fit.predictions["test"].t for fit in (first, second)])) for end in (np.min, np.max))
-    sums = [_block_sums(fit.predictions["test"], blocks, [fit.joints.index(j) for j in joints], span) for fit in (first, second)]
-    return sums, joints
+    return _block_sums([fit.predictions["test"] for fit in (first, second)], [[fit.joints.index(j) for j in joints] for fit in (first, second)]), joints
 
 
-def _block_width(first: Prediction, second: Prediction) -> float:
-    duration = min(sum(np.ptp(p.t[p.log == log]) for log in np.unique(p.log)) for p in (first, second))
-    return max(duration / _BLOCKS, _SHORTEST)
+def _block_sums(predictions: list[Prediction], columns) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Of each prediction, sums of squares and counts (blocks, joints) over the same blocks of each log's own clock.
 
-
-def _block_sums(prediction: Prediction, width: float, columns, span: tuple[float, float]):
-    """Sums of squares and counts (blocks, joints) over blocks of `width` seconds of each log's own clock.
-
-    Args:
-        span: first and last time [s] of all predictions that are compared: a filter that leaves out more at the ends of a
-            log must not shift the blocks.
+    Blocks are of all rows together: a filter that leaves out more at the ends of a log must not shift them.
     """
-    lowest, highest = (int(np.floor(t / width)) for t in span)
-    count = highest - lowest + 1
-    index = prediction.log.astype(np.int64) * count + np.floor(prediction.t / width).astype(np.int64) - lowest
-    size = (int(prediction.log.max()) + 1) * count
-    residual = prediction.residual[:, columns]
-    use = np.ones_like(residual) if prediction.use is None else prediction.use[:, columns].astype(float)
-    return summed(index, residual**2, size), summed(index, use, size)
+    t, log = (np.concatenate([getattr(p, name) for p in predictions]) for name in ("t", "log"))
+    number = numbered(t, log, fewest=1)
+    size, out = int(number.max()) + 1, []
+    for prediction, index, own in zip(predictions, np.split(number, [len(predictions[0].t)]), columns):
+        residual = prediction.residual[:, own]
+        use = np.ones_like(residual) if prediction.use is None else prediction.use[:, own].astype(float)
+        out.append((summed(index, residual**2, size), summed(index, use, size)))
+    return out
 
 
 def _jackknife(first, second) -> tuple[float, float]:

@@ -11,12 +11,12 @@ from functools import cached_property
 
 import numpy as np
 
-from .model import Model, chunks
+from .blocks import divided
+from .model import Model
 from .preprocess import Motion
 from .rows import difference_step
 
-# Blocks are the unit of correlation-robust statistics: long against the filter's memory, many enough to count.
-_MOST_BLOCKS, _FEWEST_SAMPLES = 60, 200
+_SHORTEST_BLOCK = 200  # samples: with fewer rows than columns a triangle would be no smaller than they are
 _FILTERED_STRETCH = 16384  # samples
 
 
@@ -175,9 +175,10 @@ def merge(parts: Sequence[Compressed]) -> Compressed:
     return Compressed(parts[0].size, parts[0].joints, tuple(factors), sum(part.samples for part in parts))
 
 
-def block_length(motion: Motion) -> int:
-    """Samples in a block: at least 200, at most 60 blocks over the motion."""
-    return max(_FEWEST_SAMPLES, -(-motion.samples // _MOST_BLOCKS))
+def _edges(motion: Motion) -> list[np.ndarray]:
+    """Of each piece, the rows at which its blocks begin, and its end."""
+    counts = divided([piece.samples for piece in motion.pieces], shortest=_SHORTEST_BLOCK, fewest=1)
+    return [piece.core.start + np.arange(n + 1) * piece.samples // n for piece, n in zip(motion.pieces, counts)]
 
 
 def compress(model: Model | Linearised, motion: Motion, *, thin: int = 1, progress: Callable[[float], None] | None = None) -> Compressed:
@@ -189,25 +190,26 @@ def compress(model: Model | Linearised, motion: Motion, *, thin: int = 1, progre
     """
     size = model.size
     supports = [model.support(joint) for joint in range(model.robot.dof)]
-    factors, block, done, length = [], 0, 0, block_length(motion)
-    for piece in motion.pieces:
+    factors, block, done = [], 0, 0
+    for piece, edges in zip(motion.pieces, _edges(motion)):
         # a filter needs margins on each stretch, so a filtered stretch holds many blocks
         filtered = piece.smoother is not None
-        stretch = length * max(1, _FILTERED_STRETCH // length) if filtered else length
+        many = max(1, _FILTERED_STRETCH * (len(edges) - 1) // max(piece.samples, 1)) if filtered else 1
         remembered = model.remembered(piece)
-        for rows in chunks(piece, stretch):
+        for first in range(0, len(edges) - 1, many):
+            within = edges[first : first + many + 1].tolist()
             # rows that are not wanted need no columns, unless a filter runs over them
-            columns = model.columns(piece, rows if filtered else slice(rows.start, rows.stop, thin), remembered)
-            for start in range(rows.start, rows.stop, length):
-                own = slice(start, min(start + length, rows.stop), thin)
-                part = slice(start - rows.start, own.stop - rows.start, thin) if filtered else slice(None)
+            columns = model.columns(piece, slice(within[0], within[-1], 1 if filtered else thin), remembered)
+            for start, stop in zip(within, within[1:]):
+                own = slice(start, stop, thin)
+                part = slice(start - within[0], stop - within[0], thin) if filtered else slice(None)
                 for joint, (values, support) in enumerate(zip(columns, supports)):
                     stacked = np.concatenate([values[:, part], piece.tau[None, own, joint]])
                     if piece.use is not None:
                         stacked = stacked[:, piece.use[own, joint]]
                     factors.append(Factor(joint, block, support, triangle(stacked.T), stacked.shape[1]))
                 block += 1
-            done += rows.stop - rows.start
+            done += within[-1] - within[0]
             if progress:
                 progress(done / motion.samples)
     return Compressed(size, model.robot.dof, tuple(factors), motion.samples)

@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from . import interior
+from .blocks import standard_error
 from .compress import Compressed, compress
 from .config import Experiment, PreprocessSpec
 from .errors import SysidError, SysidWarning
@@ -88,7 +89,7 @@ def _best(tried: list[dict], key: str, usual: float) -> float:
     tied = []
     for entry in tried:
         difference = np.array(entry["folds"]) - np.array(least["folds"]) if len(entry["folds"]) == len(least["folds"]) else np.array([np.inf])
-        error = difference.std(ddof=1) / np.sqrt(len(difference)) if len(difference) > 1 else 0.0
+        error = standard_error(difference) / len(difference) if len(difference) > 1 else 0.0
         if difference.mean() <= error:
             tied.append(entry[key])
     return min(tied, key=lambda value: abs(np.log(value / usual)))

@@ -225,7 +225,7 @@ def discover(experiment: Experiment, run: Path, *, most: int = 10, progress=None
         found = diagnose(fits[-1].experiment, fit=fits[-1], progress=progress)
         refused |= {(r.effect, r.joint): r for r in found.refused}
     results.write(fits[-1], run)
-    from .diagnose.document import document
+    from .statement.document import document
 
     said = document(found, run)
     results.write_json(run / "diagnosis.json", said)

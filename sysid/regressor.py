@@ -42,6 +42,39 @@ def body_motions(robot: Robot, q, qd, qdd, *, gravity=None, deflection=None) -> 
         gravity: (3,) [m/s^2] in the base frame, where it is not the robot's own.
         deflection: (3, n, dof) or None: how far q, qd and qdd of each joint's link stand behind those of its motor.
     """
+    frames = _frames(robot, q, qd, qdd, gravity=gravity, deflection=deflection)
+    zero = np.zeros((3, frames[0].angular.shape[1]))
+    jacobians: list[dict] = []
+    for i, (parent, frame) in enumerate(zip(robot.parents, frames)):
+        linear, angular = robot.subspaces[i, :3, None], robot.subspaces[i, 3:, None]
+        turn, p = frame.turn, frame.origin
+        carried = {
+            j: (turn(jl + _cross(ja, p)), turn(ja)) for j, (jl, ja) in (jacobians[parent] if parent >= 0 else {}).items()
+        }
+        for j in np.flatnonzero(robot.transmission[i]):
+            gain = robot.transmission[i, j]
+            jl, ja = carried.get(j, (0.0, 0.0))
+            carried[j] = (jl + gain * linear + zero, ja + gain * angular + zero)
+        jacobians.append(carried)
+    return [
+        BodyMotion(frames[b.row].angular, frames[b.row].angular_acceleration, frames[b.row].acceleration, jacobians[b.row])
+        for b in robot.bodies
+    ]
+
+
+@dataclass(frozen=True)
+class _Frame:
+    """Motion of a frame of the tree, (3, n) in its own axes; `turn` takes vectors from its parent's axes to its own, `origin`
+    (3, 1 or n) is where it stands in these."""
+
+    angular: np.ndarray
+    angular_acceleration: np.ndarray
+    acceleration: np.ndarray
+    turn: "_Turn"
+    origin: np.ndarray
+
+
+def _frames(robot: Robot, q, qd, qdd, *, gravity, deflection) -> list[_Frame]:
     q, qd, qdd = (np.ascontiguousarray(np.asarray(x, dtype=float).T) for x in (q, qd, qdd))
     n = q.shape[1]
     full_q, full_qd, full_qdd = (robot.transmission @ x for x in (q, qd, qdd))
@@ -51,10 +84,10 @@ def body_motions(robot: Robot, q, qd, qdd, *, gravity=None, deflection=None) -> 
             full[links] -= behind.T
     zero = np.zeros((3, n))
     # the base accelerates upward at -g: gravity enters every body at no cost
-    base = (zero, zero, np.repeat(-np.asarray(robot.gravity if gravity is None else gravity)[:, None], n, 1), {})
-    rows: list[tuple] = []
+    base = (zero, zero, np.repeat(-np.asarray(robot.gravity if gravity is None else gravity)[:, None], n, 1))
+    out: list[_Frame] = []
     for i, parent in enumerate(robot.parents):
-        w, alpha, a, jacobian = rows[parent] if parent >= 0 else base
+        w, alpha, a = (out[parent].angular, out[parent].angular_acceleration, out[parent].acceleration) if parent >= 0 else base
         linear, angular = robot.subspaces[i, :3, None], robot.subspaces[i, 3:, None]
         speed, push = full_qd[i], full_qdd[i]
         revolute = bool(np.any(angular))
@@ -62,13 +95,6 @@ def body_motions(robot: Robot, q, qd, qdd, *, gravity=None, deflection=None) -> 
         # origin of the child's frame in the parent's axes; a prismatic joint moves it along its axis
         p = robot.translations[i][:, None] + (0.0 if revolute else robot.rotations[i] @ (linear * full_q[i]))
         turn = _Turn(to_child)
-        carried = {
-            j: (turn(jl + _cross(ja, p)), turn(ja)) for j, (jl, ja) in jacobian.items()
-        }
-        for j in np.flatnonzero(robot.transmission[i]):
-            gain = robot.transmission[i, j]
-            jl, ja = carried.get(j, (0.0, 0.0))
-            carried[j] = (jl + gain * linear + zero, ja + gain * angular + zero)
         new_w, new_alpha = turn(w), turn(alpha)
         # classical acceleration of the child's origin
         new_a = turn(a + _cross(alpha, p) + _cross(w, _cross(w, p)))
@@ -77,12 +103,12 @@ def body_motions(robot: Robot, q, qd, qdd, *, gravity=None, deflection=None) -> 
             new_w = new_w + angular * speed
         else:
             new_a = new_a + linear * push + 2.0 * _cross(new_w, linear * speed)
-        rows.append((new_w, new_alpha, new_a, carried))
-    return [BodyMotion(*rows[body.row]) for body in robot.bodies]
+        out.append(_Frame(new_w, new_alpha, new_a, turn, p))
+    return out
 
 
 class _Turn:
-    """Turn vectors (3, n) by one matrix (3, 3) or by a matrix for each sample (3, 3, n)."""
+    """Turn vectors (3, n) by one matrix (3, 3) or by a matrix for each sample (3, 3, n); `back` by its inverse."""
 
     def __init__(self, matrix):
         self.matrix = matrix
@@ -91,8 +117,16 @@ class _Turn:
         m = self.matrix
         if m.ndim == 2:
             return m @ vector
-        x, y, z = vector
-        return np.stack([m[r, 0] * x + m[r, 1] * y + m[r, 2] * z for r in range(3)])
+        out = np.empty((3, m.shape[2]))
+        for r in range(3):
+            np.multiply(m[r, 0], vector[0], out=out[r])
+            out[r] += m[r, 1] * vector[1]
+            out[r] += m[r, 2] * vector[2]
+        return out
+
+    def back(self, vector):
+        """From the child's axes to the parent's."""
+        return _Turn(np.swapaxes(self.matrix, 0, 1))(vector)
 
 
 def _rotation_to_child(placement, subspace, angle) -> np.ndarray:
@@ -109,7 +143,11 @@ def _rotation_to_child(placement, subspace, angle) -> np.ndarray:
 
 
 def _cross(a, b) -> np.ndarray:
-    return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+    out = np.empty((3, *np.broadcast_shapes(np.shape(a)[1:], np.shape(b)[1:])))
+    for k, (i, j) in enumerate(((1, 2), (2, 0), (0, 1))):
+        np.multiply(a[i], b[j], out=out[k])
+        out[k] -= a[j] * b[i]
+    return out
 
 
 def wrench_columns(motion: BodyMotion, linear, angular, out) -> None:
@@ -157,15 +195,28 @@ def torque(robot: Robot, pi, q, qd, qdd, *, gravity=None, deflection=None) -> np
     for start in range(0, len(q), _CHUNK):
         part = slice(start, start + _CHUNK)
         behind = None if deflection is None else deflection[:, part]
-        motions = body_motions(robot, q[part], qd[part], qdd[part], gravity=gravity, deflection=behind)
-        for parameters, motion in zip(np.asarray(pi), motions):
-            force, moment = _wrench(parameters, motion)
-            for j, (linear, angular) in motion.jacobian.items():
-                out[part, j] += np.einsum("in,in->n", linear, force) + np.einsum("in,in->n", angular, moment)
+        frames = _frames(robot, q[part], qd[part], qdd[part], gravity=gravity, deflection=behind)
+        wrenches: dict[int, list] = {}  # force and moment about the origin of each frame, all that hangs on it included
+        for parameters, body in zip(np.asarray(pi), robot.bodies):
+            force, moment = _wrench(parameters, frames[body.row])
+            held = wrenches.setdefault(body.row, [0.0, 0.0])
+            held[0], held[1] = held[0] + force, held[1] + moment
+        for i in reversed(range(len(frames))):  # children before their parents
+            if i not in wrenches:
+                continue
+            force, moment = wrenches[i]
+            linear, angular = robot.subspaces[i, :3], robot.subspaces[i, 3:]
+            along = linear @ force + angular @ moment
+            for j in np.flatnonzero(robot.transmission[i]):
+                out[part, j] += robot.transmission[i, j] * along
+            if robot.parents[i] >= 0:
+                held = wrenches.setdefault(robot.parents[i], [0.0, 0.0])
+                force = frames[i].turn.back(force)
+                held[0], held[1] = held[0] + force, held[1] + frames[i].turn.back(moment) + _cross(frames[i].origin, force)
     return out
 
 
-def _wrench(parameters, motion: BodyMotion):
+def _wrench(parameters, motion):
     mass, h = parameters[0], parameters[1:4, None]
     xx, yy, zz, xy, yz, xz = parameters[4:]
     inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])

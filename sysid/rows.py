@@ -36,6 +36,15 @@ class Rows:
         """tau - columns x (n, dof), zero where a row does not count."""
         return self.tau - np.einsum("jnk,k->nj", self.columns, x)
 
+    def rms(self, residual) -> np.ndarray:
+        """Root mean square (dof,) of a residual (n, dof) over the rows that count."""
+        return np.sqrt((residual**2).sum(0) / np.maximum(self.use.sum(0), 1))
+
+    def of(self, motion: Motion, name: str) -> np.ndarray:
+        """What the pieces of the motion call `name`, on the rows."""
+        pieces = enumerate(motion.pieces)
+        return np.concatenate([getattr(p, name)[self.index[self.piece == k]] for k, p in pieces])
+
 
 def stride_for(motion: Motion, most: int) -> int:
     """The stride that leaves at most `most` rows."""

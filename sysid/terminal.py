@@ -8,9 +8,8 @@ from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
 
-from . import diagnosis_tables as tables
-from . import diagnosis_text as text
 from .estimate import Fit
+from .statement import tables, text
 
 _LOW = 0.1  # below this share the prior, not the data, gave a parameter
 

@@ -4,8 +4,8 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from sysid.diagnose.design import Design, by_block, summed
 from sysid.diagnose.evidence import _made
-from sysid.diagnose.view import Design, _sums, by_block
 
 
 def posed(rng: np.random.Generator, *, n: int = 240, dof: int = 2, size: int = 5, blocks: int = 20, prior: float = 0.3):
@@ -24,7 +24,7 @@ def viewed(p):
     columns = p.a * p.weights[:, None, None]
     system = m.T @ m
     design = Design(columns, residual, system, np.linalg.inv(system), np.zeros(len(x)), 0.0 * columns, 0.0 * residual)
-    return SimpleNamespace(design=design, sums=_sums(design, by_block(p.number)), blocks=p.number, weights=p.weights, x=x)
+    return SimpleNamespace(design=design, sums=summed(design, by_block(p.number)), blocks=p.number, weights=p.weights, x=x)
 
 
 def stacked(p, own, joints=(0, 1), keep=None):

@@ -132,14 +132,14 @@ def test_standard_errors_in_closed_form():
 
 
 def test_how_far_a_sum_stands_away():
-    assert blocks.away([1.0, 2.0]) == 0.0 and blocks.away(np.zeros(20)) == 0.0
+    assert blocks.z_score([1.0, 2.0]) == 0.0 and blocks.z_score(np.zeros(20)) == 0.0
     few = np.array([1.0, 1.1, 0.9, 1.0, 1.05])
-    assert blocks.away(few) == pytest.approx(5.05 / np.sqrt(5 * np.var(few, ddof=1)))
+    assert blocks.z_score(few) == pytest.approx(5.05 / np.sqrt(5 * np.var(few, ddof=1)))
     # neighbours are counted together: what alternates cancels, and a repeated block is not two
     many = np.random.default_rng(0).normal(1.0, 1.0, 12)
     pairs = many.reshape(-1, 2).sum(1)
-    assert blocks.away(many) == pytest.approx(pairs.sum() / np.sqrt(6 * np.var(pairs, ddof=1)))
-    assert blocks.away(np.repeat(many, 2)) == pytest.approx(many.sum() / np.sqrt(12 * np.var(many, ddof=1)))
+    assert blocks.z_score(many) == pytest.approx(pairs.sum() / np.sqrt(6 * np.var(pairs, ddof=1)))
+    assert blocks.z_score(np.repeat(many, 2)) == pytest.approx(many.sum() / np.sqrt(12 * np.var(many, ddof=1)))
 
 
 def test_sums_of_nothing_seldom_stand_away():
@@ -147,7 +147,7 @@ def test_sums_of_nothing_seldom_stand_away():
     x = coloured(rng, 3000, 0.1, 0.01, k=1500)
     number = blocks.numbered(np.arange(3000) * 0.01, np.zeros(3000, int), memory=0.1)
     sums = blocks.summed(number, x)
-    far = np.array([blocks.away(own) for own in sums.T])
+    far = np.array([blocks.z_score(own) for own in sums.T])
     for level in (1.645, 2.33):
         low, high = binom.ppf([1e-3, 1 - 1e-3], 1500, student.sf(level, number.max() // 2)) / 1500
         assert low <= np.mean(far > level) <= high

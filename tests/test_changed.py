@@ -7,9 +7,9 @@ import pytest
 
 from scripts.blind_benchmark import PLANAR
 from sysid import pipeline, regressor, results
-from sysid.diagnose import changed
-from sysid.diagnose.changed import document as changes_document
+from sysid.changes import changed
 from sysid.errors import ConfigError, LogError, SysidError
+from sysid.statement.changes import document as changes_document
 from tests.conftest import csv
 from tests.test_lowpass import smooth
 
@@ -48,7 +48,7 @@ def fitted(tmp_path_factory, planar):
 
 
 def what_changed(folder, log: str) -> dict:
-    said = changes_document(changed.changed(pipeline.load(folder), folder / "run", [str(folder / log)]))
+    said = changes_document(changed(pipeline.load(folder), folder / "run", [str(folder / log)]))
     json.dumps(said, allow_nan=False)
     assert [v["joint"] for v in said["verdict"]] == ["shoulder", "elbow"] == list(said["joints"])
     return said
@@ -106,5 +106,5 @@ def test_questions_about_a_change_that_cannot_be_asked(fitted, tmp_path):
         (LogError, (experiment, fitted / "run", [str(fitted / "short.csv")]), "too short"),
     ):
         with pytest.raises(kind, match=words) as caught:
-            changed.changed(*asked)
+            changed(*asked)
         assert "\n" not in str(caught.value)

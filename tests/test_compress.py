@@ -60,6 +60,17 @@ def test_parts_merge_to_the_whole_and_blocks_leave_out():
     np.testing.assert_allclose(left + only, data.squares(x), rtol=1e-10)
 
 
+def test_blocks_are_equal_within_a_piece_and_hold_every_row_once():
+    _, structure, motion, _, _ = arm()
+    (piece,) = motion.pieces
+    motion = replace(motion, pieces=tuple(replace(piece, use=None).part(slice(0, n)) for n in (150, 431, 1999)))
+    data = compress(structure, motion)
+    rows = [[factor.rows for factor in data.factors if factor.joint == joint] for joint in range(structure.robot.dof)]
+    assert all(own == rows[0] for own in rows)
+    assert rows[0][0] == 150 and sum(rows[0][1:3]) == 431 and sum(rows[0][3:]) == 1999
+    assert np.ptp(rows[0][1:3]) <= 1 and np.ptp(rows[0][3:]) <= 1 and min(rows[0][3:]) >= 199
+
+
 def test_size_does_not_grow_with_the_log():
     _, structure, motion, data, _ = leg()
     assert data.total().shape == (67, 67)

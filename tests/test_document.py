@@ -5,9 +5,9 @@ import json
 import numpy as np
 import pytest
 
-from sysid.diagnose import regions
-from sysid.diagnose.document import document
-from sysid.diagnose.lowpass import LEAST
+from sysid.failures import regions
+from sysid.lowpass import LEAST
+from sysid.statement.document import document
 from tests.test_select import BIAS, PRODUCT, TWO
 
 NUMBER, OR_NONE = (int, float), (int, float, type(None))

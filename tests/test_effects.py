@@ -132,8 +132,7 @@ def test_start_changes_nothing(name, make):
 @pytest.mark.parametrize("name", [*MOVERS, *SENSORS, "presliding", "warmup", "joint_coupling"])
 @pytest.mark.parametrize("filtered", ["raw", "same"])
 def test_columns_of_a_stretch_are_those_of_the_whole(name, filtered):
-    from sysid.compress import chunks
-    from sysid.model import ROBOT, Model, initial
+    from sysid.model import ROBOT, Model, chunks, initial
     from sysid.preprocess import prepare
     from tests.problems import arm_log
 

@@ -12,9 +12,9 @@ from scipy.signal import lfilter
 
 from sysid import config, pipeline
 from sysid.config import PreprocessSpec
-from sysid.diagnose.lowpass import lowpassed
 from sysid.events import Event, find, mended, told, usable
 from sysid.log import Log, Segment
+from sysid.lowpass import lowpassed
 from sysid.preprocess import prepare
 from sysid.repeats import held_angle, held_torque
 

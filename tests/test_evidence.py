@@ -13,9 +13,9 @@ from scipy.stats import t as student
 from sysid import blocks, config, model, regressor
 from sysid.diagnose import evidence, null
 from sysid.diagnose.candidates import candidates
-from sysid.diagnose.lowpass import lowpassed, stride_of
 from sysid.diagnose.view import looked_at
 from sysid.log import Log, Segment
+from sysid.lowpass import lowpassed, stride_of
 from tests.evidences import grouped, posed, stacked, viewed
 from tests.problems import fourier_motion
 

@@ -6,9 +6,9 @@ from scipy.signal import lfilter
 from scipy.stats import binom
 
 from sysid import blocks
-from sysid.diagnose.flexible import Unknown, unknown
 from sysid.diagnose.select import LEVEL
 from sysid.diagnose.verdict import predictable
+from sysid.flexible import Unknown, unknown
 
 STEP, N = 0.01, 2500
 RNG = np.random.default_rng(0)

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from sysid import regressor
-from sysid.diagnose.lowpass import Gaussian, lowpassed, narrowed, stride_of, widest
 from sysid.events import Event
 from sysid.log import Log, Segment
+from sysid.lowpass import Gaussian, lowpassed, narrowed, stride_of, widest
 from sysid.preprocess import standstill_speed
 
 STEP = 1e-3
@@ -199,6 +199,17 @@ def test_the_band_is_as_wide_as_the_motion_asks(fastest, told):
     assert widest([]) == 15.0 == widest([a_log(t, 0.0 * q, q)])
 
 
+def test_the_noise_of_coarse_angles_does_not_widen_the_band():
+    """Rounding fills the spectrum of the speed up to the last frequency: that is no motion."""
+    t = np.arange(20_000) * STEP
+    q = 0.3 * np.sin(2.0 * np.pi * 0.6 * t)[:, None] * [1.0, 0.5]
+    for grain in (2e-4, 1e-3):
+        coarse = grain * np.round(q / grain)
+        assert widest([a_log(t, coarse, q)]) == 15.0
+    fast = 0.1 * np.sin(2.0 * np.pi * 10.0 * t)[:, None] * [1.0, 0.5]
+    assert widest([a_log(t, 1e-3 * np.round(fast / 1e-3), q)]) == pytest.approx(40.0, rel=0.05)
+
+
 def test_the_band_narrows_with_the_angles_noise():
     """To where it makes a quarter: the power of what acceleration makes of white noise grows with the fourth power, as is said."""
     assert narrowed(15.0, 0.1) == narrowed(15.0, 0.25) == narrowed(15.0, 0.0) == 15.0
@@ -218,12 +229,34 @@ def test_noise_drawn_again_is_as_loud_as_the_noise_is_there():
     """White noise whose size follows the speed, as jittered stamps make it: the second draw has the same size in each stretch."""
     from types import SimpleNamespace
 
-    from sysid.diagnose.lowpass import rougher
+    from sysid.lowpass import rougher
 
     rng = np.random.default_rng(3)
     t = np.arange(0.0, 20.0, 0.01)
     size = 1e-3 * (0.2 + np.abs(np.sin(0.5 * t)))[:, None]
     q = np.sin(0.5 * t)[:, None] + size * rng.normal(size=(len(t), 1))
-    drawn = rougher(SimpleNamespace(q=q, step=0.01), np.median(size, axis=0), rng) - q
+    drawn = rougher(SimpleNamespace(q=q, step=0.01), np.median(size, axis=0), 15.0, rng) - q
     for part in np.array_split(np.arange(len(t)), 10):
         assert np.sqrt(np.mean(drawn[part] ** 2)) == pytest.approx(np.sqrt(np.mean(size[part] ** 2)), rel=0.35)
+
+
+@pytest.mark.parametrize("grain", [2e-4, 1e-3])
+def test_rounding_is_drawn_again_as_rounding(grain):
+    """Where an arm moves slowly, rounding makes slow errors, not white ones: those drawn have their size in each band."""
+    from types import SimpleNamespace
+
+    from sysid.lowpass.angles import grains, rougher
+
+    t = np.arange(0.0, 40.0, 1e-3)
+    truly = 250.0 * grain * np.sin(0.7 * t)[:, None] + 100.0 * grain * np.sin(2.1 * t + 1.0)[:, None]
+    q = grain * np.round(truly / grain)
+    assert grains(q) == pytest.approx([grain]) and grains(truly) == [0.0]
+    noise = np.array([grain / np.sqrt(12.0)])
+    band = lambda e, low, high: np.sqrt(np.sum(np.abs(np.fft.rfft(e)[int(low * 40) : int(high * 40)]) ** 2))  # noqa: E731
+    made = (q - truly)[:, 0]
+    for low, high in ((2.0, 10.0), (10.0, 50.0), (50.0, 400.0)):
+        drawn = [
+            band((rougher(SimpleNamespace(q=q, step=1e-3), noise, 15.0, np.random.default_rng(k)) - q)[:, 0], low, high)
+            for k in range(8)
+        ]
+        assert np.sqrt(np.mean(np.square(drawn))) == pytest.approx(band(made, low, high), rel=0.4)

@@ -63,7 +63,7 @@ def test_panda_is_within_its_published_error():
 def diagnosed(name: str):
     """The document of a diagnosis of an experiment folder of the data, and its fit."""
     from sysid.diagnose.diagnosis import diagnose
-    from sysid.diagnose.document import document
+    from sysid.statement.document import document
 
     folder = Path(os.environ.get("SYSID_DATA_DIR") or "nowhere") / name
     if not (folder / "config.yaml").exists():

@@ -14,8 +14,8 @@ from ruamel.yaml import YAML
 from sysid import loop, pipeline, results
 from sysid.addition import command, grown, spelled
 from sysid.diagnose.diagnosis import diagnose, first_view
-from sysid.diagnose.document import document
 from sysid.diagnose.select import LEVEL, WORTH, search
+from sysid.statement.document import document
 
 BIAS = ("bias", "torque_bias:elbow:b=0.4")
 STRIBECK = ("stribeck", "stribeck:shoulder:dF=1.5,vs=0.4")

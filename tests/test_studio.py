@@ -19,9 +19,9 @@ import pytest
 
 from sysid import loop
 from sysid.diagnose.diagnosis import diagnose
-from sysid.diagnose.held_out import HeldOut
 from sysid.effect import vocabulary
 from sysid.errors import SysidError
+from sysid.failures import HeldOut
 from sysid.studio import desk, guard, page, views
 from sysid.studio.app import application
 from sysid.studio.bench import Bench
@@ -406,7 +406,7 @@ def test_preview_is_what_the_suspect_removes(arm):
     claims = view.diagnosis.claims
     assert len(view.diagnosis.findings) == sum(len(claim.findings) for claim in claims) >= 1
     # the first step's head added, the residual is that of the model that it made
-    grown = HeldOut(view.diagnosis.findings[0].member.view, view.diagnosis.first.test)
+    grown = HeldOut(view.diagnosis.findings[0].member.view.settled, view.diagnosis.first.test)
     np.testing.assert_allclose(looks.first.residual - looks.removed(0), grown.residual * looks.first.rows.use, atol=1e-9)
     for k, finding in enumerate(view.diagnosis.findings):
         own = looks.own(k)

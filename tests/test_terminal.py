@@ -4,8 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from sysid import diagnosis_tables as tables
-from sysid import diagnosis_text as text
+from sysid.statement import tables, text
 from sysid.terminal import show_diagnosis, show_discovery
 
 JOINTS = ("shoulder_pan_joint_of_the_left_arm", "rail", "j3", "j4", "j5")

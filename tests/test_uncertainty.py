@@ -4,6 +4,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 from sysid import estimate, uncertainty
+from sysid.blocks import parameters
 from sysid.compress import Compressed, Factor, compress, triangle
 from sysid.config import Experiment
 from sysid.inertia import LogCholesky
@@ -114,9 +115,10 @@ def test_deviations_are_right_under_white_noise():
                 factors.append(Factor(j, b, np.arange(size), r, rows))
         data = Compressed(size, 2, tuple(factors), blocks * rows)
         x = inverse @ sum(a.T @ b for a, b in zip(slow, y))
-        basis, moves, *_ = uncertainty._left_out(data, x, None, 2.0 * normal, np.arange(size))
-        plain[k] = np.diagonal(basis @ uncertainty._neighbours(moves) @ basis.T)
-        found = uncertainty._noise(data, x, None, 2.0 * normal, np.arange(size)) / uncertainty._widening(blocks) ** 2
+        basis = uncertainty._whitening(2.0 * normal)
+        moves, _ = parameters.left_out(*uncertainty._by_block(data, x, None, basis, np.arange(size)))
+        plain[k] = np.diagonal(basis @ parameters.neighbours(moves) @ basis.T)
+        found = uncertainty._noise(data, x, None, 2.0 * normal, np.arange(size)) / parameters.widening(blocks) ** 2
         corrected[k], along[k] = np.diagonal(found), direction @ found @ direction
     # 200 repeats know the mean to 5 %
     np.testing.assert_allclose(corrected.mean(axis=0) / known, 1.0, atol=0.15)

@@ -12,12 +12,12 @@ from sysid.diagnose import claims
 from sysid.diagnose.candidates import candidates
 from sysid.diagnose.detectable import detectable
 from sysid.diagnose.diagnosis import first_view
-from sysid.diagnose.document import _verdict, dependences
-from sysid.diagnose.flexible import Unknown
 from sysid.diagnose.select import LEVEL, WORTH, ask, search
 from sysid.diagnose.verdict import predictable, verdicts
 from sysid.effect import Linear, TorqueEffect
+from sysid.flexible import Unknown
 from sysid.noise import NoiseFloor
+from sysid.statement.document import _verdict, dependences
 from sysid.transfer import Transfer
 
 # ---- verdicts, by hand

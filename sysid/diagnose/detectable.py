@@ -1,7 +1,9 @@
-"""What these logs could have shown: the smallest size of every effect on every joint that they would have named.
+"""What these logs could have shown: the smallest size of every effect on every joint that they
+would have named.
 
-A group is named where its statistic stands above the null's threshold and where it is worth having. Its coefficient is
-known to a standard deviation that the blocks tell; the size is the one that passes both in nine of ten logs.
+A group is named where its statistic stands above the null's threshold and where it is worth having.
+Its coefficient is known to a standard deviation that the blocks tell; the size is the one that
+passes both in nine of ten logs.
 """
 
 from __future__ import annotations
@@ -22,8 +24,8 @@ POWER = 0.9
 
 @dataclass(frozen=True)
 class Detectable:
-    """The smallest `size` of an effect's leading parameter that these logs would have named with probability `power`; None
-    where the model absorbs it whatever its size."""
+    """The smallest `size` of an effect's leading parameter that these logs would have named with
+    probability `power`; None where the model absorbs it whatever its size."""
 
     candidate: Candidate
     parameter: str
@@ -44,13 +46,19 @@ def detectable(view: View, asked: Asked, candidates) -> list[Detectable]:
         size = _size(group, threshold, loss)
         there = best[group.candidate.key]
         if np.isfinite(size) and (there.size is None or size < there.size):
-            best[group.candidate.key] = Detectable(group.candidate, *_leading(view, group.candidate), size)
+            best[group.candidate.key] = Detectable(
+                group.candidate, *_leading(view, group.candidate), size
+            )
     return list(best.values())
 
 
 def _leading(view: View, candidate: Candidate) -> tuple[str, str]:
     effect = candidate.effect
-    listed = [s for s in effect.shapes() if s.start is not None] if candidate.nonlinear else effect.coefficients()
+    listed = (
+        [s for s in effect.shapes() if s.start is not None]
+        if candidate.nonlinear
+        else effect.coefficients()
+    )
     grown = view.model.with_effect(effect, (candidate.joint,))
     units = [c.unit for c in grown.coefficients[len(view.model.coefficients) :]] or [
         v.unit for v in grown.shape_values[grown.last_shapes] if v.shape.start is not None
@@ -71,5 +79,7 @@ def _size(group: Group, threshold: float, loss: np.ndarray) -> float:
     needed = np.sqrt(grid[passes[0]] * spread) + ndtri(POWER) * np.sqrt(spread / directions)
     joints = slice(None) if group.candidate.joint == ROBOT else [group.candidate.joint]
     # what it takes, of the residual and of what it adds to it, must be worth having
-    worth = np.sqrt(WORTH / (1.0 - WORTH) * loss[joints].min()) + ndtri(POWER) * np.sqrt(spread / directions)
+    worth = np.sqrt(WORTH / (1.0 - WORTH) * loss[joints].min()) + ndtri(POWER) * np.sqrt(
+        spread / directions
+    )
     return float(max(needed, worth) / group.sizes[0])

@@ -75,6 +75,11 @@ class Group:
         return resting(self.squares) >= _FEWEST and float(np.linalg.eigvalsh(self.squares).max()) <= _LEVERAGE
 
     @property
+    def numbers(self) -> int:
+        """How many numbers it fits: its directions, and shape values that were searched."""
+        return len(self.c) + (0 if self.candidate.nonlinear else len(self.shapes))
+
+    @property
     def coefficients(self) -> np.ndarray:
         """(k0,) the candidate's own."""
         return self.back @ self.c

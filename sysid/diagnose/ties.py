@@ -35,15 +35,27 @@ class Member:
         """What joined."""
         return self.group.candidate
 
+    @property
+    def asked(self) -> dict[str, float]:
+        """Shape values at which to ask for it again: its own, and of an effect without columns those where it does nothing."""
+        return self.group.shapes if self.candidate.nonlinear else self.shapes
+
+    @property
+    def shapes(self) -> dict[str, float]:
+        """Its shape values, refitted."""
+        return {value.shape.name: at for value, at in zip(*_own(self.view))}
+
 
 @dataclass(frozen=True)
 class Choice:
     """The head and, by falling probability, all that these logs cannot tell from it: members with their probabilities.
-    gain (blocks,): what the head takes of the model's weighted loss in each block."""
+    gain (blocks,): what the head takes of the model's weighted loss in each block. general: those that hold the head and more,
+    which say no more than that something is there."""
 
     head: Member
     members: tuple[tuple[Member, float], ...]
     gain: np.ndarray
+    general: tuple[Member, ...] = ()
 
     @property
     def decided(self) -> bool:
@@ -82,14 +94,16 @@ def refitted(view: View, group: Group) -> Member | None:
         limits = {s.name: (low, high) for s, low, high, _ in bounds_of(view.model, candidate)}
         for shape, step in zip(free, group.coefficients):
             shapes[shape.name] = float(np.clip(shapes[shape.name] + step, *limits[shape.name]))
-    model = grown(view.source, candidate, shapes)
-    found = looked_at(
-        view.experiment, model, view.motion, view.rough, view.prior, stride=view.stride, weights=view.weights, grid=False,
-        tolerance=_COMPARED,
+    found = joined(view, candidate, shapes)
+    return Member(group, found, losses(found, view.blocks)) if _allowed(found, candidate) else None
+
+
+def joined(view: View, candidate: Candidate, shapes: dict[str, float]) -> View:
+    """A view's model with a candidate, everything settled again from shape values on."""
+    return looked_at(
+        view.experiment, grown(view.source, candidate, shapes), view.motion, view.rough, view.prior, stride=view.stride,
+        weights=view.weights, grid=False, tolerance=_COMPARED, inherited=view.blocks,
     )  # fmt: skip
-    if not _allowed(found, candidate):
-        return None
-    return Member(group, found, losses(found, view.blocks))
 
 
 def _allowed(view: View, candidate: Candidate) -> bool:
@@ -113,13 +127,31 @@ def chosen(view: View, groups: list[Group], rng: np.random.Generator) -> Choice 
     members, table = _least(members, table, rng)
     p = blocks.confidence_set(table, rng)
     inside = [k for k in np.argsort(table.sum(0)) if p[k] >= _OUTSIDE]
-    # the likeliest, and of two that are as likely the simplest: not what rounding left with less
-    chance = dict(zip(inside, blocks.chances(table[:, inside], rng)))
-    head = min(inside, key=lambda k: (-round(chance[k], 2), *members[k].candidate.simplicity))
-    inside = [k for k in inside if k == head or not holds(view, members[k], members[head])]
-    chance = dict(zip(inside, blocks.chances(table[:, inside], rng)))
+    priced = table + _price(members, int(np.argmin(table.sum(0))))
+    # the best, and of two that are the same the simplest: not what rounding left with less
+    best = priced[:, inside].sum(0).min() + blocks.SAME * np.abs(table).sum(0).min()
+    head = min((k for k in inside if priced[:, k].sum() <= best), key=lambda k: members[k].candidate.simplicity)
+    general = [k for k in inside if k != head and holds(view, members[k], members[head])]
+    inside = [k for k in inside if k not in general]
+    chance = dict(zip(inside, blocks.chances(priced[:, inside], rng)))
     order = sorted(inside, key=lambda k: (k != head, -chance[k]))
-    return Choice(members[head], tuple((members[k], float(chance[k])) for k in order), base - table[:, head])
+    return Choice(
+        members[head], tuple((members[k], float(chance[k])) for k in order), base - table[:, head], tuple(members[k] for k in general)
+    )  # fmt: skip
+
+
+def _price(members: list[Member], best: int) -> np.ndarray:
+    """(members,) what each member's numbers cost it in every block.
+
+    Blocks held apart ask who predicts best, and what holds the truth and more predicts about as well as the truth. Who is
+    the truth is another question: a number then costs the logarithm of the count of blocks times the variance of one
+    direction (that of the `best` member), of which holding apart has charged two.
+
+    Source: Schwarz 1978; Akaike 1973 for the two.
+    """
+    count, group = len(members[best].losses), members[best].group
+    one = np.sum(group.moves**2) / len(group.c)
+    return np.array([m.group.numbers for m in members]) * one * max(np.log(count) - 2.0, 0.0) / count
 
 
 def _least(members: list[Member], table: np.ndarray, rng: np.random.Generator):
@@ -140,8 +172,7 @@ def holds(view: View, general: Member, special: Member) -> bool:
     one, other = general.candidate, special.candidate
     if one.nonlinear or one.parameters <= other.parameters or one.joint != other.joint:
         return False
-    shapes = {v.shape.name: at for v, at in zip(*_own(general.view))}
-    columns = columns_of(view.source, one, [shapes])[0]
+    columns = columns_of(view.source, one, [general.shapes])[0]
     joints = one.touches(view.model.robot.dof)
     target = (special.view.source.predicted - view.source.predicted) * view.rows.use * view.weights
     base = view.design.columns[joints].reshape(-1, view.design.columns.shape[2])
@@ -150,6 +181,23 @@ def holds(view: View, general: Member, special: Member) -> bool:
     rest = lambda a: wanted - a @ np.linalg.lstsq(a, wanted, rcond=1e-9)[0]  # noqa: E731
     alone = np.sum(rest(base) ** 2)
     return bool(alone > 0 and np.sum(rest(np.concatenate([base, flat], axis=1)) ** 2) < (1.0 - _SAME) * alone)
+
+
+def alike(view: View, one: Group, other: Group) -> bool:
+    """Whether two candidates take the same part of what a model leaves, the greater half of it at least: then one of them in
+    the model leaves the other little to do, on whichever joints they stand."""
+    first, second = _taken(view, one), _taken(view, other)
+    return bool(np.sum(first * second) ** 2 > 0.5 * np.sum(first**2) * np.sum(second**2))
+
+
+def _taken(view: View, group: Group) -> np.ndarray:
+    """(dof, n) weighted torque that a group takes of the residual, the model's own columns refitted."""
+    design, joints = view.design, group.candidate.touches(view.model.robot.dof)
+    own = columns_of(view.source, group.candidate, [group.shapes])[0] @ group.coefficients * view.weights[joints, None]
+    out = np.zeros(design.columns.shape[:2])
+    out[joints] = own
+    absorbed = design.inverse @ np.einsum("jnk,jn->k", design.columns, out)
+    return out - np.einsum("jnk,k->jn", design.columns, absorbed)
 
 
 def _own(view: View):
@@ -161,5 +209,5 @@ def weighed(view: View) -> View:
     """The view with every joint weighted by what the model now leaves it."""
     return looked_at(
         view.experiment, view.model, view.motion, view.rough, view.prior, stride=view.stride,
-        weights=inverse(view.rms()), grid=False,
+        weights=inverse(view.rms()), grid=False, inherited=view.blocks,
     )  # fmt: skip

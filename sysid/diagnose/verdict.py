@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..estimate import Fit
+from ..flexible import Unknown
 from ..transfer import Transfer
 from .claims import Claim
-from .flexible import Unknown
 from .select import LEVEL, WORTH
 
 _FLOOR = 0.1  # of the floor: what a floor may be in doubt by and still be called reached

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from ..diagnosis_tables import size
 from ..estimate import Fit
+from ..statement.tables import size
 from .verdict import left_words
 from .words import SPACE, breaking, empty, percentage, quantity, raised, table, text
 

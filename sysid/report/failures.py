@@ -1,4 +1,4 @@
-"""Where a model fails, as PNG and SVG: each joint's residual over angle and speed, over time, over frequency."""
+"""Where a model fails, as PNG: each joint's residual over angle and speed, over time, over frequency."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def failures(document: dict, out: Path, prismatic: Collection[str] = ()) -> list
         over.set_title(joint.replace("$", r"\$"), loc="left", fontweight="bold", fontsize=10)
         _time(time, entry["time"], force)
         _frequency(frequency, entry["frequency"])
-    return figures._save(figure, out, "where_it_fails")
+    return figures._save(figure, out, "where_it_fails", ("png",))
 
 
 def _numbers(values) -> np.ndarray:

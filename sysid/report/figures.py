@@ -21,11 +21,11 @@ def _pyplot():
     return pyplot
 
 
-def _save(figure, out: Path, name: str) -> list[Path]:
+def _save(figure, out: Path, name: str, kinds: tuple[str, ...] = ("png", "svg")) -> list[Path]:
     from ..results import write_atomically
 
     paths = []
-    for kind in ("png", "svg"):
+    for kind in kinds:
         path = out / f"{name}.{kind}"
         # the date would make every run another file
         write_atomically(path, lambda p, k=kind: figure.savefig(p, format=k, metadata={"Date": None} if k == "svg" else None))

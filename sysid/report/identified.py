@@ -85,7 +85,7 @@ def _parameter(name: str, entry: dict, prior, at_zero: bool = False) -> list[str
 def bodies(fit: Fit, diagnosis: Diagnosis) -> tuple[str, str, list]:
     """The bodies as ellipsoids on the robot, at the middle of its motion."""
     robot = fit.model.robot
-    q = [piece.q[piece.core] for piece in diagnosis.first.view.motion.pieces]
+    q = [piece.q[piece.core] for piece in diagnosis.view.motion.pieces]
     low, high = np.min([x.min(0) for x in q], 0), np.max([x.max(0) for x in q], 0)
     placed = solids.frames(robot, (low + high) / 2)
     now, before = solids.solids(robot, fit.pi, placed), solids.solids(robot, fit.prior, placed)

@@ -15,7 +15,7 @@ def sections(fit: Fit, diagnosis: Diagnosis, document: dict, history: list[dict]
     """The sections in the order of the page: {name: {"title", "html", "charts"}}.
 
     Args:
-        document: of the diagnosis (`diagnose.document`). history: the steps made so far, oldest first; may be empty.
+        document: of the diagnosis (`statement.document`). history: the steps made so far, oldest first; may be empty.
     """
     made = {
         "verdict": verdict.verdict(fit, diagnosis, document),

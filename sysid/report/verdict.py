@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 
 from ..diagnose.diagnosis import Diagnosis
-from ..diagnosis_text import percent
 from ..effect import describe
 from ..estimate import Fit
+from ..statement.text import percent
 from .words import (
     SPACE,
     chance,

@@ -6,6 +6,7 @@ a fold costs a solve, not a pass over the samples. Test logs are not touched.
 
 import numpy as np
 
+from ..blocks import standard_error
 from ..compress import Compressed
 from ..config import Experiment
 from ..estimate import pose
@@ -43,7 +44,7 @@ def summary(results: list[dict], weights: list[float], current: float) -> dict:
     best = int(np.argmin(total))
     folds = mean.shape[1]
     difference = mean - mean[best]
-    se = difference.std(axis=1, ddof=1) / np.sqrt(folds) if folds > 1 else np.full(len(weights), np.inf)
+    se = standard_error(difference.T) / folds if folds > 1 else np.full(len(weights), np.inf)
     within = [k for k in range(len(weights)) if difference[k].mean() <= se[k]]
     return {
         "weights": weights, "rms_held_out": np.sqrt(total).tolist(),

@@ -11,8 +11,8 @@ from functools import cached_property
 import numpy as np
 
 from ..diagnose.diagnosis import Diagnosis
-from ..diagnose.held_out import HeldOut
 from ..errors import SysidError
+from ..failures import HeldOut
 from ..model import ROBOT
 from ..report import charts
 from ..report.decimate import broken
@@ -41,7 +41,7 @@ class Looks:
         out = []
         for claim in self.diagnosis.claims:
             view = claim.step.before
-            own = self.first if view is self.first.view else HeldOut(view, self.first.test)
+            own = self.first if view is self.diagnosis.view else HeldOut(view.settled, self.first.test)
             out += [own] * len(claim.findings)
         return out
 
@@ -62,7 +62,7 @@ class Looks:
             return self._removed[k]
 
     def _explained(self, k: int) -> np.ndarray:
-        after = HeldOut(self.diagnosis.findings[k].member.view, self.first.test)
+        after = HeldOut(self.diagnosis.findings[k].member.view.settled, self.first.test)
         return (self._before[k].residual - after.residual) * self.first.rows.use
 
     def own(self, k: int) -> list[int]:

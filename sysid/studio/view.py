@@ -8,12 +8,12 @@ from functools import cache, cached_property
 import numpy as np
 
 from ..diagnose.diagnosis import Diagnosis
-from ..diagnose.document import document
 from ..effect import describe, find, vocabulary
 from ..estimate import Fit
 from ..report import fitted
 from ..report.sections import sections
 from ..report.words import units
+from ..statement.document import document
 from .look import Looks
 from .play import play
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from .diagnose.diagnosis import Diagnosis
+    from ..diagnose.diagnosis import Diagnosis
 
 _TOGETHER = "several variables together"
 

@@ -1,4 +1,5 @@
-"""Where a model fails: the joints, speeds, angles, times and frequencies that hold most of its squared error."""
+"""Where a model fails: the joints, speeds, angles, times and frequencies that hold most of its
+squared error."""
 
 from __future__ import annotations
 
@@ -16,7 +17,8 @@ _BANDS = (0.0, 0.5, 1.0, 2.0, 4.0, 8.0, 15.0, 30.0, 60.0, 125.0, 250.0, 500.0)  
 
 @dataclass(frozen=True)
 class Region:
-    """A stretch of one variable, from `low` to `high`, that holds `error` of the squared error in `rows` of the rows."""
+    """A stretch of one variable, from `low` to `high`, that holds `error` of the squared error in
+    `rows` of the rows."""
 
     variable: str
     unit: str
@@ -28,16 +30,21 @@ class Region:
     def words(self) -> str:
         """As a sentence says it."""
         what = {"q": "angle", "qd": "speed", "time": "time"}.get(self.variable, self.variable)
-        return f"{100 * self.error:.0f} % of the squared error lies in the {100 * self.rows:.0f} % of the rows with {what} {self.low:.3g} to {self.high:.3g} {self.unit}"
+        where = f"{what} {self.low:.3g} to {self.high:.3g} {self.unit}"
+        error, rows = f"{100 * self.error:.0f} %", f"{100 * self.rows:.0f} %"
+        return f"{error} of the squared error lies in the {rows} of the rows with {where}"
 
 
 @dataclass(frozen=True)
 class Failure:
-    """Where one joint's residual is: its share of all joints' error in units of their noise, the regions most crowded with
-    error, a map of the mean residual over (q, qd), the error over time, and over frequency.
+    """Where one joint's residual is: its share of all joints' error in units of their noise, the
+    regions most crowded with error, a map of the mean residual over (q, qd), the error over time,
+    and over frequency.
 
-    map: {"q": edges (m + 1,), "qd": edges (m + 1,), "mean": (m, m) [N m], NaN where no row is, "rows": (m, m)}.
-    time: {"log": (k,), "start": (k,) [s], "rms": (k,)}. frequency: {"edges": (k + 1,) [Hz], "share": (k,)}.
+    map: {"q": edges (m + 1,), "qd": edges (m + 1,), "mean": (m, m) [N m], NaN where no row is,
+    "rows": (m, m)}.
+    time: {"log": (k,), "start": (k,) [s], "rms": (k,)}.
+    frequency: {"edges": (k + 1,) [Hz], "share": (k,)}.
     """
 
     joint: str
@@ -56,7 +63,8 @@ def failures(held_out: HeldOut, raw: Prediction, levels) -> list[Failure]:
     """Where each joint's test residual is.
 
     Args:
-        raw: measured and predicted torque of the test logs as the fit sees them, for the frequencies.
+        raw: measured and predicted torque of the test logs as the fit sees them, for the
+            frequencies.
         levels: (dof,) noise floors, in which the joints' errors are compared.
     """
     robot, rows, known = held_out.model.robot, held_out.rows, held_out.variables
@@ -73,13 +81,25 @@ def failures(held_out: HeldOut, raw: Prediction, levels) -> list[Failure]:
                 unit, values = known[f"{name}_{joint}"]
                 regions.append(_crowded(name, unit, values[use], square))
             regions.append(_crowded("time", "s", rows.t[use], square))
-        regions = sorted((r for r in regions if r is not None and r.error - r.rows > 0.1), key=lambda r: r.rows - r.error)
+        regions = sorted(
+            (r for r in regions if r is not None and r.error - r.rows > 0.1),
+            key=lambda r: r.rows - r.error,
+        )
         q, qd = (known[f"{name}_{joint}"][1][use] for name in ("q", "qd"))
-        residuals, steps = [raw.residual[s, j] for s in stretches], [raw.t[s.start + 1] - raw.t[s.start] for s in stretches]
-        out.append(Failure(
-            joint, float(weighted[j] / max(weighted.sum(), 1e-300)), tuple(regions), _map(q, qd, left),
-            _windows(rows.t[use], rows.log[use], square), _bands(residuals, steps),
-        ))  # fmt: skip
+        residuals, steps = (
+            [raw.residual[s, j] for s in stretches],
+            [raw.t[s.start + 1] - raw.t[s.start] for s in stretches],
+        )
+        out.append(
+            Failure(
+                joint,
+                float(weighted[j] / max(weighted.sum(), 1e-300)),
+                tuple(regions),
+                _map(q, qd, left),
+                _windows(rows.t[use], rows.log[use], square),
+                _bands(residuals, steps),
+            )
+        )
     return out
 
 
@@ -93,7 +113,8 @@ def _stretches(raw: Prediction) -> list[slice]:
 
 
 def _crowded(name: str, unit: str, values, square) -> Region | None:
-    """The shortest stretch, in rows, that holds half of the squared error, if it is clearly less than half of the rows."""
+    """The shortest stretch, in rows, that holds half of the squared error, if it is clearly less
+    than half of the rows."""
     order = np.argsort(values)
     x, total = values[order], np.cumsum(square[order]) / square.sum()
     cuts = np.linspace(0, len(x) - 1, 4 * _CUTS + 1).astype(int)
@@ -115,10 +136,17 @@ def _crowded(name: str, unit: str, values, square) -> Region | None:
 def _map(q, qd, residual) -> dict:
     if not len(q):
         q = qd = residual = np.zeros(1)
-    edges = [np.linspace(v.min(), v.max() if np.ptp(v) > 0 else v.min() + 1.0, _MAP + 1) for v in (q, qd)]
+    edges = [
+        np.linspace(v.min(), v.max() if np.ptp(v) > 0 else v.min() + 1.0, _MAP + 1) for v in (q, qd)
+    ]
     rows, *_ = np.histogram2d(q, qd, bins=edges)
     total, *_ = np.histogram2d(q, qd, bins=edges, weights=residual)
-    return {"q": edges[0], "qd": edges[1], "mean": np.divide(total, rows, out=np.full(rows.shape, np.nan), where=rows > 0), "rows": rows}
+    return {
+        "q": edges[0],
+        "qd": edges[1],
+        "mean": np.divide(total, rows, out=np.full(rows.shape, np.nan), where=rows > 0),
+        "rows": rows,
+    }
 
 
 def _windows(t, log, square) -> dict:
@@ -131,12 +159,12 @@ def _windows(t, log, square) -> dict:
 
 
 def _bands(residuals, steps) -> dict:
-    from scipy.signal import periodogram
-
     edges = np.array(_BANDS)
     total = np.zeros(len(edges) - 1)
     for residual, step in zip(residuals, steps):
-        frequency, power = periodogram(residual, fs=1.0 / step, window="hann")
-        total += np.histogram(frequency, bins=edges, weights=power * (frequency[1] if len(frequency) > 1 else 1.0) * len(residual))[0]
+        frequency = np.fft.rfftfreq(len(residual), step)
+        windowed = (residual - residual.mean()) * np.hanning(len(residual))
+        power = np.abs(np.fft.rfft(windowed)) ** 2
+        total += np.histogram(frequency, bins=edges, weights=power)[0]
     last = int(np.flatnonzero(total > 0).max(initial=0)) + 1
     return {"edges": edges[: last + 1], "share": total[:last] / max(total.sum(), 1e-300)}

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from .diagnosis_text import Told, listed, percent, wrapped
-from .events import WORDS
+from ..events import WORDS
+from .text import Told, listed, percent, wrapped
 
 _EVENTS = 20  # lines; the rest is counted
 

@@ -1,0 +1,35 @@
+"""Blocks of time, and what is said with them: the one place of the package where standard errors of
+correlated rows are made.
+
+Neighbouring rows of a filtered signal say the same thing twice. So rows are summed over blocks of
+time that are long against every memory in them (the filter's, the noise's), and blocks are what is
+counted, left out and resampled.
+
+Which rows stand together (`numbering`), how sure a sum or an estimate is (`deviations`), how sure
+the parameters of a fit are together (`parameters`), and which model loses least (`rivals`).
+"""
+
+from .deviations import jackknife, signs, slope_chance, standard_error, z_score
+from .numbering import FEWEST, MOST, SHORTEST, divided, folds, memory, numbered, summed
+from .parameters import covariance
+from .rivals import SAME, chances, confidence_set
+
+__all__ = [
+    "FEWEST",
+    "MOST",
+    "SAME",
+    "SHORTEST",
+    "chances",
+    "confidence_set",
+    "covariance",
+    "divided",
+    "folds",
+    "jackknife",
+    "memory",
+    "numbered",
+    "signs",
+    "slope_chance",
+    "standard_error",
+    "summed",
+    "z_score",
+]

@@ -1,0 +1,59 @@
+"""How sure a sum over blocks is, or an estimate that blocks were left out of.
+
+Source: White 1980; Cameron & Miller 2015 (clustered scores); Liu 1988, Davidson & Flachaire 2008
+(signs).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .numbering import summed
+
+
+def standard_error(values):
+    """Standard error of the sum of values (blocks, ...) about zero change; NaN of a single
+    block."""
+    values = np.asarray(values)
+    count = len(values)
+    if count < 2:
+        return np.full(values.shape[1:], np.nan)[()]
+    return np.sqrt(count * np.var(values, axis=0, ddof=1))
+
+
+def z_score(differences) -> float:
+    """Standard errors that a sum over blocks stands from zero; neighbouring blocks count together.
+    Zero where they are too few."""
+    d = np.asarray(differences)
+    if len(d) > 7:
+        d = d[: len(d) // 2 * 2].reshape(-1, 2).sum(1)
+    se = standard_error(d) if len(d) > 2 else 0.0
+    return float(d.sum() / se) if se > 0 else 0.0
+
+
+def slope_chance(told, values, number) -> float:
+    """Probability, were nothing there, of a slope of values (n,) on what was told of them (n,) as
+    large as theirs: Student's t of sums over blocks `number` (n,), with what the slope leaves as
+    their noise."""
+    from scipy.special import stdtr  # not scipy.stats, whose import alone takes longer than a fit
+
+    size = summed(number, told * told)
+    if not size.sum() > 0:
+        return 1.0
+    slope = float(told @ values / size.sum())
+    left = summed(number, told * (values - slope * told))
+    acting = size.sum() ** 2 / np.sum(size**2)
+    spread = np.sqrt(np.sum(left**2) * len(left) / max(len(left) - 1, 1))
+    return float(stdtr(max(acting - 1.0, 1.0), -slope * size.sum() / max(spread, 1e-300)))
+
+
+def jackknife(without) -> np.ndarray:
+    """Standard errors of estimates from those with one block left out each (blocks, ...)."""
+    without = np.asarray(without)
+    count = len(without)
+    return np.sqrt((count - 1) / count * ((without - without.mean(0)) ** 2).sum(0))
+
+
+def signs(count: int, draws: int, rng: np.random.Generator) -> np.ndarray:
+    """Random signs (draws, count)."""
+    return rng.integers(0, 2, (draws, count)) * 2.0 - 1.0

@@ -1,0 +1,53 @@
+"""Models that lose something in each block: which cannot be told from the best, and how likely each
+is the best."""
+
+from __future__ import annotations
+
+import numpy as np
+
+SAME = 1e-6  # of a loss: a difference below it is how numbers are rounded, or a solver's tolerance
+
+
+def confidence_set(losses, rng: np.random.Generator, *, draws: int = 1000) -> np.ndarray:
+    """(models,) p-values of the model confidence set: a model belongs to the set of confidence 1 -
+    a where its p is above a.
+
+    The worst model is left out while the hypothesis of equal losses is rejected; a model's p is the
+    greatest p of the tests up to the one that left it out.
+
+    Args:
+        losses: (blocks, models), what each model loses in each block.
+
+    Source: Hansen, Lunde & Nason 2011, with the range statistic over single models (T_max).
+    """
+    blocks, models = losses.shape
+    p, left, greatest = np.ones(models), list(range(models)), 0.0
+    weights = rng.multinomial(blocks, np.full(blocks, 1.0 / blocks), draws) / blocks
+    while len(left) > 1:
+        own = losses[:, left]
+        apart = own - own.mean(1, keepdims=True)
+        mean = apart.mean(0)
+        if np.abs(mean).max() <= SAME * np.abs(own).mean():
+            p[left] = 1.0  # rounding is always on the same side, and no evidence
+            break
+        drawn = weights @ apart - mean
+        spread = np.sqrt(np.maximum((drawn**2).mean(0), 1e-300))
+        worst = int(np.argmax(mean / spread))
+        found = float(np.mean((drawn / spread).max(1) >= (mean / spread).max()))
+        greatest = max(greatest, found)
+        p[left[worst]] = greatest
+        left.pop(worst)
+    if left:
+        p[left[0]] = 1.0
+    return p
+
+
+def chances(losses, rng: np.random.Generator, *, draws: int = 4000) -> np.ndarray:
+    """(models,) how often each model loses least over resampled blocks.
+
+    Source: Yao, Vehtari, Simpson & Gelman 2018 (pseudo-BMA with the Bayesian bootstrap).
+    """
+    drawn = rng.dirichlet(np.ones(len(losses)), draws) @ losses
+    least = drawn.min(1, keepdims=True)
+    best = drawn <= least + SAME * np.abs(least)  # what is the same, but for rounding, shares
+    return (best / best.sum(1, keepdims=True)).mean(0)

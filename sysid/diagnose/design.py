@@ -1,0 +1,127 @@
+"""Everything in a settled model as weighted columns, on the motion and on what the noise of its
+angles adds to it; and their sums over blocks. Frozen data; the functions stand beside it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from .. import rows as row
+from ..model import Model
+from ..preprocess import Motion
+from ..shape import Settled, inverted, prior_hessian
+
+
+@dataclass(frozen=True)
+class Source:
+    """One motion under one model at parameters x (size,): what candidates make their columns of.
+
+    use: (n, dof) bool of the rows that a stride keeps.
+    """
+
+    model: Model
+    x: np.ndarray
+    motion: Motion
+    stride: int
+    use: np.ndarray
+
+    @cached_property
+    def pieces(self) -> list:
+        """Whole pieces as effects see them."""
+        return row.seen(self.model, self.motion)
+
+    @cached_property
+    def predicted(self) -> np.ndarray:
+        """Torque (n, dof), low-passed as the columns are."""
+        return row.predicted(self.model, self.motion, self.x, self.stride)
+
+    @cached_property
+    def unfiltered(self) -> list[np.ndarray]:
+        """Torque (dof, n) over whole pieces, before the low-pass."""
+        bodies, rest = np.split(self.x, [10 * self.model.bodies])
+        whole = (replace(p, smoother=None, core=slice(0, len(p.t))) for p in self.motion.pieces)
+        return [self.model.torque(piece, bodies.reshape(-1, 10), rest).T for piece in whole]
+
+    def full(self, columns: np.ndarray) -> np.ndarray:
+        """The model's columns with the slopes of its free shape values after them."""
+        slopes = row.tangents(
+            self.model, self.motion, self.x, self.stride, self.use, self.predicted
+        )
+        free = [k for k, value in enumerate(self.model.shape_values) if not value.held]
+        return np.concatenate([columns, slopes[:, :, free]], axis=2)
+
+
+@dataclass(frozen=True)
+class Design:
+    """Weighted columns (dof, n, size), slopes last; the residual (n, dof) at their optimum,
+    weighted; `system` (size, size), columns' columns plus half of the prior's Hessian, and its
+    inverse; `change` (size,) from the model's own optimum, whose friction may be held at zero, to
+    this one, where it is free; what the angles' noise, once more, adds to columns and residual."""
+
+    columns: np.ndarray
+    residual: np.ndarray
+    system: np.ndarray
+    inverse: np.ndarray
+    change: np.ndarray
+    rough_columns: np.ndarray
+    rough_residual: np.ndarray
+
+
+@dataclass(frozen=True)
+class Sums:
+    """Over blocks: squares (blocks, size, size) of the columns, scores (blocks, size) of columns
+    and residual, `rough_scores` of what the angles' noise adds to both; over all,
+    `rough_squares`."""
+
+    squares: np.ndarray
+    scores: np.ndarray
+    rough_scores: np.ndarray
+    rough_squares: np.ndarray
+
+
+def designed(found: Settled, weights, source: Source, rough: Source) -> Design:
+    """The design of a settled model.
+
+    Args:
+        weights: (dof,). rough: the source with the angles' noise once more.
+    """
+    weighted = weights[:, None, None]
+    columns = source.full(found.rows.columns) * weighted
+    own, size = found.model.size, columns.shape[2]
+    system = np.einsum("jnk,jnl->kl", columns, columns, optimize=True)
+    system[:own, :own] += 0.5 * prior_hessian(found)
+    inverse = inverted(system)
+    residual = found.rows.residual(found.x) * weights
+    # what is held at zero, and what was settled to a tolerance only, takes its last step here
+    slopes = np.einsum("jnk,nj->k", columns[:, :, own:], residual)
+    change = inverse @ np.append(-0.5 * found.problem.objective.gradient(found.x), slopes)
+    residual = residual - np.einsum("jnk,k->nj", columns, change)
+    # near a reversal the noise, drawn again, would leave out other rows, and a row that is missing
+    # is no noise: those count that count in the source
+    pieces = zip(rough.motion.pieces, source.motion.pieces)
+    motion = replace(rough.motion, pieces=tuple(replace(r, use=p.use) for r, p in pieces))
+    more = rough.full(row.stack(found.model, motion, rough.stride).columns) * weighted - columns
+    x = np.append(found.x, np.zeros(size - own)) + change
+    left = -np.einsum("jnk,k->nj", more, x)
+    return Design(columns, residual, system, inverse, change, more, left)
+
+
+def by_block(number: np.ndarray) -> list[slice]:
+    """The rows of each block; blocks are numbered in the order of the rows."""
+    cuts = np.concatenate([[0], np.flatnonzero(np.diff(number)) + 1, [len(number)]])
+    return [slice(a, b) for a, b in zip(cuts, cuts[1:])]
+
+
+def summed(design: Design, spans: list[slice]) -> Sums:
+    """A design's sums over blocks."""
+    more, columns = design.rough_columns, design.columns
+    product = lambda a, r, s: sum(a[j][s].T @ r[s, j] for j in range(len(a)))  # noqa: E731
+    return Sums(
+        np.stack([sum(a[s].T @ a[s] for a in columns) for s in spans]),
+        np.stack([product(columns, design.residual, s) for s in spans]),
+        np.stack([product(more, design.rough_residual, s) for s in spans]),
+        np.einsum("jnk,jnl->kl", more, more, optimize=True),
+    )

@@ -1,0 +1,103 @@
+"""Functions of the motion of which a law may be made that nobody thought of."""
+
+from __future__ import annotations
+
+import numpy as np
+
+_KNOTS, _PAIRS, _WAVES = (
+    8,
+    6,
+    12,
+)  # of a spline; of variables drawn with; random cosines of each pair
+_MEMORIES = (0.05, 0.2, 0.5, 1.0)  # s
+
+
+def groups(
+    known: dict[str, np.ndarray], joint: str, piece, step: float, rng
+) -> dict[str, np.ndarray]:
+    """Functions (n, k) of all that moves a joint under "*", and of each variable alone under its
+    name.
+
+    Args:
+        known: {q_joint, qd_joint, qdd_joint, load_joint of every joint, time: (n,)}. piece: (n,).
+    """
+    parts = {name: _splines(name, values) for name, values in known.items()}
+    speed = known[f"qd_{joint}"]
+    direction = np.sign(speed)[:, None]
+    features = [parts[f"{kind}_{joint}"] for kind in ("q", "qd", "load", "qdd")] + [parts["time"]]
+    features += [direction * parts[name] for name in (f"q_{joint}", f"load_{joint}", "time")]
+    features += [speed[:, None] * parts[name] for name in (f"q_{joint}", "time")]
+    features += [
+        known[f"qdd_{joint}"][:, None] * parts[f"q_{joint}"],
+        _remembered(speed, direction[:, 0], piece, step),
+    ]
+    for other in (name[2:] for name in known if name.startswith("q_") and name[2:] != joint):
+        features += [
+            parts[f"q_{other}"],
+            parts[f"qd_{other}"][:, ::2],
+            parts[f"qdd_{other}"][:, ::4],
+        ]
+        features += [direction * parts[f"q_{other}"], np.sign(known[f"qd_{other}"])[:, None]]
+        features += [
+            known[f"{kind}_{joint}"][:, None] * parts[f"q_{other}"] for kind in ("q", "qd")
+        ]
+    features += [_waves(known, joint, rng)]
+    out = {"*": np.concatenate(features, axis=1)}
+    for name in known:
+        if not name.startswith(("load_", "qdd_")):
+            out[name] = np.concatenate([parts[name], direction * parts[name]], axis=1)
+    return out
+
+
+def _splines(name: str, values: np.ndarray) -> np.ndarray:
+    """Linear splines (n, knots) of one variable, knots where its values are; of a speed also its
+    sign, size and slow ranges."""
+    knots = np.unique(np.quantile(values, np.linspace(0.0, 1.0, _KNOTS)))
+    if len(knots) < 3:
+        return np.zeros((len(values), 0))
+    out = np.stack([np.interp(values, knots, own) for own in np.eye(len(knots))], axis=1)
+    if name.startswith("qd_"):
+        size, sign = np.abs(values) / max(np.sqrt(np.mean(values**2)), 1e-12), np.sign(values)
+        more = [
+            sign,
+            size,
+            sign * size**2,
+            *(sign * np.exp(-size / slow) for slow in (0.05, 0.2, 0.7)),
+        ]
+        out = np.column_stack([out, *more])
+    return out
+
+
+def _remembered(speed, direction, piece, step: float) -> np.ndarray:
+    """Speed and direction (n, 2 memories) as they were a while ago, by first-order lags within each
+    piece."""
+    pieces = [piece == number for number in np.unique(piece)]
+    out = []
+    for values in (speed, direction):
+        for span in _MEMORIES:
+            weights = np.exp(-np.arange(0.0, 5.0 * span, step) / span)
+            late = np.zeros(len(values))
+            for own in pieces:
+                late[own] = np.convolve(values[own], weights / weights.sum())[: own.sum()]
+            out.append(late)
+    return np.column_stack(out)
+
+
+def _waves(known: dict, own: str, rng: np.random.Generator) -> np.ndarray:
+    """Random cosines of pairs of variables, the joint's own angle or speed in each."""
+    names = [n for n in known if not n.startswith("load")]
+    pairs = [(f"q_{own}", f"qd_{own}")] + [
+        ((f"q_{own}", f"qd_{own}")[int(rng.integers(2))], names[int(rng.integers(len(names)))])
+        for _ in range(_PAIRS - 1)
+    ]
+    out = []
+    for first, second in pairs:
+        x = np.stack([known[first], known[second]], axis=1)
+        x = (x - x.mean(0)) / np.maximum(x.std(0), 1e-12)
+        w, phase = (
+            rng.normal(size=(2, _WAVES)) * rng.choice([0.7, 1.5, 3.0], _WAVES),
+            rng.uniform(0.0, 2.0 * np.pi, _WAVES),
+        )
+        waves = np.cos(x @ w + phase)
+        out += [waves, waves[:, ::2] * np.sign(known[f"qd_{own}"])[:, None]]
+    return np.concatenate(out, axis=1)

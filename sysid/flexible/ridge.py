@@ -1,0 +1,50 @@
+"""Ridge regression, judged on stretches of time that it was not fitted on."""
+
+from __future__ import annotations
+
+import numpy as np
+
+_APART = (
+    0.15  # s, several memories of the filters: what is predicted, and what it is predicted from
+)
+_RIDGES = np.geomspace(1e-3, 30.0, 10)
+
+
+def stretches(fold, t, piece) -> list[tuple[np.ndarray, np.ndarray]]:
+    """For each fold its rows, and these with all that stand within a while of them: what noise
+    remembers must not tell what is left out (Racine 2000)."""
+    apart = min(_APART, np.ptp(t) / 40.0)
+    out = []
+    for f in range(fold.max() + 1):
+        own = np.flatnonzero(fold == f)
+        near = np.zeros(len(fold), dtype=bool)
+        for stretch in np.split(own, np.flatnonzero(np.diff(own) > 1) + 1):
+            here = piece == piece[stretch[0]]
+            near |= here & (t >= t[stretch[0]] - apart) & (t <= t[stretch[-1]] + apart)
+        out.append((own, np.flatnonzero(near)))
+    return out
+
+
+def predicted(features, y, use, spans) -> tuple[np.ndarray, np.ndarray]:
+    """What ridge regression predicts (n,) of the rows of each fold from rows apart from it, and its
+    gain (folds,)."""
+    kept = np.where(use[:, None], features, 0.0)
+    kept = kept[:, kept.std(0) > 1e-9]
+    if not kept.shape[1]:
+        return np.zeros(len(y)), np.zeros(len(spans))
+    scaled = kept / np.sqrt(np.mean(kept**2, axis=0))
+    system, right = scaled.T @ scaled, scaled.T @ y
+    # the ridge of a fold is the one that serves the other folds best
+    gains, all_told = np.zeros((len(_RIDGES), len(spans))), np.zeros((len(_RIDGES), len(y)))
+    for f, (rows, near) in enumerate(spans):
+        values, vectors = np.linalg.eigh(system - scaled[near].T @ scaled[near])
+        turned, seen = vectors.T @ (right - scaled[near].T @ y[near]), scaled[rows] @ vectors
+        for i, ridge in enumerate(_RIDGES):
+            told = seen @ (turned / (np.clip(values, 0.0, None) + ridge * len(y) / len(_RIDGES)))
+            all_told[i, rows] = told
+            gains[i, f] = np.sum(2.0 * told * y[rows] - told**2)
+    chosen = [int(np.argmax(gains.sum(1) - gains[:, f])) for f in range(len(spans))]
+    told = np.zeros(len(y))
+    for i, (rows, _) in zip(chosen, spans):
+        told[rows] = all_told[i, rows]
+    return told, np.array([gains[i, f] for f, i in enumerate(chosen)])

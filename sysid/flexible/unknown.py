@@ -1,0 +1,93 @@
+"""The unknown: how much of a residual functions of the motion predict, or a steady tone holds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .. import blocks
+from .functions import groups
+from .ridge import predicted, stretches
+
+TONE = 1e-4  # probability of a line that strong by chance
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """What a flexible function takes of a joint: gain (folds,) of the weighted squared residual;
+    told (n,) the torque that it predicts of folds that it was not fitted on, weighted; shares
+    {variable: share of the squared residual that functions of it alone, and of the direction of
+    motion, predict}; total: the squared residual; chance: the probability of predictions as good as
+    these, were nothing there; tone: the share of a steady tone, zero where there is none."""
+
+    gain: np.ndarray
+    told: np.ndarray
+    shares: dict[str, float]
+    total: float
+    chance: float = 1.0
+    tone: float = 0.0
+
+    @property
+    def share(self) -> float:
+        """Of the squared residual: what functions of the motion predict, or a tone holds, whichever
+        is more."""
+        return max(float(self.gain.sum() / self.total), self.tone)
+
+
+def unknown(
+    known: dict[str, np.ndarray],
+    joint: str,
+    residual,
+    use,
+    fold,
+    piece,
+    step: float,
+    rng: np.random.Generator,
+) -> Unknown:
+    """What a flexible function of the motion takes of a joint's residual, over folds that it was
+    not fitted on.
+
+    Args:
+        known: {q_joint, qd_joint, qdd_joint, load_joint of every joint, time: (n,)}. residual:
+            (n,), zero where `use` (n,) is not set.
+        fold: (n,) number of each row's fold. piece: (n,) of its piece, ascending.
+    """
+    spans = stretches(fold, known["time"], piece)
+    told_by = groups(known, joint, piece, step, rng)
+    tried = {name: predicted(values, residual, use, spans) for name, values in told_by.items()}
+    best = max(tried, key=lambda name: tried[name][1].sum())
+    told, gain = tried[best]
+    memory = blocks.memory((residual - told)[:, None], use[:, None], piece, step)
+    number = blocks.numbered(known["time"], piece, memory=memory)
+    # as many questions as groups of functions
+    chance = min(
+        1.0,
+        len(tried) * min(blocks.slope_chance(one, residual, number) for one, _ in tried.values()),
+    )
+    total = max(float(np.sum(residual**2)), 1e-300)
+    shares = {name: float(one[1].sum() / total) for name, one in tried.items() if name != "*"}
+    share, by_chance = _tone(residual, step)
+    if by_chance < TONE:
+        shares["a steady tone"] = share
+    return Unknown(gain, told, shares, total, chance, tone=share if by_chance < TONE else 0.0)
+
+
+def _tone(residual, step: float) -> tuple[float, float]:
+    """The share of a residual's square that its strongest line holds, and the probability of such a
+    line above the spectrum about it, were it noise of any smooth colour (Fisher 1929, against a
+    local median)."""
+    from scipy.ndimage import median_filter
+
+    n = len(residual)
+    power = np.abs(np.fft.rfft(residual * np.hanning(n))) ** 2
+    width = max(9, int(2.0 * n * step) | 1)  # two hertz
+    level = median_filter(power, width) / np.log(2.0)
+    ratio = np.where(
+        np.arange(len(power)) > n * step, power / np.maximum(level, 1e-300), 0.0
+    )  # slower than 1 Hz is drift
+    at = int(np.argmax(ratio))
+    near = slice(max(0, at - 2), at + 3)
+    return float(power[near].sum() / max(power.sum(), 1e-300)), float(
+        min(1.0, len(power) * np.exp(-min(ratio[at], 700.0)))
+    )

@@ -1,0 +1,19 @@
+"""Logs -> the domain in which a model is questioned: one low-pass over both sides, standstill left
+out.
+
+Whatever filter a fit uses, structure that only the filter made must not be taken for physics, and
+single samples of noise must not hide it. So angles are lightly smoothed and differentiated, and
+then torque and every predicted column go through one and the same zero-phase Gaussian low-pass,
+whose memory is short and finite; rows where a joint stands still, where friction is whatever
+balances the rest, are left out for that joint, widened by what the filters see of them.
+
+    gaussian.py  the low-pass
+    motion.py    logs under it, and the band that a motion asks for
+    angles.py    the noise of the angles: how large it is, and drawn once more
+"""
+
+from .angles import rougher
+from .gaussian import Gaussian
+from .motion import LEAST, lowpassed, narrowed, stride_of, widest
+
+__all__ = ["LEAST", "Gaussian", "lowpassed", "narrowed", "rougher", "stride_of", "widest"]

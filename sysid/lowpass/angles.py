@@ -1,0 +1,79 @@
+"""White noise on angles: its size, and a log with more of it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .gaussian import HIGHEST, Gaussian
+
+_WINDOW = 0.1  # s
+_FEWEST = 50  # steps; and counts of a grain beyond which any number is near a whole one
+
+
+def noise_of(q, smooth, taken: float, step: float) -> np.ndarray:
+    """RMS (dof,) of white noise on angles q (n, dof): the lesser of what a low-pass took off and of
+    what third differences show, as either may hold motion too; each in the middle of all windows of
+    time, as about a reversal there is more."""
+    taken_off, differences_ = (_by_window(v, step) for v in ((q - smooth) / taken, _third(q)))
+    return np.minimum(np.median(taken_off, axis=0), np.median(differences_, axis=0))
+
+
+def _third(q) -> np.ndarray:
+    """Third differences of angles q (n, dof), as large as white noise on them."""
+    return np.diff(q, 3, axis=0) / np.sqrt(20.0)  # 1 + 9 + 9 + 1
+
+
+def _by_window(values, step: float) -> np.ndarray:
+    """RMS (windows, dof) of values (n, dof) in windows of time."""
+    parts = np.array_split(values, max(1, len(values) // max(8, round(_WINDOW / step))))
+    return np.sqrt([np.mean(own**2, axis=0) for own in parts])
+
+
+def rougher(segment, noise, cutoff: float, rng: np.random.Generator) -> np.ndarray:
+    """The angles (n, dof) of a segment with their noise once more.
+
+    White noise of RMS `noise` (dof,) in the middle of the log and elsewhere as much more or less
+    as third differences say: stamps that jitter make it grow with the speed. Of an angle that its
+    encoder rounds, what rounding makes of the smoothed angle, and of the noise before it, on a grid
+    shifted by a random part of its grain: in slow motion that is no white noise.
+
+    Args:
+        cutoff: [Hz] above which the angle holds no motion.
+    """
+    from scipy.ndimage import median_filter
+
+    q = segment.q
+    local = median_filter(_by_window(_third(q), segment.step), size=(5, 1), mode="nearest")
+    middle = np.median(local, axis=0)
+    at = np.linspace(0, len(q) - 1, len(local) + 1)
+    at = 0.5 * (at[1:] + at[:-1])
+    profile = np.stack(
+        [
+            np.interp(np.arange(len(q)), at, one)
+            for one in (local / np.where(middle > 0, middle, 1.0)).T
+        ],
+        axis=1,
+    )
+    out = q + noise * profile * rng.normal(size=q.shape)
+    smooth = Gaussian(min(cutoff, HIGHEST / segment.step), segment.step)(q, axis=0)
+    for j, grain in enumerate(grains(q)):
+        if grain:
+            before = np.sqrt(max(noise[j] ** 2 - grain**2 / 12.0, 0.0)) * rng.normal(size=len(q))
+            truly = smooth[:, j] + grain * rng.uniform()
+            out[:, j] = q[:, j] + grain * np.round((truly + before) / grain) - truly
+    return out
+
+
+def grains(q) -> np.ndarray:
+    """(dof,) what angles q (n, dof) are rounded to, zero where they are not."""
+    out = np.zeros(q.shape[1])
+    for j, steps in enumerate(np.abs(np.diff(q, axis=0)).T):
+        steps = steps[steps > 1e-9 * np.ptp(q[:, j])]
+        if len(steps) <= _FEWEST:
+            continue
+        counts = steps / steps.min()
+        # files round what is rounded; of any other numbers one in fifty comes that near to a count
+        near = np.abs(counts - np.round(counts)) < 0.01 * np.maximum(counts, 1.0)
+        if np.mean(near) > 0.99 and np.mean(counts < _FEWEST) > 0.5:
+            out[j] = np.median(steps / np.round(counts))
+    return out

@@ -1,0 +1,149 @@
+"""Logs as a motion under one low-pass on both sides, and the band that it asks for."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ..events import mended
+from ..log import Log
+from ..preprocess import (
+    Motion,
+    Piece,
+    assembled,
+    differences,
+    share_left_out,
+    standstill_speed,
+    turns,
+    without_events,
+    without_standstill,
+)
+from .angles import noise_of
+from .gaussian import HIGHEST, Gaussian
+
+LEAST = 15.0  # Hz: where friction's laws and ripple still show, several times what an arm moves at
+_MOTION = 4.0  # and this many times the motion's own bandwidth, if that is more
+_SHARE = 0.25  # of the residual's power may be made by the angles' noise at the end of the band
+# the angles' own low-pass, as a multiple of the cutoff: derivatives need some, laws of motion none
+_ANGLES = 4.0
+# how far both low-passes see, as a multiple of the torque's own: the angles' sees a quarter as far
+_SIGHT = 1.25
+# Laws are evaluated at this many samples a cycle of the cutoff: what is steeper than that, friction
+# at a reversal, is left out anyway.
+_SAMPLES_PER_CYCLE = 16.0
+_ROWS_PER_CYCLE = 6.67  # 100 Hz at 15 Hz
+MOST_ROWS = 12_000
+
+
+def lowpassed(logs: Sequence[Log], joints: tuple[str, ...], cutoff: float) -> Motion | None:
+    """Logs as a motion under one low-pass on both sides; None where they are too short for it."""
+    pieces = []
+    for number, log in enumerate(logs):
+        for segment in log.segments:
+            # spikes are mended before the low-pass, which would spread them; of the rest, rows see
+            # what both low-passes see
+            clean = (
+                replace(segment, tau=mended(segment, log.events, joints)) if log.events else segment
+            )
+            if (piece := _piece(number, log.name, clean, cutoff)) is not None:
+                torque = piece.smoother.reach * piece.step
+                angles = _SIGHT * torque + 2.0 * segment.step
+                pieces.append(
+                    without_events(piece, log.events, joints, angles, torque)
+                    if log.events
+                    else piece
+                )
+    if not pieces:
+        return None
+    disturbed = share_left_out(pieces)
+    threshold = standstill_speed(pieces)
+    # where the speed changes its sign between two samples, the angles' noise says in which:
+    # friction's jump is as uncertain
+    still = [np.where(turns(piece.qd), np.inf, threshold) for piece in pieces]
+    reach = [round(_SIGHT * piece.smoother.reach) for piece in pieces]
+    motion = assembled(joints, [without_standstill(*each) for each in zip(pieces, still, reach)])
+    return replace(
+        motion, events=tuple(event for log in logs for event in log.events), disturbed=disturbed
+    )
+
+
+def widest(logs: Sequence[Log]) -> float:
+    """Cutoff [Hz] that the motion itself asks for: several times the frequency below which its
+    speeds stay."""
+    bands = [0.0]
+    for segment in (s for log in logs for s in log.segments if len(s.t) > 50):
+        speed = np.diff(segment.q, axis=0)
+        speed = speed[:, np.ptp(segment.q, axis=0) > 1e-3 * np.ptp(segment.q, axis=0).max()]
+        if not speed.size:
+            continue
+        power = np.abs(np.fft.rfft(speed * np.hanning(len(speed))[:, None], axis=0)) ** 2
+        power = np.cumsum([_without_noise(one) for one in power.T], axis=1)
+        if (power[:, -1] > 0).all():
+            # the first frequency below which 99 % stand: less the noise, sums rise and fall
+            last = np.argmax(power >= 0.99 * power[:, -1:], axis=1).max()
+            bands.append(float(last / (len(speed) * segment.step)))
+    return max(LEAST, _MOTION * float(np.median(bands[1:] or bands)))
+
+
+def _without_noise(power: np.ndarray) -> np.ndarray:
+    """A spectrum (frequencies,) of an angle's differences, less what noise makes of it: white noise
+    on the angle grows with the square of frequency, stamps that jitter make white noise of the
+    speed. The upper half of the band, where no arm moves, tells."""
+    from scipy.optimize import nnls
+
+    angle = np.sin(0.5 * np.pi * np.linspace(0.0, 1.0, len(power))) ** 2
+    shape = np.stack([np.ones(len(power)), angle], axis=1)
+    upper = slice(len(power) // 2, None)
+    scale = max(float(power[upper].max()), 1e-300)
+    return power - shape @ nnls(shape[upper], power[upper] / scale)[0] * scale
+
+
+def narrowed(cutoff: float, share: float) -> float:
+    """The cutoff at which the angles' noise makes no more than a quarter of the residual's power,
+    where at `cutoff` it makes `share`: its density grows with the fourth power of frequency, as
+    acceleration does."""
+    return cutoff * min(1.0, (_SHARE / max(share, 1e-12)) ** 0.25)
+
+
+def stride_of(motion: Motion, cutoff: float) -> int:
+    """Every how many samples a row is kept: several a cycle of the cutoff, and no more than fit in
+    memory."""
+    step = float(np.median([piece.step for piece in motion.pieces]))
+    fine = max(1, round(1.0 / (step * cutoff * _ROWS_PER_CYCLE)))
+    return max(fine, -(-motion.samples // MOST_ROWS))
+
+
+def _piece(number: int, source: str, segment, cutoff: float) -> Piece | None:
+    rate = 1.0 / segment.step
+    every = max(1, int(rate / (_SAMPLES_PER_CYCLE * cutoff)))
+    both = Gaussian(min(cutoff, HIGHEST * rate), segment.step)
+    settling = Gaussian(both.cutoff, every * segment.step)
+    angles = Gaussian(min(_ANGLES * cutoff, HIGHEST * rate), segment.step)
+    edge = angles.reach + 2
+    rows = slice(edge, len(segment.t) - edge, every)
+    n = len(range(*rows.indices(len(segment.t))))
+    if n < 6 * settling.reach + 20:
+        return None
+    smooth = angles(segment.q, axis=0)
+    qd, qdd = differences(smooth, segment.step)
+    return Piece(
+        log=number,
+        step=every * segment.step,
+        t=segment.t[rows],
+        q=smooth[rows],
+        qd=qd[rows],
+        qdd=qdd[rows],
+        tau=both(segment.tau, axis=0)[rows],
+        measured=segment.tau[rows],
+        signals={name: values[rows] for name, values in segment.signals.items()},
+        use=None,
+        smoother=settling,
+        core=slice(settling.reach, n - settling.reach),
+        rest=np.zeros(smooth.shape[1]),
+        noise=noise_of(
+            segment.q[edge:-edge], smooth[edge:-edge], angles.taken_of_noise, segment.step
+        ),
+        source=source,
+    )

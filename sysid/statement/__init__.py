@@ -1,0 +1,7 @@
+"""What a diagnosis says, as others read it.
+
+document.py  the JSON document
+text.py      the verdict on each joint, in lines
+tables.py    what it rests on, in tables
+changes.py   the JSON document of what changed on a new log
+"""

@@ -1,0 +1,194 @@
+"""A diagnosis as the JSON document that the contract has, and more."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..diagnose.claims import Claim, Finding
+from ..diagnose.diagnosis import Diagnosis
+from ..diagnose.verdict import Verdict
+from ..flexible import Unknown
+from ..model import ROBOT
+from ..results import number, versions
+
+
+def document(found: Diagnosis, run="") -> dict:
+    """The document of `sysid diagnose`. NaN is None."""
+    fit, joints = found.fit, found.fit.joints
+    rms = {part: fit.rms(part) for part in ("train", "test")}
+    return {
+        "joints": {
+            v.joint: {
+                "rms": {part: rms[part][v.joint] for part in rms},
+                **_floor(found.floors[v.joint]),
+                "status": v.status,
+            }
+            for v in found.verdict
+        },
+        "findings": [_finding(f, claim, found) for claim in found.claims for f in claim.findings],
+        "verdict": [_verdict(v) for v in found.verdict],
+        "detectable": [
+            {
+                "effect": d.candidate.name,
+                "joint": _joint(d.candidate, joints),
+                "parameter": d.parameter,
+                "size": d.size,
+                "unit": d.unit,
+                "power": d.power,
+            }
+            for d in found.detectable
+            if d.size is not None
+        ],
+        "absorbed": [
+            {
+                "effect": d.candidate.name,
+                "joint": _joint(d.candidate, joints),
+                "separate_by": d.candidate.effect.separate_by,
+            }
+            for d in found.detectable
+            if d.size is None
+        ],
+        "events": [
+            {
+                "kind": e.kind,
+                "log": e.log,
+                "start": float(e.start),
+                "stop": float(e.stop),
+                "joints": list(e.joints),
+            }
+            for e in found.events
+        ],
+        "fails_where": [
+            {
+                "joint": f.joint,
+                "share_of_error": f.share,
+                "words": f.words(),
+                "regions": [
+                    {
+                        "variable": r.variable,
+                        "unit": r.unit,
+                        "low": r.low,
+                        "high": r.high,
+                        "share_of_error": r.error,
+                        "share_of_rows": r.rows,
+                    }
+                    for r in f.regions
+                ],
+                "map": {key: plain(values) for key, values in f.map.items()},
+                "time": {key: plain(values) for key, values in f.time.items()},
+                "frequency": {key: plain(values) for key, values in f.frequency.items()},
+            }
+            for f in found.failures
+        ],
+        "low_pass": {
+            "cutoff_hz": found.view.cutoff,
+            "rms_test_before": dict(zip(joints, found.first.rms().tolist())),
+            "rms_test_after": dict(zip(joints, found.last.rms().tolist())),
+        },
+        "not_claimed": [
+            {"effect": r.effect, "joint": r.joint, "why": r.why} for r in found.refused
+        ],
+        "notices": [*fit.notices, *found.notices],
+        "logs": list(fit.logs),
+        "versions": versions(),
+        "run": str(run),
+    }
+
+
+def _joint(candidate, joints) -> str:
+    return "*" if candidate.joint == ROBOT else joints[candidate.joint]
+
+
+def _floor(floor) -> dict:
+    return {
+        "noise_floor": floor.rms,
+        "noise_floor_se": None if floor.rms is None else number(floor.std),
+        "floor_method": floor.method,
+        "floor_detail": floor.detail,
+        "noise_floor_within": [floor.low, floor.high],
+    }
+
+
+def _finding(f: Finding, claim: Claim, found: Diagnosis) -> dict:
+    before, after = f.rms_before**2, f.rms_after**2
+    names = found.fit.joints if f.joint == "*" else [f.joint]
+    levels = [found.floors[j].rms for j in names]
+    floor = (
+        np.mean([level**2 for level in levels])
+        if None not in levels
+        else min(after, claim.after_square(names))
+    )
+    misfit = max(before - floor, abs(before - after), 1e-9 * before, 1e-300)
+    return {
+        "effect": f.effect,
+        "joint": f.joint,
+        "options": dict(f.candidate.options),
+        "probability": f.probability,
+        "q_value": f.p,
+        "rms_test_before": f.rms_before,
+        "rms_test_after": f.rms_after,
+        "misfit_removed": float((before - after) / misfit),
+        "misfit_removed_se": number(2.0 * f.rms_after * f.fall_se / misfit),
+        "parameters": {
+            name: {"value": number(v), "std": number(s), "unit": u}
+            for name, (v, s, u) in f.parameters.items()
+        },
+        "tied_with": list(f.tied_with),
+        "separate_by": f.candidate.effect.separate_by,
+        "command": f.command,
+        "joins_as_step": None if f.step is None else f.step + 1,
+    }
+
+
+def _verdict(v: Verdict) -> dict:
+    out: dict = {"joint": v.joint, "status": v.status}
+    if v.status in ("missing", "unknown") and v.claims:
+        first = v.claims[0]
+        named = {
+            "effect": first.head.effect,
+            "tied_with": list(first.head.tied_with),
+            "command": first.head.command,
+            "set": [{"effect": e, "joint": j, "probability": p} for e, j, p in first.set],
+            "explained": number(v.explained),
+        }
+        also = [c.head.effect for c in v.claims[1:]]
+        out |= (
+            {**named, "also": also}
+            if v.status == "missing"
+            else {"also": [first.head.effect, *also]}
+        )
+        out["commands"] = [c.head.command for c in v.claims]
+    elif v.status == "unknown":
+        out["also"] = []
+    if v.status == "missing" and out["explained"] is None:
+        out["explained"] = 0.0
+    if v.status == "explained":
+        out |= {
+            "by": [{"effect": c.head.effect, "joint": c.head.joint} for c in v.claims],
+            "explained": number(v.explained),
+        }
+    if v.says or v.carries:
+        out["says"] = "; ".join(words for words in (v.says, v.carries) if words)
+    if v.left is not None:
+        out |= {"depends_on": dependences(v.left), "share_left": v.left.share}
+    return out
+
+
+def dependences(found: Unknown) -> list[dict]:
+    """What a residual follows: variables with the share of its square that functions of each alone
+    predict, largest first; where none does, all of them together."""
+    alone = sorted(
+        ((share, name) for name, share in found.shares.items() if share > 0.02), reverse=True
+    )
+    out = [{"variable": name, "share": float(share)} for share, name in alone[:4]]
+    return out or [{"variable": "several variables together", "share": found.share}]
+
+
+def plain(values):
+    """Arrays as lists, NaN as None."""
+    array = np.asarray(values)
+    return (
+        [[number(v) for v in row] for row in array.tolist()]
+        if array.ndim == 2
+        else [number(v) for v in array.tolist()]
+    )
