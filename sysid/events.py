@@ -81,7 +81,7 @@ def find(segment: Segment, joints: Sequence[str], *, log: str = "") -> tuple[Eve
             tell("brake", 0, len(q) - 1, [j])
         for first, last in held_angle(q):
             tell("frozen", first, last, [j], "position")
-    for first, last, members in knocks(segment.q, calm, segment.step):
+    for first, last, members in knocks(segment.q, calm, segment.step, spiked=segment.tau):
         tell("knock", first, last, members, "both")
     return tuple(sorted(found, key=lambda event: (event.start, event.stop, event.kind)))
 

@@ -117,16 +117,44 @@ def test_knocks_are_found_where_they_are(conditions):
 
 
 def test_a_knock_that_most_joints_show_a_little_is_one():
-    """Seven joints; what is too little on any two of them is a knock where most show it, and none on three."""
+    """Seven joints: what is too little on any two is a knock where most show it in angle and torque."""
     parts = [segment(seed=seed) for seed in range(3)]
-    q, tau = (np.concatenate([getattr(p, name) for p in parts], axis=1)[:, :7] for name in ("q", "tau"))
-    made = replace(parts[0], q=q, tau=tau)
-    names = tuple("abcdefg")
+    q, tau = (np.concatenate([getattr(p, n) for p in parts], axis=1)[:, :7] for n in ("q", "tau"))
+    made, names = replace(parts[0], q=q, tau=tau), tuple("abcdefg")
+    rung = with_knock(segment(), 5.0, 1.0)
+    torque, angle = (x[:, :1] for x in (rung.tau - parts[0].tau, rung.q - parts[0].q))
     assert find(made, names) == ()
-    ring = with_knock(segment(), 5.0, 1.0).tau[:, 0] - segment().tau[:, 0]
-    for count, found in ((6, 1), (3, 0), (1, 0)):
-        shaken = replace(made, tau=tau + 2.0 * ring[:, None] * (np.arange(7) < count))
-        assert [event.kind for event in find(shaken, names)] == ["knock"] * found
+    for count, found in ((6, 1), (3, 0)):
+        own = np.arange(7) < count
+        shaken = replace(made, tau=tau + torque * own, q=q + 0.05 * angle * own)
+        events = find(shaken, names)
+        assert [event.kind for event in events] == ["knock"] * found
+        assert not found or set(events[0].joints) <= set(names[:6])
+
+
+def test_a_wrong_stamp_that_all_angles_show_a_little_is_no_knock():
+    """All angles are late at once, and no torque is."""
+    made, wide = segment(noise=0.3), lambda x: np.concatenate([x, x, x], axis=1)[:, :7]
+    late = np.zeros(len(made.t))
+    late[5000:5016] = 4e-4 * np.hanning(16)
+    q = wide(made.q + late[:, None] * np.gradient(made.q, made.t, axis=0))
+    q = q + 1e-5 * np.random.default_rng(0).normal(size=q.shape)
+    assert find(replace(made, q=q, tau=wide(made.tau)), tuple("abcdefg")) == ()
+
+
+def test_spikes_of_most_joints_at_once_are_a_knock():
+    """Of one joint alone they are spikes."""
+    parts = [segment(seed=seed) for seed in range(3)]
+    q, tau = (np.concatenate([getattr(p, n) for p in parts], axis=1)[:, :7] for n in ("q", "tau"))
+    rung = with_knock(segment(), 5.0, 1.0)
+    for count, knocks in ((5, 1), (1, 0)):
+        own = np.arange(7) < count
+        angles = q + 0.1 * (rung.q - parts[0].q)[:, :1] * own
+        hit = tau.copy()
+        hit[[5010, 5030, 5050]] += 8.0 * own
+        events = find(replace(parts[0], q=angles, tau=hit), tuple("abcdefg"))
+        assert sum(e.kind == "knock" for e in events) == knocks
+        assert {e.joints[0] for e in events if e.kind == "spike"} == set("abcdefg"[:count])
 
 
 def test_a_disturbance_of_one_joint_alone_is_no_knock():

@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 
 from sysid import pipeline
+from sysid.comparison import Difference
+from sysid.diagnose import claims
 from sysid.diagnose.ask import ask
 from sysid.diagnose.candidates import candidates
 from sysid.diagnose.detectable import detectable
@@ -52,6 +54,17 @@ def elbow(first: float, claims=(), *, rest=NOISE, before=NOISE, level=None, refu
     found = verdicts(fitted(first, train=train), claims, [NOISE, rest], [NOISE, before], [floor(), level or floor()], refused)
     assert [v.joint for v in found] == list(JOINTS) and found[0].status in ("complete", "explained")
     return found[1]
+
+
+@pytest.mark.parametrize(
+    ("fall", "size", "stands"), [(0.5, 0.001, True), (0.001, 0.5, True), (0.001, 0.001, False), (-0.001, 0.5, False)]
+)  # fmt: skip
+def test_what_is_nothing_in_size_and_error_is_not_claimed(monkeypatch, fall, size, stands):
+    """Errors are told to 0.01, the size to 0.1; one that is not determined says nothing."""
+    monkeypatch.setattr(claims.comparison, "compare", lambda *_: [Difference("", "", "elbow", -fall, 0.01)])
+    monkeypatch.setattr(claims, "_parameters", lambda *_: {"T": (size, 0.1, "s"), "k": (3.0, float("nan"), "1")})
+    member = SimpleNamespace(candidate=SimpleNamespace(joint=1))
+    assert (claims._nothing(fitted(1.0, train=1.0), fitted(1.0, train=0.9), member) is None) is stands
 
 
 @pytest.mark.parametrize("error", [1.0, 1.3])

@@ -144,6 +144,8 @@ def _nothing(before: Fit, after: Fit, member: Member) -> str | None:
         change = comparison.together(before, after)
         return None if change.delta_rms < 0.0 else f"with it the error on the test logs does not fall ({100 * change.delta_rms:+.2g} % over all joints)"
     (change,) = (d for d in comparison.compare(before, after) if d.joint == joint)
+    if -change.delta_rms < change.se and _nought(_parameters(before, after, member)):
+        return "its size is nothing beside its standard deviation, and the error on the test logs stays what it was"
     return None if change.delta_rms < 0.0 else f"with it the error on the test logs does not fall ({change.delta_rms:+.3g})"
 
 
@@ -156,10 +158,15 @@ def undecided(choice, fit: Fit) -> Refused:
     )  # fmt: skip
 
 
+def _nought(parameters: dict[str, tuple[float, float, str]]) -> bool:
+    """Whether all of an effect's parameters that are determined are nothing beside their standard deviations."""
+    known = [abs(value) <= _CLEAR * std for value, std, _ in parameters.values() if np.isfinite(std)]
+    return bool(known) and all(known)
+
+
 def hidden_by_weights(found: Finding, fit: Fit) -> str | None:
     """What to know where the fit, in which all joints count alike, does not tell the size of an effect that is there."""
-    known = [abs(value) <= _CLEAR * std for value, std, _ in found.parameters.values() if np.isfinite(std)]
-    if fit.weights is not None or not known or not all(known):
+    if fit.weights is not None or not _nought(found.parameters):
         return None
     return (
         f"{found.effect} on {found.joint} is there, but this fit tells its size badly: joints with more noise count as much as quiet "

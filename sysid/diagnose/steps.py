@@ -61,6 +61,10 @@ def revised(first: View, steps: list[Step], worth: float) -> list[Step]:
     Args:
         first: the view before all steps.
     """
+    # what came again with more to it has taken the place of what was there
+    last = {step.candidate.key: step for step in steps}
+    if len(last) < len(steps):
+        steps = _rejoined(first, [step for step in steps if last[step.candidate.key] is step])
     for _ in range(2 * len(steps)):  # two that speak for each other could take turns for ever
         steps, changed = _revised_once(first, steps, worth)
         if not changed:
