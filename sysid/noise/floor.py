@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from . import outliers, repeats
+from . import bursts, outliers, repeats
 from .motion_functions import Kinematics, kinematics
 from .of_angles import OfAngles
 from .pursuit import Functions
@@ -190,7 +190,9 @@ def _rest(shared: _Shared, raw, torque, joint: int, drawn):
         predicted = [low(p, highest, step) for p, step in zip(predicted, steps)]
     asked = Functions(shared.calm, shared.motion, predicted, joint, shared.bandwidth)
     rest, _, _ = asked.removed_from(raw, [run.counts for run in runs])
-    kept = outliers.away_from_reversals(runs, shared.motion.v, rest, [run.counts for run in runs])
+    usual = outliers.usual(rest, drawn, steps, shared.bandwidth)
+    kept = bursts.calm(rest, [run.counts for run in runs], steps, usual)
+    kept = outliers.away_from_reversals(runs, shared.motion.v, rest, kept)
     rest = [bridged(v, k) for v, k in zip(rest, kept)]
     digit = outliers.digit_of(np.concatenate([m[run.counts] for m, run in zip(torque, runs)]))
     kept, _ = outliers.without(rest, kept, steps, shared.bandwidth, digit, drawn)

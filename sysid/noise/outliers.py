@@ -46,11 +46,11 @@ def without(
             continue
         usual = [np.full(len(d), typical) for d in steps_of]
         if drawn is not None:
-            local = [
-                _local(_step(v, k, width), 0.5 / (bandwidth * step))
-                for v, k, step in zip(drawn, kept, steps)
-            ]
-            usual = _by_local(steps_of, local, typical)
+            spans = [0.5 / (bandwidth * step) for step in steps]
+            local = [_local(_step(v, k, width), n) for v, k, n in zip(drawn, kept, spans)]
+            # so few independent values tell it: two standard errors of theirs are usual
+            unsure = [1.0 + 2.0 / math.sqrt(2.0 * max(n / (2 * width + 1), 1.0)) for n in spans]
+            usual = _by_local(steps_of, local, typical, unsure)
         found = []
         for d, k, scale in zip(steps_of, kept, usual):
             most = np.maximum(_OUTLYING * scale, _DIGITS * digit)
@@ -67,19 +67,32 @@ def without(
     return kept, values
 
 
+def usual(values, drawn, steps, bandwidth: float):
+    """The size (n,) of each run's noise where `drawn` (n,) says that it differs from row to row;
+    None where nothing is drawn."""
+    if drawn is None:
+        return None
+    typical = float(np.median(np.abs(np.concatenate(values)))) / _NORMAL
+    local = [_local(v, 0.5 / (bandwidth * step)) for v, step in zip(drawn, steps)]
+    found = _by_local(values, local, typical, [1.0] * len(local)) if typical > 0.0 else None
+    return found if found is not None and all((v > 0.0).all() for v in found) else None
+
+
 def _local(values: np.ndarray, samples: float) -> np.ndarray:
     """RMS (n,) of values over so many samples about each, nan counting for nothing."""
     from scipy.ndimage import uniform_filter1d
 
     size = max(3, 2 * round(0.5 * samples) + 1)
-    return np.sqrt(
-        np.maximum(uniform_filter1d(np.nan_to_num(values) ** 2, size, mode="nearest"), 0.0)
-    )
+    square = uniform_filter1d(np.nan_to_num(values) ** 2, size, mode="nearest")
+    return np.sqrt(np.maximum(square, 0.0))
 
 
-def _by_local(values: list[np.ndarray], local: list[np.ndarray], typical: float):
+def _by_local(
+    values: list[np.ndarray], local: list[np.ndarray], typical: float, unsure: list[float]
+) -> list[np.ndarray]:
     """The usual size (n,) of values that are white noise plus some multiple of noise whose size is
-    `local` (n,) of each run: from medians among values where it is alike."""
+    `local` (n,) of each run: from medians among values where it is alike. `unsure`: by how much
+    that of each run may be too small."""
     from scipy.optimize import nnls
 
     every, size = np.concatenate(values), np.concatenate(local)
@@ -94,7 +107,9 @@ def _by_local(values: list[np.ndarray], local: list[np.ndarray], typical: float)
     weight = 1.0 / np.maximum(usual, 1e-6 * usual.max())  # each median is as sure as it is large
     white, more = nnls(shape * weight[:, None], usual * weight)[0]
     more = min(more, _KNOWN)
-    return [np.sqrt(white * typical**2 + more * own**2) for own in local]
+    return [
+        np.sqrt(white * typical**2 + more * (u * own) ** 2) for own, u in zip(local, unsure)
+    ]
 
 
 def _step(values: np.ndarray, counts: np.ndarray, width: int) -> np.ndarray:

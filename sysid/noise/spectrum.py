@@ -28,8 +28,9 @@ _SLOWEST = 0.3  # Hz, corner of the slowest noise; slower is drift
 _LEFT_BEHIND, _MISTAKEN, _COLOURS = 0.015, 0.25, 0.03
 # What the angles' noise makes: share of a band's power below which it is nothing; ordinates that
 # its size counts as known by (a draw has 0.6 to 1.7 of its RMS on simulated logs whose stamps
-# jitter: half a log unit, each way); and bands over which a draw is smoothed.
-_NOTHING, _DRAWN, _SMOOTH = 0.01, 2.0, 2.0
+# jitter: half a log unit, each way); bands over which a draw is smoothed; and the relative error
+# of its part of the RMS, as it is no stationary noise: calibrated on the same logs.
+_NOTHING, _DRAWN, _SMOOTH, _CARRIED = 0.01, 2.0, 2.0, 0.07
 _ROUNDS = 40  # of which two parts need more
 _TINY = 1e-300
 
@@ -168,6 +169,7 @@ def weighed(
     mean = float(chance @ estimate)
     spread = (estimate - mean) ** 2 + doubt * (1.0 - doubt) * doubtful**2
     sampled = float(chance @ sampling) + (2.0 * _COLOURS * mean) ** 2
+    sampled += (2.0 * _CARRIED * min(mean, float(made @ width))) ** 2
     parts = {
         "noise slower than the motion cannot be told from misfit": float(chance @ spread),
         "the log is too short for how slow its noise is": sampled,
