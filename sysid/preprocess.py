@@ -16,6 +16,7 @@ import numpy as np
 from .config import PreprocessSpec
 from .errors import ConfigError, LogError, SysidWarning
 from .events import Event, mended, usable
+from .jumps import jumps
 from .log import Log, Segment
 
 # `standstill: mask` leaves a joint's rows out below this share of its own rms speed, at most 0.03 rad/s or m/s:
@@ -344,7 +345,8 @@ def without_standstill(piece: Piece, threshold, reach: int) -> Piece:
 
 
 def clear_of_reversals(pieces, spec: PreprocessSpec) -> list[Piece]:
-    """The pieces without each joint's rows that the filter has bent about its reversals, or in which it may stand still.
+    """The pieces without each joint's rows that the filter has bent about its reversals and jumps of its torque, or in which it
+    may stand still.
 
     A joint may stand where its speed changes sign; where it is less than the filter makes of a stop amid accelerations as
     large as those about it; and where the angle travels less, while the filter sees it, than its own noise would make it.
@@ -359,7 +361,8 @@ def clear_of_reversals(pieces, spec: PreprocessSpec) -> list[Piece]:
         reach, stop = smoother.smear(piece.smoother is not None)
         seen = (2 * smoother.reach + 1) * piece.step
         threshold = np.maximum(stop * _largest_about(piece.qdd, smoother.reach), _NOISE_TRAVEL * piece.noise / seen)
-        out.append(without_standstill(piece, np.where(turns(piece.qd), np.inf, threshold), reach))
+        bent = turns(piece.qd) | jumps(piece.measured, smoother.reach)
+        out.append(without_standstill(piece, np.where(bent, np.inf, threshold), reach))
     return out
 
 

@@ -355,3 +355,50 @@ def test_seven_joints_of_twenty_seconds_at_a_kilohertz_take_a_second():
     start = time.process_time()
     assert all(f.rms == pytest.approx(1.0, rel=0.05) for f in floors([e], [e + torque(q, step)], [q], [step]))
     assert time.process_time() - start < 2.0  # measured 0.6 s; a machine may be slower
+
+
+def clock(q, step, rng, late: float):
+    """What a stamp that is wrong by `late` [s] RMS adds to the angles, and, through differences
+    over 0.1 s and an inertia of 2, to the torque that a model predicts."""
+    from scipy.signal import savgol_filter
+
+    wrong = late * rng.normal(size=q.shape) * np.gradient(q, step, axis=0)
+    smooth = lambda d: savgol_filter(wrong, 11, 4, deriv=d, delta=step, axis=0)  # noqa: E731
+    return smooth(0), 2.0 * smooth(2)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_what_the_angles_noise_makes_is_noise_and_no_function_of_the_motion_takes_it(seed):
+    from sysid.noise import OfAngles
+
+    rng, step = np.random.default_rng(seed), 0.01
+    q = wandering(40.0, step, rng)
+    angle, made = clock(q, step, rng, 4e-4)
+    # drawn again with two thirds of the size: nobody knows it better
+    _, again = clock(q, step, rng, 2.7e-4)
+    residual = -made + 0.1 * made.std(axis=0) * rng.normal(size=q.shape)
+    truth = residual[:, 1].std()
+    residual = residual + 0.8 * truth * stribeck(q, step)[:, None] / stribeck(q, step).std()
+    seen = q + angle
+    args = [residual], [torque(seen, step) + residual], [seen], [step], 1
+    found_with = floor(*args, angles=OfAngles([again], 1.5))
+    assert found_with.rms == pytest.approx(truth, rel=0.2)
+    assert abs(found_with.rms - truth) < 3.0 * found_with.std
+    blind = floor(*args)
+    assert blind.rms is None or abs(blind.rms / truth - 1.0) > 0.2
+
+
+@pytest.mark.parametrize("shape", ["pulse", "ringing"])
+def test_bursts_of_a_knock_that_no_event_told_do_not_raise_it(shape):
+    rng, step = np.random.default_rng(5), 0.001
+    q = wandering(20.0, step, rng)
+    e = 0.2 * both(len(q), step, rng)
+    knocked = e.copy()
+    for place in (3000, 9000, 16000):
+        t = np.arange(90) * step
+        wave = np.sin(np.pi * t / 0.09) if shape == "pulse" else np.exp(-t / 0.03) * np.cos(2 * np.pi * 45.0 * t)
+        knocked[place : place + 90] += 10.0 * wave
+    assert knocked.std() > 1.5 * e.std()
+    residual = np.zeros_like(q)
+    residual[:, 1] = knocked
+    assert floor([residual], [torque(q, step) + residual], [q], [step], 1).rms == pytest.approx(e.std(), rel=0.1)

@@ -25,7 +25,7 @@ from ..estimate import Fit
 from ..failures import Failure, HeldOut, failures
 from ..filters import settled
 from ..lowpass import lowpassed
-from ..noise import NoiseFloor, filtered, floors_of
+from ..noise import NoiseFloor, filtered, floors_of, of_angles
 from ..preprocess import prepare
 from ..transfer import transfers
 from . import claims as claiming
@@ -110,7 +110,9 @@ def _floors(experiment: Experiment, fit: Fit, logs) -> list[NoiseFloor]:
     spec = settled(experiment.preprocess, fit.filters)
     pieces = [piece for part in logs for piece in prepare(part, spec, fit.joints).pieces]
     predicted = [fit.predictions[part].predicted for part in ("train", "test")]
-    return filtered(floors_of(pieces, np.concatenate(predicted)), pieces[0].smoother)
+    angles = of_angles(logs, spec, fit)
+    found = floors_of(pieces, np.concatenate(predicted), angles=angles)
+    return filtered(found, pieces[0].smoother)
 
 
 def _notices(claims, refused) -> Iterator[str]:

@@ -12,8 +12,11 @@ balances the rest, are left out for that joint, widened by what the filters see 
     angles.py    the noise of the angles: how large it is, and drawn once more
 """
 
-from .angles import rougher
+from .angles import angle_noise, rougher
 from .gaussian import Gaussian
-from .motion import LEAST, lowpassed, narrowed, stride_of, widest
+from .motion import LEAST, band, lowpassed, narrowed, stride_of, widest
 
-__all__ = ["LEAST", "Gaussian", "lowpassed", "narrowed", "rougher", "stride_of", "widest"]
+__all__ = [
+    "LEAST", "Gaussian", "angle_noise", "band", "lowpassed", "narrowed", "rougher", "stride_of",
+    "widest",
+]  # fmt: skip

@@ -7,6 +7,7 @@ import numpy as np
 from .gaussian import HIGHEST, Gaussian
 
 _WINDOW = 0.1  # s
+_BAND = 4.0  # the angles' own low-pass, as a multiple of the cutoff
 _FEWEST = 50  # steps; and counts of a grain beyond which any number is near a whole one
 
 
@@ -16,6 +17,17 @@ def noise_of(q, smooth, taken: float, step: float) -> np.ndarray:
     time, as about a reversal there is more."""
     taken_off, differences_ = (_by_window(v, step) for v in ((q - smooth) / taken, _third(q)))
     return np.minimum(np.median(taken_off, axis=0), np.median(differences_, axis=0))
+
+
+def angle_noise(segment, cutoff: float) -> np.ndarray:
+    """RMS (dof,) of white noise on the angles of a segment whose motion stays below `cutoff`
+    [Hz]; see `noise_of`. Of one too short to tell, zero."""
+    low = Gaussian(min(_BAND * cutoff, HIGHEST / segment.step), segment.step)
+    inside = slice(low.reach, -low.reach)
+    if len(segment.q[inside]) < _FEWEST:
+        return np.zeros(segment.q.shape[1])
+    smooth = low(segment.q, axis=0)[inside]
+    return noise_of(segment.q[inside], smooth, low.taken_of_noise, segment.step)
 
 
 def _third(q) -> np.ndarray:

@@ -72,7 +72,13 @@ def lowpassed(logs: Sequence[Log], joints: tuple[str, ...], cutoff: float) -> Mo
 def widest(logs: Sequence[Log]) -> float:
     """Cutoff [Hz] that the motion itself asks for: several times the frequency below which its
     speeds stay."""
-    bands = [0.0]
+    return max(LEAST, _MOTION * band(logs))
+
+
+def band(logs: Sequence[Log]) -> float:
+    """The frequency [Hz] below which the speeds of all joints stay, the noise of their angles
+    aside; zero where nothing moves."""
+    bands = []
     for segment in (s for log in logs for s in log.segments if len(s.t) > 50):
         speed = np.diff(segment.q, axis=0)
         speed = speed[:, np.ptp(segment.q, axis=0) > 1e-3 * np.ptp(segment.q, axis=0).max()]
@@ -84,7 +90,7 @@ def widest(logs: Sequence[Log]) -> float:
             # the first frequency below which 99 % stand: less the noise, sums rise and fall
             last = np.argmax(power >= 0.99 * power[:, -1:], axis=1).max()
             bands.append(float(last / (len(speed) * segment.step)))
-    return max(LEAST, _MOTION * float(np.median(bands[1:] or bands)))
+    return float(np.median(bands or [0.0]))
 
 
 def _without_noise(power: np.ndarray) -> np.ndarray:

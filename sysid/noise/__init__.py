@@ -8,10 +8,12 @@ without a perfect model.
     repeats.py           noise as the scatter between repeats of the motion
     spectrum.py          noise from the spectrum of the rest, weighed over models of its colour
     floor.py             all of it, and whether the answer is sure enough to be given
+    of_angles.py         what the noise of the angles makes of the torque, drawn once more
     of_pieces.py         the floors of a motion's pieces, and behind a fit's filter
 """
 
 from .floor import NoiseFloor, floor, floors
+from .of_angles import OfAngles, of_angles
 from .of_pieces import filtered, floors_of
 
-__all__ = ["NoiseFloor", "filtered", "floor", "floors", "floors_of"]
+__all__ = ["NoiseFloor", "OfAngles", "filtered", "floor", "floors", "floors_of", "of_angles"]

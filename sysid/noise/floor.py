@@ -11,11 +11,22 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from . import outliers, repeats
+from . import bursts, outliers, repeats
 from .motion_functions import Kinematics, kinematics
+from .of_angles import OfAngles
 from .pursuit import Functions
 from .spectrum import spectrum_of, weighed
-from .stretches import FEWEST_SAMPLES, Run, bandwidth_of, bridged, runs_of, whole
+from .stretches import (
+    FEWEST_SAMPLES,
+    SMOOTHING,
+    Run,
+    bandwidth_of,
+    bridged,
+    low,
+    runs_of,
+    smoothed,
+    whole,
+)
 
 #: standard error over RMS beyond which a floor is not given: two of them are the 25 % that one can
 #: judge an error by
@@ -59,6 +70,7 @@ class _Shared:
     """What joints have in common whose rows that count are the same."""
 
     runs: list[Run]
+    calm: list[Run]  # the same without what is faster than the motion
     motion: Kinematics | None
     bandwidth: float
     periods: list[float | None]  # of each stretch [samples]
@@ -67,6 +79,7 @@ class _Shared:
 def floor(
     residual: Sequence[np.ndarray], measured: Sequence[np.ndarray], q: Sequence[np.ndarray],
     step: Sequence[float], joint: int, *, use: Sequence[np.ndarray] | None = None,
+    angles: OfAngles | None = None,
 ) -> NoiseFloor:  # fmt: skip
     """The noise floor of one joint's torque as logged; never above the residual's own RMS.
 
@@ -82,21 +95,22 @@ def floor(
         joint: which column.
         use: (n,) or (n, dof) bool, rows that count; what stands in others is not looked at. None:
             all.
+        angles: what the noise of the angles, drawn once more, adds. None: nothing.
     """
-    return judged(estimate(residual, measured, q, step, joint, use=use))
+    return judged(estimate(residual, measured, q, step, joint, use=use, angles=angles))
 
 
 def floors(
     residual: Sequence[np.ndarray], measured: Sequence[np.ndarray], q: Sequence[np.ndarray],
     step: Sequence[float], *, use: Sequence[np.ndarray] | None = None,
+    angles: OfAngles | None = None,
 ) -> tuple[NoiseFloor, ...]:  # fmt: skip
     """The noise floors of all joints' torques; what `floor` says of each, at less cost. See
     there."""
     memory: dict[bytes, _Shared] = {}
     joints = range(residual[0].shape[1] if len(residual) else 0)
-    return tuple(
-        judged(estimate(residual, measured, q, step, j, use=use, memory=memory)) for j in joints
-    )
+    given = {"use": use, "memory": memory, "angles": angles}
+    return tuple(judged(estimate(residual, measured, q, step, j, **given)) for j in joints)
 
 
 def judged(found: Estimate) -> NoiseFloor:
@@ -110,7 +124,9 @@ def judged(found: Estimate) -> NoiseFloor:
     return NoiseFloor(found.rms, found.std, found.method, found.detail, low, high)
 
 
-def estimate(residual, measured, q, step, joint: int, *, use=None, memory=None) -> Estimate:
+def estimate(
+    residual, measured, q, step, joint: int, *, use=None, memory=None, angles=None
+) -> Estimate:
     """The floor of one joint and how sure it is. See `floor`."""
     lengths = [len(r) for r in residual]
     use = [np.ones(n, dtype=bool) for n in lengths] if use is None else _of_joint(use, joint)
@@ -122,7 +138,7 @@ def estimate(residual, measured, q, step, joint: int, *, use=None, memory=None) 
         return Estimate(own, own, "none", "", "no sample counts", own)
     if own <= 1e-12 * size:
         return _certain(own, "the model leaves nothing of the torque", own)
-    shared = _shared(q, step, use, {} if memory is None else memory)
+    shared = _shared(q, step, use, {} if memory is None else memory, angles)
     runs, bandwidth = shared.runs, shared.bandwidth
     if not runs:
         why = f"{len(inside)} samples, no {FEWEST_SAMPLES} of them together, are too few"
@@ -135,7 +151,12 @@ def estimate(residual, measured, q, step, joint: int, *, use=None, memory=None) 
         found = repeats.block_rms(np.concatenate([v[k] for v, k in zip(rest, kept)]) ** 2)
         words = "nothing moves: all but the residual's mean"
         return _bounded(*found, "spectral", words, "the log is too short", own)
-    rest, kept, number, removed = _rest(shared, raw, torque, joint)
+    drawn = None
+    if angles is not None:
+        again = _of_joint(angles.torque, joint)
+        drawn = [run.of(again[run.stretch]) for run in runs]
+        drawn = drawn if any(v.any() for v in drawn) else None
+    rest, kept, number, removed = _rest(shared, raw, torque, joint, drawn)
     if math.sqrt(max(np.mean(v**2) for v in rest)) <= 1e-12 * max(size, own):
         return _certain(0.0, "the residual is a constant, or a function of the motion", own)
     if any(period is not None for period in shared.periods):
@@ -146,26 +167,35 @@ def estimate(residual, measured, q, step, joint: int, *, use=None, memory=None) 
             count = int(lengths[k] / shared.periods[k] + 0.01)
             words = f"period of {shared.periods[k] * step[k]:.3f} s found, {count} repeats"
             return _bounded(*found, "repeats", words, "the repeats differ", own)
-    spectrum = spectrum_of(rest, kept, [run.step for run in runs])
+    steps = [run.step for run in runs]
+    spectrum = spectrum_of(rest, kept, steps)
+    made = None
+    if drawn is not None:
+        made = spectrum_of([bridged(v, k) for v, k in zip(drawn, kept)], kept, steps).density
     # what the functions took off was mostly in the band, noise as well as misfit
     freedom = 2.0 * bandwidth * sum(len(run.q) * run.step for run in runs)
     spectrum.density[spectrum.centre < bandwidth] /= 1.0 - min(0.5, number / max(freedom, 1.0))
-    found = weighed(spectrum, bandwidth, min(run.step for run in runs), removed)
+    found = weighed(spectrum, bandwidth, min(steps), removed, made)
     words = f"residual above {bandwidth:.2g} Hz, {found.colour}"
     return _bounded(found.rms, found.std, "spectral", words, found.doubt, own, found.least)
 
 
-def _rest(shared: _Shared, raw, torque, joint: int):
+def _rest(shared: _Shared, raw, torque, joint: int, drawn):
     """A residual (n,) of each run without what functions of the motion explain and without what no
     noise does; which rows (n,) are kept; how many functions there were and the power they took."""
     runs, steps = shared.runs, [run.step for run in shared.runs]
     predicted = [m - r for m, r in zip(torque, raw)]
-    asked = Functions(runs, shared.motion, predicted, joint, shared.bandwidth)
+    if shared.calm is not runs:
+        highest = SMOOTHING * shared.bandwidth
+        predicted = [low(p, highest, step) for p, step in zip(predicted, steps)]
+    asked = Functions(shared.calm, shared.motion, predicted, joint, shared.bandwidth)
     rest, _, _ = asked.removed_from(raw, [run.counts for run in runs])
-    kept = outliers.away_from_reversals(runs, shared.motion.v, rest, [run.counts for run in runs])
+    usual = outliers.usual(rest, drawn, steps, shared.bandwidth)
+    kept = bursts.calm(rest, [run.counts for run in runs], steps, usual)
+    kept = outliers.away_from_reversals(runs, shared.motion.v, rest, kept)
     rest = [bridged(v, k) for v, k in zip(rest, kept)]
     digit = outliers.digit_of(np.concatenate([m[run.counts] for m, run in zip(torque, runs)]))
-    kept, _ = outliers.without(rest, kept, steps, shared.bandwidth, digit)
+    kept, _ = outliers.without(rest, kept, steps, shared.bandwidth, digit, drawn)
     # once more, without what no noise does
     rest, number, removed = asked.removed_from(raw, kept)
     return [bridged(v, k) for v, k in zip(rest, kept)], kept, number, removed
@@ -189,12 +219,17 @@ def _of_joint(values, joint: int) -> list[np.ndarray]:
     return [x[:, joint] if x.ndim == 2 else x for x in map(np.asarray, values)]
 
 
-def _shared(q, step, use, memory: dict) -> _Shared:
+def _shared(q, step, use, memory: dict, angles) -> _Shared:
     key = b"".join(np.packbits(u).tobytes() for u in use)
     if key not in memory:
         runs = runs_of(q, step, use)
         looked = whole(runs, [run.counts for run in runs], [len(x) for x in q]) if runs else []
         periods = [repeats.period_of(x, counts) for x, counts in zip(q, looked)]
-        motion, bandwidth = (kinematics(runs), bandwidth_of(runs)) if runs else (None, 0.0)
-        memory[key] = _Shared(runs, motion, bandwidth, periods)
+        bandwidth = bandwidth_of(runs) if runs else 0.0
+        if angles is not None and 0.0 < angles.band < bandwidth:
+            bandwidth = angles.band
+        known = angles is not None and bandwidth > 0.0
+        calm = [smoothed(run, bandwidth) for run in runs] if known else runs
+        motion = kinematics(calm) if runs else None
+        memory[key] = _Shared(runs, calm, motion, bandwidth, periods)
     return memory[key]

@@ -6,21 +6,24 @@ from dataclasses import replace
 import numpy as np
 
 from .floor import NoiseFloor, floors
+from .of_angles import OfAngles
 
 
-def floors_of(pieces: Sequence, predicted: np.ndarray) -> tuple[NoiseFloor, ...]:
+def floors_of(
+    pieces: Sequence, predicted: np.ndarray, *, angles: OfAngles | None = None
+) -> tuple[NoiseFloor, ...]:
     """The noise floor of each joint.
 
     Args:
         pieces: of one or more motions. predicted: (n, dof) torque over their cores, one after the
-            other [N m or N].
+            other [N m or N]. angles: `of_angles` of the same.
     """
     ends = np.cumsum([piece.samples for piece in pieces])[:-1]
     measured = [piece.measured[piece.core] for piece in pieces]
     residuals = [own - told for own, told in zip(measured, np.split(predicted, ends))]
     use = None if pieces[0].use is None else [piece.use[piece.core] for piece in pieces]
     q, steps = [piece.q[piece.core] for piece in pieces], [piece.step for piece in pieces]
-    return floors(residuals, measured, q, steps, use=use)
+    return floors(residuals, measured, q, steps, use=use, angles=angles)
 
 
 def filtered(found: Sequence[NoiseFloor], smoother) -> list[NoiseFloor]:

@@ -20,16 +20,19 @@ _MOST = 0.25  # of the rows; where more stand out, they are no exception
 # Reversals: share of its rms speed below which a joint is slow, of the time it may be, and the
 # ratio of mean squares, slow over fast, that noise does not have.
 _SLOW, _MOST_SLOW, _LARGER = 0.12, 0.25, 2.0
+_ALIKE = 10  # groups of values by the size of the noise about them
+_KNOWN = 4.0  # the most that its square is larger than drawn
 _NORMAL = 0.6745  # median of a standard Gaussian's absolute value
 
 
 def without(
     values: list[np.ndarray], kept: list[np.ndarray], steps: list[float], bandwidth: float,
-    digit: float = 0.0,
+    digit: float = 0.0, drawn: list[np.ndarray] | None = None,
 ) -> tuple[list[np.ndarray], list[np.ndarray]]:  # fmt: skip
     """Which rows (n,) of each run are kept, and the values with what is left out bridged.
 
-    `digit` is the least difference of logged torques [N m or N]: that much is no outlier.
+    `digit` is the least difference of logged torques [N m or N]: that much is no outlier. `drawn`
+    (n,) is what the angles' noise makes of each run: where there is more of it, more is usual.
     """
     shortest = min(steps)
     longest = max(1, int(_SHARE / (bandwidth * shortest))) if bandwidth > 0.0 else 1
@@ -41,8 +44,16 @@ def without(
         sizes = np.concatenate(sizes) if sizes else np.zeros(0)
         if not len(sizes) or not (typical := float(np.median(sizes)) / _NORMAL) > 0.0:
             continue
-        found, most = [], max(_OUTLYING * typical, _DIGITS * digit)
-        for d, k in zip(steps_of, kept):
+        usual = [np.full(len(d), typical) for d in steps_of]
+        if drawn is not None:
+            spans = [0.5 / (bandwidth * step) for step in steps]
+            local = [_local(_step(v, k, width), n) for v, k, n in zip(drawn, kept, spans)]
+            # so few independent values tell it: two standard errors of theirs are usual
+            unsure = [1.0 + 2.0 / math.sqrt(2.0 * max(n / (2 * width + 1), 1.0)) for n in spans]
+            usual = _by_local(steps_of, local, typical, unsure)
+        found = []
+        for d, k, scale in zip(steps_of, kept, usual):
+            most = np.maximum(_OUTLYING * scale, _DIGITS * digit)
             hit = np.flatnonzero(np.nan_to_num(np.abs(d)) > most)
             turns = np.zeros(len(k) + 1, dtype=np.int64)  # both means are suspect
             turns[hit] += 1
@@ -54,6 +65,51 @@ def without(
         values = [bridged(v, f) if f.sum() > 2 else v for v, f in zip(values, found)]
         kept = [f if f.sum() > 2 else k for f, k in zip(found, kept)]
     return kept, values
+
+
+def usual(values, drawn, steps, bandwidth: float):
+    """The size (n,) of each run's noise where `drawn` (n,) says that it differs from row to row;
+    None where nothing is drawn."""
+    if drawn is None:
+        return None
+    typical = float(np.median(np.abs(np.concatenate(values)))) / _NORMAL
+    local = [_local(v, 0.5 / (bandwidth * step)) for v, step in zip(drawn, steps)]
+    found = _by_local(values, local, typical, [1.0] * len(local)) if typical > 0.0 else None
+    return found if found is not None and all((v > 0.0).all() for v in found) else None
+
+
+def _local(values: np.ndarray, samples: float) -> np.ndarray:
+    """RMS (n,) of values over so many samples about each, nan counting for nothing."""
+    from scipy.ndimage import uniform_filter1d
+
+    size = max(3, 2 * round(0.5 * samples) + 1)
+    square = uniform_filter1d(np.nan_to_num(values) ** 2, size, mode="nearest")
+    return np.sqrt(np.maximum(square, 0.0))
+
+
+def _by_local(
+    values: list[np.ndarray], local: list[np.ndarray], typical: float, unsure: list[float]
+) -> list[np.ndarray]:
+    """The usual size (n,) of values that are white noise plus some multiple of noise whose size is
+    `local` (n,) of each run: from medians among values where it is alike. `unsure`: by how much
+    that of each run may be too small."""
+    from scipy.optimize import nnls
+
+    every, size = np.concatenate(values), np.concatenate(local)
+    there = ~np.isnan(every)
+    every, size = np.abs(every[there]), size[there]
+    if len(every) < _ALIKE**2 or not size.any():
+        return [np.full(len(v), typical) for v in values]
+    bins = np.array_split(np.argsort(size), _ALIKE)
+    usual = np.array([np.median(every[own]) / _NORMAL for own in bins]) ** 2
+    square = np.array([np.mean(size[own] ** 2) for own in bins])
+    shape = np.stack([np.full(_ALIKE, typical**2), square], axis=1)
+    weight = 1.0 / np.maximum(usual, 1e-6 * usual.max())  # each median is as sure as it is large
+    white, more = nnls(shape * weight[:, None], usual * weight)[0]
+    more = min(more, _KNOWN)
+    return [
+        np.sqrt(white * typical**2 + more * (u * own) ** 2) for own, u in zip(local, unsure)
+    ]
 
 
 def _step(values: np.ndarray, counts: np.ndarray, width: int) -> np.ndarray:
