@@ -17,9 +17,12 @@ class Elasticity(Deflection):
     source = "Spong 1987"
 
     compliance = Shape("rad/(N m)", 0.0, 0.1, of="softness", start=0.0, says="angle that the joint gives per torque")
-    damping = Shape("1", 0.02, 0.7, says="of the link on its spring, as a share of the critical one")
+    damping = Shape("1", 0.02, 0.7, says="of the link on its spring, as a share of the critical one (encoder: motor)")
 
-    def behind(self, load, inertia, step, compliance, damping):
+    def shapes(self):
+        return (self.compliance, self.damping) if self.encoder == "motor" else (self.compliance,)
+
+    def behind(self, load, inertia, step, compliance, damping=0.0):
         return sprung(load, inertia, step, compliance=compliance, damping=damping)
 
     def flights(self, bounds):
