@@ -257,8 +257,21 @@ class Deflection(MotionEffect):
         Of a link that is measured nothing is left to move by itself. The load is that of angles seen through a filter: what is
         linear in it has been seen through it too, and blows, which are not, must be, as the motor's answer to them was.
         """
-        behind = self.behind(load, inertia if self.encoder == "motor" else 0.0 * inertia, motion.step, **shapes)
-        return rates(motion.sight.smoothed(behind) if self.blows and motion.sight is not None else behind, motion.step)
+        (one,) = self.several([(load, inertia, motion, shapes)])
+        return one
+
+    def several(self, cases: list[tuple]) -> list[np.ndarray]:
+        """`apart` of several links: (load, inertia, motion, shapes) each."""
+        motor = self.encoder == "motor"
+        behind = self.links([(load, inertia if motor else 0.0 * inertia, motion.step, shapes) for load, inertia, motion, shapes in cases])
+        return [
+            rates(motion.sight.smoothed(own) if self.blows and motion.sight is not None else own, motion.step)
+            for own, (_, _, motion, _) in zip(behind, cases)
+        ]
+
+    def links(self, cases: list[tuple]) -> list[np.ndarray]:
+        """`behind` of several links: (load, inertia, step, shapes) each."""
+        return [self.behind(load, inertia, step, **shapes) for load, inertia, step, shapes in cases]
 
     def tries(self, bounds):
         return self.flights(bounds) if self.encoder == "motor" else []

@@ -156,19 +156,19 @@ def bent(model: Model, motion: Motion, x, joint: int) -> list[Bent]:
     return out
 
 
-def secants(model: Model, motion: Motion, known: list[Bent], effect, tried: list[dict], stride: int, use: np.ndarray) -> np.ndarray:
+def secants(model: Model, motion: Motion, known: list[Bent], effect, tried: list[dict], stride: int, use: np.ndarray, apart=None) -> np.ndarray:
     """What a link's standing apart from its motor would change of the predicted torque, (tried, dof, n), at several sets of
     shape values: as torque's slopes have it.
 
     Args:
         known: `bent` of its joint. effect: a Deflection that the model lacks, or that does nothing in it. use: (n, dof) bool.
+        apart: of each piece (tried, 3, n) how far, where it is at hand.
     """
     out = []
-    for piece, rows, one in zip(motion.pieces, starts(motion, stride), known):
-        apart = np.stack([effect.apart(one.load, one.inertia, one.seen, **shapes) for shapes in tried])
-        read = [
-            model.sensed(np.einsum("on,ton->tn", one.slopes[:, j], apart), piece.step, j) for j in range(model.robot.dof)
-        ]  # fmt: skip
+    apart = apart or [effect.several([(one.load, one.inertia, one.seen, shapes) for shapes in tried]) for one in known]
+    for piece, rows, one, own in zip(motion.pieces, starts(motion, stride), known, apart):
+        far = np.stack(own)
+        read = [model.sensed(np.einsum("on,ton->tn", one.slopes[:, j], far), piece.step, j) for j in range(model.robot.dof)]
         out.append(np.stack([entry[..., rows] if piece.smoother is None else piece.smoother.at(entry, rows) for entry in read], axis=1))
     return np.concatenate(out, axis=-1) * use.T
 

@@ -42,6 +42,23 @@ class Source:
         return self._bent[joint]
 
     @cached_property
+    def _flights(self) -> dict:
+        return {}
+
+    def flights(self, key, effect, tries: list[list[dict]]) -> list[list]:
+        """How far each joint's link stands apart, of each piece (tried, 3, n), at sets of shape values
+        that are tried on each joint: all links at once, once for all who ask with a `key`."""
+        if key not in self._flights:
+            bent = [self.bent(joint) for joint in range(len(tries))]
+            pieces = []
+            for k in range(len(self.motion.pieces)):
+                cases = [(b[k].load, b[k].inertia, b[k].seen, s) for b, own in zip(bent, tries) for s in own]
+                found = iter(effect.several(cases))
+                pieces.append([[next(found) for _ in own] for own in tries])
+            self._flights[key] = [[piece[joint] for piece in pieces] for joint in range(len(tries))]
+        return self._flights[key]
+
+    @cached_property
     def predicted(self) -> np.ndarray:
         """Torque (n, dof), low-passed as the columns are."""
         return row.predicted(self.model, self.motion, self.x, self.stride)

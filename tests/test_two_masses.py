@@ -79,6 +79,17 @@ def test_play_against_an_integration():
         assert np.std(found - truth[::every]) < most * np.std(truth)
 
 
+def test_many_links_at_once_fly_as_each_alone():
+    t = np.arange(0.0, 4.0, 0.004)
+    loads = np.stack([load(t), load(t + 0.3), -0.5 * load(t)])
+    masses = np.stack([inertia(t), 2.0 * inertia(t), 0.0 * t])  # the last follows its load
+    b = [0.003, 0.01, 0.004]
+    found = two_masses.flown(loads, masses, 0.004, b=b, teeth=[30.0, 30.0, 30.0])
+    for own, one, mass, width in zip(found, loads, masses, b):
+        alone = two_masses.played(one, mass, 0.004, b=width, teeth=30.0)
+        np.testing.assert_allclose(own, alone, rtol=0, atol=1e-12)
+
+
 def test_play_without_inertia_follows_the_load():
     t = np.arange(0.0, 2.0, 0.002)
     still = two_masses.played(load(t), 0.0 * t, 0.002, b=0.01, teeth=40.0)

@@ -170,8 +170,12 @@ def _changes(source, candidate: Candidate, shapes: list[dict[str, float]]) -> li
     if not shapes:
         return []
     leading = next(s.name for s in candidate.effect.shapes() if s.start is not None)
-    known = source.bent(candidate.joint)
-    found = row.secants(source.model, source.motion, known, candidate.effect, shapes, source.stride, source.use)
+    known, apart, effect = source.bent(candidate.joint), None, candidate.effect
+    if effect.blows and shapes == further(source.model, candidate):
+        everywhere = [replace(candidate, joint=joint) for joint in range(source.model.robot.dof)]
+        tries = [further(source.model, one) for one in everywhere]
+        apart = source.flights((candidate.name, candidate.options), effect, tries)[candidate.joint]
+    found = row.secants(source.model, source.motion, known, effect, shapes, source.stride, source.use, apart)
     return [change[:, :, None] / own[leading] for change, own in zip(found, shapes)]
 
 
