@@ -20,7 +20,8 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
-from sysid import pipeline, results  # noqa: E402
+from sysid import comparison, pipeline, results  # noqa: E402
+from sysid.addition import grown  # noqa: E402
 from sysid.diagnose.diagnosis import diagnose  # noqa: E402
 from sysid.statement.document import document  # noqa: E402
 
@@ -37,6 +38,24 @@ ROBOTS = (
 )
 
 
+#: what the diagnosis before this one named (docs/findings.md) and this one may not
+EARLIER = {"Panda": (("torque_gain", "panda_joint6"), ("cogging", "panda_joint7"), ("spring", "panda_joint6"))}
+
+
+def earlier(name: str, fit) -> list[str]:
+    """What each earlier claim does to the held-out error when it is added, one after the other."""
+    lines = []
+    for effect, joint in EARLIER.get(name, ()):
+        after = pipeline.fit(grown(fit.experiment, effect, [joint], {}), filters=fit.filters)
+        (change,) = [d for d in comparison.compare(fit, after, ("before", "after")) if d.joint == joint]
+        lines.append(
+            f"- `{effect}` on {joint}: RMS on the test logs {fit.rms('test')[joint]:.4g} → {after.rms('test')[joint]:.4g}, "
+            f"a change of {change.delta_rms:.2g} ± {change.se:.1g}"
+        )
+        fit = after
+    return lines
+
+
 def looked_at(name: str, path: Path) -> dict:
     """The document of a diagnosis, with the seconds of CPU of fit and diagnosis."""
     with warnings.catch_warnings():
@@ -48,6 +67,7 @@ def looked_at(name: str, path: Path) -> dict:
         said = json.loads(json.dumps(document(diagnose(experiment, fit=fit))))
         clock.append(time.process_time())
     said["cpu"] = {"fit": clock[1] - clock[0], "diagnose": clock[2] - clock[1]}
+    said["earlier"] = earlier(name, fit)
     said["fit_events"] = [dict(e) for e in fit.events]
     return {"robot": name, **said}
 
@@ -70,6 +90,10 @@ def told(found: dict, known: str) -> str:
             )  # fmt: skip
             options = "".join(f", {name}: {value}" for name, value in f["options"].items())
             lines.append(f"- `{f['effect']}` on {f['joint']}{options}: RMS on the test logs {f['rms_test_before']:.4g} → {f['rms_test_after']:.4g}; {values}")
+    if found["not_claimed"]:
+        lines += ["", "Looked at and not claimed:", "", *(f"- `{n['effect']}` on {n['joint']}: {n['why']}" for n in found["not_claimed"])]
+    if found["earlier"]:
+        lines += ["", "What docs/findings.md claims, each added after the one before:", "", *found["earlier"]]
     if said := [f"- {v['joint']}: {v['says']}" for v in found["verdict"] if v.get("says")]:
         lines += ["", "Of single joints:", "", *said]
     lines += ["", _events(found["fit_events"]), "", f"CPU: fit {found['cpu']['fit']:.1f} s, diagnosis {found['cpu']['diagnose']:.1f} s."]

@@ -60,16 +60,32 @@ def test_panda_is_within_its_published_error():
     assert relative_error(fit, "test") <= 0.0141
 
 
+def folder(name: str) -> Path:
+    """An experiment folder of the data."""
+    found = Path(os.environ.get("SYSID_DATA_DIR") or "nowhere") / name
+    if not (found / "config.yaml").exists():
+        pytest.skip(f"{name} is not in the folder that SYSID_DATA_DIR names")
+    return found
+
+
 def diagnosed(name: str):
     """The document of a diagnosis of an experiment folder of the data, and its fit."""
     from sysid.diagnose.diagnosis import diagnose
     from sysid.statement.document import document
 
-    folder = Path(os.environ.get("SYSID_DATA_DIR") or "nowhere") / name
-    if not (folder / "config.yaml").exists():
-        pytest.skip(f"{name} is not in the folder that SYSID_DATA_DIR names")
-    found = diagnose(sysid.load(folder))
+    found = diagnose(sysid.load(folder(name)))
     return document(found), found.fit
+
+
+def test_kinova_without_its_spikes_and_bursts_has_less_than_half_of_the_error():
+    experiment = sysid.load(folder("kinova"))
+    kept = experiment.model_copy(update={"preprocess": experiment.preprocess.model_copy(update={"events": "keep"})})
+    fit = sysid.fit(experiment)
+    assert fit.rms("test")["joint_1"] < 0.5 * sysid.fit(kept).rms("test")["joint_1"]
+    # most joints ring twice in the test log, where several spike at once
+    first, second = [e for e in fit.events if e["kind"] == "knock"]
+    for event, at in ((first, 1.07), (second, 1.57)):
+        assert event["part"] == "test" and event["start"] < at < event["stop"] and len(event["joints"]) >= 4
 
 
 def test_odrive_ripples_at_7_14_and_28_periods_a_turn():
