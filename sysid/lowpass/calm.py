@@ -22,7 +22,7 @@ def low(values: np.ndarray, cutoff: float, step: float) -> np.ndarray:
     from scipy.signal import butter, sosfiltfilt
 
     sections = butter(4, cutoff, fs=1.0 / step, output="sos")
-    beyond = min(math.ceil(1.0 / (cutoff * step)), len(values) - 1)
+    beyond = min(math.ceil(3.0 / (cutoff * step)), len(values) - 1)  # beyond its memory
     return sosfiltfilt(sections, values, axis=0, padtype="odd", padlen=beyond)
 
 
