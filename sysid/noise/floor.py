@@ -191,7 +191,8 @@ def _rest(shared: _Shared, raw, torque, joint: int, drawn):
     rest, _, _ = asked.removed_from(raw, [run.counts for run in runs])
     usual = outliers.usual(rest, drawn, steps, shared.bandwidth)
     kept = bursts.calm(rest, [run.counts for run in runs], steps, usual)
-    kept = outliers.away_from_reversals(runs, shared.motion.v, rest, kept)
+    even = rest if usual is None else [v / u for v, u in zip(rest, usual)]
+    kept = outliers.away_from_reversals(runs, shared.motion.v, even, kept)
     rest = [bridged(v, k) for v, k in zip(rest, kept)]
     digit = outliers.digit_of(np.concatenate([m[run.counts] for m, run in zip(torque, runs)]))
     kept, _ = outliers.without(rest, kept, steps, shared.bandwidth, digit, drawn)
