@@ -201,6 +201,7 @@ class Motion:
     still: joints that never move, or never clear of a standstill. standing (dof,): share of the rows that count in which
     a joint stands still. left_out (dof,): rows that do not count.
     events: what disturbed the logs; `disturbed` the share of all joints' rows that is left out for it.
+    band: [Hz] below which the joints' speeds stay, where it was asked for, else zero.
     """
 
     joints: tuple[str, ...]
@@ -210,6 +211,7 @@ class Motion:
     left_out: np.ndarray
     events: tuple[Event, ...] = ()
     disturbed: float = 0.0
+    band: float = 0.0
 
     @property
     def samples(self) -> int:

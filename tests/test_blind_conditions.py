@@ -181,3 +181,18 @@ def test_a_case_with_nuisances_from_end_to_end(blind):  # noqa: F811
         # linear interpolation between uneven stamps takes a little off: 2/3 to all of its power
         assert 0.8 * found["noise"][joint] < noise < 1.1 * found["noise"][joint]
     assert set(found["floors"]) == set(blind.JOINTS["planar"])
+
+
+def test_an_encoder_that_is_off_is_no_noise(blind, tmp_path):  # noqa: F811
+    from sysid import pipeline
+    from sysid.simulate import Hidden, simulate, write
+
+    experiment, machine = blind.experiment_of("planar", tmp_path)
+    seen = {}
+    for name, hide in (("plain", []), ("off", [Hidden("encoder_offset", "elbow", {"size": 1.0})])):
+        simulation = simulate(machine, hide=hide, seed=3, duration=6.0, rate=500.0)
+        write(simulation, experiment, tmp_path / name)
+        fit = pipeline.fit(pipeline.load(tmp_path / name))
+        seen[name] = blind.conditions.noise_seen(simulation, fit, tmp_path)["all"]
+    for joint, noise in seen["plain"].items():
+        assert seen["off"][joint] == pytest.approx(noise, rel=0.05)

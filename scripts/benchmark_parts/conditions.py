@@ -52,7 +52,7 @@ def noise_seen(simulation, fit, folder: Path) -> dict[str, dict[str, float]]:
     """RMS [N m] of each joint's noise as a fit sees it, over all logs: {"all": of torque, encoder
     and clock, "torque": of the torque alone}. Spikes and closed brakes are no noise.
 
-    What the sensors added is the difference of two residuals of the same fit: on the log, and on
+    An encoder's own law, an offset or an eccentricity, is no noise. What the sensors added is the difference of two residuals of the same fit: on the log, and on
     what no sensor saw at the same times. So all that is filtered, resampled and left out of the
     log is filtered, resampled and left out of its noise.
     """
@@ -70,9 +70,9 @@ def noise_seen(simulation, fit, folder: Path) -> dict[str, dict[str, float]]:
                 if event["kind"] == "brake":
                     away.append((j, event["start"], event["stop"]))
         seen = {
-            "none": _residual(simulation, fit, log, clean.q, clean.sensed, folder),
+            "none": _residual(simulation, fit, log, clean.read, clean.sensed, folder),
             "all": _residual(simulation, fit, log, log.q, tau, folder),
-            "torque": _residual(simulation, fit, log, clean.q, tau, folder),
+            "torque": _residual(simulation, fit, log, clean.read, tau, folder),
         }
         for kind in squares:
             noise, use, t = _difference(seen[kind], seen["none"])

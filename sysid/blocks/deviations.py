@@ -34,7 +34,10 @@ def z_score(differences) -> float:
 def slope_chance(told, values, number) -> float:
     """Probability, were nothing there, of a slope of values (n,) on what was told of them (n,) as
     large as theirs: Student's t of sums over blocks `number` (n,), with what the slope leaves as
-    their noise."""
+    their noise.
+
+    Source: MacKinnon & White 1985 (the jackknife's deviation).
+    """
     from scipy.special import stdtr  # not scipy.stats, whose import alone takes longer than a fit
 
     size = summed(number, told * told)
@@ -43,7 +46,8 @@ def slope_chance(told, values, number) -> float:
     slope = float(told @ values / size.sum())
     left = summed(number, told * (values - slope * told))
     acting = size.sum() ** 2 / np.sum(size**2)
-    spread = np.sqrt(np.sum(left**2) * len(left) / max(len(left) - 1, 1))
+    # each block against the slope of all others: where few act, each bends it towards itself
+    spread = np.sqrt(np.sum((left / np.maximum(1.0 - size / size.sum(), 1e-9)) ** 2))
     return float(stdtr(max(acting - 1.0, 1.0), -slope * size.sum() / max(spread, 1e-300)))
 
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .. import rows as row
+from ..lowpass import calm
 from ..shape import Settled, inverted, prior_hessian
 from ..source import Source
 
@@ -66,6 +67,26 @@ def designed(found: Settled, weights, source: Source, rough: Source) -> Design:
     x = np.append(found.x, np.zeros(size - own)) + change
     left = -np.einsum("jnk,k->nj", more, x)
     return Design(columns, residual, system, inverse, change, more, left)
+
+
+def instrumented(design: Design, use, piece, band: float, step: float) -> np.ndarray:
+    """The residual (n, dof) where the columns without the noise of the angles, Z, tell the rest no
+    more: (Z'A + P) dx = (Z - A)'r, with the prior's P.
+
+    Least squares holds A'r = 0, but noise stands in A and r alike and bends the parameters; what
+    it leaves then follows the motion though nothing is missing.
+
+    Args:
+        use: (n, dof) bool. piece: (n,). band: of the motion [Hz]. step: from row to row [s].
+
+    Source: Young 2011; Janot, Vandanjon & Gautier 2014 (instrumental variables).
+    """
+    a, r = design.columns, design.residual
+    z = np.stack([calm(own, piece, band, step) * use[:, [j]] for j, own in enumerate(a)])
+    product = lambda one, other: np.einsum("jnk,jnl->kl", one, other, optimize=True)  # noqa: E731
+    system = design.system + product(z - a, a)
+    change = np.linalg.lstsq(system, np.einsum("jnk,nj->k", z - a, r), rcond=1e-10)[0]
+    return r - np.einsum("jnk,k->nj", a, change)
 
 
 def by_block(number: np.ndarray) -> list[slice]:

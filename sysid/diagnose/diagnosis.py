@@ -21,7 +21,7 @@ import numpy as np
 from .. import model, pipeline
 from ..config import Experiment, is_own
 from ..effect import vocabulary
-from ..estimate import Fit
+from ..estimate import Fit, predict
 from ..failures import Failure, HeldOut, failures
 from ..filters import settled
 from ..lowpass import lowpassed
@@ -91,7 +91,7 @@ def diagnose(
         if test is None:
             raise too_short()
         first, then = (HeldOut(one.settled, test) for one in (view, after))
-        found = _floors(experiment, last, logs)
+        found = _floors(experiment, last, after, logs)
         said = verdicts(fit, claims, after.unknown, view.unknown, found, refused, transfers(last))
         errors = last.rms("test").values()
         levels = np.array([e if f.rms is None else f.rms for f, e in zip(found, errors)])
@@ -105,11 +105,14 @@ def diagnose(
         )  # fmt: skip
 
 
-def _floors(experiment: Experiment, fit: Fit, logs) -> list[NoiseFloor]:
-    """The noise floor of each joint, as the fit sees its torque: of what its model leaves."""
+def _floors(experiment: Experiment, fit: Fit, view: View, logs) -> list[NoiseFloor]:
+    """The noise floor of each joint, as the fit sees its torque: of what the view's model leaves,
+    in whose parameters loud joints do not drown quiet ones."""
     spec = settled(experiment.preprocess, fit.filters)
-    pieces = [piece for part in logs for piece in prepare(part, spec, fit.joints).pieces]
-    predicted = [fit.predictions[part].predicted for part in ("train", "test")]
+    motions = [prepare(part, spec, fit.joints) for part in logs]
+    x = view.settled.x + view.design.change[: view.model.size]
+    predicted = [predict(view.model, x, motion).predicted for motion in motions]
+    pieces = [piece for motion in motions for piece in motion.pieces]
     angles = of_angles(logs, spec, fit)
     found = floors_of(pieces, np.concatenate(predicted), angles=angles)
     return filtered(found, pieces[0].smoother)

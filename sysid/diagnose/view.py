@@ -14,12 +14,12 @@ from .. import rows as row
 from ..config import Experiment
 from ..errors import LogError
 from ..estimate import Fit, inverse
-from ..lowpass import lowpassed, narrowed, rougher, stride_of, widest
+from ..lowpass import calm, lowpassed, narrowed, rougher, stride_of, widest
 from ..model import Model
 from ..preprocess import Motion
 from ..shape import Settled, settle
 from ..source import Source
-from .design import Design, Sums, by_block, designed, summed
+from .design import Design, Sums, by_block, designed, instrumented, summed
 
 _FOLDS = 10
 
@@ -64,9 +64,12 @@ class View:
 
     @cached_property
     def variables(self) -> dict[str, np.ndarray]:
-        """{q_joint, qd_joint, qdd_joint, load_joint, time: (n,)} on the rows."""
+        """{q_joint, qd_joint, qdd_joint, load_joint, time: (n,)} on the rows, without the noise of
+        the angles."""
         known = {name: self.rows.of(self.motion, name) for name in ("q", "qd", "qdd")}
         known["load"] = self.source.predicted
+        piece, band = self.rows.piece, self.motion.band
+        known = {name: calm(v, piece, band, self.step) for name, v in known.items()}
         joints = self.model.robot.joints
         out = {f"{kind}_{j}": v for kind, all_ in known.items() for j, v in zip(joints, all_.T)}
         return out | {"time": self.rows.t - self.rows.t.min()}
@@ -75,7 +78,8 @@ class View:
     def unknown(self) -> tuple[flexible.Unknown, ...]:
         """What a flexible function of the motion takes of each joint."""
         # three stretches a fold, so that what is left out is seldom where nothing else was
-        rows, residual = self.rows, self.design.residual
+        rows, known = self.rows, (self.rows.piece, self.motion.band, self.step)
+        residual = instrumented(self.design, rows.use, *known)
         stretch = blocks.numbered(rows.t, rows.piece, shortest=np.inf, fewest=3 * _FOLDS)
         fold, names = stretch % _FOLDS, self.model.robot.joints
         take = lambda j, name: flexible.unknown(  # noqa: E731

@@ -10,13 +10,15 @@ balances the rest, are left out for that joint, widened by what the filters see 
     gaussian.py  the low-pass
     motion.py    logs under it, and the band that a motion asks for
     angles.py    the noise of the angles: how large it is, and drawn once more
+    calm.py      the motion without it
 """
 
 from .angles import angle_noise, rougher
+from .calm import KEPT, calm, low
 from .gaussian import Gaussian
 from .motion import LEAST, band, lowpassed, narrowed, stride_of, widest
 
 __all__ = [
-    "LEAST", "Gaussian", "angle_noise", "band", "lowpassed", "narrowed", "rougher", "stride_of",
-    "widest",
+    "KEPT", "LEAST", "Gaussian", "angle_noise", "band", "calm", "low", "lowpassed", "narrowed",
+    "rougher", "stride_of", "widest",
 ]  # fmt: skip

@@ -64,9 +64,8 @@ def lowpassed(logs: Sequence[Log], joints: tuple[str, ...], cutoff: float) -> Mo
     still = [np.where(turns(piece.qd), np.inf, threshold) for piece in pieces]
     reach = [round(_SIGHT * piece.smoother.reach) for piece in pieces]
     motion = assembled(joints, [without_standstill(*each) for each in zip(pieces, still, reach)])
-    return replace(
-        motion, events=tuple(event for log in logs for event in log.events), disturbed=disturbed
-    )
+    events = tuple(event for log in logs for event in log.events)
+    return replace(motion, events=events, disturbed=disturbed, band=band(logs))
 
 
 def widest(logs: Sequence[Log]) -> float:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..lowpass import KEPT, low
 from . import bursts, outliers, repeats
 from .motion_functions import Kinematics, kinematics
 from .of_angles import OfAngles
@@ -18,11 +19,9 @@ from .pursuit import Functions
 from .spectrum import spectrum_of, weighed
 from .stretches import (
     FEWEST_SAMPLES,
-    SMOOTHING,
     Run,
     bandwidth_of,
     bridged,
-    low,
     runs_of,
     smoothed,
     whole,
@@ -186,13 +185,14 @@ def _rest(shared: _Shared, raw, torque, joint: int, drawn):
     runs, steps = shared.runs, [run.step for run in shared.runs]
     predicted = [m - r for m, r in zip(torque, raw)]
     if shared.calm is not runs:
-        highest = SMOOTHING * shared.bandwidth
+        highest = KEPT * shared.bandwidth
         predicted = [low(p, highest, step) for p, step in zip(predicted, steps)]
     asked = Functions(shared.calm, shared.motion, predicted, joint, shared.bandwidth)
     rest, _, _ = asked.removed_from(raw, [run.counts for run in runs])
     usual = outliers.usual(rest, drawn, steps, shared.bandwidth)
     kept = bursts.calm(rest, [run.counts for run in runs], steps, usual)
-    kept = outliers.away_from_reversals(runs, shared.motion.v, rest, kept)
+    even = rest if usual is None else [v / u for v, u in zip(rest, usual)]
+    kept = outliers.away_from_reversals(runs, shared.motion.v, even, kept)
     rest = [bridged(v, k) for v, k in zip(rest, kept)]
     digit = outliers.digit_of(np.concatenate([m[run.counts] for m, run in zip(torque, runs)]))
     kept, _ = outliers.without(rest, kept, steps, shared.bandwidth, digit, drawn)

@@ -36,9 +36,8 @@ def of_angles(logs: Sequence[Sequence[Log]], spec, fit: Fit) -> OfAngles:
     rng, out, bands = np.random.default_rng(0), [], []
     for part in logs:
         cutoff = widest(part)
-        rough = lambda s, cutoff=cutoff: rougher(s, angle_noise(s, cutoff), cutoff, rng)  # noqa: E731
         again = [
-            replace(log, segments=tuple(replace(s, q=rough(s)) for s in log.segments))
+            replace(log, segments=tuple(_rougher(s, cutoff, rng) for s in log.segments))
             for log in part
         ]
         plain, noisy = (prepare(own, spec, fit.joints) for own in (part, again))
@@ -47,3 +46,7 @@ def of_angles(logs: Sequence[Sequence[Log]], spec, fit: Fit) -> OfAngles:
         out += np.split(told[1] - told[0], ends)
         bands.append(band(part))
     return OfAngles(out, max(bands))
+
+
+def _rougher(segment, cutoff: float, rng: np.random.Generator):
+    return replace(segment, q=rougher(segment, angle_noise(segment, cutoff), cutoff, rng))

@@ -10,11 +10,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..lowpass import KEPT, low
+
 _MOST_SAMPLES = 120_000  # looked at over all runs
 FEWEST_SAMPLES = 40  # of a run worth looking at
 _BRIDGED = 0.05  # of the period of the quickest joint
 _BANDWIDTH_SHARE = 0.995  # of the power of every joint's velocity
-SMOOTHING = 3.0  # bandwidths: what functions of the motion see
 _TINY = 1e-300
 
 
@@ -143,18 +144,7 @@ def whole(runs: list[Run], values: list[np.ndarray], lengths: list[int]) -> list
 def smoothed(run: Run, bandwidth: float) -> Run:
     """The run with its angles without what is faster than any motion of that bandwidth [Hz]: a
     function of the motion must not tell what the noise of the angles makes."""
-    return replace(run, q=low(run.q, SMOOTHING * bandwidth, run.step))
-
-
-def low(values: np.ndarray, cutoff: float, step: float) -> np.ndarray:
-    """Values (n, ...) below a cutoff [Hz], neither shifted nor bent at the ends."""
-    if cutoff * step >= 0.45:
-        return values
-    from scipy.signal import butter, sosfiltfilt
-
-    sections = butter(4, cutoff, fs=1.0 / step, output="sos")
-    beyond = min(math.ceil(1.0 / (cutoff * step)), len(values) - 1)
-    return sosfiltfilt(sections, values, axis=0, padtype="odd", padlen=beyond)
+    return replace(run, q=low(run.q, KEPT * bandwidth, run.step))
 
 
 def bandwidth_of(runs: list[Run]) -> float:

@@ -28,8 +28,9 @@ _SOFT_SPEED = 0.05  # of the top speed, where the friction that the controller e
 
 @dataclass(frozen=True)
 class Clean:
-    """What no sensor saw, at the times of the log: q, qd (n, dof) of the motors, link_q, link_qd of the links, the torque tau
-    that acted (asked for of the drives), logged torque without noise, and which joints stick (n, dof)."""
+    """What no sensor saw, at the times of the log: q, qd (n, dof) of the motors, `read` what an encoder without rounding reads
+    of them, link_q, link_qd of the links, the torque tau that acted (asked for of the drives), logged torque without noise, and
+    which joints stick (n, dof)."""
 
     q: np.ndarray
     qd: np.ndarray
@@ -38,6 +39,7 @@ class Clean:
     tau: np.ndarray
     sensed: np.ndarray
     sticks: np.ndarray
+    read: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -219,9 +221,13 @@ def _log(robot, truth, inside, loop: control.Loop, sensor: _Sensor, rng, events,
     if nuisance.jitter:
         rows, stamps = nuisances.jittered(rows, t, sensor.keep, loop.period, nuisance.jitter, events)
     q, dof, motor = read[rows], robot.dof, plant.motor
+    exact = x[:, motor].copy()
+    for part in inside:
+        if part.has("read"):
+            exact[:, part.j] = [part.read(float(angle)) for angle in exact[:, part.j]]
     found = sensed[rows]  # a slow logger's values are older than its stamps
     at = (lambda values: values[rows]) if not nuisance.jitter else lambda values: nuisances.interpolated(t, values, stamps)
-    clean = Clean(at(x[:, motor]), at(v[:, motor]), at(x[:, :dof]), at(v[:, :dof]), at(tau), at(sensed), sticks[rows])
+    clean = Clean(at(x[:, motor]), at(v[:, motor]), at(x[:, :dof]), at(v[:, :dof]), at(tau), at(sensed), sticks[rows], at(exact))
     added = std * _unitnoise_std(rng, len(rows), dof, sensor.keep * loop.period, sensor.colour, sensor.share)
     with np.errstate(divide="ignore"):
         digit = np.where(std > 0.0, 10.0 ** np.floor(np.log10(np.maximum(std, 1e-300) / 10.0)), 0.0)

@@ -1,0 +1,37 @@
+"""The motion without the noise of its angles: what functions of the motion may see of it.
+
+Stamps that jitter, or a coarse encoder, make noise of the angles that stands in accelerations and
+in what a model leaves alike. A flexible function of the one then tells the other, and nothing is
+missing.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+KEPT = 3.0  # bands of the motion: several, as its laws are bent functions of it
+_FEWEST = 20  # rows of a piece worth filtering
+
+
+def low(values: np.ndarray, cutoff: float, step: float) -> np.ndarray:
+    """Values (n, ...) below a cutoff [Hz], neither shifted nor bent at the ends."""
+    if cutoff * step >= 0.45 or len(values) < _FEWEST:
+        return values
+    from scipy.signal import butter, sosfiltfilt
+
+    sections = butter(4, cutoff, fs=1.0 / step, output="sos")
+    beyond = min(math.ceil(3.0 / (cutoff * step)), len(values) - 1)  # beyond its memory
+    return sosfiltfilt(sections, values, axis=0, padtype="odd", padlen=beyond)
+
+
+def calm(values: np.ndarray, piece, band: float, step: float) -> np.ndarray:
+    """Variables (n, k) of a motion that stays below `band` [Hz], without what is faster, at rows
+    `step` seconds apart of pieces (n,)."""
+    if band <= 0.0:
+        return values
+    out = values.copy()
+    for number in np.unique(piece):
+        out[piece == number] = low(values[piece == number], KEPT * band, step)
+    return out
