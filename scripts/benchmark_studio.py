@@ -24,7 +24,8 @@ import numpy as np
 import polars as pl
 
 from sysid import config, regressor, robot
-from sysid.diagnose import candidates, diagnosis, select
+from sysid import candidates
+from sysid.diagnose import ask, diagnosis
 from sysid.studio.app import application
 from sysid.studio.bench import Bench
 from sysid.studio.serve import responsive
@@ -93,7 +94,7 @@ def main() -> int:
     given = words.parse_args()
     if not given.whole:
         every = candidates.candidates
-        diagnosis.candidates = select.candidates = lambda model, extra=(): [
+        diagnosis.candidates = ask.candidates = lambda model, extra=(): [
             c for c in every(model, extra) if c.name in ASKED
         ]
     responsive()  # as `sysid studio` sets it

@@ -63,8 +63,8 @@ def conditions(seed: int, number: int) -> dict:
 
 
 def _view(case: dict, folder: Path, hide=()):
-    from sysid.diagnose.diagnosis import first_view
     from sysid.simulate import simulate, write
+    from sysid.view import first_view
 
     folder.mkdir(parents=True, exist_ok=True)
     experiment, machine = experiment_of(case["robot"], folder)
@@ -94,9 +94,9 @@ def size(case: dict, level: float, worth: float) -> dict:
 
 def power(case: dict, level: float, worth: float) -> dict:
     """Whether an effect of the smallest detectable size is named."""
+    from sysid.candidates import candidates
     from sysid.diagnose import select
     from sysid.diagnose.ask import ask
-    from sysid.diagnose.candidates import candidates
     from sysid.diagnose.detectable import detectable
     from sysid.simulate import hidden
 

@@ -4,8 +4,8 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from sysid.diagnose.design import Design, by_block, summed
 from sysid.diagnose.evidence import _made
+from sysid.view import Design, by_block, summed
 
 
 def posed(rng: np.random.Generator, *, n: int = 240, dof: int = 2, size: int = 5, blocks: int = 20, prior: float = 0.3):

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from sysid.diagnose.design import Design, instrumented
 from sysid.lowpass import calm, low
+from sysid.view import Design, instrumented
 
 STEP, N, BAND = 0.01, 4000, 1.2
 

@@ -11,11 +11,11 @@ from scipy.stats import norm
 from scipy.stats import t as student
 
 from sysid import blocks, config, model, regressor
+from sysid.candidates import candidates
 from sysid.diagnose import evidence, null
-from sysid.diagnose.candidates import candidates
-from sysid.diagnose.view import looked_at
 from sysid.log import Log, Segment
 from sysid.lowpass import lowpassed, stride_of
+from sysid.view import looked_at
 from tests.evidences import grouped, posed, stacked, viewed
 from tests.problems import fourier_motion
 

@@ -20,7 +20,7 @@ ORDER = [
     "errors", "units", "inertia", "urdf", "readers", "datasets", "config", "prior", "robot", "regressor", "outliers", "knocks", "jumps", "repeats",
     "events", "log", "preprocess", "blocks", "two_masses", "lowpass", "flexible",
     "effect", "formula", "effects", "own_effects", "model", "rows", "source", "compress", "objective", "interior", "certificate", "solve", "uncertainty", "estimate", "shape",
-    "filters", "results", "urdf_export", "pipeline", "simulate", "comparison", "transfer", "noise", "addition", "failures", "diagnose", "changes", "statement", "loop", "report", "studies", "studio", "terminal", "cli", "__main__",
+    "filters", "results", "urdf_export", "pipeline", "simulate", "comparison", "transfer", "noise", "candidates", "view", "addition", "failures", "diagnose", "changes", "statement", "loop", "report", "studies", "studio", "terminal", "cli", "__main__",
 ]  # fmt: skip
 # Late imports that close a loop on purpose: a path that names a data set, a prior that is a previous run, the effects
 # that an effect's contract finds, what an experiment file may say of them, and the segment that events are found in, a type.

@@ -13,9 +13,10 @@ from ruamel.yaml import YAML
 
 from sysid import loop, pipeline, results
 from sysid.addition import command, grown, spelled
-from sysid.diagnose.diagnosis import diagnose, first_view
+from sysid.diagnose.diagnosis import diagnose
 from sysid.diagnose.select import LEVEL, WORTH, search
 from sysid.statement.document import document
+from sysid.view import first_view
 
 BIAS = ("bias", "torque_bias:elbow:b=0.4")
 STRIBECK = ("stribeck", "stribeck:shoulder:dF=1.5,vs=0.4")

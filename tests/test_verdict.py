@@ -7,12 +7,11 @@ import numpy as np
 import pytest
 
 from sysid import pipeline
+from sysid.candidates import candidates
 from sysid.comparison import Difference
 from sysid.diagnose import claims
 from sysid.diagnose.ask import ask
-from sysid.diagnose.candidates import candidates
 from sysid.diagnose.detectable import detectable
-from sysid.diagnose.diagnosis import first_view
 from sysid.diagnose.select import LEVEL, WORTH, search
 from sysid.diagnose.verdict import predictable, verdicts
 from sysid.effect import Linear, TorqueEffect
@@ -20,6 +19,7 @@ from sysid.flexible import Unknown
 from sysid.noise import NoiseFloor
 from sysid.statement.document import _verdict, dependences
 from sysid.transfer import Transfer
+from sysid.view import first_view
 
 # ---- verdicts, by hand
 

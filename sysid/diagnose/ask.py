@@ -8,10 +8,10 @@ from functools import cached_property
 
 import numpy as np
 
+from ..candidates import candidates
+from ..view import View
 from . import null
-from .candidates import candidates
 from .evidence import Group, gain, groups
-from .view import View
 
 
 @dataclass(frozen=True)

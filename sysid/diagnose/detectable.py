@@ -13,12 +13,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import ndtri
 
+from ..candidates import Candidate, at_start
 from ..model import ROBOT
+from ..view import View
 from .ask import Asked
-from .candidates import Candidate, at_start
 from .evidence import Group, normal_scores
 from .select import LEVEL, WORTH
-from .view import View
 
 POWER = 0.9
 
@@ -41,7 +41,9 @@ def detectable(view: View, asked: Asked, candidates) -> list[Detectable]:
     loss = np.maximum(np.sum(view.design.residual**2, axis=0), 1e-300)
     best: dict[tuple, Detectable] = {}
     for candidate in candidates:
-        if candidate.parameters and not candidate.begins:  # a force from outside has none until somebody says when it acts
+        if (
+            candidate.parameters and not candidate.begins
+        ):  # a force from outside has none until somebody says when it acts
             best.setdefault(candidate.key, Detectable(candidate, *_leading(view, candidate)))
     for group in (g for g in asked.groups if not g.candidate.begins):
         size = _size(group, threshold, loss)
@@ -67,7 +69,7 @@ def _leading(view: View, candidate: Candidate) -> tuple[str, str]:
     grown = view.model.with_effect(effect, (candidate.joint,))
     units = [c.unit for c in grown.coefficients[len(view.model.coefficients) :]] or [
         v.unit for v in grown.shape_values[grown.last_shapes] if v.shape.start is not None
-    ]  # fmt: skip
+    ]
     return listed[0].name, units[0]
 
 

@@ -19,6 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .. import model, pipeline
+from ..candidates import candidates
 from ..config import Experiment, is_own
 from ..effect import vocabulary
 from ..estimate import Fit, predict
@@ -28,13 +29,12 @@ from ..lowpass import lowpassed
 from ..noise import NoiseFloor, filtered, floors_of, of_angles
 from ..preprocess import prepare
 from ..transfer import transfers
+from ..view import View, first_view, too_short
 from . import claims as claiming
 from . import select
-from .candidates import candidates
 from .claims import Claim, Finding, Refused
 from .detectable import Detectable, detectable
 from .verdict import Verdict, verdicts
-from .view import View, first_view, too_short
 
 
 @dataclass(frozen=True)
@@ -98,11 +98,19 @@ def diagnose(
         where = failures(first, fit.predictions["test"], levels)
         could = detectable(view, asked, candidates(view.model, extra))
         return Diagnosis(
-            fit, dict(zip(fit.joints, found)), tuple(claims), tuple(said), tuple(could),
+            fit,
+            dict(zip(fit.joints, found)),
+            tuple(claims),
+            tuple(said),
+            tuple(could),
             tuple(where),
-            (*view.motion.events, *test.events), view, first, then, tuple(refused),
+            (*view.motion.events, *test.events),
+            view,
+            first,
+            then,
+            tuple(refused),
             tuple(_notices(claims, refused)),
-        )  # fmt: skip
+        )
 
 
 def _floors(experiment: Experiment, fit: Fit, view: View, logs) -> list[NoiseFloor]:

@@ -1,21 +1,22 @@
 """One statistic for every candidate, as sums over blocks of time.
 
-A group is the columns of one candidate at one set of shape values, projected off everything in the model and made
-orthonormal. Over blocks b:
+A group is the columns of one candidate at one set of shape values, projected off everything in the
+model and made orthonormal. Over blocks b:
 
     s_b = Q_b' r_b - (what the angles' noise makes of it),   G_b = Q_b' Q_b
-    c = sum_b s_b + s_0                       its coefficients; s_0 is the prior's, a block that is never left out
-    m_b = (1 - G_b)^-1 (s_b - G_b c)          how far they move when a block is left out
-    T = c'c / sum_b |m_b|^2                   is it there?
-    gain = sum_f 2 c_f' s_f - c_f' G_f c_f    what does it take of blocks that it was not fitted on?
-    c_f = (1 - G_f)^-1 (c - s_f)
+    c = sum_b s_b + s_0                       its coefficients; s_0 is the prior's, a block that is
+    never left out m_b = (1 - G_b)^-1 (s_b - G_b c)          how far they move when a block is left
+    out T = c'c / sum_b |m_b|^2                   is it there? gain = sum_f 2 c_f' s_f - c_f' G_f
+    c_f    what does it take of blocks that it was not fitted on? c_f = (1 - G_f)^-1 (c - s_f)
 
-T is told on the scale of a normal variable, with as many degrees of freedom as blocks and directions take part: then
-groups that rest on few blocks and groups that rest on many can stand in one row.
+T is told on the scale of a normal variable, with as many degrees of freedom as blocks and
+directions take part: then groups that rest on few blocks and groups that rest on many can stand in
+one row.
 
-The noise of the angles stands in residual and columns alike, which neither signs nor folds can see. It is drawn once
-more: what the second draw adds to columns times what it adds to the residual has the mean of what the first one left in s_b,
-and is taken off (simulation extrapolation: Cook & Stefanski 1994).
+The noise of the angles stands in residual and columns alike, which neither signs nor folds can see.
+It is drawn once more: what the second draw adds to columns times what it adds to the residual has
+the mean of what the first one left in s_b, and is taken off (simulation extrapolation: Cook &
+Stefanski 1994).
 """
 
 from __future__ import annotations
@@ -27,8 +28,8 @@ from functools import cached_property
 import numpy as np
 
 from .. import blocks
-from .candidates import Candidate, columns_of, tried
-from .view import View, by_block
+from ..candidates import Candidate, columns_of, tried
+from ..view import View, by_block
 
 _FLAT = 1e-6  # share of a column's square: what the model leaves of it beyond that is rounding
 _DATA = 0.5  # of a direction's square must stand in the data; the prior may not tell most of it
@@ -40,9 +41,9 @@ _BATCH = 256  # columns' sets that stand in memory at once
 
 @dataclass(frozen=True)
 class Group:
-    """One candidate at shape values. scores (blocks, k), squares (blocks, k, k) of the orthonormal columns, `kept` (k,) the
-    prior's score; `back` (k0, k) turns coefficients of these into the candidate's own; `sizes` (k0,) the weighted norm of what
-    the model leaves of each own column."""
+    """One candidate at shape values. scores (blocks, k), squares (blocks, k, k) of the orthonormal
+    columns, `kept` (k,) the prior's score; `back` (k0, k) turns coefficients of these into the
+    candidate's own; `sizes` (k0,) the weighted norm of what the model leaves of each own column."""
 
     candidate: Candidate
     shapes: dict[str, float]
@@ -64,7 +65,8 @@ class Group:
 
     @property
     def freedom(self) -> tuple[float, float]:
-        """Degrees of freedom: directions that take part (Satterthwaite 1946), and blocks that they rest on."""
+        """Degrees of freedom: directions that take part (Satterthwaite 1946), and blocks that they
+        rest on."""
         moves = self.moves
         spread = moves.T @ moves
         directions = np.trace(spread) ** 2 / max(np.sum(spread**2), 1e-300)
@@ -72,16 +74,21 @@ class Group:
 
     @property
     def testable(self) -> bool:
-        """Whether it rests on enough blocks to be told from chance; if not, it may still be a rival of one that is."""
-        return resting(self.squares) >= _FEWEST and float(np.linalg.eigvalsh(self.squares).max()) <= _LEVERAGE
+        """Whether it rests on enough blocks to be told from chance; if not, it may still be a rival
+        of one that is."""
+        return (
+            resting(self.squares) >= _FEWEST
+            and float(np.linalg.eigvalsh(self.squares).max()) <= _LEVERAGE
+        )
 
     @cached_property
     def tested(self) -> Group:
-        """The group by which it is told whether it is there: of an effect that comes in blows, a few of which outweigh all
-        others, one in which no block counts more than the rest allows.
+        """The group by which it is told whether it is there: of an effect that comes in blows, a
+        few of which outweigh all others, one in which no block counts more than the rest allows.
 
-        Weights that look at columns alone leave scores of noise as they are, without a sign; blows are as good as orthogonal
-        to the model, in each block. What it takes, and its coefficients, are the group's own.
+        Weights that look at columns alone leave scores of noise as they are, without a sign; blows
+        are as good as orthogonal to the model, in each block. What it takes, and its coefficients,
+        are the group's own.
         """
         if not self.candidate.blows:
             return self
@@ -94,7 +101,14 @@ class Group:
         turn = vectors / np.sqrt(np.maximum(values, 1e-300))
         sizes = self.sizes * float(np.sqrt(values.min()))
         scores = weight[:, None] * self.scores @ turn
-        return replace(self, scores=scores, squares=turn.T @ squares @ turn, kept=self.kept @ turn, back=self.back @ turn, sizes=sizes)
+        return replace(
+            self,
+            scores=scores,
+            squares=turn.T @ squares @ turn,
+            kept=self.kept @ turn,
+            back=self.back @ turn,
+            sizes=sizes,
+        )
 
     @property
     def numbers(self) -> int:
@@ -111,15 +125,21 @@ Asked = tuple[Candidate, dict[str, float]]  # a candidate at shape values
 
 
 def groups(view: View, candidates: Sequence[Candidate]) -> list[Group]:
-    """The groups of candidates, one for each set of shape values tried; none of those that the model absorbs."""
-    return groups_at(view, [(candidate, shapes) for candidate in candidates for shapes in tried(view, candidate)])
+    """The groups of candidates, one for each set of shape values tried; none of those that the
+    model absorbs."""
+    return groups_at(
+        view, [(candidate, shapes) for candidate in candidates for shapes in tried(view, candidate)]
+    )
 
 
 def groups_at(view: View, asked: Sequence[Asked]) -> list[Group]:
-    """The groups of candidates at shape values; those on the same joints with as many columns are made together."""
+    """The groups of candidates at shape values; those on the same joints with as many columns are
+    made together."""
     dof, alike = view.model.robot.dof, {}
     for candidate, own in _together(asked):
-        plain, rough = (columns_of(source, candidate, own) for source in (view.source, view.rough_source))
+        plain, rough = (
+            columns_of(source, candidate, own) for source in (view.source, view.rough_source)
+        )
         key = (tuple(candidate.touches(dof)), plain.shape[3])
         alike.setdefault(key, []).append(([(candidate, shapes) for shapes in own], plain, rough))
     out = []
@@ -141,14 +161,20 @@ def _together(asked: Sequence[Asked]) -> list[tuple[Candidate, list[dict]]]:
     return out
 
 
-def _made(view: View, asked: Sequence[Asked], joints: Sequence[int], plain: np.ndarray, rough: np.ndarray) -> list[Group]:
+def _made(
+    view: View, asked: Sequence[Asked], joints: Sequence[int], plain: np.ndarray, rough: np.ndarray
+) -> list[Group]:
     """Groups of columns (asked, joints, n, k) on the motion, and on the rough one."""
     design, sums, spans = view.design, view.sums, by_block(view.blocks)
     count, _, n, k = plain.shape
     flat = lambda a, i, j: np.moveaxis(a[:, i], 1, 0).reshape(n, count * k) * view.weights[j]  # noqa: E731
     size, kk = design.columns.shape[2], count * k
     cross, own = np.zeros((len(spans), size, kk)), np.zeros((len(spans), count, k, k))
-    score, rough_cross, rough_own = np.zeros((len(spans), kk)), np.zeros((size, kk)), np.zeros((count, k, k))
+    score, rough_cross, rough_own = (
+        np.zeros((len(spans), kk)),
+        np.zeros((size, kk)),
+        np.zeros((count, k, k)),
+    )
     square = lambda a: np.einsum("nsk,nsl->skl", a, a)  # noqa: E731
     for i, j in enumerate(joints):
         values = flat(plain, i, j)
@@ -175,7 +201,17 @@ def _made(view: View, asked: Sequence[Asked], joints: Sequence[int], plain: np.n
         if found is None:
             continue
         turn, turned, sizes = found
-        out.append(Group(asked[s][0], dict(asked[s][1]), score[:, s] @ turn, turned, prior[s] @ turn, turn, sizes))
+        out.append(
+            Group(
+                asked[s][0],
+                dict(asked[s][1]),
+                score[:, s] @ turn,
+                turned,
+                prior[s] @ turn,
+                turn,
+                sizes,
+            )
+        )
     return out
 
 
@@ -188,8 +224,9 @@ def _reduced(own, cross, squares, absorbed, by) -> np.ndarray:
 
 
 def _turned(plain, whole, squares, rough):
-    """Orthonormal directions (k0, k) that the model leaves, that the data tell and that are no noise, the squares (blocks, k, k)
-    in them, and the norm of what is left of each own column; None where there is none."""
+    """Orthonormal directions (k0, k) that the model leaves, that the data tell and that are no
+    noise, the squares (blocks, k, k) in them, and the norm of what is left of each own column; None
+    where there is none."""
     size = np.sqrt(np.clip(np.diagonal(plain), 0.0, None))
     if not np.all(np.isfinite(whole)) or not size.max() > 0:
         return None
@@ -213,7 +250,8 @@ def resting(squares: np.ndarray) -> float:
 
 
 def _most(share: np.ndarray) -> float:
-    """What no block's share (blocks,) may pass for no block to hold more than an even part of twice the fewest blocks."""
+    """What no block's share (blocks,) may pass for no block to hold more than an even part of twice
+    the fewest blocks."""
     ascending = np.sort(share)
     below = np.concatenate([[0.0], np.cumsum(ascending)])
     count = len(share) - np.arange(len(share))
@@ -232,15 +270,19 @@ def left_out(squares: np.ndarray) -> np.ndarray:
 
 
 def gain(group: Group) -> np.ndarray:
-    """(folds,) what a group takes of the weighted squared residual of blocks that it was not fitted on."""
+    """(folds,) what a group takes of the weighted squared residual of blocks that it was not fitted
+    on."""
     fold = blocks.folds(len(group.scores))
     s, g = blocks.summed(fold, group.scores), blocks.summed(fold, group.squares)
-    rest = np.linalg.solve((1.0 + 1e-9) * np.eye(s.shape[1]) - g, (group.c - s)[:, :, None])[:, :, 0]
+    rest = np.linalg.solve((1.0 + 1e-9) * np.eye(s.shape[1]) - g, (group.c - s)[:, :, None])[
+        :, :, 0
+    ]
     return 2.0 * np.sum(rest * s, axis=1) - np.einsum("fi,fij,fj->f", rest, g, rest)
 
 
 def normal_scores(statistic, directions, rest) -> np.ndarray:
-    """F ratios with `directions` and `rest` degrees of freedom on the scale of a normal variable (Wilson & Hilferty 1931)."""
+    """F ratios with `directions` and `rest` degrees of freedom on the scale of a normal variable
+    (Wilson & Hilferty 1931)."""
     one, two = 2.0 / (9.0 * directions), 2.0 / (9.0 * rest)
     root = np.cbrt(statistic)
     return ((1.0 - two) * root - (1.0 - one)) / np.sqrt(two * root**2 + one)

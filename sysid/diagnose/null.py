@@ -1,9 +1,10 @@
 """One null for all candidates at once: what would the greatest statistic be if nothing were there?
 
-What each block moves the coefficients by, m_b, keeps its size and gets a random sign (the wild bootstrap of clusters,
-with the effect's own share left out); each draw is refitted, and the greatest statistic over all groups is taken. A group
-whose statistic stands above all but a share of these maxima is there at that family-wise level, whatever the number of
-candidates and however alike.
+What each block moves the coefficients by, m_b, keeps its size and gets a random sign (the wild
+bootstrap of clusters, with the effect's own share left out); each draw is refitted, and the
+greatest statistic over all groups is taken. A group whose statistic stands above all but a share of
+these maxima is there at that family-wise level, whatever the number of candidates and however
+alike.
 
 Source: Westfall & Young 1993; Davidson & Flachaire 2008; Cameron, Gelbach & Miller 2008.
 """
@@ -17,8 +18,9 @@ import numpy as np
 from .. import blocks
 from .evidence import Group, left_out, normal_scores
 
-# Noise that was low-passed and had a model projected off it is so much louder than signs of its blocks make it: what stands
-# across two blocks, and what the model's own parameters took. Measured with white and coloured noise through the same steps.
+# Noise that was low-passed and had a model projected off it is so much louder than signs of its
+# blocks make it: what stands across two blocks, and what the model's own parameters took. Measured
+# with white and coloured noise through the same steps.
 _LOUDER = 1.03
 
 
@@ -32,7 +34,8 @@ def statistics(groups: Sequence[Group]) -> np.ndarray:
 
 
 def maxima(groups: Sequence[Group], rng: np.random.Generator, *, draws: int = 1000) -> np.ndarray:
-    """(draws,) the greatest statistic over all groups where nothing is there; minus infinity where there are none."""
+    """(draws,) the greatest statistic over all groups where nothing is there; minus infinity where
+    there are none."""
     out = np.full(draws, -np.inf)
     groups = [g.tested for g in groups if g.tested.testable]
     if not groups:
@@ -51,7 +54,9 @@ def _greatest(groups: list[Group], sign: np.ndarray) -> np.ndarray:
     moves = np.stack([g.moves for g in groups])
     directions, rest = np.array([g.freedom for g in groups]).T
     out = left_out(squares)
-    again = np.einsum("gbkl,gbl->gbk", out, moves)  # what a draw's own scores move by, before its refit
+    again = np.einsum(
+        "gbkl,gbl->gbk", out, moves
+    )  # what a draw's own scores move by, before its refit
     pulled = out @ squares
     after = np.einsum("gbkl,gbl->gbk", pulled, again)
     twice = np.einsum("gbkl,gblm->gkm", pulled, pulled, optimize=True)
@@ -62,6 +67,10 @@ def _greatest(groups: list[Group], sign: np.ndarray) -> np.ndarray:
     u = (sign @ flat(after)).reshape(-1, count, k)
     top = np.sum(c * c, axis=2)
     size = sign**2 @ norms.T
-    bottom = size - 2.0 * np.sum(c * u, axis=2) + np.einsum("dgk,gkl,dgl->dg", c, twice, c, optimize=True)
+    bottom = (
+        size
+        - 2.0 * np.sum(c * u, axis=2)
+        + np.einsum("dgk,gkl,dgl->dg", c, twice, c, optimize=True)
+    )
     ratio = top / np.maximum(bottom, 1e-9 * size)
     return np.max(normal_scores(ratio, directions, directions * (rest - 1.0)), axis=1)

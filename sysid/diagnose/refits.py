@@ -12,10 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from .. import blocks
+from ..candidates import Candidate, at_start, bounds_of, grown
 from ..estimate import inverse
-from .candidates import Candidate, at_start, bounds_of, grown
+from ..view import View, by_block, looked_at
 from .evidence import Group
-from .view import View, by_block, looked_at
 
 _COMPARED = 1e-4  # share of the objective: finer than rivals are ever told apart by
 

@@ -7,11 +7,11 @@ from collections.abc import Callable
 
 import numpy as np
 
+from ..view import View
 from .ask import Asked, ask
 from .evidence import Group
 from .steps import Step, revised, step_of
 from .ties import Choice, alike, chosen
-from .view import View
 
 LEVEL = 0.01  # family-wise: how often anything is accused where nothing is there
 WORTH = 0.03  # of a joint's squared residual under the low-pass: 1.5 % of its root mean square

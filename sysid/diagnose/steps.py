@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..candidates import Candidate
 from ..model import ROBOT
-from .candidates import Candidate
+from ..view import View
 from .evidence import groups_at
 from .refits import joined, losses, weighed
 from .ties import Choice, chosen
-from .view import View
 
 
 @dataclass(frozen=True)

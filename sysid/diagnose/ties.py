@@ -12,10 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from .. import blocks
-from .candidates import columns_of
+from ..candidates import columns_of
+from ..view import View
 from .evidence import Group
 from .refits import Member, losses, refitted
-from .view import View
 
 _OUTSIDE = 0.10  # a model is outside the set of 90 % where its p-value is below
 _SAME = 0.99  # share of a candidate's torque that another one's columns hold

@@ -21,12 +21,13 @@ _MOST = 0.5  # of what effects took and functions of the motion still predict to
 class Verdict:
     """One joint's verdict.
 
-    status: complete (nothing is left above the noise), missing (`claims`: what is claimed, first the first), explained (by
-    the claims of other joints' equations), unknown (the motion predicts what is left, and no effect does), unresolved
-    (error stands above the floor, or the floor is not known, and these logs do not say why).
-    explained: share of the joint's misfit on the test logs that all claims take, NaN where the misfit is not known.
-    left: what functions of the motion predict of the rest; None where nothing. says: why it is unresolved. carries: that the
-    training logs do not carry the model over to the test logs, where they do not.
+    status: complete (nothing is left above the noise), missing (`claims`: what is claimed, first
+    the first), explained (by the claims of other joints' equations), unknown (the motion predicts
+    what is left, and no effect does), unresolved (error stands above the floor, or the floor is not
+    known, and these logs do not say why). explained: share of the joint's misfit on the test logs
+    that all claims take, NaN where the misfit is not known. left: what functions of the motion
+    predict of the rest; None where nothing. says: why it is unresolved. carries: that the training
+    logs do not carry the model over to the test logs, where they do not.
     """
 
     joint: str
@@ -39,25 +40,38 @@ class Verdict:
 
 
 def verdicts(
-    fit: Fit, claims: Sequence[Claim], left: Sequence[Unknown], before: Sequence[Unknown], floors: Sequence, refused: Sequence = (),
+    fit: Fit,
+    claims: Sequence[Claim],
+    left: Sequence[Unknown],
+    before: Sequence[Unknown],
+    floors: Sequence,
+    refused: Sequence = (),
     carried: Sequence[Transfer] = (),
-) -> list[Verdict]:  # fmt: skip
+) -> list[Verdict]:
     """The verdict on every joint.
 
     Args:
-        fit: of the experiment as it is. left, before: what functions of the motion predict with all claims in the model, and
-            without. floors: noise floor of each joint. carried: whether the model with all claims carries over, of each joint.
+        fit: of the experiment as it is. left, before: what functions of the motion predict with all
+            claims in the model, and without. floors: noise floor of each joint. carried: whether
+            the model with all claims carries over, of each joint.
     """
     last = claims[-1].after if claims else fit
     out = []
     for j, joint in enumerate(fit.joints):
-        own = tuple(c for c in claims if c.head.joint == joint or (c.head.joint == "*" and c.step.shares[j] >= WORTH))
+        own = tuple(
+            c
+            for c in claims
+            if c.head.joint == joint or (c.head.joint == "*" and c.step.shares[j] >= WORTH)
+        )
         others = tuple(c for c in claims if c not in own and c.step.shares[j] >= WORTH)
         first, then, floor = fit.rms("test")[joint], last.rms("test")[joint], floors[j].rms
         misfit = first**2 - (floor if floor is not None else then) ** 2
         explained = (first**2 - then**2) / misfit if misfit > 0 and claims else float("nan")
         remains = left[j] if predictable(left[j], len(fit.joints)) else None
-        reached = floor is not None and max(then, last.rms("train")[joint]) <= (1.0 + _FLOOR) * floor + 2.0 * floors[j].std
+        reached = (
+            floor is not None
+            and max(then, last.rms("train")[joint]) <= (1.0 + _FLOOR) * floor + 2.0 * floors[j].std
+        )
         if own:
             taken = sum(c.step.shares[j] for c in own)
             much = remains is not None and remains.share * max(1.0 - taken, 0.0) > _MOST * taken
@@ -66,28 +80,60 @@ def verdicts(
             out.append(Verdict(joint, "unknown", others, explained, remains))
         elif reached:
             at_floor = first <= (1.0 + _FLOOR) * floor + 2.0 * floors[j].std
-            by = () if at_floor or not claims else others or (max(claims, key=lambda c, j=j: c.step.shares[j]),)
-            out.append(Verdict(joint, "explained" if by else "complete", by, explained if by else float("nan")))
+            by = (
+                ()
+                if at_floor or not claims
+                else others or (max(claims, key=lambda c, j=j: c.step.shares[j]),)
+            )
+            out.append(
+                Verdict(
+                    joint, "explained" if by else "complete", by, explained if by else float("nan")
+                )
+            )
         else:
-            out.append(Verdict(joint, "unresolved", others, explained, remains, _why(fit, j, floors[j], then, last, refused)))
+            out.append(
+                Verdict(
+                    joint,
+                    "unresolved",
+                    others,
+                    explained,
+                    remains,
+                    _why(fit, j, floors[j], then, last, refused),
+                )
+            )
     said = {found.joint: found.says for found in carried}
     return [replace(one, carries=said.get(one.joint, "")) for one in out]
 
 
 def predictable(found: Unknown, joints: int) -> bool:
-    """Whether functions of the motion predict a part worth having of what is left, at the same family-wise level."""
+    """Whether functions of the motion predict a part worth having of what is left, at the same
+    family-wise level."""
     functions = found.chance < LEVEL / joints and found.gain.sum() > WORTH * found.total
     return bool(functions or found.tone > WORTH)
 
 
 def _why(fit: Fit, j: int, floor, error: float, last: Fit, refused) -> str:
     joint = fit.joints[j]
-    words = [f"{r.effect} was looked at and is not claimed: {r.why}" for r in refused if r.joint in (joint, "*")]
+    words = [
+        f"{r.effect} was looked at and is not claimed: {r.why}"
+        for r in refused
+        if r.joint in (joint, "*")
+    ]
     if floor.rms is None:
-        return "; ".join([f"its noise floor is not known ({floor.detail}), so nobody can say what error is left above it", *words])
+        return "; ".join(
+            [
+                f"its noise floor is not known ({floor.detail}), so nobody can say what error is left above it",
+                *words,
+            ]
+        )
     train = last.rms("train")[joint]
     if train <= (1.0 + _FLOOR) * floor.rms + 2.0 * floor.std:
-        return "; ".join(["the training logs are explained and the test logs are not: the model does not carry over to them", *words])
+        return "; ".join(
+            [
+                "the training logs are explained and the test logs are not: the model does not carry over to them",
+                *words,
+            ]
+        )
     said = f"its error is {error / max(floor.rms, 1e-300):.2g} times the noise floor, and nothing in the motion of these logs predicts the rest"
     return "; ".join([said, *words])
 

@@ -1,4 +1,5 @@
-"""What could be missing: every effect of the vocabulary on every joint, with its variants; and the columns that it would add."""
+"""What could be missing: every effect of the vocabulary on every joint, with its variants; and the
+columns that it would add."""
 
 from __future__ import annotations
 
@@ -6,18 +7,20 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .. import rows as row
-from ..effect import Deflection, Effect, MotionEffect, SensorEffect, WrenchEffect, find, vocabulary
-from ..model import ROBOT, Model
+from . import rows as row
+from .effect import Deflection, Effect, MotionEffect, SensorEffect, WrenchEffect, find, vocabulary
+from .model import ROBOT, Model
 
-# What every model has to begin with is added first where it lacks; then what has a law; then what can bend to anything.
+# What every model has to begin with is added first where it lacks; then what has a law; then what
+# can bend to anything.
 _PLAIN = ("viscous", "coulomb", "armature", "torque_bias")
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """An effect that is not in the model, on a joint (-1: the robot), with the options of a variant. begins: shape values
-    to try in place of a grid, of one that takes the place of what the model has of it."""
+    """An effect that is not in the model, on a joint (-1: the robot), with the options of a
+    variant. begins: shape values to try in place of a grid, of one that takes the place of what the
+    model has of it."""
 
     effect: Effect
     joint: int
@@ -61,7 +64,8 @@ class Candidate:
 
 
 def candidates(model: Model, extra=()) -> list[Candidate]:
-    """Every effect that a model lacks, joint by joint; `extra` effects of the user's own come with the vocabulary."""
+    """Every effect that a model lacks, joint by joint; `extra` effects of the user's own come with
+    the vocabulary."""
     robot = model.robot
     there = {(effect.name, joint) for effect, joints in model.terms for joint in joints}
     out = []
@@ -71,20 +75,36 @@ def candidates(model: Model, extra=()) -> list[Candidate]:
                 out += _richer(model, effect.name, joint)
                 continue
             for options in _variants(effect, robot, joint):
-                out.append(Candidate(effect.given(**options).bound(robot, joint), joint, tuple(options.items())))
+                out.append(
+                    Candidate(
+                        effect.given(**options).bound(robot, joint), joint, tuple(options.items())
+                    )
+                )
     return out
 
 
 def _richer(model: Model, name: str, joint: int) -> list[Candidate]:
-    """What may take the place of an effect that the model has; nothing where the user holds its shape values."""
-    ((term, effect),) = [(k, e) for k, (e, joints) in enumerate(model.terms) if e.name == name and joint in joints]
-    own = [(v, at) for v, at in zip(model.shape_values, model.shapes) if (v.term, v.joint) == (term, joint)]
+    """What may take the place of an effect that the model has; nothing where the user holds its
+    shape values."""
+    ((term, effect),) = [
+        (k, e) for k, (e, joints) in enumerate(model.terms) if e.name == name and joint in joints
+    ]
+    own = [
+        (v, at)
+        for v, at in zip(model.shape_values, model.shapes)
+        if (v.term, v.joint) == (term, joint)
+    ]
     if any(v.held for v, _ in own):
         return []
     return [
-        Candidate(effect.given(**options).bound(model.robot, joint), joint, tuple(options.items()), (tuple(at.items()),))
+        Candidate(
+            effect.given(**options).bound(model.robot, joint),
+            joint,
+            tuple(options.items()),
+            (tuple(at.items()),),
+        )
         for options, at in effect.richer(**{v.shape.name: at for v, at in own})
-    ]  # fmt: skip
+    ]
 
 
 def _variants(effect: Effect, robot, joint: int) -> list[dict]:
@@ -97,14 +117,20 @@ def _variants(effect: Effect, robot, joint: int) -> list[dict]:
 
 
 def tried(view, candidate: Candidate) -> list[dict[str, float]]:
-    """Sets of shape values to try: a grid over each value in turn, the others midway; where an effect does nothing yet, that,
-    and what it says to try beside it."""
+    """Sets of shape values to try: a grid over each value in turn, the others midway; where an
+    effect does nothing yet, that, and what it says to try beside it."""
     if candidate.begins:
         return [dict(at) for at in candidate.begins]
     bounds = bounds_of(view.model, candidate)
     if candidate.nonlinear:
-        starts = [s.start if s.start is not None else float(np.sqrt(low * high)) for s, low, high, _ in bounds]
-        return [{s.name: at for (s, *_), at in zip(bounds, starts)}, *further(view.model, candidate)]
+        starts = [
+            s.start if s.start is not None else float(np.sqrt(low * high))
+            for s, low, high, _ in bounds
+        ]
+        return [
+            {s.name: at for (s, *_), at in zip(bounds, starts)},
+            *further(view.model, candidate),
+        ]
     if not candidate.effect.coefficients():
         return []
     if not bounds:
@@ -114,7 +140,7 @@ def tried(view, candidate: Candidate) -> list[dict[str, float]]:
         {**middle, shape.name: float(at)}
         for shape, low, high, angle in bounds
         for at in shape.values(low, high, angle)
-    ]  # fmt: skip
+    ]
 
 
 def bounds_of(model: Model, candidate: Candidate) -> list[tuple]:
@@ -126,10 +152,13 @@ def bounds_of(model: Model, candidate: Candidate) -> list[tuple]:
 
 
 def further(model: Model, candidate: Candidate) -> list[dict[str, float]]:
-    """Sets of shape values to try beyond an effect's start, at which its torque is no multiple of its slope there."""
+    """Sets of shape values to try beyond an effect's start, at which its torque is no multiple of
+    its slope there."""
     if not isinstance(candidate.effect, Deflection):
         return []
-    return candidate.effect.tries({s.name: (low, high) for s, low, high, _ in bounds_of(model, candidate)})
+    return candidate.effect.tries(
+        {s.name: (low, high) for s, low, high, _ in bounds_of(model, candidate)}
+    )
 
 
 def at_start(candidate: Candidate, shapes: dict[str, float]) -> bool:
@@ -138,30 +167,47 @@ def at_start(candidate: Candidate, shapes: dict[str, float]) -> bool:
 
 
 def grown(source, candidate: Candidate, shapes: dict[str, float]) -> Model:
-    """A source's model with a candidate at shape values, in the place of what it has of the same effect on that joint."""
+    """A source's model with a candidate at shape values, in the place of what it has of the same
+    effect on that joint."""
     model = source.model.without(*candidate.key).with_effect(candidate.effect, (candidate.joint,))
     if candidate.effect.uses_load and model.reference is None:
         model = model.with_reference(source.x[: 10 * model.bodies].reshape(-1, 10))
     own = model.last_shapes
-    asked = [shapes.get(v.shape.name, at) for v, at in zip(model.shape_values[own], model.shapes[own])]
+    asked = [
+        shapes.get(v.shape.name, at) for v, at in zip(model.shape_values[own], model.shapes[own])
+    ]
     return model.with_shapes([*model.shapes[: own.start], *asked])
 
 
 def columns_of(source, candidate: Candidate, shapes: list[dict[str, float]]) -> np.ndarray:
-    """Columns (shapes, joints, n, k) that a candidate would add to a source's rows, its own joint's or every joint's.
+    """Columns (shapes, joints, n, k) that a candidate would add to a source's rows, its own joint's
+    or every joint's.
 
-    Of an effect that is no column, the slopes of the predicted torque in its values; away from its start the change of the torque
-    as a share of its first value.
+    Of an effect that is no column, the slopes of the predicted torque in its values; away from its
+    start the change of the torque as a share of its first value.
     """
     if isinstance(candidate.effect, SensorEffect):
         return np.stack([_sensed(source, candidate, own)[None] for own in shapes])
     if candidate.nonlinear:
-        apart = [own for own in shapes if isinstance(candidate.effect, Deflection) and not at_start(candidate, own)]
+        apart = [
+            own
+            for own in shapes
+            if isinstance(candidate.effect, Deflection) and not at_start(candidate, own)
+        ]
         changes = iter(_changes(source, candidate, apart))
-        return np.stack([next(changes) if own in apart else _slopes(source, candidate, own) for own in shapes])
+        return np.stack(
+            [next(changes) if own in apart else _slopes(source, candidate, own) for own in shapes]
+        )
     found = row.signatures(
-        source.model, source.motion, source.pieces, candidate.effect, candidate.joint, shapes, source.stride, source.use
-    )  # fmt: skip
+        source.model,
+        source.motion,
+        source.pieces,
+        candidate.effect,
+        candidate.joint,
+        shapes,
+        source.stride,
+        source.use,
+    )
     return np.stack([values[None] if values.ndim == 2 else values for values in found])
 
 
@@ -175,7 +221,9 @@ def _changes(source, candidate: Candidate, shapes: list[dict[str, float]]) -> li
         everywhere = [replace(candidate, joint=joint) for joint in range(source.model.robot.dof)]
         tries = [further(source.model, one) for one in everywhere]
         apart = source.flights((candidate.name, candidate.options), effect, tries)[candidate.joint]
-    found = row.secants(source.model, source.motion, known, effect, shapes, source.stride, source.use, apart)
+    found = row.secants(
+        source.model, source.motion, known, effect, shapes, source.stride, source.use, apart
+    )
     return [change[:, :, None] / own[leading] for change, own in zip(found, shapes)]
 
 
@@ -184,24 +232,42 @@ def _slopes(source, candidate: Candidate, shapes: dict[str, float]) -> np.ndarra
     own = model.last_shapes
     idle_yet = at_start(candidate, shapes)
     # where an effect does nothing yet, a value that only says how it does it changes nothing
-    idle = [*model.shape_values[: own.start], *(v for v in model.shape_values[own] if idle_yet and v.shape.start is None)]
+    idle = [
+        *model.shape_values[: own.start],
+        *(v for v in model.shape_values[own] if idle_yet and v.shape.start is None),
+    ]
     held = tuple(((v.term, v.joint, v.shape.name), 0.0) for v in idle)
     held_model = replace(model, held=(*model.held, *held))
     slopes = row.tangents(
-        held_model, source.motion, source.x, source.stride, source.use, source.predicted if idle_yet else None
-    )[:, :, own]  # fmt: skip
-    free = [k for k, v in enumerate(model.shape_values[own]) if not (idle_yet and v.shape.start is None)]
+        held_model,
+        source.motion,
+        source.x,
+        source.stride,
+        source.use,
+        source.predicted if idle_yet else None,
+    )[:, :, own]
+    free = [
+        k for k, v in enumerate(model.shape_values[own]) if not (idle_yet and v.shape.start is None)
+    ]
     return slopes[:, :, free]
 
 
 def _sensed(source, candidate: Candidate, shapes: dict[str, float]) -> np.ndarray:
-    """Slopes (n, k) of a sensor effect: what it makes of the predicted torque of its joint, by differences."""
+    """Slopes (n, k) of a sensor effect: what it makes of the predicted torque of its joint, by
+    differences."""
     out = []
-    for piece, torque, kept in zip(source.motion.pieces, source.unfiltered, row.starts(source.motion, source.stride)):
+    for piece, torque, kept in zip(
+        source.motion.pieces, source.unfiltered, row.starts(source.motion, source.stride)
+    ):
         base, own = torque[None, candidate.joint], []
         for shape, low, high, _ in bounds_of(source.model, candidate):
             step = 1e-4 * (high - low)
-            read = [candidate.effect.sensed(base, piece.step, **{**shapes, shape.name: shapes[shape.name] + h}) for h in (0.0, step)]
+            read = [
+                candidate.effect.sensed(
+                    base, piece.step, **{**shapes, shape.name: shapes[shape.name] + h}
+                )
+                for h in (0.0, step)
+            ]
             slope = (read[1] - read[0])[0] / step
             own.append(slope[kept] if piece.smoother is None else piece.smoother.at(slope, kept))
         out.append(np.stack(own, axis=1))

@@ -83,9 +83,15 @@ class View:
         stretch = blocks.numbered(rows.t, rows.piece, shortest=np.inf, fewest=3 * _FOLDS)
         fold, names = stretch % _FOLDS, self.model.robot.joints
         take = lambda j, name: flexible.unknown(  # noqa: E731
-            self.variables, name, residual[:, j], rows.use[:, j], fold, rows.piece, self.step,
+            self.variables,
+            name,
+            residual[:, j],
+            rows.use[:, j],
+            fold,
+            rows.piece,
+            self.step,
             np.random.default_rng(j),
-        )  # fmt: skip
+        )
         return tuple(take(j, name) for j, name in enumerate(names))
 
     @cached_property
@@ -125,9 +131,18 @@ class View:
 
 
 def looked_at(
-    experiment: Experiment, model: Model, motion: Motion, rough: Motion, prior, *, stride: int,
-    weights=None, grid: bool = True, tolerance: float = 1e-7, inherited=None,
-) -> View:  # fmt: skip
+    experiment: Experiment,
+    model: Model,
+    motion: Motion,
+    rough: Motion,
+    prior,
+    *,
+    stride: int,
+    weights=None,
+    grid: bool = True,
+    tolerance: float = 1e-7,
+    inherited=None,
+) -> View:
     """Settle a model on a motion.
 
     Args:
@@ -187,6 +202,8 @@ def _under(experiment: Experiment, fit: Fit, logs, cutoff: float) -> View:
 def too_short() -> LogError:
     """Of logs that the low-pass leaves nothing of."""
     return LogError(
-        "the logs are too short to question", where="diagnose",
-        allowed="some seconds of training and of test logs", do="log longer",
-    )  # fmt: skip
+        "the logs are too short to question",
+        where="diagnose",
+        allowed="some seconds of training and of test logs",
+        do="log longer",
+    )

@@ -1,0 +1,17 @@
+"""What a diagnosis looks at: a model settled on the training motion, and its least squares."""
+
+from .design import Design, Sums, by_block, designed, instrumented, summed
+from .view import View, first_view, looked_at, too_short
+
+__all__ = [
+    "Design",
+    "Sums",
+    "View",
+    "by_block",
+    "designed",
+    "first_view",
+    "instrumented",
+    "looked_at",
+    "summed",
+    "too_short",
+]
