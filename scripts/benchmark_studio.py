@@ -23,8 +23,7 @@ import httpx
 import numpy as np
 import polars as pl
 
-from sysid import config, regressor, robot
-from sysid import candidates
+from sysid import candidates, config, regressor, robot
 from sysid.diagnose import ask, diagnosis
 from sysid.studio.app import application
 from sysid.studio.bench import Bench

@@ -8,8 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from . import rows as row
+from .config import Experiment, is_own
 from .effect import Deflection, Effect, MotionEffect, SensorEffect, WrenchEffect, find, vocabulary
 from .model import ROBOT, Model
+from .model import found as found_effect
 
 # What every model has to begin with is added first where it lacks; then what has a law; then what
 # can bend to anything.
@@ -111,6 +113,19 @@ def _variants(effect: Effect, robot, joint: int) -> list[dict]:
     if effect.name == "joint_coupling" and robot.dof < 2:
         return []
     return effect.variants(robot, joint)
+
+
+def own_effects(experiment: Experiment) -> list[Effect]:
+    """The user's own effects, those named as candidates and those in the model, to be asked on
+    every joint."""
+    specs = experiment.model.candidates + [
+        s for s in experiment.model.effects if is_own(s.name) or "formula" in s.options
+    ]
+    found = {}
+    for spec in specs:
+        effect = found_effect(spec, experiment.folder)
+        found.setdefault(effect.name, effect)
+    return [effect for name, effect in found.items() if name not in vocabulary()]
 
 
 # ---- columns

@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from sysid.diagnose.evidence import _made
+from sysid.diagnose.projected import _made
 from sysid.view import Design, by_block, summed
 
 

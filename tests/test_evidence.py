@@ -12,7 +12,7 @@ from scipy.stats import t as student
 
 from sysid import blocks, config, model, regressor
 from sysid.candidates import candidates
-from sysid.diagnose import evidence, null
+from sysid.diagnose import evidence, null, projected
 from sysid.log import Log, Segment
 from sysid.lowpass import lowpassed, stride_of
 from sysid.view import looked_at
@@ -131,7 +131,7 @@ def test_columns_that_are_mostly_noise_make_no_group():
     view = viewed(p)
     own = rng.normal(size=(1, 2, 240, 1))
     candidate = grouped(view, own)[0].candidate
-    group = lambda share: evidence._made(view, [(candidate, {})], [0, 1], own, own + share * rng.normal(size=own.shape))  # noqa: E731
+    group = lambda share: projected._made(view, [(candidate, {})], [0, 1], own, own + share * rng.normal(size=own.shape))  # noqa: E731
     assert len(group(0.3)) == 1 and group(0.8) == []
 
 
@@ -161,8 +161,8 @@ def test_what_rests_on_few_blocks_is_not_tested():
 def test_normal_scores_are_normal_quantiles_of_f_ratios(d1, d2):
     for p in (0.2, 0.05, 0.01, 1e-3, 1e-4):
         ratio = fisher.isf(p, d1, d2)
-        assert evidence.normal_scores(ratio, d1, d2) == pytest.approx(norm.isf(p), rel=0.05), p
-    grid = evidence.normal_scores(np.linspace(0.0, 50.0, 500), d1, d2)
+        assert null.normal_scores(ratio, d1, d2) == pytest.approx(norm.isf(p), rel=0.05), p
+    grid = null.normal_scores(np.linspace(0.0, 50.0, 500), d1, d2)
     assert (np.diff(grid) > 0).all()
 
 
@@ -222,7 +222,7 @@ def test_the_noise_of_the_angles_is_taken_off(views):
         for view in views:
             (candidate,) = [c for c in candidates(view.model) if (c.name, c.joint) == (name, joint)]
             for out, own in ((plain, in_blocks(replace(view, rough=view.motion))), (corrected, view)):
-                (group,) = evidence.groups(own, [candidate])
+                (group,) = projected.groups(own, [candidate])
                 out.append(group.coefficients[0])
         away[name, joint] = [np.sqrt(len(own)) * np.mean(own) / np.std(own, ddof=1) for own in (plain, corrected)]
     # Student's, eleven degrees of freedom, six questions: one in a thousand in all

@@ -8,7 +8,7 @@ from scipy.stats import binom
 from sysid import blocks
 from sysid.diagnose import null
 from sysid.diagnose.detectable import _size
-from sysid.diagnose.evidence import normal_scores
+from sysid.diagnose.null import normal_scores
 from tests.evidences import grouped, posed, viewed
 
 N, BLOCKS, DRAWS, LEVEL = 400, 40, 200, 0.05

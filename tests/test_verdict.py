@@ -51,7 +51,7 @@ def floor(value: float | None = 1.0, std: float = 0.02) -> NoiseFloor:
 
 def elbow(first: float, claims=(), *, rest=NOISE, before=NOISE, level=None, refused=(), train=None):
     """The elbow's verdict; the noise floor is one."""
-    found = verdicts(fitted(first, train=train), claims, [NOISE, rest], [NOISE, before], [floor(), level or floor()], refused)
+    found = verdicts(fitted(first, train=train), claims, [NOISE, rest], [floor(), level or floor()], refused)
     assert [v.joint for v in found] == list(JOINTS) and found[0].status in ("complete", "explained")
     return found[1]
 
@@ -70,7 +70,7 @@ def test_what_is_nothing_in_size_and_error_is_not_claimed(monkeypatch, fall, siz
 @pytest.mark.parametrize("error", [1.0, 1.3])
 def test_what_does_not_carry_over_is_said_whatever_the_verdict(error):
     found = verdicts(
-        fitted(error, train=1.0), (), [NOISE, NOISE], [NOISE, NOISE], [floor(), floor()],
+        fitted(error, train=1.0), (), [NOISE, NOISE], [floor(), floor()],
         carried=[Transfer("shoulder", 1.2, 0.1, (3.0,)), Transfer("elbow", 1.5, 0.1, (2.0, 4.0))],
     )  # fmt: skip
     shoulder, own = (_verdict(v) for v in found)
@@ -107,18 +107,18 @@ def test_two_effects_stand_in_their_order():
 def test_what_another_joint_s_effect_explains_is_explained():
     """The elbow's error falls to its floor with an effect of the shoulder: the elbow lacks nothing of its own."""
     other = claim("stribeck", "shoulder", [0.9, 0.3], fitted(1.02, 1.0))
-    found = verdicts(fitted(1.5, 3.0), [other], [NOISE] * 2, [NOISE] * 2, [floor()] * 2)
+    found = verdicts(fitted(1.5, 3.0), [other], [NOISE] * 2, [floor()] * 2)
     assert [v.status for v in found] == ["missing", "explained"]
     assert found[1].claims == (other,) and found[1].explained == pytest.approx((1.5**2 - 1.02**2) / (1.5**2 - 1.0))
     assert _verdict(found[1])["by"] == [{"effect": "stribeck", "joint": "shoulder"}]
     # one that was at its floor before is complete, whatever else joined
-    found = verdicts(fitted(1.05, 3.0), [other], [NOISE] * 2, [NOISE] * 2, [floor()] * 2)
+    found = verdicts(fitted(1.05, 3.0), [other], [NOISE] * 2, [floor()] * 2)
     assert [v.status for v in found] == ["missing", "complete"]
 
 
 def test_an_effect_of_the_robot_is_missing_where_it_matters():
     tilt = claim("gravity_tilt", "*", [0.8, 0.5 * WORTH], fitted(1.0, 1.0))
-    found = verdicts(fitted(1.02, 3.0), [tilt], [NOISE] * 2, [NOISE] * 2, [floor()] * 2)
+    found = verdicts(fitted(1.02, 3.0), [tilt], [NOISE] * 2, [floor()] * 2)
     assert [v.status for v in found] == ["missing", "complete"]
 
 

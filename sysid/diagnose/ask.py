@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -11,63 +10,59 @@ import numpy as np
 from ..candidates import candidates
 from ..view import View
 from . import null
-from .evidence import Group, gain, groups
+from .evidence import Group, gain
+from .projected import groups
 
 
 @dataclass(frozen=True)
 class Asked:
-    """The answer of all candidates under one model: groups, statistics and gains (groups,), null
-    maxima of the groups of each joint {joint: (draws,)}."""
+    """The answer of all candidates under one model: {joint: (groups, statistics (groups,),
+    gains (groups,), null maxima (draws,))}."""
 
-    groups: list[Group]
-    statistics: np.ndarray
-    gains: np.ndarray
-    null: dict[int, np.ndarray]
+    by_joint: dict[int, tuple[list[Group], np.ndarray, np.ndarray, np.ndarray]]
+
+    @cached_property
+    def groups(self) -> list[Group]:
+        """Of all joints."""
+        return [group for found, *_ in self.by_joint.values() for group in found]
+
+    @cached_property
+    def statistics(self) -> np.ndarray:
+        """(groups,)."""
+        return np.concatenate([found for _, found, *_ in self.by_joint.values()])
+
+    @cached_property
+    def gains(self) -> np.ndarray:
+        """(groups,)."""
+        return np.concatenate([found for _, _, found, _ in self.by_joint.values()])
 
     @cached_property
     def maxima(self) -> np.ndarray:
         """(draws,) the greatest of all groups."""
-        return np.max([*self.null.values()], axis=0)
+        return np.max([found for *_, found in self.by_joint.values()], axis=0)
 
     def p(self, k: int) -> float:
         """Family-wise p-value of a group."""
         return float((1 + np.sum(self.maxima >= self.statistics[k])) / (1 + len(self.maxima)))
 
 
-def ask(
-    view: View,
-    extra=(),
-    tell: Callable[[float], None] = lambda share: None,
-    *,
-    before: Asked | None = None,
-    anew=None,
-) -> Asked:
+def ask(view: View, extra=(), tell=lambda share: None, *, before=None, anew=()) -> Asked:
     """Every candidate that a view's model lacks.
 
     Args:
-        before: answers under the model that this one grew from. anew: the joints where it changed
-            something: of all others the answers stand.
+        tell: is called with the share done. before: answers under the model that this one grew
+            from. anew: the joints where it changed something: of all others the answers stand.
     """
-    all_ = candidates(view.model, extra)
-    joints = sorted({c.joint for c in all_})
-    groups_, statistics, gains, nulls = [], [], [], {}
-    for number, joint in enumerate(
-        joints
-    ):  # a joint at a time: its columns stand in memory together
+    asked, out = candidates(view.model, extra), {}
+    joints = sorted({c.joint for c in asked})
+    for number, joint in enumerate(joints):  # whose columns stand in memory together
         if before is not None and joint not in anew:
-            own = [k for k, g in enumerate(before.groups) if g.candidate.joint == joint]
-            groups_ += [before.groups[k] for k in own]
-            statistics, gains = [*statistics, before.statistics[own]], [*gains, before.gains[own]]
-            nulls[joint] = before.null[joint]
+            out[joint] = before.by_joint[joint]
         else:
-            found = groups(view, [c for c in all_ if c.joint == joint])
-            groups_ += found
-            statistics, gains = (
-                [*statistics, null.statistics(found)],
-                [*gains, np.array([gain(g).sum() for g in found])],
-            )
-            nulls[joint] = null.maxima(
-                found, np.random.default_rng(0)
-            )  # the same signs for all: draws of one residual
+            found = groups(view, [c for c in asked if c.joint == joint])
+            gains = np.array([gain(group).sum() for group in found])
+            # the same signs for all: draws of one residual
+            maxima = null.maxima(found, np.random.default_rng(0))
+            out[joint] = found, null.statistics(found), gains, maxima
         tell((number + 1) / len(joints))
-    return Asked(groups_, np.concatenate(statistics), np.concatenate(gains), nulls)
+    return Asked(out)

@@ -17,7 +17,8 @@ from ..candidates import Candidate, at_start
 from ..model import ROBOT
 from ..view import View
 from .ask import Asked
-from .evidence import Group, normal_scores
+from .evidence import Group
+from .null import normal_scores
 from .select import LEVEL, WORTH
 
 POWER = 0.9
@@ -41,9 +42,8 @@ def detectable(view: View, asked: Asked, candidates) -> list[Detectable]:
     loss = np.maximum(np.sum(view.design.residual**2, axis=0), 1e-300)
     best: dict[tuple, Detectable] = {}
     for candidate in candidates:
-        if (
-            candidate.parameters and not candidate.begins
-        ):  # a force from outside has none until somebody says when it acts
+        # a force from outside has none until somebody says when it acts
+        if candidate.parameters and not candidate.begins:
             best.setdefault(candidate.key, Detectable(candidate, *_leading(view, candidate)))
     for group in (g for g in asked.groups if not g.candidate.begins):
         size = _size(group, threshold, loss)
@@ -61,16 +61,11 @@ def detectable(view: View, asked: Asked, candidates) -> list[Detectable]:
 
 def _leading(view: View, candidate: Candidate) -> tuple[str, str]:
     effect = candidate.effect
-    listed = (
-        [s for s in effect.shapes() if s.start is not None]
-        if candidate.nonlinear
-        else effect.coefficients()
-    )
     grown = view.model.with_effect(effect, (candidate.joint,))
-    units = [c.unit for c in grown.coefficients[len(view.model.coefficients) :]] or [
-        v.unit for v in grown.shape_values[grown.last_shapes] if v.shape.start is not None
-    ]
-    return listed[0].name, units[0]
+    if not candidate.nonlinear:
+        return effect.coefficients()[0].name, grown.coefficients[len(view.model.coefficients)].unit
+    first = next(v for v in grown.shape_values[grown.last_shapes] if v.shape.start is not None)
+    return first.shape.name, first.unit
 
 
 def _size(group: Group, threshold: float, loss: np.ndarray) -> float:
@@ -84,10 +79,9 @@ def _size(group: Group, threshold: float, loss: np.ndarray) -> float:
     passes = np.flatnonzero(normal_scores(grid, directions, directions * (rest - 1.0)) > threshold)
     if not len(passes):
         return np.inf  # it rests on too few blocks to stand out, whatever its size
-    needed = np.sqrt(grid[passes[0]] * spread) + ndtri(POWER) * np.sqrt(spread / directions)
+    needed = np.sqrt(grid[passes[0]] * spread)
     joints = slice(None) if group.candidate.joint == ROBOT else [group.candidate.joint]
     # what it takes, of the residual and of what it adds to it, must be worth having
-    worth = np.sqrt(WORTH / (1.0 - WORTH) * loss[joints].min()) + ndtri(POWER) * np.sqrt(
-        spread / directions
-    )
-    return float(max(needed, worth) / group.sizes[0])
+    worth = np.sqrt(WORTH / (1.0 - WORTH) * loss[joints].min())
+    chance = ndtri(POWER) * np.sqrt(spread / directions)
+    return float((max(needed, worth) + chance) / group.sizes[0])

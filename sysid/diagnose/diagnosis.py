@@ -18,10 +18,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .. import model, pipeline
-from ..candidates import candidates
-from ..config import Experiment, is_own
-from ..effect import vocabulary
+from .. import pipeline
+from ..candidates import candidates, own_effects
+from ..config import Experiment
 from ..estimate import Fit, predict
 from ..failures import Failure, HeldOut, failures
 from ..filters import settled
@@ -32,8 +31,9 @@ from ..transfer import transfers
 from ..view import View, first_view, too_short
 from . import claims as claiming
 from . import select
-from .claims import Claim, Finding, Refused
+from .claims import Claim, Refused
 from .detectable import Detectable, detectable
+from .findings import Finding, hidden_by_weights
 from .verdict import Verdict, verdicts
 
 
@@ -79,7 +79,7 @@ def diagnose(
     """
     tell = progress or (lambda stage, share: None)
     fit = fit or pipeline.fit(experiment, progress=progress)
-    extra, robot, data = _own(experiment), fit.model.robot, experiment.data
+    extra, robot, data = own_effects(experiment), fit.model.robot, experiment.data
     with pipeline.noticed():
         logs = [pipeline.read(experiment, robot, part) for part in (data.train, data.test)]
         view = first_view(experiment, fit, logs[0])
@@ -92,7 +92,7 @@ def diagnose(
             raise too_short()
         first, then = (HeldOut(one.settled, test) for one in (view, after))
         found = _floors(experiment, last, after, logs)
-        said = verdicts(fit, claims, after.unknown, view.unknown, found, refused, transfers(last))
+        said = verdicts(fit, claims, after.unknown, found, refused, transfers(last))
         errors = last.rms("test").values()
         levels = np.array([e if f.rms is None else f.rms for f, e in zip(found, errors)])
         where = failures(first, fit.predictions["test"], levels)
@@ -128,19 +128,4 @@ def _floors(experiment: Experiment, fit: Fit, view: View, logs) -> list[NoiseFlo
 
 def _notices(claims, refused) -> Iterator[str]:
     yield from (f"{r.effect} on {r.joint} is not claimed: {r.why}" for r in refused)
-    yield from (
-        words for c in claims if (words := claiming.hidden_by_weights(c.head, c.after)) is not None
-    )
-
-
-def _own(experiment: Experiment) -> list:
-    """The user's own effects, those named as candidates and those in the model, to be asked on
-    every joint."""
-    specs = experiment.model.candidates + [
-        s for s in experiment.model.effects if is_own(s.name) or "formula" in s.options
-    ]
-    found = {}
-    for spec in specs:
-        effect = model.found(spec, experiment.folder)
-        found.setdefault(effect.name, effect)
-    return [effect for name, effect in found.items() if name not in vocabulary()]
+    yield from (words for c in claims if (words := hidden_by_weights(c.head, c.after)) is not None)

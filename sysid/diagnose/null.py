@@ -16,7 +16,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from .. import blocks
-from .evidence import Group, left_out, normal_scores
+from .evidence import Group, left_out
 
 # Noise that was low-passed and had a model projected off it is so much louder than signs of its
 # blocks make it: what stands across two blocks, and what the model's own parameters took. Measured
@@ -74,3 +74,11 @@ def _greatest(groups: list[Group], sign: np.ndarray) -> np.ndarray:
     )
     ratio = top / np.maximum(bottom, 1e-9 * size)
     return np.max(normal_scores(ratio, directions, directions * (rest - 1.0)), axis=1)
+
+
+def normal_scores(statistic, directions, rest) -> np.ndarray:
+    """F ratios with `directions` and `rest` degrees of freedom on the scale of a normal variable
+    (Wilson & Hilferty 1931)."""
+    one, two = 2.0 / (9.0 * directions), 2.0 / (9.0 * rest)
+    root = np.cbrt(statistic)
+    return ((1.0 - two) * root - (1.0 - one)) / np.sqrt(two * root**2 + one)

@@ -10,7 +10,7 @@ import numpy as np
 from ..candidates import Candidate
 from ..model import ROBOT
 from ..view import View
-from .evidence import groups_at
+from .projected import groups_at
 from .refits import joined, losses, weighed
 from .ties import Choice, chosen
 

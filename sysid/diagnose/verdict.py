@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from ..estimate import Fit
 from ..flexible import Unknown
 from ..transfer import Transfer
@@ -14,7 +12,8 @@ from .claims import Claim
 from .select import LEVEL, WORTH
 
 _FLOOR = 0.1  # of the floor: what a floor may be in doubt by and still be called reached
-_MOST = 0.5  # of what effects took and functions of the motion still predict together: the greater part names the joint
+# of what effects took and functions of the motion still predict together: the greater part names
+_MOST = 0.5
 
 
 @dataclass(frozen=True)
@@ -43,7 +42,6 @@ def verdicts(
     fit: Fit,
     claims: Sequence[Claim],
     left: Sequence[Unknown],
-    before: Sequence[Unknown],
     floors: Sequence,
     refused: Sequence = (),
     carried: Sequence[Transfer] = (),
@@ -51,9 +49,9 @@ def verdicts(
     """The verdict on every joint.
 
     Args:
-        fit: of the experiment as it is. left, before: what functions of the motion predict with all
-            claims in the model, and without. floors: noise floor of each joint. carried: whether
-            the model with all claims carries over, of each joint.
+        fit: of the experiment as it is. left: what functions of the motion predict with all claims
+            in the model. floors: noise floor of each joint. carried: whether the model with all
+            claims carries over, of each joint.
     """
     last = claims[-1].after if claims else fit
     out = []
@@ -72,35 +70,21 @@ def verdicts(
             floor is not None
             and max(then, last.rms("train")[joint]) <= (1.0 + _FLOOR) * floor + 2.0 * floors[j].std
         )
-        if own:
-            taken = sum(c.step.shares[j] for c in own)
-            much = remains is not None and remains.share * max(1.0 - taken, 0.0) > _MOST * taken
-            out.append(Verdict(joint, "unknown" if much else "missing", own, explained, remains))
-        elif remains is not None and not reached:
-            out.append(Verdict(joint, "unknown", others, explained, remains))
-        elif reached:
-            at_floor = first <= (1.0 + _FLOOR) * floor + 2.0 * floors[j].std
-            by = (
-                ()
-                if at_floor or not claims
-                else others or (max(claims, key=lambda c, j=j: c.step.shares[j]),)
-            )
-            out.append(
-                Verdict(
-                    joint, "explained" if by else "complete", by, explained if by else float("nan")
-                )
-            )
+        at_floor = floor is not None and first <= (1.0 + _FLOOR) * floor + 2.0 * floors[j].std
+        taken = sum(c.step.shares[j] for c in own)
+        if own and (remains is None or remains.share * max(1.0 - taken, 0.0) <= _MOST * taken):
+            told = ("missing", own, explained, remains)
+        elif own or (remains is not None and not reached):
+            told = ("unknown", own or others, explained, remains)
+        elif not reached:
+            why = _why(fit, j, floors[j], then, last, refused)
+            told = ("unresolved", others, explained, remains, why)
+        elif at_floor or not claims:
+            told = ("complete",)
         else:
-            out.append(
-                Verdict(
-                    joint,
-                    "unresolved",
-                    others,
-                    explained,
-                    remains,
-                    _why(fit, j, floors[j], then, last, refused),
-                )
-            )
+            most = max(claims, key=lambda c, j=j: c.step.shares[j])
+            told = ("explained", others or (most,), explained)
+        out.append(Verdict(joint, *told))
     said = {found.joint: found.says for found in carried}
     return [replace(one, carries=said.get(one.joint, "")) for one in out]
 
@@ -113,31 +97,22 @@ def predictable(found: Unknown, joints: int) -> bool:
 
 
 def _why(fit: Fit, j: int, floor, error: float, last: Fit, refused) -> str:
-    joint = fit.joints[j]
-    words = [
-        f"{r.effect} was looked at and is not claimed: {r.why}"
-        for r in refused
-        if r.joint in (joint, "*")
-    ]
+    joint, train = fit.joints[j], last.rms("train")[fit.joints[j]]
     if floor.rms is None:
-        return "; ".join(
-            [
-                f"its noise floor is not known ({floor.detail}), so nobody can say what error is left above it",
-                *words,
-            ]
+        said = (
+            f"its noise floor is not known ({floor.detail}), so nobody can say what error is left "
+            "above it"
         )
-    train = last.rms("train")[joint]
-    if train <= (1.0 + _FLOOR) * floor.rms + 2.0 * floor.std:
-        return "; ".join(
-            [
-                "the training logs are explained and the test logs are not: the model does not carry over to them",
-                *words,
-            ]
+    elif train <= (1.0 + _FLOOR) * floor.rms + 2.0 * floor.std:
+        said = (
+            "the training logs are explained and the test logs are not: the model does not carry "
+            "over to them"
         )
-    said = f"its error is {error / max(floor.rms, 1e-300):.2g} times the noise floor, and nothing in the motion of these logs predicts the rest"
+    else:
+        said = (
+            f"its error is {error / max(floor.rms, 1e-300):.2g} times the noise floor, and nothing "
+            "in the motion of these logs predicts the rest"
+        )
+    asked = [r for r in refused if r.joint in (joint, "*")]
+    words = [f"{r.effect} was looked at and is not claimed: {r.why}" for r in asked]
     return "; ".join([said, *words])
-
-
-def finite(value: float) -> float | None:
-    """A number, None where there is none."""
-    return float(value) if np.isfinite(value) else None

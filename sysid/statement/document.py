@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..diagnose.claims import Claim, Finding
+from ..diagnose.claims import Claim
 from ..diagnose.diagnosis import Diagnosis
+from ..diagnose.findings import Finding
 from ..diagnose.verdict import Verdict
 from ..flexible import Unknown
 from ..model import ROBOT

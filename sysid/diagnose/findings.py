@@ -1,0 +1,119 @@
+"""What a diagnosis says of one effect: its parameters, its error and its command are those of the
+fit that has it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .. import comparison
+from ..addition import command, spelled
+from ..estimate import Fit
+from ..model import ROBOT
+from .refits import Member
+from .steps import Step
+
+_CLEAR = 2.0  # standard deviations
+
+
+@dataclass(frozen=True)
+class Finding:
+    """A candidate that these logs support.
+
+    joint: its name, or `*`. p: family-wise p-value of its set; probability: of being the best of
+    its set. rms_before, rms_after: on the test logs, on its joint (over all joints for `*`), of the
+    fits without it and with it. parameters: {name: (value, std or NaN, unit)} of the fit with it.
+    tied_with: words of the others of its set, with their joint where it is another. step: which
+    step of the search it heads, or None. command: what adds it.
+    """
+
+    member: Member
+    joint: str
+    p: float
+    probability: float
+    rms_before: float
+    rms_after: float
+    fall_se: float
+    parameters: dict[str, tuple[float, float, str]]
+    tied_with: tuple[str, ...]
+    step: int | None
+    command: str
+
+    @property
+    def candidate(self):
+        """What would join."""
+        return self.member.candidate
+
+    @property
+    def effect(self) -> str:
+        """The effect's word."""
+        return self.candidate.name
+
+
+def where(member: Member, fit: Fit) -> str:
+    """The name of its joint, or `*`."""
+    return "*" if member.candidate.joint == ROBOT else fit.joints[member.candidate.joint]
+
+
+def judged_by(member: Member, fit: Fit) -> list[str]:
+    """The joints whose error an effect is judged by."""
+    joint = where(member, fit)
+    return list(fit.joints) if joint == "*" else [joint]
+
+
+def finding(
+    before: Fit, after: Fit, member: Member, chance: float, step: Step, number: int
+) -> Finding:
+    """A member of a step's set, from the fits without it and with it.
+
+    Args:
+        number: of the step among those that stand.
+    """
+    own, joint = judged_by(member, before), where(member, before)
+    errors = [
+        float(np.sqrt(np.mean([fit.rms("test")[j] ** 2 for j in own]))) for fit in (before, after)
+    ]
+    differences = {d.joint: d.se for d in comparison.compare(before, after, ("before", "after"))}
+    se = float(np.sqrt(np.nansum([differences[j] ** 2 for j in own]) / len(own)))
+    tied = [(m.candidate.name, where(m, before)) for m, _ in step.choice.members if m is not member]
+    words = tuple(name if at in (joint, "*") else f"{name} on {at}" for name, at in tied)
+    heads = number if member is step.choice.head else None
+    added = command(before.experiment.path, *spelled(member.candidate, joint))
+    numbers = parameters(after, member)
+    return Finding(member, joint, step.p, chance, *errors, se, numbers, words, heads, added)
+
+
+def parameters(after: Fit, member: Member) -> dict[str, tuple[float, float, str]]:
+    """{name: (value, std or NaN, unit)} of an effect in the fit that has it."""
+    model, key = after.model, member.candidate.key
+    linear = zip(
+        model.coefficients, after.x[10 * model.bodies :], after.uncertainty.std[10 * model.bodies :]
+    )
+    out = {
+        c.name: (float(at), float(std), c.unit)
+        for c, at, std in linear
+        if (c.effect, c.joint) == key
+    }
+    for value, at, std in zip(model.shape_values, model.shapes, after.shape_std):
+        if (model.terms[value.term][0].name, value.joint) == key:
+            out[value.name] = (float(at), float(std), value.unit)
+    return out
+
+
+def nought(numbers: dict[str, tuple[float, float, str]]) -> bool:
+    """Whether all of an effect's parameters that are determined are nothing beside their standard
+    deviations."""
+    known = [abs(at) <= _CLEAR * std for at, std, _ in numbers.values() if np.isfinite(std)]
+    return bool(known) and all(known)
+
+
+def hidden_by_weights(found: Finding, fit: Fit) -> str | None:
+    """What to know where the fit, in which all joints count alike, does not tell the size of an
+    effect that is there."""
+    if fit.weights is not None or not nought(found.parameters):
+        return None
+    return (
+        f"{found.effect} on {found.joint} is there, but this fit tells its size badly: joints with "
+        "more noise count as much as quiet ones; solver.weighting: noise tells it better"
+    )

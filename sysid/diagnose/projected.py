@@ -1,0 +1,117 @@
+"""Candidates' columns, projected off the model: the groups that are asked."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import groupby
+
+import numpy as np
+
+from ..candidates import Candidate, columns_of, tried
+from ..view import View, by_block
+from .evidence import Group
+
+_FLAT = 1e-6  # share of a column's square: what the model leaves of it beyond that is rounding
+_DATA = 0.5  # of a direction's square must stand in the data; the prior may not tell most of it
+_NOISE = 0.25  # of a direction's square: noise to half of its size, it says nothing about a law
+_BATCH = 256  # columns' sets that stand in memory at once
+
+Asked = tuple[Candidate, dict[str, float]]  # a candidate at shape values
+
+
+def groups(view: View, candidates: Sequence[Candidate]) -> list[Group]:
+    """The groups of candidates, one for each set of shape values tried; none of those that the
+    model absorbs."""
+    return groups_at(
+        view, [(candidate, shapes) for candidate in candidates for shapes in tried(view, candidate)]
+    )
+
+
+def groups_at(view: View, asked: Sequence[Asked]) -> list[Group]:
+    """The groups of candidates at shape values; those on the same joints with as many columns are
+    made together."""
+    dof, alike = view.model.robot.dof, {}
+    for candidate, found in groupby(asked, key=lambda one: one[0]):
+        own = [shapes for _, shapes in found]
+        plain, rough = (columns_of(s, candidate, own) for s in (view.source, view.rough_source))
+        key = (tuple(candidate.touches(dof)), plain.shape[3])
+        alike.setdefault(key, []).append(([(candidate, shapes) for shapes in own], plain, rough))
+    out = []
+    for (joints, _), parts in alike.items():
+        names = [one for part in parts for one in part[0]]
+        plain, rough = (np.concatenate([part[i] for part in parts]) for i in (1, 2))
+        for some in range(0, len(names), _BATCH):
+            own = slice(some, some + _BATCH)
+            out += _made(view, names[own], joints, plain[own], rough[own])
+    return out
+
+
+def _made(
+    view: View, asked: Sequence[Asked], joints: Sequence[int], plain: np.ndarray, rough: np.ndarray
+) -> list[Group]:
+    """Groups of columns (asked, joints, n, k) on the motion, and on the rough one."""
+    design, sums, spans = view.design, view.sums, by_block(view.blocks)
+    count, _, n, k = plain.shape
+    size, kk = design.columns.shape[2], count * k
+    cross, own = np.zeros((len(spans), size, kk)), np.zeros((len(spans), count, k, k))
+    score, rough_cross = np.zeros((len(spans), kk)), np.zeros((size, kk))
+    rough_own = np.zeros((count, k, k))
+    square = lambda a: np.einsum("nsk,nsl->skl", a, a)  # noqa: E731
+    for i, j in enumerate(joints):
+        values, noisy = (
+            view.weights[j] * np.moveaxis(a[:, i], 1, 0).reshape(n, kk) for a in (plain, rough)
+        )
+        more = noisy - values
+        noise = more * design.rough_residual[:, j, None]
+        rough_cross += design.rough_columns[j].T @ more
+        rough_own += square(more.reshape(n, count, k))
+        for b, rows in enumerate(spans):
+            cross[b] += design.columns[j][rows].T @ values[rows]
+            score[b] += design.residual[rows, j] @ values[rows] - noise[rows].sum(0)
+            own[b] += square(values[rows].reshape(-1, count, k))
+    total = cross.sum(0)
+    absorbed = design.inverse @ total
+    score = (score - (sums.scores - sums.rough_scores) @ absorbed).reshape(len(spans), count, k)
+    prior = (sums.scores.sum(0) @ absorbed).reshape(count, k)
+    by = absorbed.reshape(size, count, k)
+    reduced = lambda own, cross, squares: _reduced(own, cross, squares, absorbed, by)  # noqa: E731
+    squares = np.stack([reduced(own[b], cross[b], sums.squares[b]) for b in range(len(spans))])
+    rough_square = reduced(rough_own, rough_cross, sums.rough_squares)
+    whole = own.sum(0) - np.einsum("psk,psl->skl", by, total.reshape(size, count, k))
+    out = []
+    for s in range(count):
+        found = _turned(own[:, s].sum(0), whole[s], squares[:, s], rough_square[s])
+        if found is None:
+            continue
+        (candidate, shapes), (turn, turned, sizes) = asked[s], found
+        own_score, kept = score[:, s] @ turn, prior[s] @ turn
+        out.append(Group(candidate, dict(shapes), own_score, turned, kept, turn, sizes))
+    return out
+
+
+def _reduced(own, cross, squares, absorbed, by) -> np.ndarray:
+    """(shapes, k, k) squares of columns less what the model absorbs of them."""
+    size, count, k = by.shape
+    mixed = np.einsum("psk,psl->skl", by, cross.reshape(size, count, k))
+    inner = np.einsum("psk,psl->skl", by, (squares @ absorbed).reshape(size, count, k))
+    return own - mixed - np.swapaxes(mixed, -1, -2) + inner
+
+
+def _turned(plain, whole, squares, rough):
+    """Orthonormal directions (k0, k) that the model leaves, that the data tell and that are no
+    noise, the squares (blocks, k, k) in them, and the norm of what is left of each own column; None
+    where there is none."""
+    size = np.sqrt(np.clip(np.diagonal(plain), 0.0, None))
+    if not np.all(np.isfinite(whole)) or not size.max() > 0:
+        return None
+    scale = np.where(size > 0, size, 1.0)
+    values, vectors = np.linalg.eigh(whole / np.outer(scale, scale))
+    kept = values > _FLAT
+    turn = vectors[:, kept] / np.sqrt(values[kept]) / scale[:, None]
+    for matrix, good in ((squares.sum(0), lambda v: v > _DATA), (rough, lambda v: v < _NOISE)):
+        values, vectors = np.linalg.eigh(turn.T @ matrix @ turn)
+        turn = turn @ vectors[:, good(values)]
+        if not turn.shape[1]:
+            return None
+    turned = np.einsum("ki,bkl,lj->bij", turn, squares, turn, optimize=True)
+    return turn, turned, np.sqrt(np.clip(np.diagonal(whole), 0.0, None))
