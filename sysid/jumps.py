@@ -8,9 +8,9 @@ alone. There the two sides of the equation of motion do not meet, whatever the m
 from __future__ import annotations
 
 import numpy as np
-from scipy.ndimage import maximum_filter1d
+from scipy.ndimage import maximum_filter1d, median_filter
 
-from .outliers import CHANCE, NOTHING, quantum, surprise
+from .outliers import CHANCE, NOTHING, SPIKE, quantum, surprise
 
 _WHITE = 0.70  # z75 - z50 of a Gaussian's absolute values over their median
 _TOP = 0.8  # of the largest nearby: a jump stands within a fifth of L of it
@@ -28,16 +28,18 @@ def jumps(tau, reach: int) -> np.ndarray:
     length = max(1, reach // 2)
     if len(tau) < 16 * length:
         return out
-    total = np.concatenate([np.zeros((1, tau.shape[1])), np.cumsum(tau - tau.mean(axis=0), axis=0)])
+    # a spike comes back, a jump does not
+    level = median_filter(tau - tau.mean(axis=0), (2 * SPIKE + 1, 1), mode="nearest")
+    total = np.concatenate([np.zeros((1, tau.shape[1])), np.cumsum(level, axis=0)])
     mean = (total[length:] - total[:-length]) / length  # of the rows from k on
     step = mean[length:] - mean[:-length]  # at row k + length
     bent = 0.5 * (step[: -2 * length] + step[2 * length :])
     sizes = np.abs(step[length:-length] - bent)  # at row k + 2 length
-    level = np.log(sizes.size / CHANCE)
+    least_said = np.log(sizes.size / CHANCE)
     for j, size in enumerate(sizes.T):
         least = max(np.median(size), quantum(tau[:, j]), NOTHING * np.std(tau[:, j]))
         if least > 0.0:
             top = size > _TOP * maximum_filter1d(size, 2 * length + 1)
-            found = top & (surprise(size / least, _WHITE) > level)
+            found = top & (surprise(size / least, _WHITE) > least_said)
             out[2 * length : 2 * length + len(size), j] = found
     return out

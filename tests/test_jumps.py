@@ -79,3 +79,10 @@ def test_neither_a_coarse_torque_nor_a_short_one_jumps():
     assert not jumps(tau, 50).any()
     assert not jumps(tau[:100], 50).any()
     assert not jumps(np.zeros((4000, 2)), 50).any()
+
+
+def test_a_spike_is_no_jump():
+    rng = np.random.default_rng(3)
+    tau = 0.1 * rng.normal(size=(6000, 1))
+    tau[[1000, 1001, 3000]] += 30.0
+    assert not jumps(tau, 50).any() and not jumps(tau, 5).any()
