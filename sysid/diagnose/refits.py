@@ -7,7 +7,7 @@ noise alone makes of that is taken off.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -76,20 +76,27 @@ def refitted(view: View, group: Group) -> Member | None:
         limits = {s.name: (low, high) for s, low, high, _ in bounds_of(view.model, candidate)}
         for shape, step in zip(free, group.coefficients):
             shapes[shape.name] = float(np.clip(shapes[shape.name] + step, *limits[shape.name]))
-    found = joined(view, candidate, shapes)
+    found = joined(view, (candidate, shapes))
     return Member(group, found, losses(found, view.blocks)) if _allowed(found, candidate) else None
 
 
-def joined(view: View, candidate: Candidate, shapes: dict[str, float]) -> View:
-    """A view's model with a candidate, everything settled again from shape values on."""
+def joined(view: View, *added: tuple[Candidate, dict[str, float]], weights=None) -> View:
+    """A view's model with candidates, everything settled again from their shape values on.
+
+    Args:
+        weights: (dof,) of the joints, where they are not the view's own.
+    """
+    source = view.source
+    for candidate, shapes in added:
+        source = replace(source, model=grown(source, candidate, shapes))
     return looked_at(
         view.experiment,
-        grown(view.source, candidate, shapes),
+        source.model,
         view.motion,
         view.rough,
         view.prior,
         stride=view.stride,
-        weights=view.weights,
+        weights=view.weights if weights is None else weights,
         grid=False,
         tolerance=_COMPARED,
         inherited=view.blocks,

@@ -69,10 +69,15 @@ def _next(view: View, asked: Asked, level: float, worth: float, open_: list[Choi
         key = (*asked.groups[k].candidate.key, asked.groups[k].candidate.options)
         if _sign(asked.groups[k]) and (key not in best or asked.gains[k] > asked.gains[best[key]]):
             best[key] = k
+    # far from worth having, whatever a refit adds to it
+    least = 0.5 * worth * np.sum(view.design.residual**2, axis=0)
+    dof = view.model.robot.dof
+    for key, k in [*best.items()]:
+        if asked.gains[k] < least[asked.groups[k].candidate.touches(dof)].min():
+            del best[key]
     # whoever takes as much as one that is there may be what is there
     rivals = sorted(best.values(), key=lambda k: -asked.gains[k])
     hopeful = [k for k in rivals if asked.statistics[k] > threshold]
-    dof = view.model.robot.dof
     while hopeful:
         top = hopeful[0]
         where = set(asked.groups[top].candidate.touches(dof))
@@ -84,16 +89,11 @@ def _next(view: View, asked: Asked, level: float, worth: float, open_: list[Choi
         ]
         short = [top, *(k for k in short if k != top)][:_SHORTLIST]
         found = chosen(view, [asked.groups[k] for k in short], np.random.default_rng(1))
-        # of all that cannot be told apart, one at least must be there
-        there = {id(asked.groups[k]) for k in hopeful}
-        inside = (
-            set()
-            if found is None
-            else {id(m.group) for m in (*(m for m, _ in found.members), *found.general)}
-        )
-        if found is not None and inside & there:
-            p = min(asked.p(k) for k in short if id(asked.groups[k]) in inside)
-            step = step_of(view, p, found, worth)
+        # of all that were compared, one at least must be there
+        there = {id(asked.groups[k]): asked.p(k) for k in hopeful}
+        refits = () if found is None else (*(m for m, _ in found.members), *found.beaten)
+        if p := [there[id(member.group)] for member in refits if id(member.group) in there]:
+            step = step_of(view, min(p), found, worth)
             if step is not None and found.decided:
                 return step
             if step is not None:

@@ -65,30 +65,33 @@ def revised(first: View, steps: list[Step], worth: float) -> list[Step]:
     last = {step.candidate.key: step for step in steps}
     if len(last) < len(steps):
         steps = _rejoined(first, [step for step in steps if last[step.candidate.key] is step])
+    stirred = steps[-1].changed
     for _ in range(2 * len(steps)):  # two that speak for each other could take turns for ever
-        steps, changed = _revised_once(first, steps, worth)
+        steps, changed = _revised_once(first, steps, worth, stirred)
         if not changed:
             break
+        stirred |= changed
     return steps
 
 
-def _revised_once(first: View, steps: list[Step], worth: float) -> tuple[list[Step], bool]:
-    """Steps up to the first that is another one now, or goes; and whether there was one."""
+def _revised_once(first: View, steps: list[Step], worth: float, stirred: set[int]):
+    """Steps up to the first of the joints `stirred` that is another one now, or goes; and the
+    joints that it changed, none where there is no such step."""
     for number, step in enumerate(steps[:-1]):
-        if len(step.choice.members) < 2:
+        if len(step.choice.members) < 2 or step.candidate.joint not in stirred:
             continue
         before, later = steps[:number], steps[number + 1 :]
-        others = _rejoined(first, [*before, *later])
-        without = others[-1].after
+        others = [(s.candidate, s.choice.head.shapes) for s in (*before, *later)]
+        without = joined(first, *others, weights=steps[-1].after.weights)
         groups = groups_at(without, [(m.candidate, m.asked) for m, _ in step.choice.members])
         found = chosen(without, groups, np.random.default_rng(1))
         again = None if found is None else step_of(without, step.p, found, worth)
         if again is None:
-            return others, True
+            return _rejoined(first, [*before, *later]), step.changed
         if again.candidate.key != step.candidate.key:
-            return _rejoined(first, [*before, again, *later]), True
+            return _rejoined(first, [*before, again, *later]), step.changed | again.changed
         steps = [*before, replace(step, choice=found), *later]
-    return steps, False
+    return steps, set()
 
 
 def _rejoined(first: View, steps: list[Step]) -> list[Step]:
@@ -96,7 +99,7 @@ def _rejoined(first: View, steps: list[Step]) -> list[Step]:
     out: list[Step] = []
     for step in steps:
         view = out[-1].after if out else first
-        after = joined(view, step.candidate, step.choice.head.shapes)
+        after = joined(view, (step.candidate, step.choice.head.shapes))
         shares = _shares(view, losses(after, view.blocks))
         out.append(Step(step.choice, step.p, view, weighed(after), shares))
     return out

@@ -25,13 +25,13 @@ _SAME = 0.99  # share of a candidate's torque that another one's columns hold
 class Choice:
     """The head and, by falling probability, all that these logs cannot tell from it: members with
     their probabilities. gain (blocks,): what the head takes of the model's weighted loss in each
-    block. general: those that hold the head and more, which say no more than that something is
-    there."""
+    block. beaten: all others that were refitted; where one of them is there, it is the head that
+    is."""
 
     head: Member
     members: tuple[tuple[Member, float], ...]
     gain: np.ndarray
-    general: tuple[Member, ...] = ()
+    beaten: tuple[Member, ...] = ()
 
     @property
     def decided(self) -> bool:
@@ -60,15 +60,14 @@ def chosen(view: View, groups: list[Group], rng: np.random.Generator) -> Choice 
         (k for k in inside if priced[:, k].sum() <= best),
         key=lambda k: members[k].candidate.simplicity,
     )
-    general = [k for k in inside if k != head and holds(view, members[k], members[head])]
-    inside = [k for k in inside if k not in general]
+    inside = [k for k in inside if k == head or not holds(view, members[k], members[head])]
     chance = dict(zip(inside, blocks.chances(priced[:, inside], rng)))
     order = sorted(inside, key=lambda k: (k != head, -chance[k]))
     return Choice(
         members[head],
         tuple((members[k], float(chance[k])) for k in order),
         base - table[:, head],
-        tuple(members[k] for k in general),
+        tuple(m for k, m in enumerate(members) if k not in inside),
     )
 
 
