@@ -11,19 +11,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..lowpass import KEPT, low
-from . import bursts, outliers, repeats
-from .motion_functions import Kinematics, kinematics
+from . import outliers, repeats
 from .of_angles import OfAngles
-from .pursuit import Functions
+from .rest import Shared, rest_of, shared_by
 from .spectrum import spectrum_of, weighed
 from .stretches import (
     FEWEST_SAMPLES,
-    Run,
-    bandwidth_of,
     bridged,
-    runs_of,
-    smoothed,
     whole,
 )
 
@@ -64,17 +58,6 @@ class Estimate:
     least: float = 0.0
 
 
-@dataclass(frozen=True)
-class _Shared:
-    """What joints have in common whose rows that count are the same."""
-
-    runs: list[Run]
-    calm: list[Run]  # the same without what is faster than the motion
-    motion: Kinematics | None
-    bandwidth: float
-    periods: list[float | None]  # of each stretch [samples]
-
-
 def floor(
     residual: Sequence[np.ndarray], measured: Sequence[np.ndarray], q: Sequence[np.ndarray],
     step: Sequence[float], joint: int, *, use: Sequence[np.ndarray] | None = None,
@@ -106,7 +89,7 @@ def floors(
 ) -> tuple[NoiseFloor, ...]:  # fmt: skip
     """The noise floors of all joints' torques; what `floor` says of each, at less cost. See
     there."""
-    memory: dict[bytes, _Shared] = {}
+    memory: dict[bytes, Shared] = {}
     joints = range(residual[0].shape[1] if len(residual) else 0)
     given = {"use": use, "memory": memory, "angles": angles}
     return tuple(judged(estimate(residual, measured, q, step, j, **given)) for j in joints)
@@ -137,7 +120,7 @@ def estimate(
         return Estimate(own, own, "none", "", "no sample counts", own)
     if own <= 1e-12 * size:
         return _certain(own, "the model leaves nothing of the torque", own)
-    shared = _shared(q, step, use, {} if memory is None else memory, angles)
+    shared = shared_by(q, step, use, {} if memory is None else memory, angles)
     runs, bandwidth = shared.runs, shared.bandwidth
     if not runs:
         why = f"{len(inside)} samples, no {FEWEST_SAMPLES} of them together, are too few"
@@ -155,7 +138,7 @@ def estimate(
         again = _of_joint(angles.torque, joint)
         drawn = [run.of(again[run.stretch]) for run in runs]
         drawn = drawn if any(v.any() for v in drawn) else None
-    rest, kept, number, removed = _rest(shared, raw, torque, joint, drawn)
+    rest, kept, number, removed = rest_of(shared, raw, torque, joint, drawn)
     if math.sqrt(max(np.mean(v**2) for v in rest)) <= 1e-12 * max(size, own):
         return _certain(0.0, "the residual is a constant, or a function of the motion", own)
     if any(period is not None for period in shared.periods):
@@ -179,28 +162,6 @@ def estimate(
     return _bounded(found.rms, found.std, "spectral", words, found.doubt, own, found.least)
 
 
-def _rest(shared: _Shared, raw, torque, joint: int, drawn):
-    """A residual (n,) of each run without what functions of the motion explain and without what no
-    noise does; which rows (n,) are kept; how many functions there were and the power they took."""
-    runs, steps = shared.runs, [run.step for run in shared.runs]
-    predicted = [m - r for m, r in zip(torque, raw)]
-    if shared.calm is not runs:
-        highest = KEPT * shared.bandwidth
-        predicted = [low(p, highest, step) for p, step in zip(predicted, steps)]
-    asked = Functions(shared.calm, shared.motion, predicted, joint, shared.bandwidth)
-    rest, _, _ = asked.removed_from(raw, [run.counts for run in runs])
-    usual = outliers.usual(rest, drawn, steps, shared.bandwidth)
-    kept = bursts.calm(rest, [run.counts for run in runs], steps, usual)
-    even = rest if usual is None else [v / u for v, u in zip(rest, usual)]
-    kept = outliers.away_from_reversals(runs, shared.motion.v, even, kept)
-    rest = [bridged(v, k) for v, k in zip(rest, kept)]
-    digit = outliers.digit_of(np.concatenate([m[run.counts] for m, run in zip(torque, runs)]))
-    kept, _ = outliers.without(rest, kept, steps, shared.bandwidth, digit, drawn)
-    # once more, without what no noise does
-    rest, number, removed = asked.removed_from(raw, kept)
-    return [bridged(v, k) for v, k in zip(rest, kept)], kept, number, removed
-
-
 def _bounded(
     rms: float, std: float, method: str, detail: str, doubt: str, own: float, least: float = 0.0
 ) -> Estimate:
@@ -217,19 +178,3 @@ def _certain(rms: float, detail: str, own: float) -> Estimate:
 def _of_joint(values, joint: int) -> list[np.ndarray]:
     """A joint's column (n,) of each stretch; what has no columns is the same for all joints."""
     return [x[:, joint] if x.ndim == 2 else x for x in map(np.asarray, values)]
-
-
-def _shared(q, step, use, memory: dict, angles) -> _Shared:
-    key = b"".join(np.packbits(u).tobytes() for u in use)
-    if key not in memory:
-        runs = runs_of(q, step, use)
-        looked = whole(runs, [run.counts for run in runs], [len(x) for x in q]) if runs else []
-        periods = [repeats.period_of(x, counts) for x, counts in zip(q, looked)]
-        bandwidth = bandwidth_of(runs) if runs else 0.0
-        if angles is not None and 0.0 < angles.band < bandwidth:
-            bandwidth = angles.band
-        known = angles is not None and bandwidth > 0.0
-        calm = [smoothed(run, bandwidth) for run in runs] if known else runs
-        motion = kinematics(calm) if runs else None
-        memory[key] = _Shared(runs, calm, motion, bandwidth, periods)
-    return memory[key]

@@ -10,6 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .colours import models
+
 _BANDS_PER_OCTAVE = 6
 _MANY_RUNS = 8  # take little of the first ordinate with their common mean
 _INDEPENDENT = 1.94  # ordinates of a Hann-windowed periodogram per independent one
@@ -20,7 +22,6 @@ _SAFE, _FIT, _DOUBT = 10.0, 30.0, 5.0
 # most ordinates that a band counts for, below and above `_SAFE`: no noise is quite the model's
 _VOTE, _VOTE_FAR = 4.0, 60.0
 _FARTHEST = math.log(1e4)  # misfit may lift a band by any factor up to this
-_SLOWEST = 0.3  # Hz, corner of the slowest noise; slower is drift
 # Of what functions of the motion took off, for want of a better one; most chance that a coloured
 # part is misfit; and the relative error of the RMS as no noise is quite the model's: calibrated on
 # simulated residuals, so that two standard errors
@@ -120,7 +121,7 @@ def weighed(
 
     f, seen, width = spectrum.centre, spectrum.density, spectrum.width
     looked, count = spectrum.count > 0.0, np.maximum(spectrum.count, 0.5)
-    corner, coloured = _models(f, bandwidth, step)
+    corner, coloured = models(f, bandwidth, step)
     shape = 1.0 + coloured
     # white is as likely as all colours
     prior = np.concatenate([[0.5], np.full(len(corner) - 1, 0.5 / (len(corner) - 1))])
@@ -189,18 +190,3 @@ def _smoothed(density: np.ndarray, count: np.ndarray) -> np.ndarray:
     at = np.arange(len(density))
     near = np.exp(-0.5 * ((at[:, None] - at) / _SMOOTH) ** 2) * np.maximum(count, 1e-3)
     return near @ density / near.sum(axis=1)
-
-
-def _models(f: np.ndarray, bandwidth: float, step: float) -> tuple[np.ndarray, np.ndarray]:
-    """Corner [Hz] (models,) and spectrum of the coloured part over the white one (models, bands);
-    the first has none."""
-    # heights are at the band's edge
-    corners = np.geomspace(max(_SLOWEST, f[1]), max(0.6 * f[-1], 2.0 * _SLOWEST), 30)
-    heights = np.geomspace(0.2, 1e4, 14)
-    corner, height = (x.ravel()[:, None] for x in np.meshgrid(corners, heights))
-    keep = np.exp(-2.0 * math.pi * corner * step)
-    turn = 2.0 * math.pi * step
-    first_order = lambda at: 1.0 / (1.0 - 2.0 * keep * np.cos(turn * at) + keep**2)  # noqa: E731
-    coloured = height * first_order(f) / first_order(max(bandwidth, f[1]))
-    none = np.zeros((1, len(f)))
-    return np.concatenate([[np.inf], corner[:, 0]]), np.concatenate([none, coloured])
