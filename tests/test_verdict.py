@@ -62,7 +62,7 @@ def elbow(first: float, claims=(), *, rest=NOISE, before=NOISE, level=None, refu
 def test_what_is_nothing_in_size_and_error_is_not_claimed(monkeypatch, fall, size, stands):
     """Errors are told to 0.01, the size to 0.1; one that is not determined says nothing."""
     monkeypatch.setattr(claims.comparison, "compare", lambda *_: [Difference("", "", "elbow", -fall, 0.01)])
-    monkeypatch.setattr(claims, "_parameters", lambda *_: {"T": (size, 0.1, "s"), "k": (3.0, float("nan"), "1")})
+    monkeypatch.setattr(claims, "parameters", lambda *_: {"T": (size, 0.1, "s"), "k": (3.0, float("nan"), "1")})
     member = SimpleNamespace(candidate=SimpleNamespace(joint=1))
     assert (claims._nothing(fitted(1.0, train=1.0), fitted(1.0, train=0.9), member) is None) is stands
 

@@ -16,14 +16,20 @@ _FEWEST = 20  # rows of a piece worth filtering
 
 
 def low(values: np.ndarray, cutoff: float, step: float) -> np.ndarray:
-    """Values (n, ...) below a cutoff [Hz], neither shifted nor bent at the ends."""
+    """Values (n, ...) below a cutoff [Hz], neither shifted nor bent at the ends: a Butterworth
+    filter of order 4 forth and back, by its response, as scipy.signal alone takes longer to import
+    than a log to filter."""
     if cutoff * step >= 0.45 or len(values) < _FEWEST:
         return values
-    from scipy.signal import butter, sosfiltfilt
-
-    sections = butter(4, cutoff, fs=1.0 / step, output="sos")
     beyond = min(math.ceil(3.0 / (cutoff * step)), len(values) - 1)  # beyond its memory
-    return sosfiltfilt(sections, values, axis=0, padtype="odd", padlen=beyond)
+    before = 2.0 * values[:1] - values[beyond:0:-1]
+    after = 2.0 * values[-1:] - values[-2 : -beyond - 2 : -1]
+    padded = np.concatenate([before, values, after])
+    frequency = np.minimum(np.fft.rfftfreq(len(padded)), 0.499)
+    ratio = np.tan(np.pi * frequency) / math.tan(math.pi * cutoff * step)
+    gain = (1.0 / (1.0 + ratio**8)).reshape(-1, *[1] * (values.ndim - 1))
+    filtered = np.fft.irfft(gain * np.fft.rfft(padded, axis=0), len(padded), axis=0)
+    return filtered[beyond : beyond + len(values)]
 
 
 def calm(values: np.ndarray, piece, band: float, step: float) -> np.ndarray:
