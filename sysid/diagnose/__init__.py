@@ -1,2 +1,1 @@
-"""Where a model fails, which effect is missing, what a log cannot show, and which explanations it
-cannot tell apart."""
+"""Where a model fails, which effect is missing, and what its logs cannot tell."""

@@ -1,8 +1,7 @@
 """What the search found, as `sysid add` gives it: each effect written into the experiment and
 fitted as the user's fit is.
 
-So the parameters, the command and the error that a diagnosis states are those that come of it. The
-test logs choose nothing here; they may only refuse what does not hold on them.
+So what a diagnosis states is what comes of it. The test logs choose nothing; they may only refuse.
 """
 
 from __future__ import annotations

@@ -10,13 +10,11 @@ model and made orthonormal. Over blocks b:
     c_f = (1 - G_f)^-1 (c - s_f)          its coefficients without a fold f
     gain = sum_f 2 c_f' s_f - c_f' G_f c_f   what does it take of what it was not fitted on?
 
-T is told on the scale of a normal variable, with as many degrees of freedom as blocks and
-directions take part: then groups that rest on few blocks and on many can stand in one row.
+T is told on the scale of a normal variable: groups that rest on few blocks and on many compare.
 
 The noise of the angles stands in residual and columns alike, which neither signs nor folds can see.
-It is drawn once more: what the second draw adds to columns times what it adds to the residual has
-the mean of what the first one left in s_b, and is taken off (simulation extrapolation: Cook &
-Stefanski 1994).
+Drawn once more, what it adds to columns times what it adds to the residual has the mean of what the
+first one left in s_b, and is taken off (simulation extrapolation: Cook & Stefanski 1994).
 """
 
 from __future__ import annotations
@@ -80,9 +78,8 @@ class Group:
         """The group by which it is told whether it is there: of an effect that comes in blows, a
         few of which outweigh all others, one in which no block counts more than the rest allows.
 
-        Weights that look at columns alone leave scores of noise as they are, without a sign; blows
-        are as good as orthogonal to the model, in each block. What it takes, and its coefficients,
-        are the group's own.
+        Weights that look at columns alone leave scores of noise without a sign. What it takes, and
+        its coefficients, are the group's own.
         """
         if not self.candidate.blows:
             return self

@@ -108,6 +108,5 @@ def _sign(group: Group) -> bool:
         free = [s for s in group.candidate.effect.shapes() if s.start is not None]
         return all(not (s.low == 0.0 and c < 0) for s, c in zip(free, group.coefficients))
     linear = group.candidate.effect.coefficients()
-    return len(linear) > 1 or all(
-        not (one.lower == 0 and c < 0) for one, c in zip(linear, group.coefficients)
-    )
+    signs = zip(linear, group.coefficients)
+    return len(linear) > 1 or all(one.lower != 0 or c >= 0 for one, c in signs)

@@ -56,12 +56,10 @@ def verdicts(
     last = claims[-1].after if claims else fit
     out = []
     for j, joint in enumerate(fit.joints):
-        own = tuple(
-            c
-            for c in claims
-            if c.head.joint == joint or (c.head.joint == "*" and c.step.shares[j] >= WORTH)
-        )
-        others = tuple(c for c in claims if c not in own and c.step.shares[j] >= WORTH)
+        takes = [c.head.joint == joint or c.step.shares[j] >= WORTH for c in claims]
+        taking = [c for c, it in zip(claims, takes) if it]
+        own = tuple(c for c in taking if c.head.joint in (joint, "*"))
+        others = tuple(c for c in taking if c.head.joint not in (joint, "*"))
         first, then, floor = fit.rms("test")[joint], last.rms("test")[joint], floors[j].rms
         misfit = first**2 - (floor if floor is not None else then) ** 2
         explained = (first**2 - then**2) / misfit if misfit > 0 and claims else float("nan")
@@ -70,6 +68,7 @@ def verdicts(
             floor is not None
             and max(then, last.rms("train")[joint]) <= (1.0 + _FLOOR) * floor + 2.0 * floors[j].std
         )
+        reached = reached and not _above(remains, then, floor)
         at_floor = floor is not None and first <= (1.0 + _FLOOR) * floor + 2.0 * floors[j].std
         taken = sum(c.step.shares[j] for c in own)
         if own and (remains is None or remains.share * max(1.0 - taken, 0.0) <= _MOST * taken):
@@ -94,6 +93,13 @@ def predictable(found: Unknown, joints: int) -> bool:
     family-wise level."""
     functions = found.chance < LEVEL / joints and found.gain.sum() > WORTH * found.total
     return bool(functions or found.tone > WORTH)
+
+
+def _above(remains: Unknown | None, error: float, floor: float) -> bool:
+    """Whether what the motion predicts stands above the floor: the error without it does, and it is
+    more than the floor's doubt lets pass."""
+    left = 1.0 if remains is None else 1.0 - remains.share
+    return left < (1.0 + _FLOOR) ** -2 and left * error**2 >= floor**2
 
 
 def _why(fit: Fit, j: int, floor, error: float, last: Fit, refused) -> str:

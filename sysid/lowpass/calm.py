@@ -25,10 +25,14 @@ def low(values: np.ndarray, cutoff: float, step: float) -> np.ndarray:
     before = 2.0 * values[:1] - values[beyond:0:-1]
     after = 2.0 * values[-1:] - values[-2 : -beyond - 2 : -1]
     padded = np.concatenate([before, values, after])
+    # the straight line between its ends passes as it is, and without it they join
+    along = np.linspace(0.0, 1.0, len(padded)).reshape(-1, *[1] * (values.ndim - 1))
+    line = padded[:1] + along * (padded[-1:] - padded[:1])
     frequency = np.minimum(np.fft.rfftfreq(len(padded)), 0.499)
     ratio = np.tan(np.pi * frequency) / math.tan(math.pi * cutoff * step)
     gain = (1.0 / (1.0 + ratio**8)).reshape(-1, *[1] * (values.ndim - 1))
-    filtered = np.fft.irfft(gain * np.fft.rfft(padded, axis=0), len(padded), axis=0)
+    bent = gain * np.fft.rfft(padded - line, axis=0)
+    filtered = line + np.fft.irfft(bent, len(padded), axis=0)
     return filtered[beyond : beyond + len(values)]
 
 
