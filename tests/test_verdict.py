@@ -49,7 +49,7 @@ def floor(value: float | None = 1.0, std: float = 0.02) -> NoiseFloor:
     return NoiseFloor(value, None if value is None else std, "spectral", "the band is narrow")
 
 
-def elbow(first: float, claims=(), *, rest=NOISE, before=NOISE, level=None, refused=(), train=None):
+def elbow(first: float, claims=(), *, rest=NOISE, level=None, refused=(), train=None):
     """The elbow's verdict; the noise floor is one."""
     found = verdicts(fitted(first, train=train), claims, [NOISE, rest], [floor(), level or floor()], refused)
     assert [v.joint for v in found] == list(JOINTS) and found[0].status in ("complete", "explained")

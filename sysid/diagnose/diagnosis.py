@@ -6,9 +6,9 @@ The whole loop on one page:
     fit (given, or made)
     training logs -> view: both sides under one low-pass, events and standstill left out
     view -> steps: every candidate asked at once, what is there and worth having joins, and again
-    steps -> claims: each fitted as `sysid add` fits it; parameters, error and command are that
-    fit's test logs, opened once -> errors, where the model fails claims + noise floors + what the
-    motion still predicts -> the verdict on each joint
+    steps -> claims: each fitted as `sysid add` fits it, whose parameters and command are told
+    test logs, opened once -> errors, where the model fails
+    claims + noise floors + what the motion still predicts -> the verdict on each joint
 """
 
 from __future__ import annotations
