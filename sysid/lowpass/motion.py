@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -28,8 +29,6 @@ _MOTION = 4.0  # and this many times the motion's own bandwidth, if that is more
 _SHARE = 0.25  # of the residual's power may be made by the angles' noise at the end of the band
 # the angles' own low-pass, as a multiple of the cutoff: derivatives need some, laws of motion none
 _ANGLES = 4.0
-# how far both low-passes see, as a multiple of the torque's own: the angles' sees a quarter as far
-_SIGHT = 1.25
 # Laws are evaluated at this many samples a cycle of the cutoff: what is steeper than that, friction
 # at a reversal, is left out anyway.
 _SAMPLES_PER_CYCLE = 16.0
@@ -39,7 +38,8 @@ MOST_ROWS = 12_000
 
 def lowpassed(logs: Sequence[Log], joints: tuple[str, ...], cutoff: float) -> Motion | None:
     """Logs as a motion under one low-pass on both sides; None where they are too short for it."""
-    pieces = []
+    pieces: list[Piece] = []
+    sights: list[int] = []  # rows
     for number, log in enumerate(logs):
         for segment in log.segments:
             # spikes are mended before the low-pass, which would spread them; of the rest, rows see
@@ -48,12 +48,10 @@ def lowpassed(logs: Sequence[Log], joints: tuple[str, ...], cutoff: float) -> Mo
                 replace(segment, tau=mended(segment, log.events, joints)) if log.events else segment
             )
             if (piece := _piece(number, log.name, clean, cutoff)) is not None:
-                torque = piece.smoother.reach * piece.step
-                angles = _SIGHT * torque + 2.0 * segment.step
+                seen = _sight(piece, segment.step)
+                sights.append(math.ceil(seen / piece.step))
                 pieces.append(
-                    without_events(piece, log.events, joints, angles, torque)
-                    if log.events
-                    else piece
+                    without_events(piece, log.events, joints, seen, seen) if log.events else piece
                 )
     if not pieces:
         return None
@@ -62,8 +60,7 @@ def lowpassed(logs: Sequence[Log], joints: tuple[str, ...], cutoff: float) -> Mo
     # where the speed changes its sign between two samples, the angles' noise says in which:
     # friction's jump is as uncertain
     still = [np.where(turns(piece.qd), np.inf, threshold) for piece in pieces]
-    reach = [round(_SIGHT * piece.smoother.reach) for piece in pieces]
-    motion = assembled(joints, [without_standstill(*each) for each in zip(pieces, still, reach)])
+    motion = assembled(joints, [without_standstill(*each) for each in zip(pieces, still, sights)])
     events = tuple(event for log in logs for event in log.events)
     return replace(motion, events=events, disturbed=disturbed, band=band(logs))
 
@@ -120,12 +117,32 @@ def stride_of(motion: Motion, cutoff: float) -> int:
     return max(fine, -(-motion.samples // MOST_ROWS))
 
 
+def _sight(piece: Piece, step: float) -> float:
+    """How far [s] to either side a row of a piece sees, of samples `step` seconds apart: the
+    low-pass of the angles, a difference of the second order, and then both sides' own."""
+    return (
+        _angles(piece.smoother.cutoff, step).reach + 1
+    ) * step + piece.smoother.reach * piece.step
+
+
+def _angles(cutoff: float, step: float) -> Gaussian:
+    return Gaussian(min(_ANGLES * cutoff, HIGHEST / step), step)
+
+
+def _as_seen(tau: np.ndarray) -> np.ndarray:
+    """Torque (n, dof) with the response of a second difference, whose gain falls off with
+    frequency f as 1 - (2 pi f step)^2 / 12."""
+    seen = tau.copy()
+    seen[1:-1] = (tau[:-2] + 10.0 * tau[1:-1] + tau[2:]) / 12.0
+    return seen
+
+
 def _piece(number: int, source: str, segment, cutoff: float) -> Piece | None:
     rate = 1.0 / segment.step
     every = max(1, int(rate / (_SAMPLES_PER_CYCLE * cutoff)))
     both = Gaussian(min(cutoff, HIGHEST * rate), segment.step)
     settling = Gaussian(both.cutoff, every * segment.step)
-    angles = Gaussian(min(_ANGLES * cutoff, HIGHEST * rate), segment.step)
+    angles = _angles(cutoff, segment.step)
     edge = angles.reach + 2
     rows = slice(edge, len(segment.t) - edge, every)
     n = len(range(*rows.indices(len(segment.t))))
@@ -133,6 +150,8 @@ def _piece(number: int, source: str, segment, cutoff: float) -> Piece | None:
         return None
     smooth = angles(segment.q, axis=0)
     qd, qdd = differences(smooth, segment.step)
+    # what these take of fast motion, and torque kept, would look like a joint that gives
+    tau = both(angles(_as_seen(segment.tau), axis=0), axis=0)
     return Piece(
         log=number,
         step=every * segment.step,
@@ -140,7 +159,7 @@ def _piece(number: int, source: str, segment, cutoff: float) -> Piece | None:
         q=smooth[rows],
         qd=qd[rows],
         qdd=qdd[rows],
-        tau=both(segment.tau, axis=0)[rows],
+        tau=tau[rows],
         measured=segment.tau[rows],
         signals={name: values[rows] for name, values in segment.signals.items()},
         use=None,
