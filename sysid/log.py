@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from . import datasets, units
+from .clock import corrected
 from .config import DataSpec, LogSpec
 from .errors import LogError, SysidWarning
 from .events import Event
@@ -22,6 +23,8 @@ from .readers.table import Table
 _GAP_STEPS = 10.0
 # Steps that all stay this close to the median are uniform sampling with rounded time stamps.
 _UNIFORM = 0.02
+# Of a step: stamps that are off by less are right.
+_TOLD = 1e-3
 _EPOCH = 1e6  # s: a clock that reads more counts from 1970, not from the log's start
 _LARGEST = 1e20  # no unit makes a measured signal larger (a clock in ns, logged as a signal, reads 2e18)
 _DEGREES = 4.0 * np.pi  # rad: no robot joint turns so far from zero, but its angle in degrees does
@@ -251,7 +254,7 @@ def _segments(t, signals, where: str):
         warnings.warn(
             SysidWarning(f"{where}: {cuts.size} gap(s), the longest {longest:.4g} s, split the log into {cuts.size + 1} segments"), stacklevel=3
         )
-    resampled = 0
+    resampled, off = 0, 0.0
     bounds = [0, *cuts.tolist(), len(t)]
     for a, b in zip(bounds[:-1], bounds[1:]):
         part = {name: values[a:b] for name, values in signals.items()}
@@ -262,6 +265,9 @@ def _segments(t, signals, where: str):
             mean = (clock[-1] - clock[0]) / (len(clock) - 1)
             yield _segment(clock[0] + mean * np.arange(len(clock)), mean, part)
             continue
+        true, late = corrected(clock, part["q"])
+        if late > _TOLD * step:
+            clock, off = true, max(off, late)
         own = np.diff(clock)
         # as many samples as were measured: the mean step, without the samples that are missing
         own = float(np.mean(own[own < 1.5 * step]))
@@ -271,6 +277,14 @@ def _segments(t, signals, where: str):
     if resampled:
         warnings.warn(
             SysidWarning(f"{where}: steps of {steps.min():.4g} to {np.delete(steps, cuts - 1).max():.4g} s were resampled to a uniform {own:.4g} s"),
+            stacklevel=3,
+        )
+    if off > 0.0:
+        warnings.warn(
+            SysidWarning(
+                f"{where}: the stamps stand beside the time of their samples by {1e3 * off:.2g} ms (RMS), as the angles of all joints "
+                "together show; the samples were put where they belong"
+            ),
             stacklevel=3,
         )
 
@@ -295,15 +309,16 @@ def _segment(t, step, part) -> Segment:
 
 
 def _resampled(t, part, step):
-    from scipy.interpolate import make_interp_spline
+    from scipy.interpolate import PchipInterpolator, make_interp_spline
 
     samples = int(np.floor((t[-1] - t[0]) / step + 1e-9)) + 1
     clock = t[0] + step * np.arange(samples)
     out = {}
     for name, values in part.items():
-        # angles are smooth, torque and the rest carry noise that a cubic would overshoot on
-        order = 3 if name in ("q", "qd") and len(t) > 3 else 1
-        out[name] = make_interp_spline(t, values, k=order, axis=0)(clock)
+        # angles are smooth; torque and the rest have spikes and jumps that a spline would ring about, and a straight line would
+        # take from what is fast
+        smooth = name in ("q", "qd") and len(t) > 3
+        out[name] = (make_interp_spline(t, values, k=3, axis=0) if smooth else PchipInterpolator(t, values, axis=0))(clock)
     return clock, out
 
 

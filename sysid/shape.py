@@ -24,7 +24,7 @@ from .objective import add_blocks
 from .preprocess import Motion
 
 _MOST_ROWS, _STEPS, _SETTLED = 6000, 12, 1e-7
-_SHARES = (1.0, 0.5, 0.25)
+_LEAST_SHARE = 0.25  # of the way to another load
 
 
 @dataclass(frozen=True)
@@ -253,16 +253,18 @@ def _descended(best: Settled, motion: Motion, solved, weights, tolerance: float)
     values = best.model.shape_values
     free = [k for k, value in enumerate(values) if not value.held]
     low, high = (np.array([getattr(v, end) for v in values]) for end in ("low", "high"))
+    share = 1.0
     for _ in range(_STEPS):
         before = best.objective
-        if best.model.uses_load:
-            best = _renewed(best, solved)
-        if free:
-            system, right = _normal(best, motion, free, scale)
+        if best.model.uses_load and share >= _LEAST_SHARE:
+            best, share = _renewed(best, solved, share)
+        moving = _moving(best, motion, free, scale, low, high) if free else None
+        if moving is not None and moving[3] > tolerance * abs(best.objective):
+            inside, system, right, _ = moving
             for _ in range(6):
                 diagonal = np.diagonal(system)
                 step = np.zeros(len(values))
-                step[free] = inverted(system + damping * np.diag(np.where(diagonal > 0, diagonal, 1.0))) @ right
+                step[inside] = inverted(system + damping * np.diag(np.where(diagonal > 0, diagonal, 1.0))) @ right
                 moved = np.clip(np.array(best.model.shapes) + step, low, high)
                 tried = solved(best.model.with_shapes(moved))
                 if tried.objective < best.objective:
@@ -274,20 +276,27 @@ def _descended(best: Settled, motion: Motion, solved, weights, tolerance: float)
     return best
 
 
-def _renewed(best: Settled, solved) -> Settled:
-    """The model with the load of the bodies found so far.
+def _moving(best: Settled, motion: Motion, free, scale, low, high):
+    """The free shape values that no bound holds back, their normal equations, and what a whole step would lower the objective by:
+    where that is nothing to speak of, none need be tried."""
+    system, right = _normal(best, motion, free, scale)
+    at = np.array(best.model.shapes)[free]
+    inside = ~((at <= low[free]) & (right < 0) | (at >= high[free]) & (right > 0))
+    system, right = system[np.ix_(inside, inside)], right[inside]
+    return np.array(free)[inside], system, right, 0.5 * float(right @ inverted(system) @ right) if inside.any() else 0.0
 
-    A link that moves by itself answers other bodies' load with blows at other times: there only as much of a step is taken
-    as does not raise the objective.
+
+def _renewed(best: Settled, solved, share: float) -> tuple[Settled, float]:
+    """The model with the load of the bodies found so far, and the share of the way to it that may be gone next time.
+
+    A link that moves by itself answers other bodies' load with blows at other times: there a share that raises the objective
+    is not gone, and the next one is half of it.
     """
     new, old = _bodies(best), best.model.reference
     if old is None or not best.model.deflects:
-        return solved(best.model.with_reference(new))
-    for share in _SHARES:
-        tried = solved(best.model.with_reference(old + share * (new - old)))
-        if tried.objective <= best.objective:
-            return tried
-    return best
+        return solved(best.model.with_reference(new)), share
+    tried = solved(best.model.with_reference(old + share * (new - old)))
+    return (tried, min(2.0 * share, 1.0)) if tried.objective <= best.objective else (best, 0.5 * share)
 
 
 def _normal(found: Settled, motion: Motion, free, scale):

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from sysid.lowpass import calm, low
+from sysid.frequencies import low
+from sysid.lowpass import calm
 from sysid.view import Design, instrumented
 
 STEP, N, BAND = 0.01, 4000, 1.2

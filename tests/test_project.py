@@ -18,7 +18,7 @@ ROOT = Path(__file__).resolve().parent.parent
 # The order of the method: a module imports only from modules above it.
 ORDER = [
     "errors", "units", "inertia", "urdf", "readers", "datasets", "config", "prior", "robot", "regressor", "outliers", "knocks", "jumps", "repeats",
-    "events", "log", "preprocess", "blocks", "two_masses", "lowpass", "flexible",
+    "events", "frequencies", "clock", "log", "preprocess", "blocks", "two_masses", "lowpass", "flexible",
     "effect", "formula", "effects", "own_effects", "model", "rows", "source", "compress", "objective", "interior", "certificate", "solve", "uncertainty", "estimate", "shape",
     "filters", "results", "urdf_export", "pipeline", "simulate", "comparison", "transfer", "noise", "candidates", "view", "addition", "failures", "diagnose", "changes", "statement", "loop", "report", "studies", "studio", "terminal", "cli", "__main__",
 ]  # fmt: skip

@@ -14,11 +14,11 @@ balances the rest, are left out for that joint, widened by what the filters see 
 """
 
 from .angles import angle_noise, rougher
-from .calm import KEPT, calm, low
+from .calm import KEPT, calm
 from .gaussian import Gaussian
 from .motion import LEAST, band, lowpassed, narrowed, stride_of, widest
 
 __all__ = [
-    "KEPT", "LEAST", "Gaussian", "angle_noise", "band", "calm", "low", "lowpassed", "narrowed",
+    "KEPT", "LEAST", "Gaussian", "angle_noise", "band", "calm", "lowpassed", "narrowed",
     "rougher", "stride_of", "widest",
 ]  # fmt: skip

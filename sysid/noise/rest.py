@@ -5,7 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..lowpass import KEPT, low
+from ..frequencies import low
+from ..lowpass import KEPT
 from . import bursts, outliers, repeats
 from .motion_functions import Kinematics, kinematics
 from .pursuit import Functions

@@ -10,7 +10,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..lowpass import KEPT, low
+from ..frequencies import low
+from ..lowpass import KEPT
 
 _MOST_SAMPLES = 120_000  # looked at over all runs
 FEWEST_SAMPLES = 40  # of a run worth looking at

@@ -1,0 +1,129 @@
+"""When samples were really taken: what all joints show together of stamps that are late or early.
+
+A logger that writes the time at which it woke up, and values from a while before, puts its samples
+beside their time. Of a joint at 3 rad/s half a millisecond makes 1.5 mrad, and of that a second
+difference makes torque by the newton metre. But all joints are off by the same time: their angles
+stand beside a smooth motion by their speeds times it, and that tells it.
+
+    q_j(k) - smooth_j(t_k) = speed_j(t_k) e_k + own noise_j        for each sample k and joint j
+
+How large e and the noises are is read off the log: squares that grow with the square of the speed
+are the clock's, the rest is the angles' own. With these, e_k is its mean given all joints
+(a weighted mean, drawn towards zero). A clock that is right has no e, and stays as it is.
+
+Source: variance components by least squares; Robinson 1991 (best linear unbiased prediction).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .frequencies import low
+
+_HIGHEST = 0.25  # of the sampling rate: the last frequency below which a motion may stay
+_LOWEST = 2.0  # Hz
+_FINER = 0.8  # from one frequency tried to the next
+# Of the density above the highest frequency. Errors of two values (on time, or late by one period)
+# have 2.2 times a normal variable's median; above a high frequency they look normal.
+_WHITE = 2.5
+# Of the power that the clock makes, what else may stand in the angles: a twentieth in amplitude.
+# A third of it, or three times as much, leaves nearly the same errors.
+_LITTLE = 0.0025
+# Of the largest square in a joint's bins: what is less, corners of the motion make near a standstill
+_LEAST = 0.01
+_BINS, _ROUNDS, _FEWEST = 20, 3, 200
+_MEDIAN = 0.4549  # of a squared normal variable
+_MOST = 3.0  # deviations of the clock
+_ORDERED = 0.45  # of the way to a neighbour: samples keep their order
+
+
+def corrected(t: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, float]:
+    """Stamps (n,) [s] at which samples of angles q (n, dof) were taken, and the RMS [s] by which
+    those logged were off; as they are, and zero, where the angles do not tell.
+
+    Args:
+        t: (n,) [s], ascending, without a gap.
+    """
+    step = float(np.median(np.diff(t)))
+    moves = np.ptp(q, axis=0) > 1e-3 * np.ptp(q, axis=0).max()
+    q = q[:, moves]
+    if len(t) < _FEWEST or not moves.any():
+        return t, 0.0
+    band = _band(t, q, step)
+    if band is None:
+        return t, 0.0
+    late = np.zeros(len(t))
+    for _ in range(_ROUNDS):
+        beside, speed = _beside(t + late, q, band, step)
+        beside = beside + speed * late[:, None]
+        noise, off = _components(beside, speed)
+        if not off > 0.0:
+            return t, 0.0
+        # less than this of what the clock makes of fast motion is not to be told from corners of slow
+        weight = 1.0 / np.maximum(noise, _LEAST * off * np.max(speed**2, axis=0))
+        late = (beside * speed) @ weight / (speed**2 @ weight + 1.0 / off)
+        room = _ORDERED * np.diff(t, prepend=t[0] - step, append=t[-1] + step)
+        most = _MOST * np.sqrt(off)
+        late = np.clip(late, -np.minimum(room[:-1], most), np.minimum(room[1:], most))
+    return t + late, float(np.sqrt(np.mean(late**2)))
+
+
+def _band(t, q, step: float) -> float | None:
+    """The lowest frequency [Hz] above which a log holds no motion: what the clock makes of the
+    angles is as dense above it as above all higher ones, and all else is less by far; None where
+    there is none."""
+    frequency, first, found = _HIGHEST / step, None, None
+    while frequency > _LOWEST:
+        beside, speed = _beside(t, q, frequency, step)
+        noise, off = _components(beside, speed)
+        density = off / _kept(frequency * step)
+        # what all joints together leave of the clock's power in doubt
+        left = 1.0 / max(float(np.sum(off * np.mean(speed**2, axis=0) / (noise + 1e-300))), 1e-300)
+        first = first or (density, left)
+        if not 0.0 < density <= _WHITE * first[0] or left > max(_LITTLE, 2.0 * first[1]):
+            break
+        found, frequency = frequency, _FINER * frequency
+    return found
+
+
+def _kept(frequency: float) -> float:
+    """The share of white noise's power that stands above a frequency [cycles a sample]."""
+    pulse = np.zeros(1025)
+    pulse[512] = 1.0
+    return float(np.sum((pulse - low(pulse, frequency, 1.0)) ** 2))
+
+
+def _beside(t, q, frequency: float, step: float) -> tuple[np.ndarray, np.ndarray]:
+    """By how much angles (n, dof) at times t (n,) stand beside their motion below a frequency, and
+    its speed."""
+    from scipy.interpolate import make_interp_spline
+
+    clock = np.linspace(t[0], t[-1], max(len(t), 2))
+    even = make_interp_spline(t, q, k=3, axis=0)(clock)
+    smooth = make_interp_spline(clock, low(even, frequency, clock[1] - clock[0]), k=3, axis=0)
+    return q - smooth(t), smooth(t, 1)
+
+
+def _components(beside, speed) -> tuple[np.ndarray, float]:
+    """The variances of the angles' own noise (dof,) and of the clock [s^2]: medians of squares in
+    bins of speed, as a knock or a corner of the motion is in few samples."""
+    from scipy.optimize import nnls
+
+    dof = beside.shape[1]
+    rows, squares = [], []
+    for j in range(dof):
+        for bin_ in np.array_split(np.argsort(speed[:, j] ** 2), _BINS):
+            rows.append(np.zeros(dof + 1))
+            rows[-1][j], rows[-1][dof] = 1.0, np.mean(speed[bin_, j] ** 2)
+            squares.append(np.median(beside[bin_, j] ** 2) / _MEDIAN)
+    rows, squares = np.array(rows), np.array(squares)
+    # near a standstill the ringing of the low-pass is more than the rest: bins say by how much they
+    # are off as a share of what they hold, and of no less than a share of the joint's largest
+    least = np.repeat(_LEAST * squares.reshape(dof, -1).max(axis=1), _BINS) + 1e-300
+    found, told = np.zeros(dof + 1), np.maximum(squares, least)
+    for _ in range(6):
+        scaled = rows / told[:, None]
+        size = np.sqrt(np.mean(scaled**2, axis=0)) + 1e-300
+        found = nnls(scaled / size, squares / told)[0] / size
+        told = np.maximum(rows @ found, least)
+    return found[:dof], float(found[dof])

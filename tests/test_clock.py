@@ -1,0 +1,77 @@
+"""The time of samples: read off all joints together where stamps are late or early, left alone where they are right."""
+
+import numpy as np
+import pytest
+
+from sysid.clock import corrected
+
+STEP = 0.01
+
+
+def motion(t, seed=0, dof=3):
+    """Angles (n, dof): sines below 2 Hz."""
+    rng = np.random.default_rng(seed)
+    w, a, p = 2.0 * np.pi * rng.uniform(0.1, 2.0, (5, 1, dof)), rng.uniform(0.05, 0.4, (5, 1, dof)), rng.uniform(0.0, 6.0, (5, 1, dof))
+    return np.sum(a * np.sin(w * t[None, :, None] + p), axis=0)
+
+
+def taken(seed=0, n=2000):
+    """The instants of a slow logger, early and late."""
+    rng = np.random.default_rng(seed)
+    return STEP * np.arange(n) + np.clip(2e-3 * rng.standard_normal(n), -4e-3, 4e-3)
+
+
+def rms(x):
+    return float(np.sqrt(np.mean(np.square(x))))
+
+
+@pytest.mark.parametrize("dof", [1, 3])
+@pytest.mark.parametrize("seed", [0, 1])
+def test_values_older_than_their_stamps_are_put_where_they_belong(seed, dof):
+    """Half of the samples are a millisecond old, as a logger has them that wakes up between two control periods."""
+    instants = taken(seed)
+    off = 1e-3 * np.random.default_rng(seed + 7).integers(0, 2, len(instants))
+    q = motion(instants - off, seed, dof)
+    found, told = corrected(instants, q)
+    t = instants - off
+    # as angles: where nothing moves, the time does not matter; and that all are late by the same, no angle tells
+    speed = np.gradient(q, t, axis=0)[50:-50]
+    angle = lambda late: (late - late.mean())[50:-50, None] * speed  # noqa: E731
+    assert rms(angle(found - t)) < 0.4 * rms(angle(off))  # what is as slow as the motion itself stays
+    assert rms(np.diff(angle(found - t), 2, axis=0)) < 0.1 * rms(np.diff(angle(off), 2, axis=0))  # what makes accelerations does not
+    assert 2e-4 < told < 8e-4
+    assert np.all(np.diff(found) > 0)
+
+
+def test_a_clock_that_is_right_stays_as_it_is():
+    """Angles with a little noise of their own: what moves the stamps is less than what the noise is worth in time."""
+    instants = taken(3)
+    rng = np.random.default_rng(3)
+    q = motion(instants, 3)
+    for noise in (0.0, 1e-5, 3e-4):
+        found, told = corrected(instants, q + noise * rng.standard_normal(q.shape))
+        speed = np.gradient(q, instants, axis=0)
+        worth = noise / np.sqrt(np.mean(np.sum(speed**2, axis=1)))
+        assert rms(found - instants) <= 0.3 * worth + 1e-6 and told <= 0.3 * worth + 1e-6
+
+
+def test_moves_with_stops_do_not_move_the_clock_at_rest():
+    """Corners of the motion are no time: where nothing moves, and where it starts to, stamps stay within the clock's errors."""
+    instants = taken(5, 3000)
+    off = 1e-3 * np.random.default_rng(9).integers(0, 2, len(instants))
+    t = instants - off
+    phase = np.clip((t % 3.0) / 1.2, 0.0, 1.0)  # moves of 1.2 s, stops of 1.8 s, there and back
+    way = 10.0 * phase**3 - 15.0 * phase**4 + 6.0 * phase**5
+    q = np.where((t // 3.0) % 2 == 0, way, 1.0 - way)[:, None] * [1.0, 0.4, 0.0]
+    found, _ = corrected(instants, q)
+    assert np.abs(found - instants).max() < 3e-3
+    fast = (phase > 0.3) & (phase < 0.7)
+    error = (found - t)[fast]
+    assert rms(error - error.mean()) < 2.5e-4
+
+
+def test_short_logs_and_still_ones_are_left_alone():
+    instants = taken(0, 2000)
+    for t, q in ((instants[:150], motion(instants[:150])), (instants, np.zeros((2000, 2)))):
+        found, told = corrected(t, q)
+        assert told == 0.0 and np.array_equal(found, t)
