@@ -265,12 +265,12 @@ def _segments(t, signals, where: str):
             mean = (clock[-1] - clock[0]) / (len(clock) - 1)
             yield _segment(clock[0] + mean * np.arange(len(clock)), mean, part)
             continue
-        true, late = corrected(clock, part["q"])
-        if late > _TOLD * step:
-            clock, off = true, max(off, late)
         own = np.diff(clock)
         # as many samples as were measured: the mean step, without the samples that are missing
         own = float(np.mean(own[own < 1.5 * step]))
+        true, late = corrected(clock, part["q"])
+        if late > _TOLD * step:
+            clock, off = true, max(off, late)
         clock, part = _resampled(clock, part, own)
         resampled += 1
         yield _segment(clock, own, part)

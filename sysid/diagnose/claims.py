@@ -14,7 +14,6 @@ import numpy as np
 from .. import comparison, pipeline
 from ..addition import grown, spelled
 from ..estimate import Fit
-from ..view import View
 from .findings import Finding, finding, judged_by, nought, parameters, where
 from .refits import Member
 from .steps import Step
@@ -100,10 +99,7 @@ def _nothing(before: Fit, after: Fit, member: Member) -> str | None:
         (change,) = (d for d in comparison.compare(before, after) if d.joint == own[0])
         rise = f"{change.delta_rms:+.3g}"
         if -change.delta_rms < change.se and nought(parameters(after, member)):
-            return (
-                "its size is nothing beside its standard deviation, and the error on the test logs "
-                "stays what it was"
-            )
+            return "its size is nothing beside its deviation, and the test error stays the same"
     if change.delta_rms < 0.0:
         return None
     return f"with it the error on the test logs does not fall ({rise})"
@@ -117,8 +113,3 @@ def undecided(choice: Choice, fit: Fit) -> Refused:
     ]
     why = f"something is there, and these logs cannot tell which: {', '.join(names)}"
     return Refused(choice.head.candidate.name, where(choice.head, fit), why)
-
-
-def view_after(claims: list[Claim], first: View) -> View:
-    """The view of the model with all that is claimed."""
-    return claims[-1].step.after if claims else first

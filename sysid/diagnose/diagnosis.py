@@ -86,7 +86,7 @@ def diagnose(
         steps, asked, _, undecided = select.search(view, extra, level=level, tell=tell)
         claims, refused = claiming.claimed(steps, fit, tell)
         refused += [claiming.undecided(choice, fit) for choice in undecided[-1:]]
-        after, last = claiming.view_after(claims, view), claims[-1].after if claims else fit
+        after, last = (claims[-1].step.after, claims[-1].after) if claims else (view, fit)
         test = lowpassed(logs[1], fit.joints, view.cutoff)
         if test is None:
             raise too_short()

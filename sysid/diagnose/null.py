@@ -54,9 +54,8 @@ def _greatest(groups: list[Group], sign: np.ndarray) -> np.ndarray:
     moves = np.stack([g.moves for g in groups])
     directions, rest = np.array([g.freedom for g in groups]).T
     out = left_out(squares)
-    again = np.einsum(
-        "gbkl,gbl->gbk", out, moves
-    )  # what a draw's own scores move by, before its refit
+    # what a draw's own scores move by, before its refit
+    again = np.einsum("gbkl,gbl->gbk", out, moves)
     pulled = out @ squares
     after = np.einsum("gbkl,gbl->gbk", pulled, again)
     twice = np.einsum("gbkl,gblm->gkm", pulled, pulled, optimize=True)

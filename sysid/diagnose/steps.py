@@ -99,6 +99,8 @@ def _rejoined(first: View, steps: list[Step]) -> list[Step]:
     out: list[Step] = []
     for step in steps:
         view = out[-1].after if out else first
+        there = {other.candidate.key for other in steps if other is not step}
+        step = replace(step, choice=step.choice.without(there))
         after = joined(view, (step.candidate, step.choice.head.shapes))
         shares = _shares(view, losses(after, view.blocks))
         out.append(Step(step.choice, step.p, view, weighed(after), shares))

@@ -7,7 +7,7 @@ heads it is told by these losses and by how many numbers each one needs.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -39,6 +39,12 @@ class Choice:
         together."""
         joints = {member.candidate.joint for member, _ in self.members}
         return len(joints) == 1 or self.members[0][1] >= 0.5
+
+    def without(self, there: set) -> Choice:
+        """The choice without what is in the model anyway, as another step brings it."""
+        kept = [(m, p) for m, p in self.members if m is self.head or m.candidate.key not in there]
+        whole = sum(p for _, p in kept) or 1.0
+        return replace(self, members=tuple((m, p / whole) for m, p in kept))
 
 
 def chosen(view: View, groups: list[Group], rng: np.random.Generator) -> Choice | None:
