@@ -309,16 +309,15 @@ def _segment(t, step, part) -> Segment:
 
 
 def _resampled(t, part, step):
-    from scipy.interpolate import PchipInterpolator, make_interp_spline
+    from scipy.interpolate import make_interp_spline
 
     samples = int(np.floor((t[-1] - t[0]) / step + 1e-9)) + 1
     clock = t[0] + step * np.arange(samples)
     out = {}
     for name, values in part.items():
-        # angles are smooth; torque and the rest have spikes and jumps that a spline would ring about, and a straight line would
-        # take from what is fast
-        smooth = name in ("q", "qd") and len(t) > 3
-        out[name] = (make_interp_spline(t, values, k=3, axis=0) if smooth else PchipInterpolator(t, values, axis=0))(clock)
+        # angles are smooth, torque and the rest carry noise that a cubic would overshoot on
+        order = 3 if name in ("q", "qd") and len(t) > 3 else 1
+        out[name] = make_interp_spline(t, values, k=order, axis=0)(clock)
     return clock, out
 
 
