@@ -282,8 +282,7 @@ def _segments(t, signals, where: str):
     if off > 0.0:
         warnings.warn(
             SysidWarning(
-                f"{where}: the stamps stand beside the time of their samples by {1e3 * off:.2g} ms (RMS), as the angles of all joints "
-                "together show; the samples were put where they belong"
+                f"{where}: the time stamps are off by {1e3 * off:.2g} ms (RMS), as the joints' angles show, and were corrected"
             ),
             stacklevel=3,
         )

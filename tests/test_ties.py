@@ -93,3 +93,15 @@ def test_a_log_decides_where_it_says_which_joint(members, told):
     """All of one joint, or one likelier than all others together."""
     made = tuple((SimpleNamespace(candidate=SimpleNamespace(joint=joint)), chance) for joint, chance in members)
     assert Choice(made[0][0], made, np.zeros(3)).decided is told
+
+
+def test_a_choice_without_what_is_in_the_model_anyway():
+    """Probabilities are shared among what is left; the head stays, whatever another step brings."""
+    from types import SimpleNamespace
+
+    from sysid.diagnose.ties import Choice
+
+    head, tied, there = (SimpleNamespace(candidate=SimpleNamespace(key=(word, 0))) for word in ("delay", "stribeck", "presliding"))
+    choice = Choice(head, ((head, 0.5), (tied, 0.25), (there, 0.25)), np.zeros(3)).without({("presliding", 0), ("delay", 0)})
+    assert [m.candidate.key[0] for m, _ in choice.members] == ["delay", "stribeck"]
+    assert [p for _, p in choice.members] == pytest.approx([2 / 3, 1 / 3])
