@@ -63,6 +63,7 @@ def corrected(t: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, float]:
         weight = 1.0 / np.maximum(noise, _LEAST * off * np.max(speed**2, axis=0))
         late = (beside * speed) @ weight / (speed**2 @ weight + 1.0 / off)
         room = _ORDERED * np.diff(t, prepend=t[0] - step, append=t[-1] + step)
+        late[[0, -1]] = 0.0  # of the ends, half of what they stand beside is not known
         most = _MOST * np.sqrt(off)
         late = np.clip(late, -np.minimum(room[:-1], most), np.minimum(room[1:], most))
     return t + late, float(np.sqrt(np.mean(late**2)))
