@@ -29,6 +29,7 @@ _WHITE = 2.5
 # Of the power that the clock makes, what else may stand in the angles: a twentieth in amplitude.
 # A third of it, or three times as much, leaves nearly the same errors.
 _LITTLE = 0.0025
+_SCATTER = 3.0  # samples' share: of few, no power is known better
 # Of the largest square in a joint's bins: what is less, corners of the motion make near a standstill
 _LEAST = 0.01
 _BINS, _ROUNDS, _FEWEST = 20, 3, 200
@@ -49,31 +50,45 @@ def corrected(t: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, float]:
     q = q[:, moves]
     if len(t) < _FEWEST or not moves.any():
         return t, 0.0
-    band = _band(t, q, step)
-    if band is None:
+    bands = _bands(t, q, step)
+    if not bands:
         return t, 0.0
+    room = _ORDERED * np.diff(t, prepend=t[0] - step, append=t[-1] + step)
+    to_end = np.minimum(t - t[0], t[-1] - t)
     late = np.zeros(len(t))
     for _ in range(_ROUNDS):
-        beside, speed = _beside(t + late, q, band, step)
-        beside = beside + speed * late[:, None]
-        noise, off = _components(beside, speed)
-        if not off > 0.0:
-            return t, 0.0
-        # less than this of what the clock makes of fast motion is not to be told from corners of slow
-        weight = 1.0 / np.maximum(noise, _LEAST * off * np.max(speed**2, axis=0))
-        late = (beside * speed) @ weight / (speed**2 @ weight + 1.0 / off)
-        room = _ORDERED * np.diff(t, prepend=t[0] - step, append=t[-1] + step)
-        late[[0, -1]] = 0.0  # of the ends, half of what they stand beside is not known
-        most = _MOST * np.sqrt(off)
-        late = np.clip(late, -np.minimum(room[:-1], most), np.minimum(room[1:], most))
+        told = [_late(t, q, late, band, step) for band in bands]
+        late = told[-1]
+        # beside the ends, what a low-pass that forgets sooner tells
+        for lower, band in zip(bands[::-1], told[-2::-1]):
+            late = np.where(to_end < 1.0 / lower, band, late)
+        late = np.clip(late, -room[:-1], room[1:])
+        late[[0, -1]] = 0.0
     return t + late, float(np.sqrt(np.mean(late**2)))
 
 
-def _band(t, q, step: float) -> float | None:
-    """The lowest frequency [Hz] above which a log holds no motion: what the clock makes of the
-    angles is as dense above it as above all higher ones, and all else is less by far; None where
-    there is none."""
-    frequency, first, found = _HIGHEST / step, None, None
+def _late(t, q, late, band: float, step: float) -> np.ndarray:
+    """How late (n,) [s] samples were, of a motion that stays below a frequency.
+
+    Args:
+        late: (n,) as far as it is known.
+    """
+    beside, speed = _beside(t + late, q, band, step)
+    beside = beside + speed * late[:, None]
+    noise, off = _components(beside, speed)
+    if not off > 0.0:
+        return np.zeros(len(t))
+    # less than this of what the clock makes of fast motion is not to be told from corners of slow
+    weight = 1.0 / np.maximum(noise, _LEAST * off * np.max(speed**2, axis=0))
+    found = (beside * speed) @ weight / (speed**2 @ weight + 1.0 / off)
+    return np.clip(found, -_MOST * np.sqrt(off), _MOST * np.sqrt(off))
+
+
+def _bands(t, q, step: float) -> list[float]:
+    """Frequencies [Hz], falling, above which a log holds no motion: what the clock makes of the
+    angles is as dense above each as above the highest, and all else is less by far."""
+    frequency, first, found = _HIGHEST / step, None, []
+    most = _LITTLE + _SCATTER / len(t)
     while frequency > _LOWEST:
         beside, speed = _beside(t, q, frequency, step)
         noise, off = _components(beside, speed)
@@ -81,9 +96,10 @@ def _band(t, q, step: float) -> float | None:
         # what all joints together leave of the clock's power in doubt
         left = 1.0 / max(float(np.sum(off * np.mean(speed**2, axis=0) / (noise + 1e-300))), 1e-300)
         first = first or (density, left)
-        if not 0.0 < density <= _WHITE * first[0] or left > max(_LITTLE, 2.0 * first[1]):
+        if not 0.0 < density <= _WHITE * first[0] or left > max(most, 2.0 * first[1]):
             break
-        found, frequency = frequency, _FINER * frequency
+        found.append(frequency)
+        frequency *= _FINER
     return found
 
 
