@@ -257,3 +257,21 @@ def test_slopes_of_noise_are_as_likely_as_they_are_told():
         assert low <= np.mean(p <= share) <= high, (share, np.mean(p <= share))
     assert blocks.slope_chance(told, noise[:, 0] + told, number) < 1e-6 < 0.999 < blocks.slope_chance(told, noise[:, 0] - told, number)
     assert blocks.slope_chance(0.0 * told, noise[:, 0], number) == 1.0
+
+
+def test_blocks_that_tell_each_other_are_half_as_sure():
+    """Noise, each fold predicted from all others by a function that fits anything: what two folds share counts in both."""
+    rng = np.random.default_rng(8)
+    folds, long, draws = 20, 40, 1000
+    number = np.repeat(np.arange(folds), long)
+    x = rng.normal(size=(folds * long, 60))
+    surer, p = np.zeros(draws), np.zeros(draws)
+    for k in range(draws):
+        y = rng.normal(size=len(x))
+        told = np.concatenate([x[number == f] @ (x[number != f].T @ y[number != f]) for f in range(folds)])
+        surer[k] = blocks.slope_chance(told, y, number)
+        p[k] = blocks.slope_chance(told, y, number, mutual=True)
+    for share in (0.01, 0.05, 0.25):
+        most = binom.ppf(0.999, draws, share) / draws
+        assert 0.2 * share < np.mean(p <= share) <= most
+    assert np.mean(surer <= 0.01) > 0.02  # as if they were told beforehand

@@ -31,12 +31,18 @@ def z_score(differences) -> float:
     return float(d.sum() / se) if se > 0 else 0.0
 
 
-def slope_chance(told, values, number) -> float:
+def slope_chance(told, values, number, *, mutual: bool = False) -> float:
     """Probability, were nothing there, of a slope of values (n,) on what was told of them (n,) as
     large as theirs: Student's t of sums over blocks `number` (n,), with what the slope leaves as
     their noise.
 
-    Source: MacKinnon & White 1985 (the jackknife's deviation).
+    Args:
+        mutual: blocks are told by each other. What two of them share, the product of their noises
+            by what tells the one of the other, then stands in the sums of both: their variances
+            add to half of the whole's.
+
+    Source: MacKinnon & White 1985 (the jackknife's deviation); Serfling 1980, 5.5 (degenerate
+        U-statistics).
     """
     from scipy.special import stdtr  # not scipy.stats, whose import alone takes longer than a fit
 
@@ -48,6 +54,7 @@ def slope_chance(told, values, number) -> float:
     acting = size.sum() ** 2 / np.sum(size**2)
     # each block against the slope of all others: where few act, each bends it towards itself
     spread = np.sqrt(np.sum((left / np.maximum(1.0 - size / size.sum(), 1e-9)) ** 2))
+    spread *= np.sqrt(2.0) if mutual else 1.0
     return float(stdtr(max(acting - 1.0, 1.0), -slope * size.sum() / max(spread, 1e-300)))
 
 

@@ -63,7 +63,8 @@ def unknown(
     # as many questions as groups of functions
     chance = min(
         1.0,
-        len(tried) * min(blocks.slope_chance(one, residual, number) for one, _ in tried.values()),
+        len(tried)
+        * min(blocks.slope_chance(one, residual, number, mutual=True) for one, _ in tried.values()),
     )
     total = max(float(np.sum(residual**2)), 1e-300)
     shares = {name: float(one[1].sum() / total) for name, one in tried.items() if name != "*"}
