@@ -98,6 +98,7 @@ def _richer(model: Model, name: str, joint: int) -> list[Candidate]:
     ]
     if any(v.held for v, _ in own):
         return []
+    low = {v.shape.name: v.low for v, _ in own}
     return [
         Candidate(
             effect.given(**options).bound(model.robot, joint),
@@ -106,6 +107,7 @@ def _richer(model: Model, name: str, joint: int) -> list[Candidate]:
             (tuple(at.items()),),
         )
         for options, at in effect.richer(**{v.shape.name: at for v, at in own})
+        if all(value >= low[name] for name, value in at.items())
     ]
 
 
@@ -162,8 +164,8 @@ def bounds_of(model: Model, candidate: Candidate) -> list[tuple]:
     """(shape, low, high, angle travelled) of a candidate's shape values."""
     scales, joint = model.scales, candidate.joint
     angle = None if joint == ROBOT else float(scales.angle[joint])
-    of = lambda s: scales.of(s.of, joint)  # noqa: E731
-    return [(s, s.low * of(s), s.high * of(s), angle) for s in candidate.effect.shapes()]
+    bounds = lambda s: s.bounds(scales.of(s.of, joint), angle)  # noqa: E731
+    return [(s, *bounds(s), angle) for s in candidate.effect.shapes()]
 
 
 def further(model: Model, candidate: Candidate) -> list[dict[str, float]]:

@@ -46,8 +46,8 @@ class Shape:
     of: what `low` and `high` are shares of: the joint's top "speed", its greatest "torque", the "angle" it travels, its
         "softness", which is that angle per greatest torque, the "duration" of a log, or "" for plain units. start: the value at which the effect does nothing, from which a
         search begins; None where there is none, and values between the bounds are tried: `grid` of them, in equal
-        ratios, or in equal steps where `even` or where a bound is not positive. spacing: the widest step between
-        tried values that misses nothing, as a share of 1 / (angle travelled); 0 where `grid` values suffice.
+        ratios, or in equal steps where `even` or where a bound is not positive. spacing: of a value that counts periods over
+        the angle, the widest step between tried ones that misses nothing, as a share of 1 / (angle travelled); 0 of any other.
     """
 
     unit: str
@@ -63,6 +63,12 @@ class Shape:
 
     def __set_name__(self, owner, name):
         self.name = name
+
+    def bounds(self, scale: float, angle: float | None = None) -> tuple[float, float]:
+        """The bounds where what they are shares of is `scale`, and a joint travels `angle`: of what repeats, one period at
+        least must be seen."""
+        low, high = self.low * scale, self.high * scale
+        return (min(max(low, 2.0 * np.pi / angle), high), high) if self.spacing and angle else (low, high)
 
     def values(self, low: float, high: float, angle: float | None = None) -> np.ndarray:
         """Values to try between two bounds, ascending.

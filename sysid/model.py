@@ -114,8 +114,9 @@ class Model:
             for joint in joints:
                 for shape in effect.shapes():
                     scale = 1.0 if self.scales is None else self.scales.of(shape.of, joint)
+                    angle = None if self.scales is None or joint == ROBOT else float(self.scales.angle[joint])
                     name, unit = self._name(effect, joint, shape.name), self._unit(shape.unit, joint)
-                    out.append(ShapeValue(term, joint, shape, name, unit, shape.low * scale, shape.high * scale, (term, joint, shape.name) in given))
+                    out.append(ShapeValue(term, joint, shape, name, unit, *shape.bounds(scale, angle), (term, joint, shape.name) in given))
         return tuple(out)
 
     def _name(self, effect: Effect, joint: int, word: str) -> str:
