@@ -149,7 +149,7 @@ def test_what_rests_on_few_blocks_is_not_tested():
     for count, told in ((2, False), (15, True)):
         own = rng.normal(size=(1, 2, 240, 1)) * (p.number < count)[None, None, :, None]
         (group,) = grouped(viewed(p), own)
-        assert group.testable is told and evidence.resting(group.squares) == pytest.approx(count, rel=0.15)
+        assert group.testable is told and blocks.resting(group.squares) == pytest.approx(count, rel=0.15)
         assert np.isnan(null.statistics([group])[0]) is np.bool_(not told)
 
 

@@ -105,3 +105,17 @@ def test_a_choice_without_what_is_in_the_model_anyway():
     choice = Choice(head, ((head, 0.5), (tied, 0.25), (there, 0.25)), np.zeros(3)).without({("presliding", 0), ("delay", 0)})
     assert [m.candidate.key[0] for m, _ in choice.members] == ["delay", "stribeck"]
     assert [p for _, p in choice.members] == pytest.approx([2 / 3, 1 / 3])
+
+
+def test_rivals_are_judged_with_the_weights_that_the_best_of_them_leaves(biased):
+    """A joint that lacks something is loud and counts little, and the prior much: with what is missing in the model, it is not."""
+    view, groups = biased
+    found = chosen(view, [of(groups, "torque_bias", 1), of(groups, "asymmetric_viscous", 1)], np.random.default_rng(1))
+    left = found.head.view.rms()
+    share = left / view.rms()
+    assert share[1] < 0.6 < share[0]
+    assert found.head.view.weights[1] / found.head.view.weights[0] == pytest.approx(left[0] / left[1], rel=0.02)
+    for member, _ in found.members:
+        np.testing.assert_array_equal(member.view.weights, found.head.view.weights)
+    # shares are of what each joint loses, whatever it counts
+    assert found.shares[1] == pytest.approx(1.0 - share[1] ** 2, abs=0.1)

@@ -68,3 +68,24 @@ def jackknife(without) -> np.ndarray:
 def signs(count: int, draws: int, rng: np.random.Generator) -> np.ndarray:
     """Random signs (draws, count)."""
     return rng.integers(0, 2, (draws, count)) * 2.0 - 1.0
+
+
+def resting(squares: np.ndarray) -> float:
+    """On how many blocks something rests: one over the sum of squared shares (blocks, k, k)."""
+    share = np.einsum("bkk->b", squares)
+    return float(share.sum() ** 2 / max(np.sum(share**2), 1e-300))
+
+
+def even(share: np.ndarray, parts: float) -> float:
+    """What no block's share (blocks,) may pass for none to hold more than an even one of so many
+    parts."""
+    ascending = np.sort(share)
+    below = np.concatenate([[0.0], np.cumsum(ascending)])
+    count = len(share) - np.arange(len(share))
+    capped = below[:-1] + count * ascending  # of all, where each in turn is the most
+    fits = ascending <= capped / parts
+    if fits.all():
+        return float(ascending[-1])
+    k = int(np.argmin(fits))  # the first that is too much: between its neighbour below and it
+    rest = parts - count[k]
+    return float(below[k] / rest) if rest > 0 else float(ascending[k])

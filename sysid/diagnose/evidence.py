@@ -62,14 +62,14 @@ class Group:
         moves = self.moves
         spread = moves.T @ moves
         directions = np.trace(spread) ** 2 / max(np.sum(spread**2), 1e-300)
-        return float(directions), resting(self.squares)
+        return float(directions), blocks.resting(self.squares)
 
     @property
     def testable(self) -> bool:
         """Whether it rests on enough blocks to be told from chance; if not, it may still be a rival
         of one that is."""
         return (
-            resting(self.squares) >= _FEWEST
+            blocks.resting(self.squares) >= _FEWEST
             and float(np.linalg.eigvalsh(self.squares).max()) <= _LEVERAGE
         )
 
@@ -84,7 +84,7 @@ class Group:
         if not self.candidate.blows:
             return self
         share = np.einsum("bkk->b", self.squares)
-        weight = np.minimum(1.0, _most(share) / np.maximum(share, 1e-300))
+        weight = np.minimum(1.0, blocks.even(share, 2.0 * _FEWEST) / np.maximum(share, 1e-300))
         if weight.min() == 1.0:
             return self
         squares = self.squares * weight[:, None, None]
@@ -110,27 +110,6 @@ class Group:
     def coefficients(self) -> np.ndarray:
         """(k0,) the candidate's own."""
         return self.back @ self.c
-
-
-def resting(squares: np.ndarray) -> float:
-    """On how many blocks a group rests: the inverse of the sum of squared shares (blocks, k, k)."""
-    share = np.einsum("bkk->b", squares)
-    return float(share.sum() ** 2 / max(np.sum(share**2), 1e-300))
-
-
-def _most(share: np.ndarray) -> float:
-    """What no block's share (blocks,) may pass for no block to hold more than an even part of twice
-    the fewest blocks."""
-    ascending = np.sort(share)
-    below = np.concatenate([[0.0], np.cumsum(ascending)])
-    count = len(share) - np.arange(len(share))
-    capped = below[:-1] + count * ascending  # of all, where each in turn is the most
-    fits = ascending <= capped / (2.0 * _FEWEST)
-    if fits.all():
-        return float(ascending[-1])
-    k = int(np.argmin(fits))  # the first that is too much: between its neighbour below and it
-    rest = 2.0 * _FEWEST - count[k]
-    return float(below[k] / rest) if rest > 0 else float(ascending[k])
 
 
 def left_out(squares: np.ndarray) -> np.ndarray:

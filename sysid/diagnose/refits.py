@@ -66,6 +66,12 @@ def losses(view: View, number: np.ndarray) -> np.ndarray:
     return out
 
 
+def taken(view: View, before: np.ndarray, after: np.ndarray) -> np.ndarray:
+    """The share (dof,) of each joint's loss in a view that goes, of losses (blocks, dof)."""
+    whole = before.sum(0) + np.sum(view.design.rough_residual**2, axis=0)
+    return (before - after).sum(0) / np.maximum(whole, 1e-300)
+
+
 def refitted(view: View, group: Group) -> Member | None:
     """A group's candidate in the model, everything settled again; None where its sign or its bounds
     forbid it."""
@@ -89,18 +95,8 @@ def joined(view: View, *added: tuple[Candidate, dict[str, float]], weights=None)
     source = view.source
     for candidate, shapes in added:
         source = replace(source, model=grown(source, candidate, shapes))
-    return looked_at(
-        view.experiment,
-        source.model,
-        view.motion,
-        view.rough,
-        view.prior,
-        stride=view.stride,
-        weights=view.weights if weights is None else weights,
-        grid=False,
-        tolerance=_COMPARED,
-        inherited=view.blocks,
-    )
+    own = view.weights if weights is None else weights
+    return _again(view, source.model, own, tolerance=_COMPARED)
 
 
 def _allowed(view: View, candidate: Candidate) -> bool:
@@ -118,19 +114,18 @@ def _allowed(view: View, candidate: Candidate) -> bool:
     return not starts or any(at != v.shape.start for v, at in starts)
 
 
-def weighed(view: View) -> View:
-    """The view with every joint weighted by what the model now leaves it."""
-    return looked_at(
-        view.experiment,
-        view.model,
-        view.motion,
-        view.rough,
-        view.prior,
-        stride=view.stride,
-        weights=inverse(view.rms()),
-        grid=False,
-        inherited=view.blocks,
-    )
+def weighed(view: View, weights=None) -> View:
+    """The view with every joint weighted anew.
+
+    Args:
+        weights: (dof,); None: by what the model now leaves each joint.
+    """
+    return _again(view, view.model, inverse(view.rms()) if weights is None else weights)
+
+
+def _again(view: View, model, weights, **how) -> View:
+    how |= {"stride": view.stride, "weights": weights, "grid": False, "inherited": view.blocks}
+    return looked_at(view.experiment, model, view.motion, view.rough, view.prior, **how)
 
 
 def _own(view: View):

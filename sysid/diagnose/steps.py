@@ -11,7 +11,7 @@ from ..candidates import Candidate
 from ..model import ROBOT
 from ..view import View
 from .projected import groups_at
-from .refits import joined, losses, weighed
+from .refits import joined, losses, taken, weighed
 from .ties import Choice, chosen
 
 
@@ -40,17 +40,10 @@ class Step:
 
 def step_of(view: View, p: float, found: Choice, worth: float) -> Step | None:
     """The step that a choice makes, None where it takes too little to be worth having."""
-    shares = _shares(view, found.head.losses)
     joints = found.head.candidate.touches(view.model.robot.dof)
-    if shares[joints].max() < worth or found.gain.sum() <= 0.0:
+    if found.shares[joints].max() < worth or found.gain.sum() <= 0.0:
         return None
-    return Step(found, p, view, weighed(found.head.view), shares)
-
-
-def _shares(view: View, after: np.ndarray) -> np.ndarray:
-    base = losses(view, view.blocks).sum(0)
-    whole = np.maximum(base + np.sum(view.design.rough_residual**2, axis=0), 1e-300)
-    return (base - after.sum(0)) / whole
+    return Step(found, p, view, weighed(found.head.view), found.shares)
 
 
 def revised(first: View, steps: list[Step], worth: float) -> list[Step]:
@@ -102,6 +95,6 @@ def _rejoined(first: View, steps: list[Step]) -> list[Step]:
         there = {other.candidate.key for other in steps if other is not step}
         step = replace(step, choice=step.choice.without(there))
         after = joined(view, (step.candidate, step.choice.head.shapes))
-        shares = _shares(view, losses(after, view.blocks))
+        shares = taken(view, losses(view, view.blocks), losses(after, view.blocks))
         out.append(Step(step.choice, step.p, view, weighed(after), shares))
     return out

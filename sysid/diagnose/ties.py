@@ -13,11 +13,14 @@ import numpy as np
 
 from .. import blocks
 from ..candidates import columns_of
+from ..estimate import inverse
 from ..view import View
 from .evidence import Group
-from .refits import Member, losses, refitted
+from .projected import groups_at
+from .refits import Member, losses, refitted, taken, weighed
 
 _OUTSIDE = 0.10  # a model is outside the set of 90 % where its p-value is below
+_UNEVEN = 0.35  # logarithm: two joints count half as much against each other, in power
 _SAME = 0.99  # share of a candidate's torque that another one's columns hold
 
 
@@ -25,13 +28,14 @@ _SAME = 0.99  # share of a candidate's torque that another one's columns hold
 class Choice:
     """The head and, by falling probability, all that these logs cannot tell from it: members with
     their probabilities. gain (blocks,): what the head takes of the model's weighted loss in each
-    block. beaten: all others that were refitted; where one of them is there, it is the head that
-    is."""
+    block; shares (dof,): of each joint's loss. beaten: all others that were refitted; where one of
+    them is there, it is the head that is."""
 
     head: Member
     members: tuple[tuple[Member, float], ...]
     gain: np.ndarray
     beaten: tuple[Member, ...] = ()
+    shares: np.ndarray | None = None
 
     @property
     def decided(self) -> bool:
@@ -53,9 +57,13 @@ def chosen(view: View, groups: list[Group], rng: np.random.Generator) -> Choice 
     members = [m for m in (refitted(view, g) for g in groups) if m is not None]
     if not members:
         return None
-    base = losses(view, view.blocks).sum(1)
+    first, (view, members) = view, _even(view, members)
+    base = losses(view, view.blocks)
     table = np.stack([m.losses.sum(1) for m in members], axis=1)
-    priced = table + _price(members, int(np.argmin(table.sum(0))))
+    group = members[int(np.argmin(table.sum(0)))].group
+    if view is not first:  # with these weights
+        group = (groups_at(view, [(group.candidate, group.shapes)]) or [group])[0]
+    priced = table + _price(members, group)
     kept = _least(members, priced.sum(0))
     members, table, priced = [members[k] for k in kept], table[:, kept], priced[:, kept]
     p = blocks.confidence_set(table, rng)
@@ -72,22 +80,38 @@ def chosen(view: View, groups: list[Group], rng: np.random.Generator) -> Choice 
     return Choice(
         members[head],
         tuple((members[k], float(chance[k])) for k in order),
-        base - table[:, head],
+        base.sum(1) - table[:, head],
         tuple(m for k, m in enumerate(members) if k not in inside),
+        taken(view, base, members[head].losses),
     )
 
 
-def _price(members: list[Member], best: int) -> np.ndarray:
+def _even(view: View, members: list[Member]) -> tuple[View, list[Member]]:
+    """Everything with the weights that the best of the members asks for.
+
+    A joint that lacks something is loud, counts little, and the prior much: what the prior is in
+    the way of would speak for whoever has the most freedom.
+    """
+    best = min(members, key=lambda m: m.losses.sum()).view
+    weights = inverse(best.rms())
+    if np.ptp(np.log(weights / view.weights)) < _UNEVEN:
+        return view, members
+    view = weighed(view, weights)
+    even = [(m.group, weighed(m.view, weights)) for m in members]
+    return view, [Member(group, found, losses(found, view.blocks)) for group, found in even]
+
+
+def _price(members: list[Member], group: Group) -> np.ndarray:
     """(members,) what each member's numbers cost it in every block.
 
     Blocks held apart ask who predicts best, and what holds the truth and more predicts about as
     well as the truth. Who is the truth is another question: a number then costs the logarithm of
-    the count of blocks times the variance of one direction (that of the `best` member), of which
-    holding apart has charged two.
+    the count of blocks times the variance of one direction (that of the best one's `group`), of
+    which holding apart has charged two.
 
     Source: Schwarz 1978; Akaike 1973 for the two.
     """
-    count, group = len(members[best].losses), members[best].group
+    count = len(group.scores)
     one = np.sum(group.moves**2) / len(group.c)
     return (
         np.array([m.group.numbers for m in members]) * one * max(np.log(count) - 2.0, 0.0) / count
