@@ -7,7 +7,7 @@ import pytest
 
 from sysid import blocks, pipeline
 from sysid.diagnose.ask import ask
-from sysid.diagnose.refits import losses, refitted
+from sysid.diagnose.refits import losses, refitted, weighed
 from sysid.diagnose.ties import Choice, chosen, holds
 from sysid.view import first_view
 from tests.evidences import posed, stacked, viewed
@@ -63,7 +63,8 @@ def test_the_set_holds_the_truth_and_its_twin_and_not_the_rest(biased):
     assert found.head.candidate.name == "torque_bias"
     assert {m.candidate.key for m, _ in found.members} == {("torque_bias", 1), ("asymmetric_coulomb", 1)}
     assert [p for _, p in found.members] == pytest.approx([0.5, 0.5], abs=0.01)  # one column: nobody can tell
-    assert found.gain.sum() == pytest.approx((losses(view, view.blocks) - found.head.losses).sum())
+    base = losses(weighed(view, found.head.view.weights), view.blocks)
+    assert found.gain.sum() == pytest.approx((base - found.head.losses).sum())
 
 
 def test_what_only_adds_freedom_is_told(biased):
@@ -117,5 +118,5 @@ def test_rivals_are_judged_with_the_weights_that_the_best_of_them_leaves(biased)
     assert found.head.view.weights[1] / found.head.view.weights[0] == pytest.approx(left[0] / left[1], rel=0.02)
     for member, _ in found.members:
         np.testing.assert_array_equal(member.view.weights, found.head.view.weights)
-    # shares are of what each joint loses, whatever it counts
-    assert found.shares[1] == pytest.approx(1.0 - share[1] ** 2, abs=0.1)
+    # shares are of what each joint loses, whatever it counts, less what the angles' noise makes
+    assert 1.0 - share[1] ** 2 < found.shares[1] < 1.0 and abs(found.shares[0]) < 0.5
