@@ -92,17 +92,19 @@ def _nothing(before: Fit, after: Fit, member: Member) -> str | None:
     own = judged_by(member, before)
     if not any(after.rms("train")[joint] < before.rms("train")[joint] for joint in own):
         return "the fit's own error does not fall with it"
+    whole = comparison.together(before, after)
     if where(member, before) == "*":
-        change = comparison.together(before, after)
-        rise = f"{100 * change.delta_rms:+.2g} % over all joints"
+        change, rise = whole, f"{100 * whole.delta_rms:+.2g} % over all joints"
     else:
         (change,) = (d for d in comparison.compare(before, after) if d.joint == own[0])
         rise = f"{change.delta_rms:+.3g}"
         if -change.delta_rms < change.se and nought(parameters(after, member)):
             return "its size is nothing beside its deviation, and the test error stays the same"
-    if change.delta_rms < 0.0:
-        return None
-    return f"with it the error on the test logs does not fall ({rise})"
+    if change.delta_rms >= 0.0:
+        return f"with it the error on the test logs does not fall ({rise})"
+    if whole.delta_rms > whole.se:
+        return f"with it the other joints' error on the test logs rises ({100 * whole.delta_rms:+.2g} %)"
+    return None
 
 
 def undecided(choice: Choice, fit: Fit) -> Refused:

@@ -176,21 +176,24 @@ def first_view(experiment: Experiment, fit: Fit, logs=None) -> View:
         logs = pipeline.read(experiment, fit.model.robot, experiment.data.train)
     cutoff = widest(logs)
     view = _under(experiment, fit, logs, cutoff)
+    if view is None:
+        raise too_short()
     rough, residual = view.design.rough_residual, view.design.residual
     # in the middle of the rows: about reversals, and where something is missing, there is more
     share = _middle(rough, view.rows.use) / np.maximum(_middle(residual, view.rows.use), 1e-300)
     lower = narrowed(cutoff, float(np.median(share)))
-    return view if lower > 0.9 * cutoff else _under(experiment, fit, logs, lower)
+    narrow = None if lower > 0.9 * cutoff else _under(experiment, fit, logs, lower)
+    return view if narrow is None else narrow  # of short logs a narrow low-pass leaves nothing
 
 
 def _middle(values, use) -> np.ndarray:
     return np.array([np.median(v[u] ** 2) if u.any() else 1.0 for v, u in zip(values.T, use.T)])
 
 
-def _under(experiment: Experiment, fit: Fit, logs, cutoff: float) -> View:
+def _under(experiment: Experiment, fit: Fit, logs, cutoff: float) -> View | None:
     motion = lowpassed(logs, fit.joints, cutoff)
     if motion is None or motion.samples < 50:
-        raise too_short()
+        return None
     rng, noise = np.random.default_rng(0), np.max([piece.noise for piece in motion.pieces], axis=0)
     drawn = lambda s: replace(s, q=rougher(s, noise, cutoff, rng))  # noqa: E731
     again = [replace(log, segments=tuple(map(drawn, log.segments))) for log in logs]
