@@ -103,7 +103,7 @@ def _nothing(before: Fit, after: Fit, member: Member) -> str | None:
     if change.delta_rms >= 0.0:
         return f"with it the error on the test logs does not fall ({rise})"
     if whole.delta_rms > whole.se:
-        return f"with it the other joints' error on the test logs rises ({100 * whole.delta_rms:+.2g} %)"
+        return f"with it the other joints' test error rises ({100 * whole.delta_rms:+.2g} %)"
     return None
 
 
