@@ -138,7 +138,11 @@ def _rotation_to_child(placement, subspace, angle) -> np.ndarray:
     s, c = np.sin(angle), 1.0 - np.cos(angle)
     for r in range(3):
         for k in range(3):
-            out[k, r] = constant[r, k] + sine[r, k] * s + cosine[r, k] * c
+            out[k, r] = constant[r, k]
+            if sine[r, k]:  # joints mostly turn about an axis of their frame: many are zero
+                out[k, r] += sine[r, k] * s
+            if cosine[r, k]:
+                out[k, r] += cosine[r, k] * c
     return out
 
 

@@ -35,19 +35,17 @@ class Gaussian:
     def at(self, values, rows: slice) -> np.ndarray:
         """The filtered values (..., n) at some rows of the last axis; the edge's value goes on
         beyond the edge."""
-        n = values.shape[-1]
-        kept = np.arange(n)[rows]
-        out = np.zeros(values.shape[:-1] + (len(kept),))
-        inside = len(kept) and kept[0] >= self.reach and kept[-1] < n - self.reach
-        stride = rows.step or 1
-        for shift, weight in zip(range(-self.reach, self.reach + 1), self.weights):
-            taken = (
-                values[..., kept[0] + shift : kept[-1] + shift + 1 : stride]
-                if inside
-                else values[..., np.clip(kept + shift, 0, n - 1)]
-            )
-            out += weight * taken
-        return out
+        n, stride = values.shape[-1], rows.step or 1
+        kept = range(*rows.indices(n))
+        if not len(kept):
+            return np.zeros(values.shape[:-1] + (0,))
+        first, last = kept[0] - self.reach, kept[-1] + self.reach
+        seen = values[..., max(first, 0) : last + 1]
+        if first < 0 or last >= n:
+            beyond = [(0, 0)] * (values.ndim - 1) + [(max(-first, 0), max(last - n + 1, 0))]
+            seen = np.pad(seen, beyond, mode="edge")
+        windows = np.lib.stride_tricks.sliding_window_view(seen, len(self.weights), axis=-1)
+        return np.einsum("...nt,t->...n", windows[..., ::stride, :], self.weights)
 
     def __call__(self, values, axis: int = -1) -> np.ndarray:
         """The filtered values, same shape."""
