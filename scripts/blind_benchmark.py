@@ -483,7 +483,8 @@ def score(record: dict) -> list[dict]:
         rms, row = record["rms"], {"key": record["key"], "robot": record["robot"], "kind": record["kind"], "effect": effect, "joint": joint, "size": entry["size"]}
         base = rms["without"][k] if "without" in rms else rms.get("before")
         if "true" in rms and base is not None:
-            lowered = {j: 1.0 - rms["true"][j] / base[j] for j in base}
+            # a joint that stands still on the test logs, or is braked, has no error there
+            lowered = {j: 1.0 - rms["true"][j] / base[j] if base[j] > 0.0 else 0.0 for j in base}
             joint = max(lowered, key=lowered.get) if joint == "*" else joint
             # what no model predicts on another log is not visible, whatever the log without it says
             row |= {"joint": joint, "lowered": lowered[joint], "visible": rms["true"][joint] <= (1.0 - VISIBLE) * base[joint] and effect not in ABSORBED}

@@ -88,6 +88,12 @@ def test_at_the_floor_it_is_complete():
     assert elbow(1.3, level=floor(std=0.11)).status == "complete"
 
 
+def test_an_error_that_no_row_has_measured_is_not_at_the_floor():
+    """A joint that rests, or is braked, on all test logs."""
+    found = elbow(0.0, train=0.9)
+    assert found.status == "unresolved" and "none of its rows on the test logs counts" in found.says
+
+
 def test_an_effect_on_it_is_missing():
     bias = claim("torque_bias", "elbow", [0.0, 0.8], fitted(1.1))
     found = elbow(2.0, [bias])

@@ -70,7 +70,8 @@ def verdicts(
             floor is not None
             and max(then, last.rms("train")[joint]) <= (1.0 + _FLOOR) * floor + 2.0 * floors[j].std
         )
-        reached = reached and not _above(remains, then, floor)
+        # an error of zero is one that no row has measured
+        reached = reached and first > 0.0 and not _above(remains, then, floor)
         at_floor = floor is not None and first <= (1.0 + _FLOOR) * floor + 2.0 * floors[j].std
         taken = sum(c.step.shares[j] for c in own)
         if own and (remains is None or remains.share * max(1.0 - taken, 0.0) <= _MOST * taken):
@@ -106,7 +107,9 @@ def _above(remains: Unknown | None, error: float, floor: float) -> bool:
 
 def _why(fit: Fit, j: int, floor, error: float, last: Fit, refused) -> str:
     joint, train = fit.joints[j], last.rms("train")[fit.joints[j]]
-    if floor.rms is None:
+    if not error > 0.0:
+        said = "none of its rows on the test logs counts: it stands still there, or is disturbed"
+    elif floor.rms is None:
         said = (
             f"its noise floor is not known ({floor.detail}), so nobody can say what error is left "
             "above it"
