@@ -9,7 +9,16 @@ Which rows stand together (`numbering`), how sure a sum or an estimate is (`devi
 the parameters of a fit are together (`parameters`), and which model loses least (`rivals`).
 """
 
-from .deviations import even, jackknife, resting, signs, slope_chance, standard_error, z_score
+from .deviations import (
+    even,
+    jackknife,
+    resting,
+    shared,
+    signs,
+    slope_chance,
+    standard_error,
+    z_score,
+)
 from .numbering import FEWEST, MOST, SHORTEST, divided, folds, memory, numbered, summed
 from .parameters import covariance
 from .rivals import SAME, chances, confidence_set
@@ -29,6 +38,7 @@ __all__ = [
     "memory",
     "numbered",
     "resting",
+    "shared",
     "signs",
     "slope_chance",
     "standard_error",

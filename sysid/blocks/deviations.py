@@ -89,3 +89,15 @@ def even(share: np.ndarray, parts: float) -> float:
     k = int(np.argmin(fits))  # the first that is too much: between its neighbour below and it
     rest = parts - count[k]
     return float(below[k] / rest) if rest > 0 else float(ascending[k])
+
+
+def shared(squares: np.ndarray, most: float) -> np.ndarray:
+    """(k, l) the directions of squares (blocks, k, k) that sum to one, without those of which one
+    block holds more than `most`."""
+    turn = np.eye(squares.shape[1])
+    while turn.shape[1]:
+        values, vectors = np.linalg.eigh(turn.T @ squares @ turn)
+        if values.max() <= most:
+            break
+        turn = turn @ vectors[int(np.argmax(values[:, -1]))][:, :-1]
+    return turn

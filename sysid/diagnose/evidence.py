@@ -68,37 +68,39 @@ class Group:
     def testable(self) -> bool:
         """Whether it rests on enough blocks to be told from chance; if not, it may still be a rival
         of one that is."""
-        return (
-            blocks.resting(self.squares) >= _FEWEST
-            and float(np.linalg.eigvalsh(self.squares).max()) <= _LEVERAGE
-        )
+        most = float(np.linalg.eigvalsh(self.squares).max())
+        return blocks.resting(self.squares) >= _FEWEST and most <= _LEVERAGE
 
     @cached_property
     def tested(self) -> Group:
-        """The group by which it is told whether it is there: of an effect that comes in blows, a
-        few of which outweigh all others, one in which no block counts more than the rest allows.
-
-        Weights that look at columns alone leave scores of noise without a sign. What it takes, and
-        its coefficients, are the group's own.
-        """
-        if not self.candidate.blows:
-            return self
-        share = np.einsum("bkk->b", self.squares)
+        """The group by which it is told whether it is there: without directions of which one block
+        holds nearly all; of what rests on few blocks or comes in blows, with no block that counts
+        more than the rest allows. Choices that look at columns alone leave scores of noise without
+        a sign. What it takes, and its coefficients, are the group's own."""
+        turn = blocks.shared(self.squares, _LEVERAGE)
+        group = self if turn.shape[1] in (0, len(turn)) else self._turned(turn)
+        share = np.einsum("bkk->b", group.squares)
         weight = np.minimum(1.0, blocks.even(share, 2.0 * _FEWEST) / np.maximum(share, 1e-300))
-        if weight.min() == 1.0:
-            return self
-        squares = self.squares * weight[:, None, None]
+        if weight.min() == 1.0 or (group.testable and not self.candidate.blows):
+            return group
+        squares = group.squares * weight[:, None, None]
         values, vectors = np.linalg.eigh(squares.sum(0))
-        turn = vectors / np.sqrt(np.maximum(values, 1e-300))
-        sizes = self.sizes * float(np.sqrt(values.min()))
-        scores = weight[:, None] * self.scores @ turn
+        if values.min() < 1e-6:
+            return self
+        even = replace(group, scores=weight[:, None] * group.scores, squares=squares)
+        return even._turned(vectors / np.sqrt(values))
+
+    def _turned(self, turn: np.ndarray) -> Group:
+        """The group in directions (k, l) of its own."""
+        own = np.linalg.pinv(self.back)  # (k, k0) what its own columns are in its directions
+        left, whole = (np.linalg.norm(a, axis=0) for a in (np.linalg.pinv(turn) @ own, own))
         return replace(
             self,
-            scores=scores,
-            squares=turn.T @ squares @ turn,
+            scores=self.scores @ turn,
+            squares=turn.T @ self.squares @ turn,
             kept=self.kept @ turn,
             back=self.back @ turn,
-            sizes=sizes,
+            sizes=self.sizes * left / np.maximum(whole, 1e-300),
         )
 
     @property
