@@ -63,7 +63,7 @@ def chosen(view: View, groups: list[Group], rng: np.random.Generator) -> Choice 
     group = members[int(np.argmin(table.sum(0)))].group
     if view is not first:  # with these weights
         group = (groups_at(view, [(group.candidate, group.shapes)]) or [group])[0]
-    priced = table + _price(members, group)
+    priced = table + _price(view, members, group)
     kept = _least(members, priced.sum(0))
     members, table, priced = [members[k] for k in kept], table[:, kept], priced[:, kept]
     p = blocks.confidence_set(table, rng)
@@ -101,21 +101,19 @@ def _even(view: View, members: list[Member]) -> tuple[View, list[Member]]:
     return view, [Member(group, found, losses(found, view.blocks)) for group, found in even]
 
 
-def _price(members: list[Member], group: Group) -> np.ndarray:
+def _price(view: View, members: list[Member], group: Group) -> np.ndarray:
     """(members,) what each member's numbers cost it in every block.
 
     Blocks held apart ask who predicts best, and what holds the truth and more predicts about as
     well as the truth. Who is the truth is another question: a number then costs the logarithm of
-    the count of blocks times the variance of one direction (that of the best one's `group`), of
-    which holding apart has charged two.
+    the count of values (those that a band holds: two a cycle of its cutoff) times the variance of
+    one direction (that of the best one's `group`), of which holding apart has charged two.
 
     Source: Schwarz 1978; Akaike 1973 for the two.
     """
-    count = len(group.scores)
-    one = np.sum(group.moves**2) / len(group.c)
-    return (
-        np.array([m.group.numbers for m in members]) * one * max(np.log(count) - 2.0, 0.0) / count
-    )
+    values = 2.0 * view.cutoff * view.step * float(np.mean(view.rows.use.sum(0)))
+    one = np.sum(group.moves**2) / len(group.c) / len(group.scores)
+    return np.array([m.group.numbers for m in members]) * one * max(np.log(values) - 2.0, 0.0)
 
 
 def _least(members: list[Member], lost: np.ndarray) -> list[int]:
