@@ -58,7 +58,10 @@ def elbow(first: float, claims=(), *, rest=NOISE, level=None, refused=(), train=
 
 @pytest.mark.parametrize(
     ("fall", "size", "all_", "stands"),
-    [(0.5, 0.001, 0.0, True), (0.001, 0.5, 0.005, True), (0.001, 0.001, 0.0, False), (-0.001, 0.5, 0.0, False), (0.5, 0.5, 0.02, False)],
+    [
+        (0.5, 0.001, 0.0, True), (0.001, 0.5, 0.005, True), (0.001, 0.001, 0.0, False), (-0.001, 0.5, 0.0, False),
+        (1e-5, 0.5, 0.0, False), (0.5, 0.5, 0.02, False),
+    ],
 )  # fmt: skip
 def test_what_is_nothing_in_size_and_error_is_not_claimed(monkeypatch, fall, size, all_, stands):
     """Errors are told to 0.01, the size to 0.1; one that is not determined says nothing. Nor what the other joints pay for."""

@@ -19,6 +19,7 @@ from .refits import Member
 from .steps import Step
 from .ties import Choice
 
+_NOTHING = 5e-4  # of an error: a fall that four digits do not show
 _FITTED, _LIKELY = 3, 0.1  # members of a set that are fitted, and how likely; the rest is named
 
 
@@ -94,13 +95,13 @@ def _nothing(before: Fit, after: Fit, member: Member) -> str | None:
         return "the fit's own error does not fall with it"
     whole = comparison.together(before, after)
     if where(member, before) == "*":
-        change, rise = whole, f"{100 * whole.delta_rms:+.2g} % over all joints"
+        change, unit, rise = whole, 1.0, f"{100 * whole.delta_rms:+.2g} % over all joints"
     else:
         (change,) = (d for d in comparison.compare(before, after) if d.joint == own[0])
-        rise = f"{change.delta_rms:+.3g}"
+        unit, rise = before.rms("test")[own[0]], f"{change.delta_rms:+.3g}"
         if -change.delta_rms < change.se and nought(parameters(after, member)):
             return "its size is nothing beside its deviation, and the test error stays the same"
-    if change.delta_rms >= 0.0:
+    if change.delta_rms > -_NOTHING * unit:
         return f"with it the error on the test logs does not fall ({rise})"
     if whole.delta_rms > whole.se:
         return f"with it the other joints' test error rises ({100 * whole.delta_rms:+.2g} %)"

@@ -103,9 +103,8 @@ def parameters(after: Fit, member: Member) -> dict[str, tuple[float, float, str]
 
 def nought(numbers: dict[str, tuple[float, float, str]]) -> bool:
     """Whether all of an effect's parameters that are determined are nothing beside their standard
-    deviations."""
-    known = [abs(at) <= _CLEAR * std for at, std, _ in numbers.values() if np.isfinite(std)]
-    return bool(known) and all(known)
+    deviations, or none is determined."""
+    return all(abs(at) <= _CLEAR * std for at, std, _ in numbers.values() if np.isfinite(std))
 
 
 def hidden_by_weights(found: Finding, fit: Fit) -> str | None:
