@@ -89,6 +89,7 @@ class Model:
     reference: np.ndarray | None = None
     scales: Scales | None = None
     _links: dict = field(default_factory=dict, repr=False, compare=False)  # what no shape value changes
+    _rigid: dict = field(default_factory=dict, repr=False, compare=False)  # the bodies' columns, which no torque effect changes
 
     @property
     def bodies(self) -> int:
@@ -252,17 +253,18 @@ class Model:
                     part = effect.moved(part, joint, **known, **self._of(term, joint))
         return part
 
-    def columns(self, piece: Piece, rows: slice, remembered: dict | None = None) -> list[np.ndarray]:
+    def columns(self, piece: Piece, rows: slice, remembered: dict | None = None, *, keep: bool = False) -> list[np.ndarray]:
         """For each joint the columns (support, n) of the rows `rows` of a piece, filtered where its torque is.
 
         Args:
             remembered: `remembered(piece)`, where it is at hand.
+            keep: the bodies' columns for whoever asks again for these rows, of this model or of one that grew from it.
         """
         wide, inner = self._widened(piece, rows)
         if remembered is None:
             remembered = self.remembered(piece)
         part = self._seen(piece, wide, remembered)
-        inertial = regressor.columns(self.robot, part.q, part.qd, part.qdd, gravity=part.gravity, deflection=part.deflection)
+        rigid = self._bodies_of(piece, rows, part, inner, keep)
         by_joint: list[list[np.ndarray]] = [[] for _ in self.robot.joints]
         for term, (effect, joints) in enumerate(self.terms):
             for joint in joints:
@@ -275,10 +277,25 @@ class Model:
                         own.append(values)
         out = []
         for joint, effects in enumerate(by_joint):
+            own = [self._settled(piece, inner, self.sensed(np.concatenate(effects), piece.step, joint))] if effects else []
+            out.append(np.concatenate([rigid[joint], *own]))
+        return out
+
+    def _bodies_of(self, piece: Piece, rows: slice, part: Piece, inner: slice, keep: bool) -> list[np.ndarray]:
+        """The bodies' columns (support, n) in each joint's torque at rows of a piece, seen as `part`, filtered."""
+        # with what they were made of, so that nothing else comes to its place
+        key = (id(piece.q), id(piece.smoother), rows.start, rows.stop, rows.step)
+        moved = any(isinstance(effect, (MotionEffect, SensorEffect)) for effect, _ in self.terms)
+        if not moved and key in self._rigid:
+            return self._rigid[key][2]
+        inertial = regressor.columns(self.robot, part.q, part.qd, part.qdd, gravity=part.gravity, deflection=part.deflection)
+        out = []
+        for joint in range(self.robot.dof):
             bodies = self.support(joint)
-            bodies = bodies[bodies < inertial.shape[1]]
-            stacked = np.concatenate([inertial[joint, bodies], *effects]) if effects else inertial[joint, bodies]
-            out.append(self._settled(piece, inner, self.sensed(stacked, piece.step, joint)))
+            own = inertial[joint, bodies[bodies < inertial.shape[1]]]
+            out.append(self._settled(piece, inner, self.sensed(own, piece.step, joint)))
+        if keep and not moved:
+            self._rigid[key] = (piece.q, piece.smoother, out)
         return out
 
     def torque(self, piece: Piece, pi, c, stride: int = 1) -> np.ndarray:

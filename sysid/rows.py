@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from . import regressor
+from .effect import TorqueEffect
 from .model import Model, chunks
 from .preprocess import Motion, Piece
 from .two_masses import link_side
@@ -69,7 +70,7 @@ def stack(model: Model, motion: Motion, stride: int) -> Rows:
         remembered = model.remembered(piece)
         # a stretch holds a whole number of strides, so that the kept rows go on where the last stretch ended
         for rows in chunks(piece, stride * max(1, _STRETCH // stride)):
-            parts = model.columns(piece, slice(rows.start, rows.stop, stride), remembered)
+            parts = model.columns(piece, slice(rows.start, rows.stop, stride), remembered, keep=True)
             size = parts[0].shape[-1]
             for joint, (values, support) in enumerate(zip(parts, supports)):
                 columns[joint, at : at + size, support] = values
@@ -103,12 +104,21 @@ def tangents(model: Model, motion: Motion, x, stride: int, use: np.ndarray, midd
     out = np.zeros((model.robot.dof, len(use), len(values)))
     if not values:
         return out
-    if middle is None:
-        middle = predicted(model, motion, x, stride)
+    pieces = None
     for k, value in enumerate(values):
         if value.held:
             continue
-        step = difference_step(value, model.shapes[k])
+        step, effect = difference_step(value, model.shapes[k]), model.terms[value.term][0]
+        if isinstance(effect, TorqueEffect):  # all else stays
+            pieces = seen(model, motion) if pieces is None else pieces
+            at = {v.shape.name: s for v, s in zip(values, model.shapes) if (v.term, v.joint) == (value.term, value.joint)}
+            tried = [at, {**at, value.shape.name: model.shapes[k] + step}]
+            here, there = signatures(model, motion, pieces, effect, value.joint, tried, stride, use)
+            own = [i for i, c in enumerate(model.coefficients) if (c.effect, c.joint) == (effect.name, value.joint)]
+            out[value.joint, :, k] = (there - here) @ np.asarray(x)[10 * model.bodies :][own] / step
+            continue
+        if middle is None:
+            middle = predicted(model, motion, x, stride)
         moved = model.with_shapes([s + step * (i == k) for i, s in enumerate(model.shapes)])
         out[:, :, k] = ((predicted(moved, motion, x, stride) - middle) / step * use).T
     return out
