@@ -98,7 +98,7 @@ def _nothing(before: Fit, after: Fit, member: Member) -> str | None:
         change, unit, rise = whole, 1.0, f"{100 * whole.delta_rms:+.2g} % over all joints"
     else:
         (change,) = (d for d in comparison.compare(before, after) if d.joint == own[0])
-        unit, rise = before.rms("test")[own[0]], f"{change.delta_rms:+.3g}"
+        unit, rise = before.rms("test")[own[0]], f"{max(change.delta_rms, 0.0):+.3g}"
         if -change.delta_rms < change.se and nought(parameters(after, member)):
             return "its size is nothing beside its deviation, and the test error stays the same"
     if change.delta_rms > -_NOTHING * unit:
