@@ -505,7 +505,7 @@ def score(record: dict) -> list[dict]:
             "within": rms["after"][joint] <= (1.0 + WITHIN) * rms["true"][joint],
         }  # fmt: skip
         if "plain" in rms:
-            row["hurts"] = 1.0 - rms["plain"][joint] / rms["before"][joint]
+            row["hurts"] = 1.0 - rms["plain"][joint] / rms["before"][joint] if rms["before"][joint] > 0.0 else 0.0
         if record["kind"] == "outside":
             misfit = rms["before"][joint] ** 2 - rms["true"][joint] ** 2
             removed = (rms["before"][joint] ** 2 - rms["after"][joint] ** 2) / misfit if misfit > 0 else None
@@ -711,6 +711,7 @@ def _draw_errors(plt, rows: list[dict], records: list[dict]):
             elif axis is left:
                 axis.scatter([r["true"] / r["scale"] for r in _scaled(own, noise)], [r["after"] / r["scale"] for r in _scaled(own, noise)], s=12, color=colour, alpha=0.8, label=f"{says} ({len(own)})")
             else:
+                own = [r for r in own if r["true"] > 0.0]
                 axis.scatter([r["lowered"] for r in own], [r["after"] / r["true"] for r in own], s=12, color=colour, alpha=0.8)
     left.scatter([], [], marker="x", color=_GREY, label="before")
     left.scatter([], [], color=_GREY, label="after discover")
@@ -880,7 +881,7 @@ def page(found: dict, records: list[dict], settings: dict, notes: str = "") -> s
         f"Each can be looked at again: `python scripts/blind_benchmark.py --seed {settings['seed']}{mark} --only KEY --verbose`.",
         "### Visible effects not named",
         _table(["case", "hidden", "on", "size", "RMS taken away by the true model", "outcome", "named", "RMS after / true"], [
-            [f"`{r['key']}`", r["effect"], r["joint"], f"{r['size']:.2f}", _lowered(r), r["category"], r["named"], f"{r['after'] / r['true']:.2f}" if "after" in r else "–"] for r in misnamed
+            [f"`{r['key']}`", r["effect"], r["joint"], f"{r['size']:.2f}", _lowered(r), r["category"], r["named"], f"{r['after'] / r['true']:.2f}" if r.get("true") else "–"] for r in misnamed
         ]) if misnamed else "None.",
         "### Named, and yet farther than 5 % from the true model",
         _table(["case", "hidden", "on", "size", "RMS taken away by the true model", "RMS after / true"], [[f"`{r['key']}`", r["effect"], r["joint"], f"{r['size']:.2f}", _lowered(r), f"{r['after'] / r['true']:.2f}"] for r in far]) if far else "None.",
