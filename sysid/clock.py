@@ -57,7 +57,8 @@ def corrected(t: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, float]:
     to_end = np.minimum(t - t[0], t[-1] - t)
     late = np.zeros(len(t))
     for _ in range(_ROUNDS):
-        told = [_late(t, q, late, band, step) for band in bands]
+        even = _evenly(t + late, q)
+        told = [_late(t, q, late, even, band) for band in bands]
         late = told[-1]
         # beside the ends, what a low-pass that forgets sooner tells
         for lower, band in zip(bands[::-1], told[-2::-1]):
@@ -67,13 +68,13 @@ def corrected(t: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, float]:
     return t + late, float(np.sqrt(np.mean(late**2)))
 
 
-def _late(t, q, late, band: float, step: float) -> np.ndarray:
+def _late(t, q, late, even, band: float) -> np.ndarray:
     """How late (n,) [s] samples were, of a motion that stays below a frequency.
 
     Args:
-        late: (n,) as far as it is known.
+        late: (n,) as far as it is known. even: `_evenly` of the samples with that.
     """
-    beside, speed = _beside(t + late, q, band, step)
+    beside, speed = _beside(t + late, q, even, band)
     beside = beside + speed * late[:, None]
     noise, off = _components(beside, speed)
     if not off > 0.0:
@@ -88,9 +89,9 @@ def _bands(t, q, step: float) -> list[float]:
     """Frequencies [Hz], falling, above which a log holds no motion: what the clock makes of the
     angles is as dense above each as above the highest, and all else is less by far."""
     frequency, first, found = _HIGHEST / step, None, []
-    most = _LITTLE + _SCATTER / len(t)
+    most, even = _LITTLE + _SCATTER / len(t), _evenly(t, q)
     while frequency > _LOWEST:
-        beside, speed = _beside(t, q, frequency, step)
+        beside, speed = _beside(t, q, even, frequency)
         noise, off = _components(beside, speed)
         density = off / _kept(frequency * step)
         # what all joints together leave of the clock's power in doubt
@@ -110,14 +111,26 @@ def _kept(frequency: float) -> float:
     return float(np.sum((pulse - low(pulse, frequency, 1.0)) ** 2))
 
 
-def _beside(t, q, frequency: float, step: float) -> tuple[np.ndarray, np.ndarray]:
-    """By how much angles (n, dof) at times t (n,) stand beside their motion below a frequency, and
-    its speed."""
+def _evenly(t, q) -> tuple[np.ndarray, np.ndarray]:
+    """As many evenly spaced times (n,), and the angles (n, dof) there."""
     from scipy.interpolate import make_interp_spline
 
     clock = np.linspace(t[0], t[-1], max(len(t), 2))
-    even = make_interp_spline(t, q, k=3, axis=0)(clock)
-    smooth = make_interp_spline(clock, low(even, frequency, clock[1] - clock[0]), k=3, axis=0)
+    return clock, make_interp_spline(t, q, k=3, axis=0)(clock)
+
+
+def _beside(t, q, even, frequency: float) -> tuple[np.ndarray, np.ndarray]:
+    """By how much angles (n, dof) at times t (n,) stand beside their motion below a frequency, and
+    its speed.
+
+    Args:
+        even: `_evenly` of them.
+    """
+    from scipy.interpolate import make_interp_spline
+
+    clock, angles = even
+    below = low(angles, frequency, clock[1] - clock[0])
+    smooth = make_interp_spline(clock, below, k=3, axis=0)
     return q - smooth(t), smooth(t, 1)
 
 

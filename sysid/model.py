@@ -198,7 +198,8 @@ class Model:
         first = 10 * self.bodies
         return np.array(bodies + [first + k for k, c in enumerate(self.coefficients) if c.joint in (joint, ROBOT)], dtype=int)
 
-    def _of(self, term: int, joint: int) -> dict[str, float]:
+    def shapes_of(self, term: int, joint: int) -> dict[str, float]:
+        """{name: value} of the shape values of an effect on a joint."""
         return {v.shape.name: value for v, value in zip(self.shape_values, self.shapes) if (v.term, v.joint) == (term, joint)}
 
     def _reach(self, piece: Piece) -> int:
@@ -212,14 +213,14 @@ class Model:
             return {}
         whole = piece.part(slice(0, len(piece.t)))
         out = {
-            (term, joint): effect.apart(*self._link_side(piece, joint), whole, **self._of(term, joint))
+            (term, joint): effect.apart(*self._link_side(piece, joint), whole, **self.shapes_of(term, joint))
             for term, (effect, joints) in enumerate(self.terms)
             if isinstance(effect, Deflection)
             for joint in joints
         }
         columns = [term for term, (effect, _) in enumerate(self.terms) if effect.memory and not isinstance(effect, Deflection)]
         part = self.seen(piece, out) if columns else None
-        return out | {(term, joint): self.terms[term][0].columns(part, joint, **self._of(term, joint)) for term in columns for joint in self.terms[term][1]}
+        return out | {(term, joint): self.terms[term][0].columns(part, joint, **self.shapes_of(term, joint)) for term in columns for joint in self.terms[term][1]}
 
     def _link_side(self, piece: Piece, joint: int) -> tuple[np.ndarray, np.ndarray]:
         """Load and inertia of a joint's link over a whole piece."""
@@ -250,7 +251,7 @@ class Model:
             if isinstance(effect, MotionEffect):
                 for joint in joints:
                     known = {"behind": remembered[term, joint][:, rows]} if isinstance(effect, Deflection) else {}
-                    part = effect.moved(part, joint, **known, **self._of(term, joint))
+                    part = effect.moved(part, joint, **known, **self.shapes_of(term, joint))
         return part
 
     def columns(self, piece: Piece, rows: slice, remembered: dict | None = None, *, keep: bool = False) -> list[np.ndarray]:
@@ -271,9 +272,9 @@ class Model:
                 if isinstance(effect, TorqueEffect) and effect.memory:
                     by_joint[joint].append(remembered[term, joint][:, wide])
                 elif isinstance(effect, TorqueEffect):
-                    by_joint[joint].append(effect.columns(part, joint, **self._of(term, joint)))
+                    by_joint[joint].append(effect.columns(part, joint, **self.shapes_of(term, joint)))
                 elif isinstance(effect, WrenchEffect):
-                    for own, values in zip(by_joint, effect.columns(part, self.robot, **self._of(term, joint))):
+                    for own, values in zip(by_joint, effect.columns(part, self.robot, **self.shapes_of(term, joint))):
                         own.append(values)
         out = []
         for joint, effects in enumerate(by_joint):
@@ -318,9 +319,9 @@ class Model:
                     if isinstance(effect, TorqueEffect) and effect.memory:
                         predicted[joint] += own @ remembered[term, joint][:, wide]
                     elif isinstance(effect, TorqueEffect):
-                        predicted[joint] += own @ effect.columns(part, joint, **self._of(term, joint))
+                        predicted[joint] += own @ effect.columns(part, joint, **self.shapes_of(term, joint))
                     elif isinstance(effect, WrenchEffect):
-                        predicted += np.einsum("k,jkn->jn", own, effect.columns(part, self.robot, **self._of(term, joint)))
+                        predicted += np.einsum("k,jkn->jn", own, effect.columns(part, self.robot, **self.shapes_of(term, joint)))
                     k += size
             for joint in range(self.robot.dof):
                 predicted[joint] = self.sensed(predicted[None, joint], piece.step, joint)[0]
@@ -333,7 +334,7 @@ class Model:
         """What the sensor of a joint makes of torque (k, n), sampled every `step` seconds."""
         for term, (effect, joints) in enumerate(self.terms):
             if isinstance(effect, SensorEffect) and joint in joints:
-                values = effect.sensed(values, step, **self._of(term, joint))
+                values = effect.sensed(values, step, **self.shapes_of(term, joint))
         return values
 
     @staticmethod

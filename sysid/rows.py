@@ -111,7 +111,7 @@ def tangents(model: Model, motion: Motion, x, stride: int, use: np.ndarray, midd
         step, effect = difference_step(value, model.shapes[k]), model.terms[value.term][0]
         if isinstance(effect, TorqueEffect):  # all else stays
             pieces = seen(model, motion) if pieces is None else pieces
-            at = {v.shape.name: s for v, s in zip(values, model.shapes) if (v.term, v.joint) == (value.term, value.joint)}
+            at = model.shapes_of(value.term, value.joint)
             tried = [at, {**at, value.shape.name: model.shapes[k] + step}]
             here, there = signatures(model, motion, pieces, effect, value.joint, tried, stride, use)
             own = [i for i, c in enumerate(model.coefficients) if (c.effect, c.joint) == (effect.name, value.joint)]

@@ -123,7 +123,7 @@ def _from_grid(found: Settled, motion: Motion, k: int, weights) -> Model | None:
     hessian = prior_hessian(found)[np.ix_(rest, rest)]
     projection = Projection(others_alone, _without(others_alone, rows.tau, hessian, scale), hessian, scale)
     pieces = row.seen(model, motion)
-    others = {v.shape.name: s for v, s in zip(model.shape_values, model.shapes) if (v.term, v.joint) == (value.term, value.joint)}
+    others = model.shapes_of(value.term, value.joint)
     positive = np.array([linear.lower == 0 for linear in effect.coefficients()])
     gains = []
     angle = None if model.scales is None or value.joint < 0 else float(model.scales.angle[value.joint])

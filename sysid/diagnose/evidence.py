@@ -64,7 +64,7 @@ class Group:
         directions = np.trace(spread) ** 2 / max(np.sum(spread**2), 1e-300)
         return float(directions), blocks.resting(self.squares)
 
-    @property
+    @cached_property
     def testable(self) -> bool:
         """Whether it rests on enough blocks to be told from chance; if not, it may still be a rival
         of one that is."""
@@ -77,6 +77,8 @@ class Group:
         holds nearly all; of what rests on few blocks or comes in blows, with no block that counts
         more than the rest allows. Choices that look at columns alone leave scores of noise without
         a sign. What it takes, and its coefficients, are the group's own."""
+        if self.testable and not self.candidate.blows:
+            return self
         turn = blocks.shared(self.squares, _LEVERAGE)
         group = self if turn.shape[1] in (0, len(turn)) else self._turned(turn)
         share = np.einsum("bkk->b", group.squares)

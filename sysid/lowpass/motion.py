@@ -151,7 +151,7 @@ def _piece(number: int, source: str, segment, cutoff: float) -> Piece | None:
     smooth = angles(segment.q, axis=0)
     qd, qdd = differences(smooth, segment.step)
     # what these take of fast motion, and torque kept, would look like a joint that gives
-    tau = both(angles(_as_seen(segment.tau), axis=0), axis=0)
+    tau = both.at(angles(_as_seen(segment.tau), axis=0).T, rows).T
     return Piece(
         log=number,
         step=every * segment.step,
@@ -159,7 +159,7 @@ def _piece(number: int, source: str, segment, cutoff: float) -> Piece | None:
         q=smooth[rows],
         qd=qd[rows],
         qdd=qdd[rows],
-        tau=tau[rows],
+        tau=tau,
         measured=segment.tau[rows],
         signals={name: values[rows] for name, values in segment.signals.items()},
         use=None,
