@@ -82,11 +82,34 @@ def left_out_refits(p, view, own, joints, group, number_of):
 
 
 @pytest.mark.parametrize("joints", [(0, 1), (0,)])
-def test_moves_are_refits_without_a_block(joints):
+def test_moves_are_refits_without_a_block_of_noise_as_loud_as_it_was(joints):
+    """Refits of the candidate without a block, whose rows are first rid of what the model's own fit took of their noise."""
     p, view, own, group = made(4, joints=joints)
-    refits = left_out_refits(p, view, own, joints, group, np.arange(20))
-    for move, (c, *_) in zip(group.moves, refits, strict=True):
-        np.testing.assert_allclose(group.c - move, c, atol=1e-9)
+    q, number = directions(p, view, own, joints, group.back)
+    m, y = stacked(p, own, joints)
+    base = m[:, :-2]
+    left = y - base @ view.x - q @ group.c
+    for b, move in enumerate(group.moves):
+        rows = number == b
+        taken = base[rows] @ np.linalg.inv(base.T @ base) @ base[rows].T
+        values, vectors = np.linalg.eigh(np.eye(len(taken)) - taken)
+        loud = (vectors / np.sqrt(values)) @ vectors.T @ left[rows]
+        expected = np.linalg.solve(np.eye(2) - q[rows].T @ q[rows], q[rows].T @ loud)
+        np.testing.assert_allclose(move, expected, rtol=1e-6, atol=1e-9)
+
+
+def test_moves_add_up_to_the_variance_of_the_coefficients():
+    """White noise alone: the mean of their squares is one, however much of the noise the model's own columns take."""
+    p = posed(np.random.default_rng(8), prior=0.0)
+    own, told = np.random.default_rng(9).normal(size=(2, 240, 1)), []
+    for seed in range(400):
+        p.tau = np.random.default_rng(seed).normal(size=p.tau.shape) / p.weights
+        (group,) = grouped(viewed(p), own[None])
+        told.append([group.c @ group.c, np.sum(group.moves**2)])
+    size, moves = np.mean(told, axis=0)
+    assert size == pytest.approx(1.0, abs=0.25)
+    # a block held apart from the candidate's own direction is a little louder than it was
+    assert moves == pytest.approx(1.0, abs=0.1)
 
 
 def test_gain_is_what_refits_take_of_the_fold_they_did_not_see():

@@ -14,7 +14,8 @@ from tests.evidences import posed, stacked, viewed
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_losses_are_what_refits_leave_of_the_fold_they_did_not_see(seed):
+def test_losses_are_the_predictive_densitys_of_the_fold_that_refits_did_not_see(seed):
+    """Quadratic forms, with the covariance of what refits without the fold predict of it."""
     p = posed(np.random.default_rng(seed))
     found = losses(viewed(p), p.number)
     fold, none = blocks.folds(20), np.zeros((*p.a.shape[:2], 0))
@@ -23,8 +24,13 @@ def test_losses_are_what_refits_leave_of_the_fold_they_did_not_see(seed):
         m, y = stacked(p, none, keep=fold[p.number] != f)
         x = np.linalg.lstsq(m, y, rcond=None)[0]
         left = (p.tau - np.einsum("jnk,k->nj", p.a, x)) * p.weights
+        own = fold[p.number] == f
+        a = np.concatenate(p.a[:, own] * p.weights[:, None, None])
+        covariance = np.eye(len(a)) + a @ np.linalg.inv(m.T @ m) @ a.T
+        e = np.concatenate(left[own].T)
+        told = (e * np.linalg.solve(covariance, e)).reshape(2, -1).T
         for b in np.flatnonzero(fold == f):
-            np.testing.assert_allclose(found[b], np.sum(left[p.number == b] ** 2, axis=0), rtol=1e-7)
+            np.testing.assert_allclose(found[b], told[p.number[own] == b].sum(0), rtol=1e-7)
 
 
 def test_what_the_angles_noise_makes_is_taken_off_the_losses():

@@ -5,7 +5,8 @@ model and made orthonormal. Over blocks b:
 
     s_b = Q_b' r_b - (what the angles' noise makes of it),   G_b = Q_b' Q_b
     c = sum_b s_b + s_0                   its coefficients; s_0, the prior's, is never left out
-    m_b = (1 - G_b)^-1 (s_b - G_b c)      how far they move when a block is left out
+    a_b, A_b                              s_b, G_b of noise as loud as before the model's own fit
+    m_b = (1 - G_b)^-1 (a_b - A_b c)      how far they move when a block is left out
     T = c'c / sum_b |m_b|^2               is it there?
     c_f = (1 - G_f)^-1 (c - s_f)          its coefficients without a fold f
     gain = sum_f 2 c_f' s_f - c_f' G_f c_f   what does it take of what it was not fitted on?
@@ -34,13 +35,16 @@ _LEVERAGE = 0.9  # of a direction: what one block may hold of it
 @dataclass(frozen=True)
 class Group:
     """One candidate at shape values. scores (blocks, k), squares (blocks, k, k) of the orthonormal
-    columns, `kept` (k,) the prior's score; `back` (k0, k) turns coefficients of these into the
+    columns, `loud` and `loud_squares` the same of rows whose noise is as loud as before the model's
+    fit, `kept` (k,) the prior's score; `back` (k0, k) turns coefficients of these into the
     candidate's own; `sizes` (k0,) the weighted norm of what the model leaves of each own column."""
 
     candidate: Candidate
     shapes: dict[str, float]
     scores: np.ndarray
     squares: np.ndarray
+    loud: np.ndarray
+    loud_squares: np.ndarray
     kept: np.ndarray
     back: np.ndarray
     sizes: np.ndarray
@@ -53,7 +57,8 @@ class Group:
     @property
     def moves(self) -> np.ndarray:
         """(blocks, k) how far they move when a block is left out."""
-        return np.einsum("bkl,bl->bk", left_out(self.squares), self.scores - self.squares @ self.c)
+        own = self.loud - self.loud_squares @ self.c
+        return np.einsum("bkl,bl->bk", left_out(self.squares), own)
 
     @property
     def freedom(self) -> tuple[float, float]:
@@ -89,7 +94,9 @@ class Group:
         values, vectors = np.linalg.eigh(squares.sum(0))
         if values.min() < 1e-6:
             return self
-        even = replace(group, scores=weight[:, None] * group.scores, squares=squares)
+        w = weight[:, None]
+        told = {"scores": w * group.scores, "loud": w * group.loud, "squares": squares}
+        even = replace(group, **told, loud_squares=w[:, None] * group.loud_squares)
         return even._turned(vectors / np.sqrt(values))
 
     def _turned(self, turn: np.ndarray) -> Group:
@@ -100,6 +107,8 @@ class Group:
             self,
             scores=self.scores @ turn,
             squares=turn.T @ self.squares @ turn,
+            loud=self.loud @ turn,
+            loud_squares=turn.T @ self.loud_squares @ turn,
             kept=self.kept @ turn,
             back=self.back @ turn,
             sizes=self.sizes * left / np.maximum(whole, 1e-300),

@@ -18,11 +18,6 @@ import numpy as np
 from .. import blocks
 from .evidence import Group, left_out
 
-# Noise that was low-passed and had a model projected off it is so much louder than signs of its
-# blocks make it: what stands across two blocks, and what the model's own parameters took. Measured
-# with white and coloured noise through the same steps.
-_LOUDER = 1.03
-
 
 def statistics(groups: Sequence[Group]) -> np.ndarray:
     """(groups,) T of each, on the scale of a normal variable; NaN where it cannot be tested."""
@@ -46,7 +41,7 @@ def maxima(groups: Sequence[Group], rng: np.random.Generator, *, draws: int = 10
         by_size.setdefault(group.scores.shape[1], []).append(group)
     for own in by_size.values():
         out = np.maximum(out, _greatest(own, sign))
-    return _LOUDER * out
+    return out
 
 
 def _greatest(groups: list[Group], sign: np.ndarray) -> np.ndarray:

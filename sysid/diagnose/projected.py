@@ -73,28 +73,27 @@ def _made(
     absorbed = design.inverse @ total
     score = (score - (sums.scores - sums.rough_scores) @ absorbed).reshape(len(spans), count, k)
     prior = (sums.scores.sum(0) @ absorbed).reshape(count, k)
-    by = absorbed.reshape(size, count, k)
-    reduced = lambda own, cross, squares: _reduced(own, cross, squares, absorbed, by)  # noqa: E731
-    squares = np.stack([reduced(own[b], cross[b], sums.squares[b]) for b in range(len(spans))])
-    rough_square = reduced(rough_own, rough_cross, sums.rough_squares)
-    whole = own.sum(0) - np.einsum("psk,psl->skl", by, total.reshape(size, count, k))
+    # what stands across a candidate's columns and the model's, in each block and in the noise
+    pair = lambda a, b: np.einsum("...psk,...psl->...skl", a, b)  # noqa: E731
+    split = lambda a: a.reshape(*a.shape[:-1], count, k)  # noqa: E731
+    by, mixed = split(absorbed), split(cross - sums.squares @ absorbed)
+    squares = own - pair(split(cross), by) - pair(by, mixed)
+    # the model's own columns took a part of the noise: as loud as before they did
+    freed = split(sums.freed @ mixed.reshape(cross.shape))
+    more, scores = pair(mixed, freed), sums.scores - sums.rough_scores
+    loud = score + np.einsum("bp,bpsk->bsk", scores, freed, optimize=True)
+    noise = split(rough_cross - sums.rough_squares @ absorbed)
+    rough_square = rough_own - pair(split(rough_cross), by) - pair(by, noise)
+    whole = own.sum(0) - pair(by, split(total))
     out = []
     for s in range(count):
         found = _turned(own[:, s].sum(0), whole[s], squares[:, s], rough_square[s])
         if found is None:
             continue
         (candidate, shapes), (turn, turned, sizes) = asked[s], found
-        own_score, kept = score[:, s] @ turn, prior[s] @ turn
-        out.append(Group(candidate, dict(shapes), own_score, turned, kept, turn, sizes))
+        told = score[:, s] @ turn, turned, loud[:, s] @ turn, turned + turn.T @ more[:, s] @ turn
+        out.append(Group(candidate, dict(shapes), *told, prior[s] @ turn, turn, sizes))
     return out
-
-
-def _reduced(own, cross, squares, absorbed, by) -> np.ndarray:
-    """(shapes, k, k) squares of columns less what the model absorbs of them."""
-    size, count, k = by.shape
-    mixed = np.einsum("psk,psl->skl", by, cross.reshape(size, count, k))
-    inner = np.einsum("psk,psl->skl", by, (squares @ absorbed).reshape(size, count, k))
-    return own - mixed - np.swapaxes(mixed, -1, -2) + inner
 
 
 def _turned(plain, whole, squares, rough):

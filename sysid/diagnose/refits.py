@@ -1,8 +1,8 @@
 """Candidates refitted exactly: each joins the model and everything is settled again, its shape
 values and the load included.
 
-What each model leaves of blocks that it was not fitted on is one loss a block; what the angles'
-noise alone makes of that is taken off.
+What each model leaves of blocks that it was not fitted on, in units of how well it can tell them,
+is one loss a block; what the angles' noise alone makes of that is taken off.
 """
 
 from __future__ import annotations
@@ -46,23 +46,22 @@ class Member:
 
 
 def losses(view: View, number: np.ndarray) -> np.ndarray:
-    """(blocks, dof) weighted squares that a model leaves in each block `number` (n,), fitted on the
-    other folds, less what the angles' noise makes."""
+    """(blocks, dof) what a model leaves in each block `number` (n,), fitted on the other folds,
+    times what it leaves fitted on all, less what the angles' noise makes: the quadratic form of the
+    predictive density (Geisser & Eddy 1979), in which a fold that no other tells counts little.
+    """
     design, spans = view.design, by_block(number)
     fold = blocks.folds(len(spans))
     out = np.zeros((len(spans), len(view.weights)))
     for f in range(fold.max() + 1):
-        own = [span for b, span in enumerate(spans) if fold[b] == f]
-        rows = slice(own[0].start, own[-1].stop)
+        own = np.flatnonzero(fold == f)
+        rows = slice(spans[own[0]].start, spans[own[-1]].stop)
         a, r = design.columns[:, rows], design.residual[rows]
         pull = np.einsum("jnk,nj->k", a, r)
         squares = np.einsum("jnk,jnl->kl", a, a, optimize=True)
         change = np.linalg.lstsq(design.system - squares, pull, rcond=1e-10)[0]
-        left = r + np.einsum("jnk,k->nj", a, change)
-        for b, span in enumerate(spans):
-            if fold[b] == f:
-                part = slice(span.start - rows.start, span.stop - rows.start)
-                out[b] = np.sum(left[part] ** 2 - design.rough_residual[span] ** 2, axis=0)
+        told = (r + np.einsum("jnk,k->nj", a, change)) * r - design.rough_residual[rows] ** 2
+        out[own] = np.add.reduceat(told, [spans[b].start - rows.start for b in own])
     return out
 
 

@@ -107,13 +107,12 @@ def _price(view: View, members: list[Member], group: Group) -> np.ndarray:
     Blocks held apart ask who predicts best, and what holds the truth and more predicts about as
     well as the truth. Who is the truth is another question: a number then costs the logarithm of
     the count of values (those that a band holds: two a cycle of its cutoff) times the variance of
-    one direction (that of the best one's `group`), of which holding apart has charged two.
-
-    Source: Schwarz 1978; Akaike 1973 for the two.
+    one direction (that of the best one's `group`), of which holding apart has charged one (Schwarz
+    1978).
     """
     values = 2.0 * view.cutoff * view.step * float(np.mean(view.rows.use.sum(0)))
     one = np.sum(group.moves**2) / len(group.c) / len(group.scores)
-    return np.array([m.group.numbers for m in members]) * one * max(np.log(values) - 2.0, 0.0)
+    return np.array([m.group.numbers for m in members]) * one * max(np.log(values) - 1.0, 0.0)
 
 
 def _least(members: list[Member], lost: np.ndarray) -> list[int]:

@@ -13,6 +13,8 @@ from ..lowpass import calm
 from ..shape import Settled, inverted, prior_hessian
 from ..source import Source
 
+_FIRST = 1e-6  # share of a direction: less is none, and what is left of it rounding
+
 
 @dataclass(frozen=True)
 class Design:
@@ -33,13 +35,14 @@ class Design:
 @dataclass(frozen=True)
 class Sums:
     """Over blocks: squares (blocks, size, size) of the columns, scores (blocks, size) of columns
-    and residual, `rough_scores` of what the angles' noise adds to both; over all,
-    `rough_squares`."""
+    and residual, `rough_scores` of what the angles' noise adds to both; over all, `rough_squares`;
+    `freed` (blocks, size, size) as the function of this name tells."""
 
     squares: np.ndarray
     scores: np.ndarray
     rough_scores: np.ndarray
     rough_squares: np.ndarray
+    freed: np.ndarray
 
 
 def designed(found: Settled, weights, source: Source, rough: Source) -> Design:
@@ -95,13 +98,33 @@ def by_block(number: np.ndarray) -> list[slice]:
     return [slice(a, b) for a, b in zip(cuts, cuts[1:])]
 
 
+def freed(inverse: np.ndarray, squares: np.ndarray) -> np.ndarray:
+    """(blocks, size, size) R by which A_b R A_b' + 1 is (1 - H_b)^(-1/2) of each block's rows A_b,
+    where H_b = A_b `inverse` A_b' is what a fit takes of their noise: times it, what the fit left
+    of noise of one size has this size again, with no part that another direction holds.
+
+    Args:
+        squares: (blocks, size, size) A_b' A_b.
+
+    Source: Bell & McCaffrey 2002 (the second cluster-robust covariance).
+    """
+    values, vectors = np.linalg.eigh(inverse)
+    root = vectors * np.sqrt(np.clip(values, 0.0, None))
+    taken, turn = np.linalg.eigh(root.T @ squares @ root)
+    taken = np.clip(taken, _FIRST, 1.0 - _FIRST)[:, None]
+    turn = root @ turn
+    return (turn * ((1.0 - taken) ** -0.5 - 1.0) / taken) @ np.swapaxes(turn, 1, 2)
+
+
 def summed(design: Design, spans: list[slice]) -> Sums:
     """A design's sums over blocks."""
     more, columns = design.rough_columns, design.columns
     product = lambda a, r, s: sum(a[j][s].T @ r[s, j] for j in range(len(a)))  # noqa: E731
+    squares = np.stack([sum(a[s].T @ a[s] for a in columns) for s in spans])
     return Sums(
-        np.stack([sum(a[s].T @ a[s] for a in columns) for s in spans]),
+        squares,
         np.stack([product(columns, design.residual, s) for s in spans]),
         np.stack([product(more, design.rough_residual, s) for s in spans]),
         np.einsum("jnk,jnl->kl", more, more, optimize=True),
+        freed(design.inverse, squares),
     )
