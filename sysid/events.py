@@ -1,6 +1,6 @@
 """Log -> events: what disturbed it and is no motion of its robot.
 
-Found before any model is fitted, told, and left out.
+Found before the experiment's model is fitted, told, and left out.
 
 knock       several joints pulsed or rang at once, for tens of milliseconds: a hit, a bump
 spike       a sample or a few of one joint's torque stand alone
@@ -83,7 +83,12 @@ def find(segment: Segment, joints: Sequence[str], *, log: str = "") -> tuple[Eve
             tell("frozen", first, last, [j], "position")
     for first, last, members in knocks(segment.q, calm, segment.step, spiked=segment.tau):
         tell("knock", first, last, members, "both")
-    return tuple(sorted(found, key=lambda event: (event.start, event.stop, event.kind)))
+    return ordered(found)
+
+
+def ordered(events: Sequence[Event]) -> tuple[Event, ...]:
+    """Events in order of time."""
+    return tuple(sorted(events, key=lambda event: (event.start, event.stop, event.kind)))
 
 
 def mended(segment: Segment, events: Sequence[Event], joints: Sequence[str]) -> np.ndarray:

@@ -20,6 +20,7 @@ import numpy as np
 from . import config, events, model, robot, shape
 from . import filters as filtering
 from . import log as logs
+from .bumps import bumps
 from .compress import Compressed, Linearised, compress
 from .config import Experiment, LogSpec
 from .errors import SysidWarning
@@ -46,11 +47,15 @@ def build(experiment: Experiment) -> tuple[Robot, Model, np.ndarray]:
 
 
 def read(experiment: Experiment, machine: Robot, specs: list[LogSpec]) -> list[logs.Log]:
-    """The logs of an experiment's `data.train` or `data.test`, with their events where these are left out. Raises LogError."""
+    """The logs of an experiment's `data.train` or `data.test`, with their events where these are left out: first those
+    that the signals show, then those that only the robot's equations do. Raises LogError."""
     read = [logs.read(spec, experiment.data, machine.joints, machine.prismatic, experiment.folder) for spec in specs]
     if experiment.preprocess.events == "keep":
         return read
-    return [replace(log, events=tuple(e for s in log.segments for e in events.find(s, machine.joints, log=log.name))) for log in read]
+    found = [replace(log, events=tuple(e for s in log.segments for e in events.find(s, machine.joints, log=log.name))) for log in read]
+    felt = bumps(machine, found)
+    more = [[e for e in felt if e.log == log.name] for log in found]
+    return [replace(log, events=events.ordered([*log.events, *own])) if own else log for log, own in zip(found, more)]
 
 
 def fit(experiment: Experiment, *, filters: dict | None = None, progress: Progress | None = None) -> Fit:

@@ -1,0 +1,89 @@
+"""Knocks that no signal shows by itself.
+
+An arm that gives way to a push moves smoothly, and a smooth torque drives it: only what its
+equations leave is the push. It stands in those of several joints at once and nowhere else, while
+what a model lacks on one joint stays in that joint's equation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.ndimage import maximum_filter1d, median_filter
+
+from .config import EffectSpec
+from .events import Event
+from .log import Log
+from .lowpass import lowpassed, stride_of, widest
+from .model import build
+from .outliers import CHANCE, ratio, runs, surprise
+from .robot import Robot
+from .rows import Rows, stack
+from .shape import inverted
+
+_EFFECTS = ("viscous", "coulomb", "torque_bias")  # what any joint has
+_BURST = 0.05  # s: a knock's time
+_NEARBY = 0.5  # s to either side whose median a burst must exceed
+_OFTEN = 3.0  # s of log to a burst: what comes more often is how the machine moves, and no accident
+_FEWEST = 50  # rows of a joint that have a usual
+_WHITE = 0.706  # z75 - z50 of a normal variable's size over its median
+_PASSES = 2  # the second with every joint weighted by what the first leaves
+
+
+def bumps(robot: Robot, logs: Sequence[Log]) -> list[Event]:
+    """Knocks in what rigid bodies with friction, fitted to logs of a robot, leave of them.
+
+    The size of what is left, under the low-pass of a diagnosis, over the usual: the larger of the
+    joint's own and of what is about it. A knock is where it surprises on two joints.
+    """
+    if robot.dof < 2 or (motion := lowpassed(logs, robot.joints, cutoff := widest(logs))) is None:
+        return []
+    model = build(robot, [EffectSpec(name=name) for name in _EFFECTS])
+    stride = stride_of(motion, cutoff)
+    rows = stack(model, motion, stride)
+    step = stride * motion.pieces[0].step
+    size = np.abs(_left(rows))
+    own = np.stack([_surprise(a, u, rows.piece, step) for a, u in zip(size.T, rows.use.T)], axis=1)
+    both = np.sort(own, axis=1)[:, -2]
+    span = len(both) * step
+    level = np.log(span / _BURST * robot.dof / CHANCE)
+    found = []
+    for number, piece in enumerate(motion.pieces):
+        (at,) = np.nonzero(rows.piece == number)
+        wide = maximum_filter1d(both[at], max(1, round(_BURST / step)))
+        for a, b in runs(wide > 0.5 * level) if len(at) else []:
+            greatest = own[at[a : b + 1]].max(axis=0)
+            if wide[a : b + 1].max() > level:
+                joints = tuple(robot.joints[j] for j in np.flatnonzero(greatest > 0.5 * level))
+                start, stop = (float(rows.t[at[k]]) for k in (a, b))
+                found.append(Event("knock", piece.source, start, stop, joints, "both"))
+    return found if len(found) * _OFTEN <= span else []
+
+
+def _left(rows: Rows) -> np.ndarray:
+    """What least squares leave (n, dof), every joint in units of its median."""
+    weights = np.ones(rows.tau.shape[1])
+    for _ in range(_PASSES):
+        columns = rows.columns * weights[:, None, None]
+        system = np.einsum("jnk,jnl->kl", columns, columns, optimize=True)
+        x = inverted(system) @ np.einsum("jnk,nj->k", columns, rows.tau * weights)
+        left = rows.residual(x)
+        usual = [np.median(np.abs(e[u])) if u.any() else 0.0 for e, u in zip(left.T, rows.use.T)]
+        weights = ratio(np.ones(len(usual)), np.array(usual))
+    return left * weights
+
+
+def _surprise(size, use, piece, step: float) -> np.ndarray:
+    """How surprising (n,) sizes are among those that count; less than nothing where none does."""
+    out = np.full(len(size), -1.0)
+    if use.sum() < _FEWEST:
+        return out
+    about = np.zeros(len(size))
+    for number in np.unique(piece[use]):
+        (own,) = np.nonzero(use & (piece == number))
+        near = min(2 * round(_NEARBY / step) + 1, len(own))
+        about[own] = median_filter(size[own], near, mode="nearest")
+    usual = np.median(size[use])
+    out[use] = surprise(ratio(size[use], np.maximum(about[use], usual)), _WHITE)
+    return out

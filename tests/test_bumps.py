@@ -1,0 +1,83 @@
+"""Knocks that only the robot's own equations show, held against what truth.json says."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sysid import config, pipeline
+from sysid.bumps import bumps
+from sysid.events import Event
+from sysid.simulate import hidden, load, simulate, write
+
+ROOT = config.Path(__file__).resolve().parent.parent
+
+
+@pytest.fixture(scope="module")
+def leg():
+    return load(ROOT / "configs" / "cheetah3.yaml")
+
+
+@pytest.fixture(scope="module")
+def pushed(leg, tmp_path_factory):
+    """The leg's logs, pushed three times in each; and what was done to it."""
+    experiment, machine, *_ = leg
+    made = simulate(machine, seed=3, duration=12.0, rate=500.0, knocks=3)
+    folder = tmp_path_factory.mktemp("pushed")
+    write(made, experiment, folder)
+    return pipeline.load(folder), {name: [e for e in log.events if e["kind"] == "knock"] for name, log in made.logs.items()}
+
+
+def read(experiment):
+    machine, *_ = pipeline.build(experiment)
+    with pipeline.noticed():
+        return machine, pipeline.read(experiment, machine, [*experiment.data.train, *experiment.data.test])
+
+
+def test_pushes_that_no_signal_shows_are_found_and_left_out(pushed):
+    experiment, truth = pushed
+    machine, logs = read(experiment)
+    found = {log.path.stem: [e for e in log.events if e.kind == "knock"] for log in logs}
+    hit = total = 0
+    for name, done in truth.items():
+        for event in found[name]:
+            assert any(event.start < one["stop"] + 0.1 and one["start"] < event.stop + 0.1 for one in done)
+            assert len(event.joints) >= 2 and event.stop - event.start < 0.25
+        hit += sum(any(e.start < one["stop"] + 0.05 and one["start"] < e.stop + 0.05 for e in found[name]) for one in done)
+        total += len(done)
+    # one in a few comes while two of three joints turn round, where no row counts anyway
+    assert total == 6 and hit >= 4
+    plain = experiment.model_copy(update={"preprocess": experiment.preprocess.model_copy(update={"events": "keep"})})
+    errors = [pipeline.fit(one).rms("test").values() for one in (experiment, plain)]
+    assert sum(errors[0]) < 0.8 * sum(errors[1])
+    assert all(not log.events for log in read(plain)[1])
+
+
+@pytest.mark.parametrize("hide", [(), ("backlash:hip:b=0.02",), ("torque_saturation:knee:limit=2.0",), ("stribeck:abad",)])
+def test_what_a_joint_does_by_itself_is_no_push(leg, tmp_path, hide):
+    experiment, machine, *_ = leg
+    made = simulate(machine, hide=[hidden(h) for h in hide], seed=4, duration=12.0, rate=500.0)
+    write(made, experiment, tmp_path / "logs")
+    _, logs = read(pipeline.load(tmp_path / "logs"))
+    assert not [e for log in logs for e in log.events if e.kind == "knock"]
+
+
+def test_a_log_too_short_is_asked_nothing(pushed):
+    machine, logs = read(pushed[0])
+    (segment,) = logs[0].segments
+    short = replace(segment, **{name: getattr(segment, name)[:20] for name in ("t", "q", "tau")})
+    assert bumps(machine, [replace(logs[0], events=(), segments=(short,))]) == []
+
+
+def test_bursts_that_keep_coming_are_how_the_machine_moves(leg, tmp_path):
+    """Ten pushes in ten seconds: somebody works with this arm, and every log of it looks like this."""
+    experiment, machine, *_ = leg
+    write(simulate(machine, seed=5, duration=10.0, rate=500.0, knocks=12), experiment, tmp_path / "logs")
+    found = pipeline.load(tmp_path / "logs")
+    machine, logs = read(found)
+    assert bumps(machine, [log for log in logs if log.path.stem == "train"]) == []
+
+
+def test_times_are_the_logs_own(pushed):
+    _, logs = read(pushed[0])
+    assert all(isinstance(e, Event) and isinstance(e.start, float) and np.isfinite(e.stop) for log in logs for e in log.events)
