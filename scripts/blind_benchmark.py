@@ -487,7 +487,7 @@ def score(record: dict) -> list[dict]:
             lowered = {j: 1.0 - rms["true"][j] / base[j] if base[j] > 0.0 else 0.0 for j in base}
             joint = max(lowered, key=lowered.get) if joint == "*" else joint
             # what no model predicts on another log is not visible, whatever the log without it says
-            row |= {"joint": joint, "lowered": lowered[joint], "visible": rms["true"][joint] <= (1.0 - VISIBLE) * base[joint] and effect not in ABSORBED}
+            row |= {"joint": joint, "lowered": lowered[joint], "visible": 0.0 < base[joint] and rms["true"][joint] <= (1.0 - VISIBLE) * base[joint] and effect not in ABSORBED}
         else:
             row |= {"lowered": None, "visible": True}  # a crash counts against us
         if record["error"] is not None:

@@ -54,7 +54,7 @@ def claims(record: dict) -> list[dict]:
         for step in steps_on(record, joint):
             pair = step["effect"], step["joint"]
             true = _is_hidden(step["effect"], joint, hidden)
-            held = true or any(_is_hidden(w, joint, hidden) for w in step["tied_with"])
+            held = true or any(_is_hidden(*_split(w, joint), hidden) for w in step["tied_with"])
             if joint not in own:
                 before = found.get(pair, {"true": False, "held": False})
                 found[pair] = {
@@ -62,6 +62,12 @@ def claims(record: dict) -> list[dict]:
                     "true": true or before["true"], "held": held or before["held"],
                 }  # fmt: skip
     return list(found.values())
+
+
+def _split(word: str, joint: str) -> tuple[str, str]:
+    """The effect and the joint of a word of a family, which says its joint where it is another."""
+    effect, _, other = word.partition(" on ")
+    return effect, other or joint
 
 
 def _is_hidden(effect: str, joint: str, hidden: set) -> bool:
