@@ -45,13 +45,20 @@ def compare(first: Fit, second: Fit, names: tuple[str, str] | None = None) -> li
     ]
 
 
-def together(first: Fit, second: Fit) -> Difference:
+def together(first: Fit, second: Fit, *, weighed: bool = False) -> Difference:
     """Two fits compared over all joints, each joint's residual in units of its RMS under the first:
-    `delta_rms` is a share of what the error was. Raises SysidError, as `compare`."""
-    sums, _ = _sums(first, second, ("before", "after"))
+    `delta_rms` is a share of what the error was. Raises SysidError, as `compare`.
+
+    Args:
+        weighed: as the first fit weighs its joints instead, in the unit that comes of that (N m where all count alike).
+    """
+    sums, joints = _sums(first, second, ("before", "after"))
     (s1, n1), _ = sums
     unit = s1.sum(0) / np.maximum(n1.sum(0), 1)
     known = unit > 0
+    if weighed:
+        own = np.ones(len(first.joints)) if first.weights is None else first.weights
+        unit = own[[first.joints.index(joint) for joint in joints]] ** -2.0
     totals = [((s[:, known] / unit[known]).sum(1), n[:, known].sum(1)) for s, n in sums]
     both = (totals[0][1] > 0) & (totals[1][1] > 0)
     return Difference("before", "after", "*", *_jackknife(*((s[both], n[both]) for s, n in totals)))

@@ -66,7 +66,7 @@ def elbow(first: float, claims=(), *, rest=NOISE, level=None, refused=(), train=
 def test_what_is_nothing_in_size_and_error_is_not_claimed(monkeypatch, fall, size, all_, stands):
     """Errors are told to 0.01, the size to 0.1; one that is not determined says nothing. Nor what the other joints pay for."""
     monkeypatch.setattr(claims.comparison, "compare", lambda *_: [Difference("", "", "elbow", -fall, 0.01)])
-    monkeypatch.setattr(claims.comparison, "together", lambda *_: Difference("", "", "*", all_, 0.01))
+    monkeypatch.setattr(claims.comparison, "together", lambda *_, **__: Difference("", "", "*", all_, 0.01))
     monkeypatch.setattr(claims, "parameters", lambda *_: {"T": (size, 0.1, "s"), "k": (3.0, float("nan"), "1")})
     member = SimpleNamespace(candidate=SimpleNamespace(joint=1))
     assert (claims._nothing(fitted(1.0, train=1.0), fitted(1.0, train=0.9), member) is None) is stands

@@ -103,8 +103,9 @@ def _nothing(before: Fit, after: Fit, member: Member) -> str | None:
             return "its size is nothing beside its deviation, and the test error stays the same"
     if change.delta_rms > -_NOTHING * unit:
         return f"with it the error on the test logs does not fall ({rise})"
-    if whole.delta_rms > whole.se:
-        return f"with it the other joints' test error rises ({100 * whole.delta_rms:+.2g} %)"
+    # as the fit weighs them: it trades what a quiet joint loses for what a loud one gains
+    if (paid := comparison.together(before, after, weighed=True)).delta_rms > paid.se:
+        return f"with it the test error of all joints together rises ({paid.delta_rms:+.2g})"
     return None
 
 
