@@ -251,6 +251,23 @@ def test_noise_drawn_again_is_as_loud_as_the_noise_is_there():
         assert np.sqrt(np.mean(drawn[part] ** 2)) == pytest.approx(np.sqrt(np.mean(size[part] ** 2)), rel=0.35)
 
 
+@pytest.mark.parametrize("resting", [0.0, 1e-16])
+def test_noise_drawn_again_is_no_louder_where_a_log_stands_through_its_middle(resting):
+    """A brake holds the joint for two thirds of the log, and what a file keeps of its angle there is rounding or nothing."""
+    from types import SimpleNamespace
+
+    from sysid.lowpass import rougher
+
+    rng = np.random.default_rng(3)
+    t = np.arange(0.0, 9.0, 0.01)
+    moves = (t > 3.0) & (t < 6.0)
+    size = np.where(moves, 1e-4, resting)[:, None]
+    q = np.where(moves, np.sin(t - 3.0), 0.0)[:, None] + size * rng.normal(size=(len(t), 1))
+    drawn = rougher(SimpleNamespace(q=q, step=0.01), np.array([1e-4]), 15.0, rng) - q
+    assert np.std(drawn[350:550]) == pytest.approx(1e-4, rel=0.3)
+    assert np.abs(drawn[:250]).max() < 1e-15 and np.abs(drawn).max() < 0.05
+
+
 @pytest.mark.parametrize("grain", [2e-4, 1e-3])
 def test_rounding_is_drawn_again_as_rounding(grain):
     """Where an arm moves slowly, rounding makes slow errors, not white ones: those drawn have their size in each band."""

@@ -45,7 +45,8 @@ def rougher(segment, noise, cutoff: float, rng: np.random.Generator) -> np.ndarr
     """The angles (n, dof) of a segment with their noise once more.
 
     White noise of RMS `noise` (dof,) in the middle of the log and elsewhere as much more or less
-    as third differences say: stamps that jitter make it grow with the speed. Of an angle that its
+    as third differences say: stamps that jitter make it grow with the speed. Nowhere more than
+    these themselves, as a log may stand through its middle. Of an angle that its
     encoder rounds, what rounding makes of the smoothed angle, and of the noise before it, on a grid
     shifted by a random part of its grain: in slow motion that is no white noise.
 
@@ -59,14 +60,9 @@ def rougher(segment, noise, cutoff: float, rng: np.random.Generator) -> np.ndarr
     middle = np.median(local, axis=0)
     at = np.linspace(0, len(q) - 1, len(local) + 1)
     at = 0.5 * (at[1:] + at[:-1])
-    profile = np.stack(
-        [
-            np.interp(np.arange(len(q)), at, one)
-            for one in (local / np.where(middle > 0, middle, 1.0)).T
-        ],
-        axis=1,
-    )
-    out = q + noise * profile * rng.normal(size=q.shape)
+    size = local * np.minimum(noise / np.maximum(middle, 1e-300), 1.0)
+    size = np.stack([np.interp(np.arange(len(q)), at, one) for one in size.T], axis=1)
+    out = q + size * rng.normal(size=q.shape)
     smooth = Gaussian(min(cutoff, HIGHEST / segment.step), segment.step)(q, axis=0)
     for j, grain in enumerate(grains(q)):
         if grain:
