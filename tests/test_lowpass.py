@@ -221,6 +221,18 @@ def test_the_noise_of_coarse_angles_does_not_widen_the_band():
     assert widest([a_log(t, 1e-3 * np.round(fast / 1e-3), q)]) == pytest.approx(40.0, rel=0.05)
 
 
+def test_lumps_of_noise_far_above_the_motion_do_not_widen_the_band():
+    """As much as a thirtieth of the speed's power, between 150 and 200 Hz: rounding of slow motion makes such."""
+    t, rng = np.arange(20_000) * STEP, np.random.default_rng(1)
+    q = 0.3 * np.sin(2.0 * np.pi * 0.6 * t)[:, None] * [1.0, 0.5]
+    lump = np.fft.rfft(rng.normal(size=q.shape), axis=0)
+    f = np.fft.rfftfreq(len(t), STEP)
+    lump[(f < 150.0) | (f > 200.0)] = 0.0
+    lump = np.fft.irfft(lump, len(t), axis=0)
+    noise = 0.18 * np.diff(q, axis=0).std(axis=0) / np.diff(lump, axis=0).std(axis=0)
+    assert widest([a_log(t, q + noise * lump + 1e-6 * rng.normal(size=q.shape), q)]) == 15.0
+
+
 def test_the_band_narrows_with_the_angles_noise():
     """To where it makes a quarter: the power of what acceleration makes of white noise grows with the fourth power, as is said."""
     assert narrowed(15.0, 0.1) == narrowed(15.0, 0.25) == narrowed(15.0, 0.0) == 15.0

@@ -33,6 +33,9 @@ _ANGLES = 4.0
 # at a reversal, is left out anyway.
 _SAMPLES_PER_CYCLE = 16.0
 _ROWS_PER_CYCLE = 6.67  # 100 Hz at 15 Hz
+# The mean of so many frequencies of white noise is so far above its own in one of fifty thousand
+_TOGETHER, _ABOVE = 9, 3.0
+_SELDOM = 0.05  # of an octave
 MOST_ROWS = 12_000
 
 
@@ -81,25 +84,31 @@ def band(logs: Sequence[Log]) -> float:
         if not speed.size:
             continue
         power = np.abs(np.fft.rfft(speed * np.hanning(len(speed))[:, None], axis=0)) ** 2
-        power = np.cumsum([_without_noise(one) for one in power.T], axis=1)
-        if (power[:, -1] > 0).all():
+        sums = [np.cumsum(_without_noise(one)) for one in power.T]
+        if all(one[-1] > 0 for one in sums):
             # the first frequency below which 99 % stand: less the noise, sums rise and fall
-            last = np.argmax(power >= 0.99 * power[:, -1:], axis=1).max()
-            bands.append(float(last / (len(speed) * segment.step)))
+            last = max(int(np.argmax(one >= 0.99 * one[-1])) for one in sums)
+            bands.append(last / (len(speed) * segment.step))
     return float(np.median(bands or [0.0]))
 
 
 def _without_noise(power: np.ndarray) -> np.ndarray:
     """A spectrum (frequencies,) of an angle's differences, less what noise makes of it: white noise
     on the angle grows with the square of frequency, stamps that jitter make white noise of the
-    speed. The upper half of the band, where no arm moves, tells."""
+    speed. The upper half of the band, where no arm moves, tells. Nothing is left beyond the first
+    octave in which noise is all there is: the lumps that rounding makes far above are no motion."""
+    from scipy.ndimage import uniform_filter1d
     from scipy.optimize import nnls
 
     angle = np.sin(0.5 * np.pi * np.linspace(0.0, 1.0, len(power))) ** 2
     shape = np.stack([np.ones(len(power)), angle], axis=1)
     upper = slice(len(power) // 2, None)
     scale = max(float(power[upper].max()), 1e-300)
-    return power - shape @ nnls(shape[upper], power[upper] / scale)[0] * scale
+    noise = shape @ nnls(shape[upper], power[upper] / scale)[0] * scale
+    stands = np.concatenate([[0], np.cumsum(uniform_filter1d(power, _TOGETHER) > _ABOVE * noise)])
+    first = np.arange(max(1, int(np.argmax(power))), len(power) // 2)
+    quiet = np.flatnonzero(stands[2 * first] - stands[first] < _SELDOM * first)
+    return (power - noise)[: first[quiet[0]]] if len(quiet) else power - noise
 
 
 def narrowed(cutoff: float, share: float) -> float:
