@@ -47,9 +47,8 @@ def step_of(view: View, p: float, found: Choice, worth: float) -> Step | None:
 
 
 def revised(first: View, steps: list[Step], worth: float) -> list[Step]:
-    """Steps, each chosen again among what it was tied with, now that all the others are in the
-    model: what still acted on the motion when it was chosen may have spoken for another. One that
-    the others leave nothing to do goes.
+    """Steps, each chosen again among what it was compared with, now that all others are in the
+    model: what acted on the motion then may have spoken for another. What they leave nothing goes.
 
     Args:
         first: the view before all steps.
@@ -71,12 +70,13 @@ def _revised_once(first: View, steps: list[Step], worth: float, stirred: set[int
     """Steps up to the first of the joints `stirred` that is another one now, or goes; and the
     joints that it changed, none where there is no such step."""
     for number, step in enumerate(steps[:-1]):
-        if len(step.choice.members) < 2 or step.candidate.joint not in stirred:
+        rivals = [*(m for m, _ in step.choice.members), *step.choice.beaten]
+        if len(rivals) < 2 or step.candidate.joint not in stirred:
             continue
         before, later = steps[:number], steps[number + 1 :]
         others = [(s.candidate, s.choice.head.shapes) for s in (*before, *later)]
         without = joined(first, *others, weights=steps[-1].after.weights)
-        groups = groups_at(without, [(m.candidate, m.asked) for m, _ in step.choice.members])
+        groups = groups_at(without, [(m.candidate, m.asked) for m in rivals])
         found = chosen(without, groups, np.random.default_rng(1))
         again = None if found is None else step_of(without, step.p, found, worth)
         if again is None:
