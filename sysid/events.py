@@ -108,8 +108,8 @@ def usable(
 ) -> np.ndarray:
     """Rows (n, dof) bool at times t (n,) that no event reaches, for each joint's equation.
 
-    A knock moves the whole arm: where most joints show it, no joint's row counts. A wrong angle is
-    in every joint's equation. Spikes are mended before any filter, and reach nothing beside them.
+    A knock is in the equations of all joints that bear it, whichever show it, and a wrong angle in
+    every joint's. Spikes are mended before any filter, and reach nothing beside them.
 
     Args:
         angles, torque: how far [s] the filters of the angles and of the torque see to either side.
@@ -124,8 +124,8 @@ def usable(
         rounding = 1e-9 * max(abs(event.start), abs(event.stop), 1.0)
         first = np.searchsorted(t, event.start - reach - rounding)
         last = np.searchsorted(t, event.stop + reach + rounding, side="right")
-        most = event.kind == "knock" and 2 * len(event.joints) > len(joints)
-        own = joints if most or event.signal == "position" else event.joints
+        whole = event.kind == "knock" or event.signal == "position"
+        own = joints if whole else event.joints
         use[first:last, [place[joint] for joint in own]] = False
     return use
 
