@@ -489,7 +489,8 @@ def score(record: dict) -> list[dict]:
             # what no model predicts on another log is not visible, whatever the log without it says
             row |= {"joint": joint, "lowered": lowered[joint], "visible": 0.0 < base[joint] and rms["true"][joint] <= (1.0 - VISIBLE) * base[joint] and effect not in ABSORBED}
         else:
-            row |= {"lowered": None, "visible": True}  # a crash counts against us
+            # a crash counts against us; where the simulator made no log there is nothing to see
+            row |= {"lowered": None, "visible": (record["error"] or {}).get("stage") != "simulate"}
         if record["error"] is not None:
             rows.append(row | {"category": "error", "named": "error", "extra": [], "innocent": []})
             continue
