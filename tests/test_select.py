@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from ruamel.yaml import YAML
 
-from sysid import loop, pipeline, results
+from sysid import config, loop, pipeline, results, simulate
 from sysid.addition import command, grown, spelled
 from sysid.diagnose.diagnosis import diagnose
 from sysid.diagnose.select import LEVEL, WORTH, search
@@ -304,3 +304,13 @@ def test_an_option_survives_its_discovery(simulated, tmp_path):
     again = pipeline.load(tmp_path / "step" / "experiment.yaml").model.effects[-1]
     assert (again.name, again.joints, again.options) == (name, joints, options)
     assert after.rms("test")["elbow"] < fit.rms("test")["elbow"]
+
+
+def test_what_was_beaten_is_asked_again_once_another_has_joined(tmp_path):
+    """While the gain is missing its work speaks for a tilted base, which beats the offset; with the gain in the model it does not."""
+    experiment, machine, *_ = simulate.load(config.Path(__file__).resolve().parent.parent / "configs" / "cheetah3.yaml")
+    hide = [simulate.hidden(h) for h in ("encoder_offset:abad:d=-0.077", "torque_gain:abad:e=0.11")]
+    simulate.write(simulate.simulate(machine, hide=hide, seed=7, duration=12.0, rate=500.0), experiment, tmp_path / "logs")
+    found = pipeline.load(tmp_path / "logs")
+    steps, *_ = search(first_view(found, pipeline.fit(found)))
+    assert sorted(step.candidate.key for step in steps) == [("encoder_offset", 0), ("torque_gain", 0)]
