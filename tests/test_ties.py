@@ -94,11 +94,12 @@ def test_a_size_that_may_not_be_negative_is_no_member(simulated):
 
 
 @pytest.mark.parametrize(("members", "told"), [
-    ([(0, 0.4), (0, 0.6)], True), ([(0, 1.0)], True), ([(0, 0.6), (1, 0.4)], True), ([(0, 0.4), (1, 0.35), (-1, 0.25)], False),
+    ([(0, 0.4, 1.0), (0, 0.6, 2.0)], True), ([(0, 1.0, 1.0)], True), ([(0, 0.6, 1.0), (1, 0.4, 1.1)], True),
+    ([(0, 0.4, 1.0), (1, 0.35, 1.1), (-1, 0.25, 1.2)], False), ([(0, 0.4, 1.0), (1, 0.35, 1.00005), (-1, 0.25, 1.2)], True),
 ])  # fmt: skip
 def test_a_log_decides_where_it_says_which_joint(members, told):
-    """All of one joint, or one likelier than all others together."""
-    made = tuple((SimpleNamespace(candidate=SimpleNamespace(joint=joint)), chance) for joint, chance in members)
+    """All of one joint, or one likelier than all others together, with those that leave the very same."""
+    made = tuple((SimpleNamespace(candidate=SimpleNamespace(joint=joint), losses=np.array([[lost]])), chance) for joint, chance, lost in members)
     assert Choice(made[0][0], made, np.zeros(3)).decided is told
 
 

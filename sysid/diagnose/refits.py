@@ -17,7 +17,7 @@ from ..estimate import inverse
 from ..view import View, by_block, looked_at
 from .evidence import Group
 
-_COMPARED = 1e-4  # share of the objective: finer than rivals are ever told apart by
+COMPARED = 1e-4  # share of the objective: finer than rivals are ever told apart by
 
 
 @dataclass(frozen=True)
@@ -95,7 +95,7 @@ def joined(view: View, *added: tuple[Candidate, dict[str, float]], weights=None)
     for candidate, shapes in added:
         source = replace(source, model=grown(source, candidate, shapes))
     own = view.weights if weights is None else weights
-    return _again(view, source.model, own, tolerance=_COMPARED)
+    return _again(view, source.model, own, tolerance=COMPARED)
 
 
 def _allowed(view: View, candidate: Candidate) -> bool:

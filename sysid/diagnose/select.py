@@ -48,16 +48,9 @@ def search(
         joined_ = [*steps, step]
         steps = revised(first_view, joined_, worth)
         view = steps[-1].after
-        anew = (
-            step.changed if [s.candidate for s in steps] == [s.candidate for s in joined_] else None
-        )
-        asked = ask(
-            view,
-            extra,
-            lambda share, word=step.candidate.name: tell(f"ask, with {word}", share),
-            before=asked if anew is not None else None,
-            anew=anew,
-        )
+        kept = [s.candidate for s in steps] == [s.candidate for s in joined_]
+        say = lambda share, word=step.candidate.name: tell(f"ask, with {word}", share)  # noqa: E731
+        asked = ask(view, extra, say, before=asked if kept else None, anew=step.changed)
     return steps, first, view, open_
 
 
@@ -78,6 +71,7 @@ def _next(view: View, asked: Asked, level: float, worth: float, open_: list[Choi
     # whoever takes as much as one that is there may be what is there
     rivals = sorted(best.values(), key=lambda k: -asked.gains[k])
     hopeful = [k for k in rivals if asked.statistics[k] > threshold]
+    doubtful: set[tuple] = set()  # what cannot be told from effects elsewhere
     while hopeful:
         top = hopeful[0]
         where = set(asked.groups[top].candidate.touches(dof))
@@ -94,10 +88,11 @@ def _next(view: View, asked: Asked, level: float, worth: float, open_: list[Choi
         refits = () if found is None else (*(m for m, _ in found.members), *found.beaten)
         if p := [there[id(member.group)] for member in refits if id(member.group) in there]:
             step = step_of(view, min(p), found, worth)
-            if step is not None and found.decided:
+            if step is not None and found.decided and step.candidate.key not in doubtful:
                 return step
             if step is not None:
                 open_.append(found)
+                doubtful |= {member.candidate.key for member, _ in found.members}
         hopeful = [k for k in hopeful if k not in short]
     return None
 

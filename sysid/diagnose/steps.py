@@ -39,9 +39,8 @@ class Step:
 
 
 def step_of(view: View, p: float, found: Choice, worth: float) -> Step | None:
-    """The step that a choice makes, None where it takes too little to be worth having."""
-    joints = found.head.candidate.touches(view.model.robot.dof)
-    if found.shares[joints].max() < worth or found.gain.sum() <= 0.0:
+    """The step that a choice makes, None where it takes too little of any joint to be worth it."""
+    if found.shares.max() < worth or found.gain.sum() <= 0.0:
         return None
     return Step(found, p, view, weighed(found.head.view), found.shares)
 

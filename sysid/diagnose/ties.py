@@ -17,7 +17,7 @@ from ..estimate import inverse
 from ..view import View
 from .evidence import Group
 from .projected import groups_at
-from .refits import Member, losses, refitted, taken, weighed
+from .refits import COMPARED, Member, losses, refitted, taken, weighed
 
 _OUTSIDE = 0.10  # a model is outside the set of 90 % where its p-value is below
 _UNEVEN = 0.35  # logarithm: two joints count half as much against each other, in power
@@ -40,9 +40,11 @@ class Choice:
     @property
     def decided(self) -> bool:
         """Whether the log says which joint it is, or at least which is likelier than all others
-        together."""
-        joints = {member.candidate.joint for member, _ in self.members}
-        return len(joints) == 1 or self.members[0][1] >= 0.5
+        together, with those that leave the same to what a refit is settled to."""
+        lost = np.array([member.losses.sum() for member, _ in self.members])
+        same = np.abs(lost - lost[0]) <= COMPARED * abs(lost[0])
+        chance = sum(p for (_, p), is_same in zip(self.members, same) if is_same)
+        return len({member.candidate.joint for member, _ in self.members}) == 1 or chance >= 0.5
 
     def without(self, there: set) -> Choice:
         """The choice without what is in the model anyway, as another step brings it."""
