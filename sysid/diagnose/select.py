@@ -37,9 +37,7 @@ def search(
     Returns:
         (steps, asked first, last view, what is there and cannot be told from effects elsewhere)
     """
-    steps: list[Step] = []
-    first_view = view
-    open_: list[Choice] = []
+    first_view, steps, open_ = view, list[Step](), list[Choice]()
     first = asked = ask(view, extra, lambda share: tell("ask", share))
     for _ in range(most):  # a step may go again: no more rounds than steps
         step = _next(view, asked, level, worth, open_)
@@ -71,7 +69,6 @@ def _next(view: View, asked: Asked, level: float, worth: float, open_: list[Choi
     # whoever takes as much as one that is there may be what is there
     rivals = sorted(best.values(), key=lambda k: -asked.gains[k])
     hopeful = [k for k in rivals if asked.statistics[k] > threshold]
-    doubtful: set[tuple] = set()  # what cannot be told from effects elsewhere
     while hopeful:
         top = hopeful[0]
         where = set(asked.groups[top].candidate.touches(dof))
@@ -88,11 +85,10 @@ def _next(view: View, asked: Asked, level: float, worth: float, open_: list[Choi
         refits = () if found is None else (*(m for m, _ in found.members), *found.beaten)
         if p := [there[id(member.group)] for member in refits if id(member.group) in there]:
             step = step_of(view, min(p), found, worth)
-            if step is not None and found.decided and step.candidate.key not in doubtful:
+            if step is not None and found.decided:
                 return step
             if step is not None:
                 open_.append(found)
-                doubtful |= {member.candidate.key for member, _ in found.members}
         hopeful = [k for k in hopeful if k not in short]
     return None
 
@@ -102,6 +98,5 @@ def _sign(group: Group) -> bool:
     if group.candidate.nonlinear:
         free = [s for s in group.candidate.effect.shapes() if s.start is not None]
         return all(not (s.low == 0.0 and c < 0) for s, c in zip(free, group.coefficients))
-    linear = group.candidate.effect.coefficients()
-    signs = zip(linear, group.coefficients)
-    return len(linear) > 1 or all(one.lower != 0 or c >= 0 for one, c in signs)
+    signs = list(zip(group.candidate.effect.coefficients(), group.coefficients))
+    return len(signs) > 1 or all(one.lower != 0 or c >= 0 for one, c in signs)

@@ -46,7 +46,7 @@ def step_of(view: View, p: float, found: Choice, worth: float) -> Step | None:
 
 
 def revised(first: View, steps: list[Step], worth: float) -> list[Step]:
-    """Steps, each chosen again among what it was compared with, now that all others are in the
+    """Steps, each chosen again among what took nearly as much, now that all others are in the
     model: what acted on the motion then may have spoken for another. What they leave nothing goes.
 
     Args:
@@ -69,7 +69,7 @@ def _revised_once(first: View, steps: list[Step], worth: float, stirred: set[int
     """Steps up to the first of the joints `stirred` that is another one now, or goes; and the
     joints that it changed, none where there is no such step."""
     for number, step in enumerate(steps[:-1]):
-        rivals = [*(m for m, _ in step.choice.members), *step.choice.beaten]
+        rivals = step.choice.close
         if len(rivals) < 2 or step.candidate.joint not in stirred:
             continue
         before, later = steps[:number], steps[number + 1 :]

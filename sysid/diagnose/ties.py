@@ -21,6 +21,7 @@ from .refits import COMPARED, Member, losses, refitted, taken, weighed
 
 _OUTSIDE = 0.10  # a model is outside the set of 90 % where its p-value is below
 _UNEVEN = 0.35  # logarithm: two joints count half as much against each other, in power
+_CLOSE = 0.1  # of what the head takes: by less another may have lost to what still acted then
 _SAME = 0.99  # share of a candidate's torque that another one's columns hold
 
 
@@ -45,6 +46,12 @@ class Choice:
         same = np.abs(lost - lost[0]) <= COMPARED * abs(lost[0])
         chance = sum(p for (_, p), is_same in zip(self.members, same) if is_same)
         return len({member.candidate.joint for member, _ in self.members}) == 1 or chance >= 0.5
+
+    @property
+    def close(self) -> list[Member]:
+        """All members, and of the beaten those that took nearly as much as the head."""
+        most = self.head.losses.sum() + _CLOSE * self.gain.sum()
+        return [*(m for m, _ in self.members), *(m for m in self.beaten if m.losses.sum() <= most)]
 
     def without(self, there: set) -> Choice:
         """The choice without what is in the model anyway, as another step brings it."""
