@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from .. import blocks
 from ..candidates import Candidate
 from ..model import ROBOT
 from ..view import View
@@ -39,8 +40,9 @@ class Step:
 
 
 def step_of(view: View, p: float, found: Choice, worth: float) -> Step | None:
-    """The step that a choice makes, None where it takes too little of any joint to be worth it."""
-    if found.shares.max() < worth or found.gain.sum() <= 0.0:
+    """The step that a choice makes, None where it takes too little of any joint to be worth it, or
+    no more of all together than the standard error of that."""
+    if found.shares.max() < worth or found.gain.sum() <= blocks.standard_error(found.gain):
         return None
     return Step(found, p, view, weighed(found.head.view), found.shares)
 
