@@ -17,13 +17,12 @@ from .events import Event
 from .log import Log
 from .lowpass import lowpassed, stride_of, widest
 from .model import build
-from .outliers import CHANCE, ratio, runs, surprise
+from .outliers import BURST, CHANCE, bursts, ratio, surprise
 from .robot import Robot
 from .rows import Rows, stack
 from .shape import inverted
 
 _EFFECTS = ("viscous", "coulomb", "torque_bias")  # what any joint has
-_BURST = 0.05  # s: a knock's time
 _NEARBY = 0.5  # s to either side whose median a burst must exceed
 _OFTEN = 3.0  # s of log to a burst: what comes more often is how the machine moves, and no accident
 _FEWEST = 50  # rows of a joint that have a usual
@@ -47,17 +46,16 @@ def bumps(robot: Robot, logs: Sequence[Log]) -> list[Event]:
     own = np.stack([_surprise(a, u, rows.piece, step) for a, u in zip(size.T, rows.use.T)], axis=1)
     both = np.sort(own, axis=1)[:, -2]
     span = len(both) * step
-    level = np.log(span / _BURST * robot.dof / CHANCE)
+    level = np.log(span / BURST * robot.dof / CHANCE)
     found = []
     for number, piece in enumerate(motion.pieces):
         (at,) = np.nonzero(rows.piece == number)
-        wide = maximum_filter1d(both[at], max(1, round(_BURST / step)))
-        for a, b in runs(wide > 0.5 * level) if len(at) else []:
+        wide = maximum_filter1d(both[at], max(1, round(BURST / step)))
+        for a, b in bursts(wide, level):
             greatest = own[at[a : b + 1]].max(axis=0)
-            if wide[a : b + 1].max() > level:
-                joints = tuple(robot.joints[j] for j in np.flatnonzero(greatest > 0.5 * level))
-                start, stop = (float(rows.t[at[k]]) for k in (a, b))
-                found.append(Event("knock", piece.source, start, stop, joints, "both"))
+            joints = tuple(robot.joints[j] for j in np.flatnonzero(greatest > 0.5 * level))
+            start, stop = (float(rows.t[at[k]]) for k in (a, b))
+            found.append(Event("knock", piece.source, start, stop, joints, "both"))
     return found if len(found) * _OFTEN <= span else []
 
 

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.ndimage import median_filter
 
-from .outliers import CHANCE, FEWEST, NOTHING, RESTING, quantum, ratio, runs, surprise
+from .outliers import BURST, CHANCE, FEWEST, NOTHING, RESTING, bursts, quantum, ratio, surprise
 
-_BURST = 0.05  # s: a knock's time
 _NEARBY = 0.3  # s to either side whose median level a burst must exceed: a knock rings for less
 _FINEST = 1e-5  # share of an angle's spread that no encoder tells
 # z75 - z50 of white noise in the shortest window, from 200 000 samples: 0.27 in 7, 0.08 in 51
@@ -20,7 +19,7 @@ _WHITE_MOST, _TAIL_MOST = 0.24, 1.8
 def knocks(q, tau, step: float, *, spiked=None) -> list[tuple[int, int, list[int]]]:
     """First and last sample, and joints, of knocks in angles and torque (n, dof), `step` [s] apart.
 
-    The level of what is unexplained in windows of `_BURST`, over the usual: the larger of the log's
+    The level of what is unexplained in windows of `BURST`, over the usual: the larger of the log's
     own while the joint moves, of what is about it, and of the quantum. A knock is where it
     surprises on two joints, be it in angle or torque, or where most of four or more show it in
     both; where there is one joint, in both.
@@ -30,7 +29,7 @@ def knocks(q, tau, step: float, *, spiked=None) -> list[tuple[int, int, list[int
             once is none. None: it has none.
     """
     n, dof = tau.shape
-    length = max(FEWEST, 2 * round(0.5 * _BURST / step) + 1)
+    length = max(FEWEST, 2 * round(0.5 * BURST / step) + 1)
     if n < 8 * length:
         return []
     # at its ends a log is seen from one side only
@@ -38,23 +37,21 @@ def knocks(q, tau, step: float, *, spiked=None) -> list[tuple[int, int, list[int
     travel = np.abs(q[first + length] - q[first])
     moves = travel > RESTING * np.sqrt(np.mean(travel**2, axis=0))
     near = 2 * round(_NEARBY / (step * (length // 2))) + 1
-    bursts = lambda x, nothing: np.array(  # noqa: E731 - (dof, windows)
+    told = lambda x, nothing: np.array(  # noqa: E731 - (dof, windows)
         [_bursts(x[:, j], first, length, near, moves[:, j], nothing) for j in range(dof)]
     )
-    angle, torque = bursts(q, _FINEST), bursts(tau, NOTHING)
-    whole = torque if spiked is None or spiked is tau else bursts(spiked, NOTHING)
+    angle, torque = told(q, _FINEST), told(tau, NOTHING)
+    whole = torque if spiked is None or spiked is tau else told(spiked, NOTHING)
     own = np.maximum(angle, torque)
     level = np.log(len(first) * dof / CHANCE)
     both = np.minimum(angle, torque)[0] if dof == 1 else np.sort(own, axis=0)[-2]
     if dof > 3:
         both = np.maximum(both, _most(angle, whole) + np.log(dof))  # whose level has no joints in it
     found = []
-    # a knock rings: it lasts as long as windows are unusual at all, on half the evidence
-    for a, b in runs(both > 0.5 * level):
-        if both[a : b + 1].max() > level:
-            greatest = own[:, a : b + 1].max(axis=1)
-            members = np.flatnonzero(greatest > min(0.5 * level, np.median(greatest)))
-            found.append((int(first[a]), int(first[b]) + length - 1, members.tolist()))
+    for a, b in bursts(both, level):  # a knock rings
+        greatest = own[:, a : b + 1].max(axis=1)
+        members = np.flatnonzero(greatest > min(0.5 * level, np.median(greatest)))
+        found.append((int(first[a]), int(first[b]) + length - 1, members.tolist()))
     return found
 
 

@@ -23,6 +23,7 @@ SHORT = 8 * FEWEST  # samples: a log with fewer has no usual
 RESTING = 0.05  # of the usual speed: what is slower rests
 _ABOUT = 4  # steps to either side of a spike that it is compared with
 _BLOCK = 64  # samples of which a median is the level thereabouts
+BURST = 0.05  # s: a knock's time
 NOTHING = 1e-3  # share of a torque's spread that disturbs nothing
 # z75 - z50 of white noise, from 200 000 samples: 0.42 to 0.53, the wider the pulse the less
 _WHITE = 0.53
@@ -52,6 +53,12 @@ def runs(flags) -> list[tuple[int, int]]:
     """First and last index of every run of true flags (n,)."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], np.asarray(flags, dtype=np.int8), [0]])))
     return [(int(a), int(b) - 1) for a, b in zip(edges[::2], edges[1::2])]
+
+
+def bursts(s, level: float) -> list[tuple[int, int]]:
+    """First and last index of every run of surprises s (n,) above half the level in which one
+    stands above it: what is out of the ordinary lasts as long as anything is unusual at all."""
+    return [(a, b) for a, b in runs(s > 0.5 * level) if s[a : b + 1].max() > level]
 
 
 def spikes(tau) -> list[list[tuple[int, int]]]:

@@ -93,9 +93,9 @@ def _nothing(before: Fit, after: Fit, member: Member) -> str | None:
     own = judged_by(member, before)
     if not any(after.rms("train")[joint] < before.rms("train")[joint] for joint in own):
         return "the fit's own error does not fall with it"
-    whole = comparison.together(before, after)
     if where(member, before) == "*":
-        change, unit, rise = whole, 1.0, f"{100 * whole.delta_rms:+.2g} % over all joints"
+        change, unit = comparison.together(before, after), 1.0
+        rise = f"{100 * change.delta_rms:+.2g} % over all joints"
     else:
         (change,) = (d for d in comparison.compare(before, after) if d.joint == own[0])
         unit, rise = before.rms("test")[own[0]], f"{max(change.delta_rms, 0.0):+.3g}"

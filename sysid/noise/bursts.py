@@ -6,9 +6,8 @@ was accelerated by what no torque sensor saw.
 
 import numpy as np
 
-from ..outliers import CHANCE, runs, surprise
+from ..outliers import BURST, CHANCE, bursts, surprise
 
-_WINDOW = 0.05  # s: a knock's time
 _FEWEST = 40  # windows that have a usual
 # Mean squares of a Gaussian over a window: z75 - z50 of one independent value, the widest there is,
 # over the median, and how much flatter its tail is from there on than from z50 to z75.
@@ -26,7 +25,7 @@ def calm(values: list[np.ndarray], kept: list[np.ndarray], steps: list[float], u
     """
     places, squares = [], []
     for k, (v, counts, step) in enumerate(zip(values, kept, steps)):
-        length = max(3, round(_WINDOW / step))
+        length = max(3, round(BURST / step))
         first = np.arange(0, max(len(v) - length + 1, 0), max(1, length // 2))
         own = np.where(counts, v if usual is None else v / usual[k], 0.0)
         total = np.concatenate([[0.0], np.cumsum(own**2)])
@@ -42,8 +41,7 @@ def calm(values: list[np.ndarray], kept: list[np.ndarray], steps: list[float], u
         return kept
     s, level = surprise(squares / middle, _WHITE, tail=_TAIL), np.log(len(squares) / CHANCE)
     out = [k.copy() for k in kept]
-    for a, b in runs(s > 0.5 * level):
-        if s[a : b + 1].max() > level:
-            for k, first, last in places[a : b + 1]:
-                out[k][first:last] = False
+    for a, b in bursts(s, level):
+        for k, first, last in places[a : b + 1]:
+            out[k][first:last] = False
     return [a if a.sum() > 2 else b for a, b in zip(out, kept)]
