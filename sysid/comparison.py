@@ -14,6 +14,7 @@ from .errors import SysidError
 from .estimate import Fit, Prediction
 from .results import number
 
+_ROUNDING = 1e-9  # of an error: two fits of one model differ by 1e-16 of it, with a standard error as small
 
 @dataclass(frozen=True)
 class Difference:
@@ -66,9 +67,12 @@ def together(first: Fit, second: Fit, *, weighed: bool = False) -> Difference:
 
 def rises(first: Fit, second: Fit, joints: list[str] | None) -> tuple[Difference, ...]:
     """Where the held-out error of some joints (None: over all together) rises by more than its
-    standard error."""
+    standard error, and by more than rounding."""
     judged = (together(first, second),) if joints is None else compare(first, second, ("before", "after"))
-    return tuple(d for d in judged if d.delta_rms > d.se and (joints is None or d.joint in joints))
+    was = {"*": 1.0, **first.rms("test")}
+    return tuple(
+        d for d in judged if d.delta_rms > max(d.se, _ROUNDING * was[d.joint]) and (joints is None or d.joint in joints)
+    )
 
 
 def _sums(first: Fit, second: Fit, names: tuple[str, str]):

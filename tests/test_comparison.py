@@ -12,11 +12,12 @@ LOGS = ({"part": "test", "sha256": "a", "start": None, "stop": None},)
 
 
 def fitted(scale, weights=None):
-    """A fit that leaves noise of this size (2,) on two joints over twenty seconds."""
+    """A fit that leaves noise of this size (2,), or at each time (2000, 2), on two joints over twenty seconds."""
     rng, n = np.random.default_rng(2), 2000
     left = rng.normal(size=(n, 2)) * scale
     told = Prediction(np.zeros(n, int), np.arange(n) * 0.01, left, np.zeros((n, 2)), None)
-    return SimpleNamespace(joints=("loud", "quiet"), logs=LOGS, predictions={"test": told}, weights=weights, experiment=SimpleNamespace(name="made"))
+    rms = lambda part: dict(zip(("loud", "quiet"), np.sqrt((left**2).mean(0))))  # noqa: E731, ARG005
+    return SimpleNamespace(joints=("loud", "quiet"), logs=LOGS, predictions={"test": told}, weights=weights, rms=rms, experiment=SimpleNamespace(name="made"))
 
 
 @pytest.mark.parametrize(
@@ -38,3 +39,10 @@ def test_all_joints_together_as_the_fit_weighs_them(weights, expected):
 def test_all_joints_together_by_what_their_errors_were():
     found = comparison.together(fitted([2.0, 0.1]), fitted([1.0, 0.3]))
     assert found.delta_rms == pytest.approx(np.sqrt(0.5 * (0.25 + 9.0)) - 1.0, rel=0.01)
+
+
+@pytest.mark.parametrize(("grows", "risen"), [(1e-13, ()), (1e-3, ("loud",))])
+def test_rounding_is_no_rise(grows, risen):
+    """Everywhere the same share more: the standard error of that is as small as the share."""
+    found = comparison.rises(fitted([2.0, 0.1]), fitted(np.array([2.0 * (1 + grows), 0.1])), ["loud"])
+    assert tuple(d.joint for d in found) == risen

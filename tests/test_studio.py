@@ -310,6 +310,17 @@ def test_while_it_works_the_state_needs_no_file_and_yet_hears_of_edits(opened, m
     opened.wait()
 
 
+def test_a_job_that_ends_while_it_is_asked_for_is_not_done_with_nothing_ready(opened, monkeypatch):
+    go = threading.Event()
+    monkeypatch.setattr(Bench, "_work", lambda self, job, text: (job.tell("compress", 0.5), go.wait(20)))
+    opened.post("/api/add", sha=opened.sha, effect="armature", joint="elbow")
+    assert opened.bench.glance(lambda look: None)["job"]["state"] == "running"
+    said = Job.document
+    monkeypatch.setattr(Job, "document", lambda self: (setattr(self, "state", "done"), said(self))[1])
+    assert opened.bench.glance(lambda look: None) is None
+    go.set()
+
+
 # ---- several experiments
 
 

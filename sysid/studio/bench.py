@@ -57,12 +57,15 @@ class Bench:
         was seen a moment ago, and `beside`, which runs a function in another thread, makes the next look.
         """
         job, last = self.worker.job, self._last
-        if last is None or job is None or job.state != "running" or last["job"] is None or last["job"]["number"] != job.number:
+        if last is None or job is None or last["job"] is None or last["job"]["number"] != job.number:
+            return None
+        now = job.document()  # asked once: a job that ends in between would be done with nothing ready
+        if now["state"] != "running":
             return None
         if not self._looking:
             self._looking = True
             beside(self._look)
-        return {**last, "job": job.document()}
+        return {**last, "job": now}
 
     def _look(self) -> None:
         try:
