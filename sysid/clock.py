@@ -16,6 +16,8 @@ Source: variance components by least squares; Robinson 1991 (best linear unbiase
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from .frequencies import low
@@ -30,17 +32,56 @@ _WHITE = 2.5
 # A third of it, or three times as much, leaves nearly the same errors.
 _LITTLE = 0.0025
 _SCATTER = 3.0  # samples' share: of few, no power is known better
-# Of the largest square in a joint's bins: what is less, corners of the motion make near a standstill
+# Of the largest square in a joint's bins: what is less, corners of the motion make at a standstill
 _LEAST = 0.01
 _BINS, _ROUNDS, _FEWEST = 20, 3, 200
 _MEDIAN = 0.4549  # of a squared normal variable
 _MOST = 3.0  # deviations of the clock
+_SELDOM = 1e-3  # windows of a clock that is as even as any, in which its spectrum seems to fall
 _ORDERED = 0.45  # of the way to a neighbour: samples keep their order
 
 
-def corrected(t: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, float]:
-    """Stamps (n,) [s] at which samples of angles q (n, dof) were taken, and the RMS [s] by which
-    those logged were off; as they are, and zero, where the angles do not tell.
+@dataclass(frozen=True)
+class Clock:
+    """When samples were taken: t (n,) [s]; off: RMS [s] by which their stamps were off, zero where
+    they were right; deviation [s] of one stamp's error; below (n,) [Hz]: the frequency above which
+    the errors about each sample were read off. What is slower than that is left in t."""
+
+    t: np.ndarray
+    off: float = 0.0
+    deviation: float = 0.0
+    below: np.ndarray | None = None
+
+    def at(self, t, step: float) -> Left | None:
+        """What is left of the errors at times t (m,) [s] a `step` apart; None where none is."""
+        if self.below is None:
+            return None
+        nearest = np.searchsorted(0.5 * (self.t[1:] + self.t[:-1]), t)
+        return Left(self.deviation, self.below[nearest], step)
+
+
+@dataclass(frozen=True)
+class Left:
+    """Errors of a clock that no angle told: those of stamps `step` [s] apart, white and of RMS
+    `deviation` [s], as far as they stay below the frequencies `below` (n,) [Hz]."""
+
+    deviation: float
+    below: np.ndarray
+    step: float
+
+    def drawn(self, rng: np.random.Generator) -> np.ndarray:
+        """Such errors (n,) [s], once more."""
+        errors = self.deviation * rng.standard_normal(len(self.below))
+        out = np.zeros(len(errors))
+        for frequency in np.unique(self.below):
+            here = self.below == frequency
+            out[here] = low(errors, frequency, self.step)[here]
+        return out
+
+
+def corrected(t: np.ndarray, q: np.ndarray) -> Clock:
+    """When samples of angles q (n, dof) with stamps t (n,) [s] were taken; as these say, where the
+    angles do not tell.
 
     Args:
         t: (n,) [s], ascending, without a gap.
@@ -49,23 +90,41 @@ def corrected(t: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, float]:
     moves = np.ptp(q, axis=0) > 1e-3 * np.ptp(q, axis=0).max()
     q = q[:, moves]
     if len(t) < _FEWEST or not moves.any():
-        return t, 0.0
-    bands = _bands(t, q, step)
+        return Clock(t)
+    bands, density = _bands(t, q, step)
     if not bands:
-        return t, 0.0
+        return Clock(t)
     room = _ORDERED * np.diff(t, prepend=t[0] - step, append=t[-1] + step)
-    to_end = np.minimum(t - t[0], t[-1] - t)
     late = np.zeros(len(t))
     for _ in range(_ROUNDS):
         even = _evenly(t + late, q)
         told = [_late(t, q, late, even, band) for band in bands]
-        late = told[-1]
-        # beside the ends, what a low-pass that forgets sooner tells
-        for lower, band in zip(bands[::-1], told[-2::-1]):
-            late = np.where(to_end < 1.0 / lower, band, late)
+        late, below = _lowest(t, told, bands, step)
         late = np.clip(late, -room[:-1], room[1:])
         late[[0, -1]] = 0.0
-    return t + late, float(np.sqrt(np.mean(late**2)))
+    return Clock(t + late, float(np.sqrt(np.mean(late**2))), float(np.sqrt(density)), below)
+
+
+def _lowest(t, told: list[np.ndarray], bands: list[float], step: float):
+    """How late (n,) samples were, and above which frequency (n,) [Hz] that was read off: the lowest
+    that has forgotten the log's ends and above which nothing moves near a sample.
+
+    A short fast move, too seldom to count in the whole log, is told from the clock by its spectrum:
+    the clock's is even, a move's falls with frequency."""
+    from scipy.ndimage import maximum_filter1d, uniform_filter1d
+    from scipy.stats import f as ratios
+
+    late, highest, below = told[0], bands[0], np.full(len(t), bands[0])
+    to_end, still = np.minimum(t - t[0], t[-1] - t), np.ones(len(t), bool)
+    for band, own in zip(bands[1:], told[1:]):
+        width = max(3, round(2.0 / (band * step)))
+        power = lambda values: uniform_filter1d(values**2, width)  # noqa: E731, B023
+        between, above = _kept(band * step) - _kept(highest * step), _kept(highest * step)
+        unlikely = ratios.isf(_SELDOM, max(1.0, between * width), max(1.0, above * width))
+        beyond = power(own - told[0]) * above > unlikely * between * power(told[0])
+        still &= ~maximum_filter1d(beyond, width) & (to_end >= 1.0 / band)
+        late, below = np.where(still, own, late), np.where(still, band, below)
+    return late, below
 
 
 def _late(t, q, late, even, band: float) -> np.ndarray:
@@ -82,12 +141,15 @@ def _late(t, q, late, even, band: float) -> np.ndarray:
     # less than this of what the clock makes of fast motion is not to be told from corners of slow
     weight = 1.0 / np.maximum(noise, _LEAST * off * np.max(speed**2, axis=0))
     found = (beside * speed) @ weight / (speed**2 @ weight + 1.0 / off)
+    # what is slower, an earlier round and another frequency brought in
+    found = found - low(found, band, even[0][1] - even[0][0])
     return np.clip(found, -_MOST * np.sqrt(off), _MOST * np.sqrt(off))
 
 
-def _bands(t, q, step: float) -> list[float]:
+def _bands(t, q, step: float) -> tuple[list[float], float]:
     """Frequencies [Hz], falling, above which a log holds no motion: what the clock makes of the
-    angles is as dense above each as above the highest, and all else is less by far."""
+    angles is as dense above each as above the highest, and all else is less by far. And the
+    variance [s^2] of the clock's errors at all frequencies."""
     frequency, first, found = _HIGHEST / step, None, []
     most, even = _LITTLE + _SCATTER / len(t), _evenly(t, q)
     while frequency > _LOWEST:
@@ -101,7 +163,7 @@ def _bands(t, q, step: float) -> list[float]:
             break
         found.append(frequency)
         frequency *= _FINER
-    return found
+    return found, first[0]
 
 
 def _kept(frequency: float) -> float:

@@ -6,13 +6,13 @@ refused with its row; what can be mended (an irregular clock, a gap) is mended w
 
 import hashlib
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from . import datasets, units
-from .clock import corrected
+from .clock import Left, corrected
 from .config import DataSpec, LogSpec
 from .errors import LogError, SysidWarning
 from .events import Event
@@ -32,7 +32,8 @@ _DEGREES = 4.0 * np.pi  # rad: no robot joint turns so far from zero, but its an
 
 @dataclass(frozen=True)
 class Segment:
-    """Uniformly sampled signals without a gap. t (n,) [s]; q, tau (n, dof); qd, qdd (n, dof) or None where not logged."""
+    """Uniformly sampled signals without a gap. t (n,) [s]; q, tau (n, dof); qd, qdd (n, dof) or None where not logged.
+    clock: what is left of the errors of stamps that were corrected."""
 
     t: np.ndarray
     step: float
@@ -41,6 +42,7 @@ class Segment:
     qd: np.ndarray | None
     qdd: np.ndarray | None
     signals: dict[str, np.ndarray]
+    clock: Left | None = None
 
 
 @dataclass(frozen=True)
@@ -268,12 +270,15 @@ def _segments(t, signals, where: str):
         own = np.diff(clock)
         # as many samples as were measured: the mean step, without the samples that are missing
         own = float(np.mean(own[own < 1.5 * step]))
-        true, late = corrected(clock, part["q"])
-        if late > _TOLD * step:
-            clock, off = true, max(off, late)
+        true, left = corrected(clock, part["q"]), None
+        told = true.off > _TOLD * step
+        if told:
+            clock, off = true.t, max(off, true.off)
         clock, part = _resampled(clock, part, own)
+        if told:
+            left = true.at(clock, own)
         resampled += 1
-        yield _segment(clock, own, part)
+        yield replace(_segment(clock, own, part), clock=left)
     if resampled:
         warnings.warn(
             SysidWarning(f"{where}: steps of {steps.min():.4g} to {np.delete(steps, cuts - 1).max():.4g} s were resampled to a uniform {own:.4g} s"),

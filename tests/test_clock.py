@@ -32,7 +32,8 @@ def test_values_older_than_their_stamps_are_put_where_they_belong(seed, dof):
     instants = taken(seed)
     off = 1e-3 * np.random.default_rng(seed + 7).integers(0, 2, len(instants))
     q = motion(instants - off, seed, dof)
-    found, told = corrected(instants, q)
+    clock = corrected(instants, q)
+    found, told = clock.t, clock.off
     t = instants - off
     # as angles: where nothing moves, the time does not matter; and that all are late by the same, no angle tells
     speed = np.gradient(q, t, axis=0)[50:-50]
@@ -49,7 +50,8 @@ def test_a_clock_that_is_right_stays_as_it_is():
     rng = np.random.default_rng(3)
     q = motion(instants, 3)
     for noise in (0.0, 1e-5, 3e-4):
-        found, told = corrected(instants, q + noise * rng.standard_normal(q.shape))
+        clock = corrected(instants, q + noise * rng.standard_normal(q.shape))
+        found, told = clock.t, clock.off
         speed = np.gradient(q, instants, axis=0)
         worth = noise / np.sqrt(np.mean(np.sum(speed**2, axis=1)))
         assert rms(found - instants) <= 0.3 * worth + 1e-6 and told <= 0.3 * worth + 1e-6
@@ -63,7 +65,7 @@ def test_moves_with_stops_do_not_move_the_clock_at_rest():
     phase = np.clip((t % 3.0) / 1.2, 0.0, 1.0)  # moves of 1.2 s, stops of 1.8 s, there and back
     way = 10.0 * phase**3 - 15.0 * phase**4 + 6.0 * phase**5
     q = np.where((t // 3.0) % 2 == 0, way, 1.0 - way)[:, None] * [1.0, 0.4, 0.0]
-    found, _ = corrected(instants, q)
+    found = corrected(instants, q).t
     assert np.abs(found - instants).max() < 3e-3
     fast = (phase > 0.3) & (phase < 0.7)
     error = (found - t)[fast]
@@ -73,5 +75,45 @@ def test_moves_with_stops_do_not_move_the_clock_at_rest():
 def test_short_logs_and_still_ones_are_left_alone():
     instants = taken(0, 2000)
     for t, q in ((instants[:150], motion(instants[:150])), (instants, np.zeros((2000, 2)))):
-        found, told = corrected(t, q)
-        assert told == 0.0 and np.array_equal(found, t)
+        clock = corrected(t, q)
+        assert clock.off == 0.0 and np.array_equal(clock.t, t) and clock.at(t, STEP) is None
+
+
+def moved(t):
+    """Angles (n, 2): slow sines, and in the middle a move of a fifth of a second whose acceleration jumps."""
+    slow = np.stack([0.4 * np.sin(0.9 * t), 0.6 * np.sin(0.7 * t + 1.0)], axis=1)
+    since = np.clip(t - 10.0, 0.0, 0.2)
+    way = np.where(since < 0.1, 0.5 * 60.0 * since**2, 0.6 - 0.5 * 60.0 * (0.2 - since) ** 2)
+    return slow + way[:, None] * [1.0, 0.3]
+
+
+def test_a_short_fast_move_is_no_clock():
+    """Its corners stand above the frequency below which the rest of the log moves: there the clock is read off what is faster still."""
+    instants = taken(4)
+    off = 1e-3 * np.random.default_rng(11).integers(0, 2, len(instants))
+    t = instants - off
+    clock = corrected(instants, moved(t))
+    error = clock.t - t
+    near = (t > 9.95) & (t < 10.25)
+    assert rms((error - error.mean())[near]) < 7e-4  # what stamps are off by is 5e-4
+    assert rms((error - error.mean())[~near]) < 2.5e-4
+    assert np.median(clock.below[near]) > 2.0 * np.median(clock.below[~near])
+
+
+def test_what_no_angle_told_of_the_clock_is_drawn_again():
+    """As large as what is left in the stamps, in each band below the frequency above which they were read off."""
+    left, drawn = [], []
+    for seed in range(6):
+        instants = taken(seed)
+        off = 1e-3 * np.random.default_rng(seed + 20).integers(0, 2, len(instants))
+        clock = corrected(instants, motion(instants - off, seed))
+        assert clock.deviation == pytest.approx(5e-4, rel=0.2)
+        error = clock.t - (instants - off)
+        even = STEP * np.arange(len(instants))
+        again = clock.at(even, STEP).drawn(np.random.default_rng(seed))
+        spectrum = lambda e: np.abs(np.fft.rfft((e - e.mean()) * np.hanning(len(e)))) ** 2  # noqa: E731
+        left.append(spectrum(error)), drawn.append(spectrum(again))
+    frequency = np.fft.rfftfreq(len(instants), STEP)
+    for low, high in ((0.5, 1.5), (1.5, 3.0)):
+        here = (frequency > low) & (frequency < high)
+        assert np.mean(np.array(drawn)[:, here]) == pytest.approx(np.mean(np.array(left)[:, here]), rel=0.5), (low, high)

@@ -252,7 +252,7 @@ def test_noise_drawn_again_is_as_loud_as_the_noise_is_there():
     """White noise whose size follows the speed, as jittered stamps make it: the second draw has the same size in each stretch."""
     from types import SimpleNamespace
 
-    from sysid.lowpass import rougher
+    from sysid.lowpass.angles import rougher
 
     rng = np.random.default_rng(3)
     t = np.arange(0.0, 20.0, 0.01)
@@ -268,7 +268,7 @@ def test_noise_drawn_again_is_no_louder_where_a_log_stands_through_its_middle(re
     """A brake holds the joint for two thirds of the log, and what a file keeps of its angle there is rounding or nothing."""
     from types import SimpleNamespace
 
-    from sysid.lowpass import rougher
+    from sysid.lowpass.angles import rougher
 
     rng = np.random.default_rng(3)
     t = np.arange(0.0, 9.0, 0.01)

@@ -13,12 +13,12 @@ balances the rest, are left out for that joint, widened by what the filters see 
     calm.py      the motion without it
 """
 
-from .angles import angle_noise, rougher
+from .angles import again, angle_noise
 from .calm import KEPT, calm
 from .gaussian import Gaussian
 from .motion import LEAST, band, lowpassed, narrowed, stride_of, widest
 
 __all__ = [
-    "KEPT", "LEAST", "Gaussian", "angle_noise", "band", "calm", "lowpassed", "narrowed",
-    "rougher", "stride_of", "widest",
+    "KEPT", "LEAST", "Gaussian", "again", "angle_noise", "band", "calm", "lowpassed", "narrowed",
+    "stride_of", "widest",
 ]  # fmt: skip

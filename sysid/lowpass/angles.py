@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from .gaussian import HIGHEST, Gaussian
@@ -39,6 +41,17 @@ def _by_window(values, step: float) -> np.ndarray:
     """RMS (windows, dof) of values (n, dof) in windows of time."""
     parts = np.array_split(values, max(1, len(values) // max(8, round(_WINDOW / step))))
     return np.sqrt([np.mean(own**2, axis=0) for own in parts])
+
+
+def again(segment, noise, cutoff: float, rng: np.random.Generator):
+    """A segment with the noise of its angles once more (see `rougher`), and with what was left of
+    its clock's errors: all signals are late or early by the same."""
+    q, tau = rougher(segment, noise, cutoff, rng), segment.tau
+    if segment.clock is not None:
+        late = segment.clock.drawn(rng)[:, None]
+        rate = lambda values: np.gradient(values, segment.step, axis=0)  # noqa: E731
+        q, tau = q + late * rate(segment.q), tau + late * rate(tau)
+    return replace(segment, q=q, tau=tau)
 
 
 def rougher(segment, noise, cutoff: float, rng: np.random.Generator) -> np.ndarray:

@@ -8,14 +8,15 @@ import numpy as np
 
 from ..estimate import Fit, predict
 from ..log import Log
-from ..lowpass import angle_noise, band, rougher, widest
+from ..lowpass import again, angle_noise, band, widest
 from ..preprocess import prepare
 
 
 @dataclass(frozen=True)
 class OfAngles:
     """torque (n, dof) [N m or N] over the core of each piece: what the angles' noise, drawn once
-    more, adds to the torque that a fit predicts. band: [Hz] below which the logs' motion stays."""
+    more, adds to the torque that a fit predicts, beside the measured one. band: [Hz] below which
+    the logs' motion stays."""
 
     torque: list[np.ndarray]
     band: float
@@ -36,17 +37,13 @@ def of_angles(logs: Sequence[Sequence[Log]], spec, fit: Fit) -> OfAngles:
     rng, out, bands = np.random.default_rng(0), [], []
     for part in logs:
         cutoff = widest(part)
-        again = [
-            replace(log, segments=tuple(_rougher(s, cutoff, rng) for s in log.segments))
-            for log in part
-        ]
-        plain, noisy = (prepare(own, spec, fit.joints) for own in (part, again))
-        told = [predict(fit.model, fit.x, motion).predicted for motion in (plain, noisy)]
+        drawn = lambda s: again(s, angle_noise(s, cutoff), cutoff, rng)  # noqa: E731, B023
+        noisy = [replace(log, segments=tuple(map(drawn, log.segments))) for log in part]
+        motions = plain, _ = [prepare(own, spec, fit.joints) for own in (part, noisy)]
+        told = [predict(fit.model, fit.x, motion) for motion in motions]
         ends = np.cumsum([piece.samples for piece in plain.pieces])[:-1]
-        out += np.split(told[1] - told[0], ends)
+        # a clock that is late shifts the measured torque as well
+        error = [one.predicted - one.measured for one in told]
+        out += np.split(error[1] - error[0], ends)
         bands.append(band(part))
     return OfAngles(out, max(bands))
-
-
-def _rougher(segment, cutoff: float, rng: np.random.Generator):
-    return replace(segment, q=rougher(segment, angle_noise(segment, cutoff), cutoff, rng))

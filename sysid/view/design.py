@@ -66,9 +66,11 @@ def designed(found: Settled, weights, source: Source, rough: Source) -> Design:
     # is no noise: those count that count in the source
     pieces = zip(rough.motion.pieces, source.motion.pieces)
     motion = replace(rough.motion, pieces=tuple(replace(r, use=p.use) for r, p in pieces))
-    more = rough.full(row.stack(found.model, motion, rough.stride).columns) * weighted - columns
+    noisy = row.stack(found.model, motion, rough.stride)
+    more = rough.full(noisy.columns) * weighted - columns
     x = np.append(found.x, np.zeros(size - own)) + change
-    left = -np.einsum("jnk,k->nj", more, x)
+    # a clock that is late shifts the measured torque as well
+    left = (noisy.tau - found.rows.tau) * weights - np.einsum("jnk,k->nj", more, x)
     return Design(columns, residual, system, inverse, change, more, left)
 
 

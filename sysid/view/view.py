@@ -14,7 +14,7 @@ from .. import rows as row
 from ..config import Experiment
 from ..errors import LogError
 from ..estimate import Fit, inverse
-from ..lowpass import calm, lowpassed, narrowed, rougher, stride_of, widest
+from ..lowpass import again, calm, lowpassed, narrowed, stride_of, widest
 from ..model import Model
 from ..preprocess import Motion
 from ..shape import Settled, settle
@@ -195,9 +195,9 @@ def _under(experiment: Experiment, fit: Fit, logs, cutoff: float) -> View | None
     if motion is None or motion.samples < 50:
         return None
     rng, noise = np.random.default_rng(0), np.max([piece.noise for piece in motion.pieces], axis=0)
-    drawn = lambda s: replace(s, q=rougher(s, noise, cutoff, rng))  # noqa: E731
-    again = [replace(log, segments=tuple(map(drawn, log.segments))) for log in logs]
-    rough = lowpassed(again, fit.joints, cutoff)
+    drawn = lambda s: again(s, noise, cutoff, rng)  # noqa: E731
+    noisy = [replace(log, segments=tuple(map(drawn, log.segments))) for log in logs]
+    rough = lowpassed(noisy, fit.joints, cutoff)
     stride = stride_of(motion, cutoff)
     return looked_at(experiment, fit.model, motion, rough, fit.prior, stride=stride)
 
