@@ -1,22 +1,26 @@
 """The verdict on each joint, from small made inputs; and the size that a log would have shown, from logs with and without it."""
 
+import re
 from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from scripts import blind_benchmark
 from sysid import pipeline
 from sysid.candidates import candidates
 from sysid.comparison import Difference
 from sysid.diagnose import claims
 from sysid.diagnose.ask import ask
 from sysid.diagnose.detectable import detectable
+from sysid.diagnose.diagnosis import diagnose
 from sysid.diagnose.select import LEVEL, WORTH, search
 from sysid.diagnose.verdict import predictable, verdicts
 from sysid.effect import Linear, TorqueEffect
 from sysid.flexible import Unknown
 from sysid.noise import NoiseFloor
+from sysid.simulate import simulate, write
 from sysid.statement.document import _verdict, dependences
 from sysid.transfer import Transfer
 from sysid.view import first_view
@@ -36,7 +40,7 @@ def left(share: float) -> Unknown:
 def fitted(elbow: float, shoulder: float = 1.0, train: float | None = None):
     rms = {"test": {"shoulder": shoulder, "elbow": elbow}}
     rms["train"] = rms["test"] if train is None else {"shoulder": shoulder, "elbow": train}
-    return SimpleNamespace(joints=JOINTS, rms=rms.get)
+    return SimpleNamespace(joints=JOINTS, rms=rms.get, weights=None)
 
 
 def claim(effect: str, joint: str, shares, after):
@@ -158,6 +162,32 @@ def test_error_above_the_floor_that_nothing_predicts_is_unresolved():
     refused = SimpleNamespace(effect="backlash", joint="elbow", why="its parameters are nothing")
     assert "backlash was looked at and is not claimed: its parameters are nothing" in elbow(2.0, refused=[refused]).says
     assert "backlash" not in elbow(2.0, refused=[SimpleNamespace(effect="backlash", joint="shoulder", why="x")]).says
+
+
+@pytest.mark.parametrize(("weighed", "train", "told"), [(1.05, 2.0, True), (1.6, 2.0, False), (1.05, 1.0, True), (2.0, 2.0, False)])
+def test_what_only_the_weights_of_the_joints_leave_is_said_to_be_theirs(weighed, train, told):
+    """Where most of what stands above the floor goes when each joint counts by its noise."""
+    fit, floors = fitted(2.0, train=train), [floor(), floor()]
+    says = verdicts(fit, (), [NOISE, NOISE], floors, weighed={"elbow": weighed})[1].says
+    assert ("solver.weighting: noise" in says) is told and "2 times the noise floor" in says or not told
+    fit.weights = np.ones(2)  # they do count so
+    assert "solver.weighting" not in verdicts(fit, (), [NOISE, NOISE], floors, weighed={"elbow": weighed})[1].says
+
+
+def test_the_weights_do_what_the_verdict_says_of_them(tmp_path):
+    """An elbow six times as quiet as the shoulder, in slow noise: what is said of its error holds when it is done."""
+    experiment, machine = blind_benchmark.experiment_of("planar", tmp_path)
+    case = next(c for c in blind_benchmark.cases(53912, "full", "clean") if c.key == "planar/control/12")
+    options = {"seed": case.seed, "duration": 20.0, "rate": 500.0, "colour": case.colour, "encoder": case.encoder}
+    write(simulate(machine, **options), experiment, tmp_path / "logs")
+    experiment = pipeline.load(tmp_path / "logs")
+    found = diagnose(experiment)
+    (verdict,) = (v for v in found.verdict if v.joint == "elbow")
+    times = float(re.search(r"solver.weighting: noise it would be ([0-9.]+) times", verdict.says)[1])
+    solver = experiment.solver.model_copy(update={"weighting": "noise"})
+    after = pipeline.fit(experiment.model_copy(update={"solver": solver}))
+    error = max(after.rms(part)["elbow"] for part in ("train", "test"))
+    assert error == pytest.approx(times * found.floors["elbow"].rms, rel=0.1) and error < 0.9 * found.fit.rms("test")["elbow"]
 
 
 def test_a_floor_that_nobody_knows_leaves_it_unresolved():

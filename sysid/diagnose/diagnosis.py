@@ -91,39 +91,29 @@ def diagnose(
         if test is None:
             raise too_short()
         first, then = (HeldOut(one.settled, test) for one in (view, after))
-        found = _floors(experiment, last, after, logs)
-        said = verdicts(fit, claims, after.unknown, found, refused, transfers(last))
+        found, weighed = _floors(experiment, last, after, logs)
+        said = verdicts(fit, claims, after.unknown, found, refused, transfers(last), weighed)
         errors = last.rms("test").values()
         levels = np.array([e if f.rms is None else f.rms for f, e in zip(found, errors)])
         where = failures(first, fit.predictions["test"], levels)
         could = detectable(view, asked, candidates(view.model, extra))
-        return Diagnosis(
-            fit,
-            dict(zip(fit.joints, found)),
-            tuple(claims),
-            tuple(said),
-            tuple(could),
-            tuple(where),
-            (*view.motion.events, *test.events),
-            view,
-            first,
-            then,
-            tuple(refused),
-            tuple(_notices(claims, refused)),
-        )
+        events, notices = (*view.motion.events, *test.events), tuple(_notices(claims, refused))
+        told = tuple(claims), tuple(said), tuple(could), tuple(where), events, view, first, then
+        return Diagnosis(fit, dict(zip(fit.joints, found)), *told, tuple(refused), notices)
 
 
-def _floors(experiment: Experiment, fit: Fit, view: View, logs) -> list[NoiseFloor]:
-    """The noise floor of each joint, as the fit sees its torque: of what the view's model leaves,
-    in whose parameters loud joints do not drown quiet ones."""
+def _floors(experiment: Experiment, fit: Fit, view: View, logs) -> tuple[list[NoiseFloor], dict]:
+    """Each joint's noise floor, as the fit sees its torque: of what the view's model leaves, in
+    whose parameters loud joints do not drown quiet ones; and {joint: the RMS of that}."""
     spec = settled(experiment.preprocess, fit.filters)
     motions = [prepare(part, spec, fit.joints) for part in logs]
     x = view.settled.x + view.design.change[: view.model.size]
-    predicted = [predict(view.model, x, motion).predicted for motion in motions]
+    told = [predict(view.model, x, motion) for motion in motions]
     pieces = [piece for motion in motions for piece in motion.pieces]
     angles = of_angles(logs, spec, fit)
-    found = floors_of(pieces, np.concatenate(predicted), angles=angles)
-    return filtered(found, pieces[0].smoother)
+    found = floors_of(pieces, np.concatenate([one.predicted for one in told]), angles=angles)
+    left = np.max([one.errors()["rms"] for one in told], axis=0)
+    return filtered(found, pieces[0].smoother), dict(zip(fit.joints, left))
 
 
 def _notices(claims, refused) -> Iterator[str]:

@@ -45,13 +45,15 @@ def verdicts(
     floors: Sequence,
     refused: Sequence = (),
     carried: Sequence[Transfer] = (),
+    weighed: dict[str, float] | None = None,
 ) -> list[Verdict]:
     """The verdict on every joint.
 
     Args:
         fit: of the experiment as it is. left: what functions of the motion predict with all claims
             in the model. floors: noise floor of each joint. carried: whether the model with all
-            claims carries over, of each joint.
+            claims carries over, of each joint. weighed: {joint: RMS that it leaves where each joint
+            counts by its noise}.
     """
     last = claims[-1].after if claims else fit
     out = []
@@ -79,7 +81,8 @@ def verdicts(
         elif own or (remains is not None and not reached):
             told = ("unknown", own or others, explained, remains)
         elif not reached:
-            why = _why(fit, j, floors[j], then, last, refused)
+            apart = (weighed or {}).get(joint, float("inf"))
+            why = _why(fit, j, floors[j], then, last, refused, apart)
             told = ("unresolved", others, explained, remains, why)
         elif at_floor or not claims:
             told = ("complete",)
@@ -105,7 +108,7 @@ def _above(remains: Unknown | None, error: float, floor: float) -> bool:
     return left < (1.0 + _FLOOR) ** -2 and left * error**2 >= floor**2
 
 
-def _why(fit: Fit, j: int, floor, error: float, last: Fit, refused) -> str:
+def _why(fit: Fit, j: int, floor, error: float, last: Fit, refused, weighed: float) -> str:
     joint, train = fit.joints[j], last.rms("train")[fit.joints[j]]
     if not error > 0.0:
         said = "none of its rows on the test logs counts: it stands still there, or is disturbed"
@@ -113,6 +116,12 @@ def _why(fit: Fit, j: int, floor, error: float, last: Fit, refused) -> str:
         said = (
             f"its noise floor is not known ({floor.detail}), so nobody can say what error is left "
             "above it"
+        )
+    elif fit.weights is None and error**2 - weighed**2 > _MOST * (error**2 - floor.rms**2):
+        said = (
+            f"its error is {error / floor.rms:.2g} times the noise floor because joints with more "
+            "noise count as much as quiet ones in this fit; with solver.weighting: noise it would "
+            f"be {weighed / floor.rms:.2g} times"
         )
     elif train <= (1.0 + _FLOOR) * floor.rms + 2.0 * floor.std:
         said = (
