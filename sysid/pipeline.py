@@ -58,11 +58,29 @@ def read(experiment: Experiment, machine: Robot, specs: list[LogSpec]) -> list[l
     return [replace(log, events=events.ordered([*log.events, *own])) if own else log for log, own in zip(found, more)]
 
 
-def fit(experiment: Experiment, *, filters: dict | None = None, progress: Progress | None = None) -> Fit:
+@dataclass(frozen=True)
+class Read:
+    """An experiment's logs, read once for all who look at them, and what there was to say of them."""
+
+    train: list[logs.Log]
+    test: list[logs.Log]
+    notices: tuple[str, ...]
+
+
+def read_all(experiment: Experiment) -> Read:
+    """The training and the test logs of an experiment. Raises SysidError."""
+    machine = robot.load(experiment.robot, experiment.folder)
+    with noticed() as notices:
+        parts = [read(experiment, machine, part) for part in (experiment.data.train, experiment.data.test)]
+    return Read(*parts, tuple(notices))
+
+
+def fit(experiment: Experiment, *, filters: dict | None = None, progress: Progress | None = None, measured: Read | None = None) -> Fit:
     """Identify an experiment: everything from its logs to its errors on held-out data.
 
     Args:
         filters: what an earlier fit of the same logs chose, `Fit.filters`; by default the filters are compared again.
+        measured: its logs, where they are at hand.
 
     Raises:
         SysidError: bad input, with the one line that says so. A search that does not converge does not raise; it
@@ -73,8 +91,10 @@ def fit(experiment: Experiment, *, filters: dict | None = None, progress: Progre
     with noticed() as notices:
         with _timed(seconds, "robot"):
             machine, structure, prior = build(experiment)
+        for text in measured.notices if measured else ():
+            warnings.warn(SysidWarning(text), stacklevel=2)
         with _timed(seconds, "read"):
-            train = read(experiment, machine, experiment.data.train)
+            train = measured.train if measured else read(experiment, machine, experiment.data.train)
         provenance = [_provenance("train", log, spec) for log, spec in zip(train, experiment.data.train)]
         with _timed(seconds, "filters"):
             chosen = filtering.compare(experiment, structure, train, prior) if filters is None else filters
@@ -101,7 +121,7 @@ def fit(experiment: Experiment, *, filters: dict | None = None, progress: Progre
             del motion
         with _timed(seconds, "test"):
             _tell_overlap(experiment)
-            held_out = read(experiment, machine, experiment.data.test)
+            held_out = measured.test if measured else read(experiment, machine, experiment.data.test)
             provenance += [_provenance("test", log, spec) for log, spec in zip(held_out, experiment.data.test)]
             motion = prepare(held_out, preprocess, machine.joints)
             del held_out
@@ -275,4 +295,4 @@ def _timed(seconds: dict[str, float], stage: str):
     seconds[stage] = time.perf_counter() - start
 
 
-__all__ = ["build", "fit", "load", "predict_log", "prepared", "read"]
+__all__ = ["Read", "build", "fit", "load", "predict_log", "prepared", "read", "read_all"]

@@ -54,26 +54,27 @@ class Refused:
 
 
 def claimed(
-    steps: list[Step], fit: Fit, tell: Callable[[str, float], None]
+    steps: list[Step], fit: Fit, measured: pipeline.Read, tell: Callable[[str, float], None]
 ) -> tuple[list[Claim], list[Refused]]:
     """Fit each step's head, and the best of what is tied with it, on top of what stands before it.
 
     Args:
-        fit: of the experiment as it is.
+        fit: of the experiment as it is. measured: its logs.
     """
+    with_ = lambda last, member: _with(last, member, fit, measured, tell)  # noqa: E731
     claims: list[Claim] = []
     refused: list[Refused] = []
     last = fit
     for step in steps:
         head, *tied = step.choice.members
-        after = _with(last, head[0], fit, tell)
+        after = with_(last, head[0])
         if (why := _nothing(last, after, head[0])) is not None:
             refused.append(Refused(head[0].candidate.name, where(head[0], fit), why))
             continue
         found = [(*head, after)]
         for member, chance in tied[: _FITTED - 1]:
             if chance >= _LIKELY:
-                found.append((member, chance, _with(last, member, fit, tell)))
+                found.append((member, chance, with_(last, member)))
         findings = [finding(last, then, m, chance, step, len(claims)) for m, chance, then in found]
         named = [(m.candidate.name, where(m, fit), chance) for m, chance in step.choice.members]
         claims.append(Claim(step, tuple(findings), last, after, tuple(named)))
@@ -81,11 +82,11 @@ def claimed(
     return claims, refused
 
 
-def _with(last: Fit, member: Member, first: Fit, tell) -> Fit:
+def _with(last: Fit, member: Member, first: Fit, measured, tell) -> Fit:
     """The fit of the last experiment with a candidate in it, filtered as the first one was."""
     name, joints, options = spelled(member.candidate, where(member, first))
     experiment = grown(last.experiment, name, joints, options, every=first.joints)
-    return pipeline.fit(experiment, filters=first.filters, progress=tell)
+    return pipeline.fit(experiment, filters=first.filters, progress=tell, measured=measured)
 
 
 def _nothing(before: Fit, after: Fit, member: Member) -> str | None:

@@ -78,20 +78,20 @@ def diagnose(
         SysidError: bad input, or logs too short to question.
     """
     tell = progress or (lambda stage, share: None)
-    fit = fit or pipeline.fit(experiment, progress=progress)
-    extra, robot, data = own_effects(experiment), fit.model.robot, experiment.data
+    measured = pipeline.read_all(experiment)
+    fit = fit or pipeline.fit(experiment, progress=progress, measured=measured)
+    extra = own_effects(experiment)
     with pipeline.noticed():
-        logs = [pipeline.read(experiment, robot, part) for part in (data.train, data.test)]
-        view = first_view(experiment, fit, logs[0])
+        view = first_view(experiment, fit, measured.train)
         steps, asked, _, undecided = select.search(view, extra, level=level, tell=tell)
-        claims, refused = claiming.claimed(steps, fit, tell)
+        claims, refused = claiming.claimed(steps, fit, measured, tell)
         refused += [claiming.undecided(choice, fit) for choice in undecided[-1:]]
         after, last = (claims[-1].step.after, claims[-1].after) if claims else (view, fit)
-        test = lowpassed(logs[1], fit.joints, view.cutoff)
+        test = lowpassed(measured.test, fit.joints, view.cutoff)
         if test is None:
             raise too_short()
         first, then = (HeldOut(one.settled, test) for one in (view, after))
-        found, weighed = _floors(experiment, last, after, logs)
+        found, weighed = _floors(experiment, last, after, (measured.train, measured.test))
         said = verdicts(fit, claims, after.unknown, found, refused, transfers(last), weighed)
         errors = last.rms("test").values()
         levels = np.array([e if f.rms is None else f.rms for f, e in zip(found, errors)])
