@@ -65,10 +65,10 @@ class Shape:
         self.name = name
 
     def bounds(self, scale: float, angle: float | None = None) -> tuple[float, float]:
-        """The bounds where what they are shares of is `scale`, and a joint travels `angle`: of what repeats, one period at
-        least must be seen."""
+        """The bounds where what they are shares of is `scale`, and a joint travels `angle`: what repeats must be
+        seen to: two periods at least, as of fewer a polynomial of the angle makes as much."""
         low, high = self.low * scale, self.high * scale
-        return (min(max(low, 2.0 * np.pi / angle), high), high) if self.spacing and angle else (low, high)
+        return (min(max(low, 4.0 * np.pi / angle), high), high) if self.spacing and angle else (low, high)
 
     def values(self, low: float, high: float, angle: float | None = None) -> np.ndarray:
         """Values to try between two bounds, ascending.

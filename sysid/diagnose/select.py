@@ -80,11 +80,9 @@ def _next(view: View, asked: Asked, level: float, worth: float, open_: list[Choi
         ]
         short = [top, *(k for k in short if k != top)][:_SHORTLIST]
         found = chosen(view, [asked.groups[k] for k in short], np.random.default_rng(1))
-        # of all that were compared, one at least must be there
-        there = {id(asked.groups[k]): asked.p(k) for k in hopeful}
-        refits = () if found is None else (*(m for m, _ in found.members), *found.beaten)
-        if p := [there[id(member.group)] for member in refits if id(member.group) in there]:
-            step = step_of(view, min(p), found, worth)
+        if found is not None:
+            # of all that were compared one at least is there, though its sign may forbid its name
+            step = step_of(view, min(asked.p(k) for k in short), found, worth)
             if step is not None and found.decided:
                 return step
             if step is not None:
