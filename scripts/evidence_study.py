@@ -109,7 +109,8 @@ def power(case: dict, level: float, worth: float) -> dict:
         for pick in rng.permutation(len(found)):
             one = found[pick]
             joint, sign = joints[one.candidate.joint], 1.0
-            text = f"{one.candidate.name}:{joint}:{one.parameter}={sign * one.size:.6g}"
+            values = {one.parameter: sign * one.size, **one.at}
+            text = f"{one.candidate.name}:{joint}:{','.join(f'{name}={value:.6g}' for name, value in values.items())}"
             try:
                 view = _view(case, Path(folder) / f"hidden{pick}", [hidden(text)])
             except Exception as error:  # noqa: BLE001 - a size that this robot cannot have

@@ -19,7 +19,7 @@ DIAGNOSE = {
         "probability": NUMBER, "command": str,
     }],
     "verdict": [{"joint": str, "status": str}],
-    "detectable": [{"effect": str, "joint": str, "parameter": str, "size": NUMBER, "unit": str, "power": NUMBER}],
+    "detectable": [{"effect": str, "joint": str, "parameter": str, "size": NUMBER, "unit": str, "power": NUMBER, "at": {str: NUMBER}}],
     "events": [{"kind": str, "log": str, "start": NUMBER, "stop": NUMBER, "joints": [str]}],
     "absorbed": [{"effect": str, "joint": str, "separate_by": str}],
     "fails_where": [{"joint": str, "share_of_error": NUMBER, "words": [str], "regions": list, "map": dict, "time": dict, "frequency": dict}],

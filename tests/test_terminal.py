@@ -104,6 +104,7 @@ def document(**more):
                 "size": 0.0123 * 10**k,
                 "unit": "N m/rad",
                 "power": 0.9,
+                "at": {},
             }
             for k, j in enumerate(JOINTS)
         ]
@@ -115,6 +116,7 @@ def document(**more):
                 "size": 0.011,
                 "unit": "rad",
                 "power": 0.9,
+                "at": {},
             }
         ],
         "absorbed": [

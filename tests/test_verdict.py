@@ -284,6 +284,9 @@ def test_every_effect_has_its_size_or_is_absorbed(control):
     assert found["payload", -1].size is None  # the last link's own inertia is a payload
     known = [d.size for d in found.values() if d.size is not None]
     assert len(known) > 20 and np.isfinite(known).all() and min(known) > 0
+    # what has a shape says at which, and what has none says nothing
+    assert set(found["stribeck", 0].at) == {"vs"} and found["stribeck", 0].at["vs"] > 0
+    assert found["quadratic_drag", 0].at == found["delay", 0].at == {}
 
 
 @pytest.mark.parametrize(("effect", "joint", "values"), [("quadratic_drag", 0, "c={}"), ("spring", 1, "k={},q0=0")])

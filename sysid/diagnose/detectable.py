@@ -8,7 +8,7 @@ passes both in nine of ten logs.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.special import ndtri
@@ -27,13 +27,15 @@ POWER = 0.9
 @dataclass(frozen=True)
 class Detectable:
     """The smallest `size` of an effect's leading parameter that these logs would have named with
-    probability `power`; None where the model absorbs it whatever its size."""
+    probability `power`, at the shape values `at` that show it best; None where the model absorbs it
+    whatever its size."""
 
     candidate: Candidate
     parameter: str
     unit: str
     size: float | None = None
     power: float = POWER
+    at: dict[str, float] = field(default_factory=dict)
 
 
 def detectable(view: View, asked: Asked, candidates) -> list[Detectable]:
@@ -53,9 +55,9 @@ def detectable(view: View, asked: Asked, candidates) -> list[Detectable]:
             size = own if size <= own else np.inf
         there = best[group.candidate.key]
         if np.isfinite(size) and (there.size is None or size < there.size):
-            best[group.candidate.key] = Detectable(
-                group.candidate, *_leading(view, group.candidate), size
-            )
+            name, unit = _leading(view, group.candidate)
+            at = {shape: own for shape, own in group.shapes.items() if shape != name}
+            best[group.candidate.key] = Detectable(group.candidate, name, unit, size, POWER, at)
     return list(best.values())
 
 

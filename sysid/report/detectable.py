@@ -32,7 +32,7 @@ def detectable(fit: Fit, document: dict) -> tuple[str, str, list]:
     if found:
         body += (
             "<p>The smallest size of each effect that these logs would have named nine times in "
-            "ten, had it been there. Smaller ones may be there unseen. “–”: at no size, as other "
+            "ten, had it been there, at the values of its shape that show it best. Smaller ones may be there unseen. “–”: at no size, as other "
             "parameters take its place.</p>"
         )
     if rows:
@@ -63,7 +63,8 @@ def detectable(fit: Fit, document: dict) -> tuple[str, str, list]:
 
 def _size(entry: dict) -> str:
     unit = "" if entry["unit"] in ("", "1") else SPACE + text(raised(entry["unit"]))
-    return f"{text(entry['parameter'])}{SPACE}{size(entry['size'])}{unit}"
+    at = "".join(f", {text(name)}{SPACE}{size(value)}" for name, value in entry["at"].items())
+    return f"{text(entry['parameter'])}{SPACE}{size(entry['size'])}{unit}{at}"
 
 
 def _followed(fit: Fit, document: dict) -> str:

@@ -36,6 +36,7 @@ def document(found: Diagnosis, run="") -> dict:
                 "size": d.size,
                 "unit": d.unit,
                 "power": d.power,
+                "at": dict(d.at),
             }
             for d in found.detectable
             if d.size is not None

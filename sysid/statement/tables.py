@@ -115,6 +115,12 @@ def shown(document: dict, joints: Sequence[str], width: int) -> list[str]:
     if not sizes and not absorbed:
         return []
     out = ["what these logs could have shown: the smallest size named nine times in ten"]
+    if any(d["at"] for d in document["detectable"]):
+        out = wrapped(
+            f"{out[0]}, where an effect has values of its shape at those that show it best",
+            width,
+            "  ",
+        )
     own = {
         # no cell: the effect is in the model already
         _label(key): [cells.get(j, absorbed.get((key[0], j), "")) for j in joints]
