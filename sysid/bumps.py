@@ -44,14 +44,14 @@ def bumps(robot: Robot, logs: Sequence[Log]) -> list[Event]:
     step = stride * motion.pieces[0].step
     size = np.abs(_left(rows))
     own = np.stack([_surprise(a, u, rows.piece, step) for a, u in zip(size.T, rows.use.T)], axis=1)
-    both = np.sort(own, axis=1)[:, -2]
-    span = len(both) * step
+    span = len(own) * step
     level = np.log(span / BURST * robot.dof / CHANCE)
     found = []
     for number, piece in enumerate(motion.pieces):
         (at,) = np.nonzero(rows.piece == number)
-        wide = maximum_filter1d(both[at], max(1, round(BURST / step)))
-        for a, b in bursts(wide, level):
+        # at once: within a burst, as each joint's rows may count at other moments of it
+        wide = maximum_filter1d(own[at], max(1, round(BURST / step)), axis=0)
+        for a, b in bursts(np.sort(wide, axis=1)[:, -2], level):
             greatest = own[at[a : b + 1]].max(axis=0)
             joints = tuple(robot.joints[j] for j in np.flatnonzero(greatest > 0.5 * level))
             start, stop = (float(rows.t[at[k]]) for k in (a, b))

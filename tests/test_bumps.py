@@ -81,3 +81,22 @@ def test_bursts_that_keep_coming_are_how_the_machine_moves(leg, tmp_path):
 def test_times_are_the_logs_own(pushed):
     _, logs = read(pushed[0])
     assert all(isinstance(e, Event) and isinstance(e.start, float) and np.isfinite(e.stop) for log in logs for e in log.events)
+
+
+@pytest.mark.parametrize(("apart", "found"), [(0.02, 1), (0.2, 0)])
+def test_a_push_stands_on_two_joints_within_a_burst(pushed, monkeypatch, apart, found):
+    """Each joint's rows may count at other moments of it, as one of them turns round."""
+    from sysid import bumps as module
+
+    machine, logs = read(pushed[0])
+    joints = iter((500, 500, 500))
+    shift = iter((0.0, apart, np.inf))
+
+    def surprise(size, use, piece, step):
+        out, at, late = np.full(len(size), -1.0), next(joints), next(shift)
+        if np.isfinite(late):
+            out[at + round(late / step)] = 100.0
+        return out
+
+    monkeypatch.setattr(module, "_surprise", surprise)
+    assert len(bumps(machine, [replace(log, events=()) for log in logs])) == found
