@@ -51,6 +51,25 @@ def fit(experiment: ExperimentPath, as_json: Json = False, out: Out = None, quie
 
 
 @app.command()
+def check(experiment: ExperimentPath, as_json: Json = False, out: Out = None, quiet: Quiet = False) -> None:
+    """What is wrong with an experiment's logs, before any fit. Exit status 1 where a fit of them would be wrong."""
+    from . import check as doctor
+    from . import pipeline, results
+
+    spec = pipeline.load(experiment)
+    document = doctor.document(doctor.check(spec))
+    results.write_json(results.folder(out or Path("runs") / spec.name) / "check.json", document)
+    if as_json:
+        print(json.dumps(document, allow_nan=False))
+    elif not quiet:
+        from .terminal import show_check
+
+        show_check(document)
+    if not document["ok"]:
+        raise typer.Exit(1)
+
+
+@app.command()
 def compare(
     experiments: Annotated[list[Path], typer.Argument(metavar="EXPERIMENT...", help="One or more experiments with the same test logs.")],
     as_json: Json = False, out: Out = None, quiet: Quiet = False,

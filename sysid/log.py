@@ -71,6 +71,17 @@ def read(log: LogSpec, data: DataSpec, joints: tuple[str, ...], prismatic, folde
     Raises:
         LogError: the file, a column, a unit or a value is not what a log can hold.
     """
+    path, t, signals = measured(log, data, joints, prismatic, folder)
+    segments = tuple(_segments(t, signals, str(path)))
+    return Log(name=log.file, path=path, sha256=_sha256(path), segments=segments)
+
+
+def measured(log: LogSpec, data: DataSpec, joints: tuple[str, ...], prismatic, folder: Path = Path()) -> tuple[Path, np.ndarray, dict]:
+    """The file of a log, its stamps t (n,) [s] and its signals {name: (n, ...)} in SI units, before they are resampled or split.
+
+    Raises:
+        LogError: as `read`.
+    """
     if (dataset := datasets.reference(log.file)) is not None:
         path = dataset.locate()
         table = dataset.open(path)
@@ -87,8 +98,7 @@ def read(log: LogSpec, data: DataSpec, joints: tuple[str, ...], prismatic, folde
     for name, values in signals.items():
         _check_finite(values, name, t, joints, where, first)
     _convert(signals, data, joints, prismatic, where)
-    segments = tuple(_segments(t, signals, where))
-    return Log(name=log.file, path=path, sha256=_sha256(path), segments=segments)
+    return path, t, signals
 
 
 def _load(table: Table, data: DataSpec, joints):

@@ -27,6 +27,7 @@ from .errors import SysidWarning
 from .estimate import Fit, Prediction, identify, predict
 from .inertia.consistency import is_consistent
 from .model import Model, moving_coefficients
+from .plausible import implausible
 from .preprocess import Motion, prepare
 from .robot import Robot
 
@@ -128,6 +129,9 @@ def fit(experiment: Experiment, *, filters: dict | None = None, progress: Progre
             disturbed += _tell_events("test", motion)
             predictions["test"] = predict(structure, found.x, motion)
             samples["test"], left_out["test"] = motion.samples, _left_out(motion)
+        _tell_same(provenance)
+        for text in implausible(replace(found, predictions=predictions)):
+            warnings.warn(SysidWarning(text), stacklevel=2)
     return replace(
         found, predictions=predictions, samples=samples, left_out=left_out, seconds=seconds, filters=chosen, logs=tuple(provenance),
         notices=tuple(notices), events=tuple(disturbed),
@@ -265,6 +269,15 @@ def _tell_overlap(experiment: Experiment) -> None:
             high = min(np.inf if test.stop is None else test.stop, np.inf if train.stop is None else train.stop)
             if test.file == train.file and low < high:
                 warnings.warn(SysidWarning(f"test log {test.file} overlaps a training log; its error is not held out"), stacklevel=2)
+
+
+def _tell_same(logs: list[dict]) -> None:
+    for test in (log for log in logs if log["part"] == "test"):
+        for train in (log for log in logs if log["part"] == "train" and log["log"] != test["log"]):
+            low = max(test["start"] or 0.0, train["start"] or 0.0)
+            high = min(np.inf if test["stop"] is None else test["stop"], np.inf if train["stop"] is None else train["stop"])
+            if test["sha256"] == train["sha256"] and low < high:
+                warnings.warn(SysidWarning(f"test log {test['log']} is the training log {train['log']} under another name; its error is not held out"), stacklevel=3)
 
 
 def _provenance(part: str, log: logs.Log, spec: LogSpec) -> dict:

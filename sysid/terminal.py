@@ -71,6 +71,26 @@ def _show_filter(chosen: dict) -> None:
     print(f"filter: {chosen['filter']}, {key} {chosen[key]:g} {unit} ({chosen['chosen']}); held-out error within the training logs, {shown}")
 
 
+def show_check(document: dict) -> None:
+    """Every fault of the logs with its cure, the gravest first; the same fault of several joints or logs under one cure."""
+    width = shutil.get_terminal_size().columns
+    groups: dict[tuple[str, str, str], list[str]] = {}
+    for f in document["faults"]:
+        groups.setdefault((f["severity"], f["fault"], f["do"]), []).append(f["says"])
+    for (severity, fault, do), says in groups.items():
+        print(f"{severity}: {fault}")
+        for line in says:
+            print("\n".join(text.wrapped(f"  {line}", width, "    ")))
+        print("\n".join(text.wrapped(f"  -> {do}", width, "     ")))
+    errors, all_ = (sum(f["severity"] == "error" for f in document["faults"]), len(document["faults"]))
+    if not all_:
+        print("no fault was found")
+    elif document["ok"]:
+        print(f"{all_} warning{'s' * (all_ > 1)}; a fit can be trusted beyond them")
+    else:
+        print(f"{errors} error{'s' * (errors > 1)}, {all_ - errors} warning{'s' * (all_ - errors != 1)}: a fit of these logs would be wrong")
+
+
 def show_comparison(document: dict) -> None:
     """RMS of every experiment and the differences with their standard errors."""
     console = Console()

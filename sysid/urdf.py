@@ -33,7 +33,8 @@ class Link:
 
 @dataclass(frozen=True)
 class Joint:
-    """A joint as the URDF states it; `damping` [N m s/rad] and `friction` [N m] from `<dynamics>`, `limits` [rad or m]."""
+    """A joint as the URDF states it; `damping` [N m s/rad] and `friction` [N m] from `<dynamics>`, `limits` [rad or m], and
+    what it may do at most, infinite where nothing is stated: `velocity` [rad/s or m/s], `effort` [N m or N]."""
 
     name: str
     type: str
@@ -42,6 +43,8 @@ class Joint:
     damping: float
     friction: float
     limits: tuple[float, float]
+    velocity: float = math.inf
+    effort: float = math.inf
 
 
 @dataclass(frozen=True)
@@ -246,7 +249,10 @@ def _joint(element, path: Path) -> Joint:
         axis = _numbers(element.find("axis"), "xyz", 3, "1 0 0", path, f"joint {name!r}")
         if not np.linalg.norm(axis) > 0:
             raise RobotError(f"joint {name!r} has the axis 0 0 0", where=str(path), allowed="a direction")
-    return Joint(name, kind, ends[0], ends[1], damping, friction, (lower, upper) if kind != "continuous" else (-math.inf, math.inf))
+    # zero is what exporters write where nobody knows
+    most = [(_numbers(limit, key, 1, "0", path, f"joint {name!r}")[0] if limit is not None else 0.0) or math.inf for key in ("velocity", "effort")]
+    bounds = (lower, upper) if kind != "continuous" else (-math.inf, math.inf)
+    return Joint(name, kind, ends[0], ends[1], damping, friction, bounds, *most)
 
 
 # What identification does not use, but the identified URDF repeats: {element: {attribute: how many numbers}}.

@@ -19,8 +19,8 @@ ROOT = Path(__file__).resolve().parent.parent
 ORDER = [
     "errors", "units", "inertia", "urdf", "readers", "datasets", "config", "prior", "robot", "regressor", "outliers", "knocks", "jumps", "repeats",
     "events", "frequencies", "clock", "log", "preprocess", "blocks", "two_masses", "lowpass", "flexible",
-    "effect", "formula", "effects", "own_effects", "model", "rows", "source", "compress", "objective", "interior", "certificate", "solve", "uncertainty", "estimate", "shape", "bumps",
-    "filters", "results", "urdf_export", "pipeline", "simulate", "comparison", "transfer", "noise", "candidates", "view", "addition", "failures", "diagnose", "changes", "statement", "loop", "report", "studies", "studio", "terminal", "cli", "__main__",
+    "effect", "formula", "effects", "own_effects", "model", "rows", "source", "compress", "objective", "interior", "certificate", "solve", "uncertainty", "estimate", "plausible", "shape", "bumps",
+    "filters", "results", "urdf_export", "pipeline", "check", "simulate", "comparison", "transfer", "noise", "candidates", "view", "addition", "failures", "diagnose", "changes", "statement", "loop", "report", "studies", "studio", "terminal", "cli", "__main__",
 ]  # fmt: skip
 # Late imports that close a loop on purpose: a path that names a data set, a prior that is a previous run, the effects
 # that an effect's contract finds, what an experiment file may say of them, and the segment that events are found in, a type.
@@ -66,7 +66,7 @@ def test_the_diagnosis_can_be_read():
     assert not long and not wide and total < 1500, (long, wide, total)
 
 
-BESIDE = ["blocks", "changes", "failures", "flexible", "lowpass", "noise", "statement"]
+BESIDE = ["blocks", "changes", "check", "failures", "flexible", "lowpass", "noise", "statement"]
 
 
 @pytest.mark.parametrize("room", BESIDE)

@@ -1,0 +1,73 @@
+"""The log doctor: what is wrong with an experiment's logs, before any fit.
+
+look.py       every log as measured, and as it is used
+equations.py  what the URDF's robot makes of it, however its columns are read
+faults/       what can be wrong; each module has `find(look)`, says AFTER which others it is asked
+              (a number), and errors of which it would be SENSELESS
+fault.py      what is told
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from importlib import import_module
+from pkgutil import iter_modules
+
+from ..config import Experiment
+from ..pipeline import noticed
+from .fault import ERROR, WARNING, Fault
+from .look import looked
+
+#: the user can be told of these
+FAULTS = (
+    "angle_wrap", "joint_order", "sign_flipped", "wrong_unit", "torque_in_amperes",
+    "commanded_torque", "effort_missing", "spikes", "knock", "brake_closed", "values_held",
+    "clock_jitter", "clock_gap", "delayed_signal", "saturation", "coarse_values", "standstill",
+    "slow_logger", "test_is_train", "not_excited", "limit_exceeded", "mass_implausible",
+)  # fmt: skip
+
+
+def check(experiment: Experiment) -> list[Fault]:
+    """The faults of an experiment's logs, the gravest first.
+
+    Raises:
+        SysidError: what cannot be read at all.
+    """
+    with noticed():
+        found = list(_found(looked(experiment)))
+    return sorted(found, key=lambda fault: (fault.severity != ERROR, FAULTS.index(fault.fault)))
+
+
+def _found(look) -> Iterator[Fault]:
+    from . import faults
+
+    names = sorted(module.name for module in iter_modules(faults.__path__))
+    modules = [import_module(f"{faults.__name__}.{name}") for name in names]
+    grave: set[str] = set()
+    # what a later one looks at, an earlier one's errors may have made senseless
+    for module in sorted(modules, key=lambda module: module.AFTER):
+        if grave.isdisjoint(module.SENSELESS):
+            for fault in module.find(look):
+                grave |= {fault.fault} if fault.severity == ERROR else set()
+                yield fault
+
+
+def document(found: list[Fault]) -> dict:
+    """The document of `sysid check`."""
+    listed = [
+        {
+            "fault": f.fault,
+            "severity": f.severity,
+            "joint": f.joint or None,
+            "log": f.log or None,
+            "times": list(f.times),
+            "rows": f.rows,
+            "says": f.says,
+            "do": f.do,
+        }
+        for f in found
+    ]
+    return {"ok": not any(f.severity == ERROR for f in found), "faults": listed}
+
+
+__all__ = ["ERROR", "FAULTS", "WARNING", "Fault", "check", "document"]

@@ -1,0 +1,93 @@
+"""What stamps show by themselves."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from ...lowpass import band
+from ..fault import ERROR, WARNING, Fault
+from ..look import Logged, Look
+
+AFTER, SENSELESS = 0, ()
+_GAP = 10.0  # steps: as `log` splits them
+_JITTER = 0.05  # of a step, RMS: what is less, resampling mends
+_STEPS = (2e-5, 0.5)  # s from sample to sample: no logger of a robot is faster or slower
+# Samples in a cycle of the fastest motion, and a second: accelerations need some, and what friction
+# does at a reversal none more than that
+_CYCLE, _FAST = 20.0, 120.0
+_SHOWN = 8
+
+
+def find(look: Look) -> Iterator[Fault]:
+    """wrong_unit of time; clock_gap, clock_jitter, slow_logger."""
+    for log in look.logs:
+        if not _STEPS[0] <= log.step <= _STEPS[1]:
+            yield _unit(log)
+            continue
+        steps = np.diff(log.t)
+        gaps = np.flatnonzero(steps > _GAP * log.step)
+        if len(gaps):
+            times = tuple(float(log.t[k]) for k in gaps[:_SHOWN])
+            yield Fault(
+                "clock_gap",
+                WARNING,
+                (
+                    f"{len(gaps)} gap{'s' * (len(gaps) > 1)} in {log.log.name}, the longest "
+                    f"{steps[gaps].max():.3g} s "
+                    f"at {log.t[gaps[np.argmax(steps[gaps])]]:.4g} s"
+                ),
+                "the log is split there; log without gaps",
+                log=log.log.name,
+                times=times,
+                rows=len(gaps),
+            )
+        regular = steps[steps <= _GAP * log.step]
+        # missing samples are whole steps more, and no jitter
+        late = regular - log.step * np.maximum(np.round(regular / log.step), 1.0)
+        jitter = float(np.sqrt(np.mean(late**2)))
+        if jitter > _JITTER * log.step:
+            worst = float(log.t[int(np.argmax(np.abs(steps - log.step)))])
+            yield Fault(
+                "clock_jitter",
+                WARNING,
+                (
+                    f"the stamps of {log.log.name} are {1e3 * jitter:.2g} ms (RMS) off a "
+                    f"steady step of {1e3 * log.step:.3g} ms"
+                ),
+                (
+                    "log with the time at which the values were taken; they are resampled, "
+                    "and what the angles show of their time is corrected"
+                ),
+                log=log.log.name,
+                times=(worst,),
+                rows=int(np.sum(np.abs(late) > _JITTER * log.step)),
+            )
+        fastest = band([log.log])
+        if fastest * log.step * _CYCLE > 1.0 and log.step * _FAST > 1.0:
+            yield Fault(
+                "slow_logger",
+                WARNING,
+                (
+                    f"{log.log.name} has {1.0 / log.step:.3g} samples a second for motion "
+                    f"of up to {fastest:.2g} Hz: {1.0 / (fastest * log.step):.2g} a cycle"
+                ),
+                f"log at {min(_CYCLE * fastest, _FAST):.0f} Hz or more, or move slower",
+                log=log.log.name,
+                rows=len(log.t),
+            )
+
+
+def _unit(log: Logged) -> Fault:
+    return Fault(
+        "wrong_unit",
+        ERROR,
+        (
+            f"{log.log.name} has {log.step:.3g} s from sample to sample, "
+            f"{np.ptp(log.t):.4g} s in all"
+        ),
+        "set data.units.time (s, ms, us, ns)",
+        log=log.log.name,
+        rows=len(log.t),
+    )

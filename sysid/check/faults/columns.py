@@ -1,0 +1,129 @@
+"""Whether another reading of the columns explains the torque better: order, signs, units."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import combinations
+
+import numpy as np
+
+from ..equations import LIKELY, Equations, Reading, Scored
+from ..fault import ERROR, Fault
+from ..look import Look
+
+AFTER, SENSELESS = 2, ("wrong_unit", "angle_wrap")
+# Log of squares that another reading must take off, in all and of each joint whose column it reads
+# otherwise: what is left falls to a third of its power.
+_BETTER = 1.0
+_ROUNDS = 4
+_EXPLAINS = 0.2  # of a joint's torque squared: less of the URDF's torque tells no factor
+_THOUSAND = (500.0, 2000.0)
+_OUT_OF = "compare the logger's order and signs with the URDF's"
+
+
+def find(look: Look) -> Iterator[Fault]:
+    """joint_order, sign_flipped, wrong_unit, torque_in_amperes."""
+    equations = look.equations
+    if equations is None:
+        return
+    reading = Reading.plain(look.robot.dof)
+    scored = equations.scored(reading)
+    for _ in range(_ROUNDS):
+        tried = [(made, told, equations.scored(made)) for made, told in _others(reading, look)]
+        tried = [(s.loss, made, told, s) for made, told, s in tried if _clear(scored, s, told[1])]
+        if not tried:
+            break
+        _, reading, (kind, joints, word), scored = min(tried, key=lambda one: one[0])
+        yield from _told(look, kind, joints, word)
+    yield from _factors(look, equations, reading, scored)
+
+
+def _others(reading: Reading, look: Look) -> Iterator[tuple[Reading, tuple]]:
+    """Readings that differ in one thing, with (fault, joints, what)."""
+    dof = look.robot.dof
+    for i, j in combinations(range(dof), 2):
+        angle, torque = _swapped(reading.angle, i, j), _swapped(reading.torque, i, j)
+        yield replace(reading, torque=torque), ("joint_order", (i, j), "torque")
+        yield replace(reading, angle=angle), ("joint_order", (i, j), "angle")
+        yield replace(reading, angle=angle, torque=torque), ("joint_order", (i, j), "")
+    for j in range(dof):
+        angle, torque = _turned(reading.angle_factor, j), _turned(reading.torque_factor, j)
+        yield replace(reading, torque_factor=torque), ("sign_flipped", (j,), "torque")
+        yield replace(reading, angle_factor=angle), ("sign_flipped", (j,), "angle")
+        yield (
+            replace(reading, angle_factor=angle, torque_factor=torque),
+            ("sign_flipped", (j,), "angle and torque"),
+        )
+
+
+def _swapped(order, i: int, j: int) -> tuple:
+    return tuple(order[{i: j, j: i}.get(k, k)] for k in range(len(order)))
+
+
+def _turned(factors, j: int) -> tuple:
+    return tuple(-f if k == j else f for k, f in enumerate(factors))
+
+
+def _clear(before: Scored, after: Scored, joints) -> bool:
+    known = before.known & after.known
+    gain = np.log(before.left / after.left) * known
+    return bool(gain.sum() > _BETTER * len(joints) and np.all(gain[list(joints)] > 0.0))
+
+
+def _told(look: Look, kind: str, joints, word: str) -> Iterator[Fault]:
+    names = [look.robot.joints[j] for j in joints]
+    for name in names:
+        if kind == "joint_order":
+            other = names[1 - names.index(name)]
+            what = f"the {word} column" if word else "the columns"
+            says = (
+                f"{what} of {name} and {other} look exchanged: the URDF's robot "
+                "explains them in the other order"
+            )
+            yield Fault(kind, ERROR, says, f"correct data.columns; {_OUT_OF}", name)
+        else:
+            says = (
+                f"the {word} of {name} has the sign against the URDF's: as it is, "
+                "friction would drive the joint or gravity lift it"
+            )
+            yield Fault(kind, ERROR, says, f"turn the sign before it is logged; {_OUT_OF}", name)
+
+
+def _factors(look: Look, equations: Equations, reading: Reading, scored: Scored) -> Iterator[Fault]:
+    """How much larger or smaller the torque is than the URDF's masses ask for."""
+    free = equations.scored(reading, free=True)
+    tells = free.known & (free.taken > _EXPLAINS) & (free.factor > 0.0)
+    off = (
+        tells
+        & ((free.factor < LIKELY[0]) | (free.factor > LIKELY[1]))
+        & (np.log(scored.left / free.left) > 0.1)
+    )
+    # one link's mass may be anything; that of all is a unit
+    if off.sum() <= 0.5 * tells.sum():
+        return
+    for j in np.flatnonzero(tells):
+        name, own = look.robot.joints[j], float(free.factor[j])
+        says = f"the torque of {name} is {_times(own)} what the URDF's masses need"
+        thousand = _THOUSAND[0] < max(own, 1.0 / own) < _THOUSAND[1]
+        if thousand:
+            yield Fault("wrong_unit", ERROR, says, "is it in mN m, or kN m? give it in N m", name)
+        elif own < 1.0:
+            yield Fault(
+                "torque_in_amperes",
+                ERROR,
+                says,
+                (
+                    "if it is a current set data.units.torque: A and torque_constant, the "
+                    "gear's ratio included"
+                ),
+                name,
+            )
+        else:
+            yield Fault(
+                "wrong_unit", ERROR, says, "give it in N m, on the joint's side of the gear", name
+            )
+
+
+def _times(factor: float) -> str:
+    return f"{factor:.2g} times" if factor >= 1.0 else f"one {1.0 / factor:.2g}th of"

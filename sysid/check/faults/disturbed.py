@@ -1,0 +1,83 @@
+"""What disturbed a log and is no motion of its robot: `sysid.events`, told."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from ..fault import WARNING, Fault
+from ..look import Look
+
+AFTER, SENSELESS = 0, ()
+#: {kind of event: (fault, what it is, what to do)}
+_KINDS = {
+    "spike": (
+        "spikes",
+        "single samples of the torque of {joint} stand alone",
+        "mend the reading; fits leave them out",
+    ),
+    "knock": ("knock", "the arm was pushed or hit", "log again without; fits leave these rows out"),
+    "brake": (
+        "brake_closed",
+        "the torque of {joint} is held while it rests, as by a closed brake",
+        "nothing, where a brake closed: fits leave these rows out",
+    ),
+    "frozen": (
+        "values_held",
+        "the reading of {joint} stood still while it moved",
+        "mend the logger; fits leave these rows out",
+    ),
+    "saturation": (
+        "saturation",
+        "the torque of {joint} has flat tops at its extreme",
+        ("raise the sensor's range or move slower; see the effect torque_saturation"),
+    ),
+}
+_SHOWN = 8
+_AGAIN = 0.2  # of the rows: that many which only repeat the row before
+
+
+def find(look: Look) -> Iterator[Fault]:
+    """spikes, knock, brake_closed, values_held, saturation."""
+    for log in look.logs:
+        groups: dict[tuple[str, str], list] = {}
+        for event in log.log.events:
+            for joint in event.joints if event.kind != "knock" else ("",):
+                groups.setdefault((event.kind, joint), []).append(event)
+        for (kind, joint), own in groups.items():
+            fault, says, do = _KINDS[kind]
+            times = tuple(round(e.start, 6) for e in own[:_SHOWN])
+            rows = sum(max(1, round((e.stop - e.start) / log.step) + 1) for e in own)
+            shown = ", ".join(f"{at:.4g}" for at in times[:4]) + (", ..." if len(own) > 4 else "")
+            yield Fault(
+                fault,
+                WARNING,
+                (
+                    f"{says.format(joint=joint)} {len(own)} time{'s' * (len(own) > 1)} in "
+                    f"{log.log.name}, at {shown} s"
+                ),
+                do,
+                joint,
+                log.log.name,
+                times,
+                rows,
+            )
+        moving = np.any(np.abs(np.diff(log.q, axis=0)) > 0.0, axis=1).any()
+        again = np.all(np.diff(log.q, axis=0) == 0.0, axis=1) & np.all(
+            np.diff(log.tau, axis=0) == 0.0, axis=1
+        )
+        if moving and np.mean(again) > _AGAIN:
+            yield Fault(
+                "values_held",
+                WARNING,
+                (
+                    f"{100 * np.mean(again):.0f} % of the rows of {log.log.name} only "
+                    "repeat the row before: it was written faster than it was measured"
+                ),
+                "log at the rate of the measurement",
+                "",
+                log.log.name,
+                (float(log.t[int(np.argmax(again)) + 1]),),
+                int(np.sum(again)),
+            )

@@ -1,0 +1,53 @@
+"""What the torques show by themselves."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from ...outliers import quantum
+from ..fault import ERROR, WARNING, Fault
+from ..look import Logged, Look
+
+AFTER, SENSELESS = 0, ()
+_COARSE = 0.015  # of the greatest torque
+_TRAVELS = 0.05  # rad or m: a joint that moves so far needs torque
+
+
+def find(look: Look) -> Iterator[Fault]:
+    """effort_missing, coarse_values."""
+    for j, joint in enumerate(look.robot.joints):
+        for log in look.logs:
+            yield from _of_log(look, log, j, joint)
+
+
+def _of_log(look: Look, log: Logged, j: int, joint: str) -> Iterator[Fault]:
+    tau, name = log.tau[:, j], log.log.name
+    if not np.ptp(tau) > 0.0:
+        if np.ptp(log.q[:, j]) > _TRAVELS:
+            yield Fault(
+                "effort_missing",
+                ERROR,
+                (f"the torque of {joint} is {tau[0]:.4g} throughout {name}, and the joint moves"),
+                "log its torque or current, or leave the joint out with robot.lock",
+                joint,
+                name,
+                (float(log.t[0]),),
+                len(tau),
+            )
+        return
+    grain, most = float(quantum(tau)), float(np.quantile(np.abs(tau - np.median(tau)), 0.999))
+    if grain > _COARSE * most:
+        yield Fault(
+            "coarse_values",
+            WARNING,
+            (
+                f"the torque of {joint} comes in steps of {grain:.2g} in {name}, "
+                f"{100 * grain / most:.2g} % of its range"
+            ),
+            "log it with more digits",
+            joint,
+            name,
+            rows=len(tau),
+        )

@@ -1,0 +1,104 @@
+"""What a check looks at: the samples of every log as they were measured, and as they are used."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from .. import log as logs
+from .. import pipeline, robot
+from ..config import EffectSpec, Experiment, LogSpec
+from ..lowpass import lowpassed, stride_of, widest
+from ..model import Model, build
+from ..preprocess import Motion
+from ..robot import Robot
+from ..rows import Rows, stack
+from .equations import Equations
+
+_HAS = ("armature", "viscous", "coulomb", "torque_bias")  # what any joint has
+_FEWEST = 50  # samples
+
+
+@dataclass(frozen=True)
+class Logged:
+    """One log: part "train" or "test", its entry in the experiment file, the file, stamps t (n,)
+    [s], angles q and torque tau (n, dof) as measured, and the log in segments with its events."""
+
+    part: str
+    spec: LogSpec
+    path: Path
+    t: np.ndarray
+    q: np.ndarray
+    tau: np.ndarray
+    log: logs.Log
+
+    @property
+    def step(self) -> float:
+        """Median seconds from sample to sample."""
+        return float(np.median(np.diff(self.t)))
+
+
+@dataclass(frozen=True)
+class Seen:
+    """A motion, every how many samples of it a row is kept, a model, and its rows."""
+
+    motion: Motion
+    stride: int
+    model: Model
+    rows: Rows
+
+    @property
+    def step(self) -> float:
+        """Seconds from row to row."""
+        return self.stride * self.motion.pieces[0].step
+
+
+@dataclass(frozen=True)
+class Look:
+    """An experiment, its robot and all its logs."""
+
+    experiment: Experiment
+    robot: Robot
+    logs: tuple[Logged, ...]
+
+    def part(self, name: str) -> list[Logged]:
+        """The logs of "train" or "test"."""
+        return [log for log in self.logs if log.part == name]
+
+    @cached_property
+    def seen(self) -> Seen | None:
+        """The training motion under a low-pass, with the columns of rigid bodies and of what any
+        joint has; None where the logs are too short."""
+        found = [log.log for log in self.part("train")]
+        cutoff = widest(found)
+        motion = lowpassed(found, self.robot.joints, cutoff)
+        if motion is None or motion.samples < _FEWEST:
+            return None
+        model, stride = (
+            build(self.robot, [EffectSpec(name=n) for n in _HAS]),
+            stride_of(motion, cutoff),
+        )
+        return Seen(motion, stride, model, stack(model, motion, stride))
+
+    @cached_property
+    def equations(self) -> Equations | None:
+        """What the robot of the URDF makes of the training logs; None where they are too short."""
+        return Equations.of(self.robot, [log.log for log in self.part("train")])
+
+
+def looked(experiment: Experiment) -> Look:
+    """Read everything that an experiment names. Raises SysidError, as a fit would."""
+    preprocess = experiment.preprocess.model_copy(update={"events": "mask"})
+    asked = experiment.model_copy(update={"preprocess": preprocess})
+    machine = robot.load(experiment.robot, experiment.folder)
+    out = []
+    for part in ("train", "test"):
+        specs = getattr(experiment.data, part)
+        for spec, log in zip(specs, pipeline.read(asked, machine, specs)):
+            args = experiment.data, machine.joints, machine.prismatic, experiment.folder
+            path, t, signals = logs.measured(spec, *args)
+            out.append(Logged(part, spec, path, t, signals["q"], signals["tau"], log))
+    return Look(experiment, machine, tuple(out))

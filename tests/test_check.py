@@ -1,0 +1,127 @@
+"""The log doctor: every fault is found where it is planted, and a clean log has none."""
+
+import json
+import shutil
+
+import numpy as np
+import pytest
+
+from scripts import check_study
+from scripts.blind_benchmark import experiment_of
+from sysid import check, pipeline
+from sysid.check import FAULTS
+from sysid.check.equations import Reading
+from sysid.check.look import looked
+from sysid.simulate import simulate, write
+
+RATE, SECONDS = 500.0, 15.0
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """Makes the planar arm's logs under conditions, each once."""
+    known = {}
+
+    def make(**options):
+        key = tuple(sorted(options.items()))
+        if key not in known:
+            folder = tmp_path_factory.mktemp("logs")
+            experiment, machine = experiment_of("planar", folder)
+            own = {"seed": 5, "duration": SECONDS, "rate": RATE, **options}
+            write(simulate(machine, **own), experiment, folder / "logs")
+            known[key] = folder / "logs"
+        return known[key]
+
+    return make
+
+
+def planted(fault: str, folder, tmp_path, seed: int):
+    """A copy of a folder with a fault in it, and the joints on which it may be named."""
+    logs = shutil.copytree(folder, tmp_path / "logs")
+    spoiled = check_study.Planted(logs, ("shoulder", "elbow"), np.random.default_rng(seed))
+    spoiled.step = 1.0 / RATE
+    getattr(check_study, fault)(spoiled)
+    spoiled.save()
+    return logs, {spoiled.joint} if isinstance(spoiled.joint, str) else set(spoiled.joint)
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_every_fault_is_found_where_it_is(fault, made, tmp_path):
+    if fault in check_study.MADE:
+        logs, joints = made(**check_study.MADE[fault]), {"shoulder", "elbow", ""}
+    else:
+        logs, joints = planted(fault, made(), tmp_path, seed=3)
+    found = check.check(pipeline.load(logs))
+    own = [f for f in found if f.fault == fault]
+    assert own and {f.joint for f in own} <= joints | {""}, [(f.fault, f.joint, f.says) for f in found]
+    for f in own:
+        assert f.says and f.do and f.severity in ("error", "warning")
+        assert f.joint in ("", "shoulder", "elbow") and f.log in ("", "train.csv", "test.csv")
+        assert all(np.isfinite(f.times)) and f.rows >= 0
+
+
+@pytest.mark.parametrize("seed", [5, 6, 7])
+def test_a_clean_log_has_no_fault(seed, made):
+    assert check.check(pipeline.load(made(seed=seed))) == []
+
+
+@pytest.mark.parametrize("what", ["deg", "ms", "mNm"])
+def test_a_wrong_unit_is_said_once_and_nothing_that_follows_from_it(what, made, tmp_path):
+    class Drawn:
+        choice = staticmethod(lambda *_: what)
+        integers = staticmethod(lambda *_: 0)
+
+    logs = shutil.copytree(made(), tmp_path / "logs")
+    spoiled = check_study.Planted(logs, ("shoulder", "elbow"), Drawn())
+    check_study.wrong_unit(spoiled)
+    spoiled.save()
+    found = check.check(pipeline.load(logs))
+    assert {f.fault for f in found if f.severity == "error"} == {"wrong_unit"}
+    assert not {f.fault for f in found} & {"joint_order", "sign_flipped", "mass_implausible", "not_excited"}
+
+
+def test_another_reading_is_scored_as_the_log_that_it_makes(made, tmp_path):
+    """Exchanged columns read exchanged leave what the right ones leave."""
+    right = looked(pipeline.load(made())).equations
+    logs = shutil.copytree(made(), tmp_path / "logs")
+    spoiled = check_study.Planted(logs, ("shoulder", "elbow"), np.random.default_rng(0))
+    names = {"tau_shoulder": "tau_elbow", "tau_elbow": "tau_shoulder", "q_elbow": "q_elbow"}
+    spoiled.tables = {file: table.rename(names).select(table.columns) for file, table in spoiled.tables.items()}
+    spoiled.save()
+    wrong = looked(pipeline.load(logs)).equations
+    exchanged = Reading((0, 1), (1, 0), (1.0, 1.0), (1.0, 1.0))
+    assert wrong.scored(exchanged).left == pytest.approx(right.scored(Reading.plain(2)).left, rel=1e-9)
+    assert wrong.scored(exchanged).loss < wrong.scored(Reading.plain(2)).loss - 2.0
+
+
+def test_the_command_says_it_and_exits_with_one(made, tmp_path, cli):
+    said = cli("check", made(), "--json")
+    assert said.status == 0 and json.loads(said.out) == {"ok": True, "faults": []}
+    assert "no fault was found" in cli("check", made()).out
+    logs, _ = planted("effort_missing", made(), tmp_path, seed=1)
+    said = cli("check", logs, "--json")
+    document = json.loads(said.out)
+    assert said.status == 1 and document["ok"] is False
+    keys = {"fault": str, "severity": str, "joint": (str, type(None)), "log": (str, type(None)), "times": list, "rows": int, "says": str, "do": str}
+    for fault in document["faults"]:
+        assert set(fault) == set(keys) and all(isinstance(fault[key], kind) for key, kind in keys.items())
+    shown = cli("check", logs)
+    assert shown.status == 1 and "error: effort_missing" in shown.out and "a fit of these logs would be wrong" in shown.out
+    cli("check", tmp_path / "nothing", out=tmp_path / "another").complains("nothing")
+
+
+@pytest.mark.parametrize(("fault", "seed", "words"), [
+    ("joint_order", 1, "worse than none"), ("torque_in_amperes", 1, "implausible masses"), ("test_is_train", 1, "under another name"),
+])  # fmt: skip
+def test_a_fit_says_what_cannot_be_meant(fault, seed, words, made, tmp_path):
+    """Nothing that can be fitted is refused, and what comes of it is not told as a fact."""
+    assert not any("implausible" in notice for notice in pipeline.fit(pipeline.load(made())).notices)
+    logs, _ = planted(fault, made(), tmp_path, seed)
+    assert any(words in notice for notice in pipeline.fit(pipeline.load(logs)).notices)
+
+
+def test_a_fit_says_which_torque_no_drive_gives(made, tmp_path):
+    logs = shutil.copytree(made(), tmp_path / "logs")
+    urdf = logs / "robot.urdf"
+    urdf.write_text(urdf.read_text().replace('effort="100"', 'effort="0.5"'))
+    assert any("the torque of elbow reaches" in notice for notice in pipeline.fit(pipeline.load(logs)).notices)
