@@ -1,7 +1,10 @@
 """Identify what a robot is made of, and name the physics its model lacks.
 
     experiment = sysid.load("experiment.yaml")
+    sysid.check(experiment)
     fit = sysid.fit(experiment)
+    sysid.diagnose(experiment, fit=fit)
+    fit.to_dataframe(), fit.plot()
     fit.rms("test"), fit.x, fit.uncertainty.std
     sysid.predict(fit, "another_log.csv").residual
     sysid.compare(fit, another_fit)
@@ -14,6 +17,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from . import check, diagnose
     from .comparison import Difference, compare
     from .config import Experiment
     from .errors import SysidError, SysidWarning
@@ -26,7 +30,7 @@ _WHERE = {
     "load": ("pipeline", "load"), "fit": ("pipeline", "fit"), "predict": ("pipeline", "predict_log"),
     "write": ("results", "write"), "compare": ("comparison", "compare"), "Difference": ("comparison", "Difference"),
     "Experiment": ("config", "Experiment"), "Fit": ("estimate", "Fit"), "Prediction": ("estimate", "Prediction"),
-    "SysidError": ("errors", "SysidError"), "SysidWarning": ("errors", "SysidWarning"),
+    "check": ("check", None), "diagnose": ("diagnose", None), "SysidError": ("errors", "SysidError"), "SysidWarning": ("errors", "SysidWarning"),
 }  # fmt: skip
 
 
@@ -34,10 +38,15 @@ def __getattr__(name: str):
     if name not in _WHERE:
         raise AttributeError(f"module 'sysid' has no attribute {name!r}")
     module, attribute = _WHERE[name]
-    return getattr(import_module(f".{module}", __name__), attribute)
+    found = import_module(f".{module}", __name__)
+    return found if attribute is None else getattr(found, attribute)
+
+
+def __dir__():
+    return sorted([*(name for name in globals() if name.startswith("__")), *_WHERE])
 
 
 __all__ = [
-    "Difference", "Experiment", "Fit", "Prediction", "SysidError", "SysidWarning", "compare", "fit", "load", "predict",
-    "write",
+    "Difference", "Experiment", "Fit", "Prediction", "SysidError", "SysidWarning", "check", "compare", "diagnose", "fit",
+    "load", "predict", "write",
 ]

@@ -99,6 +99,33 @@ class Fit:
     events: tuple[dict, ...] = ()
     notices: tuple[str, ...] = ()
 
+    def __repr__(self) -> str:
+        said = ["converged" if self.solution.converged else "not converged", *(["proven optimal"] if self.certificate.globally_optimal else [])]
+        errors = ", ".join(f"{joint} {rms:.4g}" for joint, rms in self.rms("test").items()) if "test" in self.predictions else "none"
+        return f"<Fit of {self.experiment.name}: {len(self.x)} parameters, {', '.join(said)}; RMS on the test logs: {errors}>"
+
+    def to_dataframe(self):
+        """The parameters as a polars data frame: name, value, unit, std, from_data."""
+        import polars
+
+        from .results import document
+
+        return polars.DataFrame([{key: p[key] for key in ("name", "value", "unit", "std", "from_data")} for p in document(self)["parameters"]])
+
+    def plot(self, part: str = "test"):
+        """Measured and predicted torque of every joint on "train" or "test", as a Matplotlib figure."""
+        from matplotlib.figure import Figure
+
+        told, dof = self.predictions[part], len(self.joints)
+        figure = Figure(figsize=(10.0, 1.0 + 1.8 * dof), layout="constrained")
+        for j, axes in enumerate(np.atleast_1d(figure.subplots(dof, 1, sharex=True))):
+            for values, label in ((told.measured, "measured"), (told.predicted, "predicted")):
+                axes.plot(told.t, values[:, j], linewidth=0.8, label=label)
+            axes.set_ylabel(f"{self.joints[j]} [{'N' if self.model.robot.prismatic[j] else 'N m'}]")
+        axes.set_xlabel("time [s]")
+        figure.axes[0].legend(loc="upper right")
+        return figure
+
     @property
     def pi(self) -> np.ndarray:
         """Inertial parameters (bodies, 10)."""

@@ -30,6 +30,7 @@ from .model import Model, moving_coefficients
 from .plausible import implausible
 from .preprocess import Motion, prepare
 from .robot import Robot
+from .threads import single_threaded
 
 #: called with the stage's name and the share of it done, 0 to 1
 Progress = Callable[[str, float], None]
@@ -76,6 +77,7 @@ def read_all(experiment: Experiment) -> Read:
     return Read(*parts, tuple(notices))
 
 
+@single_threaded
 def fit(experiment: Experiment, *, filters: dict | None = None, progress: Progress | None = None, measured: Read | None = None) -> Fit:
     """Identify an experiment: everything from its logs to its errors on held-out data.
 

@@ -255,3 +255,30 @@ def test_without_a_prior_what_no_data_see_stays_where_it_was():
     assert abs(x["abad.m"] - 1.5) < 0.5 and np.abs(fit.x).max() < 100
     if not fit.physically_consistent:
         assert any("impossible bodies" in notice for notice in fit.notices)
+
+
+def test_what_python_sees(leg):
+    """Names appear, packages are called by their own name, and a result says what it is in a line."""
+    assert {"load", "check", "fit", "diagnose", "compare", "predict", "write"} <= set(dir(sysid)) and all(hasattr(sysid, name) for name in sysid.__all__)
+    assert all(getattr(sysid, name).__doc__ for name in sysid.__all__)
+    assert repr(leg).startswith("<Fit of cheetah3: 66 parameters, converged, proven optimal; RMS on the test logs: abad ") and len(repr(leg)) < 200
+    frame = leg.to_dataframe()
+    assert frame.columns == ["name", "value", "unit", "std", "from_data"] and len(frame) == len(leg.x)
+    assert frame["value"].to_list()[:10] == leg.x[:10].tolist()
+    figure = leg.plot()
+    assert len(figure.axes) == 3 and len(figure.axes[0].lines) == 2
+    assert sysid.check(leg.experiment) == []
+
+
+def test_threads_of_the_linear_algebra_are_tamed_unless_the_user_says_otherwise(monkeypatch):
+    from threadpoolctl import threadpool_info
+
+    from sysid.threads import single_threaded
+
+    counted = single_threaded(lambda: {info["num_threads"] for info in threadpool_info() if info["user_api"] == "blas"})
+    for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
+        monkeypatch.delenv(name, raising=False)
+    assert counted() == {1}
+    before = {info["num_threads"] for info in threadpool_info() if info["user_api"] == "blas"}
+    monkeypatch.setenv("OMP_NUM_THREADS", "2")
+    assert counted() == before

@@ -17,14 +17,14 @@ ROOT = Path(__file__).resolve().parent.parent
 
 # The order of the method: a module imports only from modules above it.
 ORDER = [
-    "errors", "units", "inertia", "urdf", "readers", "datasets", "config", "prior", "robot", "regressor", "outliers", "knocks", "jumps", "repeats",
+    "errors", "units", "threads", "callable_module", "inertia", "urdf", "readers", "datasets", "config", "prior", "robot", "regressor", "outliers", "knocks", "jumps", "repeats",
     "events", "frequencies", "clock", "log", "preprocess", "blocks", "two_masses", "lowpass", "flexible",
     "effect", "formula", "effects", "own_effects", "model", "rows", "source", "compress", "objective", "interior", "certificate", "solve", "uncertainty", "estimate", "plausible", "shape", "bumps",
     "filters", "results", "urdf_export", "pipeline", "check", "simulate", "comparison", "transfer", "noise", "candidates", "view", "addition", "failures", "diagnose", "changes", "statement", "loop", "report", "studies", "studio", "terminal", "cli", "__main__",
 ]  # fmt: skip
 # Late imports that close a loop on purpose: a path that names a data set, a prior that is a previous run, the effects
 # that an effect's contract finds, what an experiment file may say of them, and the segment that events are found in, a type.
-LATE = {("config", "effect"), ("config", "formula"), ("urdf", "datasets"), ("pipeline", "results"), ("results", "urdf_export"), ("effect", "effects"), ("events", "log")}
+LATE = {("config", "effect"), ("config", "formula"), ("urdf", "datasets"), ("pipeline", "results"), ("results", "urdf_export"), ("effect", "effects"), ("events", "log"), ("estimate", "results")}
 
 
 def modules():

@@ -13,6 +13,7 @@ from collections.abc import Iterator
 from importlib import import_module
 from pkgutil import iter_modules
 
+from ..callable_module import callable_module
 from ..config import Experiment
 from ..pipeline import noticed
 from .fault import ERROR, WARNING, Fault
@@ -69,5 +70,7 @@ def document(found: list[Fault]) -> dict:
     ]
     return {"ok": not any(f.severity == ERROR for f in found), "faults": listed}
 
+
+callable_module(__name__, "", "check")  # `sysid.check(experiment)`
 
 __all__ = ["ERROR", "FAULTS", "WARNING", "Fault", "check", "document"]

@@ -1,1 +1,5 @@
-"""Where a model fails, which effect is missing, and what its logs cannot tell."""
+"""Where a model fails, which effect is missing, and what its logs cannot tell: diagnose(experiment)."""
+
+from ..callable_module import callable_module
+
+callable_module(__name__, "diagnosis", "diagnose")

@@ -61,7 +61,12 @@ def claimed(
     Args:
         fit: of the experiment as it is. measured: its logs.
     """
-    with_ = lambda last, member: _with(last, member, fit, measured, tell)  # noqa: E731
+
+    def with_(last: Fit, member: Member) -> Fit:  # filtered as the first one was
+        name, joints, options = spelled(member.candidate, where(member, fit))
+        experiment = grown(last.experiment, name, joints, options, every=fit.joints)
+        return pipeline.fit(experiment, filters=fit.filters, progress=tell, measured=measured)
+
     claims: list[Claim] = []
     refused: list[Refused] = []
     last = fit
@@ -80,13 +85,6 @@ def claimed(
         claims.append(Claim(step, tuple(findings), last, after, tuple(named)))
         last = after
     return claims, refused
-
-
-def _with(last: Fit, member: Member, first: Fit, measured, tell) -> Fit:
-    """The fit of the last experiment with a candidate in it, filtered as the first one was."""
-    name, joints, options = spelled(member.candidate, where(member, first))
-    experiment = grown(last.experiment, name, joints, options, every=first.joints)
-    return pipeline.fit(experiment, filters=first.filters, progress=tell, measured=measured)
 
 
 def _nothing(before: Fit, after: Fit, member: Member) -> str | None:

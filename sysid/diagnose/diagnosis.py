@@ -78,17 +78,15 @@ def diagnose(
         SysidError: bad input, or logs too short to question.
     """
     tell = progress or (lambda stage, share: None)
-    measured = pipeline.read_all(experiment)
+    measured, extra = pipeline.read_all(experiment), own_effects(experiment)
     fit = fit or pipeline.fit(experiment, progress=progress, measured=measured)
-    extra = own_effects(experiment)
     with pipeline.noticed():
         view = first_view(experiment, fit, measured.train)
         steps, asked, _, undecided = select.search(view, extra, level=level, tell=tell)
         claims, refused = claiming.claimed(steps, fit, measured, tell)
         refused += [claiming.undecided(choice, fit) for choice in undecided[-1:]]
         after, last = (claims[-1].step.after, claims[-1].after) if claims else (view, fit)
-        test = lowpassed(measured.test, fit.joints, view.cutoff)
-        if test is None:
+        if (test := lowpassed(measured.test, fit.joints, view.cutoff)) is None:
             raise too_short()
         first, then = (HeldOut(one.settled, test) for one in (view, after))
         found, weighed = _floors(experiment, last, after, (measured.train, measured.test))
@@ -110,8 +108,8 @@ def _floors(experiment: Experiment, fit: Fit, view: View, logs) -> tuple[list[No
     x = view.settled.x + view.design.change[: view.model.size]
     told = [predict(view.model, x, motion) for motion in motions]
     pieces = [piece for motion in motions for piece in motion.pieces]
-    angles = of_angles(logs, spec, fit)
-    found = floors_of(pieces, np.concatenate([one.predicted for one in told]), angles=angles)
+    predicted = np.concatenate([one.predicted for one in told])
+    found = floors_of(pieces, predicted, angles=of_angles(logs, spec, fit))
     left = np.max([one.errors()["rms"] for one in told], axis=0)
     return filtered(found, pieces[0].smoother), dict(zip(fit.joints, left))
 
