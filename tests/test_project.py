@@ -186,7 +186,8 @@ def test_readme_s_python_runs():
     with tempfile.TemporaryDirectory() as out:
         done = subprocess.run([sys.executable, "-W", "error", "-c", code.replace("{out}", out)], cwd=ROOT, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
-    assert done.stdout.splitlines()[0].endswith("True")
+    checked, fit, errors, *_ = done.stdout.splitlines()
+    assert checked == "[]" and fit.startswith("<Fit of cheetah3") and errors.endswith("True")
 
 
 def test_readme_s_table_of_keys_is_complete():

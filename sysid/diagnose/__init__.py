@@ -1,4 +1,4 @@
-"""Where a model fails, which effect is missing, and what its logs cannot tell: diagnose(experiment)."""
+"""Where a model fails, which effect is missing, what its logs cannot tell: diagnose(experiment)."""
 
 from ..callable_module import callable_module
 
