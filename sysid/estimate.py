@@ -146,6 +146,13 @@ class Fit:
         return dict(zip(self.joints, self.predictions[part].errors()["rms"].tolist()))
 
 
+def given_shapes(fit: Fit) -> str:
+    """What a certificate takes as given, in words: it proves the rest of the model at the shape values that were found, of which
+    the objective is no convex function. Empty where the model has none."""
+    count = len(fit.model.shape_values)
+    return f"given the {count} shape value{'s' * (count > 1)}, which {'were' if count > 1 else 'was'} searched" if count else ""
+
+
 @dataclass(frozen=True)
 class Problem:
     """Everything a solve needs: objective, coordinates, the default start."""

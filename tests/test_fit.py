@@ -282,3 +282,15 @@ def test_threads_of_the_linear_algebra_are_tamed_unless_the_user_says_otherwise(
     before = {info["num_threads"] for info in threadpool_info() if info["user_api"] == "blas"}
     monkeypatch.setenv("OMP_NUM_THREADS", "2")
     assert counted() == before
+
+
+def test_a_certificate_says_what_it_takes_as_given(leg):
+    """Of a model with shape values only the rest is convex: what is proven is said to be so given these."""
+    from types import SimpleNamespace
+
+    from sysid.estimate import given_shapes
+
+    assert given_shapes(leg) == ""
+    shaped = lambda n: SimpleNamespace(model=SimpleNamespace(shape_values=(None,) * n))  # noqa: E731
+    assert given_shapes(shaped(1)) == "given the 1 shape value, which was searched"
+    assert given_shapes(shaped(2)) == "given the 2 shape values, which were searched"

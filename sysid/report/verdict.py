@@ -6,7 +6,7 @@ import math
 
 from ..diagnose.diagnosis import Diagnosis
 from ..effect import describe
-from ..estimate import Fit
+from ..estimate import Fit, given_shapes
 from ..statement.text import percent
 from .words import (
     SPACE,
@@ -45,7 +45,8 @@ def verdict(fit: Fit, diagnosis: Diagnosis, document: dict) -> tuple[str, str, l
         if fit.certificate.globally_optimal
         else "not proven to be the global optimum"
     )
-    proof = f"The fit is {proven}."
+    given = given_shapes(fit)
+    proof = f"The fit is {proven}{f', {given}' if given else ''}."
     if not fit.solution.converged:
         proof = "<strong>The fit did not converge: nothing below is to be trusted.</strong>"
     bodies = (
