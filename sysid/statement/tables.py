@@ -115,12 +115,6 @@ def shown(document: dict, joints: Sequence[str], width: int) -> list[str]:
     if not sizes and not absorbed:
         return []
     out = ["what these logs could have shown: the smallest size named nine times in ten"]
-    if any(d["at"] for d in document["detectable"]):
-        out = wrapped(
-            f"{out[0]}, where an effect has values of its shape at those that show it best",
-            width,
-            "  ",
-        )
     own = {
         # no cell: the effect is in the model already
         _label(key): [cells.get(j, absorbed.get((key[0], j), "")) for j in joints]
@@ -136,6 +130,9 @@ def shown(document: dict, joints: Sequence[str], width: int) -> list[str]:
         words = "-: at no size, as other parameters take its place; "
         words += "`sysid effects NAME` says what shows it"
         out += wrapped(f"  {words}", width, "    ")
+    if shaped := dict.fromkeys(d["effect"] for d in document["detectable"] if d["at"]):
+        words = f"  {', '.join(shaped)}: at the values of their shape that show them best"
+        out += wrapped(words, width, "    ")
     somewhere = {effect for effect, *_ in sizes}
     if never := [e for e in dict.fromkeys(e for e, _ in absorbed) if e not in somewhere]:
         out += wrapped(f"  at no size on any joint: {', '.join(never)}", width, "    ")

@@ -32,7 +32,8 @@ def find(look: Look) -> Iterator[Fault]:
     for _ in range(_ROUNDS):
         tried = [(made, told, equations.scored(made)) for made, told in _others(reading, look)]
         tried = [(s.loss, made, told, s) for made, told, s in tried if _clear(scored, s, told[1])]
-        if not tried:
+        # as it is, and in another unit, it may leave the least
+        if not tried or equations.scored(reading, free=True).loss < min(loss for loss, *_ in tried):
             break
         _, reading, (kind, joints, word), scored = min(tried, key=lambda one: one[0])
         yield from _told(look, kind, joints, word)

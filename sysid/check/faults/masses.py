@@ -28,7 +28,7 @@ AFTER, SENSELESS = (
 # five real ones, stand between a quarter and twice these
 _WEIGHT = (1.0 / 6.0, 3.0)
 _CLEAR = 4.0  # standard errors
-_FELT = 0.05  # of a joint's torque, RMS: a weight that is less says nothing
+_FELT = 0.1  # of a joint's torque, RMS: a weight that is less says nothing
 _PASSES = 3  # the last two with every joint weighted by what the one before left
 
 
