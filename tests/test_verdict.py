@@ -15,8 +15,8 @@ from sysid.diagnose import claims
 from sysid.diagnose.ask import ask
 from sysid.diagnose.detectable import detectable
 from sysid.diagnose.diagnosis import diagnose
-from sysid.diagnose.select import LEVEL, WORTH, search
-from sysid.diagnose.verdict import predictable, verdicts
+from sysid.diagnose.select import WORTH, search
+from sysid.diagnose.verdict import _UNKNOWN, predictable, verdicts
 from sysid.effect import Linear, TorqueEffect
 from sysid.flexible import Unknown
 from sysid.noise import NoiseFloor
@@ -170,6 +170,8 @@ def test_what_only_the_weights_of_the_joints_leave_is_said_to_be_theirs(weighed,
     fit, floors = fitted(2.0, train=train), [floor(), floor()]
     says = verdicts(fit, (), [NOISE, NOISE], floors, weighed={"elbow": weighed})[1].says
     assert ("solver.weighting: noise" in says) is told and "2 times the noise floor" in says or not told
+    # what the motion predicts of it is no unknown effect then
+    assert (verdicts(fit, (), [NOISE, left(0.5)], floors, weighed={"elbow": weighed})[1].status == "unresolved") is told
     fit.weights = np.ones(2)  # they do count so
     assert "solver.weighting" not in verdicts(fit, (), [NOISE, NOISE], floors, weighed={"elbow": weighed})[1].says
 
@@ -218,7 +220,7 @@ def test_dependences_are_sorted_and_say_something():
 
 def test_predictable_is_a_level_and_a_share():
     assert predictable(left(0.3), 2) and not predictable(NOISE, 2) and not predictable(left(0.9 * WORTH), 2)
-    by_chance = replace(left(0.3), chance=0.6 * LEVEL)
+    by_chance = replace(left(0.3), chance=0.6 * _UNKNOWN)
     assert predictable(by_chance, 1) and not predictable(by_chance, 2)  # a level for all joints together
     assert predictable(replace(NOISE, tone=2.0 * WORTH), 2) and not predictable(replace(NOISE, tone=0.9 * WORTH), 2)
 

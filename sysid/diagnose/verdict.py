@@ -9,11 +9,11 @@ from ..estimate import Fit
 from ..flexible import Unknown
 from ..transfer import Transfer
 from .claims import Claim
-from .select import LEVEL, WORTH
+from .select import WORTH
 
 _FLOOR = 0.1  # of the floor: what a floor may be in doubt by and still be called reached
-# of what effects took and functions of the motion still predict together: the greater part names
-_MOST = 0.5
+_MOST = 0.5  # of what effects took and functions of the motion still predict: that part names
+_UNKNOWN = 0.05  # family-wise: it is asked of joints alone whose error stands above the floor
 
 
 @dataclass(frozen=True)
@@ -72,17 +72,18 @@ def verdicts(
             floor is not None
             and max(then, last.rms("train")[joint]) <= (1.0 + _FLOOR) * floor + 2.0 * floors[j].std
         )
-        # an error of zero is one that no row has measured
         reached = reached and first > 0.0 and not _above(remains, then, floor)
         at_floor = floor is not None and first <= (1.0 + _FLOOR) * floor + 2.0 * floors[j].std
         taken = sum(c.step.shares[j] for c in own)
+        # most of what stands above the floor may be how the fit weighs its joints
+        above = then**2 - floor**2 if floor is not None and fit.weights is None else float("inf")
+        even = then**2 - (weighed or {}).get(joint, then) ** 2 > _MOST * abs(above)
         if own and (remains is None or remains.share * max(1.0 - taken, 0.0) <= _MOST * taken):
             told = ("missing", own, explained, remains)
-        elif own or (remains is not None and not reached):
+        elif own or (remains is not None and not reached and not even):
             told = ("unknown", own or others, explained, remains)
         elif not reached:
-            apart = (weighed or {}).get(joint, float("inf"))
-            why = _why(fit, j, floors[j], then, last, refused, apart)
+            why = _why(fit, j, floors[j], then, last, refused, weighed[joint] if even else None)
             told = ("unresolved", others, explained, remains, why)
         elif at_floor or not claims:
             told = ("complete",)
@@ -95,9 +96,8 @@ def verdicts(
 
 
 def predictable(found: Unknown, joints: int) -> bool:
-    """Whether functions of the motion predict a part worth having of what is left, at the same
-    family-wise level."""
-    functions = found.chance < LEVEL / joints and found.gain.sum() > WORTH * found.total
+    """Whether functions of the motion predict a part worth having of what is left."""
+    functions = found.chance < _UNKNOWN / joints and found.gain.sum() > WORTH * found.total
     return bool(functions or found.tone > WORTH)
 
 
@@ -108,7 +108,7 @@ def _above(remains: Unknown | None, error: float, floor: float) -> bool:
     return left < (1.0 + _FLOOR) ** -2 and left * error**2 >= floor**2
 
 
-def _why(fit: Fit, j: int, floor, error: float, last: Fit, refused, weighed: float) -> str:
+def _why(fit: Fit, j: int, floor, error: float, last: Fit, refused, weighed: float | None) -> str:
     joint, train = fit.joints[j], last.rms("train")[fit.joints[j]]
     if not error > 0.0:
         said = "none of its rows on the test logs counts: it stands still there, or is disturbed"
@@ -117,7 +117,7 @@ def _why(fit: Fit, j: int, floor, error: float, last: Fit, refused, weighed: flo
             f"its noise floor is not known ({floor.detail}), so nobody can say what error is left "
             "above it"
         )
-    elif fit.weights is None and error**2 - weighed**2 > _MOST * (error**2 - floor.rms**2):
+    elif weighed is not None:
         said = (
             f"its error is {error / floor.rms:.2g} times the noise floor because joints with more "
             "noise count as much as quiet ones in this fit; with solver.weighting: noise it would "
