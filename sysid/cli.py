@@ -17,7 +17,7 @@ from .errors import SysidError
 # It must be said before NumPy is loaded; a user's own setting wins.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-app = typer.Typer(add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False, rich_markup_mode=None, help="Identify what a robot is made of, and name the physics its model lacks.")
+app = typer.Typer(add_completion=False, invoke_without_command=True, pretty_exceptions_enable=False, rich_markup_mode=None, help="Identify what a robot is made of, and name the physics its model lacks.")
 
 Json = Annotated[bool, typer.Option("--json", help="One JSON document on standard output, nothing else there.")]
 Out = Annotated[Optional[Path], typer.Option("--out", help="Run folder (default runs/<experiment name>).")]  # noqa: UP045 - typer reads it
@@ -25,9 +25,22 @@ Quiet = Annotated[bool, typer.Option("--quiet", help="No progress, no table.")]
 ExperimentPath = Annotated[Path, typer.Argument(metavar="EXPERIMENT", help="A YAML file, or a folder with config.yaml.")]
 
 
+def _version(asked: bool) -> None:
+    if asked:
+        from importlib.metadata import version
+
+        print(f"sysid {version('sysid')}")
+        raise typer.Exit
+
+
 @app.callback()
-def _root() -> None:
+def _root(
+    context: typer.Context,
+    version: Annotated[bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and leave.")] = False,
+) -> None:
     """Keeps `sysid fit` a command of its own however many there are."""
+    if context.invoked_subcommand is None:
+        raise SysidError("which command? `sysid check EXPERIMENT` looks at logs, `sysid fit EXPERIMENT` identifies, `sysid diagnose EXPERIMENT` names what is missing; `sysid --help` lists all")
 
 
 @app.command()

@@ -352,6 +352,10 @@ def file_of(path: str | Path) -> Path:
     return path / "config.yaml" if path.is_dir() else path
 
 
+_LOGS = (".csv", ".parquet", ".npz", ".mat", ".h5", ".hdf5", ".mcap", ".db3", ".bag", ".gz")
+_ROBOTS = (".urdf", ".xacro", ".xml", ".mjcf", ".sdf")
+
+
 def load(path: str | Path) -> Experiment:
     """Read an experiment file, or the config.yaml of a folder.
 
@@ -359,6 +363,12 @@ def load(path: str | Path) -> Experiment:
         ConfigError: with the line, the key, and what is allowed there.
     """
     path = file_of(path)
+    for word, endings in (("a log", _LOGS), ("a robot", _ROBOTS)):
+        if path.suffix.lower() in endings:
+            raise ConfigError(
+                f"{word}, and no experiment", where=str(path), allowed="a YAML file, or a folder with config.yaml",
+                do="put robot.urdf, train.csv, test.csv and an empty config.yaml into a folder and give that, or name the files in a config.yaml",
+            )  # fmt: skip
     try:
         data = path.read_bytes()
     except OSError as error:

@@ -671,3 +671,22 @@ def test_urdf_of_an_example(scheme):
 
 def test_notices_come_once_and_good_input_has_none(experiment, cli):
     assert decided(fitted(cli("fit", experiment(), "--json"))) == []
+
+
+@pytest.mark.parametrize(("name", "word"), [("log.csv", "a log"), ("day.mcap", "a log"), ("arm.urdf", "a robot"), ("arm.xml", "a robot")])
+def test_a_file_that_is_no_experiment_is_told_what_to_do(name, word, cli, tmp_path):
+    (tmp_path / name).write_text("t,q\n")
+    cli("fit", tmp_path / name).complains(name, f"{word}, and no experiment", "config.yaml into a folder")
+
+
+def test_the_bare_command_says_what_to_type(monkeypatch, capfd):
+    import sys
+
+    from sysid import cli as commands
+
+    for words, status, says in (([], 2, "which command?"), (["--version"], 0, "sysid 0.")):
+        monkeypatch.setattr(sys, "argv", ["sysid", *words])
+        with pytest.raises(SystemExit) as stop:
+            commands.main()
+        said = capfd.readouterr()
+        assert int(stop.value.code or 0) == status and says in said.out + said.err and len((said.out + said.err).splitlines()) == 1
