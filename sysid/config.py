@@ -160,6 +160,11 @@ class LogSpec(_Spec):
         if self.start is not None and self.stop is not None and not self.start < self.stop:
             raise ValueError(f"start {self.start:g} must be before stop {self.stop:g}")
 
+    def overlaps(self, other: LogSpec) -> bool:
+        """Whether both hold a piece, were they of one recording."""
+        stops = [log.stop for log in (self, other) if log.stop is not None]
+        return not stops or max(self.start or 0.0, other.start or 0.0) < min(stops)
+
 
 def _log(value: Any) -> Any:
     if isinstance(value, str):

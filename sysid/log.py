@@ -20,14 +20,14 @@ from .readers import open_table
 from .readers.table import Table
 
 # A step longer than this many median steps is a hole that interpolation would invent motion for.
-_GAP_STEPS = 10.0
+GAP_STEPS = 10.0
 # Steps that all stay this close to the median are uniform sampling with rounded time stamps.
 _UNIFORM = 0.02
 # Of a step: stamps that are off by less are right.
 _TOLD = 1e-3
 _EPOCH = 1e6  # s: a clock that reads more counts from 1970, not from the log's start
 _LARGEST = 1e20  # no unit makes a measured signal larger (a clock in ns, logged as a signal, reads 2e18)
-_DEGREES = 4.0 * np.pi  # rad: no robot joint turns so far from zero, but its angle in degrees does
+DEGREES = 4.0 * np.pi  # rad: no robot joint turns so far from zero, but its angle in degrees does
 
 
 @dataclass(frozen=True)
@@ -71,9 +71,12 @@ def read(log: LogSpec, data: DataSpec, joints: tuple[str, ...], prismatic, folde
     Raises:
         LogError: the file, a column, a unit or a value is not what a log can hold.
     """
-    path, t, signals = measured(log, data, joints, prismatic, folder)
-    segments = tuple(_segments(t, signals, str(path)))
-    return Log(name=log.file, path=path, sha256=_sha256(path), segments=segments)
+    return assembled(log.file, *measured(log, data, joints, prismatic, folder))
+
+
+def assembled(name: str, path: Path, t, signals: dict) -> Log:
+    """The log of what was `measured`: resampled where its clock is irregular, split at gaps."""
+    return Log(name=name, path=path, sha256=_sha256(path), segments=tuple(_segments(t, signals, str(path))))
 
 
 def measured(log: LogSpec, data: DataSpec, joints: tuple[str, ...], prismatic, folder: Path = Path()) -> tuple[Path, np.ndarray, dict]:
@@ -251,7 +254,7 @@ def _convert(signals, data: DataSpec, joints, prismatic, where: str) -> None:
     if unit == "rad":
         largest = np.abs(signals["q"]).max(axis=0)
         for joint, value, slides in zip(joints, largest, prismatic):
-            if not slides and value > _DEGREES:
+            if not slides and value > DEGREES:
                 warnings.warn(
                     SysidWarning(f"{where}: joint {joint!r} reaches {value:.4g} rad; if that is degrees, set data.units.position: deg"), stacklevel=3
                 )
@@ -260,7 +263,7 @@ def _convert(signals, data: DataSpec, joints, prismatic, where: str) -> None:
 def _segments(t, signals, where: str):
     steps = np.diff(t)
     step = float(np.median(steps))
-    cuts = np.flatnonzero(steps > _GAP_STEPS * step) + 1
+    cuts = np.flatnonzero(steps > GAP_STEPS * step) + 1
     if cuts.size:
         longest = steps[cuts - 1].max()
         warnings.warn(

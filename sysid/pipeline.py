@@ -49,11 +49,13 @@ def build(experiment: Experiment) -> tuple[Robot, Model, np.ndarray]:
 
 
 def read(experiment: Experiment, machine: Robot, specs: list[LogSpec]) -> list[logs.Log]:
-    """The logs of an experiment's `data.train` or `data.test`, with their events where these are left out: first those
-    that the signals show, then those that only the robot's equations do. Raises LogError."""
+    """The logs of an experiment's `data.train` or `data.test`, with their events where these are left out. Raises LogError."""
     read = [logs.read(spec, experiment.data, machine.joints, machine.prismatic, experiment.folder) for spec in specs]
-    if experiment.preprocess.events == "keep":
-        return read
+    return read if experiment.preprocess.events == "keep" else with_events(machine, read)
+
+
+def with_events(machine: Robot, read: list[logs.Log]) -> list[logs.Log]:
+    """Logs with their events: first those that the signals show, then those that only the robot's equations do."""
     found = [replace(log, events=tuple(e for s in log.segments for e in events.find(s, machine.joints, log=log.name))) for log in read]
     felt = bumps(machine, found)
     more = [[e for e in felt if e.log == log.name] for log in found]
@@ -123,15 +125,14 @@ def fit(experiment: Experiment, *, filters: dict | None = None, progress: Progre
             samples, left_out = {"train": motion.samples}, {"train": _left_out(motion)}
             del motion
         with _timed(seconds, "test"):
-            _tell_overlap(experiment)
             held_out = measured.test if measured else read(experiment, machine, experiment.data.test)
             provenance += [_provenance("test", log, spec) for log, spec in zip(held_out, experiment.data.test)]
+            _tell_overlap(experiment, provenance)
             motion = prepare(held_out, preprocess, machine.joints)
             del held_out
             disturbed += _tell_events("test", motion)
             predictions["test"] = predict(structure, found.x, motion)
             samples["test"], left_out["test"] = motion.samples, _left_out(motion)
-        _tell_same(provenance)
         for text in implausible(replace(found, predictions=predictions)):
             warnings.warn(SysidWarning(text), stacklevel=2)
     return replace(
@@ -264,22 +265,17 @@ def _tell_events(part: str, motion: Motion) -> list[dict]:
     return [{"part": part, "kind": e.kind, "log": e.log, "start": e.start, "stop": e.stop, "joints": list(e.joints), "signal": e.signal} for e in motion.events]
 
 
-def _tell_overlap(experiment: Experiment) -> None:
-    for test in experiment.data.test:
-        for train in experiment.data.train:
-            low = max(test.start or 0.0, train.start or 0.0)
-            high = min(np.inf if test.stop is None else test.stop, np.inf if train.stop is None else train.stop)
-            if test.file == train.file and low < high:
+def _tell_overlap(experiment: Experiment, logs: list[dict]) -> None:
+    hashes = [log["sha256"] for log in logs]
+    trained = list(zip(experiment.data.train, hashes))
+    for test, own in zip(experiment.data.test, hashes[len(trained) :]):
+        for train, other in trained:
+            if not test.overlaps(train):
+                continue
+            if test.file == train.file:
                 warnings.warn(SysidWarning(f"test log {test.file} overlaps a training log; its error is not held out"), stacklevel=2)
-
-
-def _tell_same(logs: list[dict]) -> None:
-    for test in (log for log in logs if log["part"] == "test"):
-        for train in (log for log in logs if log["part"] == "train" and log["log"] != test["log"]):
-            low = max(test["start"] or 0.0, train["start"] or 0.0)
-            high = min(np.inf if test["stop"] is None else test["stop"], np.inf if train["stop"] is None else train["stop"])
-            if test["sha256"] == train["sha256"] and low < high:
-                warnings.warn(SysidWarning(f"test log {test['log']} is the training log {train['log']} under another name; its error is not held out"), stacklevel=3)
+            elif own == other:
+                warnings.warn(SysidWarning(f"test log {test.file} is the training log {train.file} under another name; its error is not held out"), stacklevel=2)
 
 
 def _provenance(part: str, log: logs.Log, spec: LogSpec) -> dict:

@@ -12,18 +12,17 @@ sign, a unit are readings, and each is scored by the same sum, log of the residu
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from .. import regressor
-from ..log import Log
-from ..lowpass import lowpassed, stride_of, widest
+from ..preprocess import Motion
 from ..robot import Robot
+from ..rows import Rows, starts
 
 LIKELY = (1.0 / 3.0, 3.0)  # masses of a URDF, over the robot's
-_FEWEST = 50  # rows by which a joint can be told anything
+FEWEST = 50  # rows by which a joint can be told anything
 
 
 @dataclass(frozen=True)
@@ -71,19 +70,12 @@ class Equations:
     use: np.ndarray
 
     @staticmethod
-    def of(robot: Robot, logs: Sequence[Log]) -> Equations | None:
-        """None where nothing is left of the logs under a low-pass."""
-        cutoff = widest(logs)
-        motion = lowpassed(logs, robot.joints, cutoff)
-        if motion is None or motion.samples < _FEWEST:
-            return None
-        stride, pieces, tau, use = stride_of(motion, cutoff), [], [], []
-        for p in motion.pieces:
-            rows = slice(p.core.start, p.core.stop, stride)
-            pieces.append((p.q, p.qd, p.qdd, p.smoother, rows))
-            tau.append(p.tau[rows])
-            use.append(np.ones(p.q.shape, bool)[rows] if p.use is None else p.use[rows])
-        return Equations(robot, tuple(pieces), np.concatenate(tau), np.concatenate(use))
+    def of(robot: Robot, motion: Motion, stride: int, rows: Rows) -> Equations:
+        """Of the rows of a motion that a stride keeps."""
+        kept = zip(motion.pieces, starts(motion, stride))
+        pieces = tuple((p.q, p.qd, p.qdd, p.smoother, own) for p, own in kept)
+        # the torque where another joint's angle would have a row count, too
+        return Equations(robot, pieces, rows.of(motion, "tau"), rows.use)
 
     def scored(self, reading: Reading, *, free: bool = False) -> Scored:
         """What a reading of the columns leaves of each joint's torque.
@@ -110,7 +102,7 @@ class Equations:
 def _fitted(columns, tau, free: bool) -> tuple[float, float, float, float, bool]:
     """Least squares of one joint's torque (n,) by columns (5, n), with their signs and the first
     one's bounds."""
-    if len(tau) < _FEWEST or not np.ptp(tau) > 0.0:
+    if len(tau) < FEWEST or not np.ptp(tau) > 0.0:
         return 1.0, 1.0, 1.0, 0.0, False
     size = np.sqrt(np.mean(columns**2, axis=1)) + 1e-300
     unit = float(np.std(tau))

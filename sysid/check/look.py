@@ -16,10 +16,9 @@ from ..model import Model, build
 from ..preprocess import Motion
 from ..robot import Robot
 from ..rows import Rows, stack
-from .equations import Equations
+from .equations import FEWEST, Equations
 
 _HAS = ("armature", "viscous", "coulomb", "torque_bias")  # what any joint has
-_FEWEST = 50  # samples
 
 
 @dataclass(frozen=True)
@@ -55,6 +54,12 @@ class Seen:
         """Seconds from row to row."""
         return self.stride * self.motion.pieces[0].step
 
+    def columns(self, joint: int) -> np.ndarray:
+        """What the model has for a joint's torque (n, k), of one size."""
+        own = self.rows.columns[joint]
+        size = np.linalg.norm(own, axis=0)
+        return own[:, size > 0.0] / size[size > 0.0]
+
 
 @dataclass(frozen=True)
 class Look:
@@ -75,7 +80,7 @@ class Look:
         found = [log.log for log in self.part("train")]
         cutoff = widest(found)
         motion = lowpassed(found, self.robot.joints, cutoff)
-        if motion is None or motion.samples < _FEWEST:
+        if motion is None or motion.samples < FEWEST:
             return None
         model, stride = (
             build(self.robot, [EffectSpec(name=n) for n in _HAS]),
@@ -86,19 +91,20 @@ class Look:
     @cached_property
     def equations(self) -> Equations | None:
         """What the robot of the URDF makes of the training logs; None where they are too short."""
-        return Equations.of(self.robot, [log.log for log in self.part("train")])
+        if self.seen is None:
+            return None
+        return Equations.of(self.robot, self.seen.motion, self.seen.stride, self.seen.rows)
 
 
 def looked(experiment: Experiment) -> Look:
     """Read everything that an experiment names. Raises SysidError, as a fit would."""
-    preprocess = experiment.preprocess.model_copy(update={"events": "mask"})
-    asked = experiment.model_copy(update={"preprocess": preprocess})
     machine = robot.load(experiment.robot, experiment.folder)
+    args = experiment.data, machine.joints, machine.prismatic, experiment.folder
     out = []
     for part in ("train", "test"):
         specs = getattr(experiment.data, part)
-        for spec, log in zip(specs, pipeline.read(asked, machine, specs)):
-            args = experiment.data, machine.joints, machine.prismatic, experiment.folder
-            path, t, signals = logs.measured(spec, *args)
-            out.append(Logged(part, spec, path, t, signals["q"], signals["tau"], log))
+        told = [logs.measured(spec, *args) for spec in specs]
+        found = [logs.assembled(spec.file, *one) for spec, one in zip(specs, told)]
+        for spec, (path, t, s), log in zip(specs, told, pipeline.with_events(machine, found)):
+            out.append(Logged(part, spec, path, t, s["q"], s["tau"], log))
     return Look(experiment, machine, tuple(out))

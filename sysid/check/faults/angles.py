@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ...log import DEGREES
 from ...lowpass.angles import grains
 from ..fault import ERROR, WARNING, Fault
 from ..look import Logged, Look
@@ -13,7 +14,6 @@ from ..look import Logged, Look
 AFTER, SENSELESS = 1, ("wrong_unit",)
 _TURN = 2.0 * np.pi
 _NEAR = 0.1  # of a turn: so near to a whole one is a jump of the count, and no motion
-_DEGREES = 4.0 * np.pi  # rad: no joint turns so far from zero, its angle in degrees does
 _BEYOND = 0.02  # rad or m beyond a limit, and share of the range
 _FASTER = 1.5  # times a limit of speed, as many a URDF states the rated one
 _COARSE = _TURN / 2**12  # rad: a velocity by differences then is mostly steps
@@ -57,7 +57,7 @@ def _of_log(look: Look, log: Logged, j: int, joint: str, slides: bool) -> Iterat
         )
         return
     largest = float(np.abs(q).max())
-    if not slides and largest > _DEGREES and look.experiment.data.units.position == "rad":
+    if not slides and largest > DEGREES and look.experiment.data.units.position == "rad":
         yield Fault(
             "wrong_unit",
             ERROR,
@@ -66,7 +66,7 @@ def _of_log(look: Look, log: Logged, j: int, joint: str, slides: bool) -> Iterat
             joint,
             name,
             (float(log.t[int(np.argmax(np.abs(q)))]),),
-            int(np.sum(np.abs(q) > _DEGREES)),
+            int(np.sum(np.abs(q) > DEGREES)),
         )
         return
     low, high = look.robot.limits[j]

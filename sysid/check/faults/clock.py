@@ -6,12 +6,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ...log import GAP_STEPS
 from ...lowpass import band
 from ..fault import ERROR, WARNING, Fault
 from ..look import Logged, Look
 
 AFTER, SENSELESS = 0, ()
-_GAP = 10.0  # steps: as `log` splits them
 _JITTER = 0.05  # of a step, RMS: what is less, resampling mends
 _STEPS = (2e-5, 0.5)  # s from sample to sample: no logger of a robot is faster or slower
 # Samples in a cycle of the fastest motion, and a second: accelerations need some, and what friction
@@ -27,7 +27,7 @@ def find(look: Look) -> Iterator[Fault]:
             yield _unit(log)
             continue
         steps = np.diff(log.t)
-        gaps = np.flatnonzero(steps > _GAP * log.step)
+        gaps = np.flatnonzero(steps > GAP_STEPS * log.step)
         if len(gaps):
             times = tuple(float(log.t[k]) for k in gaps[:_SHOWN])
             yield Fault(
@@ -43,7 +43,7 @@ def find(look: Look) -> Iterator[Fault]:
                 times=times,
                 rows=len(gaps),
             )
-        regular = steps[steps <= _GAP * log.step]
+        regular = steps[steps <= GAP_STEPS * log.step]
         # missing samples are whole steps more, and no jitter
         late = regular - log.step * np.maximum(np.round(regular / log.step), 1.0)
         jitter = float(np.sqrt(np.mean(late**2)))

@@ -31,10 +31,8 @@ def find(look: Look) -> Iterator[Fault]:
         beyond = rows.use[:, j] & (np.abs(tau) > _BEYOND * allowed)
         if beyond.sum() < _FEWEST or within.sum() < _FEWEST:
             continue
-        columns = rows.columns[j]
-        columns = columns[:, np.linalg.norm(columns, axis=0) > 0.0]
-        size = np.linalg.norm(columns, axis=0)
-        told = columns / size @ np.linalg.lstsq(columns[within] / size, tau[within], rcond=1e-4)[0]
+        columns = look.seen.columns(j)
+        told = columns @ np.linalg.lstsq(columns[within], tau[within], rcond=1e-4)[0]
         lacks = float(np.median(1.0 - told[beyond] / tau[beyond]))
         at = int(np.argmax(np.abs(tau) * beyond))
         name = look.part("train")[int(rows.log[at])].log.name

@@ -63,11 +63,10 @@ def find(look: Look) -> Iterator[Fault]:
                 times,
                 rows,
             )
-        moving = np.any(np.abs(np.diff(log.q, axis=0)) > 0.0, axis=1).any()
         again = np.all(np.diff(log.q, axis=0) == 0.0, axis=1) & np.all(
             np.diff(log.tau, axis=0) == 0.0, axis=1
         )
-        if moving and np.mean(again) > _AGAIN:
+        if np.ptp(log.q, axis=0).any() and np.mean(again) > _AGAIN:
             yield Fault(
                 "values_held",
                 WARNING,

@@ -7,8 +7,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from ... import blocks
+from ..equations import FEWEST
 from ..fault import WARNING, Fault
-from ..look import Look
+from ..look import Look, Seen
 
 AFTER, SENSELESS = 3, ("wrong_unit", "angle_wrap", "joint_order", "sign_flipped")
 _MOST, _LAGS = 0.1, 81  # s to either side, and how many of them are tried
@@ -23,14 +24,14 @@ def find(look: Look) -> Iterator[Fault]:
     """delayed_signal."""
     if look.seen is None:
         return
-    motion, stride, rows = look.seen.motion, look.seen.stride, look.seen.rows
+    rows = look.seen.rows
     step = max(log.step for log in look.part("train"))
     lags = np.linspace(-_MOST, _MOST, _LAGS)
     for j, joint in enumerate(look.robot.joints):
         use = rows.use[:, j]
-        if use.sum() < 50 or not np.ptp(rows.tau[use, j]) > 0.0:
+        if use.sum() < FEWEST or not np.ptp(rows.tau[use, j]) > 0.0:
             continue
-        left = _left(rows, motion, stride, j, lags)
+        left = _left(look.seen, j, lags)
         squares = np.sum(left**2, axis=1)
         best, none = int(np.argmin(squares)), len(lags) // 2
         lag, pause = float(lags[best]), max(_LEAST[0], _LEAST[1] * step)
@@ -53,18 +54,18 @@ def find(look: Look) -> Iterator[Fault]:
             )
 
 
-def _left(rows, motion, stride: int, j: int, lags) -> np.ndarray:
+def _left(seen: Seen, j: int, lags) -> np.ndarray:
     """What least squares by this joint's own columns leave (lags, n) of its torque, read a while
     later."""
-    use = rows.use[:, j]
-    columns = rows.columns[j][use]
-    columns = columns[:, np.linalg.norm(columns, axis=0) > 0.0]
-    columns = columns / np.linalg.norm(columns, axis=0)
-    basis, sizes, _ = np.linalg.svd(columns, full_matrices=False)
+    use = seen.rows.use[:, j]
+    basis, sizes, _ = np.linalg.svd(seen.columns(j)[use], full_matrices=False)
     basis = basis[:, sizes > 1e-4 * sizes[0]]
     out = []
     for lag in lags:
-        late = [np.interp(p.t[p.core][::stride] + lag, p.t, p.tau[:, j]) for p in motion.pieces]
+        late = [
+            np.interp(p.t[p.core][:: seen.stride] + lag, p.t, p.tau[:, j])
+            for p in seen.motion.pieces
+        ]
         tau = np.concatenate(late)[use]
         out.append(tau - basis @ (basis.T @ tau))
     return np.array(out)

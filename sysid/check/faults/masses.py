@@ -10,6 +10,7 @@ import numpy as np
 from ... import blocks
 from ...model import build
 from ...rows import stack
+from ...shape import inverted
 from ..fault import WARNING, Fault
 from ..look import Look, Seen
 
@@ -80,20 +81,14 @@ def weights(seen: Seen) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     count, w = np.maximum(rows.use.sum(0), 1), np.ones(robot.dof)
     for _ in range(_PASSES):
         system = np.einsum("jnk,jnl,j->kl", a, a, w**2, optimize=True)
-        size = 1.0 / np.sqrt(np.diag(system) + 1e-300)
-        inverse = size[:, None] * np.linalg.pinv(system * size[:, None] * size, rcond=1e-8) * size
+        inverse = inverted(system)
         x = inverse @ np.einsum("jnk,nj,j->k", a, rows.tau * rows.use, w**2, optimize=True)
         left = rows.tau - np.einsum("jnk,k->nj", a, x)
         w = 1.0 / np.sqrt((left**2).sum(0) / count + 1e-300)
     number = blocks.numbered(
         rows.t, rows.piece, memory=blocks.memory(left, rows.use, rows.piece, seen.step)
     )
-    scores = np.stack(
-        [
-            np.einsum("jnk,nj,j->k", a[:, own], left[own], w**2)
-            for own in (number == b for b in range(number.max() + 1))
-        ]
-    )
+    scores = blocks.summed(number, np.einsum("jnk,nj,j->nk", a, left, w**2, optimize=True))
     error = np.sqrt(np.sum((scores @ inverse) ** 2, axis=0))
     rms = lambda values: np.sqrt((values**2).sum(1) / count[:, None])  # noqa: E731
     torque = np.sqrt((rows.tau**2).sum(0) / count + 1e-300)

@@ -14,12 +14,7 @@ def find(look: Look) -> Iterator[Fault]:
     """test_is_train: a test log that is a training log, whatever its name."""
     for test in look.part("test"):
         for train in look.part("train"):
-            if test.log.sha256 != train.log.sha256:
-                continue
-            low = max(test.spec.start or 0.0, train.spec.start or 0.0)
-            ends = [log.spec.stop for log in (test, train) if log.spec.stop is not None]
-            stop = min([*ends, float(test.t[-1] - test.t[0]) if not ends else min(ends)])
-            if low < stop:
+            if test.log.sha256 == train.log.sha256 and test.spec.overlaps(train.spec):
                 yield Fault(
                     "test_is_train",
                     ERROR,
@@ -30,7 +25,7 @@ def find(look: Look) -> Iterator[Fault]:
                     ),
                     "give data.test another recording, or another piece of this one",
                     log=test.log.name,
-                    times=(float(low),),
+                    times=(max(test.spec.start or 0.0, train.spec.start or 0.0),),
                     rows=len(test.t),
                 )
                 break
