@@ -271,7 +271,7 @@ def experiment_of(robot: str, folder: Path):
         file = folder / "planar.urdf"
         file.write_text(PLANAR)
         spec = {"urdf": str(file)}
-    experiment = config.Experiment.model_validate({"robot": spec})
+    experiment = config.experiment({"robot": spec})
     return experiment, robots.load(experiment.robot)
 
 

@@ -19,12 +19,12 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from . import check, diagnose
     from .comparison import Difference, compare
-    from .config import Experiment
     from .errors import SysidError, SysidWarning
     from .estimate import Fit, Prediction
     from .pipeline import fit, load
     from .pipeline import predict_log as predict
     from .results import write
+    from .specs import Experiment
 
 _WHERE = {
     "load": ("pipeline", "load"), "fit": ("pipeline", "fit"), "predict": ("pipeline", "predict_log"),

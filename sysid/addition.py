@@ -5,7 +5,7 @@ from __future__ import annotations
 import shlex
 from collections.abc import Sequence
 
-from .config import EffectSpec, Experiment
+from .specs import EffectSpec, Experiment
 
 
 def spelled(candidate, joint: str) -> tuple[str, list[str] | None, dict]:

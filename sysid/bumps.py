@@ -12,7 +12,6 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.ndimage import maximum_filter1d, median_filter
 
-from .config import EffectSpec
 from .events import Event
 from .log import Log
 from .lowpass import lowpassed, stride_of, widest
@@ -21,6 +20,7 @@ from .outliers import BURST, CHANCE, bursts, ratio, surprise
 from .robot import Robot
 from .rows import Rows, stack
 from .shape import inverted
+from .specs import EffectSpec
 
 _EFFECTS = ("viscous", "coulomb", "torque_bias")  # what any joint has
 _NEARBY = 0.5  # s to either side whose median a burst must exceed

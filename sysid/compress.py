@@ -14,7 +14,7 @@ import numpy as np
 
 from .blocks import divided
 from .model import Model
-from .preprocess import Motion
+from .motion import Motion
 from .rows import difference_step
 
 # samples: with fewer rows than columns a triangle would be no smaller than they are

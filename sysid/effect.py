@@ -23,7 +23,7 @@ from typing import ClassVar
 import numpy as np
 
 from .errors import ConfigError
-from .preprocess import Piece
+from .motion import Piece
 
 
 @dataclass

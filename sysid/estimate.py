@@ -9,13 +9,13 @@ import numpy as np
 from . import uncertainty
 from .certificate import Certificate, certify
 from .compress import Compressed
-from .config import Experiment
 from .inertia import DIVERGENCES, PARAMETERIZATIONS
 from .inertia.consistency import is_consistent
 from .model import Model, moving_coefficients
+from .motion import Motion
 from .objective import Objective
-from .preprocess import Motion
 from .solve import Coordinates, Solution, solve
+from .specs import Experiment
 
 
 @dataclass(frozen=True)

@@ -13,16 +13,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from .knocks import knocks
 from .outliers import spikes
 from .repeats import held_angle, held_torque, rests
-
-if TYPE_CHECKING:
-    from .log import Segment
+from .segment import Segment
 
 WORDS = {
     "knock": "knock", "spike": "torque spike", "brake": "closed brake", "frozen": "frozen value",

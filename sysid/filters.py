@@ -14,13 +14,14 @@ import numpy as np
 from . import interior
 from .blocks import standard_error
 from .compress import Compressed, compress
-from .config import Experiment, PreprocessSpec
 from .errors import SysidError, SysidWarning
 from .estimate import pose
 from .events import usable
 from .log import Log
 from .model import Model, moving_coefficients
-from .preprocess import Smoother, prepare
+from .preprocess import prepare
+from .smoother import Smoother
+from .specs import Experiment, PreprocessSpec
 
 _WINDOWS = (0.02, 0.03, 0.05, 0.07, 0.1, 0.15, 0.2, 0.3, 0.4, 0.6, 0.8)  # s
 _CUTOFFS = (1.0, 1.5, 2.0, 3.0, 5.0, 7.0, 10.0, 15.0, 20.0, 30.0, 50.0, 100.0)  # Hz

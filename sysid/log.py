@@ -12,12 +12,13 @@ from pathlib import Path
 import numpy as np
 
 from . import datasets, units
-from .clock import Left, corrected
-from .config import DataSpec, LogSpec
+from .clock import corrected
 from .errors import LogError, SysidWarning
 from .events import Event
 from .readers import open_table
 from .readers.table import Table
+from .segment import Segment
+from .specs import DataSpec, LogSpec
 
 # A step longer than this many median steps is a hole that interpolation would invent motion for.
 GAP_STEPS = 10.0
@@ -28,21 +29,6 @@ _TOLD = 1e-3
 _EPOCH = 1e6  # s: a clock that reads more counts from 1970, not from the log's start
 _LARGEST = 1e20  # no unit makes a measured signal larger (a clock in ns, logged as a signal, reads 2e18)
 DEGREES = 4.0 * np.pi  # rad: no robot joint turns so far from zero, but its angle in degrees does
-
-
-@dataclass(frozen=True)
-class Segment:
-    """Uniformly sampled signals without a gap. t (n,) [s]; q, tau (n, dof); qd, qdd (n, dof) or None where not logged.
-    clock: what is left of the errors of stamps that were corrected."""
-
-    t: np.ndarray
-    step: float
-    q: np.ndarray
-    tau: np.ndarray
-    qd: np.ndarray | None
-    qdd: np.ndarray | None
-    signals: dict[str, np.ndarray]
-    clock: Left | None = None
 
 
 @dataclass(frozen=True)

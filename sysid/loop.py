@@ -15,10 +15,10 @@ from pathlib import Path
 
 from . import comparison, config, pipeline, results
 from .addition import remaining, spelled
-from .config import Experiment
 from .diagnose.diagnosis import Diagnosis, diagnose
 from .errors import ConfigError
 from .estimate import Fit
+from .specs import Experiment
 
 _HISTORY, _STEPS = "history.json", "steps"
 

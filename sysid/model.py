@@ -10,13 +10,13 @@ from pathlib import Path
 import numpy as np
 
 from . import own_effects, regressor, two_masses, units
-from .config import is_own
 from .effect import Deflection, Effect, MotionEffect, SensorEffect, Shape, TorqueEffect, WrenchEffect, find
 from .errors import ConfigError
 from .formula import Formula
 from .inertia import PARAMETERS, UNITS
-from .preprocess import Motion, Piece
+from .motion import Motion, Piece
 from .robot import Robot
+from .specs import is_own
 
 _CHUNK = 4096  # samples whose columns stand in memory at once
 ROBOT = -1  # the "joint" of an effect of the whole robot, called `*`

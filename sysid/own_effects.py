@@ -31,7 +31,7 @@ import numpy as np
 from . import regressor
 from .effect import KINDS, Effect, MotionEffect, SensorEffect, WrenchEffect, vocabulary
 from .errors import ConfigError, SysidError
-from .preprocess import Piece
+from .motion import Piece
 
 _STATED = ("equation", "looks_like", "separate_by", "source")
 _LOADED: dict[tuple[str, str], dict] = {}  # what a file holds, by its path and its content

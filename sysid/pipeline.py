@@ -22,14 +22,15 @@ from . import filters as filtering
 from . import log as logs
 from .bumps import bumps
 from .compress import Compressed, Linearised, compress
-from .config import Experiment, LogSpec
 from .errors import SysidWarning
 from .estimate import Fit, Prediction, identify, predict
 from .inertia.consistency import is_consistent
 from .model import Model, moving_coefficients
+from .motion import Motion
 from .plausible import implausible
-from .preprocess import Motion, prepare
+from .preprocess import prepare
 from .robot import Robot
+from .specs import Experiment, LogSpec
 from .threads import single_threaded
 
 #: called with the stage's name and the share of it done, 0 to 1

@@ -21,13 +21,13 @@ from pathlib import Path
 
 import numpy as np
 
-from .config import Experiment, is_own
 from .errors import ConfigError, SysidError
 from .estimate import Fit
 from .filters import settled
 from .inertia import PARAMETERS
 from .inertia.consistency import is_consistent
 from .model import Model
+from .specs import Experiment, is_own
 
 _PACKAGES = ("sysid", "pin", "numpy", "scipy", "yourdfpy", "polars")
 

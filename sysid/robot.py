@@ -16,10 +16,10 @@ import numpy as np
 import pinocchio as pin
 
 from . import prior, urdf
-from .config import InertiaSpec, RobotSpec
 from .errors import RobotError, SysidWarning
 from .inertia import pseudo
 from .inertia.consistency import is_consistent
+from .specs import InertiaSpec, RobotSpec
 
 # Before the names of links in the Pinocchio model of a URDF: a joint and a link may share a name, and Pinocchio keeps the
 # frames of both in one list.

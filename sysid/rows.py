@@ -13,7 +13,7 @@ import numpy as np
 from . import regressor
 from .effect import TorqueEffect
 from .model import Model, chunks
-from .preprocess import Motion, Piece
+from .motion import Motion, Piece
 from .two_masses import link_side
 
 _STRETCH = 16384  # samples whose columns are computed at once

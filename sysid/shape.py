@@ -15,13 +15,13 @@ import numpy as np
 
 from . import rows as row
 from .compress import Compressed, Factor, triangle
-from .config import Experiment
 from .effect import Deflection, TorqueEffect
 from .estimate import Fit, Problem, pose
 from .inertia import DIVERGENCES
 from .model import Model, moving_coefficients
+from .motion import Motion
 from .objective import add_blocks
-from .preprocess import Motion
+from .specs import Experiment
 
 _MOST_ROWS, _STEPS, _SETTLED = 6000, 12, 1e-7
 _LEAST_SHARE = 0.25  # of the way to another load

@@ -9,7 +9,7 @@ import numpy as np
 
 from . import rows as row
 from .model import Model
-from .preprocess import Motion
+from .motion import Motion
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ import math
 import numpy as np
 
 from . import regressor
-from .preprocess import Piece
+from .motion import Piece
 from .robot import Robot
 
 _FORGOTTEN = 4.0  # times of decay: two per cent are left

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 from ruamel.yaml import YAML
 
-from sysid import config, regressor, robot
+from sysid import regressor, robot, specs
 
 URDF = """<?xml version="1.0"?>
 <robot name="arm">
@@ -108,7 +108,7 @@ def arm_logs(tmp_path_factory) -> tuple[dict, dict]:
     """Columns of the training log and of the test log."""
     file = tmp_path_factory.mktemp("arm") / "robot.urdf"
     file.write_text(URDF)
-    machine = robot.load(config.RobotSpec(urdf=str(file), rotors=[config.RotorSpec.model_validate(ROTOR)]))
+    machine = robot.load(specs.RobotSpec(urdf=str(file), rotors=[specs.RotorSpec.model_validate(ROTOR)]))
     return logged(machine, 0), logged(machine, 1)
 
 
@@ -182,7 +182,7 @@ def cli(monkeypatch, capfd, tmp_path):
 @pytest.fixture(scope="session")
 def planar(tmp_path_factory) -> robot.Robot:
     """The planar arm of the blind benchmark: shoulder and elbow."""
-    return robot.load(config.RobotSpec(urdf=str(_planar(tmp_path_factory))))
+    return robot.load(specs.RobotSpec(urdf=str(_planar(tmp_path_factory))))
 
 
 def _planar(tmp_path_factory) -> Path:
@@ -199,7 +199,7 @@ def simulated(tmp_path_factory, planar):
 
     hide: EFFECT:JOINT:VALUES, or the torque of an effect that no catalogue has.
     """
-    from sysid import simulate
+    from sysid import simulate, specs
 
     made = {}
 
@@ -208,8 +208,8 @@ def simulated(tmp_path_factory, planar):
             told = [simulate.hidden(h) if isinstance(h, str) else h for h in hide]
             found = simulate.simulate(planar, hide=told, seed=seed, duration=duration, rate=500.0, **more)
             made[name] = tmp_path_factory.mktemp("simulated") / name
-            spec = config.RobotSpec(urdf=str(_planar(tmp_path_factory)))
-            simulate.write(found, config.Experiment(robot=spec), made[name])
+            spec = specs.RobotSpec(urdf=str(_planar(tmp_path_factory)))
+            simulate.write(found, specs.Experiment(robot=spec), made[name])
         return made[name]
 
     return make

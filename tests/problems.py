@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sysid import config, estimate, pipeline, regressor, robot
+from sysid import config, estimate, pipeline, regressor, robot, specs
 from sysid.compress import compress
 from sysid.log import Log, Segment
 from sysid.model import build, moving_coefficients
@@ -43,7 +43,7 @@ def arm_log(machine, rng, *, seconds=20.0, rate=200.0, noise=0.3, pi=None, visco
 @cache
 def arm() -> tuple:
     """The same as `leg` for a UR5 with other bodies than its URDF's."""
-    experiment = config.Experiment.model_validate({
+    experiment = config.experiment({
         "robot": {"urdf": UR5}, "model": {"effects": ["viscous", "coulomb", "torque_bias"]},
     })  # fmt: skip
     machine = robot.load(experiment.robot)
@@ -56,7 +56,7 @@ def arm() -> tuple:
     return experiment, structure, motion, compress(structure, motion), np.array(machine.prior)
 
 
-def posed(case: tuple, **changes) -> tuple[config.Experiment, estimate.Problem]:
+def posed(case: tuple, **changes) -> tuple[specs.Experiment, estimate.Problem]:
     """The optimisation problem of a case, with sections of its experiment changed."""
     experiment, structure, motion, data, prior = case
     update = {key: getattr(experiment, key).model_copy(update=value) for key, value in changes.items()}

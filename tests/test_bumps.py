@@ -1,16 +1,17 @@
 """Knocks that only the robot's own equations show, held against what truth.json says."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from sysid import config, pipeline
+from sysid import pipeline
 from sysid.bumps import bumps
 from sysid.events import Event
 from sysid.simulate import hidden, load, simulate, write
 
-ROOT = config.Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parent.parent
 
 
 @pytest.fixture(scope="module")

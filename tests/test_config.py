@@ -4,7 +4,7 @@ import dataclasses
 
 import pytest
 
-from sysid import config, pipeline
+from sysid import config, pipeline, specs
 from sysid.errors import ConfigError
 
 CONTRACT = """
@@ -30,7 +30,7 @@ solver: {tolerance: 1.0e-8, max_iterations: 200}
 """
 
 
-def load(tmp_path, text: str) -> config.Experiment:
+def load(tmp_path, text: str) -> specs.Experiment:
     file = tmp_path / "experiment.yaml"
     file.write_text(text)
     return config.load(file)

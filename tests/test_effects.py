@@ -8,10 +8,10 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from sysid import config, effect, regressor, robot
+from sysid import effect, regressor, robot, specs
 from sysid.errors import ConfigError
 from sysid.inertia import pseudo
-from sysid.preprocess import Piece
+from sysid.motion import Piece
 from tests.problems import UR5, fourier_motion
 
 SLIDE = """<robot name="slide"><link name="base"/>
@@ -39,7 +39,7 @@ def moving() -> tuple:
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "slide.urdf"
         file.write_text(SLIDE)
-        machine = robot.load(config.RobotSpec(urdf=str(file)))
+        machine = robot.load(specs.RobotSpec(urdf=str(file)))
     t, q, qd, qdd = fourier_motion(np.random.default_rng(1), 2.0, 200.0, machine.dof)
     still = t < 0.25
     q[still], qd[still], qdd[still] = q[~still][0], 0.0, 0.0
@@ -49,7 +49,7 @@ def moving() -> tuple:
 @cache
 def arm_moving() -> tuple:
     """A six-joint arm and a motion of it."""
-    machine = robot.load(config.RobotSpec(urdf=UR5))
+    machine = robot.load(specs.RobotSpec(urdf=UR5))
     return machine, piece_of(machine, *fourier_motion(np.random.default_rng(2), 3.0, 200.0, machine.dof))
 
 
@@ -137,7 +137,7 @@ def test_columns_of_a_stretch_are_those_of_the_whole(name, filtered):
     from tests.problems import arm_log
 
     machine, _ = arm_moving()
-    spec = config.PreprocessSpec(torque=filtered)
+    spec = specs.PreprocessSpec(torque=filtered)
     motion = prepare([arm_log(machine, np.random.default_rng(0), seconds=4.0)], spec, machine.joints)
     (piece,) = motion.pieces
     joint = ROBOT if effect.find(name).scope == "robot" else 1
@@ -235,7 +235,7 @@ def test_a_soft_joint_parts_link_and_motor(tmp_path, encoder, name):
     file = tmp_path / "pendulum.urdf"
     file.write_text(PENDULUM)
     rotor = {"joint": "hinge", "ratio": 10.0, "on": "base", "axis": [0, 1, 0], "inertia": {"parameters": [1, 0, 0, 0, 0.006, 0.005, 0.006, 0, 0, 0]}}
-    machine = robot.load(config.RobotSpec(urdf=str(file), rotors=[config.RotorSpec.model_validate(rotor)]))
+    machine = robot.load(specs.RobotSpec(urdf=str(file), rotors=[specs.RotorSpec.model_validate(rotor)]))
     t = np.arange(2000) * 5e-4
     q, qd, qdd = (x[:, None] for x in (0.6 * np.sin(4 * t), 2.4 * np.cos(4 * t), -9.6 * np.sin(4 * t)))
     piece = piece_of(machine, t, q, qd, qdd)
@@ -410,7 +410,7 @@ def test_signals_and_neighbours_that_are_not_there(tmp_path):
         effect.find("warmup").given(signal="cold").columns(small_piece(), 1)
     file = tmp_path / "pendulum.urdf"
     file.write_text(PENDULUM)
-    machine = robot.load(config.RobotSpec(urdf=str(file)))
+    machine = robot.load(specs.RobotSpec(urdf=str(file)))
     with pytest.raises(ConfigError, match="second joint"):
         effect.find("joint_coupling").bound(machine, 0)
     assert effect.find("joint_coupling").variants(machine, 0) == []

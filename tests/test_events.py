@@ -11,12 +11,12 @@ import pytest
 from scipy.signal import lfilter
 
 from sysid import config, pipeline
-from sysid.config import PreprocessSpec
 from sysid.events import Event, find, mended, told, usable
 from sysid.log import Log, Segment
 from sysid.lowpass import lowpassed
 from sysid.preprocess import prepare
 from sysid.repeats import held_angle, held_torque
+from sysid.specs import PreprocessSpec
 
 STEP = 1e-3
 JOINTS = ("a", "b", "c")

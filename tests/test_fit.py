@@ -115,7 +115,7 @@ def test_locked_joints_and_welded_links_are_exported_as_one_body(tmp_path):
     from tests.test_inertia import random_bodies
 
     names = [f"panda_joint{k}" for k in range(1, 8)]
-    spec = config.Experiment.model_validate({
+    spec = config.experiment({
         "robot": {"urdf": "example-robot-data://panda_description/urdf/panda.urdf", "joints": names, "lock": {"panda_finger_joint1": 0.03}},
     })  # fmt: skip
     from sysid.estimate import identify

@@ -8,11 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sysid import effect, pipeline
-from sysid.config import EffectSpec
 from sysid.effect import describe
 from sysid.errors import ConfigError
 from sysid.formula import FUNCTIONS, Formula, parse
 from sysid.model import found
+from sysid.specs import EffectSpec
 from tests.test_effects import moving, small_piece
 
 REFUSED = {

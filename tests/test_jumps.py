@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from sysid.config import PreprocessSpec
 from sysid.jumps import jumps
 from sysid.log import Log, Segment
 from sysid.preprocess import prepare
+from sysid.specs import PreprocessSpec
 
 STEP, INERTIA, NOISE = 1e-3, 2.0, 0.02
 

@@ -1,6 +1,7 @@
 """The loop: an effect goes into the file, the fit is repeated, the history tells; discover never keeps what held-out data refuse."""
 
 import json
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -43,7 +44,7 @@ model:
 
 
 def effects_of(text: str) -> list[tuple]:
-    return [(e.name, e.joints, e.options) for e in config.loads(text, config.Path("experiment.yaml")).model.effects]
+    return [(e.name, e.joints, e.options) for e in config.loads(text, Path("experiment.yaml")).model.effects]
 
 
 # ---- the file
@@ -131,7 +132,7 @@ def test_other_options_take_the_place_of_what_is_there():
         text = f"model:\n  effects: [viscous, {before}]  # kept\n"
         made = with_effect(text, "stribeck", added, {"vs": 0.2}, every=every)
         assert effects_of(made) == [("viscous", None, {}), *after] and "# kept" in made
-        model = grown(config.loads(text, config.Path("e.yaml")), "stribeck", added, {"vs": 0.2}, every=every).model
+        model = grown(config.loads(text, Path("e.yaml")), "stribeck", added, {"vs": 0.2}, every=every).model
         assert [(e.name, e.joints, e.options) for e in model.effects] == effects_of(made)
     with pytest.raises(ConfigError, match="already on hip"):
         with_effect("model: {effects: [{stribeck: {joints: [hip], vs: 0.2}}]}", "stribeck", ["hip"], {"vs": 0.2}, every=every)
@@ -142,7 +143,7 @@ def test_what_the_file_does_not_say_is_written_out(text):
     """The effects that hold by default would be gone if the list began with the new one."""
     grown = with_effect(text, "stribeck", ["hip"], {})
     assert effects_of(grown) == [("viscous", None, {}), ("coulomb", None, {}), ("stribeck", ["hip"], {})]
-    assert config.loads(grown, config.Path("e.yaml")).model.inertia == (("linear" in text and "linear") or "log-cholesky")
+    assert config.loads(grown, Path("e.yaml")).model.inertia == (("linear" in text and "linear") or "log-cholesky")
 
 
 def test_an_empty_list_stays_the_user_s():
@@ -218,7 +219,7 @@ def test_add_writes_refits_and_tells(experiment, cli):
     assert [s["added"] for s in loop.read_history(said.run)] == [None, "torque_bias"]
 
 
-CHEETAH = config.Path(__file__).resolve().parent.parent / "configs" / "cheetah3.yaml"
+CHEETAH = Path(__file__).resolve().parent.parent / "configs" / "cheetah3.yaml"
 
 
 def test_the_readme_s_example_reaches_its_floor(cli, tmp_path):

@@ -1,16 +1,17 @@
 """What labs' logs have in them, held against what truth.json says, and against closed forms."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from sysid import config, pipeline, regressor, robot
+from sysid import pipeline, regressor, robot, specs
 from sysid.errors import SysidError
 from sysid.simulate import hidden, load, motion, motions, simulate
 from tests.conftest import URDF
 
-ROOT = config.Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parent.parent
 RATE = 500.0
 
 
@@ -18,7 +19,7 @@ RATE = 500.0
 def arm(tmp_path_factory):
     file = tmp_path_factory.mktemp("planar") / "robot.urdf"
     file.write_text(URDF)
-    return robot.load(config.RobotSpec(urdf=str(file)))
+    return robot.load(specs.RobotSpec(urdf=str(file)))
 
 
 @pytest.fixture(scope="module")

@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 from sysid import filters
-from sysid.config import PreprocessSpec
 from sysid.errors import ConfigError, LogError, SysidWarning
 from sysid.log import Log, Segment
-from sysid.preprocess import Smoother, _convolved, prepare, savitzky_golay
+from sysid.preprocess import prepare
+from sysid.smoother import Smoother, _convolved, savitzky_golay
+from sysid.specs import PreprocessSpec
 from tests.problems import arm, arm_log
 
 STEP = 1e-3

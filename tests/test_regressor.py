@@ -5,9 +5,9 @@ import pinocchio as pin
 import pytest
 
 from sysid import regressor
-from sysid.config import RobotSpec
 from sysid.errors import RobotError
 from sysid.inertia import pseudo
+from sysid.specs import RobotSpec
 from tests import robots
 from tests.test_inertia import random_bodies
 
@@ -173,10 +173,10 @@ def test_rotor_mistakes_are_named(tmp_path):
 
 
 def test_example_robot_data_and_package_paths():
-    from sysid import config, robot
+    from sysid import robot, specs
 
-    panda = robot.load(config.RobotSpec(urdf="example-robot-data://panda_description/urdf/panda.urdf", lock={"panda_finger_joint1": 0.0, "panda_finger_joint2": 0.0}))
+    panda = robot.load(specs.RobotSpec(urdf="example-robot-data://panda_description/urdf/panda.urdf", lock={"panda_finger_joint1": 0.0, "panda_finger_joint2": 0.0}))
     assert panda.dof == 7 and panda.bodies[6].name == "panda_link7"
     assert pseudo.to_pseudo(panda.prior).shape == (7, 4, 4)
     with pytest.raises(RobotError, match="package://"):
-        robot.load(config.RobotSpec(urdf="package://nowhere/robot.urdf"))
+        robot.load(specs.RobotSpec(urdf="package://nowhere/robot.urdf"))

@@ -16,7 +16,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from sysid import config, pipeline, regressor, robot
+from sysid import pipeline, regressor, robot, specs
 from sysid.diagnose.diagnosis import diagnose
 from sysid.report import charts, page, solids
 from sysid.report.decimate import broken, kept
@@ -37,7 +37,7 @@ def written(folder, hidden: float):
     folder.mkdir()
     (folder / "robot.urdf").write_text(URDF.replace('"shoulder"', f'"{html.escape(EVIL)}"'))
     rotor = {**CONFIG["robot"]["rotors"][0], "joint": EVIL}
-    machine = robot.load(config.RobotSpec(urdf=str(folder / "robot.urdf"), rotors=[config.RotorSpec.model_validate(rotor)]))
+    machine = robot.load(specs.RobotSpec(urdf=str(folder / "robot.urdf"), rotors=[specs.RotorSpec.model_validate(rotor)]))
     for name, seed in ((LOG, 0), ("test.csv", 1)):
         rng, t = np.random.default_rng(seed), np.arange(0, 8.0, 0.005)
         q, qd, qdd = motion(t, seed)

@@ -6,12 +6,13 @@ with the simulator's truth.json, which the diagnosis does not read.
 
 import json
 import shlex
+from pathlib import Path
 
 import numpy as np
 import pytest
 from ruamel.yaml import YAML
 
-from sysid import config, loop, pipeline, results, simulate
+from sysid import loop, pipeline, results, simulate
 from sysid.addition import command, grown, spelled
 from sysid.diagnose.diagnosis import diagnose
 from sysid.diagnose.select import LEVEL, WORTH, search
@@ -308,7 +309,7 @@ def test_an_option_survives_its_discovery(simulated, tmp_path):
 
 def test_what_was_beaten_is_asked_again_once_another_has_joined(tmp_path):
     """While the gain is missing its work speaks for a tilted base, which beats the offset; with the gain in the model it does not."""
-    experiment, machine, *_ = simulate.load(config.Path(__file__).resolve().parent.parent / "configs" / "cheetah3.yaml")
+    experiment, machine, *_ = simulate.load(Path(__file__).resolve().parent.parent / "configs" / "cheetah3.yaml")
     hide = [simulate.hidden(h) for h in ("encoder_offset:abad:d=-0.077", "torque_gain:abad:e=0.11")]
     simulate.write(simulate.simulate(machine, hide=hide, seed=7, duration=12.0, rate=500.0), experiment, tmp_path / "logs")
     found = pipeline.load(tmp_path / "logs")

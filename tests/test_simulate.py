@@ -3,12 +3,13 @@
 import json
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.signal import butter, sosfiltfilt
 
-from sysid import config, regressor, robot
+from sysid import config, regressor, robot, specs
 from sysid.errors import SysidError
 from sysid.inertia import pseudo
 from sysid.simulate import Hidden, Scales, defaults, hidden, simulate
@@ -17,7 +18,7 @@ from sysid.simulate.plant import Plant, Truth
 from tests.conftest import URDF
 
 UR5 = "example-robot-data://ur_description/urdf/ur5_robot.urdf"
-ROOT = config.Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parent.parent
 SECONDS, SLOW = 4.0, 0.03  # s; rad/s below which friction is not looked at
 
 
@@ -28,8 +29,8 @@ def machines(tmp_path_factory):
     file.write_text(URDF)
     leg = config.load(ROOT / "configs/cheetah3.yaml")
     return {
-        "arm": robot.load(config.RobotSpec(urdf=str(file))), "leg": robot.load(leg.robot, leg.folder),
-        "ur5": robot.load(config.RobotSpec(urdf=UR5)),
+        "arm": robot.load(specs.RobotSpec(urdf=str(file))), "leg": robot.load(leg.robot, leg.folder),
+        "ur5": robot.load(specs.RobotSpec(urdf=UR5)),
     }  # fmt: skip
 
 

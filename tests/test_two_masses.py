@@ -1,14 +1,16 @@
 """A link behind its motor, against integrations of the same law, closed forms and the simulator's link, which no sensor sees."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from sysid import config, pipeline, regressor, robot, two_masses
+from sysid import config, pipeline, regressor, robot, specs, two_masses
 from sysid.addition import grown
 from sysid.lowpass import Gaussian
-from sysid.preprocess import Smoother
 from sysid.simulate import hidden, simulate
+from sysid.smoother import Smoother
 from tests.conftest import URDF
 from tests.test_effects import piece_of
 
@@ -101,7 +103,7 @@ def test_play_without_inertia_follows_the_load():
 def arm(tmp_path_factory):
     file = tmp_path_factory.mktemp("planar") / "robot.urdf"
     file.write_text(URDF)
-    return robot.load(config.RobotSpec(urdf=str(file)))
+    return robot.load(specs.RobotSpec(urdf=str(file)))
 
 
 @pytest.mark.parametrize("what", ["elasticity:elbow:K=60,D=0.3", "elasticity:elbow:K=200,D=1", "backlash:elbow:b=0.01", "backlash:elbow:b=0.004"])
@@ -146,7 +148,7 @@ def test_a_fit_finds_it_from_nothing(simulated, effect, hide, word, truly, near,
 
 def test_rotors_are_no_load_of_their_own_gear():
     """The leg's own rotor turns with the motor; the rotors that a link carries are its load."""
-    leg = config.load(config.Path(__file__).resolve().parent.parent / "configs/cheetah3.yaml")
+    leg = config.load(Path(__file__).resolve().parent.parent / "configs/cheetah3.yaml")
     machine = robot.load(leg.robot, leg.folder)
     rng = np.random.default_rng(0)
     q, qd, qdd = rng.normal(size=(3, 5, machine.dof))
@@ -165,7 +167,7 @@ def test_rotors_are_no_load_of_their_own_gear():
 
 def test_a_filter_reaches_the_ends():
     """Of a straight line, as of anything that it leaves alone, nothing changes, up to the last sample."""
-    smoother = Smoother(config.PreprocessSpec(window=0.1), 0.01)
+    smoother = Smoother(specs.PreprocessSpec(window=0.1), 0.01)
     line = np.linspace(-1.0, 2.0, 60)
     np.testing.assert_allclose(smoother.smoothed(line), line, atol=1e-12)
     np.testing.assert_array_equal(smoother.smoothed(line[:1]), line[:1])

@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 
 from .. import pipeline
-from ..config import Experiment
 from ..errors import ConfigError
 from ..model import Model
 from ..results import read_fit
+from ..specs import Experiment
 
 
 def read_run(run: Path, experiment: Experiment) -> tuple[Model, np.ndarray]:

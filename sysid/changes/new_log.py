@@ -9,10 +9,10 @@ import numpy as np
 
 from .. import datasets, pipeline, rows
 from ..blocks import numbered
-from ..config import Experiment, LogSpec
 from ..errors import LogError
 from ..lowpass import LEAST, lowpassed, stride_of
 from ..noise import floors_of
+from ..specs import Experiment, LogSpec
 from .fitted import Change, together
 from .halves import BLOCKS, Question
 from .held import read_run

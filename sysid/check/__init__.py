@@ -14,8 +14,8 @@ from importlib import import_module
 from pkgutil import iter_modules
 
 from ..callable_module import callable_module
-from ..config import Experiment
 from ..pipeline import noticed
+from ..specs import Experiment
 from .fault import ERROR, WARNING, Fault
 from .look import looked
 

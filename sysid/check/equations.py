@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .. import regressor
-from ..preprocess import Motion
+from ..motion import Motion
 from ..robot import Robot
 from ..rows import Rows, starts
 

@@ -10,12 +10,12 @@ import numpy as np
 
 from .. import log as logs
 from .. import pipeline, robot
-from ..config import EffectSpec, Experiment, LogSpec
 from ..lowpass import lowpassed, stride_of, widest
 from ..model import Model, build
-from ..preprocess import Motion
+from ..motion import Motion
 from ..robot import Robot
 from ..rows import Rows, stack
+from ..specs import EffectSpec, Experiment, LogSpec
 from .equations import FEWEST, Equations
 
 _HAS = ("armature", "viscous", "coulomb", "torque_bias")  # what any joint has

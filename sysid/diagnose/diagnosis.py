@@ -20,13 +20,13 @@ import numpy as np
 
 from .. import pipeline
 from ..candidates import candidates, own_effects
-from ..config import Experiment
 from ..estimate import Fit, predict
 from ..failures import Failure, HeldOut, failures
 from ..filters import settled
 from ..lowpass import lowpassed
 from ..noise import NoiseFloor, filtered, floors_of, of_angles
 from ..preprocess import prepare
+from ..specs import Experiment
 from ..transfer import transfers
 from ..view import View, first_view, too_short
 from . import claims as claiming

@@ -10,17 +10,16 @@ import numpy as np
 
 from ..events import mended
 from ..log import Log
+from ..motion import Motion, Piece
 from ..preprocess import (
-    Motion,
-    Piece,
     assembled,
-    differences,
     share_left_out,
     standstill_speed,
     turns,
     without_events,
     without_standstill,
 )
+from ..smoother import differences
 from .angles import noise_of
 from .gaussian import HIGHEST, Gaussian
 

@@ -16,10 +16,10 @@ from pathlib import Path
 import numpy as np
 
 from .. import config
-from ..config import Experiment, PreprocessSpec
 from ..errors import SysidError, SysidWarning
 from ..robot import Robot
 from ..robot import load as robot_of
+from ..specs import Experiment, PreprocessSpec
 from .run import SimulatedLog, Simulation
 
 _LOG = re.compile(r"(train|train_[0-9]+|test)\.csv")

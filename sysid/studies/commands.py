@@ -5,10 +5,10 @@ from dataclasses import asdict
 from pathlib import Path
 
 from .. import results
-from ..config import Experiment
 from ..inertia import PARAMETERS as _NAMES
 from ..pipeline import prepared
 from ..report import figures
+from ..specs import Experiment
 from . import bodies, prior, restarts
 from .journal import Journal, run
 

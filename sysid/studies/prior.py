@@ -8,10 +8,10 @@ import numpy as np
 
 from ..blocks import standard_error
 from ..compress import Compressed
-from ..config import Experiment
 from ..estimate import pose
 from ..interior import minimise
 from ..model import Model
+from ..specs import Experiment
 
 WEIGHTS = tuple(10.0 ** np.arange(-6, 7).astype(float))
 _FOLDS = 8

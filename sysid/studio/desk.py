@@ -15,8 +15,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 from .. import config, loop, pipeline, results
-from ..config import Experiment
 from ..errors import ConfigError, SysidError
+from ..specs import Experiment
 
 _MOST, _LARGEST = 200, 1_000_000  # texts kept; bytes of one
 _EDIT = "edit by hand"

@@ -9,8 +9,8 @@ import re
 import threading
 from pathlib import Path
 
-from ..config import Experiment
 from ..errors import SysidError
+from ..specs import Experiment
 from .bench import Bench
 from .views import Views
 

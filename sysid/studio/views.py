@@ -7,7 +7,7 @@ import threading
 from collections import OrderedDict
 from pathlib import Path
 
-from ..config import Experiment
+from ..specs import Experiment
 from .view import View
 
 _KEPT, _SAMPLES = 8, 4_000_000  # views in memory; samples that they hold together (at least two are kept)

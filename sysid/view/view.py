@@ -11,14 +11,14 @@ import numpy as np
 
 from .. import blocks, flexible, pipeline
 from .. import rows as row
-from ..config import Experiment
 from ..errors import LogError
 from ..estimate import Fit, inverse
 from ..lowpass import again, calm, lowpassed, narrowed, stride_of, widest
 from ..model import Model
-from ..preprocess import Motion
+from ..motion import Motion
 from ..shape import Settled, settle
 from ..source import Source
+from ..specs import Experiment
 from .design import Design, Sums, by_block, designed, instrumented, summed
 
 _FOLDS = 10

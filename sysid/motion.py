@@ -1,0 +1,95 @@
+"""Motion: position, velocity, acceleration and torque in contiguous pieces. What identification works on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .events import Event
+from .smoother import Smoother
+
+
+@dataclass(frozen=True)
+class Piece:
+    """A contiguous stretch of motion, every row usable.
+
+    log, source: number and name of the log. t (n,) [s]; q, qd, qdd (n, dof); tau (n, dof) as the fit sees it, `measured` as logged; signals {name: (n,)}; `use` (n, dof) bool, None where every row counts.
+    `smoother` filters columns where torque was filtered, else None; then `margin` extra rows stand before and
+    after `core`, whose filtered values the filter needs but which are not used. `rest` (dof,) [rad/s or m/s] is the
+    speed that rounding makes of a constant angle; `noise` (dof,) [rad or m] what the filter took off the angles, RMS, or an
+    estimate of their noise from that. `sight` is the filter that the angles were seen through, where it matters: torque was not.
+
+    What a model adds: `load` (n, dof) the torque that its bodies alone need; `gravity` (3,) or None for the robot's own;
+    `deflection` (3, n, dof), how far each link is behind its motor in q, qd and qdd, or None.
+    """
+
+    log: int
+    step: float
+    t: np.ndarray
+    q: np.ndarray
+    qd: np.ndarray
+    qdd: np.ndarray
+    tau: np.ndarray
+    measured: np.ndarray
+    signals: dict[str, np.ndarray]
+    use: np.ndarray | None
+    smoother: Smoother | None
+    core: slice
+    rest: np.ndarray
+    noise: np.ndarray
+    source: str = ""
+    sight: Smoother | None = None
+    load: np.ndarray | None = None
+    gravity: np.ndarray | None = None
+    deflection: np.ndarray | None = None
+
+    def direction(self, joint: int) -> np.ndarray:
+        """sign(qd) (n,) of a joint, zero where the filter of a constant angle leaves nothing but rounding."""
+        qd = self.qd[:, joint]
+        return np.where(np.abs(qd) > self.rest[joint], np.sign(qd), 0.0)
+
+    def part(self, rows: slice) -> Piece:
+        """The rows `rows`, without margins."""
+        return replace(
+            self, t=self.t[rows], q=self.q[rows], qd=self.qd[rows], qdd=self.qdd[rows], tau=self.tau[rows],
+            measured=self.measured[rows], signals={name: values[rows] for name, values in self.signals.items()},
+            use=None if self.use is None else self.use[rows], core=slice(0, len(self.t[rows])),
+            load=None if self.load is None else self.load[rows],
+            deflection=None if self.deflection is None else self.deflection[:, rows],
+        )  # fmt: skip
+
+    @property
+    def samples(self) -> int:
+        """Number of usable rows."""
+        return self.core.stop - self.core.start
+
+
+@dataclass(frozen=True)
+class Motion:
+    """What identification works on: pieces of motion of the same joints.
+
+    still: joints that never move, or never clear of a standstill. standing (dof,): share of the rows that count in which
+    a joint stands still. left_out (dof,): rows that do not count.
+    events: what disturbed the logs; `disturbed` the share of all joints' rows that is left out for it.
+    band: [Hz] below which the joints' speeds stay, where it was asked for, else zero.
+    """
+
+    joints: tuple[str, ...]
+    pieces: tuple[Piece, ...]
+    still: tuple[str, ...]
+    standing: np.ndarray
+    left_out: np.ndarray
+    events: tuple[Event, ...] = ()
+    disturbed: float = 0.0
+    band: float = 0.0
+
+    @property
+    def samples(self) -> int:
+        """Number of usable rows over all pieces."""
+        return sum(piece.samples for piece in self.pieces)
+
+    @property
+    def duration(self) -> float:
+        """Seconds of motion over all pieces."""
+        return sum(piece.samples * piece.step for piece in self.pieces)

@@ -1,0 +1,24 @@
+"""A stretch of a log: uniformly sampled signals without a gap."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .clock import Left
+
+
+@dataclass(frozen=True)
+class Segment:
+    """Uniformly sampled signals without a gap. t (n,) [s]; q, tau (n, dof); qd, qdd (n, dof) or None where not logged.
+    clock: what is left of the errors of stamps that were corrected."""
+
+    t: np.ndarray
+    step: float
+    q: np.ndarray
+    tau: np.ndarray
+    qd: np.ndarray | None
+    qdd: np.ndarray | None
+    signals: dict[str, np.ndarray]
+    clock: Left | None = None

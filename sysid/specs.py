@@ -1,0 +1,285 @@
+"""What an experiment says: every key typed. Plain data; how it is read from a file stands in `config`."""
+
+from __future__ import annotations
+
+import math
+import re
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
+
+_LARGEST = 1e12  # nothing of a robot is larger in SI units, and its square is still a number
+
+
+def _finite(value: float) -> float:
+    if not abs(value) <= _LARGEST:
+        raise ValueError(f"must be a finite number, at most {_LARGEST:g} in size")
+    return value
+
+
+def _column(value: Any) -> Any:
+    if isinstance(value, bool) or not isinstance(value, (str, int)):
+        raise ValueError("must be a column's name or its number, counted from 0")
+    return value
+
+
+def _columns(value: Any) -> Any:
+    if isinstance(value, str):
+        return value
+    if isinstance(value, list) and value:
+        return [_column(item) for item in value]
+    raise ValueError('must be a pattern such as "q_{joint}", a list of names, or a list of numbers counted from 0')
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) <= _LARGEST
+
+
+def _auto_or_positive(value: Any) -> Any:
+    if value == "auto":
+        return value
+    if _is_number(value) and value > 0:
+        return float(value)
+    raise ValueError("must be a positive number or auto")
+
+
+def _standstill(value: Any) -> Any:
+    if value in ("auto", "keep", "mask"):
+        return value
+    if _is_number(value) and value >= 0:
+        return float(value)
+    raise ValueError("must be auto, keep, mask, or a speed [rad/s or m/s]")
+
+
+def _nonzero(value: float) -> float:
+    if value == 0:
+        raise ValueError("must not be 0")
+    return value
+
+
+def _reference(value: str) -> str:
+    if not value or "\0" in value:
+        raise ValueError("must be the path of a file")
+    return value
+
+
+Text = Annotated[str, AfterValidator(_reference)]
+Number = Annotated[float, AfterValidator(_finite)]
+Vector = Annotated[list[Number], Field(min_length=3, max_length=3)]
+Positive = Annotated[float, AfterValidator(_finite), Field(gt=0)]
+Columns = Annotated[Any, BeforeValidator(_columns)]
+
+
+class _Spec(BaseModel):
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+
+
+class CylinderSpec(_Spec):
+    """A cylinder along its frame's z axis [m]."""
+
+    radius: Positive
+    length: Positive
+
+
+class InertiaSpec(_Spec):
+    """A body: a uniform box or cylinder of a mass [kg] and centre of mass [m], or its ten parameters."""
+
+    mass: Positive | None = None
+    com: Vector = [0.0, 0.0, 0.0]
+    box: Annotated[list[Positive], Field(min_length=3, max_length=3)] | None = None
+    cylinder: CylinderSpec | None = None
+    parameters: Annotated[list[Number], Field(min_length=10, max_length=10)] | None = None
+
+    def model_post_init(self, _context: Any) -> None:
+        shapes = [key for key in ("box", "cylinder", "parameters") if getattr(self, key) is not None]
+        if len(shapes) != 1:
+            raise ValueError("give exactly one of box, cylinder, parameters")
+        if (self.mass is None) != (self.parameters is not None):
+            raise ValueError("mass goes with box or cylinder; parameters holds its own")
+
+
+def _ratio(value: float) -> float:
+    if value == 0:
+        raise ValueError("a gear ratio of 0 drives nothing; give motor turns per joint turn")
+    return value
+
+
+Ratio = Annotated[float, AfterValidator(_finite), AfterValidator(_ratio)]
+NonZero = Annotated[float, AfterValidator(_finite), AfterValidator(_nonzero)]
+
+
+def _direction(value: list[float]) -> list[float]:
+    if math.hypot(*value) < 1e-6:
+        raise ValueError("must be a direction, not 0 0 0")
+    return value
+
+
+class RotorSpec(_Spec):
+    """A motor's rotor: a rigid body on a link, spinning `ratio` times as fast as its joint."""
+
+    joint: str
+    ratio: Ratio
+    on: str
+    xyz: Vector = [0.0, 0.0, 0.0]
+    rpy: Vector = [0.0, 0.0, 0.0]
+    axis: Annotated[Vector, AfterValidator(_direction)] = [0.0, 0.0, 1.0]
+    inertia: InertiaSpec
+
+
+class RobotSpec(_Spec):
+    """The URDF, the joints that move, and the rotors that they drive."""
+
+    urdf: Text = "robot.urdf"
+    joints: list[str] | None = None
+    lock: dict[str, Number] = {}
+    gravity: Vector = [0.0, 0.0, -9.81]
+    rotors: list[RotorSpec] = []
+    transmission: dict[str, Annotated[dict[str, NonZero], Field(min_length=1)]] = {}
+
+
+class LogSpec(_Spec):
+    """A log: a path or a public dataset, or a piece of one: start <= t - t[0] < stop [s]."""
+
+    file: Text
+    start: Annotated[float, AfterValidator(_finite), Field(ge=0)] | None = None
+    stop: Positive | None = None
+
+    def model_post_init(self, _context: Any) -> None:
+        if self.start is not None and self.stop is not None and not self.start < self.stop:
+            raise ValueError(f"start {self.start:g} must be before stop {self.stop:g}")
+
+    def overlaps(self, other: LogSpec) -> bool:
+        """Whether both hold a piece, were they of one recording."""
+        stops = [log.stop for log in (self, other) if log.stop is not None]
+        return not stops or max(self.start or 0.0, other.start or 0.0) < min(stops)
+
+
+def _log(value: Any) -> Any:
+    if isinstance(value, str):
+        return {"file": value}
+    if isinstance(value, (dict, LogSpec)):
+        return value
+    raise ValueError("must be a path, or {file: path, start: seconds, stop: seconds}")
+
+
+Logs = Annotated[list[Annotated[LogSpec, BeforeValidator(_log)]], Field(min_length=1)]
+
+
+class ColumnsSpec(_Spec):
+    """Which column of a log holds what; `{joint}` stands for each joint's name."""
+
+    time: Annotated[Any, BeforeValidator(_column)] = "t"
+    position: Columns = "q_{joint}"
+    torque: Columns = "tau_{joint}"
+    velocity: Columns | None = None
+    acceleration: Columns | None = None
+    signals: dict[str, Annotated[Any, BeforeValidator(_column)]] = {}
+
+
+def _constants(value: Any) -> Any:
+    if value is None or isinstance(value, dict):
+        return value
+    raise ValueError("must map each joint to its constant, {joint: N m per A}")
+
+
+class UnitsSpec(_Spec):
+    """The units of a log; everything behind the reader is SI."""
+
+    time: Literal["s", "ms", "us", "ns"] = "s"
+    position: Literal["rad", "deg", "m", "mm"] = "rad"
+    torque: Literal["N m", "N", "A"] = "N m"
+    torque_constant: Annotated[dict[str, NonZero] | None, BeforeValidator(_constants)] = None
+
+    def model_post_init(self, _context: Any) -> None:
+        if self.torque_constant is not None and self.torque != "A":
+            raise ValueError(
+                f"torque_constant turns current into torque, and torque is in {self.torque}: write torque: A, or leave the constants out"
+            )
+
+
+class DataSpec(_Spec):
+    """The logs: what to fit, what to hold out, how to read them."""
+
+    train: Logs = Field(default_factory=lambda: [LogSpec(file="train.csv")])
+    test: Logs = Field(default_factory=lambda: [LogSpec(file="test.csv")])
+    columns: ColumnsSpec = ColumnsSpec()
+    signals: dict[str, Annotated[Any, BeforeValidator(_column)]] = {}
+    units: UnitsSpec = UnitsSpec()
+    rate: Positive | None = None
+
+
+class PreprocessSpec(_Spec):
+    """The filter from logged angles to position, velocity and acceleration."""
+
+    filter: Literal["savitzky-golay", "butterworth", "none"] = "savitzky-golay"
+    order: Annotated[int, Field(ge=1, le=12)] = 4
+    window: Annotated[Any, BeforeValidator(_auto_or_positive)] = 0.1
+    cutoff: Annotated[Any, BeforeValidator(_auto_or_positive)] = 10.0
+    torque: Literal["raw", "same"] = "raw"
+    standstill: Annotated[Any, BeforeValidator(_standstill)] = "auto"
+    events: Literal["mask", "keep"] = "mask"
+
+    def model_post_init(self, _context: Any) -> None:
+        if self.filter == "savitzky-golay" and self.order < 2:
+            raise ValueError(f"order {self.order} has no acceleration: savitzky-golay needs 2 to 12")
+
+
+def is_own(name: str) -> bool:
+    """Whether an effect's name is a class in a Python file, `my_effects.py:Name`."""
+    return re.fullmatch(r"[^\0]*[^\0/\\:]\.py:[A-Za-z_]\w*", name) is not None
+
+
+class EffectSpec(_Spec):
+    """An effect of the vocabulary, the joints that have it (None: every joint), and its own options by name."""
+
+    name: str
+    joints: Annotated[list[str], Field(min_length=1)] | None = None
+    options: dict[str, Any] = {}
+
+
+class ModelSpec(_Spec):
+    """How bodies are parameterized, and the effects on the joints."""
+
+    inertia: Literal["log-cholesky", "exponential", "eigenvalue", "linear"] = "log-cholesky"
+    effects: list[EffectSpec] = [EffectSpec(name="viscous"), EffectSpec(name="coulomb")]
+    candidates: list[EffectSpec] = []
+
+
+class PriorSpec(_Spec):
+    """What the bodies are believed to be before any data, and how strongly."""
+
+    divergence: Literal["log-det", "pullback", "euclidean"] = "log-det"
+    weight: Annotated[float, AfterValidator(_finite), Field(ge=0)] = 1.0e-2
+    source: Text = "urdf"
+
+
+class SolverSpec(_Spec):
+    """When to stop, and whether each joint counts by its noise."""
+
+    tolerance: Annotated[float, AfterValidator(_finite), Field(gt=0, lt=1)] = 1.0e-8
+    max_iterations: Annotated[int, Field(ge=1)] = 200
+    weighting: Literal["none", "noise"] = "none"
+    handover: Annotated[float, AfterValidator(_finite), Field(ge=0, le=1)] = 0.5
+
+
+class Experiment(_Spec):
+    """An experiment file, every default filled in. `path` is the file; paths inside are relative to its folder."""
+
+    robot: RobotSpec = RobotSpec()
+    data: DataSpec = Field(default_factory=DataSpec)
+    preprocess: PreprocessSpec = PreprocessSpec()
+    model: ModelSpec = ModelSpec()
+    prior: PriorSpec = PriorSpec()
+    solver: SolverSpec = SolverSpec()
+    path: Path = Field(default=Path("experiment.yaml"), exclude=True)
+
+    @property
+    def folder(self) -> Path:
+        """The folder that the experiment's paths are relative to."""
+        return self.path.parent
+
+    @property
+    def name(self) -> str:
+        """The file's name without its ending; for a folder with config.yaml, the folder's."""
+        return self.path.resolve().parent.name if self.path.stem == "config" else self.path.stem
