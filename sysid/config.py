@@ -12,10 +12,12 @@ from typing import Any, get_args
 
 from pydantic import BaseModel, ValidationError
 
+from . import datasets
 from .effect import find, vocabulary
 from .errors import ConfigError
 from .formula import option_names
-from .specs import EffectSpec, Experiment, is_own
+from .readers import listed
+from .specs import EffectSpec, Experiment, LogSpec, is_own
 
 _LARGEST_FILE = 1_000_000  # bytes
 _MOST_ALIASED_NODES = 10_000
@@ -28,7 +30,7 @@ def file_of(path: str | Path) -> Path:
     return path / "config.yaml" if path.is_dir() else path
 
 
-_LOGS = (".csv", ".parquet", ".npz", ".mat", ".h5", ".hdf5", ".mcap", ".db3", ".bag", ".gz")
+_LOGS = (".csv", ".parquet", ".npz", ".mat", ".h5", ".hdf5", ".mcap", ".db3", ".bag", ".gz", ".bz2", ".xz")
 _ROBOTS = (".urdf", ".xacro", ".xml", ".mjcf", ".sdf")
 
 
@@ -88,9 +90,25 @@ def experiment(plain: dict, path: Path = Path("experiment.yaml"), tree=None) -> 
                 model[key] = [_effect(entry, ("model", key, k), given, path) for k, entry in enumerate(entries)]
         plain = {**plain, "model": model}
     try:
-        return Experiment.model_validate({**plain, "path": path})
+        return _listed(Experiment.model_validate({**plain, "path": path}))
     except ValidationError as error:
         raise _named(error, given, path) from None
+
+
+def _listed(experiment: Experiment) -> Experiment:
+    """The experiment with every pattern and folder of logs spelled out, file by file."""
+    parts = {part: [one for log in getattr(experiment.data, part) for one in _each(log, experiment.folder)] for part in ("train", "test")}
+    return experiment.model_copy(update={"data": experiment.data.model_copy(update=parts)})
+
+
+def _each(log: LogSpec, folder: Path) -> list[LogSpec]:
+    if log.files is not None:
+        return [log.model_copy(update={"files": [name for entry in log.files for name in _found(entry, folder)]})]
+    return [log.model_copy(update={"file": name}) for name in _found(log.file, folder)]
+
+
+def _found(name: str, folder: Path) -> list[str]:
+    return [name] if datasets.reference(name) is not None else listed(name, folder)
 
 
 def _effect(entry: Any, location: tuple, tree, path: Path) -> Any:

@@ -1,22 +1,22 @@
 """File -> Log: measured signals in SI units, in segments of uniform sampling.
 
-Every unit is converted here and nowhere else. What cannot be a measurement (a NaN, time that stands still) is
+Every unit is converted here and nowhere else, but for the clock's in `recording`. What cannot be a measurement (a NaN, time that stands still) is
 refused with its row; what can be mended (an irregular clock, a gap) is mended with a notice.
 """
 
 import hashlib
 import warnings
-from dataclasses import dataclass, replace
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
-from . import datasets, units
+from . import units
 from .clock import corrected
 from .errors import LogError, SysidWarning
 from .events import Event
-from .readers import open_table
-from .readers.table import Table
+from .recording import Recording, recorded
 from .segment import Segment
 from .specs import DataSpec, LogSpec
 
@@ -26,20 +26,21 @@ GAP_STEPS = 10.0
 _UNIFORM = 0.02
 # Of a step: stamps that are off by less are right.
 _TOLD = 1e-3
-_EPOCH = 1e6  # s: a clock that reads more counts from 1970, not from the log's start
 _LARGEST = 1e20  # no unit makes a measured signal larger (a clock in ns, logged as a signal, reads 2e18)
 DEGREES = 4.0 * np.pi  # rad: no robot joint turns so far from zero, but its angle in degrees does
 
 
 @dataclass(frozen=True)
 class Log:
-    """One log: where it came from, the SHA-256 of its file, its segments, and what disturbed them, where it was looked for."""
+    """One log: where it came from, the SHA-256 of its file (of several, of all of theirs), its segments, what disturbed them, where
+    it was looked for, and the SHA-256 of each file by its name."""
 
     name: str
     path: Path
     sha256: str
     segments: tuple[Segment, ...]
     events: tuple[Event, ...] = ()
+    hashes: dict[str, str] = field(default_factory=dict)
 
     @property
     def samples(self) -> int:
@@ -57,151 +58,49 @@ def read(log: LogSpec, data: DataSpec, joints: tuple[str, ...], prismatic, folde
     Raises:
         LogError: the file, a column, a unit or a value is not what a log can hold.
     """
-    return assembled(log.file, *measured(log, data, joints, prismatic, folder))
+    return assembled(measured(log, data, joints, prismatic, folder))
 
 
-def assembled(name: str, path: Path, t, signals: dict) -> Log:
-    """The log of what was `measured`: resampled where its clock is irregular, split at gaps."""
-    return Log(name=name, path=path, sha256=_sha256(path), segments=tuple(_segments(t, signals, str(path))))
+def assembled(samples: Recording) -> Log:
+    """The log of what was `measured`: resampled where its clock is irregular, split at gaps and where a recording ends."""
+    hashes = {name: _sha256(path) for name, path in samples.files.items()}
+    each = list(hashes.values())
+    whole = each[0] if len(each) == 1 else hashlib.sha256("".join(each).encode()).hexdigest()
+    return Log(samples.name, next(iter(samples.files.values())), whole, tuple(_segments(samples.t, samples.signals, samples.where, samples.breaks)), hashes=hashes)
 
 
-def measured(log: LogSpec, data: DataSpec, joints: tuple[str, ...], prismatic, folder: Path = Path()) -> tuple[Path, np.ndarray, dict]:
-    """The file of a log, its stamps t (n,) [s] and its signals {name: (n, ...)} in SI units, before they are resampled or split.
+def measured(log: LogSpec, data: DataSpec, joints: tuple[str, ...], prismatic, folder: Path = Path()) -> Recording:
+    """The samples of a log with signals in SI units, before they are resampled or split.
 
     Raises:
         LogError: as `read`.
     """
-    if (dataset := datasets.reference(log.file)) is not None:
-        path = dataset.locate()
-        table = dataset.open(path)
-    else:
-        path = (folder / log.file).resolve()
-        table = open_table(path)
-    t, signals = _load(table, data, joints)
-    where = str(path)
-    t = _clock(t, data, where, len(signals["q"]))
-    _check_time(t, where)
-    first = 0
+    samples, first = recorded(log, data, joints, folder), 0
     if log.start is not None or log.stop is not None:
-        first, t, signals = _piece(t, signals, log, where)
-    for name, values in signals.items():
-        _check_finite(values, name, t, joints, where, first)
-    _convert(signals, data, joints, prismatic, where)
-    return path, t, signals
+        first, samples = _piece(samples, log)
+    for name, values in samples.signals.items():
+        _check_finite(values, name, samples.t, joints, samples.where, first)
+    _convert(samples.signals, data, joints, prismatic, samples.where)
+    return samples
 
 
-def _load(table: Table, data: DataSpec, joints):
-    """The time column and the (n, dof) signals by name; other signals under their own names, as `signals.name`."""
-    spec = data.columns
-    wanted: dict[str, list[str]] = {}
-    for name, pattern in (("q", spec.position), ("tau", spec.torque), ("qd", spec.velocity), ("qdd", spec.acceleration)):
-        if pattern is not None:
-            wanted[name] = _names(table, pattern, joints, name)
-    for name, column in {**spec.signals, **data.signals}.items():
-        wanted[f"signals.{name}"] = [_single(table, column, f"signal {name!r}")]
-    time = [] if data.rate else [_single(table, spec.time, "time")]
-    columns = table.load(list(dict.fromkeys(time + [c for names in wanted.values() for c in names])))
-    lengths = {name: len(values) for name, values in columns.items()}
-    if len(set(lengths.values())) > 1:
-        shown = ", ".join(f"{name!r} {length}" for name, length in lengths.items())
-        raise LogError(
-            f"columns differ in length: {shown}",
-            where=str(table.path),
-            allowed="a value in every column for each sample",
-            do="correct data.columns or the log",
-        )
-    if not min(lengths.values()):
-        raise LogError("the log has no samples", where=str(table.path), do="give a log with samples")
-    signals = {}
-    for name, names in wanted.items():
-        if len(names) == 1:
-            values = np.array(columns[names[0]], dtype=float)
-            signals[name] = values if values.ndim == 2 or name.startswith("signals.") else values[:, None]
-        else:
-            signals[name] = np.empty((lengths[names[0]], len(names)))
-            for k, c in enumerate(names):
-                signals[name][:, k] = columns[c]
-    return (columns[time[0]] if time else None), signals
+def overlapping(test: LogSpec, own: Iterable[str], train: LogSpec, other: Iterable[str]) -> bool:
+    """Whether two entries of an experiment hold the same samples; own, other: the SHA-256 of their files. Pieces of recordings that
+    share some of their files count from other samples: these are taken to overlap."""
+    own, other = set(own), set(other)
+    return not own.isdisjoint(other) and (own != other or test.overlaps(train))
 
 
-def _names(table: Table, pattern, joints, signal: str) -> list[str]:
-    if isinstance(pattern, str) and "{joint}" not in pattern:
-        name = table.resolve(pattern)
-        if table.width(name) != len(joints):
-            raise LogError(
-                f"{signal}: column {name!r} is {table.width(name)} wide for {len(joints)} joints", where=str(table.path),
-                allowed="a pattern with {joint}, a list with a column for each joint, or a matrix that wide", do="correct data.columns",
-            )  # fmt: skip
-        return [name]
-    if isinstance(pattern, str):
-        pattern = [pattern.replace("{joint}", joint) for joint in joints]
-        for joint, name in zip(joints, pattern):
-            if name not in table.names:
-                raise LogError(
-                    f"joint {joint!r} has no column: {name!r} is not there", where=str(table.path),
-                    allowed=table.some_names(),
-                    do="correct data.columns or robot.joints",
-                )  # fmt: skip
-    if len(pattern) != len(joints):
-        raise LogError(
-            f"{signal}: {len(pattern)} columns for {len(joints)} joints",
-            where=str(table.path),
-            allowed=f"one for each of {', '.join(joints)}",
-            do="correct data.columns",
-        )
-    return [_single(table, column, signal) for column in pattern]
-
-
-def _single(table: Table, column, signal: str) -> str:
-    name = table.resolve(column)
-    if (width := table.width(name)) > 1:
-        raise LogError(
-            f"{signal}: {name!r} is {width} columns",
-            where=str(table.path),
-            allowed=f"one of {name}[0] to {name}[{width - 1}]",
-            do="correct data.columns",
-        )
-    return name
-
-
-def _clock(t, data: DataSpec, where: str, samples: int) -> np.ndarray:
-    if t is None:
-        return np.arange(samples) / data.rate
-    scale = units.TIME[data.units.time]
-    # large stamps (ns since 1970) lose nothing if the start is taken off before the unit is converted
-    t = t.astype(np.int64, copy=False) if t.dtype.kind in "iu" else t
-    start = t[0] if _EPOCH <= abs(t[0] * scale) < np.inf else 0
-    return (t - start) * scale
-
-
-def _piece(t, signals, log: LogSpec, where: str):
-    """The number of the piece's first sample, and its time and signals."""
-    since = t - t[0]
+def _piece(samples: Recording, log: LogSpec) -> tuple[int, Recording]:
+    """The number of the piece's first sample, and its samples."""
+    since = samples.t - samples.t[0]
     first, last = np.searchsorted(since, [log.start or 0.0, np.inf if log.stop is None else log.stop])
     if last - first < 2:
         raise LogError(
-            f"{max(last - first, 0)} samples between start {log.start} and stop {log.stop}", where=where,
+            f"{max(last - first, 0)} samples between start {log.start} and stop {log.stop}", where=samples.where,
             allowed=f"start < stop within 0 to {since[-1]:.6g} s, counted from the log's first sample", do="correct start and stop",
         )  # fmt: skip
-    part = slice(int(first), int(last))
-    return part.start, t[part], {name: values[part] for name, values in signals.items()}
-
-
-def _check_time(t, where: str) -> None:
-    if not np.isfinite(t).all():
-        raise LogError("time is not a finite number", where=f"{where} row {int(np.argmin(np.isfinite(t)))} counted from 0", do="leave the row out")
-    if len(t) < 2:
-        raise LogError("the log has one sample", where=where, allowed="two or more", do="give a longer log")
-    backwards = np.diff(t) <= 0.0
-    if backwards.any():
-        row = int(np.argmax(backwards)) + 1
-        verb = "stands still" if t[row] == t[row - 1] else "runs backwards"
-        raise LogError(
-            f"time {verb}: {t[row - 1]:.9g} s, then {t[row]:.9g} s",
-            where=f"{where} row {row} counted from 0",
-            allowed="increasing time",
-            do="sort the rows or leave doubles out",
-        )
+    return int(first), samples.rows(int(first), int(last))
 
 
 def _check_finite(values, name: str, t, joints, where: str, first: int) -> None:
@@ -246,15 +145,17 @@ def _convert(signals, data: DataSpec, joints, prismatic, where: str) -> None:
                 )
 
 
-def _segments(t, signals, where: str):
+def _segments(t, signals, where: str, breaks: Iterable[int] = ()):
+    breaks = np.array(breaks, dtype=int)
     steps = np.diff(t)
-    step = float(np.median(steps))
-    cuts = np.flatnonzero(steps > GAP_STEPS * step) + 1
+    step = float(np.median(np.delete(steps, breaks - 1)))
+    cuts = np.setdiff1d(np.flatnonzero(steps > GAP_STEPS * step) + 1, breaks)
     if cuts.size:
         longest = steps[cuts - 1].max()
         warnings.warn(
-            SysidWarning(f"{where}: {cuts.size} gap(s), the longest {longest:.4g} s, split the log into {cuts.size + 1} segments"), stacklevel=3
+            SysidWarning(f"{where}: {cuts.size} gap(s), the longest {longest:.4g} s, split the log into {cuts.size + breaks.size + 1} segments"), stacklevel=3
         )
+    cuts = np.union1d(cuts, breaks).astype(int)
     resampled, off = 0, 0.0
     bounds = [0, *cuts.tolist(), len(t)]
     for a, b in zip(bounds[:-1], bounds[1:]):
@@ -280,7 +181,7 @@ def _segments(t, signals, where: str):
         yield replace(_segment(clock, own, part), clock=left)
     if resampled:
         warnings.warn(
-            SysidWarning(f"{where}: steps of {steps.min():.4g} to {np.delete(steps, cuts - 1).max():.4g} s were resampled to a uniform {own:.4g} s"),
+            SysidWarning(f"{where}: steps of {np.delete(steps, cuts - 1).min():.4g} to {np.delete(steps, cuts - 1).max():.4g} s were resampled to a uniform {own:.4g} s"),
             stacklevel=3,
         )
     if off > 0.0:

@@ -266,23 +266,24 @@ def _tell_events(part: str, motion: Motion) -> list[dict]:
     return [{"part": part, "kind": e.kind, "log": e.log, "start": e.start, "stop": e.stop, "joints": list(e.joints), "signal": e.signal} for e in motion.events]
 
 
-def _tell_overlap(experiment: Experiment, logs: list[dict]) -> None:
-    hashes = [log["sha256"] for log in logs]
+def _tell_overlap(experiment: Experiment, found: list[dict]) -> None:
+    hashes = [set(log.get("files", {}).values()) or {log["sha256"]} for log in found]
     trained = list(zip(experiment.data.train, hashes))
     for test, own in zip(experiment.data.test, hashes[len(trained) :]):
         for train, other in trained:
-            if not test.overlaps(train):
+            if not logs.overlapping(test, own, train, other):
                 continue
-            if test.file == train.file:
-                warnings.warn(SysidWarning(f"test log {test.file} overlaps a training log; its error is not held out"), stacklevel=2)
-            elif own == other:
-                warnings.warn(SysidWarning(f"test log {test.file} is the training log {train.file} under another name; its error is not held out"), stacklevel=2)
+            if own == other and test.name != train.name:
+                warnings.warn(SysidWarning(f"test log {test.name} is the training log {train.name} under another name; its error is not held out"), stacklevel=2)
+            else:
+                warnings.warn(SysidWarning(f"test log {test.name} overlaps a training log; its error is not held out"), stacklevel=2)
 
 
 def _provenance(part: str, log: logs.Log, spec: LogSpec) -> dict:
+    chosen = {key: value for key in ("topic", "episode") if (value := getattr(spec, key)) is not None}
     return {
         "part": part, "log": log.name, "sha256": log.sha256, "start": spec.start, "stop": spec.stop,
-        "samples": log.samples, "segments": len(log.segments),
+        "samples": log.samples, "segments": len(log.segments), **chosen, **({"files": log.hashes} if len(log.hashes) > 1 else {}),
     }  # fmt: skip
 
 

@@ -180,7 +180,10 @@ def _relocated(experiment: Experiment, run: Path) -> dict:
     tree["robot"]["urdf"] = moved(tree["robot"]["urdf"])
     for part in ("train", "test"):
         for log in tree["data"][part]:
-            log["file"] = moved(log["file"])
+            if "file" in log:
+                log["file"] = moved(log["file"])
+            else:
+                log["files"] = [moved(name) for name in log["files"]]
     if tree["prior"]["source"] != "urdf":
         tree["prior"]["source"] = moved(tree["prior"]["source"])
     if experiment.robot.joints is None:

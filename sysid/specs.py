@@ -138,19 +138,54 @@ class RobotSpec(_Spec):
     transmission: dict[str, Annotated[dict[str, NonZero], Field(min_length=1)]] = {}
 
 
-class LogSpec(_Spec):
-    """A log: a path or a public dataset, or a piece of one: start <= t - t[0] < stop [s]."""
+def _episodes(value: Any) -> Any:
+    listed = value if isinstance(value, list) else [value]
+    if value is None or (listed and all(isinstance(k, int) and not isinstance(k, bool) and k >= 0 for k in listed)):
+        return value
+    raise ValueError("must be an episode's number, counted from 0, or a list of them")
 
-    file: Text
+
+class LogSpec(_Spec):
+    """A log: a path or a public dataset, or several files that are one recording; a topic of a bag, episodes of a data
+    set; or a piece of it: start <= t - t[0] < stop [s]."""
+
+    file: Text | None = None
+    files: Annotated[list[Text], Field(min_length=1)] | None = None
+    topic: Text | None = None
+    episode: Annotated[int | list[int] | None, BeforeValidator(_episodes)] = None
     start: Annotated[float, AfterValidator(_finite), Field(ge=0)] | None = None
     stop: Positive | None = None
 
     def model_post_init(self, _context: Any) -> None:
+        if (self.file is None) == (self.files is None):
+            raise ValueError("must have either file: a path, or files: a list of paths that are one recording")
         if self.start is not None and self.stop is not None and not self.start < self.stop:
             raise ValueError(f"start {self.start:g} must be before stop {self.stop:g}")
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Every file, as written."""
+        return (self.file,) if self.file is not None else tuple(self.files)
+
+    @property
+    def name(self) -> str:
+        """What the log is called: its file, or its files."""
+        return " + ".join(self.names)
+
+    @property
+    def episodes(self) -> frozenset[int] | None:
+        """Which episodes it holds; None for all."""
+        return None if self.episode is None else frozenset(self.episode if isinstance(self.episode, list) else [self.episode])
+
     def overlaps(self, other: LogSpec) -> bool:
         """Whether both hold a piece, were they of one recording."""
+        if None not in (self.topic, other.topic) and self.topic != other.topic:
+            return False
+        if None not in (self.episodes, other.episodes):
+            if self.episodes != other.episodes:
+                return not self.episodes.isdisjoint(other.episodes)
+        elif self.episodes != other.episodes:
+            return True  # start and stop count from other samples
         stops = [log.stop for log in (self, other) if log.stop is not None]
         return not stops or max(self.start or 0.0, other.start or 0.0) < min(stops)
 
@@ -160,7 +195,7 @@ def _log(value: Any) -> Any:
         return {"file": value}
     if isinstance(value, (dict, LogSpec)):
         return value
-    raise ValueError("must be a path, or {file: path, start: seconds, stop: seconds}")
+    raise ValueError("must be a path, {file: path, start: seconds, stop: seconds}, or {files: [paths of one recording]}")
 
 
 Logs = Annotated[list[Annotated[LogSpec, BeforeValidator(_log)]], Field(min_length=1)]

@@ -433,7 +433,7 @@ def test_other_values(experiment, cli, arm_logs, values, ending):
 
 
 @pytest.mark.parametrize(
-    ("values", "said"), [(["x"] * 600, "String"), ([None] + [0.5] * 599, "missing"), ([NAN] * 600, "nan"), ([[1.0]] * 600, "List")]
+    ("values", "said"), [(["x"] * 600, "String"), ([None] + [0.5] * 599, "missing"), ([NAN] * 600, "nan"), ([["x"]] * 600, "List"), ([[1.0]] * 599 + [[1.0, 2.0]], "a list of 2 numbers")]
 )
 def test_other_values_parquet(experiment, cli, arm_logs, values, said):
     folder = experiment(config={"data.train": ["train.parquet"]})

@@ -18,7 +18,7 @@ ROOT = Path(__file__).resolve().parent.parent
 # The order of the method: a module imports only from modules above it.
 ORDER = [
     "errors", "units", "threads", "callable_module", "inertia", "urdf", "readers", "datasets", "specs", "prior", "robot", "regressor", "outliers", "knocks", "jumps", "repeats",
-    "frequencies", "clock", "segment", "events", "log", "smoother", "motion", "preprocess", "blocks", "two_masses", "lowpass", "flexible",
+    "frequencies", "clock", "segment", "events", "recording", "log", "smoother", "motion", "preprocess", "blocks", "two_masses", "lowpass", "flexible",
     "effect", "formula", "effects", "own_effects", "config", "model", "rows", "source", "compress", "objective", "interior", "certificate", "solve", "uncertainty", "estimate", "plausible", "shape", "bumps",
     "filters", "results", "urdf_export", "pipeline", "check", "simulate", "comparison", "transfer", "noise", "candidates", "view", "addition", "failures", "diagnose", "changes", "statement", "loop", "report", "studies", "studio", "terminal", "cli", "__main__",
 ]  # fmt: skip

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -13,6 +13,7 @@ from .. import pipeline, robot
 from ..lowpass import lowpassed, stride_of, widest
 from ..model import Model, build
 from ..motion import Motion
+from ..recording import Recording
 from ..robot import Robot
 from ..rows import Rows, stack
 from ..specs import EffectSpec, Experiment, LogSpec
@@ -104,7 +105,17 @@ def looked(experiment: Experiment) -> Look:
     for part in ("train", "test"):
         specs = getattr(experiment.data, part)
         told = [logs.measured(spec, *args) for spec in specs]
-        found = [logs.assembled(spec.file, *one) for spec, one in zip(specs, told)]
-        for spec, (path, t, s), log in zip(specs, told, pipeline.with_events(machine, found)):
-            out.append(Logged(part, spec, path, t, s["q"], s["tau"], log))
+        found = pipeline.with_events(machine, [logs.assembled(one) for one in told])
+        for spec, one, log in zip(specs, told, found):
+            out += [_logged(part, spec, one.rows(*rows), log) for rows in one.parts]
     return Look(experiment, machine, tuple(out))
+
+
+def _logged(part: str, spec: LogSpec, samples: Recording, log: logs.Log) -> Logged:
+    """What was recorded in one go, with its own part of the log."""
+    t, signals = samples.t, samples.signals
+    inside = lambda at: t[0] <= at <= t[-1]  # noqa: E731
+    segments = tuple(s for s in log.segments if inside(0.5 * (s.t[0] + s.t[-1])))
+    events = tuple(e for e in log.events if inside(e.start))
+    own = replace(log, segments=segments, events=events)
+    return Logged(part, spec, log.path, t, signals["q"], signals["tau"], own)

@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from ..errors import LogError
+from .hdf5 import own_item
 from .table import ArrayTable
 
 
@@ -23,6 +24,8 @@ class Mat73Table(ArrayTable):
             for name, dataset in self._datasets.items():
                 if shape := self._shape(dataset):
                     shapes[name] = shape
+        except LogError:
+            raise
         except Exception as error:  # h5py raises what it likes on corrupt bytes
             raise self._unreadable("the MAT v7.3 file", error) from None
         super().__init__(path, shapes)
@@ -35,10 +38,10 @@ class Mat73Table(ArrayTable):
         for name in group:
             if name.startswith("#"):
                 continue  # what cells refer to stands under #refs#, an item for each cell
-            item = group[name]
+            item = own_item(group, name, str(self.path))
             if hasattr(item, "dtype"):
                 self._datasets[prefix + name] = item
-            else:
+            elif item is not None:
                 self._collect(f"{prefix}{name}.", item)
 
     def _shape(self, dataset):

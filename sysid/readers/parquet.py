@@ -1,11 +1,13 @@
-"""Parquet: only the columns that are asked for are read, one at a time."""
+"""Parquet: only the columns that are asked for are read, one at a time. A column of lists of one length is a matrix."""
 
 import os
 from contextlib import contextmanager
 
+import numpy as np
 import polars as pl
 
 from ..errors import LogError
+from . import lerobot
 from .table import Table
 
 # on corrupt pages Polars panics; what it raises then is no Exception, and Rust has written to standard error
@@ -13,16 +15,45 @@ _CORRUPT = (pl.exceptions.PolarsError, pl.exceptions.PanicException, OSError)
 
 
 class ParquetTable(Table):
-    """Columns by name."""
+    """Columns by name; of a LeRobot data set, the elements of a list column also by theirs, `observation.state.elbow`."""
 
     def __init__(self, path):
         self.path = path
         try:
             with _silent():
                 self._schema = pl.read_parquet_schema(path)
+                self._widths = {name: width for name, kind in self._schema.items() if (width := self._width(name, kind))}
         except _CORRUPT as error:
             raise self._unreadable(error) from None
-        self.names = list(self._schema)
+        self.names, self._elements = [], {}
+        for name in self._schema:
+            self.names.append(name)
+            parts = [f"{name}[{k}]" for k in range(self._widths.get(name, 1))] if self.width(name) > 1 else []
+            self.names += parts
+            self._elements |= {part: (name, k) for k, part in enumerate(parts)}
+        own = {name: e for name, e in self._said().items() if len(e) == self._widths.get(name)}
+        for name, elements in own.items():
+            named = {f"{name}.{element}": (name, k) for k, element in enumerate(elements)}
+            self._elements |= {part: at for part, at in named.items() if part not in self.names}
+        self.names += [part for part in self._elements if part not in self.names]
+        if usual := lerobot.usual(self.names, own):
+            self.usual, self.clock = usual, "s"
+
+    def _said(self) -> dict[str, list[str]]:
+        """The names of elements that the data set gives, where the file has lists at all."""
+        return lerobot.element_names(self.path) if self._widths else {}
+
+    def _width(self, name, kind) -> int | None:
+        """The length of a column's lists of numbers, by its type or its first row; None for any other column."""
+        if isinstance(kind, pl.Array):
+            return kind.shape[0] if len(kind.shape) == 1 and kind.inner.is_numeric() else None
+        if not isinstance(kind, pl.List) or not kind.inner.is_numeric():
+            return None
+        first = pl.scan_parquet(self.path).select(pl.col(name).list.len()).head(1).collect()
+        return first.item() if first.height else None
+
+    def width(self, name):
+        return self._widths.get(name, 1) or 1
 
     def _unreadable(self, error: BaseException, name: str | None = None) -> LogError:
         said = (str(error).splitlines() or [type(error).__name__])[0]
@@ -30,23 +61,41 @@ class ParquetTable(Table):
         return LogError(f"not a readable Parquet file ({said})", where=where, do="write it again")
 
     def load(self, names):
-        out = {}
+        out, held = {}, {}
         for name in names:
-            if not self._schema[name].is_numeric():
-                raise LogError(f"column {name!r} holds {self._schema[name]}", where=str(self.path), allowed="numbers")
-            try:
-                # column by column, so that the file never stands in memory beside the arrays
-                with _silent():
-                    values = pl.read_parquet(self.path, columns=[name], use_statistics=False)[name]
-                    values = values if values.dtype.is_integer() else values.cast(pl.Float64)
-            except _CORRUPT as error:
-                raise self._unreadable(error, name) from None
-            if values.null_count():
-                raise LogError(
-                    "a value is missing", where=f"{self.path} column {name!r} row {int(values.is_null().arg_max())}", do="leave the row out"
-                )
-            out[name] = values.to_numpy()
+            column, k = self._elements.get(name, (name, None))
+            if column not in held:
+                held[column] = self._column(column)
+            out[name] = held[column] if k is None else held[column][:, k]
         return out
+
+    def _column(self, name) -> np.ndarray:
+        kind, width = self._schema[name], self._widths.get(name)
+        if not (kind.is_numeric() or width):
+            raise LogError(f"column {name!r} holds {kind}", where=str(self.path), allowed="numbers, or lists of numbers of one length")
+        try:
+            # column by column, so that the file never stands in memory beside the arrays
+            with _silent():
+                values = pl.read_parquet(self.path, columns=[name], use_statistics=False)[name]
+                self._check_null(name, values, 1)
+                if isinstance(kind, pl.List) and (other := values.list.len() != width).any():
+                    row = int(other.arg_max())
+                    raise LogError(
+                        f"a list of {len(values[row])} numbers where the first row has {width}",
+                        where=f"{self.path} column {name!r} row {row}", do="leave the row out",
+                    )  # fmt: skip
+                values = values.explode() if width else values
+                values = values if values.dtype.is_integer() else values.cast(pl.Float64)
+        except _CORRUPT as error:
+            raise self._unreadable(error, name) from None
+        self._check_null(name, values, width or 1)
+        out = values.to_numpy()
+        return out.reshape(-1, width) if width and width > 1 else out
+
+    def _check_null(self, name, values, width: int) -> None:
+        if values.null_count():
+            row = int(values.is_null().arg_max()) // width
+            raise LogError("a value is missing", where=f"{self.path} column {name!r} row {row}", do="leave the row out")
 
 
 @contextmanager

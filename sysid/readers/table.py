@@ -1,7 +1,9 @@
 """What a reader gives: named columns, loaded when asked for."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 
@@ -9,10 +11,21 @@ from ..errors import LogError
 
 
 class Table(ABC):
-    """Named columns of a file. Matrices (n, k) go by their name, and column by column as `name[0]` …"""
+    """Named columns of a file. Matrices (n, k) go by their name, and column by column as `name[0]` …
+
+    usual: what the format itself calls its signals, {"time", "position", "velocity" or "torque": a column, or a pattern with
+        {joint}}; it stands in for the defaults of an experiment. clock: the unit of that time where the format says it.
+    """
 
     path: Path
     names: list[str]
+    usual: Mapping[str, str] = MappingProxyType({})
+    clock: str | None = None
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """The files that the table was read from."""
+        return (self.path,)
 
     @abstractmethod
     def load(self, names: list[str]) -> dict[str, np.ndarray]:
@@ -52,7 +65,7 @@ class ArrayTable(Table):
         for name, shape in shapes.items():
             if len(shape) > 2 or not shape:
                 continue
-            width = 1 if len(shape) == 1 or 1 in shape else min(shape)
+            width = self.width_of(shape)
             self._widths[name] = width
             self.names.append(name)
             if width > 1:
@@ -64,6 +77,16 @@ class ArrayTable(Table):
 
     def width(self, name):
         return self._widths.get(name, 1)
+
+    def width_of(self, shape: tuple[int, ...]) -> int:
+        """How many columns an array of a shape is; samples run along the longer side."""
+        return 1 if len(shape) == 1 or 1 in shape else min(shape)
+
+    def upright(self, array: np.ndarray) -> np.ndarray:
+        """An array with a row for each sample: (n,) or (n, k)."""
+        if array.ndim == 2 and 1 in array.shape:
+            return array.ravel()
+        return array.T if array.ndim == 2 and array.shape[0] < array.shape[1] else array
 
     def load(self, names):
         out, held = {}, {}
@@ -80,10 +103,7 @@ class ArrayTable(Table):
             raise LogError(f"variable {name!r} holds {array.dtype}", where=str(self.path), allowed="real numbers")
         # whole numbers stay whole: a clock in ns since 1970 has more digits than a float
         array = array if array.dtype.kind in "iu" else array.astype(float, copy=False)
-        if array.ndim == 2 and 1 in array.shape:
-            return array.ravel()
-        # samples run along the longer side
-        return array.T if array.ndim == 2 and array.shape[0] < array.shape[1] else array
+        return self.upright(array)
 
 
 def stacked(cells) -> np.ndarray | None:

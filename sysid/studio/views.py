@@ -43,7 +43,7 @@ class Views:
 
 def key(sha: str, experiment: Experiment) -> str:
     """A text's hash with the state of the files that it names."""
-    names = [experiment.robot.urdf, *(log.file for part in (experiment.data.train, experiment.data.test) for log in part)]
+    names = [experiment.robot.urdf, *(name for part in (experiment.data.train, experiment.data.test) for log in part for name in log.names)]
     names += [spec.name.rpartition(":")[0] for spec in [*experiment.model.effects, *experiment.model.candidates] if ":" in spec.name]
     state = hashlib.sha256(sha.encode())
     for name in names:

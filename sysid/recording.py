@@ -1,0 +1,286 @@
+"""An entry of data.train or data.test -> its columns over one clock, from however many files hold
+it.
+
+A file whose clock goes on from the one before continues it; where the clock starts anew, and at
+every new episode of a data set, a recording of its own begins: `breaks`, which nothing is filtered
+across.
+"""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from . import datasets, units
+from .errors import LogError, SysidWarning
+from .readers import open_table
+from .readers.table import Table
+from .specs import ColumnsSpec, DataSpec, LogSpec
+
+_EPOCH = 1e6  # s: a clock that reads more counts from 1970, not from the log's start
+_EPISODE = "episode_index"  # the column in which LeRobot numbers episodes
+_DEFAULTS = ColumnsSpec()
+
+
+@dataclass(frozen=True)
+class Recording:
+    """Samples as they were logged. t (n,) [s], increasing; signals {name: (n, ...)}; breaks: rows
+    at which another recording begins; name, and where to find it in a message; files: path of each
+    file, by its name."""
+
+    name: str
+    where: str
+    files: dict[str, Path]
+    t: np.ndarray
+    signals: dict[str, np.ndarray]
+    breaks: np.ndarray
+
+    def rows(self, first: int, last: int) -> Recording:
+        """The samples from row `first` up to, not including, `last`."""
+        part = slice(first, last)
+        inside = self.breaks[(self.breaks > first) & (self.breaks < last)] - first
+        signals = {name: values[part] for name, values in self.signals.items()}
+        return Recording(self.name, self.where, self.files, self.t[part], signals, inside)
+
+    @property
+    def parts(self) -> list[tuple[int, int]]:
+        """First row and the row after the last of what was recorded in one go."""
+        bounds = [0, *self.breaks.tolist(), len(self.t)]
+        return list(zip(bounds[:-1], bounds[1:]))
+
+
+def recorded(
+    log: LogSpec, data: DataSpec, joints: tuple[str, ...], folder: Path = Path()
+) -> Recording:
+    """What an entry of an experiment holds, in the units of its files but for time.
+
+    Args:
+        joints: names, in order. folder: what relative paths are relative to.
+
+    Raises:
+        LogError: a file or a column is not there, or what it holds is no log.
+    """
+    tables = {name: _table(name, log, folder) for name in log.names}
+    where = " + ".join(str(table.path) for table in tables.values())
+    loaded = [_load(table, data, joints, log.episodes) for table in tables.values()]
+    if len({unit for _, unit, _, _ in loaded}) > 1:
+        raise LogError(
+            "the clocks of these files have different units", where=where,
+            allowed="files of one logger", do="give them as logs of their own",
+        )  # fmt: skip
+    borders = np.cumsum([len(signals["q"]) for *_, signals, _ in loaded])
+    signals = {name: _joined([part[name] for *_, part, _ in loaded]) for name in loaded[0][2]}
+    breaks = np.concatenate([rows + start for start, (*_, rows) in zip([0, *borders], loaded)])
+    if data.rate:
+        t = np.arange(borders[-1]) / data.rate
+        breaks = np.union1d(breaks, borders[:-1])
+    else:
+        t = _seconds(_joined([t for t, *_ in loaded]), loaded[0][1])
+        anew = [row for row in borders[:-1] if t[row] <= t[row - 1]]
+        if anew:
+            warnings.warn(
+                SysidWarning(
+                    f"{where}: the clock starts anew in {len(anew)} of {len(tables)} files; "
+                    "what each holds is a segment of its own"
+                ),
+                stacklevel=3,
+            )
+        breaks = np.union1d(breaks, anew)
+    files = {
+        name if path == table.path else f"{name}/{path.relative_to(table.path).as_posix()}": path
+        for name, table in tables.items()
+        for path in table.files
+    }
+    breaks = breaks.astype(int)
+    return Recording(log.name, where, files, _increasing(t, breaks, where), signals, breaks)
+
+
+def _joined(parts: list[np.ndarray]) -> np.ndarray:
+    return parts[0] if len(parts) == 1 else np.concatenate(parts)
+
+
+def _table(name: str, log: LogSpec, folder: Path) -> Table:
+    if (dataset := datasets.reference(name)) is not None:
+        return dataset.open(dataset.locate())
+    return open_table((folder / name).resolve(), log.topic)
+
+
+def _load(table: Table, data: DataSpec, joints, episodes):
+    """Stamps (None where a rate is given), their unit, the signals (n, dof) by name, others as
+    `signals.name`, and the rows at which an episode begins."""
+    spec, wanted = data.columns, {}
+    for name, key in (
+        ("q", "position"),
+        ("tau", "torque"),
+        ("qd", "velocity"),
+        ("qdd", "acceleration"),
+    ):
+        if (pattern := _meant(table, spec, key)) is not None:
+            wanted[name] = _names(table, pattern, joints, name)
+    for name, column in {**spec.signals, **data.signals}.items():
+        wanted[f"signals.{name}"] = [_single(table, column, f"signal {name!r}")]
+    time = None if data.rate else _time(table, _meant(table, spec, "time"))
+    counted = _EPISODE if _EPISODE in table.names else None
+    if episodes is not None and counted is None:
+        raise LogError(
+            f"an episode is asked for, and there is no column {_EPISODE!r}", where=str(table.path),
+            do="remove episode, or give start and stop",
+        )  # fmt: skip
+    asked = [*filter(None, (time, counted)), *(c for names in wanted.values() for c in names)]
+    columns = table.load(list(dict.fromkeys(asked)))
+    lengths = {name: len(values) for name, values in columns.items()}
+    if len(set(lengths.values())) > 1:
+        shown = ", ".join(f"{name!r} {length}" for name, length in lengths.items())
+        raise LogError(
+            f"columns differ in length: {shown}",
+            where=str(table.path),
+            allowed="a value in every column for each sample",
+            do="correct data.columns or the log",
+        )
+    if not min(lengths.values()):
+        raise LogError(
+            "the log has no samples", where=str(table.path), do="give a log with samples"
+        )
+    rows, breaks = slice(None), np.zeros(0, dtype=int)
+    if counted:
+        rows, breaks = _chosen(columns[counted], episodes, str(table.path))
+    unit = (
+        table.clock if time and time == table.usual.get("time") and table.clock else data.units.time
+    )
+    signals = {}
+    for name, names in wanted.items():
+        if len(names) == 1:
+            values = np.array(columns[names[0]][rows], dtype=float)
+            signals[name] = (
+                values if values.ndim == 2 or name.startswith("signals.") else values[:, None]
+            )
+        else:
+            signals[name] = np.empty((len(columns[names[0]][rows]), len(names)))
+            for k, c in enumerate(names):
+                signals[name][:, k] = columns[c][rows]
+    return (columns[time][rows] if time else None), unit, signals, breaks
+
+
+def _meant(table: Table, spec: ColumnsSpec, key: str):
+    """What the experiment says of a signal; where it says nothing, what files of this format call
+    it. Velocity and acceleration are read where the experiment names them."""
+    own, default = getattr(spec, key), getattr(_DEFAULTS, key)
+    return table.usual.get(key, own) if own == default and own is not None else own
+
+
+def _time(table: Table, column) -> str:
+    if column not in table.names and not isinstance(column, int):
+        raise LogError(
+            f"there is no column {column!r} for time",
+            where=str(table.path),
+            allowed=table.some_names(),
+            do="name it in data.columns.time, or give data.rate [Hz] where no time was logged",
+        )
+    return _single(table, column, "time")
+
+
+def _chosen(index, episodes, where: str):
+    """The rows of the episodes, in the file's order, and where among them an episode begins."""
+    rows = np.arange(len(index))
+    if episodes is not None:
+        if missing := sorted(episodes - set(np.unique(index).tolist())):
+            there = np.unique(index)
+            raise LogError(
+                f"there is no episode {missing[0]}",
+                where=where,
+                allowed=f"{there[0]:g} to {there[-1]:g}"
+                if len(there) > 8
+                else ", ".join(f"{k:g}" for k in there),
+                do="correct episode",
+            )
+        rows = np.flatnonzero(np.isin(index, sorted(episodes)))
+    return rows, np.flatnonzero(np.diff(index[rows])) + 1
+
+
+def _names(table: Table, pattern, joints, signal: str) -> list[str]:
+    if isinstance(pattern, str) and "{joint}" not in pattern:
+        name = table.resolve(pattern)
+        if table.width(name) != len(joints):
+            raise LogError(
+                f"{signal}: column {name!r} is {table.width(name)} wide for {len(joints)} joints",
+                where=str(table.path),
+                allowed="a pattern with {joint}, a list of a column a joint, or a matrix that wide",
+                do="correct data.columns",
+            )
+        return [name]
+    if isinstance(pattern, str):
+        pattern = [pattern.replace("{joint}", joint) for joint in joints]
+        for joint, name in zip(joints, pattern):
+            if name not in table.names:
+                raise LogError(
+                    f"joint {joint!r} has no column: {name!r} is not there",
+                    where=str(table.path),
+                    allowed=table.some_names(),
+                    do="correct data.columns or robot.joints",
+                )
+    if len(pattern) != len(joints):
+        raise LogError(
+            f"{signal}: {len(pattern)} columns for {len(joints)} joints",
+            where=str(table.path),
+            allowed=f"one for each of {', '.join(joints)}",
+            do="correct data.columns",
+        )
+    return [_single(table, column, signal) for column in pattern]
+
+
+def _single(table: Table, column, signal: str) -> str:
+    name = table.resolve(column)
+    if (width := table.width(name)) > 1:
+        raise LogError(
+            f"{signal}: {name!r} is {width} columns",
+            where=str(table.path),
+            allowed=f"one of {name}[0] to {name}[{width - 1}]",
+            do="correct data.columns",
+        )
+    return name
+
+
+def _seconds(t, unit: str) -> np.ndarray:
+    scale = units.TIME[unit]
+    # large stamps (ns since 1970) lose nothing if the start is taken off before the unit is
+    # converted
+    t = t.astype(np.int64, copy=False) if t.dtype.kind in "iu" else t
+    start = t[0] if _EPOCH <= abs(t[0] * scale) < np.inf else 0
+    return (t - start) * scale
+
+
+def _increasing(t, breaks, where: str) -> np.ndarray:
+    """The clock with every recording put a step behind the one before, where it does not stand
+    behind it anyway."""
+    if not np.isfinite(t).all():
+        raise LogError(
+            "time is not a finite number",
+            where=f"{where} row {int(np.argmin(np.isfinite(t)))} counted from 0",
+            do="leave the row out",
+        )
+    if len(t) < 2:
+        raise LogError(
+            "the log has one sample", where=where, allowed="two or more", do="give a longer log"
+        )
+    steps = np.diff(t)
+    within = np.ones(len(steps), dtype=bool)
+    within[breaks - 1] = False
+    if (backwards := within & (steps <= 0.0)).any():
+        row = int(np.argmax(backwards)) + 1
+        verb = "stands still" if t[row] == t[row - 1] else "runs backwards"
+        raise LogError(
+            f"time {verb}: {t[row - 1]:.9g} s, then {t[row]:.9g} s",
+            where=f"{where} row {row} counted from 0",
+            allowed="increasing time",
+            do="sort the rows or leave doubles out",
+        )
+    anew = [row for row in breaks if steps[row - 1] <= 0.0]
+    if anew:
+        step = float(np.median(steps[within])) if within.any() else 1.0
+        t = t.astype(float, copy=True)
+        for row in anew:
+            t[row:] += t[row - 1] + step - t[row]
+    return t
