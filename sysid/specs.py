@@ -7,7 +7,7 @@ import re
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
 _LARGEST = 1e12  # nothing of a robot is larger in SI units, and its square is still a number
 
@@ -125,6 +125,15 @@ class RotorSpec(_Spec):
     rpy: Vector = [0.0, 0.0, 0.0]
     axis: Annotated[Vector, AfterValidator(_direction)] = [0.0, 0.0, 1.0]
     inertia: InertiaSpec
+
+    @model_validator(mode="before")
+    @classmethod
+    def _carrier(cls, value: Any) -> Any:
+        """`link` is `on` in other words; tools of YAML 1.1 make a boolean of `on`."""
+        given = [key for key in ("on", "link", True) if key in value] if isinstance(value, dict) else []
+        if len(given) > 1:
+            raise ValueError("on and link say the same: give one of them")
+        return {"on" if key in given else key: entry for key, entry in value.items()} if given else value
 
 
 class RobotSpec(_Spec):

@@ -105,6 +105,19 @@ robot:
     assert [(rotor.joint, rotor.ratio, rotor.inertia.mass) for rotor in found.robot.rotors] == [("a", 9.0, 0.3), ("b", 9.0, 0.3), ("c", 3.0, 0.3)]
 
 
+@pytest.mark.parametrize("key", ["on", "link", "true", '"on"'])
+def test_the_link_of_a_rotor(tmp_path, key):
+    """`on` is a boolean to tools of YAML 1.1: what they write back reads as it was meant."""
+    text = "robot: {rotors: [{joint: a, ratio: 9, KEY: base, inertia: {mass: 1, box: [1, 1, 1]}}]}".replace("KEY", key)
+    assert load(tmp_path, text).robot.rotors[0].on == "base"
+
+
+def test_a_rotor_on_two_links(tmp_path):
+    text = "robot: {rotors: [{joint: a, ratio: 9, on: base, link: hip, inertia: {mass: 1, box: [1, 1, 1]}}]}"
+    with pytest.raises(ConfigError, match="line 1: robot.rotors.0.: on and link say the same"):
+        load(tmp_path, text)
+
+
 def test_resolved_experiment_reads_back(tmp_path):
     """What a run folder states of its experiment is an experiment file, with the same meaning."""
     from sysid.results import _relocated, _yaml
