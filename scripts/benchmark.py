@@ -13,6 +13,10 @@ memory  Peak memory of `sysid fit` on the leg's log and on one 50 times as long,
         The regressor kept whole would take 1440 bytes.
 diagnose  The whole `sysid diagnose configs/cheetah3.yaml` process, the whole catalogue on every joint, over `sysid fit` on
         the same experiment, in turns. At most 10 is the aim.
+torque  `torque(q, qd, qdd)` of a seven-joint arm with viscous and Coulomb friction beside a bare `pin.rnea` of its bodies, one
+        sample a call, in turns; and a million samples at once, per sample.
+cpu     Processor time of `sysid.fit` and `sysid.write` in a Python process over that of the command `sysid fit`, with nothing
+        said of threads in the environment. At most 1.2 is the aim.
 solve   On the leg's compressed problem: 20 random starts over one fit's solve (compression not counted), and cvxpy +
         clarabel over one fit's solve, at equal objective. cvxpy's time is that of `Problem.solve`, which writes the
         problem down for clarabel and runs it; clarabel's own time alone is printed beside it.
@@ -32,6 +36,8 @@ ROOT = Path(__file__).resolve().parent.parent
 CONFIG = ROOT / "configs" / "cheetah3.yaml"
 LOG = ROOT / "data" / "cheetah3" / "train.parquet"
 TIMES = 50
+PARTS = ["time", "memory", "diagnose", "torque", "cpu", "solve"]
+PANDA = "example-robot-data://panda_description/urdf/panda.urdf"
 
 FLOOR = '''
 import sys
@@ -71,17 +77,21 @@ def main() -> None:
     """Run the benchmarks and print them; with --json as one document."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--repeats", type=int, default=7, help="runs of each process; the median counts")
-    parser.add_argument("--only", choices=["time", "memory", "diagnose", "solve"])
+    parser.add_argument("--only", choices=PARTS)
     parser.add_argument("--json", action="store_true")
     options = parser.parse_args()
     found = {}
-    wanted = [options.only] if options.only else ["time", "memory", "diagnose", "solve"]
+    wanted = [options.only] if options.only else PARTS
     if "time" in wanted:
         found["fit_over_floor"] = fit_over_floor(options.repeats)
     if "memory" in wanted:
         found["memory"] = memory()
     if "diagnose" in wanted:
         found["diagnose_over_fit"] = diagnose_over_fit(min(options.repeats, 3))
+    if "torque" in wanted:
+        found["torque"] = torque(options.repeats)
+    if "cpu" in wanted:
+        found["cpu"] = cpu(options.repeats)
     if "solve" in wanted:
         found["solve"] = solve(options.repeats)
     if options.json:
@@ -99,6 +109,15 @@ def main() -> None:
     if "diagnose_over_fit" in found:
         entry = found["diagnose_over_fit"]
         print(f"sysid diagnose {entry['diagnose_seconds']:.1f} s / sysid fit {entry['fit_seconds']:.2f} s = {entry['ratio']:.1f} (medians of {entry['runs']})")
+    if "torque" in found:
+        entry = found["torque"]
+        print(
+            f"torque {entry['microseconds']:.1f} us a call, bare pin.rnea {entry['rnea_microseconds']:.1f} us; "
+            f"{entry['samples']} samples at once {entry['microseconds_a_sample']:.2f} us each (medians of {options.repeats})"
+        )
+    if "cpu" in found:
+        entry = found["cpu"]
+        print(f"processor time of sysid.fit in Python {entry['python_seconds']:.2f} s / of the command {entry['command_seconds']:.2f} s = {entry['ratio']:.2f}")
     if "solve" in found:
         entry = found["solve"]
         print(
@@ -108,8 +127,8 @@ def main() -> None:
         )
 
 
-def _run(command: list[str]) -> tuple[float, int]:
-    """Wall time [s] and peak memory [bytes] of a process."""
+def _run(command: list[str]) -> tuple[float, int, float]:
+    """Wall time [s], peak memory [bytes] and processor time [s] of a process."""
     start = time.perf_counter()
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, env=_environment())
     said = process.stderr.read()
@@ -118,11 +137,12 @@ def _run(command: list[str]) -> tuple[float, int]:
     if process.returncode:
         sys.exit(f"{command} failed: {said.decode()[-500:]}")
     scale = 1 if sys.platform == "darwin" else 1024
-    return time.perf_counter() - start, usage.ru_maxrss * scale
+    return time.perf_counter() - start, usage.ru_maxrss * scale, usage.ru_utime + usage.ru_stime
 
 
 def _environment() -> dict[str, str]:
-    return {**os.environ, "PYTHONPATH": str(ROOT)}
+    said = {name: value for name, value in os.environ.items() if not name.endswith("_NUM_THREADS")}
+    return {**said, "PYTHONPATH": str(ROOT)}
 
 
 def fit_over_floor(repeats: int) -> dict:
@@ -148,6 +168,52 @@ def diagnose_over_fit(runs: int) -> dict:
                 spent.append(_run(command(word))[0])
     medians = {name: statistics.median(values[1:]) for name, values in times.items()}
     return {"ratio": medians["diagnose"] / medians["fit"], "diagnose_seconds": medians["diagnose"], "fit_seconds": medians["fit"], "runs": runs}
+
+
+def torque(repeats: int) -> dict:
+    """One sample a call, ours and Pinocchio's in turns, and a million samples at once; medians, after a warm-up."""
+    sys.path.insert(0, str(ROOT))
+    import numpy as np
+    import pinocchio as pin
+
+    from sysid import inverse_dynamics, model, robot
+    from sysid.specs import EffectSpec, RobotSpec
+
+    machine = robot.load(RobotSpec(urdf=PANDA, joints=[f"panda_joint{k}" for k in range(1, 8)]))
+    structure = model.build(machine, [EffectSpec(name="viscous"), EffectSpec(name="coulomb")])
+    ours = inverse_dynamics.inverse_dynamics(structure, np.concatenate([machine.prior.ravel(), np.ones(14)]))
+    samples = np.random.default_rng(0).normal(size=(3, 1_000_000, machine.dof))
+    one, data, calls = [np.array(x[0]) for x in samples], machine.model.createData(), 2000
+    spent: dict[str, list[float]] = {"ours": [], "bare": [], "many": []}
+    for _ in range(repeats + 1):
+        start = time.perf_counter()
+        for _ in range(calls):
+            pin.rnea(machine.model, data, *one)
+        middle = time.perf_counter()
+        for _ in range(calls):
+            ours(*one)
+        end = time.perf_counter()
+        ours(*samples)
+        for name, seconds, count in (("bare", middle - start, calls), ("ours", end - middle, calls), ("many", time.perf_counter() - end, samples.shape[1])):
+            spent[name].append(1e6 * seconds / count)
+    bare, own, many = (statistics.median(spent[name][1:]) for name in ("bare", "ours", "many"))
+    return {"microseconds": own, "rnea_microseconds": bare, "samples": samples.shape[1], "microseconds_a_sample": many}
+
+
+def cpu(repeats: int) -> dict:
+    """Medians of alternating runs, after one warm-up of each."""
+    said = "import sys, sysid; sysid.write(sysid.fit(sysid.load(sys.argv[1])), sys.argv[2])"
+    with tempfile.TemporaryDirectory() as out:
+        commands = {
+            "command": [sys.executable, "-m", "sysid", "fit", str(CONFIG), "--quiet", "--out", out],
+            "python": [sys.executable, "-c", said, str(CONFIG), out],
+        }  # fmt: skip
+        times: dict[str, list[float]] = {name: [] for name in commands}
+        for _ in range(repeats + 1):
+            for name, command in commands.items():
+                times[name].append(_run(command)[2])
+    medians = {name: statistics.median(values[1:]) for name, values in times.items()}
+    return {"ratio": medians["python"] / medians["command"], "python_seconds": medians["python"], "command_seconds": medians["command"]}
 
 
 def memory() -> dict:

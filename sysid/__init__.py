@@ -9,6 +9,7 @@
     sysid.predict(fit, "another_log.csv").residual
     sysid.compare(fit, another_fit)
     sysid.write(fit, "runs/mine")
+    sysid.read_run("runs/mine").torque(q, qd, qdd)
 
 Names are imported when they are first used, so that `import sysid` costs nothing.
 """
@@ -24,12 +25,14 @@ if TYPE_CHECKING:
     from .pipeline import fit, load
     from .pipeline import predict_log as predict
     from .results import write
+    from .run import Run, read_run
     from .specs import Experiment
 
 _WHERE = {
     "load": ("pipeline", "load"), "fit": ("pipeline", "fit"), "predict": ("pipeline", "predict_log"),
     "write": ("results", "write"), "compare": ("comparison", "compare"), "Difference": ("comparison", "Difference"),
     "Experiment": ("config", "Experiment"), "Fit": ("estimate", "Fit"), "Prediction": ("estimate", "Prediction"),
+    "read_run": ("run", "read_run"), "Run": ("run", "Run"),
     "check": ("check", None), "diagnose": ("diagnose", None), "SysidError": ("errors", "SysidError"), "SysidWarning": ("errors", "SysidWarning"),
 }  # fmt: skip
 
@@ -47,6 +50,6 @@ def __dir__():
 
 
 __all__ = [
-    "Difference", "Experiment", "Fit", "Prediction", "SysidError", "SysidWarning", "check", "compare", "diagnose", "fit",
-    "load", "predict", "write",
+    "Difference", "Experiment", "Fit", "Prediction", "Run", "SysidError", "SysidWarning", "check", "compare", "diagnose", "fit",
+    "load", "predict", "read_run", "write",
 ]

@@ -96,6 +96,8 @@ class Effect(ABC):
     tied_with: words of the vocabulary that look alike; `separate_by`: the experiment that tells them apart.
     reach: samples on either side of a row that its columns look at; memory: they look back to the start of the log.
     uses_load: they need `motion.load` (n, dof), the torque that the bodies alone are predicted to need.
+    elementwise: each row of its columns follows from the joint's own q, qd, qdd and load in that row, and shape values may
+        be arrays along the rows: joints can then be treated as samples of one joint.
     """
 
     name: ClassVar[str]
@@ -109,6 +111,12 @@ class Effect(ABC):
     reach: ClassVar[int] = 0
     memory: ClassVar[bool] = False
     uses_load: ClassVar[bool] = False
+    elementwise: ClassVar[bool] = False
+
+    @property
+    def instantaneous(self) -> bool:
+        """Whether what it does follows from q, qd and qdd of the same instant, whatever the clock and other signals say."""
+        return not (self.memory or self.reach)
 
     def coefficients(self) -> tuple[Linear, ...]:
         """The linear coefficients, in the order of the columns."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -11,9 +12,11 @@ from .certificate import Certificate, certify
 from .compress import Compressed
 from .inertia import DIVERGENCES, PARAMETERIZATIONS
 from .inertia.consistency import is_consistent
+from .inverse_dynamics import InverseDynamics, inverse_dynamics
 from .model import Model, moving_coefficients
 from .motion import Motion
 from .objective import Objective
+from .robot import Robot
 from .solve import Coordinates, Solution, solve
 from .specs import Experiment
 
@@ -63,6 +66,20 @@ class Prediction:
                 np.sqrt(squares.sum() / counts.sum()), float(np.sqrt(share(squares.sum(), size.sum()))), 1.0 - float(share(squares.sum(), spread.sum())),
             ]),
         }  # fmt: skip
+
+    def plot(self, robot: Robot):
+        """Measured and predicted torque of every joint of the robot, as a Matplotlib figure."""
+        from matplotlib.figure import Figure
+
+        dof = robot.dof
+        figure = Figure(figsize=(10.0, 1.0 + 1.8 * dof), layout="constrained")
+        for j, axes in enumerate(np.atleast_1d(figure.subplots(dof, 1, sharex=True))):
+            for values, label in ((self.measured, "measured"), (self.predicted, "predicted")):
+                axes.plot(self.t, values[:, j], linewidth=0.8, label=label)
+            axes.set_ylabel(f"{robot.joints[j]} [{'N' if robot.prismatic[j] else 'N m'}]")
+        axes.set_xlabel("time [s]")
+        figure.axes[0].legend(loc="upper right")
+        return figure
 
 
 def _sum(values):
@@ -114,17 +131,31 @@ class Fit:
 
     def plot(self, part: str = "test"):
         """Measured and predicted torque of every joint on "train" or "test", as a Matplotlib figure."""
-        from matplotlib.figure import Figure
+        return self.predictions[part].plot(self.model.robot)
 
-        told, dof = self.predictions[part], len(self.joints)
-        figure = Figure(figsize=(10.0, 1.0 + 1.8 * dof), layout="constrained")
-        for j, axes in enumerate(np.atleast_1d(figure.subplots(dof, 1, sharex=True))):
-            for values, label in ((told.measured, "measured"), (told.predicted, "predicted")):
-                axes.plot(told.t, values[:, j], linewidth=0.8, label=label)
-            axes.set_ylabel(f"{self.joints[j]} [{'N' if self.model.robot.prismatic[j] else 'N m'}]")
-        axes.set_xlabel("time [s]")
-        figure.axes[0].legend(loc="upper right")
-        return figure
+    @cached_property
+    def inverse_dynamics(self) -> InverseDynamics:
+        """What `torque` computes with; made when it is first used."""
+        return inverse_dynamics(self.model, self.x)
+
+    def torque(self, q, qd, qdd) -> np.ndarray:
+        """Torque [N m or N] of one sample (dof,) or many (n, dof), bodies, rotors and every effect that looks at one instant.
+
+        Args:
+            q, qd, qdd: positions [rad or m], velocities and accelerations, in the order of `joints`.
+
+        Effects that look back in time, at the clock or at logged signals (presliding, backlash, elasticity, delay,
+        current_lag, external_force, warmup) are left out; `omitted` names those of this model.
+
+        Raises:
+            SysidError: shapes that are neither, or not alike.
+        """
+        return self.inverse_dynamics(q, qd, qdd)
+
+    @property
+    def omitted(self) -> tuple[str, ...]:
+        """The effects of the model that `torque` leaves out, as `effect.joint`."""
+        return self.inverse_dynamics.omitted
 
     @property
     def pi(self) -> np.ndarray:

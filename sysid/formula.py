@@ -60,6 +60,10 @@ class Formula(TorqueEffect):
         self.uses_load = any(isinstance(node, ast.Name) and node.id in ("load", "tau_load") for node in ast.walk(self.parsed.tree))
         self.joints: tuple[str, ...] = ()
 
+    @property
+    def instantaneous(self):
+        return not any(isinstance(node, ast.Name) and node.id == "t" for node in ast.walk(self.parsed.tree))
+
     def coefficients(self):
         return tuple(called(Linear("SI", says="coefficient of the formula"), name) for name in self.parsed.linear)
 

@@ -23,6 +23,7 @@ import inspect
 import re
 import sys
 import traceback
+from dataclasses import replace
 from functools import wraps
 from pathlib import Path
 
@@ -88,6 +89,31 @@ def check(effect: Effect, robot, joint: int) -> None:
             effect.moved(piece, joint, **shapes)
         else:
             effect.columns(piece, robot if isinstance(effect, WrenchEffect) else joint, **shapes)
+
+
+def instantaneous(effect: Effect, robot, joint: int, shapes: dict[str, float]) -> bool:
+    """Whether what an effect does at an instant follows from q, qd and qdd of that instant: the same instants in the opposite
+    order, at other times, with other signals and other torque, come out as they were."""
+    forth = _sample(robot)
+    turned = {name: getattr(forth, name)[::-1] for name in ("q", "qd", "qdd", "load")}
+    back = replace(forth, **turned, t=forth.t + 100.0, tau=0.0 * forth.tau, measured=0.0 * forth.tau)
+    try:
+        done = [_done(effect, piece, robot, joint, shapes) for piece in (forth, back)]
+    except SysidError:
+        return False
+    return all(np.allclose(x, y[..., ::-1], rtol=1e-9, atol=0.0, equal_nan=True) for x, y in zip(*done))
+
+
+def _done(effect: Effect, piece: Piece, robot, joint: int, shapes: dict[str, float]) -> list[np.ndarray]:
+    """What an effect makes of a piece, samples last."""
+    if isinstance(effect, SensorEffect):
+        return [np.asarray(effect.sensed(piece.load.T, piece.step, **shapes))]
+    if isinstance(effect, MotionEffect):
+        moved = effect.moved(piece, joint, **shapes)
+        down = [] if moved.gravity is None else [np.repeat(np.asarray(moved.gravity)[:, None], len(piece.t), axis=1)]
+        behind = [] if moved.deflection is None else [np.swapaxes(moved.deflection, 1, 2)]
+        return [moved.q.T, moved.qd.T, moved.qdd.T, *down, *behind]
+    return [np.asarray(effect.columns(piece, robot if isinstance(effect, WrenchEffect) else joint, **shapes))]
 
 
 def _is_effect(value) -> bool:

@@ -66,6 +66,8 @@ def document(fit: Fit, run: str | Path = "") -> dict:
         "samples": fit.samples,
         "left_out": fit.left_out,
         "parameters": parameters,
+        # what the effects that look at the load took for the bodies; the last step towards `parameters` is not taken again
+        "load_bodies": _by_body(fit.model),
         "weights": None if fit.weights is None else dict(zip(fit.joints, fit.weights.tolist())),
         "filter": fit.filters,
         "robot": {"joints": list(fit.joints), "locked": fit.model.robot.locked},
@@ -77,6 +79,12 @@ def document(fit: Fit, run: str | Path = "") -> dict:
         "seconds": fit.seconds,
         "run": str(run),
     }  # fmt: skip
+
+
+def _by_body(model: Model) -> dict[str, list[float]] | None:
+    if model.reference is None:
+        return None
+    return {body.name: pi.tolist() for body, pi in zip(model.robot.bodies, model.reference)}
 
 
 def number(value: float) -> float | None:

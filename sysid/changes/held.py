@@ -1,4 +1,4 @@
-"""The model that a run folder holds, on the robot of an experiment."""
+"""The model that a run folder holds, for logs of an experiment's robot."""
 
 from __future__ import annotations
 
@@ -6,39 +6,25 @@ from pathlib import Path
 
 import numpy as np
 
-from .. import pipeline
+from .. import pipeline, run
 from ..errors import ConfigError
 from ..model import Model
-from ..results import read_fit
 from ..specs import Experiment
 
 
-def read_run(run: Path, experiment: Experiment) -> tuple[Model, np.ndarray]:
-    """The model and the parameters x (size,) of a run folder of `sysid fit`, on the experiment's
-    robot.
+def held(folder: Path, experiment: Experiment) -> tuple[Model, np.ndarray]:
+    """The model and the parameters x (size,) of a run folder of `sysid fit`.
 
     Raises:
-        ConfigError: the folder holds no fit, or one of another robot.
+        ConfigError: the folder holds no fit, or one of another robot than the experiment's.
     """
-    values, _ = read_fit(run / "fit.json", "--model")
-    _, structure, _ = pipeline.build(pipeline.load(run / "experiment.yaml"))
-    missing = [
-        name
-        for name in (*structure.names, *(v.name for v in structure.shape_values))
-        if name not in values
-    ]
-    if missing:
-        raise ConfigError(
-            f"the run has no value for {missing[0]}", where=str(run), do="fit it again"
-        )
+    found = run.read_run(folder)
     _, own, _ = pipeline.build(experiment)
-    if own.robot.joints != structure.robot.joints:
+    if own.robot.joints != found.joints:
         raise ConfigError(
-            f"the run moved {', '.join(structure.robot.joints)}",
-            where=str(run),
+            f"the run moved {', '.join(found.joints)}",
+            where=str(folder),
             allowed=", ".join(own.robot.joints),
             do="give the experiment that was fitted",
         )
-    x = np.array([values[name] for name in structure.names])
-    structure = structure.with_shapes([values[v.name] for v in structure.shape_values])
-    return structure.with_reference(x[: 10 * structure.bodies].reshape(-1, 10)), x
+    return found.model, found.x

@@ -15,7 +15,7 @@ from ..noise import floors_of
 from ..specs import Experiment, LogSpec
 from .fitted import Change, together
 from .halves import BLOCKS, Question
-from .held import read_run
+from .held import held
 from .signatures import signatures
 
 
@@ -42,7 +42,7 @@ def changed(experiment: Experiment, run: Path, logs: list[str]) -> Changed:
     Raises:
         SysidError: no such run or log, or a log too short to be split in halves.
     """
-    structure, x = read_run(run, experiment)
+    structure, x = held(run, experiment)
     robot = structure.robot
     specs = [LogSpec(file=_located(log)) for log in logs]
     with pipeline.noticed():

@@ -12,6 +12,7 @@ class AsymmetricCoulomb(TorqueEffect):
     tied_with = ("torque_bias",)
     separate_by = "torque at rest: a bias stays, friction goes"
     source = "Elhami & Brookfield 1996"
+    elementwise = True
 
     dF = Linear("N m", says="how much more friction forwards than backwards")
 

@@ -14,6 +14,7 @@ class AsymmetricViscous(TorqueEffect):
     tied_with = ("asymmetric_coulomb", "torque_bias")
     separate_by = "a ladder of constant speeds, both ways"
     source = "the asymmetric counterpart of viscous friction; no reference"
+    elementwise = True
 
     dFv = Linear("N m s/rad", says="how much larger the viscous coefficient is forwards than backwards")
 

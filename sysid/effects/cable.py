@@ -14,6 +14,7 @@ class Cable(TorqueEffect):
     tied_with = ("spring", "cogging", "position_friction", "gravity")
     separate_by = "static scans both ways, with and without the cable"
     source = "a polynomial fit; no reference"
+    elementwise = True
     options = {"order": "highest power of the angle, from 1 (default 5)"}
 
     order = 5

@@ -18,6 +18,7 @@ class Cogging(TorqueEffect):
     tied_with = ("spring", "cable", "position_friction", "encoder_eccentricity", "gravity where k is 1")
     separate_by = "a slow scan both ways over several periods"
     source = "Holtz 1996"
+    elementwise = True
     options = {"lines": "how many multiples of k, from 1 (default 1)"}
 
     lines = 1

@@ -12,6 +12,7 @@ class Coulomb(TorqueEffect):
     tied_with = ("torque_bias", "asymmetric_coulomb")
     separate_by = "slow sweeps both ways"
     source = "Rucker & Wensing 2022, eq. 14"
+    elementwise = True
 
     Fc = Linear("N m", lower=0, says="friction torque while sliding")
 

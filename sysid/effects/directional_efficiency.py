@@ -15,6 +15,7 @@ class DirectionalEfficiency(TorqueEffect):
     separate_by = "the same sweep up against gravity and down with it, at two loads"
     source = "Wang & Kim 2015"
     uses_load = True
+    elementwise = True
 
     e = Linear("1", lower=0, says="extra share of the load torque needed while driving: 1/eta - 1")
 

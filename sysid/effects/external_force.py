@@ -21,6 +21,7 @@ class ExternalForce(LinkEffect):
     source = "virtual work; no reference"
     options = {"during": "a list of [start, stop] in seconds of the log's clock", "link": "the link that touches (default: the last)"}
 
+    instantaneous = False  # the clock's
     during = ()
 
     def given(self, **options):

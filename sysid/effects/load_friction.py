@@ -18,6 +18,7 @@ class LoadFriction(TorqueEffect):
     separate_by = "the same slow sweep under three loads"
     source = "Hamon 2010; Bittencourt & Gunnarsson 2012"
     uses_load = True
+    elementwise = True
 
     mu = Linear("1", lower=0, says="friction torque per load torque")
 

@@ -31,6 +31,10 @@ class Payload(LinkEffect):
         texts(chosen, "logs")
         return chosen
 
+    @property
+    def instantaneous(self):
+        return self.logs is None
+
     def coefficients(self):
         return tuple(called(Linear(unit, lower=0 if p == "m" else None, says=f"{p} of the payload"), p) for p, unit in zip(PARAMETERS, UNITS))
 

@@ -14,6 +14,7 @@ class PositionFriction(TorqueEffect):
     tied_with = ("cogging", "spring", "cable")
     separate_by = "the same slow scan both ways: half the difference is friction, half the sum is not"
     source = "Bittencourt, Wernholt, Sander-Tavallaey & Brogardh 2010"
+    elementwise = True
     options = {
         "times": "what the sum multiplies: direction, as Coulomb friction, or speed, as viscous friction (default direction)",
         "harmonics": "how many k, from 1 (default 3)",

@@ -14,6 +14,7 @@ class Spring(TorqueEffect):
     tied_with = ("cable", "torque_bias", "gravity on a joint that swings a little")
     separate_by = "another payload: gravity grows with it, a spring does not"
     source = "Hooke's law"
+    elementwise = True
 
     k = Linear("N m/rad", lower=0, says="stiffness")
     c = Linear("N m", says="torque at angle zero, -k q0; the same column as torque_bias")

@@ -14,6 +14,7 @@ class Stribeck(TorqueEffect):
     tied_with = ("presliding", "quadratic_drag", "sublinear_viscous")
     separate_by = "creep both ways at several constant speeds, without reversing"
     source = "Armstrong 1994"
+    elementwise = True
 
     dF = Linear("N m", lower=0, says="friction on the verge of motion above that while sliding")
     vs = Shape("rad/s", 0.003, 0.7, of="speed", grid=10, says="Stribeck speed")

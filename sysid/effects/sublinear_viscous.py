@@ -14,6 +14,7 @@ class SublinearViscous(TorqueEffect):
     tied_with = ("stribeck", "quadratic_drag", "warmup")
     separate_by = "a ladder of constant speeds, at several temperatures"
     source = "Wolf & Iskandar 2018"
+    elementwise = True
 
     Fa = Linear("N m (s/rad)^a", lower=0, says="friction at unit speed")
     a = Shape("1", 0.1, 0.9, even=True, says="power of the speed: 0 is Coulomb friction, 1 viscous")

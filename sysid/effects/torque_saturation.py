@@ -15,6 +15,7 @@ class TorqueSaturation(TorqueEffect):
     separate_by = "a ladder of static torques up to the largest"
     source = "the magnetisation curve of a motor's iron; no reference"
     uses_load = True
+    elementwise = True
 
     e = Linear("1", says="share of the torque beyond the limit that the signal shows too much; -1 reads flat")
     limit = Shape("N m", 0.3, 0.97, of="torque", says="torque beyond which the signal bends")

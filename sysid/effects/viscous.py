@@ -12,6 +12,7 @@ class Viscous(TorqueEffect):
     tied_with = ("warmup",)
     separate_by = "constant speeds, both ways, cold and warm"
     source = "Rucker & Wensing 2022, eq. 14"
+    elementwise = True
 
     Fv = Linear("N m s/rad", lower=0, says="viscous coefficient; includes the motor's back-EMF where torque is a voltage")
 

@@ -22,6 +22,7 @@ class Warmup(TorqueEffect):
     source = "Simoni, Beschi, Legnani & Visioli 2017"
     options = {"signal": "the logged signal that is the joint's temperature [deg C]; without it, an exponential of time"}
 
+    instantaneous = False  # the clock's or a thermometer's
     signal = None
     dFv = Linear("N m s/rad", says="change of the viscous coefficient")
     dFc = Linear("N m", says="change of Coulomb friction")
