@@ -128,7 +128,7 @@ def document(fits: list[Fit], names: list[str]) -> dict:
         errors = fit.predictions["test"].errors()
         by_joint = lambda key: {j: number(v) for j, v in zip(fit.joints, errors[key])}  # noqa: E731, B023
         experiments.append({
-            "name": name, "rms_test": by_joint("rms"), "relative_error": {**by_joint("relative_error"), "*": number(errors["total"][1])},
+            "name": name, "rms_test": dict(zip(fit.joints, fit.predictions["test"].told())), "relative_error": {**by_joint("relative_error"), "*": number(errors["total"][1])},
             "r2": by_joint("r2"), "converged": fit.solution.converged, "globally_optimal": fit.certificate.globally_optimal,
         })  # fmt: skip
         notices += [f"{name}: {notice}" for notice in fit.notices]

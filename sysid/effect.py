@@ -14,10 +14,12 @@ from __future__ import annotations
 
 import copy
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache
 from importlib import import_module
 from pkgutil import iter_modules
+from types import MappingProxyType
 from typing import ClassVar
 
 import numpy as np
@@ -98,6 +100,7 @@ class Effect(ABC):
     uses_load: they need `motion.load` (n, dof), the torque that the bodies alone are predicted to need.
     elementwise: each row of its columns follows from the joint's own q, qd, qdd and load in that row, and shape values may
         be arrays along the rows: joints can then be treated as samples of one joint.
+    given_coefficients: {name: value} of those that the user says.
     """
 
     name: ClassVar[str]
@@ -117,6 +120,8 @@ class Effect(ABC):
     def instantaneous(self) -> bool:
         """Whether what it does follows from q, qd and qdd of the same instant, whatever the clock and other signals say."""
         return not (self.memory or self.reach)
+
+    given_coefficients: Mapping[str, float] = MappingProxyType({})
 
     def coefficients(self) -> tuple[Linear, ...]:
         """The linear coefficients, in the order of the columns."""

@@ -10,12 +10,13 @@ import numpy as np
 from . import uncertainty
 from .certificate import Certificate, certify
 from .compress import Compressed
+from .errors import ConfigError
 from .inertia import DIVERGENCES, PARAMETERIZATIONS
 from .inertia.consistency import is_consistent
 from .inverse_dynamics import InverseDynamics, inverse_dynamics
 from .model import Model, moving_coefficients
 from .motion import Motion
-from .objective import Objective
+from .objective import Objective, posed
 from .robot import Robot
 from .solve import Coordinates, Solution, solve
 from .specs import Experiment
@@ -47,9 +48,14 @@ class Prediction:
         n, dof = self.measured.shape
         return np.full(dof, n) if self.use is None else self.use.sum(0)
 
+    def told(self) -> list[float | None]:
+        """RMS [N m] of each joint, None where no row of it counts."""
+        return [float(rms) if count else None for rms, count in zip(self.errors()["rms"], self.counts)]
+
     def errors(self) -> dict[str, np.ndarray]:
         """`rms` [N m], `relative_error` (norm of the residual over that of the torque), `r2`, each (dof,), and their
-        totals over all joints under `total`; NaN where the torque itself is zero or constant."""
+        totals over all joints under `total`; NaN where the torque itself is zero or constant. The RMS of a joint no row
+        of which counts is zero: `told` says None."""
         squares = _sum(self.residual**2)
         kept = self.measured if self.use is None else np.where(self.use, self.measured, 0.0)
         counts = np.maximum(self.counts, 1)
@@ -63,7 +69,7 @@ class Prediction:
             "relative_error": np.sqrt(share(squares, size)),
             "r2": 1.0 - share(squares, spread),
             "total": np.array([
-                np.sqrt(squares.sum() / counts.sum()), float(np.sqrt(share(squares.sum(), size.sum()))), 1.0 - float(share(squares.sum(), spread.sum())),
+                np.sqrt(squares.sum() / max(self.counts.sum(), 1)), float(np.sqrt(share(squares.sum(), size.sum()))), 1.0 - float(share(squares.sum(), spread.sum())),
             ]),
         }  # fmt: skip
 
@@ -90,8 +96,9 @@ def _sum(values):
 class Fit:
     """What identification found.
 
-    pi (bodies, 10) about the joints' frames, `prior` the same before any data; coefficients of the effects in `model.coefficients`' order;
+    pi (bodies, 10) about the joints' frames, `prior` the same before any data, `known` (bodies, 10, 10) the Hessian by which some are held to it, or None; coefficients of the effects in `model.coefficients`' order;
     x both in one vector. `shape_std` of the model's shape values, NaN where held or undetermined. `predictions` by "train" and "test". `notices`: what was decided on the way.
+    `drives`: what was free of the drives, as found; `rollout`: {joint: RMS [rad or m]} by which they, let go, miss the test logs.
     """
 
     experiment: Experiment
@@ -106,6 +113,7 @@ class Fit:
     compressed: Compressed
     physically_consistent: bool
     prior: np.ndarray
+    known: np.ndarray | None = None
     shape_std: np.ndarray = field(default_factory=lambda: np.zeros(0))
     predictions: dict[str, Prediction] = field(default_factory=dict)
     samples: dict[str, int] = field(default_factory=dict)
@@ -115,10 +123,12 @@ class Fit:
     logs: tuple[dict, ...] = ()
     events: tuple[dict, ...] = ()
     notices: tuple[str, ...] = ()
+    drives: tuple = ()
+    rollout: dict[str, float] | None = None
 
     def __repr__(self) -> str:
         said = ["converged" if self.solution.converged else "not converged", *(["proven optimal"] if self.certificate.globally_optimal else [])]
-        errors = ", ".join(f"{joint} {rms:.4g}" for joint, rms in self.rms("test").items()) if "test" in self.predictions else "none"
+        errors = ", ".join(f"{joint} {rms:.4g}" for joint, rms in zip(self.joints, self.predictions["test"].told()) if rms is not None) if "test" in self.predictions else "none"
         return f"<Fit of {self.experiment.name}: {len(self.x)} parameters, {', '.join(said)}; RMS on the test logs: {errors}>"
 
     def to_dataframe(self):
@@ -217,12 +227,21 @@ def pose(experiment: Experiment, model: Model, compressed: Compressed, moving: n
         weights: (joints,) that multiply the rows of each joint, or None.
     """
     spec = experiment
-    objective = Objective(compressed.total(weights), DIVERGENCES[spec.prior.divergence](prior), spec.prior.weight)
+    objective = posed(compressed.total(weights), DIVERGENCES[spec.prior.divergence](prior), spec.prior.weight, known_bodies(spec, model))
     positive = np.array([c.positive for c in model.coefficients], dtype=bool)
     held = ~moving | undetermined(objective, model, moving)
     coordinates = Coordinates(PARAMETERIZATIONS[spec.model.inertia](), model.bodies, positive, held)
     x = np.concatenate([prior.ravel(), _starting_coefficients(model, objective, prior, positive, held)])
     return Problem(objective, coordinates, coordinates.theta(x), weights)
+
+
+def known_bodies(experiment: Experiment, model: Model) -> list[int]:
+    """The numbers of the bodies that `prior.known` names. Raises ConfigError: there is none of that name."""
+    names = [body.name for body in model.robot.bodies]
+    for name in experiment.prior.known:
+        if name not in names:
+            raise ConfigError(f"prior.known names the body {name!r}", allowed=", ".join(names), do="correct the name")
+    return [names.index(name) for name in experiment.prior.known]
 
 
 # A coefficient's column that others match to this share of its size is told from them by rounding alone.
@@ -250,11 +269,12 @@ def undetermined(objective: Objective, model: Model, moving) -> np.ndarray:
 
 
 def _starting_coefficients(model: Model, objective: Objective, prior, positive, held) -> np.ndarray:
-    """Held: what the URDF states (viscous, coulomb), else zero. The rest: the size that the data alone suggest."""
+    """Held: what is given, or what the URDF states (viscous, coulomb), else zero. The rest: the size that the data alone suggest."""
     count = prior.size
     robot = model.robot
     stated = {"viscous": robot.damping, "coulomb": robot.friction}
     urdf = np.array([stated[c.effect][c.joint] if c.effect in stated else 0.0 for c in model.coefficients])
+    urdf = np.array([own if c.given is None else c.given for own, c in zip(urdf, model.coefficients)])
     columns = objective.triangle[:, count:-1]
     rest = objective.triangle[:, -1] - objective.triangle[:, :count] @ prior.ravel()
     squares = np.sum(columns**2, axis=0)
@@ -273,9 +293,10 @@ def noise_weights(compressed: Compressed, x) -> np.ndarray:
 
 
 def inverse(rms: np.ndarray) -> np.ndarray:
-    """(joints,) weights: the inverse of residual RMS, with a geometric mean of one."""
-    weights = 1.0 / np.maximum(rms, 1e-9 * rms.max())
-    return weights / np.exp(np.mean(np.log(weights)))
+    """(joints,) weights: the inverse of residual RMS, with a geometric mean of one; one for a joint that has no residual."""
+    there = rms > 0.0
+    weights = 1.0 / np.maximum(np.where(there, rms, 1.0), 1e-9 * rms.max())
+    return np.where(there, weights / np.exp(np.mean(np.log(weights[there]))), 1.0) if there.any() else np.ones(len(rms))
 
 
 def identify(experiment: Experiment, model: Model, motion: Motion, data: Compressed, prior: np.ndarray, callback=None) -> Fit:
@@ -299,9 +320,11 @@ def identify(experiment: Experiment, model: Model, motion: Motion, data: Compres
     count = 10 * model.bodies
     fixed = np.zeros(len(solution.x), dtype=bool)
     fixed[count:] = held
+    for body in known_bodies(experiment, model):
+        fixed[10 * body : 10 * body + 10] = True
     fixed[[count + k for k in certificate.at_zero]] = True
     slopes = data.size - model.size
-    objective = problem.objective if not slopes else Objective(data.total(problem.weights), problem.objective.divergence, problem.objective.weight)
+    objective = problem.objective if not slopes else posed(data.total(problem.weights), problem.objective.divergence, problem.objective.weight, known_bodies(experiment, model))
     sure = uncertainty.estimate(objective, data, np.append(solution.x, np.zeros(slopes)), np.append(fixed, np.zeros(slopes, dtype=bool)), problem.weights)
     shape_std = np.full(len(model.shape_values), np.nan)
     shape_std[[k for k, value in enumerate(model.shape_values) if not value.held][:slopes]] = sure.std[model.size :]
@@ -309,7 +332,7 @@ def identify(experiment: Experiment, model: Model, motion: Motion, data: Compres
     return Fit(
         experiment=experiment, model=model, x=solution.x, objective=solution.objective, solution=solution,
         certificate=certificate, held=held, weights=problem.weights, compressed=compressed,
-        uncertainty=kept, shape_std=shape_std, prior=prior,
+        uncertainty=kept, shape_std=shape_std, prior=prior, known=problem.objective.known,
         physically_consistent=bool(is_consistent(solution.x[:count].reshape(-1, 10)).all()),
     )  # fmt: skip
 

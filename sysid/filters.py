@@ -122,10 +122,14 @@ def _held_out(experiment: Experiment, spec: PreprocessSpec, model: Model, logs, 
     motion = replace(motion, pieces=tuple(_trimmed(piece, logs[piece.log].segments[0], edge) for piece in motion.pieces))
     # against the torque as logged, over every row: what a filter smooths away or masks it has not explained
     # but for what disturbed the logs, as far as the widest candidate sees of it
-    calm = usable if motion.events else lambda *_, **__: None
-    raw = replace(motion, pieces=tuple(
-        replace(piece, tau=piece.measured, use=calm(piece.t, model.robot.joints, logs[piece.log].events, angles=edge, torque=edge)) for piece in motion.pieces
-    ))  # fmt: skip
+    told = np.array([joint not in motion.unused for joint in model.robot.joints])
+
+    def calm(piece):
+        joints = model.robot.joints
+        use = usable(piece.t, joints, logs[piece.log].events, angles=edge, torque=edge) if motion.events else None
+        return use if told.all() else told & (np.ones(piece.q.shape, dtype=bool) if use is None else use)
+
+    raw = replace(motion, pieces=tuple(replace(piece, tau=piece.measured, use=calm(piece)) for piece in motion.pieces))
     thin = max(1, motion.samples // _ROWS)
     data = compress(model, motion, thin=thin)
     target = data if spec.torque == "raw" and spec.standstill == "keep" and not motion.events else compress(model, raw, thin=thin)

@@ -12,13 +12,13 @@ from pathlib import Path
 
 import numpy as np
 
-from . import units
+from . import motor_side, units
 from .clock import corrected
 from .errors import LogError, SysidWarning
 from .events import Event
 from .recording import Recording, recorded
 from .segment import Segment
-from .specs import DataSpec, LogSpec
+from .specs import ActuatorSpec, DataSpec, LogSpec
 
 # A step longer than this many median steps is a hole that interpolation would invent motion for.
 GAP_STEPS = 10.0
@@ -27,13 +27,14 @@ _UNIFORM = 0.02
 # Of a step: stamps that are off by less are right.
 _TOLD = 1e-3
 _LARGEST = 1e20  # no unit makes a measured signal larger (a clock in ns, logged as a signal, reads 2e18)
+NO_ACTUATORS: dict[str, ActuatorSpec] = {}
 DEGREES = 4.0 * np.pi  # rad: no robot joint turns so far from zero, but its angle in degrees does
 
 
 @dataclass(frozen=True)
 class Log:
     """One log: where it came from, the SHA-256 of its file (of several, of all of theirs), its segments, what disturbed them, where
-    it was looked for, and the SHA-256 of each file by its name."""
+    it was looked for, the SHA-256 of each file by its name, and the joints whose torque is not used."""
 
     name: str
     path: Path
@@ -41,6 +42,7 @@ class Log:
     segments: tuple[Segment, ...]
     events: tuple[Event, ...] = ()
     hashes: dict[str, str] = field(default_factory=dict)
+    unused: tuple[str, ...] = ()
 
     @property
     def samples(self) -> int:
@@ -48,40 +50,55 @@ class Log:
         return sum(len(segment.t) for segment in self.segments)
 
 
-def read(log: LogSpec, data: DataSpec, joints: tuple[str, ...], prismatic, folder: Path = Path()) -> Log:
+def read(log: LogSpec, data: DataSpec, joints: tuple[str, ...], prismatic, folder: Path = Path(), actuators=NO_ACTUATORS) -> Log:
     """Read one log of an experiment. A piece holds the samples from `start` up to, not including, `stop`: pieces that meet share none.
 
     Args:
         log: the file and the piece of it. data: columns, units, rate. joints: names, in order.
         prismatic: (dof,) bool. folder: what relative paths are relative to.
+        actuators: {joint: what drives it} of joints whose torque was not logged.
 
     Raises:
         LogError: the file, a column, a unit or a value is not what a log can hold.
     """
-    return assembled(measured(log, data, joints, prismatic, folder))
+    return assembled(measured(log, data, joints, prismatic, folder, actuators), tuple(data.unused))
 
 
-def assembled(samples: Recording) -> Log:
+def assembled(samples: Recording, unused: tuple[str, ...] = ()) -> Log:
     """The log of what was `measured`: resampled where its clock is irregular, split at gaps and where a recording ends."""
     hashes = {name: _sha256(path) for name, path in samples.files.items()}
     each = list(hashes.values())
     whole = each[0] if len(each) == 1 else hashlib.sha256("".join(each).encode()).hexdigest()
-    return Log(samples.name, next(iter(samples.files.values())), whole, tuple(_segments(samples.t, samples.signals, samples.where, samples.breaks)), hashes=hashes)
+    return Log(samples.name, next(iter(samples.files.values())), whole, tuple(_segments(samples.t, samples.signals, samples.where, samples.breaks)), hashes=hashes, unused=unused)
 
 
-def measured(log: LogSpec, data: DataSpec, joints: tuple[str, ...], prismatic, folder: Path = Path()) -> Recording:
+def measured(log: LogSpec, data: DataSpec, joints: tuple[str, ...], prismatic, folder: Path = Path(), actuators=NO_ACTUATORS) -> Recording:
     """The samples of a log with signals in SI units, before they are resampled or split.
 
     Raises:
         LogError: as `read`.
     """
-    samples, first = recorded(log, data, joints, folder), 0
+    drives = {joint: motor_side.drive(spec) for joint, spec in actuators.items()}
+    samples, first = recorded(log, data, joints, folder, drives), 0
     if log.start is not None or log.stop is not None:
         first, samples = _piece(samples, log)
     for name, values in samples.signals.items():
         _check_finite(values, name, samples.t, joints, samples.where, first)
-    _convert(samples.signals, data, joints, prismatic, samples.where)
+    _convert(samples.signals, data, joints, prismatic, samples.where, drives)
+    for joint, own in drives.items():
+        _driven(samples, joints.index(joint), joint, own)
     return samples
+
+
+def _driven(samples: Recording, j: int, joint: str, own: motor_side.Drive) -> None:
+    """Put what a drive's command makes in the place of its joint's torque."""
+    signals = samples.signals
+    command, rate = signals[f"signals.{motor_side.command_name(joint)}"], np.zeros(len(samples.t))
+    for first, last in samples.parts:
+        part = slice(first, last)
+        signals["tau"][part, j], rate[part] = motor_side.driven(own, samples.t[part], command[part], signals["q"][part, j])
+    if own.free_delay:
+        signals[f"signals.{motor_side.rate_name(joint)}"] = rate
 
 
 def overlapping(test: LogSpec, own: Iterable[str], train: LogSpec, other: Iterable[str]) -> bool:
@@ -115,7 +132,7 @@ def _check_finite(values, name: str, t, joints, where: str, first: int) -> None:
     )  # fmt: skip
 
 
-def _convert(signals, data: DataSpec, joints, prismatic, where: str) -> None:
+def _convert(signals, data: DataSpec, joints, prismatic, where: str, drives) -> None:
     prismatic = np.asarray(prismatic)
     unit = data.units.position
     angular = unit in ("rad", "deg")
@@ -125,17 +142,21 @@ def _convert(signals, data: DataSpec, joints, prismatic, where: str) -> None:
         for name in ("q", "qd", "qdd"):
             if name in signals:
                 signals[name] *= scale
+        for joint, own in drives.items():
+            if own.servo:
+                signals[f"signals.{motor_side.command_name(joint)}"] *= scale[joints.index(joint)]
     if data.units.torque == "A":
-        constants = data.units.torque_constant
-        if constants is None or (missing := [j for j in joints if j not in constants]):
-            missing = list(joints) if constants is None else missing
+        # a sum's factors make torque of its signals
+        logged = [j for j in joints if j not in (*data.torque, *data.unused, *drives)]
+        constants = data.units.torque_constant or {}
+        if missing := [j for j in logged if j not in constants]:
             raise LogError(
                 f"torque is in A and joint {missing[0]!r} has no torque constant",
                 where=where,
                 allowed="data.units.torque_constant: {joint: N m per A, …}",
                 do="add the constants",
             )
-        signals["tau"] *= np.array([constants[j] for j in joints])
+        signals["tau"] *= np.array([constants[j] if j in logged else 1.0 for j in joints])
     if unit == "rad":
         largest = np.abs(signals["q"]).max(axis=0)
         for joint, value, slides in zip(joints, largest, prismatic):

@@ -24,13 +24,14 @@ ROBOT = -1  # the "joint" of an effect of the whole robot, called `*`
 
 @dataclass(frozen=True)
 class Coefficient:
-    """One linear coefficient of an effect on a joint (-1: on the robot)."""
+    """One linear coefficient of an effect on a joint (-1: on the robot). given: its value, where the user says it."""
 
     effect: str
     joint: int
     name: str
     unit: str
     positive: bool
+    given: float | None = None
 
 
 @dataclass(frozen=True)
@@ -100,7 +101,10 @@ class Model:
     def coefficients(self) -> tuple[Coefficient, ...]:
         """The effects' coefficients, after the bodies: by effect, then joint, then coefficient."""
         return tuple(
-            Coefficient(effect.name, joint, self._name(effect, joint, linear.name), self._unit(linear.unit, joint), linear.lower == 0)
+            Coefficient(
+                effect.name, joint, self._name(effect, joint, linear.name), self._unit(linear.unit, joint), linear.lower == 0,
+                effect.given_coefficients.get(linear.name),
+            )
             for effect, joints in self.terms
             for joint in joints
             for linear in effect.coefficients()
@@ -443,5 +447,7 @@ def _number(effect: Effect, word: str, value) -> float:
 
 
 def moving_coefficients(model: Model, motion: Motion) -> np.ndarray:
-    """(coefficients,) bool: False for those of a joint that never moves, which no data can tell."""
-    return np.array([c.joint == ROBOT or model.robot.joints[c.joint] not in motion.still for c in model.coefficients], dtype=bool)
+    """(coefficients,) bool: False for those of a joint that never moves or whose torque is not used, which no data can tell, and for
+    those that are given."""
+    silent = (*motion.still, *motion.unused)
+    return np.array([c.given is None and (c.joint == ROBOT or model.robot.joints[c.joint] not in silent) for c in model.coefficients], dtype=bool)

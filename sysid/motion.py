@@ -72,7 +72,7 @@ class Motion:
     still: joints that never move, or never clear of a standstill. standing (dof,): share of the rows that count in which
     a joint stands still. left_out (dof,): rows that do not count.
     events: what disturbed the logs; `disturbed` the share of all joints' rows that is left out for it.
-    band: [Hz] below which the joints' speeds stay, where it was asked for, else zero.
+    band: [Hz] below which the joints' speeds stay, where it was asked for, else zero. unused: joints whose torque is not used.
     """
 
     joints: tuple[str, ...]
@@ -83,6 +83,7 @@ class Motion:
     events: tuple[Event, ...] = ()
     disturbed: float = 0.0
     band: float = 0.0
+    unused: tuple[str, ...] = ()
 
     @property
     def samples(self) -> int:

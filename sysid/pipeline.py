@@ -17,11 +17,12 @@ from pathlib import Path
 
 import numpy as np
 
-from . import config, events, model, robot, shape
+from . import config, drives, events, gains, model, robot, rollout, shape
 from . import filters as filtering
 from . import log as logs
 from .bumps import bumps
 from .compress import Compressed, Linearised, compress
+from .drives import rescaled, scale_is_told, with_drives
 from .errors import SysidWarning
 from .estimate import Fit, Prediction, identify, predict
 from .inertia.consistency import is_consistent
@@ -42,22 +43,30 @@ def load(path: str | Path) -> Experiment:
     return config.load(path)
 
 
+def started(experiment: Experiment) -> Experiment:
+    """An experiment whose drives' free values have a start from its training logs; itself where none lacks one. Raises SysidError."""
+    return gains.started(experiment, robot.load(experiment.robot, experiment.folder)) if experiment.actuator or experiment.data.torque else experiment
+
+
 def build(experiment: Experiment) -> tuple[Robot, Model, np.ndarray]:
     """The robot, the model and the prior (bodies, 10) of an experiment. Raises RobotError, ConfigError."""
     machine = robot.load(experiment.robot, experiment.folder)
-    structure = model.build(machine, experiment.model.effects, experiment.folder)
+    structure = with_drives(model.build(machine, experiment.model.effects, experiment.folder), experiment)
     return machine, structure, _prior(experiment, structure)
 
 
 def read(experiment: Experiment, machine: Robot, specs: list[LogSpec]) -> list[logs.Log]:
     """The logs of an experiment's `data.train` or `data.test`, with their events where these are left out. Raises LogError."""
-    read = [logs.read(spec, experiment.data, machine.joints, machine.prismatic, experiment.folder) for spec in specs]
+    read = [logs.read(spec, experiment.data, machine.joints, machine.prismatic, experiment.folder, experiment.actuator) for spec in specs]
     return read if experiment.preprocess.events == "keep" else with_events(machine, read)
 
 
 def with_events(machine: Robot, read: list[logs.Log]) -> list[logs.Log]:
     """Logs with their events: first those that the signals show, then those that only the robot's equations do."""
-    found = [replace(log, events=tuple(e for s in log.segments for e in events.find(s, machine.joints, log=log.name))) for log in read]
+    told = lambda log, e: not (e.signal == "torque" and set(e.joints) <= set(log.unused))  # noqa: E731
+    found = [
+        replace(log, events=tuple(e for s in log.segments for e in events.find(s, machine.joints, log=log.name) if told(log, e))) for log in read
+    ]  # fmt: skip
     felt = bumps(machine, found)
     more = [[e for e in felt if e.log == log.name] for log in found]
     return [replace(log, events=events.ordered([*log.events, *own])) if own else log for log, own in zip(found, more)]
@@ -95,6 +104,7 @@ def fit(experiment: Experiment, *, filters: dict | None = None, progress: Progre
     tell = progress or (lambda stage, share: None)
     seconds: dict[str, float] = {}
     with noticed() as notices:
+        experiment = started(experiment)
         with _timed(seconds, "robot"):
             machine, structure, prior = build(experiment)
         for text in measured.notices if measured else ():
@@ -134,11 +144,15 @@ def fit(experiment: Experiment, *, filters: dict | None = None, progress: Progre
             disturbed += _tell_events("test", motion)
             predictions["test"] = predict(structure, found.x, motion)
             samples["test"], left_out["test"] = motion.samples, _left_out(motion)
+            told = drives.found(experiment, structure, found.x, found.uncertainty.std, found.shape_std)
+            let_go = rollout.rms(experiment, structure, found.x, motion)
+        if not scale_is_told(experiment, machine.joints):
+            warnings.warn(SysidWarning("no joint's torque is known in N m: these logs tell masses, friction and gains up to one common factor, which the prior's masses choose; one known gain, or a payload of known mass, settles it"), stacklevel=2)
         for text in implausible(replace(found, predictions=predictions)):
             warnings.warn(SysidWarning(text), stacklevel=2)
     return replace(
         found, predictions=predictions, samples=samples, left_out=left_out, seconds=seconds, filters=chosen, logs=tuple(provenance),
-        notices=tuple(notices), events=tuple(disturbed),
+        notices=tuple(notices), events=tuple(disturbed), drives=tuple(told), rollout=let_go,
     )  # fmt: skip
 
 
@@ -167,6 +181,7 @@ class Prepared:
 def prepared(experiment: Experiment) -> Prepared:
     """Read, filter and compress the training and the test logs of an experiment. Raises SysidError."""
     with noticed() as notices:
+        experiment = started(experiment)
         machine, structure, prior = build(experiment)
         train = read(experiment, machine, experiment.data.train)
         preprocess = experiment.preprocess
@@ -190,6 +205,9 @@ def _settled(experiment: Experiment, structure: Model, motion: Motion, prior) ->
     if not (structure.shape_values or structure.uses_load):
         return structure, None
     found = shape.settle(experiment, structure, motion, prior)
+    bodies = found.x[: 10 * structure.bodies].reshape(-1, 10)
+    if (scaled := rescaled(found.model, experiment, bodies, prior)) is not found.model:
+        found = shape.settle(experiment, scaled, motion, prior, grid=False)
     structure, slopes = found.model, Linearised(found.model, found.x)
     if not slopes.free:
         return structure, None
@@ -250,7 +268,7 @@ def _tell_still(motion: Motion) -> None:
 
 
 def _tell_left_out(motion: Motion, spec) -> None:
-    shares = [f"{joint} {100 * count / motion.samples:.0f} %" for joint, count in zip(motion.joints, motion.left_out) if count]
+    shares = [f"{joint} {100 * count / motion.samples:.0f} %" for joint, count in zip(motion.joints, motion.left_out) if count and joint not in motion.unused]
     if spec.standstill == "auto" and shares:
         warnings.warn(SysidWarning(f"rows around each joint's reversals and standstill, where the filter smears friction's jump, are left out of its fit and its error: {', '.join(shares)}; preprocess.standstill: keep uses every row"), stacklevel=2)
 

@@ -54,15 +54,24 @@ def prepare(logs: Sequence[Log], spec: PreprocessSpec, joints: tuple[str, ...]) 
     elif spec.standstill != "keep":
         threshold = standstill_speed(pieces) if spec.standstill == "mask" else spec.standstill
         pieces = [without_standstill(piece, threshold, 0 if piece.smoother is None else piece.smoother.reach) for piece in pieces]
-    return replace(assembled(joints, pieces, stuck), events=tuple(event for log in logs for event in log.events), disturbed=disturbed)
+    events = tuple(event for log in logs for event in log.events)
+    return replace(assembled(joints, pieces, stuck, unused_of(logs)), events=events, disturbed=disturbed)
 
 
-def assembled(joints: tuple[str, ...], pieces: Sequence[Piece], stuck=False) -> Motion:
+def unused_of(logs: Sequence[Log]) -> tuple[str, ...]:
+    """The joints of which the torque is not used."""
+    return tuple(dict.fromkeys(joint for log in logs for joint in log.unused))
+
+
+def assembled(joints: tuple[str, ...], pieces: Sequence[Piece], stuck=False, unused: tuple[str, ...] = ()) -> Motion:
     """Pieces as one motion, which knows the speed that rounding makes of a constant angle and the joints that never move.
 
     Args:
-        stuck: (dof,) bool, joints that are known not to.
+        stuck: (dof,) bool, joints that are known not to. unused: joints no row of which counts.
     """
+    if unused:
+        counts = np.array([joint not in unused for joint in joints])
+        pieces = [replace(p, use=counts & (np.ones(p.q.shape, dtype=bool) if p.use is None else p.use)) for p in pieces]
     rest = _ROUNDING * np.max([np.abs(piece.qd).max(axis=0) for piece in pieces], axis=0)
     travel = np.ptp(np.concatenate([[p.q[p.core].min(0), p.q[p.core].max(0)] for p in pieces]), axis=0)
     noise = np.max([piece.noise for piece in pieces], axis=0)
@@ -71,7 +80,7 @@ def assembled(joints: tuple[str, ...], pieces: Sequence[Piece], stuck=False) -> 
     if any(piece.use is not None for piece in pieces):
         pieces = [replace(p, use=np.ones(p.q.shape, dtype=bool)) if p.use is None else p for p in pieces]
     left_out = sum(_left_out(piece) for piece in pieces)
-    return Motion(joints, tuple(replace(piece, rest=rest) for piece in pieces), still, standing(pieces), left_out)
+    return Motion(joints, tuple(replace(piece, rest=rest) for piece in pieces), still, standing(pieces), left_out, unused=unused)
 
 
 def _left_out(piece: Piece) -> np.ndarray:

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from . import datasets, units
+from . import datasets, motor_side, units
 from .errors import LogError, SysidWarning
 from .readers import open_table
 from .readers.table import Table
@@ -53,19 +53,20 @@ class Recording:
 
 
 def recorded(
-    log: LogSpec, data: DataSpec, joints: tuple[str, ...], folder: Path = Path()
+    log: LogSpec, data: DataSpec, joints: tuple[str, ...], folder: Path, drives: dict
 ) -> Recording:
     """What an entry of an experiment holds, in the units of its files but for time.
 
     Args:
-        joints: names, in order. folder: what relative paths are relative to.
+        joints: names, in order. folder: what relative paths are relative to. drives: {joint: what
+            drives it} where torque was not logged; `signals.command.joint` is then its command.
 
     Raises:
         LogError: a file or a column is not there, or what it holds is no log.
     """
     tables = {name: _table(name, log, folder) for name in log.names}
     where = " + ".join(str(table.path) for table in tables.values())
-    loaded = [_load(table, data, joints, log.episodes) for table in tables.values()]
+    loaded = [_load(table, data, joints, log.episodes, drives) for table in tables.values()]
     if len({unit for _, unit, _, _ in loaded}) > 1:
         raise LogError(
             "the clocks of these files have different units", where=where,
@@ -108,10 +109,14 @@ def _table(name: str, log: LogSpec, folder: Path) -> Table:
     return open_table((folder / name).resolve(), log.topic)
 
 
-def _load(table: Table, data: DataSpec, joints, episodes):
+def _load(table: Table, data: DataSpec, joints, episodes, drives):
     """Stamps (None where a rate is given), their unit, the signals (n, dof) by name, others as
     `signals.name`, and the rows at which an episode begins."""
     spec, wanted = data.columns, {}
+    needed = {
+        "q": motor_side.has_column(data.position, (), joints),
+        "tau": motor_side.has_column(data.torque, (*data.unused, *drives), joints),
+    }
     for name, key in (
         ("q", "position"),
         ("tau", "torque"),
@@ -119,9 +124,10 @@ def _load(table: Table, data: DataSpec, joints, episodes):
         ("qdd", "acceleration"),
     ):
         if (pattern := _meant(table, spec, key)) is not None:
-            wanted[name] = _names(table, pattern, joints, name)
-    for name, column in {**spec.signals, **data.signals}.items():
-        wanted[f"signals.{name}"] = [_single(table, column, f"signal {name!r}")]
+            own = needed.get(name, [True] * len(joints))
+            there = _names(table, pattern, joints, name, own) if any(own) else [None] * len(own)
+            wanted[name] = there
+    wanted |= _signals(table, data, joints, drives)
     time = None if data.rate else _time(table, _meant(table, spec, "time"))
     counted = _EPISODE if _EPISODE in table.names else None
     if episodes is not None and counted is None:
@@ -129,7 +135,7 @@ def _load(table: Table, data: DataSpec, joints, episodes):
             f"an episode is asked for, and there is no column {_EPISODE!r}", where=str(table.path),
             do="remove episode, or give start and stop",
         )  # fmt: skip
-    asked = [*filter(None, (time, counted)), *(c for names in wanted.values() for c in names)]
+    asked = [*filter(None, (time, counted)), *(c for names in wanted.values() for c in names if c)]
     columns = table.load(list(dict.fromkeys(asked)))
     lengths = {name: len(values) for name, values in columns.items()}
     if len(set(lengths.values())) > 1:
@@ -152,16 +158,46 @@ def _load(table: Table, data: DataSpec, joints, episodes):
     )
     signals = {}
     for name, names in wanted.items():
-        if len(names) == 1:
+        if len(names) == 1 and names[0]:
             values = np.array(columns[names[0]][rows], dtype=float)
-            signals[name] = (
-                values if values.ndim == 2 or name.startswith("signals.") else values[:, None]
-            )
+            alone = values.ndim == 2 or name not in ("q", "tau", "qd", "qdd")
+            signals[name] = values if alone else values[:, None]
         else:
-            signals[name] = np.empty((len(columns[names[0]][rows]), len(names)))
+            samples = len(np.arange(min(lengths.values()))[rows])
+            signals[name] = np.zeros((samples, len(names)))
             for k, c in enumerate(names):
-                signals[name][:, k] = columns[c][rows]
+                if c:
+                    signals[name][:, k] = columns[c][rows]
+    _sum(signals, data, joints)
     return (columns[time][rows] if time else None), unit, signals, breaks
+
+
+def _signals(table: Table, data: DataSpec, joints, drives) -> dict[str, list[str]]:
+    """The columns of other signals, as `signals.name`; of what only sums need, as `sums.name`."""
+    named = {**data.columns.signals, **data.signals}
+    wanted = {f"signals.{n}": [_single(table, c, f"signal {n!r}")] for n, c in named.items()}
+    free = [n for entry in data.torque.values() for n in entry if n not in motor_side.told(entry)]
+    for sums in (data.position, data.torque):
+        for name in motor_side.signals_of(sums, joints):
+            if name not in named:  # effects see it only where a factor of it is free
+                kind = "signals" if name in free else "sums"
+                wanted[f"{kind}.{name}"] = [_single(table, name, f"signal {name!r}")]
+    for joint, drive in drives.items():
+        column = named.get(drive.column, drive.column)
+        name = f"signals.{motor_side.command_name(joint)}"
+        wanted[name] = [_single(table, column, f"actuator.{joint}")]
+    return wanted
+
+
+def _sum(signals: dict, data: DataSpec, joints) -> None:
+    """Put sums in the place of what they stand for, and nothing in that of torque not used."""
+    torques = {joint: motor_side.told(entry) for joint, entry in data.torque.items()}
+    alone = lambda name: signals.get(f"signals.{name}", signals.get(f"sums.{name}"))  # noqa: E731
+    for key, sums, where in (("q", data.position, "position"), ("tau", torques, "torque")):
+        signals[key] = motor_side.summed(sums, joints, signals[key], alone, f"data.{where}")
+    signals["tau"][:, [joints.index(joint) for joint in data.unused]] = 0.0
+    for name in [name for name in signals if name.startswith("sums.")]:
+        del signals[name]
 
 
 def _meant(table: Table, spec: ColumnsSpec, key: str):
@@ -200,7 +236,8 @@ def _chosen(index, episodes, where: str):
     return rows, np.flatnonzero(np.diff(index[rows])) + 1
 
 
-def _names(table: Table, pattern, joints, signal: str) -> list[str]:
+def _names(table: Table, pattern, joints, signal: str, needed: list[bool]) -> list[str | None]:
+    """The column of each joint, None where it is not needed; or the one matrix of all."""
     if isinstance(pattern, str) and "{joint}" not in pattern:
         name = table.resolve(pattern)
         if table.width(name) != len(joints):
@@ -213,8 +250,8 @@ def _names(table: Table, pattern, joints, signal: str) -> list[str]:
         return [name]
     if isinstance(pattern, str):
         pattern = [pattern.replace("{joint}", joint) for joint in joints]
-        for joint, name in zip(joints, pattern):
-            if name not in table.names:
+        for joint, name, looked_at in zip(joints, pattern, needed):
+            if looked_at and name not in table.names:
                 raise LogError(
                     f"joint {joint!r} has no column: {name!r} is not there",
                     where=str(table.path),
@@ -228,7 +265,7 @@ def _names(table: Table, pattern, joints, signal: str) -> list[str]:
             allowed=f"one for each of {', '.join(joints)}",
             do="correct data.columns",
         )
-    return [_single(table, column, signal) for column in pattern]
+    return [_single(table, c, signal) if own else None for c, own in zip(pattern, needed)]
 
 
 def _single(table: Table, column, signal: str) -> str:

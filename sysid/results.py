@@ -51,7 +51,7 @@ def document(fit: Fit, run: str | Path = "") -> dict:
         for value, at, std in zip(fit.model.shape_values, fit.model.shapes, fit.shape_std.tolist())
     ]
     return {
-        "rms": {part: by_joint(part, "rms") for part in errors},
+        "rms": {part: dict(zip(fit.joints, fit.predictions[part].told())) for part in errors},
         "relative_error": {part: {**by_joint(part, "relative_error"), "*": number(errors[part]["total"][1])} for part in errors},
         "r2": {part: by_joint(part, "r2") for part in errors},
         "objective": fit.objective,
@@ -68,6 +68,8 @@ def document(fit: Fit, run: str | Path = "") -> dict:
         "parameters": parameters,
         # what the effects that look at the load took for the bodies; the last step towards `parameters` is not taken again
         "load_bodies": _by_body(fit.model),
+        "drives": [{"joint": d.joint, "name": d.name, "value": d.value, "std": number(d.std), "unit": d.unit} for d in fit.drives],
+        "rollout": fit.rollout,
         "weights": None if fit.weights is None else dict(zip(fit.joints, fit.weights.tolist())),
         "filter": fit.filters,
         "robot": {"joints": list(fit.joints), "locked": fit.model.robot.locked},
@@ -194,6 +196,7 @@ def _relocated(experiment: Experiment, run: Path) -> dict:
                 log["files"] = [moved(name) for name in log["files"]]
     if tree["prior"]["source"] != "urdf":
         tree["prior"]["source"] = moved(tree["prior"]["source"])
+    tree["actuator"] = {joint: spec.model_dump(exclude_unset=True, exclude_none=True) for joint, spec in experiment.actuator.items()}
     if experiment.robot.joints is None:
         tree["robot"].pop("joints", None)
     for key in ("effects", "candidates"):

@@ -101,6 +101,8 @@ def correction(fit: Fit, data: Compressed) -> np.ndarray:
     if fit.experiment.prior.weight:
         divergence = DIVERGENCES[fit.experiment.prior.divergence](fit.prior)
         add_blocks(prior, fit.experiment.prior.weight * np.asarray(divergence.hessian(fit.pi)))
+    if fit.known is not None:
+        add_blocks(prior, fit.known)
     columns, slopes = triangle_[:, :size], triangle_[:, size:-1]
     cross = columns.T @ slopes
     system = slopes.T @ slopes - cross.T @ inverted(columns.T @ columns + 0.5 * prior) @ cross
@@ -170,10 +172,7 @@ def _without(columns, tau, hessian, weights) -> np.ndarray:
 def prior_hessian(found: Settled) -> np.ndarray:
     """The prior's Hessian (size, size) where a model settled, zero for coefficients."""
     out = np.zeros((found.model.size, found.model.size))
-    if found.problem.objective.weight:
-        for b, block in enumerate(found.problem.objective.prior_hessian(found.x)):
-            out[10 * b : 10 * b + 10, 10 * b : 10 * b + 10] = block
-    return out
+    return add_blocks(out, found.problem.objective.beside_data(found.x)) if found.problem.objective.says else out
 
 
 class Projection:

@@ -40,11 +40,17 @@ def show_fit(fit: Fit, document: dict) -> None:
         table.add_column(heading, justify="left" if heading == "joint" else "right", overflow="fold")
     for joint, prismatic in zip(fit.joints, robot.prismatic):
         table.add_row(
-            escape(joint), "N" if prismatic else "N m", f"{document['rms']['train'][joint]:.4g}", f"{document['rms']['test'][joint]:.4g}",
+            escape(joint), "N" if prismatic else "N m", _level(document["rms"]["train"][joint]), _level(document["rms"]["test"][joint]),
             _percent(document["relative_error"]["test"][joint]), _four(document["r2"]["test"][joint]),
         )  # fmt: skip
     console.print(table)
     certificate = document["certificate"]
+    for own in document["drives"]:
+        deviation = "" if own["std"] is None else f" +- {own['std']:.2g}"
+        print(f"drive of {own['joint']}: {own['name']} = {own['value']:.6g}{deviation} {own['unit']}")
+    if document["rollout"]:
+        missed = ", ".join(f"{joint} {value:.3g}" for joint, value in document["rollout"].items())
+        print(f"rollout of the closed loop over the test logs, RMS of the angles it misses [rad or m]: {missed}")
     print(f"relative error, all joints: train {_percent(document['relative_error']['train']['*'])}, test {_percent(document['relative_error']['test']['*'])}")
     print(f"objective {document['objective']:.8g} after {document['iterations']} iterations, {'converged' if document['converged'] else 'NOT CONVERGED'}")
     known = certificate["gap"] is not None and certificate["gap"] < 1.0
@@ -102,7 +108,7 @@ def show_comparison(document: dict) -> None:
         table.add_column(escape(joint), justify="right", overflow="fold")
     table.add_column("relative", justify="right", overflow="fold")
     for entry in document["experiments"]:
-        cells = [f"{entry['rms_test'][joint]:.4g}" if joint in entry["rms_test"] else "" for joint in joints]
+        cells = [_level(entry["rms_test"][joint]) if joint in entry["rms_test"] else "" for joint in joints]
         table.add_row(escape(entry["name"]), *cells, _percent(entry["relative_error"]["*"]))
     console.print(table)
     for entry in document["differences"]:
@@ -113,6 +119,10 @@ def show_comparison(document: dict) -> None:
 
 def _percent(share: float | None) -> str:
     return "-" if share is None else f"{100 * share:.2f} %"
+
+
+def _level(value: float | None) -> str:
+    return "-" if value is None else f"{value:.4g}"
 
 
 def _four(value: float | None) -> str:
@@ -177,7 +187,7 @@ def show_added(document: dict) -> None:
     for entry in document["differences"]:
         se = "-" if entry["se"] is None else f"{entry['se']:.2g}"
         joint = entry["joint"]
-        table.add_row(escape(joint), f"{document['rms_test_before'][joint]:.4g}", f"{document['rms_test_after'][joint]:.4g}", f"{entry['delta_rms']:+.4g}", se)
+        table.add_row(escape(joint), _level(document["rms_test_before"][joint]), _level(document["rms_test_after"][joint]), f"{entry['delta_rms']:+.4g}", se)
     console.print(table)
     for parameter in document["parameters"]:
         std = "" if parameter["std"] is None else f" +- {parameter['std']:.2g}"
@@ -192,7 +202,7 @@ def show_added(document: dict) -> None:
 def show_step(step: dict) -> None:
     """One step of a discovery, as it is made."""
     what = "start" if step["added"] is None else f"+ {step['added']} on {step['joint']}"
-    rms = ", ".join(f"{joint} {value:.4g}" for joint, value in step["rms_test"].items())
+    rms = ", ".join(f"{joint} {_level(value)}" for joint, value in step["rms_test"].items())
     Console().print(f"{escape(what)}: held-out RMS {escape(rms)}", soft_wrap=True, highlight=False)
 
 
@@ -214,7 +224,7 @@ def show_history(steps: list[dict]) -> None:
     first = steps[0]["rms_test"]
     for number, step in enumerate(steps):
         what = "start" if step["added"] is None else f"+ {step['added']} on {step['joint']}"
-        cells = [f"{step['rms_test'][j]:.4g} {'#' * max(1, round(10 * step['rms_test'][j] / first[j])) if first.get(j) else ''}" if j in step["rms_test"] else "" for j in joints]
+        cells = [f"{_level(step['rms_test'][j])} {'#' * max(1, round(10 * (step['rms_test'][j] or 0.0) / first[j])) if first.get(j) else ''}" if j in step["rms_test"] else "" for j in joints]
         table.add_row(f"{number} {escape(what)}", *cells)
     Console().print(table)
 

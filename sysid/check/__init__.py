@@ -26,6 +26,10 @@ FAULTS = (
     "clock_jitter", "clock_gap", "delayed_signal", "saturation", "coarse_values", "standstill",
     "slow_logger", "test_is_train", "not_excited", "limit_exceeded", "mass_implausible",
 )  # fmt: skip
+# of a joint whose torque is not used, only its motion can be at fault
+_OF_ANGLES = (
+    "angle_wrap", "wrong_unit", "coarse_values", "standstill", "not_excited", "limit_exceeded",
+)  # fmt: skip
 
 
 def check(experiment: Experiment) -> list[Fault]:
@@ -49,6 +53,8 @@ def _found(look) -> Iterator[Fault]:
     for module in sorted(modules, key=lambda module: module.AFTER):
         if grave.isdisjoint(module.SENSELESS):
             for fault in module.find(look):
+                if fault.joint in look.experiment.data.unused and fault.fault not in _OF_ANGLES:
+                    continue
                 grave |= {fault.fault} if fault.severity == ERROR else set()
                 yield fault
 

@@ -99,13 +99,16 @@ class Look:
 
 def looked(experiment: Experiment) -> Look:
     """Read everything that an experiment names. Raises SysidError, as a fit would."""
+    experiment = pipeline.started(experiment)
     machine = robot.load(experiment.robot, experiment.folder)
-    args = experiment.data, machine.joints, machine.prismatic, experiment.folder
-    out = []
+    args = (
+        experiment.data, machine.joints, machine.prismatic, experiment.folder, experiment.actuator,
+    )  # fmt: skip
+    out, unused = [], tuple(experiment.data.unused)
     for part in ("train", "test"):
         specs = getattr(experiment.data, part)
         told = [logs.measured(spec, *args) for spec in specs]
-        found = pipeline.with_events(machine, [logs.assembled(one) for one in told])
+        found = pipeline.with_events(machine, [logs.assembled(one, unused) for one in told])
         for spec, one, log in zip(specs, told, found):
             out += [_logged(part, spec, one.rows(*rows), log) for rows in one.parts]
     return Look(experiment, machine, tuple(out))

@@ -74,10 +74,10 @@ def diagnose(
         fit: where it is at hand. level: family-wise, how often anything is accused where nothing is
             there.
 
-    Raises:
-        SysidError: bad input, or logs too short to question.
+    Raises SysidError: bad input, or logs too short to question.
     """
     tell = progress or (lambda stage, share: None)
+    experiment = fit.experiment if fit else pipeline.started(experiment)
     measured, extra = pipeline.read_all(experiment), own_effects(experiment)
     fit = fit or pipeline.fit(experiment, progress=progress, measured=measured)
     with pipeline.noticed():

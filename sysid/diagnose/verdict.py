@@ -111,7 +111,7 @@ def _above(remains: Unknown | None, error: float, floor: float) -> bool:
 def _why(fit: Fit, j: int, floor, error: float, last: Fit, refused, weighed: float | None) -> str:
     joint, train = fit.joints[j], last.rms("train")[fit.joints[j]]
     if not error > 0.0:
-        said = "none of its rows on the test logs counts: it stands still there, or is disturbed"
+        said = "none of its rows on the test logs counts: unused, at a standstill, or disturbed"
     elif floor.rms is None:
         said = (
             f"its noise floor is not known ({floor.detail}), so nobody can say what error is left "

@@ -16,6 +16,7 @@ from ..preprocess import (
     share_left_out,
     standstill_speed,
     turns,
+    unused_of,
     without_events,
     without_standstill,
 )
@@ -62,7 +63,8 @@ def lowpassed(logs: Sequence[Log], joints: tuple[str, ...], cutoff: float) -> Mo
     # where the speed changes its sign between two samples, the angles' noise says in which:
     # friction's jump is as uncertain
     still = [np.where(turns(piece.qd), np.inf, threshold) for piece in pieces]
-    motion = assembled(joints, [without_standstill(*each) for each in zip(pieces, still, sights)])
+    moving = [without_standstill(*each) for each in zip(pieces, still, sights)]
+    motion = assembled(joints, moving, unused=unused_of(logs))
     events = tuple(event for log in logs for event in log.events)
     return replace(motion, events=events, disturbed=disturbed, band=band(logs))
 

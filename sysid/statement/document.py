@@ -16,7 +16,7 @@ from ..results import number, versions
 def document(found: Diagnosis, run="") -> dict:
     """The document of `sysid diagnose`. NaN is None."""
     fit, joints = found.fit, found.fit.joints
-    rms = {part: fit.rms(part) for part in ("train", "test")}
+    rms = {part: dict(zip(joints, fit.predictions[part].told())) for part in ("train", "test")}
     return {
         "joints": {
             v.joint: {

@@ -28,13 +28,14 @@ def errors(of: Told, width: int) -> list[str]:
     rows, how = [], {}
     for joint, entry in of.document["joints"].items():
         floor, se = entry["noise_floor"], entry["noise_floor_se"]
-        added = [f"{of.after[joint]:.4g}"] if named else []
+        added = [level(of.after[joint] if entry["rms"]["test"] is not None else None)]
+        added = added if named else []
         rows.append(
             [
                 joint,
                 of.units[joint],
-                f"{entry['rms']['train']:.4g}",
-                f"{entry['rms']['test']:.4g}",
+                level(entry["rms"]["train"]),
+                level(entry["rms"]["test"]),
                 *added,
                 "not known" if floor is None else f"{floor:.4g}",
                 "" if se is None else f"{se:.2g}",
@@ -158,6 +159,11 @@ def _parts(rows: dict, joints: Sequence[str], width: int) -> list[list[int]]:
 def size(value: float) -> str:
     """Two digits, without an exponent where that is short."""
     return f"{value:.2g}" if not 10 <= abs(value) < 1e5 else f"{float(f'{value:.2g}'):.0f}"
+
+
+def level(value: float | None) -> str:
+    """An error to four digits, a dash where there is none."""
+    return "-" if value is None else f"{value:.4g}"
 
 
 def columns(heads: Sequence[str], rows: Sequence[Sequence[str]], left: int) -> list[str]:

@@ -50,6 +50,7 @@ def verdict(of: Told, width: int) -> list[tuple[str, list[str]]]:
 
 def _joint(v: dict, of: Told, width: int, said: dict[str, str]) -> list[str]:
     joint, status = v["joint"], v["status"]
+    seen = of.document["joints"][joint]["rms"]["test"] is not None  # a row of it counts
     known = {f["command"]: f for f in of.document["findings"]}
     heads = [known[command] for command in v.get("commands", []) if command in known]
     words = [placed(f["effect"], f["joint"], joint) for f in heads]
@@ -66,7 +67,9 @@ def _joint(v: dict, of: Told, width: int, said: dict[str, str]) -> list[str]:
             + listed([placed(c["effect"], c["joint"]) for c in v["by"]], "and")
             + f"; {_fall(v, of)}"
         ),
-        "unresolved": lambda: v["says"] + (f"; {_fall(v, of)}" if of.sets else ""),
+        "unresolved": lambda: (
+            v["says"] + (f"; {_fall(v, of)}" if of.sets and seen else "")
+        ),
         "missing": lambda: f"{named or v['effect']}; {_fall(v, of)}",
         "unknown": lambda: (
             "no effect of the catalogue explains what is left"

@@ -30,7 +30,7 @@ def _of_log(look: Look, log: Logged, j: int, joint: str) -> Iterator[Fault]:
                 "effort_missing",
                 ERROR,
                 (f"the torque of {joint} is {tau[0]:.4g} throughout {name}, and the joint moves"),
-                "log its torque or current, or leave the joint out with robot.lock",
+                "log its torque or current, or name the joint in data.unused",
                 joint,
                 name,
                 (float(log.t[0]),),
