@@ -10,6 +10,7 @@
     sysid.compare(fit, another_fit)
     sysid.write(fit, "runs/mine")
     sysid.read_run("runs/mine").torque(q, qd, qdd)
+    sysid.export("runs/mine", "mjcf", "simulation")
 
 Names are imported when they are first used, so that `import sysid` costs nothing.
 """
@@ -18,7 +19,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from . import check, diagnose
+    from . import check, diagnose, export
     from .comparison import Difference, compare
     from .errors import SysidError, SysidWarning
     from .estimate import Fit, Prediction
@@ -33,7 +34,7 @@ _WHERE = {
     "write": ("results", "write"), "compare": ("comparison", "compare"), "Difference": ("comparison", "Difference"),
     "Experiment": ("config", "Experiment"), "Fit": ("estimate", "Fit"), "Prediction": ("estimate", "Prediction"),
     "read_run": ("run", "read_run"), "Run": ("run", "Run"),
-    "check": ("check", None), "diagnose": ("diagnose", None), "SysidError": ("errors", "SysidError"), "SysidWarning": ("errors", "SysidWarning"),
+    "check": ("check", None), "diagnose": ("diagnose", None), "export": ("export", None), "SysidError": ("errors", "SysidError"), "SysidWarning": ("errors", "SysidWarning"),
 }  # fmt: skip
 
 
@@ -50,6 +51,6 @@ def __dir__():
 
 
 __all__ = [
-    "Difference", "Experiment", "Fit", "Prediction", "Run", "SysidError", "SysidWarning", "check", "compare", "diagnose", "fit",
+    "Difference", "Experiment", "Fit", "Prediction", "Run", "SysidError", "SysidWarning", "check", "compare", "diagnose", "export", "fit",
     "load", "predict", "read_run", "write",
 ]

@@ -333,6 +333,28 @@ def history(experiment: ExperimentPath, as_json: Json = False, out: Out = None, 
 
 
 @app.command()
+def export(
+    run: Annotated[Path, typer.Argument(metavar="RUN", help="A run folder of `sysid fit`.")],
+    to: Annotated[str, typer.Option("--to", help="mjcf, sdf, drake or isaaclab.")],
+    out: Annotated[Optional[Path], typer.Option("--out", help="The folder to write into (default RUN/<format>).")] = None,  # noqa: UP045
+    as_json: Json = False, quiet: Quiet = False,
+) -> None:  # fmt: skip
+    """Write the fitted model for a simulator, load it there again where that is installed, and tell what the format cannot say."""
+    from . import export as exporting
+
+    found = exporting.export(run, to, out or run / to)
+    said = exporting.document(found)
+    if as_json:
+        print(json.dumps(said, allow_nan=False))
+    elif not quiet:
+        from .terminal import show_export
+
+        show_export(found)
+    if found.check.agrees is False:
+        raise typer.Exit(1)
+
+
+@app.command()
 def effects(name: Annotated[Optional[str], typer.Argument(help="One effect; without it, all.")] = None, as_json: Json = False, out: Out = None, quiet: Quiet = False) -> None:  # noqa: UP045
     """The catalogue of physical effects: equation, parameters, units, what it looks like, what it is confused with."""
     from .effect import describe, find, vocabulary

@@ -101,6 +101,10 @@ class Effect(ABC):
     elementwise: each row of its columns follows from the joint's own q, qd, qdd and load in that row, and shape values may
         be arrays along the rows: joints can then be treated as samples of one joint.
     given_coefficients: {name: value} of those that the user says.
+    simulators: {term: coefficient or shape value} of what it is to a simulator's joint: `damping` times qd, `drag` times
+        |qd| qd, `friction` times sign(qd), `breakaway` on top of it from rest, `armature` times qdd, `stiffness` times q,
+        `torque` that is constant beside a stiffness, `zero` that is added to q; and of an effect of the whole robot `gravity`
+        or `inertia`, a body on a link.
     """
 
     name: ClassVar[str]
@@ -115,13 +119,13 @@ class Effect(ABC):
     memory: ClassVar[bool] = False
     uses_load: ClassVar[bool] = False
     elementwise: ClassVar[bool] = False
+    simulators: ClassVar[dict[str, str]] = {}
+    given_coefficients: Mapping[str, float] = MappingProxyType({})
 
     @property
     def instantaneous(self) -> bool:
         """Whether what it does follows from q, qd and qdd of the same instant, whatever the clock and other signals say."""
         return not (self.memory or self.reach)
-
-    given_coefficients: Mapping[str, float] = MappingProxyType({})
 
     def coefficients(self) -> tuple[Linear, ...]:
         """The linear coefficients, in the order of the columns."""

@@ -135,7 +135,7 @@ class InverseDynamics:
         load = None if self._load is None else self._load.many(q, qd, qdd)
         part, gravity = None, None
         if self._moving or self._single:
-            part = _piece(q, qd, qdd, load)
+            part = at_no_time(q, qd, qdd, load)
             for own in self._moving:
                 part = own.effect.moved(part, own.joint, **own.shapes)
             q, qd, qdd, gravity = part.q, part.qd, part.qdd, part.gravity
@@ -192,7 +192,7 @@ class _Instants:
         return np.sign(self.qd[:, joint])
 
 
-def _piece(q, qd, qdd, load) -> Piece:
+def at_no_time(q, qd, qdd, load=None) -> Piece:
     """Samples (n, dof) as effects see them: at no time, with no signal beside them."""
     n, dof = q.shape
     zero, still = np.zeros(n), np.zeros(dof)

@@ -149,7 +149,7 @@ def write(fit: Fit, out: str | Path) -> dict:
     found = document(fit, path)
     resolved = fit.experiment.model_copy(update={"preprocess": settled(fit.experiment.preprocess, fit.filters)})
     texts = {
-        "experiment.yaml": _yaml(_relocated(resolved, path)).encode(), "identified.urdf": identified_urdf(fit),
+        "experiment.yaml": _yaml(_relocated(resolved, path)).encode(), "identified.urdf": identified_urdf(fit, path),
         "identified.yaml": _yaml(_identified(fit, _relocated(resolved, path))).encode(),
     }  # fmt: skip
     table = _predictions(fit)

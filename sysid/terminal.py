@@ -9,6 +9,7 @@ from rich.table import Table
 from rich.text import Text
 
 from .estimate import Fit, given_shapes
+from .export import exported
 from .statement import tables, text
 
 _LOW = 0.1  # below this share the prior, not the data, gave a parameter
@@ -227,6 +228,13 @@ def show_history(steps: list[dict]) -> None:
         cells = [f"{_level(step['rms_test'][j])} {'#' * max(1, round(10 * (step['rms_test'][j] or 0.0) / first[j])) if first.get(j) else ''}" if j in step["rms_test"] else "" for j in joints]
         table.add_row(f"{number} {escape(what)}", *cells)
     Console().print(table)
+
+
+def show_export(found) -> None:
+    """What was written, whether the simulator agrees, what the format cannot say."""
+    width = shutil.get_terminal_size().columns
+    for line in exported(found):
+        print("\n".join(text.wrapped(line, width, "    ")))
 
 
 def show_effects(found: list[dict]) -> None:

@@ -56,6 +56,12 @@ class Urdf:
     links: dict[str, Link]
     joints: dict[str, Joint]
 
+    @property
+    def root(self) -> str:
+        """The link that no joint moves."""
+        children = {joint.child for joint in self.joints.values()}
+        return next(name for name in self.links if name not in children)
+
 
 def locate(reference: str, folder: Path) -> Path:
     """The file that `robot.urdf` names: a path relative to `folder`, package://, example-robot-data://, or a dataset's file.

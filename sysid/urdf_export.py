@@ -1,53 +1,117 @@
 """The identified robot as a URDF: inertias about each link's centre of mass, friction in `<dynamics>`.
 
-What a URDF cannot say stays out and is told beside it: rotors, and every effect but viscous and Coulomb friction.
-Links that do not move against each other are one body to identification; the whole body stands in the link that
+What a URDF cannot say stays out and is told in a comment at its head: rotors, and every effect but viscous and Coulomb
+friction. Links that do not move against each other are one body to identification; the whole body stands in the link that
 its joint moves, and the others lose their inertia. Locked joints become fixed at their angle.
 """
 
 import io
+import os
 import warnings
+from pathlib import Path
 
 import numpy as np
 
 from .estimate import Fit
 from .inertia import pseudo
 
+SAYS = frozenset({"damping", "friction"})  # of `Effect.simulators`
 
-def identified_urdf(fit: Fit) -> bytes:
-    """URDF text of the fit, written by yourdfpy."""
+
+def identified_urdf(fit: Fit, folder: Path | None = None) -> bytes:
+    """URDF text of the fit.
+
+    Args:
+        folder: where it will stand; meshes that the source names relative to itself are named from there.
+    """
+    robot = fit.model.robot
+    known = {c.name: float(value) for c, value in zip(fit.model.coefficients, fit.coefficients)}
+    dynamics = {name: (known.get(f"viscous.{name}.Fv", 0.0), known.get(f"coulomb.{name}.Fc", 0.0)) for name in robot.joints}
+    return text(tree(robot, fit.pi[: robot.dof], dynamics, folder=folder), _unsaid(fit))
+
+
+def tree(robot, links, dynamics: dict[str, tuple[float, float]], *, zero=None, folder: Path | None = None):
+    """The robot's URDF with other bodies and friction, as yourdfpy writes it (an lxml tree).
+
+    Args:
+        links: (dof, 10) about the joints' frames. dynamics: damping and friction by joint.
+        zero: (dof,) that the joints stand ahead of their encoders, put into their origins.
+        folder: as for `identified_urdf`.
+    """
     import yourdfpy
     from yourdfpy.urdf import Dynamics, Inertial
 
-    robot = fit.model.robot
+    def named(file: str) -> str:
+        if folder is None or "://" in file or os.path.isabs(file):
+            return file
+        return Path(os.path.relpath((robot.source.path.parent / file).resolve(), Path(folder).resolve())).as_posix()
+
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         document = yourdfpy.URDF.load(
-            io.BytesIO(robot.source.text.encode()), build_scene_graph=False, load_meshes=False, filename_handler=lambda name: name
+            io.BytesIO(robot.source.text.encode()), build_scene_graph=False, load_meshes=False, filename_handler=named
         )
-    links = {link.name: link for link in document.robot.links}
+    links_there = {link.name: link for link in document.robot.links}
     joints = {joint.name: joint for joint in document.robot.joints}
     for name, angle in robot.locked.items():
-        _fix(joints[name], angle)
+        joint = joints[name]
+        joint.origin = _moved(joint, angle)
+        joint.type, joint.limit, joint.dynamics, joint.mimic, joint.axis = "fixed", None, None, None, None
     carried = _carriers(robot)
-    for name in links:
+    for name, link in links_there.items():
         if carried.get(name) is not None:
-            links[name].inertial = None
-    for body, pi in zip(robot.bodies, fit.pi):
-        if body.kind != "link":
-            continue
+            link.inertial = None
+    for body, pi in zip(robot.bodies, links):
         mass, com, central = pseudo.to_central(pi)
         origin = np.eye(4)
         origin[:3, 3] = com
-        links[body.name].inertial = Inertial(origin=origin, mass=float(mass), inertia=central)
-    friction = {c.name: float(value) for c, value in zip(fit.model.coefficients, fit.coefficients)}
-    for name in robot.joints:
-        joints[name].dynamics = Dynamics(
-            damping=friction.get(f"viscous.{name}.Fv", 0.0), friction=friction.get(f"coulomb.{name}.Fc", 0.0)
-        )
+        links_there[body.name].inertial = Inertial(origin=origin, mass=float(mass), inertia=central)
+    for name, ahead in zip(robot.joints, np.zeros(robot.dof) if zero is None else zero):
+        joints[name].dynamics = Dynamics(*dynamics[name])
+        if ahead:
+            joints[name].origin = _moved(joints[name], float(ahead))
+    return document.write_xml()
+
+
+def text(written, said: str) -> bytes:
+    """An XML tree as a file, a comment before it."""
+    from lxml import etree
+
+    written.getroot().addprevious(etree.Comment(harmless(said)))
     out = io.BytesIO()
-    document.write_xml().write(out, pretty_print=True, encoding="utf-8", xml_declaration=True)
+    written.write(out, pretty_print=True, encoding="utf-8", xml_declaration=True)
     return out.getvalue()
+
+
+def harmless(said: str) -> str:
+    """Text that may stand in an XML comment."""
+    kept = "".join(c if c.isprintable() or c == "\n" else "?" for c in said)
+    while "--" in kept:
+        kept = kept.replace("--", "- -")
+    return f" {kept} "
+
+
+def _unsaid(fit: Fit) -> str:
+    """What a URDF cannot say of a fit, in lines."""
+    model, robot = fit.model, fit.model.robot
+    values = {c.name: (float(at), c.unit) for c, at in zip(model.coefficients, fit.coefficients)}
+    values |= {v.name: (float(at), v.unit) for v, at in zip(model.shape_values, model.shapes)}
+    left = []
+    for effect, joints in model.terms:
+        if effect.simulators and set(effect.simulators) <= SAYS:
+            continue
+        for joint in joints:
+            name = f"{effect.name}.{'*' if joint < 0 else robot.joints[joint]}"
+            own = ", ".join(f"{key.rpartition('.')[2]} = {at:.6g} {unit}" for key, (at, unit) in values.items() if key.startswith(f"{name}."))
+            left.append(f"  {name}: {own}")
+    for body, pi in zip(robot.bodies[robot.dof :], fit.pi[robot.dof :]):
+        axis = robot.subspaces[body.row, 3:]
+        about = float(axis @ pseudo.rotational_inertia(pi) @ axis)
+        felt = [f"{about * ratio**2:.6g} kg m^2 about {joint}" for joint, ratio in zip(robot.joints, robot.transmission[body.row]) if ratio]
+        left.append(f"  {body.name}: {pi[0]:.6g} kg, reflected {', '.join(felt)}")
+    if not left:
+        return f"{robot.name}, as sysid identified it."
+    return "\n".join([f"{robot.name}, as sysid identified it. A URDF cannot say:", *left, "`sysid export` says more of it to a simulator.\n"])
 
 
 def _carriers(robot) -> dict[str, str | None]:
@@ -65,8 +129,8 @@ def _carriers(robot) -> dict[str, str | None]:
     return {link: mover(link) for link in robot.source.links}
 
 
-def _fix(joint, angle: float) -> None:
-    """Turn a locked joint into a fixed one at its position [rad or m]."""
+def _moved(joint, angle: float) -> np.ndarray:
+    """The origin (4, 4) of a joint that stands at an angle [rad or m] where it now stands at zero."""
     axis = np.array([1.0, 0.0, 0.0] if joint.axis is None else joint.axis, dtype=float)
     axis = axis / np.linalg.norm(axis)
     motion = np.eye(4)
@@ -75,5 +139,4 @@ def _fix(joint, angle: float) -> None:
     else:
         skew = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
         motion[:3, :3] += np.sin(angle) * skew + (1.0 - np.cos(angle)) * skew @ skew
-    joint.origin = motion if joint.origin is None else joint.origin @ motion
-    joint.type, joint.limit, joint.dynamics, joint.mimic, joint.axis = "fixed", None, None, None, None
+    return motion if joint.origin is None else joint.origin @ motion

@@ -12,7 +12,7 @@ import polars as pl
 import pytest
 
 import sysid
-from sysid import config, regressor, results, robot
+from sysid import config, effect, regressor, results, robot
 from sysid.inertia import PARAMETERS, pseudo
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -94,6 +94,32 @@ def test_identified_urdf_gives_the_fit_s_torque(leg, run):
     total = links + regressor.torque(leg.model.robot, rotors_only, motion.q, motion.qd, motion.qdd)
     total += model.damping * motion.qd + model.lowerDryFrictionLimit * 0 + machine.friction * np.sign(motion.qd)
     np.testing.assert_allclose(total, prediction.predicted, atol=1e-9)
+
+
+def test_identified_urdf_says_what_it_cannot_say_and_keeps_mesh_names(leg, tmp_path):
+    """In a comment; package:// stays, a mesh beside the source is named from where the file will stand."""
+    from dataclasses import replace
+
+    from sysid.urdf_export import identified_urdf, text
+
+    said = identified_urdf(leg).decode()
+    comment = said[said.index("<!--") : said.index("-->")]
+    assert "hip_rotor: 0.5" in comment and "kg m^2 about hip" in comment and "coulomb" not in comment
+    source = leg.model.robot.source
+    meshes = "".join(f'<visual><geometry><mesh filename="{name}"/></geometry></visual>' for name in ("package://leg/meshes/a.stl", "meshes/b.stl"))
+    shaped = replace(source, text=source.text.replace('<link name="abad">', f'<link name="abad">{meshes}', 1))
+    machine = replace(leg.model.robot, source=shaped)
+    model = replace(leg.model, robot=machine, terms=(*leg.model.terms, (effect.find("armature"), (1,)), (effect.find("stribeck"), (0,))), shapes=(0.2,))
+    found = replace(leg, model=model, x=np.append(leg.x, [0.05, 1.5]))
+    said = identified_urdf(found, tmp_path).decode()
+    assert "armature.hip: Ia = 0.05 kg m^2" in said and "stribeck.abad: dF = 1.5 N m, vs = 0.2 rad/s" in said
+    assert 'filename="package://leg/meshes/a.stl"' in said
+    (near,) = [word for word in said.split('"') if word.endswith("b.stl")]
+    assert (tmp_path / near).resolve() == (source.path.parent / "meshes" / "b.stl").resolve()
+    from lxml import etree
+
+    odd = etree.ElementTree(etree.Element("robot"))
+    assert etree.fromstring(text(odd, "a--b---")).tag == "robot"
 
 
 def _test_motion(fit):

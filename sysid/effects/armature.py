@@ -17,6 +17,7 @@ class Armature(TorqueEffect):
     separate_by = "a chirp in two poses of the joints behind it"
     source = "Featherstone 2008, section 9.6"
     elementwise = True
+    simulators = {"armature": "Ia"}
 
     Ia = Linear("kg m^2", lower=0, says="rotor inertia times the squared gear ratio")
 

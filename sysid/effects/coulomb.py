@@ -13,6 +13,7 @@ class Coulomb(TorqueEffect):
     separate_by = "slow sweeps both ways"
     source = "Rucker & Wensing 2022, eq. 14"
     elementwise = True
+    simulators = {"friction": "Fc"}
 
     Fc = Linear("N m", lower=0, says="friction torque while sliding")
 

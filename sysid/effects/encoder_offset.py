@@ -16,6 +16,7 @@ class EncoderOffset(MotionEffect):
     tied_with = ("centre of mass of the links behind it", "gravity_tilt")
     separate_by = "static poses over the full range of several joints"
     source = "elementary; no reference"
+    simulators = {"zero": "d"}
 
     d = Shape("rad", -0.5, 0.5, start=0.0, says="true angle less the measured one")
 

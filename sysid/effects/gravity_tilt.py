@@ -18,6 +18,7 @@ class GravityTilt(MotionEffect):
     separate_by = "level the base, or turn the first joint through a full circle"
     source = "elementary; no reference"
     scope = "robot"
+    simulators = {"gravity": "*"}
 
     g = (0.0, 0.0, -9.81)
     roll = Shape("rad", -0.5, 0.5, start=0.0, says="turn of the base about its x axis")

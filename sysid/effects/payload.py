@@ -24,6 +24,7 @@ class Payload(LinkEffect):
         "logs": "the logs that have it, by their names under `data` (default: all)",
     }
 
+    simulators = {"inertia": "*"}
     logs = None
 
     def given(self, **options):

@@ -15,6 +15,7 @@ class QuadraticDrag(TorqueEffect):
     separate_by = "a wide ladder of constant speeds at a fixed temperature"
     source = "the drag equation at high Reynolds number; no reference"
     elementwise = True
+    simulators = {"drag": "c"}
 
     c = Linear("N m s^2/rad^2", lower=0, says="drag coefficient")
 

@@ -15,6 +15,7 @@ class Spring(TorqueEffect):
     separate_by = "another payload: gravity grows with it, a spring does not"
     source = "Hooke's law"
     elementwise = True
+    simulators = {"stiffness": "k", "torque": "c"}
 
     k = Linear("N m/rad", lower=0, says="stiffness")
     c = Linear("N m", says="torque at angle zero, -k q0; the same column as torque_bias")

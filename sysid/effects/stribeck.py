@@ -15,6 +15,7 @@ class Stribeck(TorqueEffect):
     separate_by = "creep both ways at several constant speeds, without reversing"
     source = "Armstrong 1994"
     elementwise = True
+    simulators = {"breakaway": "dF"}
 
     dF = Linear("N m", lower=0, says="friction on the verge of motion above that while sliding")
     vs = Shape("rad/s", 0.003, 0.7, of="speed", grid=10, says="Stribeck speed")

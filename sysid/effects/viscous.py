@@ -13,6 +13,7 @@ class Viscous(TorqueEffect):
     separate_by = "constant speeds, both ways, cold and warm"
     source = "Rucker & Wensing 2022, eq. 14"
     elementwise = True
+    simulators = {"damping": "Fv"}
 
     Fv = Linear("N m s/rad", lower=0, says="viscous coefficient; includes the motor's back-EMF where torque is a voltage")
 

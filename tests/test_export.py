@@ -1,0 +1,350 @@
+"""Exported robots, loaded again by MuJoCo and Drake, against our own torque; what they leave out
+and what that costs."""
+
+import json
+from importlib import import_module
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+import sysid
+from sysid import effect, inverse_dynamics, regressor
+from sysid.export import FORMATS, Check, document, isaaclab
+from sysid.export.cost import costs
+from sysid.export.stated import stated
+from sysid.inertia import pseudo
+from sysid.inertia.consistency import is_consistent
+from sysid.model import ROBOT, Model
+from sysid.run import Run
+from sysid.specs import Experiment
+from tests import robots
+from tests.test_inertia import random_bodies
+
+pytest.importorskip("mujoco")
+pytest.importorskip("pydrake")
+
+EVERYWHERE = ["viscous", "encoder_offset"]
+KNOWN = {
+    "mjcf": ["coulomb", "armature", "spring", "quadratic_drag", "gravity_tilt", "payload"],
+    "sdf": ["coulomb", "spring", "payload"],
+    "drake": ["armature", "payload"],
+    "isaaclab": ["coulomb", "armature", "payload"],
+}
+
+
+def built(machine, names, seed=0) -> tuple[Model, np.ndarray]:
+    """A model of a robot with effects on every joint, and its parameters."""
+    rng = np.random.default_rng(seed)
+    terms, shapes, c = [], [], []
+    for name in names:
+        found = effect.find(name)
+        joints = (ROBOT,) if found.scope == "robot" else tuple(range(machine.dof))
+        for joint in joints:
+            found = found.bound(machine, joint)
+            shapes += rng.uniform(0.1, 0.4, len(found.shapes())).tolist()
+            body = 0.3 * random_bodies(1, seed=4)[0]
+            c += (
+                body if name == "payload" else rng.uniform(0.2, 2.0, len(found.coefficients()))
+            ).tolist()
+        terms.append((found, joints))
+    pi = np.array(machine.prior)
+    return Model(machine, tuple(terms), tuple(shapes)), np.concatenate([pi.ravel(), c])
+
+
+def run_of(tmp_path, model: Model, x) -> Run:
+    """A run folder's content, without the folder: its logs are nowhere."""
+    tree = {
+        "robot": {"urdf": "robot.urdf"},
+        "data": {"train": [{"file": "no.csv"}], "test": [{"file": "no.csv"}]},
+    }
+    experiment = Experiment.model_validate({**tree, "path": tmp_path / "config.yaml"})
+    return Run(tmp_path, experiment, model, x, {"rms": {"test": {}}, "parameters": []})
+
+
+def of_simulator(to, found, model) -> np.ndarray:
+    """Torque of the written files on 30 drawn samples."""
+    form = import_module(f"sysid.export.{to}")
+    said = stated(model[0], model[1], form.KNOWS, form.SHOWS)
+    torque, _ = form.loaded({path.name: path for path in found.files}, said)
+    return torque(*samples(model[0].robot))
+
+
+def samples(machine):
+    return np.random.default_rng(9).normal(size=(3, 30, machine.dof))
+
+
+@pytest.mark.parametrize("to", FORMATS)
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_tree_of_every_joint_comes_back(tmp_path, to, seed):
+    """Revolute, continuous, prismatic and welded links, in another order, one locked; rotors of
+    the base are exact."""
+    rng = np.random.default_rng(seed)
+    rotors = []
+    if to != "sdf":  # which has no armature
+        body = pseudo.cylinder(0.4, [0, 0, 0.01], 0.05, 0.03).tolist()
+        rotors = [
+            {
+                "joint": "joint2",
+                "ratio": -9.0,
+                "on": "base",
+                "xyz": [0.1, 0, 0],
+                "axis": [0, 0, 1],
+                "inertia": {"parameters": body},
+            }
+        ]
+    order = ["joint3", "joint0", "joint2", "joint1"]
+    machine = robots.load(
+        tmp_path, robots.urdf(rng, links=5), joints=order, lock={"joint4": 0.3}, rotors=rotors
+    )
+    model = built(machine, [*EVERYWHERE, *KNOWN[to]], seed)
+    found = sysid.export(run_of(tmp_path, *model), to, tmp_path / "out")
+    assert [cost.what for cost in found.left_out] == ["rotors"] * bool(
+        rotors
+    ) and "no.csv" in found.notes[0]
+    assert (
+        found.check.agrees
+        and found.check.samples == 500
+        and max(found.check.difference.values()) < 1e-9
+    )
+    ours = inverse_dynamics.inverse_dynamics(*model)(*samples(machine))
+    theirs = of_simulator(to, found, model)
+    np.testing.assert_allclose(
+        theirs / np.abs(ours).max(0), ours / np.abs(ours).max(0), rtol=0, atol=1e-9
+    )
+
+
+HEAVY = """<robot name="heavy"><link name="base"/>{links}
+<joint name="first" type="revolute"><parent link="base"/><child link="upper"/><axis xyz="0 1 0"/>
+<limit lower="-3" upper="3" effort="9" velocity="9"/></joint>
+<joint name="second" type="revolute"><parent link="upper"/><child link="lower"/>
+<origin xyz="0 0.1 0.5" rpy="1.2 0 0.3"/><axis xyz="0.6 0 0.8"/>
+<limit lower="-3" upper="3" effort="9" velocity="9"/></joint></robot>"""
+LINK = """<link name="{name}"><inertial><origin xyz="0.1 0 0.2"/><mass value="9"/>
+<inertia ixx="{i}" iyy="{i}" izz="{i}" ixy="0" ixz="0" iyz="0"/></inertial></link>"""
+
+
+def geared(
+    tmp_path, *, moment: float, on: str, ratio: float, against: bool = False, transmission=()
+):
+    """Two links of a moment of inertia, and a balanced rotor of the second joint about that
+    joint's axis."""
+    text = HEAVY.format(
+        links="".join(LINK.format(name=name, i=moment) for name in ("upper", "lower"))
+    )
+    turn = (
+        {"xyz": [0, 0.1, 0.5], "rpy": [1.2, 0, 0.3]}
+        if on == "upper"
+        else {"xyz": [0.1, 0, 0], "rpy": [0, 0, 0]}
+    )
+    rotor = {
+        "joint": "second",
+        "ratio": ratio,
+        "on": on,
+        "axis": [-0.6, 0, -0.8] if against else [0.6, 0, 0.8],
+        **turn,
+    }
+    axis = np.array(rotor["axis"])
+    inertia = 2e-3 * np.eye(3) + 1e-3 * np.outer(axis, axis)
+    rotor["inertia"] = {"parameters": pseudo.from_central(0.5, 0.02 * axis, inertia).tolist()}
+    return robots.load(tmp_path, text, rotors=[rotor], transmission=dict(transmission))
+
+
+@pytest.mark.parametrize("on", ["upper", "lower"])
+@pytest.mark.parametrize(("ratio", "against"), [(30.0, False), (-30.0, False), (30.0, True)])
+def test_a_rotor_along_its_joint_is_said_to_the_last_digit(tmp_path, on, ratio, against):
+    machine = geared(tmp_path, moment=2.0, on=on, ratio=ratio, against=against)
+    model = built(machine, [])
+    said = stated(*model, frozenset({"armature", "inertia"}))
+    expected = regressor.torque(machine, machine.prior, *samples(machine))
+    np.testing.assert_allclose(
+        said.torque(*samples(machine)), expected, atol=1e-12 * np.abs(expected).max()
+    )
+    found = sysid.export(run_of(tmp_path, *model), "mjcf", tmp_path / "out")
+    assert is_consistent(said.links).all() and found.check.agrees
+
+
+def test_a_rotor_of_light_links_is_an_armature(tmp_path):
+    machine = geared(tmp_path, moment=0.01, on="upper", ratio=30.0)
+    said = stated(*built(machine, []), frozenset({"armature", "inertia"}))
+    assert is_consistent(said.links).all() and said.terms["armature"][1] == pytest.approx(
+        900 * 3e-3
+    )
+    q, qd, qdd = samples(machine)
+    expected = regressor.torque(machine, machine.prior, q, qd, qdd)
+    qdd[:, 0], qd[:, 0] = 0.0, 0.0  # the carrier does not turn: nothing is lost
+    assert np.abs(said.torque(*samples(machine)) - expected).max() > 0.01
+    expected = regressor.torque(machine, machine.prior, q, qd, qdd)[:, 1]
+    np.testing.assert_allclose(
+        said.torque(q, qd, qdd)[:, 1], expected, atol=1e-12 * np.abs(expected).max()
+    )
+
+
+def test_a_rotor_of_two_joints_is_a_tendon_in_mujoco(tmp_path):
+    """On the base, so that nothing is lost; Drake's URDF has no word for it."""
+    text = HEAVY.format(links="".join(LINK.format(name=name, i=0.1) for name in ("upper", "lower")))
+    body = pseudo.cylinder(0.4, [0, 0, 0], 0.05, 0.03).tolist()
+    rotor = {
+        "joint": "second",
+        "ratio": 1.0,
+        "on": "base",
+        "axis": [0, 0, 1],
+        "inertia": {"parameters": body},
+    }
+    machine = robots.load(
+        tmp_path, text, rotors=[rotor], transmission={"second": {"first": 20.0, "second": -30.0}}
+    )
+    model = built(machine, ["viscous"])
+    found = sysid.export(run_of(tmp_path, *model), "mjcf", tmp_path / "out")
+    ours = inverse_dynamics.inverse_dynamics(*model)(*samples(machine))
+    np.testing.assert_allclose(
+        of_simulator("mjcf", found, model), ours, atol=1e-9 * np.abs(ours).max()
+    )
+    assert [cost.what for cost in found.left_out] == ["rotors"]
+    assert sysid.export(run_of(tmp_path, *model), "drake", tmp_path / "out").check.agrees
+
+
+@pytest.fixture(scope="module")
+def leg_run(tmp_path_factory):
+    """The leg with a Stribeck bump that is not in its logs, and the run folder of its fit."""
+    from tests.problems import ROOT
+
+    experiment = sysid.load(ROOT / "configs" / "cheetah3.yaml")
+    out = tmp_path_factory.mktemp("leg") / "run"
+    return sysid.write(sysid.fit(experiment), out), out
+
+
+@pytest.mark.parametrize("to", ["mjcf", "drake"])
+def test_the_leg_on_its_test_log(leg_run, tmp_path, to):
+    """The simulator's inverse dynamics and what is left out make up our torque on the test log."""
+    _, run = leg_run
+    found = sysid.export(run, to, tmp_path)
+    assert (
+        found.check.agrees
+        and max(found.check.difference.values()) < 1e-9
+        and found.check.samples == 5000
+    )
+    left = {(cost.what, cost.joint): cost.torque for cost in found.left_out}
+    if to == "drake":
+        values = {
+            p["name"]: p["value"] for p in json.loads((run / "fit.json").read_text())["parameters"]
+        }
+        assert left["coulomb", "hip"]["hip"] == pytest.approx(values["coulomb.hip.Fc"], rel=1e-3)
+        assert left["coulomb", "hip"]["abad"] == 0.0
+    # a rotor of the base and its coupling cost least; whatever is left is less than what the
+    # armature says
+    assert 0.0 < left["rotors", "*"]["abad"] < 0.1 < left["rotors", "*"]["hip"] < 1.0
+    assert all(
+        found.together[joint] >= 0.9 * left["rotors", "*"][joint] for joint in found.together
+    )
+    text = found.files[0].read_text()
+    assert "rotors: abad 0.01" in text and text.count("<!--") == 1
+
+
+def test_costs_are_the_torque_of_each_effect(leg_run):
+    from sysid import pipeline
+    from sysid.preprocess import prepare
+
+    _, folder = leg_run
+    run = sysid.read_run(folder)
+    model = run.model.with_effect(effect.find("stribeck"), (1,)).with_effect(
+        effect.find("delay"), (2,)
+    )
+    model = model.with_shapes([0.5, 0.004])
+    x = np.append(run.x, 2.0)
+    said = stated(model, x, frozenset({"damping", "friction", "armature", "inertia"}))
+    assert said.unsaid == (("stribeck", 1), ("delay", 2))
+    spec = run.experiment
+    motion = prepare(pipeline.read(spec, model.robot, spec.data.test), spec.preprocess, run.joints)
+    found, together = costs(model, x, said, motion)
+    own = {cost.what: cost.torque for cost in found}
+    qd = np.concatenate([piece.qd[piece.core] for piece in motion.pieces])[:, 1]
+    bump = 2.0 * np.exp(-((qd / 0.5) ** 2)) * np.sign(qd)
+    assert own["stribeck"] == pytest.approx(
+        {"abad": 0.0, "hip": np.sqrt(np.mean(bump**2)), "knee": 0.0}
+    )
+    assert own["delay"]["knee"] > 0.01 and own["delay"]["hip"] == 0.0
+    assert together["hip"] == pytest.approx(
+        np.hypot(own["stribeck"]["hip"], own["rotors"]["hip"]), rel=0.2
+    )
+    # in Isaac Lab the bump is what starts the joint
+    begin = stated(model, x, isaaclab.KNOWS, isaaclab.SHOWS)
+    assert begin.terms["breakaway"][1] == 2.0 and ("stribeck", 1) in begin.unsaid
+
+
+def test_isaac_lab_s_file_is_python_of_its_classes(leg_run, tmp_path):
+    found = sysid.export(leg_run[1], "isaaclab", tmp_path)
+    source = (tmp_path / "actuators.py").read_text()
+
+    class ImplicitActuatorCfg(dict):
+        pass
+
+    known = {"ImplicitActuatorCfg": ImplicitActuatorCfg}
+    exec(source.replace("from isaaclab.actuators import ImplicitActuatorCfg", ""), known)
+    group = known["ACTUATORS"]["identified"]
+    assert (
+        group == isaaclab.read(source) and group["stiffness"] is None and group["damping"] is None
+    )
+    assert (
+        group["friction"] == group["dynamic_friction"] and group["effort_limit_sim"]["hip"] == 230.0
+    )
+    assert found.check.agrees and "Isaac Lab itself was not asked" in found.check.by
+
+
+def test_the_command(leg_run, tmp_path, cli):
+    said = cli("export", leg_run[1], "--to", "mjcf", "--json", out=tmp_path)
+    told = json.loads(said.out)
+    assert (
+        said.status == 0
+        and told["checked"]["agrees"]
+        and told["files"] == [str(tmp_path / "robot.xml")]
+    )
+    assert (
+        set(told["left_out"][0]) == {"what", "joint", "torque_rms"}
+        and told["left_out_torque_rms"]["hip"] > 0
+    )
+    said = cli("export", leg_run[1], "--to", "mjcf")
+    assert said.status == 0 and "within" in said.out and "rotors: abad" in said.out
+    for words in (
+        ("export", leg_run[1], "--to", "usd"),
+        ("export", tmp_path / "nothing", "--to", "sdf"),
+    ):
+        said = cli(*words)
+        assert said.status == 2 and said.err.count("\n") == 1 and "allowed" in said.err
+
+
+def test_a_simulator_that_is_missing_or_disagrees(leg_run, tmp_path, cli, monkeypatch):
+    import sys
+
+    monkeypatch.setitem(sys.modules, "mujoco", None)
+    said = cli("export", leg_run[1], "--to", "mjcf", out=tmp_path)
+    assert (
+        said.status == 0 and "not checked: mujoco is not installed, pip install mujoco" in said.out
+    )
+    assert (tmp_path / "robot.xml").is_file()
+    monkeypatch.undo()
+    from sysid.export import mjcf
+
+    real = mjcf.files
+    monkeypatch.setattr(
+        mjcf,
+        "files",
+        lambda *a: {"robot.xml": real(*a)["robot.xml"].replace(b'mass="', b'mass="1')},
+    )
+    said = cli("export", leg_run[1], "--to", "mjcf", out=tmp_path)
+    assert said.status == 1 and "NOT THE SAME" in said.out
+    monkeypatch.setattr(mjcf, "files", lambda *a: {"robot.xml": b"<mujoco><worldbody><body/>"})
+    said = cli("export", leg_run[1], "--to", "mjcf", out=tmp_path)
+    assert said.status == 1 and "mujoco refuses it" in said.out
+    assert not Check("x", 1, {"a": float("nan")}, None).agrees
+
+
+def test_document_is_strict_json(leg_run, tmp_path):
+    found = sysid.export(leg_run[1], "sdf", tmp_path)
+    json.dumps(document(found), allow_nan=False)
+    assert len(repr(found)) < 300
+    names = [
+        joint.get("name")
+        for joint in ElementTree.parse(tmp_path / "robot.sdf").getroot().iter("joint")
+    ]
+    assert "abad_joint" in names  # a link is called abad
