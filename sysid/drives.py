@@ -102,6 +102,10 @@ class SharedTorque(TorqueEffect):
         return -np.stack([motion.signals[name] for name in self.signals])
 
 
+#: what stands on the drive's side of a joint's equation, and is no part of the torque that the joint needs
+DRIVE_EFFECTS = (FreeGain, DriveDamping, LateCommand, SharedTorque)
+
+
 def leading_factors(experiment: Experiment) -> dict[str, float | FreeFactor]:
     """{joint: the factor of the signal that leads its torque} of joints whose torque was not logged as such."""
     sums = {joint: entry[motor_side.leading(entry)] for joint, entry in experiment.data.torque.items()}

@@ -18,6 +18,7 @@ import numpy as np
 import pinocchio as pin
 
 from . import own_effects, regressor
+from .drives import DRIVE_EFFECTS
 from .effect import Effect, MotionEffect, SensorEffect, WrenchEffect
 from .errors import SysidError
 from .model import ROBOT, Model
@@ -223,6 +224,8 @@ def inverse_dynamics(model: Model, x) -> InverseDynamics:
         own = rest[k : k + size * len(joints)].reshape(len(joints), size)
         k += size * len(joints)
         named = [model.shapes_of(term, joint) for joint in joints]
+        if isinstance(effect, DRIVE_EFFECTS):
+            continue  # torque is the joint's, whatever turns it
         if not (effect.instantaneous and _keeps_its_word(effect, robot, joints, named)):
             omitted += [
                 f"{effect.name}.{'*' if joint == ROBOT else robot.joints[joint]}"

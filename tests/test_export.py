@@ -18,7 +18,7 @@ from sysid.inertia.consistency import is_consistent
 from sysid.model import ROBOT, Model
 from sysid.run import Run
 from sysid.specs import Experiment
-from tests import robots
+from tests import robots, servos
 from tests.test_inertia import random_bodies
 
 pytest.importorskip("mujoco")
@@ -289,6 +289,56 @@ def test_isaac_lab_s_file_is_python_of_its_classes(leg_run, tmp_path):
         group["friction"] == group["dynamic_friction"] and group["effort_limit_sim"]["hip"] == 230.0
     )
     assert found.check.agrees and "Isaac Lab itself was not asked" in found.check.by
+
+
+@pytest.fixture(scope="module")
+def servo_run(tmp_path_factory):
+    """Two servos whose gains are known, one damped by its drive, and nothing but commands and angles logged."""
+    folder = tmp_path_factory.mktemp("servos")
+    text = """
+model: {effects: [viscous, coulomb, armature]}
+actuator:
+  joint_1: {command: cmd_joint_1, kp: 26.0, kd: 0.3, delay: free}
+  joint_2: {command: cmd_joint_2, kp: free}
+"""
+    servos.write(folder, 11, 2, text, seconds=4.0)
+    sysid.write(sysid.fit(sysid.load(folder)), folder / "run")
+    return folder / "run"
+
+
+def test_servos_come_out_as_servos(servo_run, tmp_path):
+    """MuJoCo's force of each actuator is kp (command - q) - kd qd, Isaac Lab's gains are the same."""
+    import mujoco
+
+    found, run = sysid.export(servo_run, "mjcf", tmp_path), sysid.read_run(servo_run)
+    assert found.check.agrees and found.left_out == () and run.omitted == ()
+    text = (tmp_path / "robot.xml").read_text()
+    assert "Servo of joint_1: its command acts 0.01" in text
+    drives = {(d["joint"], d["name"]): d["value"] for d in run.document["drives"]}
+    kp, kd = np.array([26.0, drives["joint_2", "kp"]]), np.array([0.3, 0.0])
+    model = mujoco.MjModel.from_xml_string(text)
+    data = mujoco.MjData(model)
+    data.qpos[:], data.qvel[:], data.ctrl[:] = [0.1, -0.2], [0.5, 0.4], [0.3, 0.1]
+    mujoco.mj_forward(model, data)
+    expected = kp * (data.ctrl - data.qpos) - kd * data.qvel
+    np.testing.assert_allclose(data.actuator_force, expected, rtol=1e-12)
+    sysid.export(servo_run, "isaaclab", tmp_path)
+    group = isaaclab.read((tmp_path / "actuators.py").read_text())
+    assert group["stiffness"] == {"joint_1": 26.0, "joint_2": pytest.approx(kp[1])}
+    assert group["damping"] == {"joint_1": 0.3, "joint_2": 0.0}
+    # torque is what the joint needs, without its drive's damping
+    q, qd, qdd = np.zeros((3, 2))
+    qd[:] = 1.0
+    values = {p["name"]: p["value"] for p in run.document["parameters"]}
+    change = run.torque(q, qd, qdd) - run.torque(q, 0.5 * qd, qdd)
+    bodies = regressor.torque(
+        run.model.robot,
+        run.x[:20].reshape(-1, 10),
+        *(np.array([q] * 2), np.array([qd, 0.5 * qd]), np.zeros((2, 2))),
+    )
+    assert change[0] - (bodies[0] - bodies[1])[0] == pytest.approx(
+        0.5 * values["viscous.joint_1.Fv"]
+    )
 
 
 def test_the_command(leg_run, tmp_path, cli):

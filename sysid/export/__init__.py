@@ -8,7 +8,7 @@ installed, and its inverse dynamics compared.
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import import_module
 from pathlib import Path
 
@@ -23,6 +23,7 @@ from ..results import folder, number, write_atomically
 from ..run import Run, read_run
 from .cost import Cost, costs, sampled
 from .document import comment, felt, line
+from .motors import joint_side, motors
 from .stated import stated
 
 FORMATS = ("mjcf", "sdf", "drake", "isaaclab")
@@ -96,9 +97,11 @@ def export(run: Run | str | Path, to: str, out: str | Path) -> Export:
     found = run if isinstance(run, Run) else read_run(run)
     where = folder(out)
     form = import_module(f".{to}", __name__)
-    said = stated(found.model, found.x, form.KNOWS, form.SHOWS)
+    model, x = joint_side(found.model, found.x)
+    drives = motors(found.experiment, found.model, found.x)
+    said = replace(stated(model, x, form.KNOWS, form.SHOWS), motors=drives)
     motion, why = _test_motion(found)
-    left, together = costs(found.model, found.x, said, motion)
+    left, together = costs(model, x, said, motion)
     notes = [
         *([] if why is None else [f"no test log is at hand ({why}): what is left out has no price"])
     ]

@@ -11,6 +11,7 @@ import numpy as np
 import pinocchio as pin
 
 from ..urdf_export import harmless, tree
+from . import motors
 from .cost import Cost
 from .stated import Stated
 
@@ -30,6 +31,7 @@ def comment(said: Stated, left: tuple[Cost, ...], together: dict[str, float] | N
     lines = [f"{said.robot.name}, as sysid identified it."]
     if not np.allclose(said.gravity, (0.0, 0.0, -9.81)):
         lines.append(f"Gravity in the base's axes is {numbers(said.gravity)} m/s^2.")
+    lines += motors.told(said.motors)
     if not left:
         return "\n".join([*lines, "Nothing of the identified model is left out."])
     lines.append("Left out, with the RMS torque that goes with it on the test logs:")

@@ -32,8 +32,8 @@ ACTUATORS = {{
     "identified": ImplicitActuatorCfg(
 {body}
         # gains of your controller; None: those of the USD, 0.0: torque is commanded
-        stiffness=None,
-        damping=None,
+        stiffness={stiffness},
+        damping={damping},
     ),
 }}
 '''
@@ -61,7 +61,13 @@ def files(said: Stated, comment: str, folder: Path) -> dict[str, bytes]:
         lines += [f"{name}={{", *(f"    {j!r}: {v!r}," for j, v in known.items()), "},"]
     body = "\n".join(f"        {line}" for line in lines)
     quoted = comment.replace("\\", "/").replace('"""', "'''")
-    return {"robot.urdf": urdf, "actuators.py": _OPENS.format(comment=quoted, body=body).encode()}
+    servos = {re.escape(name): motor for name, motor in said.motors.items() if motor.servo}
+    gains = {
+        "stiffness": {name: motor.gain for name, motor in servos.items()} or None,
+        "damping": {name: motor.damping for name, motor in servos.items()} or None,
+    }
+    written = _OPENS.format(comment=quoted, body=body, **gains)
+    return {"robot.urdf": urdf, "actuators.py": written.encode()}
 
 
 def loaded(written: dict[str, Path], said: Stated):

@@ -46,12 +46,28 @@ def files(said: Stated, comment: str, folder: Path) -> dict[str, bytes]:
             for name, ratio in zip(robot.joints, shaft.row):
                 if ratio:
                     ElementTree.SubElement(fixed, "joint", joint=name, coef=numbers(ratio))
-    motors = ElementTree.SubElement(root, "actuator")
-    for name in robot.joints:
-        motor = ElementTree.SubElement(motors, "motor", name=name, joint=name)
-        if np.isfinite(effort := robot.source.joints[name].effort):
-            motor.set("ctrlrange", numbers([-effort, effort]))
+    _actuators(ElementTree.SubElement(root, "actuator"), said)
     return {"robot.xml": indented(root, f"{comment}\n{CANNOT}")}
+
+
+def _actuators(parent, said: Stated) -> None:
+    """Servos and DC motors where commands were logged, else motors that are given torque."""
+    for name in said.robot.joints:
+        own = {"name": name, "joint": name}
+        effort, drive = said.robot.source.joints[name].effort, said.motors.get(name)
+        limit = numbers([-effort, effort]) if np.isfinite(effort) else None
+        if drive is None:
+            ElementTree.SubElement(
+                parent, "motor", **own, **({"ctrlrange": limit} if limit else {})
+            )
+            continue
+        own |= {"forcerange": limit} if limit else {}
+        if drive.servo:
+            gains = {"kp": numbers(drive.gain), "kv": numbers(drive.damping)}
+            ElementTree.SubElement(parent, "position", **own, **gains)
+        else:
+            gains = {"gainprm": numbers(drive.gain), "biasprm": numbers([0.0, 0.0, -drive.damping])}
+            ElementTree.SubElement(parent, "general", biastype="affine", **own, **gains)
 
 
 def _body(parent, said: Stated, joint: int):

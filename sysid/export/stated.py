@@ -30,6 +30,7 @@ from ..inertia.consistency import is_consistent
 from ..inverse_dynamics import at_no_time
 from ..model import ROBOT, Model
 from ..robot import Body, Robot
+from .motors import Motor
 
 JOINT_TERMS = (
     "damping", "drag", "friction", "breakaway", "armature", "stiffness", "torque", "zero"
@@ -57,6 +58,7 @@ class Stated:
     shafts: rotors of several joints.
     unsaid: (effect, joint) of the model that it leaves out; joint -1: of the robot.
     knows: the terms that the format knows.
+    motors: {joint: its drive} where a command was logged in the place of torque.
     """
 
     robot: Robot
@@ -67,6 +69,7 @@ class Stated:
     unsaid: tuple[tuple[str, int], ...]
     knows: frozenset[str]
     _model: pin.Model = field(repr=False)
+    motors: dict[str, Motor] = field(default_factory=dict)
 
     def torque(self, q, qd, qdd) -> np.ndarray:
         """Inverse dynamics (n, dof) [N m or N] of what is said, by Pinocchio; at rest friction is
