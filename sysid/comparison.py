@@ -28,7 +28,33 @@ class Difference:
     se: float
 
 
-def compare(first: Fit, second: Fit, names: tuple[str, str] | None = None) -> list[Difference]:
+class Differences(tuple[Difference, ...]):
+    """The differences of two models, joint by joint."""
+
+    def __repr__(self) -> str:
+        told = ", ".join(f"{d.joint} {d.delta_rms:+.2g} +- {d.se:.2g}" for d in self)
+        return f"<Differences of RMS, {self[0].to} less {self[0].from_}: {told}>"
+
+    def to_dataframe(self):
+        """A polars data frame, a row a joint: from, to, joint, delta_rms, se."""
+        import polars
+
+        rows = [(d.from_, d.to, d.joint, d.delta_rms, d.se) for d in self]
+        return polars.DataFrame(rows, schema=["from", "to", "joint", "delta_rms", "se"], orient="row")
+
+    def plot(self):
+        """The difference on every joint with its standard error, as a Matplotlib figure."""
+        from .picture import Picture
+
+        figure = Picture(1.5 + 1.2 * len(self), 3.5)
+        axes = figure.subplots()
+        axes.errorbar([d.joint for d in self], [d.delta_rms for d in self], [d.se for d in self], fmt="o", capsize=4)
+        axes.axhline(0.0, color="gray", linewidth=0.8)
+        axes.set_ylabel(f"RMS of {self[0].to} less {self[0].from_} [N m or N]")
+        return figure
+
+
+def compare(first: Fit, second: Fit, names: tuple[str, str] | None = None) -> Differences:
     """Compare two fits joint by joint on their test logs.
 
     Args:
@@ -40,10 +66,10 @@ def compare(first: Fit, second: Fit, names: tuple[str, str] | None = None) -> li
     names = names or (first.experiment.name, second.experiment.name)
     sums, joints = _sums(first, second, names)
     both = (sums[0][1] > 0) & (sums[1][1] > 0)  # a block counts where both models have rows in it
-    return [
+    return Differences(
         Difference(*names, joint, *_jackknife(*((s[both[:, k], k], n[both[:, k], k]) for s, n in sums)))
         for k, joint in enumerate(joints)
-    ]
+    )
 
 
 def together(first: Fit, second: Fit, *, weighed: bool = False) -> Difference:

@@ -27,7 +27,7 @@ class Prediction:
     """Measured and predicted torque over the pieces of one set of logs.
 
     log (n,) number of the log; t (n,) [s]; measured (n, dof) as logged, filtered where the fit filtered torque;
-    predicted (n, dof); use (n, dof) bool, None where every row counts.
+    predicted (n, dof); use (n, dof) bool, None where every row counts; joints: names, units: N m or N, of each.
     """
 
     log: np.ndarray
@@ -35,6 +35,22 @@ class Prediction:
     measured: np.ndarray
     predicted: np.ndarray
     use: np.ndarray | None
+    joints: tuple[str, ...] = ()
+    units: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        errors = ", ".join(f"{joint} {rms:.4g}" for joint, rms in zip(self.joints, self.told()) if rms is not None)
+        return f"<Prediction of {len(self.t)} samples: RMS {errors}>"
+
+    def to_dataframe(self):
+        """A polars data frame: log, t [s], measured_ and predicted_ torque of each joint, used_ where rows are left out."""
+        import polars
+
+        columns = {"log": self.log, "t": self.t}
+        for k, joint in enumerate(self.joints):
+            columns |= {f"measured_{joint}": self.measured[:, k], f"predicted_{joint}": self.predicted[:, k]}
+            columns |= {} if self.use is None else {f"used_{joint}": self.use[:, k]}
+        return polars.DataFrame(columns)
 
     @property
     def residual(self) -> np.ndarray:
@@ -73,19 +89,24 @@ class Prediction:
             ]),
         }  # fmt: skip
 
-    def plot(self, robot: Robot):
-        """Measured and predicted torque of every joint of the robot, as a Matplotlib figure."""
-        from matplotlib.figure import Figure
+    def plot(self):
+        """Measured and predicted torque of every joint, as a Matplotlib figure."""
+        from .picture import Picture
 
-        dof = robot.dof
-        figure = Figure(figsize=(10.0, 1.0 + 1.8 * dof), layout="constrained")
+        dof = len(self.joints)
+        figure = Picture(10.0, 1.0 + 1.8 * dof)
         for j, axes in enumerate(np.atleast_1d(figure.subplots(dof, 1, sharex=True))):
             for values, label in ((self.measured, "measured"), (self.predicted, "predicted")):
                 axes.plot(self.t, values[:, j], linewidth=0.8, label=label)
-            axes.set_ylabel(f"{robot.joints[j]} [{'N' if robot.prismatic[j] else 'N m'}]")
+            axes.set_ylabel(f"{self.joints[j]} [{self.units[j]}]")
         axes.set_xlabel("time [s]")
         figure.axes[0].legend(loc="upper right")
         return figure
+
+
+def units(robot: Robot) -> tuple[str, ...]:
+    """The unit of each joint's torque."""
+    return tuple("N" if slides else "N m" for slides in robot.prismatic)
 
 
 def _sum(values):
@@ -141,7 +162,7 @@ class Fit:
 
     def plot(self, part: str = "test"):
         """Measured and predicted torque of every joint on "train" or "test", as a Matplotlib figure."""
-        return self.predictions[part].plot(self.model.robot)
+        return self.predictions[part].plot()
 
     @cached_property
     def inverse_dynamics(self) -> InverseDynamics:
@@ -349,4 +370,5 @@ def predict(model: Model, x, motion: Motion) -> Prediction:
         measured=joined([piece.tau[piece.core] for piece in pieces]),
         predicted=joined([model.torque(piece, pi, c) for piece in pieces]),
         use=None if pieces[0].use is None else joined([piece.use[piece.core] for piece in pieces]),
+        joints=model.robot.joints, units=units(model.robot),
     )

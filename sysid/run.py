@@ -16,7 +16,7 @@ import numpy as np
 
 from . import config, pipeline
 from .errors import ConfigError, SysidWarning
-from .estimate import Prediction
+from .estimate import Prediction, units
 from .inertia import PARAMETERS
 from .inverse_dynamics import InverseDynamics, inverse_dynamics
 from .model import Model
@@ -99,7 +99,12 @@ class Run:
             masked = f"used_{self.joints[0]}" in table.columns
             times = table["log"].to_numpy(), table["t"].to_numpy()
             return Prediction(
-                *times, taken("measured"), taken("predicted"), taken("used") if masked else None
+                *times,
+                taken("measured"),
+                taken("predicted"),
+                taken("used") if masked else None,
+                self.joints,
+                units(self.model.robot),
             )
         except (OSError, polars.exceptions.PolarsError) as error:
             said = getattr(error, "strerror", None) or "not as `sysid fit` writes it"
@@ -119,7 +124,7 @@ class Run:
     def plot(self, part: str = "test"):
         """Measured and predicted torque of every joint on "train" or "test", as a Matplotlib
         figure."""
-        return self.prediction(part).plot(self.model.robot)
+        return self.prediction(part).plot()
 
 
 def read_run(folder: str | Path) -> Run:

@@ -387,6 +387,13 @@ class Experiment(_Spec):
     solver: SolverSpec = SolverSpec()
     path: Path = Field(default=Path("experiment.yaml"), exclude=True)
 
+    def __repr__(self) -> str:
+        effects = ", ".join(effect.name for effect in self.model.effects) or "bodies alone"
+        logs = f"{len(self.data.train)} training and {len(self.data.test)} test logs"
+        return f"<Experiment {self.name}: {self.robot.urdf}, {effects}; {logs}>"
+
+    __str__ = __repr__
+
     @property
     def folder(self) -> Path:
         """The folder that the experiment's paths are relative to."""

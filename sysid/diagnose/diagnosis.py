@@ -26,6 +26,7 @@ from ..filters import settled
 from ..lowpass import lowpassed
 from ..noise import NoiseFloor, filtered, floors_of, of_angles
 from ..preprocess import prepare
+from ..shown import ShownDiagnosis
 from ..specs import Experiment
 from ..transfer import transfers
 from ..view import View, first_view, too_short
@@ -37,8 +38,8 @@ from .findings import Finding, hidden_by_weights
 from .verdict import Verdict, verdicts
 
 
-@dataclass(frozen=True)
-class Diagnosis:
+@dataclass(frozen=True, repr=False)
+class Diagnosis(ShownDiagnosis):
     """Everything that `sysid diagnose` says. view: the model before all claims; first, last: before
     and after them, on the test logs; notices: what to know beside it."""
 
@@ -71,8 +72,7 @@ def diagnose(
     """Question an experiment's model.
 
     Args:
-        fit: where it is at hand. level: family-wise, how often anything is accused where nothing is
-            there.
+        fit: where it is at hand. level: family-wise, of accusing anything where nothing is.
 
     Raises SysidError: bad input, or logs too short to question.
     """
