@@ -41,7 +41,7 @@ class Run:
 
     def __repr__(self) -> str:
         errors = ", ".join(
-            f"{joint} {rms:.4g}" for joint, rms in self.document["rms"]["test"].items()
+            f"{joint} {rms:.4g}" for joint, rms in self.rms("test").items() if rms is not None
         )
         left = f"; torque is without {', '.join(self.omitted)}" if self.omitted else ""
         return (
@@ -80,8 +80,9 @@ class Run:
         """The effects of the model that `torque` leaves out, as `effect.joint`."""
         return self.inverse_dynamics.omitted
 
-    def rms(self, part: str) -> dict[str, float]:
-        """RMS residual of each joint on "train" or "test" [N m or N], as the fit found it."""
+    def rms(self, part: str) -> dict[str, float | None]:
+        """RMS residual of each joint on "train" or "test" [N m or N], as the fit found it; None of
+        a joint whose torque is not used."""
         return dict(self.document["rms"][part])
 
     def prediction(self, part: str = "test") -> Prediction:

@@ -2,6 +2,7 @@
 and what that costs."""
 
 import json
+from dataclasses import replace
 from importlib import import_module
 from xml.etree import ElementTree
 
@@ -204,6 +205,13 @@ def test_a_rotor_of_two_joints_is_a_tendon_in_mujoco(tmp_path):
     assert sysid.export(run_of(tmp_path, *model), "drake", tmp_path / "out").check.agrees
 
 
+def test_drake_keeps_the_rotor_of_a_joint_without_effort(tmp_path):
+    text = HEAVY.format(links="".join(LINK.format(name=name, i=0.1) for name in ("upper", "lower")))
+    machine = robots.load(tmp_path, text.replace('effort="9"', 'effort="0"'))
+    model = built(machine, ["armature"])
+    assert sysid.export(run_of(tmp_path, *model), "drake", tmp_path / "out").check.agrees
+
+
 @pytest.fixture(scope="module")
 def leg_run(tmp_path_factory):
     """The leg with a Stribeck bump that is not in its logs, and the run folder of its fit."""
@@ -272,6 +280,15 @@ def test_costs_are_the_torque_of_each_effect(leg_run):
     assert begin.terms["breakaway"][1] == 2.0 and ("stribeck", 1) in begin.unsaid
 
 
+def test_impossible_bodies_are_named(leg_run, tmp_path):
+    run = sysid.read_run(leg_run[1])
+    x = np.array(run.x)
+    x[14] = 10.0  # thigh.Ixx: the triangle of its moments does not close
+    for to in FORMATS:
+        found = sysid.export(replace(run, x=x), to, tmp_path)
+        assert found.check.agrees is False and "thigh" in found.notes[0]
+
+
 def test_isaac_lab_s_file_is_python_of_its_classes(leg_run, tmp_path):
     found = sysid.export(leg_run[1], "isaaclab", tmp_path)
     source = (tmp_path / "actuators.py").read_text()
@@ -293,7 +310,7 @@ def test_isaac_lab_s_file_is_python_of_its_classes(leg_run, tmp_path):
 
 @pytest.fixture(scope="module")
 def servo_run(tmp_path_factory):
-    """Two servos whose gains are known, one damped by its drive, and nothing but commands and angles logged."""
+    """Two servos, one damped by its drive; nothing but commands and angles is logged."""
     folder = tmp_path_factory.mktemp("servos")
     text = """
 model: {effects: [viscous, coulomb, armature]}
@@ -307,7 +324,7 @@ actuator:
 
 
 def test_servos_come_out_as_servos(servo_run, tmp_path):
-    """MuJoCo's force of each actuator is kp (command - q) - kd qd, Isaac Lab's gains are the same."""
+    """MuJoCo's force is kp (command - q) - kd qd, and Isaac Lab's gains are the same."""
     import mujoco
 
     found, run = sysid.export(servo_run, "mjcf", tmp_path), sysid.read_run(servo_run)

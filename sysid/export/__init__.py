@@ -17,6 +17,7 @@ import numpy as np
 from .. import pipeline
 from ..callable_module import callable_module
 from ..errors import SysidError, SysidWarning
+from ..inertia.consistency import is_consistent
 from ..motion import Motion
 from ..preprocess import prepare
 from ..results import folder, number, write_atomically
@@ -49,7 +50,7 @@ class Check:
         """Whether it says the same as we do; None where nobody was asked."""
         if self.by is None:
             return None
-        return bool(self.difference) and max(self.difference.values()) <= AGREES
+        return bool(self.difference) and all(d <= AGREES for d in self.difference.values())
 
 
 @dataclass(frozen=True)
@@ -73,7 +74,7 @@ def told(check: Check) -> str:
     """A check in words."""
     if check.why is not None:
         return check.why
-    worst = max(check.difference.values())
+    worst = float(np.max(list(check.difference.values())))
     return f"inverse dynamics of {check.by} within {worst:.1e} of ours on {check.samples} samples"
 
 
@@ -102,9 +103,13 @@ def export(run: Run | str | Path, to: str, out: str | Path) -> Export:
     said = replace(stated(model, x, form.KNOWS, form.SHOWS), motors=drives)
     motion, why = _test_motion(found)
     left, together = costs(model, x, said, motion)
-    notes = [
-        *([] if why is None else [f"no test log is at hand ({why}): what is left out has no price"])
-    ]
+    notes = (
+        [] if why is None else [f"no test log is at hand ({why}): what is left out has no price"]
+    )
+    bodies = zip(found.model.robot.bodies, is_consistent(said.links))
+    if names := [body.name for body, possible in bodies if not possible]:
+        do = "fit with model.inertia: log-cholesky, which keeps them possible"
+        notes.append(f"impossible bodies, which a simulator may refuse: {', '.join(names)}; {do}")
     contents = form.files(said, comment(said, left, together), where)
     for name, content in contents.items():
         write_atomically(where / name, lambda path, content=content: path.write_bytes(content))
@@ -136,7 +141,8 @@ def _samples(run: Run, motion: Motion | None) -> list[np.ndarray]:
 
 def _asked(form, written: dict[str, Path], said, samples) -> Check:
     try:
-        torque, by = form.loaded(written, said)
+        with pipeline.noticed():
+            torque, by = form.loaded(written, said)
     except ImportError:
         return Check(
             None, 0, {}, f"not checked: {form.PACKAGE} is not installed, pip install {form.PACKAGE}"

@@ -25,6 +25,9 @@ def files(said: Stated, comment: str, folder: Path) -> dict[str, bytes]:
     written = tree(robot, said.links, dynamics, zero=at["zero"], folder=folder)
     root = etree.Element("robot", nsmap={"drake": _SPACE}, attrib=dict(written.getroot().attrib))
     root.extend(list(written.getroot()))
+    for limit in root.iterfind("joint/limit"):
+        if float(limit.get("effort", "inf")) == 0.0:
+            del limit.attrib["effort"]  # Drake would leave such a joint without its rotor
     for name, armature, ratio in zip(robot.joints, at["armature"], _ratios(said)):
         drive = etree.SubElement(root, "transmission", name=f"{name}_transmission")
         etree.SubElement(drive, "type").text = "transmission_interface/SimpleTransmission"
