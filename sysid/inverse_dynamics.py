@@ -66,11 +66,11 @@ class _Rigid:
 
 @dataclass(frozen=True)
 class _Alike:
-    """An elementwise effect on all joints at once: coefficients (k, dof), zero on joints that lack
+    """An elementwise effect on all joints at once: k coefficients (dof,), zero on joints that lack
     it; shape values (dof,)."""
 
     effect: Effect
-    coefficients: np.ndarray
+    coefficients: tuple[np.ndarray, ...]
     shapes: dict[str, np.ndarray]
 
 
@@ -126,11 +126,20 @@ class InverseDynamics:
         if len(shapes) > 1 or q.ndim not in (1, 2) or q.shape[-1] != dof:
             raise _refused(f"q, qd and qdd are {q.shape}, {qd.shape}, {qdd.shape}", self.joints)
         if q.ndim == 1:
-            return self._torque(q[None], qd[None], qdd[None])[0]
+            return self._one(q, qd, qdd)
         if len(q) <= _CHUNK:
             return self._torque(q, qd, qdd)
         parts = (slice(start, start + _CHUNK) for start in range(0, len(q), _CHUNK))
         return np.concatenate([self._torque(q[rows], qd[rows], qdd[rows]) for rows in parts])
+
+    def _one(self, q, qd, qdd) -> np.ndarray:
+        if self._moving or self._single or self._sensors:
+            return self._torque(q[None], qd[None], qdd[None])[0]
+        load = None if self._load is None else self._load.one(q, qd, qdd)
+        out = self._bodies.one(q, qd, qdd)
+        if self._alike:
+            self._add_alike(out, q, qd, qdd, load)
+        return out
 
     def _torque(self, q, qd, qdd) -> np.ndarray:
         load = None if self._load is None else self._load.many(q, qd, qdd)
@@ -145,7 +154,7 @@ class InverseDynamics:
         else:
             out = self._bodies.many(q, qd, qdd, gravity)
         if self._alike:
-            self._add_alike(out, q, qd, qdd, load)
+            self._add_alike(out.reshape(-1), q, qd, qdd, load, len(q))
         for own in self._single:
             if isinstance(own.effect, WrenchEffect):
                 columns = own.effect.columns(part, self._bodies.robot, **own.shapes)
@@ -158,17 +167,17 @@ class InverseDynamics:
             out[:, own.joint] = own.effect.sensed(out[None, :, own.joint], 1.0, **own.shapes)[0]
         return out
 
-    def _add_alike(self, out, q, qd, qdd, load) -> None:
-        """Add what elementwise effects make of samples (n, dof), the joints being so many samples
-        of one."""
-        n = len(q)
+    def _add_alike(self, out, q, qd, qdd, load, n: int = 1) -> None:
+        """Add what elementwise effects make of n samples to out (n dof,), the joints being so many
+        samples of one."""
         part = _Instants(q, qd, qdd, load)
         for own in self._alike:
-            shapes = (
-                own.shapes if n == 1 else {name: np.tile(at, n) for name, at in own.shapes.items()}
-            )
-            for coefficient, column in zip(own.coefficients, own.effect.columns(part, 0, **shapes)):
-                out += coefficient * column.reshape(out.shape)
+            coefficients, shapes = own.coefficients, own.shapes
+            if n > 1:
+                coefficients = [np.tile(c, n) for c in coefficients]
+                shapes = {name: np.tile(at, n) for name, at in shapes.items()}
+            for coefficient, column in zip(coefficients, own.effect.columns(part, 0, **shapes)):
+                out += coefficient * column
 
 
 def _refused(what: str, joints: tuple[str, ...]) -> SysidError:
@@ -281,4 +290,4 @@ def _alike(
     for joint, own in zip(joints, shapes):
         for name, at in own.items():
             values[name][joint] = at
-    return _Alike(effect, c, values)
+    return _Alike(effect, tuple(c), values)
