@@ -335,10 +335,18 @@ def test_servos_come_out_as_servos(servo_run, tmp_path):
     kp, kd = np.array([26.0, drives["joint_2", "kp"]]), np.array([0.3, 0.0])
     model = mujoco.MjModel.from_xml_string(text)
     data = mujoco.MjData(model)
-    data.qpos[:], data.qvel[:], data.ctrl[:] = [0.1, -0.2], [0.5, 0.4], [0.3, 0.1]
-    mujoco.mj_forward(model, data)
-    expected = kp * (data.ctrl - data.qpos) - kd * data.qvel
-    np.testing.assert_allclose(data.actuator_force, expected, rtol=1e-12)
+    asked, felt, at = [], [], []
+    for k in range(40):  # a ramp, as the joints begin to move
+        data.ctrl[:] = [0.3 + 0.01 * k, 0.1]
+        asked.append(np.array(data.ctrl))
+        at.append((np.array(data.qpos), np.array(data.qvel)))
+        mujoco.mj_step(model, data)
+        felt.append(np.array(data.actuator_force))
+    late = drives["joint_1", "delay"] / model.opt.timestep
+    before = asked[30][0] - 0.01 * late
+    q, qd = at[30]
+    expected = kp * (np.array([before, 0.1]) - q) - kd * qd
+    np.testing.assert_allclose(felt[30], expected, rtol=1e-9)
     sysid.export(servo_run, "isaaclab", tmp_path)
     group = isaaclab.read((tmp_path / "actuators.py").read_text())
     assert group["stiffness"] == {"joint_1": 26.0, "joint_2": pytest.approx(kp[1])}

@@ -4,6 +4,7 @@ torque motors."""
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -21,6 +22,7 @@ KNOWS = frozenset(
 )  # fmt: skip
 SHOWS: frozenset[str] = frozenset()
 PACKAGE = "mujoco"
+_SHORTEST = 5e-4  # s: time steps of robots' simulations are seldom shorter
 CANNOT = "MuJoCo decides the direction of dry friction at rest by itself."
 
 
@@ -62,6 +64,10 @@ def _actuators(parent, said: Stated) -> None:
             )
             continue
         own |= {"forcerange": limit} if limit else {}
+        if drive.delay > 0.0:
+            # a buffer that holds the delay at any time step down to the shortest
+            kept = str(math.ceil(drive.delay / _SHORTEST) + 1)
+            own |= {"delay": numbers(drive.delay), "nsample": kept, "interp": "linear"}
         if drive.servo:
             gains = {"kp": numbers(drive.gain), "kv": numbers(drive.damping)}
             ElementTree.SubElement(parent, "position", **own, **gains)

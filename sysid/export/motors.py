@@ -64,8 +64,6 @@ def joint_side(model: Model, x) -> tuple[Model, np.ndarray]:
 
 def told(found: dict[str, Motor]) -> list[str]:
     """What a file's comment says of drives."""
-    return [
-        f"{'Servo' if m.servo else 'DC motor'} of {m.joint}: its command acts {m.delay:.4g} s late."
-        for m in found.values()
-        if m.delay
-    ]
+    kinds = {True: "Servo", False: "DC motor"}
+    late = [motor for motor in found.values() if motor.delay]
+    return [f"{kinds[m.servo]} of {m.joint}: its command acts {m.delay:.4g} s late." for m in late]
