@@ -125,7 +125,7 @@ def own_effects(experiment: Experiment) -> list[Effect]:
     ]
     found = {}
     for spec in specs:
-        effect = found_effect(spec, experiment.folder)
+        effect = found_effect(spec, experiment.folder, experiment.data.logged)
         found.setdefault(effect.name, effect)
     return [effect for name, effect in found.items() if name not in vocabulary()]
 
@@ -162,10 +162,7 @@ def tried(view, candidate: Candidate) -> list[dict[str, float]]:
 
 def bounds_of(model: Model, candidate: Candidate) -> list[tuple]:
     """(shape, low, high, angle travelled) of a candidate's shape values."""
-    scales, joint = model.scales, candidate.joint
-    angle = None if joint == ROBOT else float(scales.angle[joint])
-    bounds = lambda s: s.bounds(scales.of(s.of, joint), angle)  # noqa: E731
-    return [(s, *bounds(s), angle) for s in candidate.effect.shapes()]
+    return model.ranges(candidate.effect, candidate.joint)
 
 
 def further(model: Model, candidate: Candidate) -> list[dict[str, float]]:

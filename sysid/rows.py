@@ -126,7 +126,10 @@ def tangents(model: Model, motion: Motion, x, stride: int, use: np.ndarray, midd
 
 def difference_step(value, at: float) -> float:
     """The step of a difference in a shape value, away from the nearer bound."""
-    size = 1e-4 * (abs(at) if value.shape.start is None and at else value.high - value.low)
+    if value.shape.least:
+        size = 1e-4 * max(abs(at), value.shape.least)
+    else:
+        size = 1e-4 * (abs(at) if value.shape.start is None and at else value.high - value.low)
     return size if at + size <= value.high else -size
 
 

@@ -1,0 +1,237 @@
+"""Many places at which to start the search for an effect's shape values, and the profile of the objective over each.
+
+All combinations of the values that are worth trying are tried, or, where these are too many, a Sobol sequence over
+them and then all combinations of each two of them about the best; the best that stand apart are each followed downhill. The profile of one value is the objective at values of it from one
+end of its range to the other with everything else solved for, the other shape values included: what lies lower there
+than where the search ended is followed downhill too.
+
+Source: Marti, Lozano-Duran & Savage, Multi-start methods, Handbook of Heuristics 2018; Raue et al. 2009 (profiles).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import combinations, product
+
+import numpy as np
+
+from . import rows as row
+from .effect import NotFinite, TorqueEffect
+from .landscape import Landscape
+from .model import Model
+from .motion import Motion
+
+_MOST = 8192  # sets that are tried
+ROWS = 1500  # they are tried on
+_FOLLOWED, _LONGER, _FEW = (
+    24,
+    6,
+    8,
+)  # starts followed downhill, those followed to the end, steps before that
+_FOLLOWED_PAIR, _ROUNDS, _BETTER = (
+    6,
+    3,
+    1e-9,
+)  # of each two values; how often, where a share of the objective is gained
+_APART = 0.06  # of a range, or of the list of values tried over it, by which starts differ
+_PROFILED = 25  # values of a profile
+
+
+@dataclass(frozen=True)
+class Searched:
+    """What was done about a shape value: how many sets of values it was started from, at how many its profile was asked for, and
+    whether the profile led to a lower place than the starts."""
+
+    name: str
+    starts: int
+    profile: int
+    lower: bool
+
+
+@dataclass(frozen=True)
+class Place:
+    """Values (K,) of an effect's free shape values, and what the objective falls by there."""
+
+    values: np.ndarray
+    gain: float
+
+
+def places(
+    rough: Landscape, fine: Landscape, tried: list[np.ndarray], begin=()
+) -> tuple[list[Place], int]:
+    """The best places found from many starts, best first and apart from each other, and how many sets were tried.
+
+    Args:
+        rough: the landscape of fewer rows, on which all are tried. fine: that of all rows.
+        tried: for each value those worth trying, ascending. begin: sets of values (K,) that a user, or the model, begins at.
+    """
+    where, sets = _sets(tried)
+    starts = [np.clip(np.asarray(at, dtype=float), fine.low, fine.high) for at in begin]
+    starts += [sets[k] for k in _best(where, rough.gains(sets), _FOLLOWED)]
+    done = _followed(starts, fine, tried)
+    count = len(sets) + len(begin)
+    for _ in range(_ROUNDS if len(tried) > 2 and done else 0):
+        before = done[0].gain
+        for pair in combinations(range(len(tried)), 2):
+            where, two = _sets([tried[k] for k in pair])
+            sets = np.tile(done[0].values, (len(two), 1))
+            sets[:, pair] = two
+            count += len(sets)
+            starts = [sets[k] for k in _best(where, rough.gains(sets), _FOLLOWED_PAIR)]
+            done = _distinct(
+                sorted([*done, *_followed(starts, fine, tried)], key=lambda p: -p.gain), fine
+            )
+        if not done[0].gain > before + _BETTER * fine.objective:
+            break
+    return done, count
+
+
+def _followed(starts: list[np.ndarray], fine: Landscape, tried) -> list[Place]:
+    """Where starts lead, best first: all a few steps, then the best to their ends."""
+    begun = sorted((Place(*fine.descended(at, steps=_FEW)) for at in starts), key=lambda p: -p.gain)
+    done = [_ended(place, fine, tried) for place in _distinct(begun, fine)[:_LONGER]]
+    return _distinct(sorted(done, key=lambda p: -p.gain), fine)
+
+
+def _ended(place: Place, fine: Landscape, tried: list[np.ndarray]) -> Place:
+    at, gain = fine.descended(place.values)
+    # steps along each value find what slopes cannot: a corner, a jump, the next hollow
+    reach = np.array([_gap(own, x) for own, x in zip(tried, at)])
+    further, more = fine.stepped(at, reach)
+    return Place(*fine.descended(further)) if more > gain else Place(at, gain)
+
+
+def _gap(own: np.ndarray, at: float) -> float:
+    """The way from a value to the next of those tried."""
+    away = np.abs(own - at)
+    return float(np.min(away[away > 1e-9 * (np.ptp(own) or 1.0)], initial=np.ptp(own) or 1.0))
+
+
+def _sets(tried: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """Sets of values (B, K), with where (B, K) each stands in its list, from 0 to 1."""
+    lists = list(tried)
+    count = lambda: int(np.prod([len(own) for own in lists]))  # noqa: E731
+    if count() > _MOST and count() <= 2 * _MOST and len(lists) > 1:
+        shortest = min(range(len(lists)), key=lambda k: len(lists[k]))
+        lists[shortest] = lists[shortest][::2]
+    if count() <= _MOST:
+        rank = np.array(list(product(*(np.arange(len(own)) for own in lists))), dtype=float)
+        sets = np.column_stack([own[rank[:, k].astype(int)] for k, own in enumerate(lists)])
+        return rank / np.array([max(1, len(own) - 1) for own in lists]), sets
+    from scipy.stats import qmc
+
+    where = qmc.Sobol(len(tried), scramble=False).random(_MOST)
+    return where, np.column_stack(
+        [np.interp(u * (len(own) - 1), np.arange(len(own)), own) for u, own in zip(where.T, tried)]
+    )
+
+
+def _best(where: np.ndarray, gains: np.ndarray, most: int) -> list[int]:
+    """Sets that gain most and stand apart in their lists."""
+    chosen: list[int] = []
+    apart = np.minimum(
+        _APART, 1.5 / np.maximum(1, [len(np.unique(column)) - 1 for column in where.T])
+    )
+    for k in np.argsort(-gains, kind="stable")[: 40 * most]:
+        if not np.isfinite(gains[k]) or len(chosen) == most:
+            break
+        if all(np.any(np.abs(where[k] - where[j]) > apart) for j in chosen):
+            chosen.append(int(k))
+    return chosen
+
+
+def _distinct(sorted_places: list[Place], fine: Landscape) -> list[Place]:
+    """Without places that are one with a better one."""
+    out: list[Place] = []
+    for place in sorted_places:
+        size = np.maximum(np.abs(place.values), fine.least)
+        if np.isfinite(place.gain) and all(
+            np.any(np.abs(place.values - other.values) > 1e-3 * size) for other in out
+        ):
+            out.append(place)
+    return out
+
+
+def lower_on_profile(
+    fine: Landscape, tried: list[np.ndarray], tolerance: float
+) -> tuple[Place | None, list[int]]:
+    """The lowest place that the profiles lead to, where it is lower than where the model stands by a share `tolerance` of the
+    objective, and at how many values each profile was asked for."""
+    best, counts, here = None, [], float(fine.gains(fine.here[None])[0])
+    for k, own in enumerate(tried):
+        values = _spread(own, fine.here[k])
+        counts.append(len(values))
+        others = np.arange(len(fine.here)) != k
+        for side in (values[values >= fine.here[k]], values[values < fine.here[k]][::-1]):
+            last = fine.here
+            for at in side:
+                place = _along(fine, last, k, at, others)
+                if not np.isfinite(place.gain):
+                    continue
+                last = place.values
+                if place.gain > here + tolerance * fine.objective and (
+                    best is None or place.gain > best.gain
+                ):
+                    best = place
+    return (None if best is None else _ended(best, fine, tried)), counts
+
+
+def _along(fine: Landscape, base: np.ndarray, k: int, at: float, others: np.ndarray) -> Place:
+    """The best place with one value given, sought from a base."""
+    start = np.array(base)
+    start[k] = at
+    if not others.any():
+        return Place(start, float(fine.gains(start[None])[0]))
+    return Place(*fine.descended(start, free=others, steps=_FEW))
+
+
+def _spread(own: np.ndarray, here: float) -> np.ndarray:
+    """Values of a profile, ascending: from those tried, with the ends, closer about where the model stands."""
+    picked = (
+        own[np.unique(np.linspace(0, len(own) - 1, _PROFILED).astype(int))]
+        if len(own) > _PROFILED
+        else own
+    )
+    gap = _gap(own, here)
+    close = here + gap * np.array([-0.5, -0.25, 0.25, 0.5])
+    return np.unique(np.concatenate([picked, close[(close > own[0]) & (close < own[-1])]]))
+
+
+def finite(model: Model, motion: Motion) -> Model:
+    """A model with the shape values of each torque effect where it is a finite number, of those that are tried the one nearest to the
+    middle.
+
+    Raises:
+        NotFinite: there is none.
+    """
+    pieces = row.seen(model, motion)
+    for block in dict.fromkeys((v.term, v.joint) for v in model.shape_values if not v.held):
+        effect, (term, joint) = model.terms[block[0]][0], block
+        own = [
+            k for k, v in enumerate(model.shape_values) if (v.term, v.joint) == block and not v.held
+        ]
+        if not isinstance(effect, TorqueEffect):
+            continue
+        values = [model.shape_values[k] for k in own]
+        where, sets = _sets(
+            [np.asarray(v.shape.values(v.low, v.high), dtype=float) for v in values]
+        )
+        order = np.argsort(np.abs(where - 0.5).sum(1), kind="stable")
+        for at in [[model.shapes[k] for k in own], *sets[order]]:
+            shapes = {
+                **model.shapes_of(term, joint),
+                **{v.shape.name: float(x) for v, x in zip(values, at)},
+            }
+            try:
+                for piece in pieces:
+                    effect.columns(piece, joint, **shapes)
+            except NotFinite as error:
+                refused = error
+                continue
+            model = model.with_shapes(
+                [dict(zip(own, at)).get(k, s) for k, s in enumerate(model.shapes)]
+            )
+            break
+        else:
+            raise refused
+    return model
