@@ -1,12 +1,14 @@
-"""The objective over the shape values of one effect on one joint, everything linear solved for each set of them.
+"""The objective over the shape values of one effect on one joint, everything linear solved for each
+set of them.
 
-About a model that is settled, with the prior's Hessian there, all that is linear answers a change u of one joint's torque
-by -H^-1 2A'u, so that the objective changes by -2r'u + M(u, u)/2 with
+About a model that is settled, with the prior's Hessian there, all that is linear answers a change u
+of one joint's torque by -H^-1 2A'u, so that the objective changes by -2r'u + M(u, u)/2 with
 
     M(u, v) = 2u'v - (2A'u)' H^-1 (2A'v),        H = 2A'A + P,  r the residual.
 
-What a joint's effect makes, C(s) c, is such a change against what it makes now; the best c for each s is least squares
-under M (variable projection; Golub & Pereyra 1973), and hundreds of sets s are asked for in one product of matrices.
+What a joint's effect makes, C(s) c, is such a change against what it makes now; the best c for each
+s is least squares under M (variable projection; Golub & Pereyra 1973), and hundreds of sets s are
+asked for in one product of matrices.
 """
 
 from __future__ import annotations
@@ -29,10 +31,11 @@ _STEPS = 30
 class Landscape:
     """The objective over an effect's free shape values, relative to where the model stands.
 
-    names, low, high, least (K,): of the values that are not held; here (K,) where they stand. `make(values (B, K))` gives
-    the effect's columns (n, B, k), not finite where it has none.
-    positive (k,): which coefficients must not be negative. columns (n, rest): everything else that is linear, in this
-    joint's torque; inverse (rest, rest): H^-1. target (n,): what C(s) is held against. zero: what it makes now is worth.
+    names, low, high, least (K,): of the values that are not held; here (K,) where they stand.
+    `make(values (B, K))` gives the effect's columns (n, B, k), not finite where it has none.
+    positive (k,): which coefficients must not be negative. columns (n, rest): everything else that
+    is linear, in this joint's torque; inverse (rest, rest): H^-1. target (n,): what C(s) is held
+    against. zero: what it makes now is worth.
     """
 
     names: tuple[str, ...]
@@ -50,7 +53,9 @@ class Landscape:
     objective: float
 
     def gains(self, values: np.ndarray) -> np.ndarray:
-        """What the objective falls by (B,) at sets of values (B, K); minus infinity where an effect is no number or would have to be negative."""
+        """What the objective falls by (B,) at sets of values (B, K); minus infinity where an effect
+        is no number or would have to be negative.
+        """
         out, size = [], max(1, _SPACE // (len(self.target) * max(1, len(self.positive))))
         for start in range(0, len(values), size):
             out.append(self._gains(self.make(values[start : start + size])))
@@ -79,7 +84,9 @@ class Landscape:
         return np.where(finite & ~(c[:, self.positive] < 0).any(1), gain, -np.inf)
 
     def slopes(self, at: np.ndarray):
-        """Normal equations (K, K) and (K,) of the values about a place (K,), all that is linear solved for; None where it is no number."""
+        """Normal equations (K, K) and (K,) of the values about a place (K,), all that is linear
+        solved for; None where it is no number.
+        """
         step = 1e-4 * np.maximum(np.abs(at), self.least)
         step = np.where(at + step <= self.high, step, -step)
         made = self.make(np.vstack([at, at + np.diag(step)]))
@@ -137,7 +144,8 @@ class Landscape:
     def stepped(
         self, at: np.ndarray, reach: np.ndarray, *, halvings: int = 12
     ) -> tuple[np.ndarray, float]:
-        """Values and gain after steps along each value in turn, halved where none gains: for what has corners and jumps.
+        """Values and gain after steps along each value in turn, halved where none gains: for what
+        has corners and jumps.
 
         Args:
             reach: (K,) the first step.
@@ -157,7 +165,9 @@ class Landscape:
 
 
 def _scaled(made: np.ndarray):
-    """Which sets (B,) are finite, and their columns (n, B, k) as long as one each, zero where they are not."""
+    """Which sets (B,) are finite, and their columns (n, B, k) as long as one each, zero where they
+    are not.
+    """
     size = np.max(np.abs(made), axis=0)
     finite = np.isfinite(size)
     made = np.where(finite, made, 0.0) / np.where(finite & (size > 0), size, 1.0)
@@ -171,8 +181,10 @@ def landscape(
     """The landscape of a torque effect of a model that is settled.
 
     Args:
-        found: a `shape.Settled`. weights: (joints,) or None. rows: on so many of the rows, drawn from all.
-        pinned: what stands at its bound of zero stays there; otherwise it answers as if it had no bound.
+        found: a `shape.Settled`. weights: (joints,) or None. rows: on so many of the rows, drawn
+        from all.
+        pinned: what stands at its bound of zero stays there; otherwise it answers as if it had no
+        bound.
     """
     model, wanted, rows = found.model, rows, found.rows
     effect = model.terms[term][0]
@@ -218,8 +230,10 @@ def landscape(
     names = tuple(v.shape.name for v in free)
     return Landscape(
         names, *(np.array([getattr(v, end) for v in free]) for end in ("low", "high")),
-        np.array([v.shape.least or 1e-2 * (v.high - v.low) for v in free]), np.array([held[name] for name in names]),
-        _maker(found, motion, effect, joint, names, held, kept), np.array([c.lower == 0 for c in effect.coefficients()], dtype=bool),
+        np.array([v.shape.least or 1e-2 * (v.high - v.low) for v in free]),
+        np.array([held[name] for name in names]),
+        _maker(found, motion, effect, joint, names, held, kept),
+        np.array([c.lower == 0 for c in effect.coefficients()], dtype=bool),
         columns, inverse, target, weight, zero, found.objective,
     )  # fmt: skip
 

@@ -1,11 +1,15 @@
-"""Many places at which to start the search for an effect's shape values, and the profile of the objective over each.
+"""Many places at which to start the search for an effect's shape values, and the profile of the
+objective over each.
 
-All combinations of the values that are worth trying are tried, or, where these are too many, a Sobol sequence over
-them and then all combinations of each two of them about the best; the best that stand apart are each followed downhill. The profile of one value is the objective at values of it from one
-end of its range to the other with everything else solved for, the other shape values included: what lies lower there
-than where the search ended is followed downhill too.
+All combinations of the values that are worth trying are tried, or, where these are too many, a
+Sobol sequence over them and then all combinations of each two of them about the best; the best that
+stand apart are each followed downhill. The profile of one value is the objective at values of it
+from one
+end of its range to the other with everything else solved for, the other shape values included: what
+lies lower there than where the search ended is followed downhill too.
 
-Source: Marti, Lozano-Duran & Savage, Multi-start methods, Handbook of Heuristics 2018; Raue et al. 2009 (profiles).
+Source: Marti, Lozano-Duran & Savage, Multi-start methods, Handbook of Heuristics 2018; Raue et al.
+2009 (profiles).
 """
 
 from __future__ import annotations
@@ -39,8 +43,8 @@ _PROFILED = 25  # values of a profile
 
 @dataclass(frozen=True)
 class Searched:
-    """What was done about a shape value: how many sets of values it was started from, at how many its profile was asked for, and
-    whether the profile led to a lower place than the starts."""
+    """What was done about a shape value: how many sets of values it was started from, at how many
+    its profile was asked for, and whether the profile led to a lower place than the starts."""
 
     name: str
     starts: int
@@ -59,11 +63,13 @@ class Place:
 def places(
     rough: Landscape, fine: Landscape, tried: list[np.ndarray], begin=()
 ) -> tuple[list[Place], int]:
-    """The best places found from many starts, best first and apart from each other, and how many sets were tried.
+    """The best places found from many starts, best first and apart from each other, and how many
+    sets were tried.
 
     Args:
         rough: the landscape of fewer rows, on which all are tried. fine: that of all rows.
-        tried: for each value those worth trying, ascending. begin: sets of values (K,) that a user, or the model, begins at.
+        tried: for each value those worth trying, ascending. begin: sets of values (K,) that a user,
+        or the model, begins at.
     """
     where, sets = _sets(tried)
     starts = [np.clip(np.asarray(at, dtype=float), fine.low, fine.high) for at in begin]
@@ -155,8 +161,8 @@ def _distinct(sorted_places: list[Place], fine: Landscape) -> list[Place]:
 def lower_on_profile(
     fine: Landscape, tried: list[np.ndarray], tolerance: float
 ) -> tuple[Place | None, list[int]]:
-    """The lowest place that the profiles lead to, where it is lower than where the model stands by a share `tolerance` of the
-    objective, and at how many values each profile was asked for."""
+    """The lowest place that the profiles lead to, where it is lower than where the model stands by
+    a share `tolerance` of the objective, and at how many values each profile was asked for."""
     best, counts, here = None, [], float(fine.gains(fine.here[None])[0])
     for k, own in enumerate(tried):
         values = _spread(own, fine.here[k])
@@ -186,7 +192,9 @@ def _along(fine: Landscape, base: np.ndarray, k: int, at: float, others: np.ndar
 
 
 def _spread(own: np.ndarray, here: float) -> np.ndarray:
-    """Values of a profile, ascending: from those tried, with the ends, closer about where the model stands."""
+    """Values of a profile, ascending: from those tried, with the ends, closer about where the model
+    stands.
+    """
     picked = (
         own[np.unique(np.linspace(0, len(own) - 1, _PROFILED).astype(int))]
         if len(own) > _PROFILED
@@ -198,8 +206,8 @@ def _spread(own: np.ndarray, here: float) -> np.ndarray:
 
 
 def finite(model: Model, motion: Motion) -> Model:
-    """A model with the shape values of each torque effect where it is a finite number, of those that are tried the one nearest to the
-    middle.
+    """A model with the shape values of each torque effect where it is a finite number, of those
+    that are tried the one nearest to the middle.
 
     Raises:
         NotFinite: there is none.

@@ -1,4 +1,6 @@
-"""What the linear parameters of a model leave of a column: least squares with the prior, on rows that stand in memory."""
+"""What the linear parameters of a model leave of a column: least squares with the prior, on rows
+that stand in memory.
+"""
 
 from __future__ import annotations
 
@@ -15,17 +17,21 @@ def prior_hessian(found) -> np.ndarray:
 
 
 class Projection:
-    """What the linear parameters leave of a signature: least squares with the prior, the same for every candidate."""
+    """What the linear parameters leave of a signature: least squares with the prior, the same for
+    every candidate.
+    """
 
     def __init__(self, columns, residual, hessian, weights, positive=None):
-        """columns (dof, n, size), residual (n, dof) at the optimum, hessian (size, size) of the prior, weights (dof,); positive:
-        {parameter: value at the optimum} of those that must not fall below zero."""
+        """columns (dof, n, size), residual (n, dof) at the optimum, hessian (size, size) of the
+        prior, weights (dof,); positive: {parameter: value at the optimum} of those that must not
+        fall below zero."""
         self.columns, self.residual, self.weights = columns, residual, np.asarray(weights)
         self.positive = dict(positive or {})
         self._system = sum(2.0 * w**2 * a.T @ a for w, a in zip(self.weights, columns)) + hessian
         self.inverse = inverted(self._system)
         self._inverses: dict[tuple[int, ...], np.ndarray] = {}
-        # where a parameter is held at zero the objective still falls away from it: it is no stationary point
+        # where a parameter is held at zero the objective still falls away from it: it is no
+        # stationary point
         self._pull = np.zeros(len(self._system))
         for k in self.positive:
             self._pull[k] = sum(
@@ -44,8 +50,9 @@ class Projection:
         """Least squares when columns (n, k) of a joint, or (dof, n, k) of the robot, come in.
 
         Returns:
-            their coefficients c (k,); the change (size,) of everything else; what everything else absorbs of them (size, k);
-            what the objective falls by; which share (k,) of each column's square everything else cannot absorb.
+            their coefficients c (k,); the change (size,) of everything else; what everything else
+            absorbs of them (size, k); what the objective falls by; which share (k,) of each
+            column's square everything else cannot absorb.
         """
         cross, square, right = 0.0, 0.0, 0.0
         for j in range(len(self.weights)) if columns.ndim == 3 else [joint]:
@@ -60,7 +67,8 @@ class Projection:
         visible = np.clip(np.diagonal(system), 0.0, None) / np.where(size > 0, size, 1.0)
         pinned, gone, inverse = (), np.zeros(len(self._system)), self.inverse
         for _ in range(len(self.positive) + 1):
-            # the least of 1/2 d'Hd - pull'd + d'Xc + 1/2 c'Sc - right'c, with the pinned d taking their parameters to zero
+            # the least of 1/2 d'Hd - pull'd + d'Xc + 1/2 c'Sc - right'c, with the pinned d taking
+            # their parameters to zero
             base = inverse @ (self._pull + self._system @ gone)
             c = inverted(system) @ (right + cross.T @ gone - cross.T @ base)
             change = base - absorbed @ c - gone

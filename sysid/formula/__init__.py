@@ -1,7 +1,7 @@
 """A user's formula -> a torque effect: `a*sin(3*q) + b*qd**3` on the joints that it is given.
 
-`text` parses and checks it, `words` finds mistyped names in it, `ranges` works out where the values inside it can
-be found, `effect` makes columns of it.
+`text` parses and checks it, `words` finds mistyped names in it, `ranges` works out where the values
+inside it can be found, `effect` makes columns of it.
 """
 
 from .effect import Formula

@@ -9,8 +9,10 @@ import numpy as np
 
 from ..effect import Linear, NotFinite, Shape, TorqueEffect, called, vocabulary
 from ..motion import Piece
-from .ranges import Range, ranges
-from .text import OTHER, culprit, names_of, parse, refused, value
+from .ranges import ranges
+from .search_range import Range
+from .text import OTHER, parse, refused
+from .tree import culprit, names_of, value
 from .words import near
 
 
@@ -108,7 +110,9 @@ class Formula(TorqueEffect):
         return out
 
     def _columns(self, motion: Piece, joint: int, shapes: dict) -> np.ndarray:
-        """(k, n): linear in its coefficients and nothing left over, so the column of one is the formula with this one alone."""
+        """(k, n): linear in its coefficients and nothing left over, so the column of one is the
+        formula with this one alone.
+        """
         known, linear = self._known(motion, joint), self.parsed.linear
         out = np.empty((len(linear), len(motion.t)))
         with np.errstate(all="ignore"):

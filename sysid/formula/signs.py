@@ -1,45 +1,48 @@
-"""Which values inside a formula need both signs: those whose turning changes the columns by more than a factor."""
+"""Which values inside a formula need both signs: those whose turning changes the columns by more
+than a factor."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
 
+from .search_range import Range
 
-def one_sided(found: dict, columns: Callable[[dict], np.ndarray]) -> dict:
+_POINTS, _WITH = 6, 5  # places at which a sign is turned; other values turned with it, at most
+
+
+def one_sided(found: dict[str, Range], columns: Callable[[dict], np.ndarray]) -> dict[str, Range]:
     """Ranges by name without the negative half of values that lose nothing by it.
 
     Args:
-        columns: called with values by name, gives the formula's columns (k, n), not finite where it cannot.
+        columns: called with values by name, gives the formula's columns (k, n), not finite where
+            it cannot.
     """
-    both = [name for name, r in found.items() if r.low == -r.high and r.spacing != "even"]
-    turned = [name for name, r in found.items() if r.low == -r.high]
     rng = np.random.default_rng(0)
-    points = [{name: float(rng.choice(r.tried)) for name, r in found.items()} for _ in range(6)]
+    points = [{n: float(rng.choice(r.tried)) for n, r in found.items()} for _ in range(_POINTS)]
     out = dict(found)
-    for name in both:
-        others = [n for n in turned if n != name and out[n].low == -out[n].high][:5]
-        patterns = [
-            (name, *extra)
-            for count in range(len(others) + 1)
-            for extra in combinations(others, count)
-        ]
-        if any(all(_alike(columns, at, pattern) for at in points) for pattern in patterns):
-            own = tuple(at for at in out[name].tried if at > 0)
-            out[name] = replace(out[name], low=min(own), tried=own)
+    mirrored = lambda name: out[name].low == -out[name].high  # noqa: E731
+    for name in found:
+        if not mirrored(name) or out[name].spacing == "even":
+            continue
+        others = [n for n in found if n != name and mirrored(n)][:_WITH]
+        sets = [(name, *more) for k in range(len(others) + 1) for more in combinations(others, k)]
+        if any(all(_alike(columns, at, turned) for at in points) for turned in sets):
+            out[name] = out[name].positive()
     return out
 
 
-def _alike(columns, at: dict, pattern) -> bool:
-    """Whether turning the signs of some values leaves the columns what they were, but for a factor each."""
+def _alike(columns, at: dict, turned) -> bool:
+    """Whether turning the signs of some values leaves the columns what they were, but for a factor
+    each."""
     with np.errstate(all="ignore"):
-        one, other = columns(at), columns({**at, **{name: -at[name] for name in pattern}})
-    if not (np.isfinite(one).all() and np.isfinite(other).all()):
-        return bool((np.isfinite(one) == np.isfinite(other)).all() and not np.isfinite(one).all())
+        one, other = columns(at), columns({**at, **{name: -at[name] for name in turned}})
+    finite = np.isfinite(one).all(), np.isfinite(other).all()
+    if not all(finite):
+        return not any(finite)
     size = lambda x: np.max(np.abs(x), axis=-1, keepdims=True)  # noqa: E731
     a, b = (x / np.where(size(x) > 0, size(x), 1.0) for x in (one, other))
-    cross = np.abs(np.sum(a * b, axis=-1))
-    return bool(np.all(cross >= (1.0 - 1e-9) * np.sqrt(np.sum(a**2, -1) * np.sum(b**2, -1))))
+    norms = np.sqrt(np.sum(a**2, -1) * np.sum(b**2, -1))
+    return bool(np.all(np.abs(np.sum(a * b, axis=-1)) >= (1.0 - 1e-9) * norms))

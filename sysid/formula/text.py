@@ -1,8 +1,9 @@
 """A formula's text -> its tree, checked, with what is to be found in it.
 
-The text is parsed, every piece of the tree is compared with a list of what is allowed, and the tree is then worked out
-here over arrays; it is never run as code. Names that are no variable are what is to be found: those that multiply a
-term become linear coefficients, those inside a function, a divisor or a power become shape values.
+The text is parsed, every piece of the tree is compared with a list of what is allowed, and the tree
+is then worked out here over arrays; it is never run as code. Names that are no variable are what is
+to be found: those that multiply a term become linear coefficients, those inside a function, a
+divisor or a power become shape values.
 """
 
 from __future__ import annotations
@@ -16,15 +17,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import ConfigError
+from .tree import OPERATIONS, names_of, operands, terms
 from .words import FUNCTIONS, VARIABLES, mistyped, near
 
-_OPERATIONS = {
-    ast.Add: np.add,
-    ast.Sub: np.subtract,
-    ast.Mult: np.multiply,
-    ast.Div: np.divide,
-    ast.Pow: np.power,
-}
 _LONGEST, _DEEPEST, _POWER = 500, 50, 20
 OTHER = re.compile(r"(q|qd|qdd)_(\w+)")
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9]*(_[A-Za-z0-9]+)*")
@@ -33,7 +28,9 @@ _KEYS = ("formula", "joints", "name", "options")
 
 @dataclass(frozen=True)
 class Parsed:
-    """A formula's tree, its coefficients, its shape values, and the other joints' variables and the logged signals in it."""
+    """A formula's tree, its coefficients, its shape values, and the other joints' variables and the
+    logged signals in it.
+    """
 
     tree: ast.expr
     linear: tuple[str, ...]
@@ -80,7 +77,8 @@ def parse(text: str, signals: Iterable[str] = ()) -> Parsed:
     for term in terms(tree):
         if () in _products(term, set(linear)):
             raise refused(
-                f"the term {shown(term)} has no coefficient in front: a constant cannot be identified",
+                f"the term {shown(term)} has no coefficient in front:"
+                " a constant cannot be identified",
                 do=f"write c*({shown(term)})",
             )
     for node in _outermost(tree):
@@ -89,17 +87,12 @@ def parse(text: str, signals: Iterable[str] = ()) -> Parsed:
                 dict.fromkeys(w for n in own & set(inner) for w in near(n, [*VARIABLES, *signals]))
             )
             raise refused(
-                f"{shown(node)} in the formula holds nothing that changes: {' and '.join(sorted(own))} would be to be found",
+                f"{shown(node)} in the formula holds nothing that changes:"
+                f" {' and '.join(sorted(own))}"
+                " would be to be found",
                 allowed=", ".join(close) or ", ".join(VARIABLES),
             )
     return Parsed(tree, linear, inner, others, logged)
-
-
-def names_of(node: ast.expr) -> set[str]:
-    """The names in a tree, but not its functions'."""
-    if isinstance(node, ast.Name):
-        return {node.id}
-    return set().union(*(names_of(part) for part in operands(node)))
 
 
 def _outermost(node: ast.expr) -> list[ast.expr]:
@@ -166,7 +159,7 @@ def _checked(tree: ast.expr) -> list[str]:
         node, depth = waiting.pop()
         if depth > _DEEPEST:
             raise refused("a formula too deeply nested", allowed=f"{_DEEPEST} levels")
-        if isinstance(node, ast.BinOp) and type(node.op) in _OPERATIONS:
+        if isinstance(node, ast.BinOp) and type(node.op) in OPERATIONS:
             if isinstance(node.op, ast.Pow):
                 _check_power(node.right)
             # a chain of sums or products leans to the left and is one level
@@ -248,13 +241,6 @@ def _inside(node: ast.expr, within: bool = False) -> set[str]:
     )
 
 
-def terms(node: ast.expr) -> list[ast.expr]:
-    """The terms of a sum."""
-    if isinstance(node, ast.BinOp) and isinstance(node.op, (ast.Add, ast.Sub)):
-        return terms(node.left) + terms(node.right)
-    return terms(node.operand) if isinstance(node, ast.UnaryOp) else [node]
-
-
 def _products(node: ast.expr, linear: set[str]) -> set[tuple[str, ...]]:
     """The coefficients that multiply each term of a tree, written out as a sum of products."""
     if isinstance(node, ast.Name):
@@ -276,38 +262,3 @@ def _products(node: ast.expr, linear: set[str]) -> set[tuple[str, ...]]:
             allowed=f"one coefficient a term, and the variables {', '.join(VARIABLES)}",
         )
     return both
-
-
-def operands(node: ast.expr) -> list[ast.expr]:
-    """The parts of a piece of a tree."""
-    if isinstance(node, ast.BinOp):
-        return [node.left, node.right]
-    return (
-        [node.operand]
-        if isinstance(node, ast.UnaryOp)
-        else node.args
-        if isinstance(node, ast.Call)
-        else []
-    )
-
-
-def value(node: ast.expr, known: dict):
-    """What a tree is worth, with the names' values."""
-    if isinstance(node, ast.Constant):
-        return float(node.value)
-    if isinstance(node, ast.Name):
-        return known[node.id]
-    parts = [value(part, known) for part in operands(node)]
-    if isinstance(node, ast.UnaryOp):
-        return np.negative(parts[0]) if isinstance(node.op, ast.USub) else parts[0]
-    return (FUNCTIONS[node.func.id] if isinstance(node, ast.Call) else _OPERATIONS[type(node.op)])(
-        *parts
-    )
-
-
-def culprit(node: ast.expr, known: dict) -> ast.expr:
-    """The smallest part of a tree that is not finite."""
-    for part in operands(node):
-        if not np.isfinite(value(part, known)).all():
-            return culprit(part, known)
-    return node

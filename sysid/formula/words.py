@@ -1,12 +1,13 @@
 """The words of a formula, and what looks like one of them mistyped.
 
-A name that is no word of this list is a value to be found, so a mistyped word would be fitted without
-a sound. What a slip looks like, and is refused with the names it may have meant:
+A name that is no word of this list is a value to be found, so a mistyped word would be fitted
+without a sound. What a slip looks like, and is refused with the names it may have meant:
 
 - another case (`Q`, `Load`); but `T` beside `t` is a time constant, so where the word itself stands
   in the formula too the two are meant to be different;
-- a letter doubled or two neighbours exchanged (`tauu`, `dq`), and in words of four letters or more one
-  letter more, less or other (`lod`, `sigm`): of shorter words that makes names which people mean;
+- a letter doubled or two neighbours exchanged (`tauu`, `dq`), and in words of four letters or more
+  one letter more, less or other (`lod`, `sigm`): of shorter words that makes names which people
+  mean;
 - a word with a number (`qdd1`), unless it is added to that word or taken from it: `q0` in `q - q0`;
 - what other programs call these things (`qdot`, `velocity`, `sgn`).
 """
@@ -20,11 +21,13 @@ from collections.abc import Iterable
 import numpy as np
 
 FUNCTIONS = {
-    "sin": np.sin, "cos": np.cos, "tan": np.tan, "exp": np.exp, "log": np.log, "sqrt": np.sqrt, "abs": np.abs, "sign": np.sign,
-    "tanh": np.tanh, "sinh": np.sinh, "cosh": np.cosh, "atan": np.arctan, "min": np.minimum, "max": np.maximum,
+    "sin": np.sin, "cos": np.cos, "tan": np.tan, "exp": np.exp, "log": np.log,
+    "sqrt": np.sqrt, "abs": np.abs, "sign": np.sign, "tanh": np.tanh, "sinh": np.sinh,
+    "cosh": np.cosh, "atan": np.arctan, "min": np.minimum, "max": np.maximum,
 }  # fmt: skip
 VARIABLES = {
-    "q": "position", "qd": "velocity", "qdd": "acceleration", "s": "sign of the velocity", "t": "time [s]", "pi": "3.14159",
+    "q": "position", "qd": "velocity", "qdd": "acceleration",
+    "s": "sign of the velocity", "t": "time [s]", "pi": "3.14159",
     "load": "torque that the bodies need", "tau_load": "the same",
 }  # fmt: skip
 # measured torque, which no formula may use, is still a word that may be mistyped
@@ -37,7 +40,8 @@ _ELSEWHERE = {
     "qdd": ("qddot", "q_ddot", "ddq", "qpp", "acc", "acceleration", "qacc"),
     "t": ("time",),
     "load": ("torque_load",),
-    "sign": ("sgn", "signum"), "atan": ("arctan",), "log": ("ln",), "abs": ("fabs",), "max": ("maximum",), "min": ("minimum",),
+    "sign": ("sgn", "signum"), "atan": ("arctan",), "log": ("ln",), "abs": ("fabs",),
+    "max": ("maximum",), "min": ("minimum",),
 }  # fmt: skip
 _MEANT = {alias: word for word, aliases in _ELSEWHERE.items() for alias in aliases}
 
