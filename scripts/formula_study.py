@@ -85,7 +85,7 @@ def drawn(rng: np.random.Generator, kind: str, signals: dict) -> float:
         "place": lambda: rng.uniform(low, high), "width": lambda: share * (sign if kind.startswith("signed") else 1.0) * span,
         "rate": lambda: sign * rng.uniform(0.5, 4.0) / size, "steep": lambda: rng.uniform(1.0, 20.0) / size, "shift": lambda: rng.uniform(-3, 3),
         "cycles": lambda: 2.0 * np.pi * rng.uniform(1.5, 12.0) / span, "phase": lambda: rng.uniform(-np.pi, np.pi), "power": lambda: rng.uniform(0.3, 3.0),
-        "low": lambda: rng.uniform(0.8, 0.1) * low, "high": lambda: rng.uniform(0.1, 0.8) * high,
+        "low": lambda: rng.uniform(0.1, 0.8) * low, "high": lambda: rng.uniform(0.1, 0.8) * high,
     }[kind_]()  # fmt: skip
 
 

@@ -98,10 +98,11 @@ def called(value, name: str):
 
 @dataclass(frozen=True)
 class Asked:
-    """What a user says of where to search a shape value: where to begin, and between which bounds."""
+    """What a user says of a shape value: the value itself, or where the search for it begins, and between which bounds it is."""
 
     start: float | None = None
     within: tuple[float, float] | None = None
+    held: float | None = None
 
 
 class NotFinite(ConfigError):
@@ -119,7 +120,7 @@ class Effect(ABC):
     elementwise: each row of its columns follows from the joint's own q, qd, qdd and load in that row, and shape values may
         be arrays along the rows: joints can then be treated as samples of one joint.
     given_coefficients: {name: value} of those that the user says.
-    asked: {shape value: where the user wants it searched}.
+    asked: {shape value: what the user says of it}.
     """
 
     name: ClassVar[str]

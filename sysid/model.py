@@ -191,7 +191,8 @@ class Model:
 
     def with_effect(self, effect: Effect, joints: tuple[int, ...]) -> Model:
         """The model with one more effect; its shape values start where they do nothing, or midway."""
-        grown = replace(self, terms=(*self.terms, (effect, joints)))
+        held = (*self.held, *_holds(len(self.terms), effect, joints).items())
+        grown = replace(self, terms=(*self.terms, (effect, joints)), held=held)
         return replace(grown, shapes=(*self.shapes, *initial(grown)[len(self.shapes) :]))
 
     def without(self, name: str, joint: int) -> Model:
@@ -461,10 +462,7 @@ def build(robot: Robot, effects, folder: Path = Path(), signals=()) -> Model:
             effect = effect.bound(robot, joint)
             if is_own(spec.name):
                 own_effects.check(effect, robot, joint)
-        words = {shape.name: shape for shape in effect.shapes()}
-        for word, value in spec.options.items():
-            if word in words and not isinstance(value, dict):
-                held |= {(len(terms), joint, word): _number(effect, word, value) for joint in joints}
+        held |= _holds(len(terms), effect, joints)
         terms.append((effect, tuple(joints)))
     made = Model(robot, tuple(terms), held=tuple(held.items()))
     return made.with_shapes(initial(made))
@@ -490,7 +488,7 @@ def found(spec, folder: Path = Path(), signals=()) -> Effect:
     shapes = {shape.name: shape for shape in chosen.shapes()}
     if idle := sorted(words & set(own) - set(shapes)):
         raise ConfigError(f"model.effects: {effect.name} with these options has no {idle[0]}", do="leave it out")
-    asked = {name: _asked(effect, shapes[name], value) for name, value in own.items() if name in shapes and isinstance(value, dict)}
+    asked = {name: _asked(effect, shapes[name], value) for name, value in own.items() if name in shapes}
     if asked:
         vars(chosen)["asked"] = asked
     if "formula" in spec.options or is_own(spec.name):
@@ -507,8 +505,15 @@ def _number(effect: Effect, word: str, value) -> float:
     return float(value)
 
 
-def _asked(effect: Effect, shape: Shape, value: dict) -> Asked:
-    """What an entry says of where to search a shape value."""
+def _holds(term: int, effect: Effect, joints) -> dict[tuple[int, int, str], float]:
+    """{(term, joint, name): value} of the shape values that the user gives."""
+    return {(term, joint, word): asked.held for word, asked in effect.asked.items() if asked.held is not None for joint in joints}
+
+
+def _asked(effect: Effect, shape: Shape, value) -> Asked:
+    """What an entry says of a shape value."""
+    if not isinstance(value, dict):
+        return Asked(held=_number(effect, shape.name, value))
     where = f"model.effects: {effect.name}.{shape.name}"
     if not value or set(value) - {"start", "within"}:
         odd = sorted(map(str, set(value) - {"start", "within"}))

@@ -2,11 +2,11 @@
 objective over each.
 
 All combinations of the values that are worth trying are tried, or, where these are too many, a
-Sobol sequence over them and then all combinations of each two of them about the best; the best that
-stand apart are each followed downhill. The profile of one value is the objective at values of it
-from one
-end of its range to the other with everything else solved for, the other shape values included: what
-lies lower there than where the search ended is followed downhill too.
+Sobol sequence over them and then all combinations of each two of them about the best. Those that
+are better than all about them are followed downhill, the best first. The profile of one value is
+the objective at values of it from one end of its range to the other with everything else solved
+for, the other shape values included: what lies lower there than where the search ended is followed
+downhill too.
 
 Source: Marti, Lozano-Duran & Savage, Multi-start methods, Handbook of Heuristics 2018; Raue et al.
 2009 (profiles).
@@ -27,17 +27,11 @@ from .motion import Motion
 
 _MOST = 8192  # sets that are tried
 ROWS = 1500  # they are tried on
-_FOLLOWED, _LONGER, _FEW = (
-    24,
-    6,
-    8,
-)  # starts followed downhill, those followed to the end, steps before that
-_FOLLOWED_PAIR, _ROUNDS, _BETTER = (
-    6,
-    3,
-    1e-9,
-)  # of each two values; how often, where a share of the objective is gained
-_APART = 0.06  # of a range, or of the list of values tried over it, by which starts differ
+_FOLLOWED, _FOLLOWED_PAIR = 24, 6  # starts followed downhill, of all values and of each two
+_FEW, _LONGER = 8, 6  # steps that each is followed, and how many are followed to their ends
+_ROUNDS, _BETTER = 3, 1e-9  # of pairs, as long as so large a share of the objective is gained
+_APART = 1.5  # steps between values tried, by which starts differ
+_AROUND = 27  # sets tried about each, of which the best is a start
 _PROFILED = 25  # values of a profile
 
 
@@ -68,8 +62,8 @@ def places(
 
     Args:
         rough: the landscape of fewer rows, on which all are tried. fine: that of all rows.
-        tried: for each value those worth trying, ascending. begin: sets of values (K,) that a user,
-        or the model, begins at.
+        tried: for each value those worth trying, ascending. begin: sets of values (K,) that a
+            user, or the model, begins at.
     """
     where, sets = _sets(tried)
     starts = [np.clip(np.asarray(at, dtype=float), fine.low, fine.high) for at in begin]
@@ -93,10 +87,11 @@ def places(
 
 
 def _followed(starts: list[np.ndarray], fine: Landscape, tried) -> list[Place]:
-    """Where starts lead, best first: all a few steps, then the best to their ends."""
+    """Where starts lead, best first: all a few steps, the best of these to their ends."""
     begun = sorted((Place(*fine.descended(at, steps=_FEW)) for at in starts), key=lambda p: -p.gain)
-    done = [_ended(place, fine, tried) for place in _distinct(begun, fine)[:_LONGER]]
-    return _distinct(sorted(done, key=lambda p: -p.gain), fine)
+    done = [Place(*fine.descended(p.values)) for p in _distinct(begun, fine)[:_LONGER]]
+    done = _distinct(sorted(done, key=lambda p: -p.gain), fine)
+    return [_ended(done[0], fine, tried), *done[1:]] if done else done
 
 
 def _ended(place: Place, fine: Landscape, tried: list[np.ndarray]) -> Place:
@@ -114,34 +109,39 @@ def _gap(own: np.ndarray, at: float) -> float:
 
 
 def _sets(tried: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    """Sets of values (B, K), with where (B, K) each stands in its list, from 0 to 1."""
+    """Sets of values (B, K), with where (B, K) they stand in their lists, in steps from one to the
+    next."""
     lists = list(tried)
     count = lambda: int(np.prod([len(own) for own in lists]))  # noqa: E731
-    if count() > _MOST and count() <= 2 * _MOST and len(lists) > 1:
+    if _MOST < count() <= 2 * _MOST and len(lists) > 1:
         shortest = min(range(len(lists)), key=lambda k: len(lists[k]))
         lists[shortest] = lists[shortest][::2]
     if count() <= _MOST:
-        rank = np.array(list(product(*(np.arange(len(own)) for own in lists))), dtype=float)
-        sets = np.column_stack([own[rank[:, k].astype(int)] for k, own in enumerate(lists)])
-        return rank / np.array([max(1, len(own) - 1) for own in lists]), sets
+        rank = np.array(list(product(*(range(len(own)) for own in lists))))
+        return rank, np.column_stack([own[rank[:, k]] for k, own in enumerate(lists)])
     from scipy.stats import qmc
 
     where = qmc.Sobol(len(tried), scramble=False).random(_MOST)
-    return where, np.column_stack(
-        [np.interp(u * (len(own) - 1), np.arange(len(own)), own) for u, own in zip(where.T, tried)]
-    )
+    place = [u * (len(own) - 1) for u, own in zip(where.T, tried)]
+    sets = [np.interp(x, np.arange(len(own)), own) for x, own in zip(place, tried)]
+    return where * _MOST ** (1.0 / len(tried)), np.column_stack(sets)
 
 
 def _best(where: np.ndarray, gains: np.ndarray, most: int) -> list[int]:
-    """Sets that gain most and stand apart in their lists."""
+    """Sets that gain more than all about them, best first; then others that stand apart."""
+    from scipy.spatial import cKDTree
+
+    gains = np.where(np.isfinite(gains), gains, -np.inf)
+    count = min(_AROUND, 3 ** where.shape[1], len(where))
+    _, about = cKDTree(where).query(where, k=count, p=np.inf)
+    tops = gains >= gains[about.reshape(len(where), count)].max(1)
+    order = np.argsort(-gains, kind="stable")
     chosen: list[int] = []
-    apart = np.minimum(
-        _APART, 1.5 / np.maximum(1, [len(np.unique(column)) - 1 for column in where.T])
-    )
-    for k in np.argsort(-gains, kind="stable")[: 40 * most]:
-        if not np.isfinite(gains[k]) or len(chosen) == most:
+    for k in [*order[tops[order]], *order[: 40 * most]]:
+        if len(chosen) == most:
             break
-        if all(np.any(np.abs(where[k] - where[j]) > apart) for j in chosen):
+        apart = (np.abs(where[k] - where[j]).max() > _APART for j in chosen)
+        if np.isfinite(gains[k]) and all(apart):
             chosen.append(int(k))
     return chosen
 

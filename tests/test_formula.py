@@ -304,6 +304,36 @@ def test_other_effects_are_searched_where_the_user_says(experiment, cli):
     assert given["stribeck.elbow.vs"]["range"] == [0.3, 0.4] and given["delay.elbow.d"]["range"] == [-0.001, 0.002]
 
 
+def test_a_candidate_is_questioned_where_it_can_be_found(experiment, cli):
+    """Its values are placed as in a fit; what is held stays so, in the model and in the command; what is no number at most values says nothing."""
+    import json
+
+    candidates = [{**FORMULA, "w": 0.12}, {"formula": "g*log(q-b)", "name": "odd"}]
+    config = {"model.candidates": candidates, "data.train": ["train.csv"], "data.test": ["test.csv"]}
+    said = json.loads(cli("diagnose", experiment(config=config, train=bump, test=bump), "--json").out)
+    best = next(f for f in said["findings"] if f["joint"] == "elbow")
+    assert best["effect"] == "formula" and abs(best["parameters"]["formula.elbow.q0"]["value"] + 0.23) < 0.02
+    assert "--option w=0.12" in best["command"] and best["parameters"]["formula.elbow.w"]["value"] == 0.12
+
+
+def test_add_takes_start_and_within(experiment, cli):
+    import shlex
+
+    folder = experiment(train=bump, test=bump)
+    options = ["formula=h*exp(-((q-q0)/w)**2)", "q0={start: 0.1, within: [-1, 1]}"]
+    said = cli("add", folder, "formula", "--joint", "elbow", *(word for option in options for word in ("--option", option)))
+    assert said.status == 0, said.err
+    entry = pipeline.load(folder).model.effects[-1]
+    assert entry.options["q0"] == {"start": 0.1, "within": [-1, 1]}
+    from sysid.addition import command
+
+    words = shlex.split(command(folder / "config.yaml", "formula", ["elbow"], entry.options))
+    from sysid.loop import options as read
+
+    given = read([word for before, word in zip(words, words[1:]) if before == "--option"])
+    assert given == entry.options
+
+
 # ---- through the experiment file
 
 
