@@ -1,10 +1,11 @@
 """The objective over the shape values of one effect on one joint, everything linear solved for each
 set of them.
 
-About a model that is settled, with the prior's Hessian there, all that is linear answers a change u
-of one joint's torque by -H^-1 2A'u, so that the objective changes by -2r'u + M(u, u)/2 with
+About a model that is settled, with the prior's Hessian P there, all that is linear answers a change
+u of one joint's torque, in units of 1/sqrt(2 w^2), by -H^-1 A'u, so that the objective changes by
+-r'u + M(u, u)/2 with
 
-    M(u, v) = 2u'v - (2A'u)' H^-1 (2A'v),        H = 2A'A + P,  r the residual.
+    M(u, v) = u'v - (B'u)'(B'v),        H = A'A + P,  BB' = A H^-1 A',  r the residual.
 
 What a joint's effect makes, C(s) c, is such a change against what it makes now; the best c for each
 s is least squares under M (variable projection; Golub & Pereyra 1973), and hundreds of sets s are
@@ -24,6 +25,7 @@ from .projection import inverted, prior_hessian
 
 _SPACE = 4_000_000  # numbers in one batch of columns
 _VISIBLE = 1e-9  # of a column's square, what rounding leaves of one that all else makes
+_FLAT = 1e-9  # of the greatest singular value, in columns as long as one each
 _STEPS = 30
 
 
@@ -32,10 +34,9 @@ class Landscape:
     """The objective over an effect's free shape values, relative to where the model stands.
 
     names, low, high, least (K,): of the values that are not held; here (K,) where they stand.
-    `make(values (B, K))` gives the effect's columns (n, B, k), not finite where it has none.
-    positive (k,): which coefficients must not be negative. columns (n, rest): everything else that
-    is linear, in this joint's torque; inverse (rest, rest): H^-1. target (n,): what C(s) is held
-    against. zero: what it makes now is worth.
+    `make(values (B, K))` gives the effect's columns (n, B, k) in the units above, not finite where
+    it has none. positive (k,): which coefficients must not be negative. basis (n, r): B. target
+    (n,): what C(s) c is held against. zero: what the effect makes now is worth.
     """
 
     names: tuple[str, ...]
@@ -45,68 +46,50 @@ class Landscape:
     here: np.ndarray
     make: Callable[[np.ndarray], np.ndarray]
     positive: np.ndarray
-    columns: np.ndarray
-    inverse: np.ndarray
+    basis: np.ndarray
     target: np.ndarray
-    weight: float
     zero: float
     objective: float
 
     def gains(self, values: np.ndarray) -> np.ndarray:
         """What the objective falls by (B,) at sets of values (B, K); minus infinity where an effect
-        is no number or would have to be negative.
-        """
-        out, size = [], max(1, _SPACE // (len(self.target) * max(1, len(self.positive))))
-        for start in range(0, len(values), size):
-            out.append(self._gains(self.make(values[start : start + size])))
-        return np.concatenate(out) if out else np.zeros(0)
+        is no number or would have to be negative."""
+        size = max(1, _SPACE // (len(self.target) * max(1, len(self.positive))))
+        parts = [values[start : start + size] for start in range(0, len(values), size)]
+        return np.concatenate([self._gains(self.make(own)) for own in parts] or [np.zeros(0)])
 
     def _gains(self, made: np.ndarray) -> np.ndarray:
-        n, count, k = made.shape
-        finite, scale = _scaled(made)
-        flat = scale.reshape(n, count * k)
-        cross = 2.0 * self.weight * self.columns.T @ flat
-        absorbed = (self.inverse @ cross).reshape(-1, count, k)
-        system = 2.0 * self.weight * np.einsum("nbi,nbj->bij", scale, scale) - np.einsum(
-            "rbi,rbj->bij", cross.reshape(-1, count, k), absorbed
-        )
-        right = np.einsum("nbi,n->bi", scale, self.target)
-        if k == 1:
-            seen = system[:, 0, 0] > _VISIBLE * 2.0 * self.weight
-            c = np.where(seen, right[:, 0] / np.where(seen, system[:, 0, 0], 1.0), 0.0)[:, None]
-        else:
-            c = (
-                np.stack([inverted(one) @ r for one, r in zip(system, right)])
-                if count
-                else np.zeros((0, k))
-            )
+        finite, unit = _unit(made)
+        system, right = self._reduced(unit)
+        sizes, axes = np.linalg.eigh(system)
+        seen = sizes > _VISIBLE
+        along = np.einsum("bij,bi->bj", axes, right)
+        c = np.einsum("bij,bj->bi", axes, along * seen / np.where(seen, sizes, 1.0))
         gain = 0.5 * np.einsum("bi,bi->b", c, right) - self.zero
         return np.where(finite & ~(c[:, self.positive] < 0).any(1), gain, -np.inf)
 
-    def slopes(self, at: np.ndarray):
+    def _reduced(self, made: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Normal equations (B, k, k) and (B, k) of columns (n, B, k)."""
+        n, count, k = made.shape
+        absorbed = (self.basis.T @ made.reshape(n, count * k)).reshape(-1, count, k)
+        square = lambda x: np.einsum("nbi,nbj->bij", x, x)  # noqa: E731
+        return square(made) - square(absorbed), np.einsum("nbi,n->bi", made, self.target)
+
+    def slopes(self, at: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
         """Normal equations (K, K) and (K,) of the values about a place (K,), all that is linear
-        solved for; None where it is no number.
-        """
+        solved for; None where it is no number."""
         step = 1e-4 * np.maximum(np.abs(at), self.least)
         step = np.where(at + step <= self.high, step, -step)
         made = self.make(np.vstack([at, at + np.diag(step)]))
         if not np.isfinite(made).all():
             return None
-        own = made[:, 0]
-        m, right = self._reduced(own)
-        c = inverted(m) @ right
-        bent = np.einsum("nbi,i->nb", made[:, 1:] - own[:, None], c) / step
-        m, right = self._reduced(np.hstack([own, bent]))
-        k = own.shape[1]
-        back = inverted(m[:k, :k]) @ np.column_stack([m[:k, k:], right[:k]])
-        return m[k:, k:] - m[k:, :k] @ back[:, :-1], right[k:] - m[k:, :k] @ back[:, -1]
-
-    def _reduced(self, made: np.ndarray):
-        cross = 2.0 * self.weight * self.columns.T @ made
-        return (
-            2.0 * self.weight * made.T @ made - cross.T @ self.inverse @ cross,
-            made.T @ self.target,
-        )
+        own, k = made[:, :1], made.shape[2]
+        (system,), (right,) = self._reduced(own)
+        bent = ((made[:, 1:] - own) @ (inverted(system) @ right)) / step
+        (system,), (right,) = self._reduced(np.concatenate([own, bent[:, None]], axis=2))
+        cross = system[k:, :k]
+        back = inverted(system[:k, :k]) @ np.column_stack([cross.T, right[:k]])
+        return system[k:, k:] - cross @ back[:, :-1], right[k:] - cross @ back[:, -1]
 
     def descended(
         self, at: np.ndarray, *, free=None, steps: int = _STEPS, tolerance: float = 1e-10
@@ -164,10 +147,9 @@ class Landscape:
         return at, gain
 
 
-def _scaled(made: np.ndarray):
+def _unit(made: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Which sets (B,) are finite, and their columns (n, B, k) as long as one each, zero where they
-    are not.
-    """
+    are not."""
     size = np.max(np.abs(made), axis=0)
     finite = np.isfinite(size)
     made = np.where(finite, made, 0.0) / np.where(finite & (size > 0), size, 1.0)
@@ -181,61 +163,57 @@ def landscape(
     """The landscape of a torque effect of a model that is settled.
 
     Args:
-        found: a `shape.Settled`. weights: (joints,) or None. rows: on so many of the rows, drawn
-        from all.
+        found: a `shape.Settled`. weights: (joints,) or None.
+        rows: on so many of the rows, drawn from all.
         pinned: what stands at its bound of zero stays there; otherwise it answers as if it had no
-        bound.
+            bound.
     """
-    model, wanted, rows = found.model, rows, found.rows
-    effect = model.terms[term][0]
+    model, effect = found.model, found.model.terms[term][0]
     values = [v for v in model.shape_values if (v.term, v.joint) == (term, joint)]
-    free = [v for v in values if not v.held]
-    held = model.shapes_of(term, joint)
+    free, at = [v for v in values if not v.held], model.shapes_of(term, joint)
+    kept = np.arange(len(found.rows.t))
+    if rows is not None and rows < len(kept):
+        kept = np.sort(np.random.default_rng(0).permutation(kept)[:rows])
+    scale = np.ones(model.robot.dof) if weights is None else np.asarray(weights, dtype=float)
+    scale = np.sqrt(2.0 * len(found.rows.t) / len(kept)) * scale
     count = 10 * model.bodies
-    own = [
-        count + i
-        for i, c in enumerate(model.coefficients)
-        if (c.effect, c.joint) == (effect.name, joint)
-    ]
+    linear = [(c.effect, c.joint) == (effect.name, joint) for c in model.coefficients]
+    own = count + np.flatnonzero(linear)
     # what is held, or stands at its bound of zero, does not answer
-    still = np.zeros(model.size, dtype=bool)
-    still[count:] = found.problem.coordinates.held
-    if pinned:
-        still[[count + k for k in at_zero(found)]] = True
-    rest = np.setdiff1d(np.flatnonzero(~still), own)
-    scale = np.ones(model.robot.dof) if weights is None else np.asarray(weights)
-    kept = np.arange(len(rows.t))
-    if wanted is not None and wanted < len(kept):
-        kept = np.sort(np.random.default_rng(0).permutation(kept)[:wanted])
-    share = len(rows.t) / len(kept)
-    square = share * scale**2
-    picked = rows.columns[np.ix_(range(len(scale)), kept, rest)]
-    system = (
-        sum(2.0 * w * a.T @ a for w, a in zip(square, picked))
-        + prior_hessian(found)[np.ix_(rest, rest)]
-    )
-    columns, inverse, weight = picked[joint], inverted(system), float(square[joint])
-    residual = rows.residual(found.x)[kept, joint]
+    still = [*np.flatnonzero(found.problem.coordinates.held), *(at_zero(found) if pinned else ())]
+    rest = np.setdiff1d(np.arange(model.size), [*own, *(count + k for k in still)])
+    columns = scale[:, None, None] * found.rows.columns[np.ix_(range(len(scale)), kept, rest)]
+    residual = scale * found.rows.residual(found.x)[kept]
+    half = _half_inverse(columns, prior_hessian(found)[np.ix_(rest, rest)])
+    basis = columns[joint] @ half
     # a coefficient at its bound is at no stationary point: it would move by itself
-    pull = np.where(
-        rest >= count,
-        sum(2.0 * w * a.T @ r for w, a, r in zip(square, picked, rows.residual(found.x)[kept].T)),
-        0.0,
-    )
-    residual = residual - columns @ (inverse @ pull)
-    now = rows.columns[joint][np.ix_(kept, own)] @ found.x[own]
-    answered = now - columns @ (inverse @ (2.0 * weight * columns.T @ now))
-    target = 2.0 * weight * (residual + answered)
-    zero = float(now @ target - weight * now @ answered - 0.5 * pull @ inverse @ pull)
+    pull = half.T @ np.where(rest >= count, np.einsum("jnk,nj->k", columns, residual), 0.0)
+    now = scale[joint] * found.rows.columns[joint][np.ix_(kept, own)] @ found.x[own]
+    left = now - basis @ (basis.T @ now)
+    target = residual[:, joint] - basis @ pull + left
     names = tuple(v.shape.name for v in free)
+    make = _maker(found, motion, effect, joint, names, at, kept)
     return Landscape(
         names, *(np.array([getattr(v, end) for v in free]) for end in ("low", "high")),
         np.array([v.shape.least or 1e-2 * (v.high - v.low) for v in free]),
-        np.array([held[name] for name in names]),
-        _maker(found, motion, effect, joint, names, held, kept),
-        np.array([c.lower == 0 for c in effect.coefficients()], dtype=bool),
-        columns, inverse, target, weight, zero, found.objective,
+        np.array([at[name] for name in names]), lambda values: scale[joint] * make(values),
+        np.array([c.lower == 0 for c in effect.coefficients()], dtype=bool), basis, target,
+        float(now @ target - 0.5 * now @ left - 0.5 * pull @ pull), found.objective,
     )  # fmt: skip
+
+
+def _half_inverse(columns: np.ndarray, prior: np.ndarray) -> np.ndarray:
+    """G (size, r) with GG' = (A'A + P)^-1 on its range, of columns A (joints, n, size): from
+    singular values, as those of A'A would lose half the digits."""
+    sizes, axes = np.linalg.eigh(prior)
+    root = (axes * np.sqrt(np.clip(sizes, 0.0, None))).T
+    stacked = np.concatenate([*columns, root])
+    norm = np.linalg.norm(stacked, axis=0)
+    norm = np.where(norm > 0.0, norm, 1.0)
+    triangle = np.linalg.qr(stacked / norm, mode="r")
+    _, sizes, axes = np.linalg.svd(triangle, full_matrices=False)
+    kept = sizes > _FLAT * sizes[:1]
+    return (axes[kept].T / sizes[kept]) / norm[:, None]
 
 
 def at_zero(found) -> list[int]:
@@ -248,40 +226,27 @@ def at_zero(found) -> list[int]:
 def _maker(
     found, motion, effect, joint: int, names, others: dict, kept
 ) -> Callable[[np.ndarray], np.ndarray]:
-    """The effect's columns on the rows `kept` (n,) for sets of values (B, K)."""
-    model, rows = found.model, found.rows
+    """The effect's columns (n, B, k) on the rows `kept` (n,) for sets of values (B, K)."""
+    model, use, stride = found.model, found.rows.use, found.stride
     pieces = row.seen(model, motion)
-    use, stride = rows.use, found.stride
     sensed = any(isinstance(other, SensorEffect) for other, _ in model.terms)
-    plain = not (
-        effect.memory
-        or effect.reach
-        or sensed
-        or any(p.smoother is not None for p in motion.pieces)
-    )
+    filtered = any(piece.smoother is not None for piece in motion.pieces)
+    plain = not (effect.memory or effect.reach or sensed or filtered)
     if plain:  # row by row: only those that count are needed
-        parts = []
-        for k, piece in enumerate(pieces):
-            mine = rows.index[kept][rows.piece[kept] == k]
-            parts.append(piece.part(mine))
-        pieces, counts = parts, use[kept, joint][:, None]
-    k = len(effect.coefficients())
+        at = [found.rows.index[kept][found.rows.piece[kept] == k] for k in range(len(pieces))]
+        pieces = [piece.part(mine) for piece, mine in zip(pieces, at) if len(mine)]
+    counts = use[kept, joint][:, None]
 
-    def columns(at) -> np.ndarray:
+    def columns(at: np.ndarray) -> np.ndarray:
         shapes = {**others, **dict(zip(names, map(float, at)))}
-        with np.errstate(all="ignore"):
-            try:
+        try:
+            with np.errstate(all="ignore"):
                 if plain:
-                    return (
-                        np.concatenate(
-                            [effect.columns(p, joint, **shapes) for p in pieces if len(p.t)], axis=1
-                        ).T
-                        * counts
-                    )
-                return row.signature(model, motion, pieces, effect, joint, shapes, stride, use)[
-                    kept
-                ]
-            except NotFinite:
-                return np.full((len(kept), k), np.nan)
+                    parts = [effect.columns(piece, joint, **shapes) for piece in pieces]
+                    return np.concatenate(parts, axis=1).T * counts
+                made = row.signature(model, motion, pieces, effect, joint, shapes, stride, use)
+                return made[kept]
+        except NotFinite:
+            return np.full((len(kept), len(effect.coefficients())), np.nan)
 
     return lambda values: np.stack([columns(at) for at in values], axis=1)

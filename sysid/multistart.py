@@ -103,9 +103,11 @@ def _ended(place: Place, fine: Landscape, tried: list[np.ndarray]) -> Place:
 
 
 def _gap(own: np.ndarray, at: float) -> float:
-    """The way from a value to the next of those tried."""
-    away = np.abs(own - at)
-    return float(np.min(away[away > 1e-9 * (np.ptp(own) or 1.0)], initial=np.ptp(own) or 1.0))
+    """The step between the values tried on either side of a value."""
+    if len(own) < 2:
+        return 0.0
+    k = int(np.clip(np.searchsorted(own, at), 1, len(own) - 1))
+    return float(own[k] - own[k - 1])
 
 
 def _sets(tried: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
