@@ -42,7 +42,8 @@ class Candidate:
     @property
     def parameters(self) -> int:
         """How many numbers it brings."""
-        return len(self.effect.coefficients()) + len(self.effect.shapes())
+        held = sum(asked.held is not None for asked in self.effect.asked.values())
+        return len(self.effect.coefficients()) + len(self.effect.shapes()) - held
 
     @property
     def nonlinear(self) -> bool:
@@ -125,7 +126,7 @@ def own_effects(experiment: Experiment) -> list[Effect]:
     ]
     found = {}
     for spec in specs:
-        effect = found_effect(spec, experiment.folder)
+        effect = found_effect(spec, experiment.folder, experiment.data.logged)
         found.setdefault(effect.name, effect)
     return [effect for name, effect in found.items() if name not in vocabulary()]
 
@@ -152,20 +153,26 @@ def tried(view, candidate: Candidate) -> list[dict[str, float]]:
         return []
     if not bounds:
         return [{}]
-    middle = {s.name: float(np.median(s.values(low, high))) for s, low, high, _ in bounds}
-    return [
-        {**middle, shape.name: float(at)}
-        for shape, low, high, angle in bounds
-        for at in shape.values(low, high, angle)
-    ]
+    lists = {s.name: _worth(candidate.effect, s, *own) for s, *own in bounds}
+    middle = {name: float(np.median(own)) for name, own in lists.items()}
+    return [{**middle, name: float(at)} for name, own in lists.items() for at in own]
+
+
+_MOST = 500  # values of one shape value that are tried
+
+
+def _worth(effect: Effect, shape, low: float, high: float, angle: float | None) -> np.ndarray:
+    """The values of a shape value that are tried: the user's, where it is given."""
+    asked = effect.asked.get(shape.name)
+    if asked is not None and asked.held is not None:
+        return np.array([asked.held])
+    own = shape.values(low, high, angle)
+    return own[:: -(-len(own) // _MOST)]
 
 
 def bounds_of(model: Model, candidate: Candidate) -> list[tuple]:
     """(shape, low, high, angle travelled) of a candidate's shape values."""
-    scales, joint = model.scales, candidate.joint
-    angle = None if joint == ROBOT else float(scales.angle[joint])
-    bounds = lambda s: s.bounds(scales.of(s.of, joint), angle)  # noqa: E731
-    return [(s, *bounds(s), angle) for s in candidate.effect.shapes()]
+    return model.ranges(candidate.effect, candidate.joint)
 
 
 def further(model: Model, candidate: Candidate) -> list[dict[str, float]]:
@@ -215,16 +222,8 @@ def columns_of(source, candidate: Candidate, shapes: list[dict[str, float]]) -> 
         return np.stack(
             [next(changes) if own in apart else _slopes(source, candidate, own) for own in shapes]
         )
-    found = row.signatures(
-        source.model,
-        source.motion,
-        source.pieces,
-        candidate.effect,
-        candidate.joint,
-        shapes,
-        source.stride,
-        source.use,
-    )
+    asked = (source.model, source.motion, source.pieces, candidate.effect, candidate.joint, shapes)
+    found = row.signatures_where_finite(*asked, source.stride, source.use)
     return np.stack([values[None] if values.ndim == 2 else values for values in found])
 
 

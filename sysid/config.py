@@ -15,7 +15,7 @@ from pydantic import BaseModel, ValidationError
 from . import datasets
 from .effect import find, vocabulary
 from .errors import ConfigError
-from .formula import option_names
+from .formula import parse
 from .readers import listed
 from .specs import EffectSpec, Experiment, LogSpec, is_own
 
@@ -146,7 +146,7 @@ def _known(name: str) -> str:
 
 
 def _own_keys(name: str, given) -> list[str]:
-    """The keys that an effect has beside `joints`: its options, and its shape values, which may be held."""
+    """The keys that an effect has beside `joints`: its options, and its shape values, which may be held or be told where to be searched."""
     if is_own(name):
         return [key for key in given if key != "joints"]  # only the file can tell; it is not run here
     effect = find(name)
@@ -154,11 +154,18 @@ def _own_keys(name: str, given) -> list[str]:
 
 
 def _formula(value: Any) -> dict:
-    """The entry {formula: text, joints: [...], name: ..., and shape values that are held}."""
+    """The entry {formula: text, joints: [...], name: ..., and where values inside are held or searched}."""
     text = value.get("formula") if isinstance(value, dict) else None
     if not isinstance(text, str) or "options" in value:
         raise ValueError('must be {formula: "a*sin(3*q)", joints: [...]}')
-    keys = option_names(text)
+    parsed = parse(text)
+    keys = ["formula", "name", *parsed.inner]
+    for key in value:
+        if key in parsed.linear:
+            raise ValueError(f"{key} is a coefficient of the formula: it is solved for and takes no value; allowed: {', '.join([*keys, 'joints'])}")
+        if key not in (*keys, "joints"):
+            close = difflib.get_close_matches(str(key), [*keys, "joints"], n=3, cutoff=0.4) or [*keys, "joints"]
+            raise ValueError(f"unknown key {key!r}: the formula has no such value inside; allowed: {', '.join(close)}")
     own = {key: given for key, given in value.items() if key in keys}
     return {**{key: given for key, given in value.items() if key not in own}, "name": "formula", "options": own}
 

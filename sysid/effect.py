@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import copy
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache
 from importlib import import_module
@@ -50,6 +50,8 @@ class Shape:
         search begins; None where there is none, and values between the bounds are tried: `grid` of them, in equal
         ratios, or in equal steps where `even` or where a bound is not positive. spacing: of a value that counts periods over
         the angle, the widest step between tried ones that misses nothing, as a share of 1 / (angle travelled); 0 of any other.
+    least: what it may differ by and change little, where that is known; respaced: which values to try between two bounds, where
+        a formula says so.
     """
 
     unit: str
@@ -61,6 +63,8 @@ class Shape:
     says: str = ""
     even: bool = False
     spacing: float = 0.0
+    least: float = 0.0
+    respaced: Callable[[float, float], np.ndarray] | None = field(default=None, repr=False, compare=False)
     name: str = field(default="", init=False)
 
     def __set_name__(self, owner, name):
@@ -78,6 +82,8 @@ class Shape:
         Args:
             angle: what the joint travels, where it is known; only `spacing` looks at it.
         """
+        if self.respaced is not None:
+            return self.respaced(low, high)
         if self.spacing and angle:
             return np.linspace(low, high, 2 + int((high - low) * angle / self.spacing))
         return np.geomspace(low, high, self.grid) if low > 0 and not self.even else np.linspace(low, high, self.grid)
@@ -88,6 +94,19 @@ def called(value, name: str):
     out = copy.copy(value)
     out.name = name
     return out
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What a user says of a shape value: the value itself, or where the search for it begins, and between which bounds it is."""
+
+    start: float | None = None
+    within: tuple[float, float] | None = None
+    held: float | None = None
+
+
+class NotFinite(ConfigError):
+    """An effect is no finite number at some shape values."""
 
 
 class Effect(ABC):
@@ -105,6 +124,7 @@ class Effect(ABC):
         |qd| qd, `friction` times sign(qd), `breakaway` on top of it from rest, `armature` times qdd, `stiffness` times q,
         `torque` that is constant beside a stiffness, `zero` that is added to q; and of an effect of the whole robot `gravity`
         or `inertia`, a body on a link.
+    asked: {shape value: what the user says of it}.
     """
 
     name: ClassVar[str]
@@ -121,6 +141,7 @@ class Effect(ABC):
     elementwise: ClassVar[bool] = False
     simulators: ClassVar[dict[str, str]] = {}
     given_coefficients: Mapping[str, float] = MappingProxyType({})
+    asked: Mapping[str, Asked] = MappingProxyType({})
 
     @property
     def instantaneous(self) -> bool:
@@ -134,6 +155,14 @@ class Effect(ABC):
     def shapes(self) -> tuple[Shape, ...]:
         """The values that it is not linear in."""
         return self._declared(Shape)
+
+    def sized(self, motion: Piece, rows: int, joint: int) -> tuple[Shape, ...] | None:
+        """`shapes()` with the bounds that a motion gives them on a joint, in plain units; None where they say so themselves.
+
+        Args:
+            motion: some rows of the motion, then as many, the rows after each. rows: how many it has in all.
+        """
+        return None
 
     def _declared(self, what: type) -> tuple:
         """What a class and those it derives from declare, these first."""

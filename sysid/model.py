@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from . import own_effects, regressor, two_masses, units
-from .effect import Deflection, Effect, MotionEffect, SensorEffect, Shape, TorqueEffect, WrenchEffect, find
+from .effect import Asked, Deflection, Effect, MotionEffect, SensorEffect, Shape, TorqueEffect, WrenchEffect, find
 from .errors import ConfigError
 from .formula import Formula
 from .inertia import PARAMETERS, UNITS
@@ -36,7 +36,8 @@ class Coefficient:
 
 @dataclass(frozen=True)
 class ShapeValue:
-    """One value that the columns are not linear in: term, joint, what it is, its bounds here. `held`: given by the user."""
+    """One value that the columns are not linear in: term, joint, what it is, its bounds here. `held`: given by the user;
+    `begin`: where the user wants the search to begin."""
 
     term: int
     joint: int
@@ -46,16 +47,23 @@ class ShapeValue:
     low: float
     high: float
     held: bool = False
+    begin: float | None = None
 
 
 @dataclass(frozen=True)
 class Scales:
-    """How large a joint's motion is: top speed, greatest torque, angle travelled, each (dof,); the longest log [s]."""
+    """How large a joint's motion is: top speed, greatest torque, angle travelled, each (dof,); the longest log [s].
+
+    sample: some of its rows, then the rows after each; rows: how many it has in all. `ranges` keeps what was found of effects.
+    """
 
     speed: np.ndarray
     torque: np.ndarray
     angle: np.ndarray
     duration: float
+    sample: Piece
+    rows: int
+    ranges: dict = field(default_factory=dict, repr=False, compare=False)
 
     def of(self, word: str, joint: int) -> float:
         """What bounds that are shares of `word` are multiplied with."""
@@ -70,7 +78,24 @@ def scales(motion: Motion) -> Scales:
     most = lambda name: np.max([np.abs(getattr(p, name)).max(0) for p in motion.pieces], axis=0)  # noqa: E731
     low, high = (np.array([reach(p.q, 0) for p in motion.pieces]) for reach in (np.min, np.max))
     positive = lambda x: np.where(x > 0, x, 1.0)  # noqa: E731 - of a joint that never moves nothing can be said anyway
-    return Scales(positive(most("qd")), positive(most("tau")), positive(high.max(0) - low.min(0)), float(max(np.ptp(p.t) for p in motion.pieces)))
+    return Scales(positive(most("qd")), positive(most("tau")), positive(high.max(0) - low.min(0)), float(max(np.ptp(p.t) for p in motion.pieces)), _sample(motion), motion.samples)
+
+
+_SAMPLED = 1000  # rows that say how large a motion is
+
+
+def _sample(motion: Motion) -> Piece:
+    """Some rows of a motion, then the row after each."""
+    stride = max(1, motion.samples // _SAMPLED)
+    picked = [np.arange(p.core.start, p.core.stop - 1, stride) for p in motion.pieces]
+
+    def joined(pick) -> np.ndarray:
+        return np.concatenate([pick(p)[own + later] for later in (0, 1) for p, own in zip(motion.pieces, picked)])
+
+    first = motion.pieces[0]
+    arrays = {name: joined(lambda p, name=name: getattr(p, name)) for name in ("t", "q", "qd", "qdd", "tau", "measured")}
+    signals = {name: joined(lambda p, name=name: p.signals[name]) for name in first.signals if all(name in p.signals for p in motion.pieces)}
+    return replace(first, **arrays, signals=signals, use=None, smoother=None, sight=None, core=slice(0, len(arrays["t"])), load=None, deflection=None)
 
 
 @dataclass(frozen=True)
@@ -117,12 +142,26 @@ class Model:
         out = []
         for term, (effect, joints) in enumerate(self.terms):
             for joint in joints:
-                for shape in effect.shapes():
-                    scale = 1.0 if self.scales is None else self.scales.of(shape.of, joint)
-                    angle = None if self.scales is None or joint == ROBOT else float(self.scales.angle[joint])
+                for shape, low, high, _ in self.ranges(effect, joint):
                     name, unit = self._name(effect, joint, shape.name), self._unit(shape.unit, joint)
-                    out.append(ShapeValue(term, joint, shape, name, unit, *shape.bounds(scale, angle), (term, joint, shape.name) in given))
+                    begin = effect.asked[shape.name].start if shape.name in effect.asked else None
+                    out.append(ShapeValue(term, joint, shape, name, unit, low, high, (term, joint, shape.name) in given, begin))
         return tuple(out)
+
+    def ranges(self, effect: Effect, joint: int) -> list[tuple[Shape, float, float, float | None]]:
+        """(shape, low, high, angle that the joint travels) of an effect's shape values on a joint of this motion."""
+        if self.scales is None:
+            return [(s, *_within(s, effect, s.bounds(1.0)), None) for s in effect.shapes()]
+        key = (id(effect), joint)
+        if key not in self.scales.ranges:  # with the effect itself, so that no other comes to its place
+            sample, angle = self.scales.sample, None if joint == ROBOT else float(self.scales.angle[joint])
+            if effect.uses_load:
+                sample = replace(sample, load=regressor.torque(self.robot, self.robot.prior, sample.q, sample.qd, sample.qdd))
+            sized = effect.sized(sample, self.scales.rows, joint)
+            bounds = lambda s: (s.low, s.high) if sized is not None else s.bounds(self.scales.of(s.of, joint), angle)  # noqa: E731
+            shapes = effect.shapes() if sized is None else sized
+            self.scales.ranges[key] = effect, [(s, *_within(s, effect, bounds(s)), angle) for s in shapes]
+        return self.scales.ranges[key][1]
 
     def _name(self, effect: Effect, joint: int, word: str) -> str:
         return f"{effect.name}.{'*' if joint == ROBOT else self.robot.joints[joint]}.{word}"
@@ -152,7 +191,8 @@ class Model:
 
     def with_effect(self, effect: Effect, joints: tuple[int, ...]) -> Model:
         """The model with one more effect; its shape values start where they do nothing, or midway."""
-        grown = replace(self, terms=(*self.terms, (effect, joints)))
+        held = (*self.held, *_holds(len(self.terms), effect, joints).items())
+        grown = replace(self, terms=(*self.terms, (effect, joints)), held=held)
         return replace(grown, shapes=(*self.shapes, *initial(grown)[len(self.shapes) :]))
 
     def without(self, name: str, joint: int) -> Model:
@@ -177,8 +217,8 @@ class Model:
         return replace(self, scales=scales(motion))
 
     def measured_by(self, motion: Motion) -> Model:
-        """The model with shape bounds as wide as this motion is, and its shape values within them."""
-        sized = self.scaled_by(motion)
+        """The model with shape bounds as wide as this motion is, and its shape values where a search begins."""
+        sized = replace(self.scaled_by(motion), shapes=())
         return sized.with_shapes(initial(sized))
 
     @property
@@ -359,6 +399,16 @@ class Model:
         return wide, slice(rows.start - wide.start, rows.stop - wide.start, rows.step)
 
 
+def _within(shape: Shape, effect: Effect, bounds: tuple[float, float]) -> tuple[float, float]:
+    """The bounds of a shape value, as the user wants them; wide enough for the user's start."""
+    asked = effect.asked.get(shape.name)
+    if asked is None:
+        return bounds
+    if asked.within is not None:
+        return asked.within
+    return (min(bounds[0], asked.start), max(bounds[1], asked.start)) if asked.start is not None else bounds
+
+
 def initial(model: Model) -> list[float]:
     """Shape values to begin with: as given, as the model has them (within their bounds), else where they do nothing or midway."""
     given, out = dict(model.held), []
@@ -368,6 +418,8 @@ def initial(model: Model) -> list[float]:
             continue
         if k < len(model.shapes):
             begin = model.shapes[k]
+        elif value.begin is not None:
+            begin = value.begin
         elif value.shape.start is not None:
             begin = value.shape.start
         else:
@@ -383,8 +435,8 @@ def chunks(piece: Piece, size: int) -> Iterator[slice]:
         yield slice(start, min(start + size, piece.core.stop))
 
 
-def build(robot: Robot, effects, folder: Path = Path()) -> Model:
-    """The model of an experiment's `model.effects`; files of own effects are relative to `folder`.
+def build(robot: Robot, effects, folder: Path = Path(), signals=()) -> Model:
+    """The model of an experiment's `model.effects`; files of own effects are relative to `folder`, `signals` are logged.
 
     Raises:
         ConfigError: an effect or joint that is not there, or an effect twice on a joint, or an option it does not have, or
@@ -392,7 +444,7 @@ def build(robot: Robot, effects, folder: Path = Path()) -> Model:
     """
     terms, seen, held = [], set(), {}
     for spec in effects:
-        effect = found(spec, folder)
+        effect = found(spec, folder, signals)
         if effect.scope == "robot" and spec.joints is not None:
             raise ConfigError(f"model.effects: {effect.name} is an effect of the whole robot", allowed="no joints", do="leave `joints` out")
         names = ["*"] if effect.scope == "robot" else spec.joints if spec.joints is not None else list(robot.joints)
@@ -410,40 +462,78 @@ def build(robot: Robot, effects, folder: Path = Path()) -> Model:
             effect = effect.bound(robot, joint)
             if is_own(spec.name):
                 own_effects.check(effect, robot, joint)
-        words = {shape.name: shape for shape in effect.shapes()}
-        for word, value in spec.options.items():
-            if word in words:
-                held |= {(len(terms), joint, word): _number(effect, word, value) for joint in joints}
+        held |= _holds(len(terms), effect, joints)
         terms.append((effect, tuple(joints)))
     made = Model(robot, tuple(terms), held=tuple(held.items()))
     return made.with_shapes(initial(made))
 
 
-def found(spec, folder: Path = Path()) -> Effect:
+def found(spec, folder: Path = Path(), signals=()) -> Effect:
     """The effect that an entry of `model.effects` names, with its options; a file of own effects is relative to `folder`.
+
+    Args:
+        signals: names of logged signals, which formulas may use.
 
     Raises:
         ConfigError: there is none, or not with these options.
     """
     if "formula" in spec.options:
-        effect = Formula(spec.options["formula"], spec.options.get("name", "formula"))
+        effect = Formula(spec.options["formula"], spec.options.get("name", "formula"), signals)
         own = {name: value for name, value in spec.options.items() if name not in ("formula", "name")}
     else:
         effect = own_effects.load(spec.name, folder) if is_own(spec.name) else find(spec.name)
         own = spec.options
     words = {shape.name for shape in effect.shapes()}
     chosen = effect.given(**{name: value for name, value in own.items() if name not in words})
-    if idle := sorted(words & set(own) - {shape.name for shape in chosen.shapes()}):
+    shapes = {shape.name: shape for shape in chosen.shapes()}
+    if idle := sorted(words & set(own) - set(shapes)):
         raise ConfigError(f"model.effects: {effect.name} with these options has no {idle[0]}", do="leave it out")
+    asked = {name: _asked(effect, shapes[name], value) for name, value in own.items() if name in shapes}
+    if asked:
+        vars(chosen)["asked"] = asked
     if "formula" in spec.options or is_own(spec.name):
         vars(chosen)["spelled"] = (spec.name, dict(spec.options))
     return chosen
 
 
+_SAYS = "a number, which is then held, or {start: number, within: [low, high]}"
+
+
 def _number(effect: Effect, word: str, value) -> float:
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not np.isfinite(value):
-        raise ConfigError(f"model.effects: {effect.name}.{word} is {value!r}", allowed="a number, which is then held", do="give a number or leave it out")
+        raise ConfigError(f"model.effects: {effect.name}.{word} is {value!r}", allowed=_SAYS, do="give a number or leave it out")
     return float(value)
+
+
+def _holds(term: int, effect: Effect, joints) -> dict[tuple[int, int, str], float]:
+    """{(term, joint, name): value} of the shape values that the user gives."""
+    return {(term, joint, word): asked.held for word, asked in effect.asked.items() if asked.held is not None for joint in joints}
+
+
+def _asked(effect: Effect, shape: Shape, value) -> Asked:
+    """What an entry says of a shape value."""
+    if not isinstance(value, dict):
+        return Asked(held=_number(effect, shape.name, value))
+    where = f"model.effects: {effect.name}.{shape.name}"
+    if not value or set(value) - {"start", "within"}:
+        odd = sorted(map(str, set(value) - {"start", "within"}))
+        raise ConfigError(f"{where} has {'the key ' + repr(odd[0]) if odd else 'neither start nor within'}", allowed=_SAYS)
+    start = None if value.get("start") is None else _number(effect, f"{shape.name}.start", value["start"])
+    bounds = value.get("within")
+    if bounds is not None:
+        if not isinstance(bounds, (list, tuple)) or len(bounds) != 2:
+            raise ConfigError(f"{where}.within is {bounds!r}", allowed="[low, high]")
+        bounds = tuple(_number(effect, f"{shape.name}.within", end) for end in bounds)
+        if not bounds[0] < bounds[1]:
+            raise ConfigError(f"{where}.within is {list(bounds)}", allowed="[low, high], the low below the high")
+        if start is not None and not bounds[0] <= start <= bounds[1]:
+            raise ConfigError(f"{where}.start is {start:g}, outside {list(bounds)}", do="move the start or widen `within`")
+    # of a vocabulary effect a value that has no negative side has none in any file
+    signed = "formula" in effect.options or shape.low < 0
+    lowest = min(x for x in (start, *(bounds or ())) if x is not None)
+    if not signed and (lowest < 0 or (lowest == 0 and shape.low > 0)):
+        raise ConfigError(f"{where} may be {lowest:g}", allowed="values above zero" if shape.low > 0 else "values from zero on")
+    return Asked(start, bounds)
 
 
 def moving_coefficients(model: Model, motion: Motion) -> np.ndarray:

@@ -30,7 +30,7 @@ from pathlib import Path
 import numpy as np
 
 from . import regressor
-from .effect import KINDS, Effect, MotionEffect, SensorEffect, WrenchEffect, vocabulary
+from .effect import KINDS, Effect, MotionEffect, NotFinite, SensorEffect, WrenchEffect, vocabulary
 from .errors import ConfigError, SysidError
 from .motion import Piece
 
@@ -178,7 +178,7 @@ def _guard(kind: type[Effect], path: Path, name: str) -> None:
             if result.shape != wanted:
                 raise ConfigError(f"{name}.{word} returns an array of {result.shape}", where=str(path), allowed=str(wanted), do="return one row for each coefficient")
             if not np.isfinite(result).all():
-                raise ConfigError(f"{name}.{word} returns numbers that are not finite", where=str(path), do="mind what happens at rest, where qd is 0, and outside a function's domain")
+                raise NotFinite(f"{name}.{word} returns numbers that are not finite", where=str(path), do="mind what happens at rest, where qd is 0, and outside a function's domain")
         return out if word == "moved" else results[0]
 
     setattr(kind, word, guarded)

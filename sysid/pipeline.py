@@ -23,11 +23,13 @@ from . import log as logs
 from .bumps import bumps
 from .compress import Compressed, Linearised, compress
 from .drives import rescaled, scale_is_told, with_drives
+from .effect import NotFinite
 from .errors import SysidWarning
 from .estimate import Fit, Prediction, identify, predict
 from .inertia.consistency import is_consistent
 from .model import Model, moving_coefficients
 from .motion import Motion
+from .multistart import Searched
 from .plausible import implausible
 from .preprocess import prepare
 from .robot import Robot
@@ -51,7 +53,8 @@ def started(experiment: Experiment) -> Experiment:
 def build(experiment: Experiment) -> tuple[Robot, Model, np.ndarray]:
     """The robot, the model and the prior (bodies, 10) of an experiment. Raises RobotError, ConfigError."""
     machine = robot.load(experiment.robot, experiment.folder)
-    structure = with_drives(model.build(machine, experiment.model.effects, experiment.folder), experiment)
+    parts = model.build(machine, experiment.model.effects, experiment.folder, experiment.data.logged)
+    structure = with_drives(parts, experiment)
     return machine, structure, _prior(experiment, structure)
 
 
@@ -122,7 +125,7 @@ def fit(experiment: Experiment, *, filters: dict | None = None, progress: Progre
         _tell_left_out(motion, preprocess)
         disturbed = _tell_events("train", motion)
         with _timed(seconds, "shape"):
-            structure, slopes = _settled(experiment, structure, motion, prior)
+            structure, slopes, searched = _settled(experiment, structure, motion, prior)
         with _timed(seconds, "compress"):  # the regressor is built and reduced chunk by chunk, never whole
             compressed = compress(slopes or structure, motion, progress=lambda share: tell("compress", share))
         with _timed(seconds, "solve"):
@@ -152,7 +155,7 @@ def fit(experiment: Experiment, *, filters: dict | None = None, progress: Progre
             warnings.warn(SysidWarning(text), stacklevel=2)
     return replace(
         found, predictions=predictions, samples=samples, left_out=left_out, seconds=seconds, filters=chosen, logs=tuple(provenance),
-        notices=tuple(notices), events=tuple(disturbed), drives=tuple(told), rollout=let_go,
+        notices=tuple(notices), events=tuple(disturbed), drives=tuple(told), rollout=let_go, searched=searched,
     )  # fmt: skip
 
 
@@ -189,7 +192,7 @@ def prepared(experiment: Experiment) -> Prepared:
             preprocess = filtering.settled(preprocess, filtering.compare(experiment, structure, train, prior))
         motion = prepare(train, preprocess, machine.joints)
         _tell_still(motion)
-        structure, _ = _settled(experiment, structure, motion, prior)
+        structure, *_ = _settled(experiment, structure, motion, prior)
         held_out = prepare(read(experiment, machine, experiment.data.test), preprocess, machine.joints)
         train_data, test_data = compress(structure, motion), compress(structure, held_out)
     return Prepared(structure, motion, train_data, test_data, prior, moving_coefficients(structure, motion), tuple(notices))
@@ -198,25 +201,31 @@ def prepared(experiment: Experiment) -> Prepared:
 _PASSES, _NEAR = 3, 0.1  # refinements on all rows; of a standard deviation
 
 
-def _settled(experiment: Experiment, structure: Model, motion: Motion, prior) -> tuple[Model, Linearised | None]:
+def _settled(experiment: Experiment, structure: Model, motion: Motion, prior) -> tuple[Model, Linearised | None, tuple[Searched, ...]]:
     """The model measured by a motion, its shape values found: on rows that fit in memory, then by Gauss-Newton steps on all
-    of them. And its slopes there, None where no shape value is free."""
+    of them. And its slopes there, None where no shape value is free, and what was done to find them."""
     structure = structure.measured_by(motion)
     if not (structure.shape_values or structure.uses_load):
-        return structure, None
-    found = shape.settle(experiment, structure, motion, prior)
-    bodies = found.x[: 10 * structure.bodies].reshape(-1, 10)
+        return structure, None, ()
+    found = shape.settle(experiment, structure, motion, prior, profile=True)
+    bodies, searched = found.x[: 10 * structure.bodies].reshape(-1, 10), found.searched
     if (scaled := rescaled(found.model, experiment, bodies, prior)) is not found.model:
         found = shape.settle(experiment, scaled, motion, prior, grid=False)
     structure, slopes = found.model, Linearised(found.model, found.x)
     if not slopes.free:
-        return structure, None
+        return structure, None, searched
     best = None
     for _ in range(_PASSES):
-        data = compress(slopes, motion)
+        try:
+            data = compress(slopes, motion)
+        except NotFinite:
+            if best is None:
+                raise
+            return *best[1:], searched  # of a formula, the last step left its domain
         fit = identify(experiment, structure, motion, data, prior)
-        if best is not None and structure.deflects and fit.objective > best[0]:
-            return best[1:]  # blows make valleys narrower than a step: the last one is taken back
+        # blows make valleys narrower than a step, and slopes say little at a corner: the last step is taken back
+        if best is not None and (structure.deflects or not structure.uses_load) and fit.objective > best[0]:
+            return *best[1:], searched
         best = fit.objective, structure, slopes
         change = shape.correction(fit, data)
         values = np.array(structure.shapes)
@@ -229,7 +238,7 @@ def _settled(experiment: Experiment, structure: Model, motion: Motion, prior) ->
         std = fit.shape_std[slopes.free]
         if not np.any(np.abs(change) > _NEAR * np.where(np.isfinite(std), std, np.inf)):
             break
-    return structure, slopes
+    return structure, slopes, searched
 
 
 def _tell_undetermined(found: Fit, motion: Motion) -> None:

@@ -22,7 +22,7 @@ from pathlib import Path
 import numpy as np
 
 from .errors import ConfigError, SysidError
-from .estimate import Fit
+from .estimate import Fit, at_edge
 from .filters import settled
 from .inertia import PARAMETERS
 from .inertia.consistency import is_consistent
@@ -62,6 +62,7 @@ def document(fit: Fit, run: str | Path = "") -> dict:
         "certificate": {
             "globally_optimal": certificate.globally_optimal, "stationarity": number(certificate.stationarity),
             "gap": number(certificate.gap), "at_zero": {coefficients[k].name: slope for k, slope in certificate.at_zero.items()},
+            "given": _given(fit),
         },
         "samples": fit.samples,
         "left_out": fit.left_out,
@@ -87,6 +88,19 @@ def _by_body(model: Model) -> dict[str, list[float]] | None:
     if model.reference is None:
         return None
     return {body.name: pi.tolist() for body, pi in zip(model.robot.bodies, model.reference)}
+
+
+def _given(fit: Fit) -> list[dict]:
+    """The shape values at which a certificate proves the rest, with what was done about each."""
+    done = {one.name: one for one in fit.searched}
+    return [
+        {
+            "name": value.name, "range": [value.low, value.high], "held": value.held, "at_edge": at_edge(value, at),
+            "starts": done[value.name].starts if value.name in done else 0, "profile": done[value.name].profile if value.name in done else 0,
+            "lower_on_profile": value.name in done and done[value.name].lower,
+        }
+        for value, at in zip(fit.model.shape_values, fit.model.shapes)
+    ]  # fmt: skip
 
 
 def number(value: float) -> float | None:

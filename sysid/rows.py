@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from . import regressor
-from .effect import TorqueEffect
+from .effect import NotFinite, TorqueEffect
 from .model import Model, chunks
 from .motion import Motion, Piece
 from .two_masses import link_side
@@ -126,7 +126,10 @@ def tangents(model: Model, motion: Motion, x, stride: int, use: np.ndarray, midd
 
 def difference_step(value, at: float) -> float:
     """The step of a difference in a shape value, away from the nearer bound."""
-    size = 1e-4 * (abs(at) if value.shape.start is None and at else value.high - value.low)
+    if value.shape.least:
+        size = 1e-4 * max(abs(at), value.shape.least)
+    else:
+        size = 1e-4 * (abs(at) if value.shape.start is None and at else value.high - value.low)
     return size if at + size <= value.high else -size
 
 
@@ -207,3 +210,14 @@ def signatures(model: Model, motion: Motion, pieces: list, effect, joint: int, t
     joined = joined * (use[:, [joint]] if joint >= 0 else use.T[:, :, None])
     k = joined.shape[2] // len(tried)
     return [joined[0, :, i : i + k] if joint >= 0 else joined[:, :, i : i + k] for i in range(0, k * len(tried), k)] if k else [joined] * len(tried)
+
+
+def signatures_where_finite(model: Model, motion: Motion, pieces: list, effect, joint: int, tried: list[dict], stride: int, use: np.ndarray) -> list[np.ndarray]:
+    """`signatures`, NaN at shape values where the effect is no finite number."""
+    try:
+        return signatures(model, motion, pieces, effect, joint, tried, stride, use)
+    except NotFinite:
+        if len(tried) > 1:
+            return [own for at in tried for own in signatures_where_finite(model, motion, pieces, effect, joint, [at], stride, use)]
+        size = len(use), len(effect.coefficients())
+        return [np.full(size if joint >= 0 else (model.robot.dof, *size), np.nan)]

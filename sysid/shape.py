@@ -1,35 +1,45 @@
 """The values that a model is not linear in: found by variable projection, before everything else is solved.
 
-For fixed shape values the problem is the convex one of `solve`. Values of torque effects without a natural start are
-first tried over a grid, one at a time, with everything linear solved for each; then all values move together by
-Gauss-Newton steps on what the linear parameters leave (Golub & Pereyra 1973), damped, within their bounds. The load
+For fixed shape values the problem is the convex one of `solve`. Those of a torque effect on a joint are started from
+many places (`multistart`); then all values move together by Gauss-Newton steps on what the linear parameters
+leave (Golub & Pereyra 1973), damped, within their bounds. At last the profile of the objective over each value is
+checked, and where it lies lower than what was found the search goes on from there. The load
 that some effects look at is that of the bodies found so far, and is renewed with every step: measured torque in its
 place would bring its noise into the columns.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from . import multistart
 from . import rows as row
 from .compress import Compressed, Factor, triangle
-from .effect import Deflection, TorqueEffect
+from .effect import Deflection, NotFinite, TorqueEffect
 from .estimate import Fit, Problem, pose
 from .inertia import DIVERGENCES
+from .landscape import at_zero, landscape
 from .model import Model, moving_coefficients
 from .motion import Motion
+from .multistart import Searched
 from .objective import add_blocks
+from .projection import Projection, inverted, prior_hessian
 from .specs import Experiment
 
 _MOST_ROWS, _STEPS, _SETTLED = 6000, 12, 1e-7
 _LEAST_SHARE = 0.25  # of the way to another load
+_SOLVED = 3  # of the best places, which are solved with every bound kept
+_ROUNDS, _LOWER, _POINTS = 4, 1e-8, 8  # of profiles; a share of the objective that is lower; values where each is a fit of its own
 
 
 @dataclass(frozen=True)
 class Settled:
-    """A model with its shape values found, the linear parameters x there, and the rows that both were found on."""
+    """A model with its shape values found, the linear parameters x there, and the rows that both were found on.
+
+    searched: what was done about the shape values, where they were searched.
+    """
 
     model: Model
     x: np.ndarray
@@ -37,6 +47,7 @@ class Settled:
     rows: row.Rows
     stride: int
     objective: float
+    searched: tuple[Searched, ...] = ()
 
 
 def condensed(model: Model, rows: row.Rows) -> Compressed:
@@ -50,15 +61,22 @@ def condensed(model: Model, rows: row.Rows) -> Compressed:
     return Compressed(model.size, model.robot.dof, tuple(factors), len(rows.t))
 
 
-def settle(experiment: Experiment, model: Model, motion: Motion, prior: np.ndarray, *, weights=None, stride: int | None = None, grid: bool = True, hold: bool = False, tolerance: float = _SETTLED) -> Settled:
+def settle(
+    experiment: Experiment, model: Model, motion: Motion, prior: np.ndarray, *, weights=None, stride: int | None = None, grid: bool = True,
+    hold: bool = False, profile: bool = False, tolerance: float = _SETTLED,
+) -> Settled:  # fmt: skip
     """Find a model's shape values and its load on a motion.
 
     Args:
         weights: (joints,) that multiply the rows of each joint, or None.
         stride: which rows; by default as many as suffice.
-        grid: search grids of values that have no start; without it the model's own values are where the search begins.
+        grid: start values that have no start of their own from many places; without it the model's own are where the search begins.
         hold: leave the shape values and the load as the model has them.
+        profile: check the objective's profile over each value.
         tolerance: share of the objective by which a step must lower it for another to follow.
+
+    Raises:
+        NotFinite: an effect is no finite number wherever it was tried.
     """
     stride = stride or row.stride_for(motion, _MOST_ROWS)
     lighter = experiment.model_copy(update={"prior": experiment.prior.model_copy(update={"weight": experiment.prior.weight / stride})})
@@ -70,22 +88,113 @@ def settle(experiment: Experiment, model: Model, motion: Motion, prior: np.ndarr
         solution = problem.solve(lighter)
         return Settled(candidate, solution.x, problem, rows, stride, solution.objective)
 
-    best = solved(model)
+    def attempted(candidate: Model) -> Settled | None:
+        try:
+            return solved(candidate)
+        except NotFinite:
+            return None
+
+    best = attempted(model) or solved(multistart.finite(model, motion))
     if hold:
         return best
     if model.uses_load:
         best = solved(best.model.with_reference(_bodies(best)))
+    tally = {}
     if grid:
-        for k, value in enumerate(best.model.shape_values):
-            effect = best.model.terms[value.term][0]
-            if isinstance(effect, TorqueEffect) and not value.held and value.shape.start is None:
-                if (tried := _from_grid(best, motion, k, weights)) is not None:
-                    best = min(best, solved(tried), key=lambda s: s.objective)
+        for block in _blocks(best.model, motion):
+            best, tally[block] = _started(best, motion, block, weights, attempted)
         for term, (effect, joints) in enumerate(best.model.terms):
             for joint in joints if isinstance(effect, Deflection) else ():
                 if (tried := _from_tries(best, motion, term, joint, weights)) is not None:
                     best = min(best, solved(tried), key=lambda s: s.objective)
-    return _descended(best, motion, solved, weights, tolerance)
+    best = _descended(best, motion, attempted, weights, tolerance)
+    if profile:
+        best = _profiled(best, motion, weights, attempted, tally, tolerance)
+    return best
+
+
+def _blocks(model: Model, motion: Motion) -> list[tuple[int, int]]:
+    """(term, joint) of torque effects with free shape values, on joints that move: what is searched together."""
+    moves = [joint not in (*motion.still, *motion.unused) for joint in model.robot.joints]
+    blocks = [
+        (v.term, v.joint) for v in model.shape_values
+        if isinstance(model.terms[v.term][0], TorqueEffect) and model.terms[v.term][0].coefficients() and moves[v.joint] and not v.held
+    ]  # fmt: skip
+    return list(dict.fromkeys(blocks))
+
+
+def _own(model: Model, block: tuple[int, int]) -> list[int]:
+    """Which of a model's shape values are a block's, and free."""
+    return [k for k, v in enumerate(model.shape_values) if (v.term, v.joint) == block and not v.held]
+
+
+def _tried(model: Model, own: list[int]) -> list[np.ndarray]:
+    values = [model.shape_values[k] for k in own]
+    angle = None if model.scales is None else float(model.scales.angle[values[0].joint])
+    return [np.asarray(v.shape.values(v.low, v.high, angle), dtype=float) for v in values]
+
+
+def _placed(model: Model, own: list[int], values) -> Model:
+    at = dict(zip(own, map(float, values)))
+    return model.with_shapes([at.get(k, s) for k, s in enumerate(model.shapes)])
+
+
+def _started(best: Settled, motion: Motion, block, weights, attempted) -> tuple[Settled, int]:
+    """A block of shape values started from many places: the best of them, and how many there were."""
+    own, count = _own(best.model, block), 0
+    wanted = [best.model.shape_values[k].begin for k in own]
+    for pinned in (False, True):  # first as if no coefficient had a bound, then with those that came to it
+        if pinned and not at_zero(best):
+            break
+        fine = landscape(best, motion, *block, weights, pinned=pinned)
+        rough = landscape(best, motion, *block, weights, pinned=pinned, rows=multistart.ROWS)
+        begin = [fine.here, [here if at is None else at for here, at in zip(fine.here, wanted)]]
+        found, sets = multistart.places(rough, fine, _tried(best.model, own), begin)
+        count += sets
+        for place in found[:_SOLVED]:
+            solution = attempted(_placed(best.model, own, place.values))
+            best = solution if solution is not None and solution.objective < best.objective else best
+    return best, count
+
+
+def _profiled(best: Settled, motion: Motion, weights, attempted, tally: dict, tolerance: float) -> Settled:
+    """The model after the profile over each shape value was checked, and gone on from where it is lower."""
+    lower, points = set(), {}
+    for _ in range(_ROUNDS):
+        before = best
+        for block in _blocks(best.model, motion):
+            own = _own(best.model, block)
+            for pinned in (True, False) if at_zero(best) else (True,):
+                fine = landscape(best, motion, *block, weights, pinned=pinned)
+                place, counts = multistart.lower_on_profile(fine, _tried(best.model, own), _LOWER)
+                points |= dict(zip(own, counts))
+                found = None if place is None else attempted(_placed(best.model, own, place.values))
+                further = _gone_on(best, found, motion, weights, attempted, tolerance)
+                lower |= set(own) if further is not best else set()
+                best = further
+        for k, value in enumerate(best.model.shape_values):
+            if k in points and (value.term, value.joint) in tally or value.held or (value.term, value.joint) in _blocks(best.model, motion):
+                continue
+            tried = [attempted(_placed(best.model, [k], [at])) for at in np.linspace(value.low, value.high, _POINTS)]
+            points[k] = _POINTS
+            found = min((one for one in tried if one is not None), key=lambda s: s.objective, default=None)
+            further = _gone_on(best, found, motion, weights, attempted, tolerance)
+            lower |= {k} if further is not best else set()
+            best = further
+        if best is before:
+            break
+    done = tuple(
+        Searched(v.name, tally.get((v.term, v.joint), 1), points.get(k, 0), k in lower)
+        for k, v in enumerate(best.model.shape_values) if not v.held
+    )  # fmt: skip
+    return replace(best, searched=done)
+
+
+def _gone_on(best: Settled, found: Settled | None, motion: Motion, weights, attempted, tolerance: float) -> Settled:
+    """The better of two, the search gone on from the other where it is lower."""
+    if found is None or not found.objective < best.objective * (1.0 - _LOWER):
+        return best
+    return _descended(found, motion, attempted, weights, tolerance)
 
 
 def correction(fit: Fit, data: Compressed) -> np.ndarray:
@@ -113,32 +222,6 @@ def _bodies(found: Settled) -> np.ndarray:
     return found.x[: 10 * found.model.bodies].reshape(-1, 10)
 
 
-def _from_grid(found: Settled, motion: Motion, k: int, weights) -> Model | None:
-    """The model with the best of the grid's values for one shape value, everything linear solved for each."""
-    model, rows = found.model, found.rows
-    value = model.shape_values[k]
-    effect = model.terms[value.term][0]
-    own = [i for i, c in enumerate(model.coefficients) if c.effect == effect.name and c.joint == value.joint]
-    rest = np.setdiff1d(np.arange(model.size), 10 * model.bodies + np.array(own))
-    scale = np.ones(model.robot.dof) if weights is None else np.asarray(weights)
-    others_alone = rows.columns[:, :, rest]
-    hessian = prior_hessian(found)[np.ix_(rest, rest)]
-    projection = Projection(others_alone, _without(others_alone, rows.tau, hessian, scale), hessian, scale)
-    pieces = row.seen(model, motion)
-    others = model.shapes_of(value.term, value.joint)
-    positive = np.array([linear.lower == 0 for linear in effect.coefficients()])
-    gains = []
-    angle = None if model.scales is None or value.joint < 0 else float(model.scales.angle[value.joint])
-    tried = value.shape.values(value.low, value.high, angle)
-    for at in tried:
-        columns = row.signature(model, motion, pieces, effect, value.joint, {**others, value.shape.name: float(at)}, found.stride, rows.use)
-        c, _, _, gain, _ = projection.step(columns, value.joint)
-        gains.append(0.0 if np.any(c[positive] < 0) else gain)
-    if not max(gains) > 0:
-        return None
-    return model.with_shapes([tried[int(np.argmax(gains))] if i == k else s for i, s in enumerate(model.shapes)])
-
-
 def _from_tries(found: Settled, motion: Motion, term: int, joint: int, weights) -> Model | None:
     """The model with the best of the values that a deflection says to try, where it does nothing yet and none is held: on the
     other side of a resonance no step from there arrives."""
@@ -162,90 +245,6 @@ def _from_tries(found: Settled, motion: Motion, term: int, joint: int, weights) 
     return model.with_shapes([best.get(k, s) for k, s in enumerate(model.shapes)])
 
 
-def _without(columns, tau, hessian, weights) -> np.ndarray:
-    """What least squares with the prior leave of tau (n, dof)."""
-    system = sum(2.0 * w**2 * a.T @ a for w, a in zip(weights, columns)) + hessian
-    x = inverted(system) @ sum(2.0 * w**2 * a.T @ t for w, a, t in zip(weights, columns, tau.T))
-    return tau - np.einsum("jnk,k->nj", columns, x)
-
-
-def prior_hessian(found: Settled) -> np.ndarray:
-    """The prior's Hessian (size, size) where a model settled, zero for coefficients."""
-    out = np.zeros((found.model.size, found.model.size))
-    return add_blocks(out, found.problem.objective.beside_data(found.x)) if found.problem.objective.says else out
-
-
-class Projection:
-    """What the linear parameters leave of a signature: least squares with the prior, the same for every candidate."""
-
-    def __init__(self, columns, residual, hessian, weights, positive=None):
-        """columns (dof, n, size), residual (n, dof) at the optimum, hessian (size, size) of the prior, weights (dof,); positive:
-        {parameter: value at the optimum} of those that must not fall below zero."""
-        self.columns, self.residual, self.weights = columns, residual, np.asarray(weights)
-        self.positive = dict(positive or {})
-        self._system = sum(2.0 * w**2 * a.T @ a for w, a in zip(self.weights, columns)) + hessian
-        self.inverse = inverted(self._system)
-        self._inverses: dict[tuple[int, ...], np.ndarray] = {}
-        # where a parameter is held at zero the objective still falls away from it: it is no stationary point
-        self._pull = np.zeros(len(self._system))
-        for k in self.positive:
-            self._pull[k] = sum(2.0 * w**2 * a[:, k] @ r for w, a, r in zip(self.weights, columns, residual.T))
-
-    def _rest(self, pinned: tuple[int, ...]) -> np.ndarray:
-        """The inverse (size, size) where some parameters may not move, zero for these."""
-        if pinned not in self._inverses:
-            rest = np.setdiff1d(np.arange(len(self._system)), pinned)
-            self._inverses[pinned] = np.zeros_like(self._system)
-            self._inverses[pinned][np.ix_(rest, rest)] = inverted(self._system[np.ix_(rest, rest)])
-        return self._inverses[pinned]
-
-    def step(self, columns, joint: int):
-        """Least squares when columns (n, k) of a joint, or (dof, n, k) of the robot, come in.
-
-        Returns:
-            their coefficients c (k,); the change (size,) of everything else; what everything else absorbs of them (size, k);
-            what the objective falls by; which share (k,) of each column's square everything else cannot absorb.
-        """
-        cross, square, right = 0.0, 0.0, 0.0
-        for j in range(len(self.weights)) if columns.ndim == 3 else [joint]:
-            own = columns[j] if columns.ndim == 3 else columns
-            w = 2.0 * self.weights[j] ** 2
-            cross = cross + w * (self.columns[j].T @ own)
-            square = square + w * (own.T @ own)
-            right = right + w * (own.T @ self.residual[:, j])
-        absorbed = self.inverse @ cross
-        system = square - cross.T @ absorbed
-        size = np.diagonal(square)
-        visible = np.clip(np.diagonal(system), 0.0, None) / np.where(size > 0, size, 1.0)
-        pinned, gone, inverse = (), np.zeros(len(self._system)), self.inverse
-        for _ in range(len(self.positive) + 1):
-            # the least of 1/2 d'Hd - pull'd + d'Xc + 1/2 c'Sc - right'c, with the pinned d taking their parameters to zero
-            base = inverse @ (self._pull + self._system @ gone)
-            c = inverted(system) @ (right + cross.T @ gone - cross.T @ base)
-            change = base - absorbed @ c - gone
-            # friction that would help by turning negative is taken to zero, and stays there
-            below = [k for k, value in self.positive.items() if k not in pinned and value + change[k] < -1e-9 * abs(value)]
-            if not below:
-                break
-            pinned = tuple(sorted({*pinned, *below}))
-            gone[list(pinned)] = [self.positive[k] for k in pinned]
-            inverse = self._rest(pinned)
-            absorbed = inverse @ cross
-            system = square - cross.T @ absorbed
-        gain = float(c @ right + self._pull @ change) - 0.5 * float(c @ square @ c + 2.0 * change @ cross @ c + change @ self._system @ change)
-        return c, change, absorbed, gain, visible
-
-
-def inverted(system: np.ndarray) -> np.ndarray:
-    """Inverse of a positive semidefinite matrix on its range."""
-    diagonal = np.diagonal(system)
-    there = diagonal > 1e-100
-    scale = np.sqrt(np.where(there, diagonal, 1.0))
-    values, vectors = np.linalg.eigh(np.where(np.outer(there, there), system, 0.0) / np.outer(scale, scale))
-    keep = values > max(1e-11 * values[-1], 1e-100)
-    return (vectors[:, keep] / values[keep]) @ vectors[:, keep].T / np.outer(scale, scale)
-
-
 def _descended(best: Settled, motion: Motion, solved, weights, tolerance: float) -> Settled:
     """Damped Gauss-Newton over all shape values that are not held."""
     damping, scale = 1e-3, np.ones(best.model.robot.dof) if weights is None else np.asarray(weights)
@@ -266,7 +265,7 @@ def _descended(best: Settled, motion: Motion, solved, weights, tolerance: float)
                 step[inside] = inverted(system + damping * np.diag(np.where(diagonal > 0, diagonal, 1.0))) @ right
                 moved = np.clip(np.array(best.model.shapes) + step, low, high)
                 tried = solved(best.model.with_shapes(moved))
-                if tried.objective < best.objective:
+                if tried is not None and tried.objective < best.objective:
                     best, damping = tried, max(damping * 0.1, 1e-9)
                     break
                 damping *= 10.0
@@ -293,8 +292,8 @@ def _renewed(best: Settled, solved, share: float) -> tuple[Settled, float]:
     """
     new, old = _bodies(best), best.model.reference
     if old is None or not best.model.deflects:
-        return solved(best.model.with_reference(new)), share
-    tried = solved(best.model.with_reference(old + share * (new - old)))
+        return solved(best.model.with_reference(new)) or best, share
+    tried = solved(best.model.with_reference(old + share * (new - old))) or best
     return (tried, min(2.0 * share, 1.0)) if tried.objective <= best.objective else (best, 0.5 * share)
 
 

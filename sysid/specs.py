@@ -319,6 +319,11 @@ class DataSpec(_Spec):
     position: dict[str, Annotated[dict[str, NonZero], Field(min_length=1)]] = {}
     unused: list[str] = []
 
+    @property
+    def logged(self) -> tuple[str, ...]:
+        """Names of what was logged beside the joints."""
+        return tuple({**self.columns.signals, **self.signals})
+
 
 class PreprocessSpec(_Spec):
     """The filter from logged angles to position, velocity and acceleration."""

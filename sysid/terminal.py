@@ -8,7 +8,7 @@ from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
 
-from .estimate import Fit, given_shapes
+from .estimate import Fit, given_shapes, said_of_shapes
 from .export import exported
 from .statement import tables, text
 
@@ -58,6 +58,8 @@ def show_fit(fit: Fit, document: dict) -> None:
     gap = f"at most {certificate['gap']:.1e} of it can be gained" if known else "no bound was found"
     given = given_shapes(fit)
     print(f"global optimum: {'proven' if certificate['globally_optimal'] else 'not proven'}{f' {given}' if given else ''} ({gap})")
+    for said in said_of_shapes(fit):
+        print(f"  {said}")
     for name, slope in certificate["at_zero"].items():
         print(f"  {name} went to zero and is held there (gradient {slope:+.3g})")
     print(f"every body physically possible: {'yes' if document['physically_consistent'] else 'NO'}")

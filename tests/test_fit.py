@@ -314,9 +314,18 @@ def test_a_certificate_says_what_it_takes_as_given(leg):
     """Of a model with shape values only the rest is convex: what is proven is said to be so given these."""
     from types import SimpleNamespace
 
-    from sysid.estimate import given_shapes
+    from sysid.estimate import at_edge, given_shapes, said_of_shapes
+    from sysid.multistart import Searched
 
-    assert given_shapes(leg) == ""
-    shaped = lambda n: SimpleNamespace(model=SimpleNamespace(shape_values=(None,) * n))  # noqa: E731
-    assert given_shapes(shaped(1)) == "given the 1 shape value, which was searched"
-    assert given_shapes(shaped(2)) == "given the 2 shape values, which were searched"
+    assert given_shapes(leg) == "" and said_of_shapes(leg) == []
+    value = lambda name, held=False, start=None: SimpleNamespace(name=name, held=held, low=0.1, high=2.0, unit="1", shape=SimpleNamespace(start=start))  # noqa: E731
+    values = value("a.hip.x"), value("a.hip.y"), value("b.hip.z"), value("c.hip.w", held=True)
+    done = Searched("a.hip.x", 30, 9, False), Searched("a.hip.y", 30, 12, False), Searched("b.hip.z", 1, 8, True)
+    fit = SimpleNamespace(model=SimpleNamespace(shape_values=values, shapes=(0.5, 2.0, 1.0, 0.1)), searched=done)
+    assert given_shapes(fit) == "given the shape values"
+    assert said_of_shapes(fit) == [
+        "a.hip.x, a.hip.y: started from 30 places; the profile over each was checked at 9 to 12 values, and none lay lower",
+        "b.hip.z: started where nothing is done; its profile was checked at 8 values, which led to a lower place, and the search went on there",
+        "c.hip.w: held as the experiment says", "a.hip.y = 2 1 is at the edge of its range, 0.1 to 2",
+    ]  # fmt: skip
+    assert not at_edge(value("x", start=0.1), 0.1) and at_edge(value("x"), 0.1) and not at_edge(value("x"), 0.11)

@@ -29,7 +29,7 @@ REFUSED = {
     "a*sin(x=q)": "1 value", "a*sin(*q)": "1 value", "a*max(q)": "2 values", "a*foo(q)": "function 'foo'", "a*sin(q)(q)": "function 'sin(q)'",
     "": "empty", "   ": "empty", "a*(q": "cannot be read", "_a*q": "'_a'", "a__b*q": "'a__b'", "joints*q": "'joints'", "a*tau": "tau",
     "a*q + 3": "the term 3", "sin(q)": "the term sin(q)", "a*q + exp(-b*qd)": "the term exp(-b * qd)", "a*b*q": "coefficients a and b", "a*(q - q0)": "a and q0",
-    "qdot*a": "qdot and a", "a*a*q": "a and a",
+    "qdot*a": "'qdot' in the formula looks like a word mistyped; allowed: qd", "a*a*q": "a and a",
 }  # fmt: skip
 
 
@@ -57,7 +57,7 @@ SORTED = {
 @pytest.mark.parametrize("text", SORTED)
 def test_linear_or_not(text):
     parsed = parse(text)
-    assert ("".join(parsed.linear), "".join(parsed.bent)) == SORTED[text]
+    assert ("".join(parsed.linear), "".join(parsed.inner)) == SORTED[text]
 
 
 def test_columns():
@@ -111,7 +111,7 @@ def _grown(inner):
 @settings(max_examples=150, deadline=None, derandomize=True)
 @given(st.recursive(_LEAVES, _grown, max_leaves=10))
 def test_worth_what_python_makes_of_it(text):
-    piece, whole = small_piece(), f"a*sin(b*0 + ({text}))"
+    piece, whole = small_piece(), f"a*sin((b + q)*0 + ({text}))"
     if len(whole) > 500:
         return
     known = {"q": piece.q[:, 1], "qd": piece.qd[:, 1], "qdd": piece.qdd[:, 1], "t": piece.t, "s": np.sign(piece.qd[:, 1]), "load": piece.load[:, 1]}
@@ -120,7 +120,7 @@ def test_worth_what_python_makes_of_it(text):
         floats = ast.unparse(_Floats().visit(ast.parse(text, mode="eval")))
         truth = np.sin(eval(floats, {"__builtins__": {}}, {**FUNCTIONS, **known, "pi": np.pi, "b": np.float64(0.8), "number": np.float64}))
     formula = Formula(whole)
-    assert formula.parsed.linear == ("a",) and formula.parsed.bent == ("b",)
+    assert formula.parsed.linear == ("a",) and formula.parsed.inner == ("b",)
     if np.isfinite(truth).all():
         np.testing.assert_allclose(formula.columns(piece, 1, b=0.8)[0], np.broadcast_to(truth, 4), rtol=1e-12, atol=1e-12)
     else:
@@ -143,6 +143,195 @@ def test_any_text_is_a_formula_or_one_line(text):
         assert formula.columns(small_piece(), 1, **{shape.name: 1.0 for shape in formula.shapes()}).shape == (len(formula.coefficients()), 4)
     except ConfigError as error:
         assert "\n" not in str(error)
+
+
+# ---- words that look mistyped
+
+MISTYPED = {
+    "a*sgn(qd)": "sign", "a*q*exp(-sgn)": "sign", "a*sin(qdot*b)": "qd", "a*exp(-abs(Q)/w)": "q", "a*qdd1": "qdd", "a*exp(-qdd1*b)": "qdd", "a*exp(-abs(tauu)/b)": "tau",
+    "a*sin(k*dq)": "qd", "a*laod": "load", "a*sin(Load*b)": "load", "a*q + velocity": "qd", "a*exp(-time/T)": "t", "a*sin(q1)": "q", "a*tanhh(q)": "tanh", "a*arctan(q)": "atan",
+    "a*sin(temprature*k)": "temperature", "a*q*cos(ddq)": "qdd", "a*sin(2*PI*q*b)": "pi",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("text", MISTYPED)
+def test_a_mistyped_word_is_refused_with_what_it_may_mean(text):
+    with pytest.raises(ConfigError) as error:
+        parse(text, ["temperature"])
+    allowed = str(error.value).partition("allowed: ")[2].partition(";")[0].split(", ")
+    assert allowed[0] == MISTYPED[text], error.value
+
+
+NAMES_OF_THEIR_OWN = ["h*exp(-((q-q0)/w)**2)", "a*exp(-t/T)", "a*tanh(qd/qd0)", "a*tanh((qdd-qdd1)/w)", "Fc*tanh(qd/vs) + Fv*qd", "k1*q + k2*q**3", "a*sin(k*q + phi)",
+                      "a*exp(-abs(qd/vs)**delta)*s", "mass*qdd + stiffness*q", "a*max(q-qmax, 0)", "amp*sin(omega*t + phase)", "a*exp(-abs(temperature - T0)/w)*s", "kd*qd + kp*q", "a/b*q"]  # fmt: skip
+
+
+@pytest.mark.parametrize("text", NAMES_OF_THEIR_OWN)
+def test_names_that_people_mean_are_free(text):
+    parse(text, ["temperature"])
+
+
+def test_what_never_changes_is_refused():
+    with pytest.raises(ConfigError, match=r"exp\(-b\) in the formula holds nothing that changes: b would be to be found"):
+        parse("a*q*exp(-b)")
+
+
+def test_a_logged_signal_is_a_variable():
+    from dataclasses import replace
+
+    piece = replace(small_piece(), signals={"heat": np.array([20.0, 21.0, 22.0, 23.0])})
+    formula = Formula("a*exp(-heat/b)*s", signals=["heat"])
+    assert formula.parsed.linear == ("a",) and formula.parsed.inner == ("b",)
+    np.testing.assert_allclose(formula.columns(piece, 1, b=10.0)[0], np.exp(-piece.signals["heat"] / 10.0) * np.sign(piece.qd[:, 1]))
+    with pytest.raises(ConfigError, match="signal heat of the formula is not logged"):
+        formula.columns(replace(piece, signals={}), 1, b=10.0)
+
+
+# ---- where values inside a formula are searched
+
+
+def swing(n: int = 2000):
+    """q from -1 to 0.6, of one joint, for 10 s; as `Effect.sized` is asked: rows, then those after them."""
+    from sysid.motion import Piece
+
+    t = np.arange(n) * 10.0 / n
+    q = (-0.2 + 0.8 * np.sin(2 * np.pi * 0.7 * t))[:, None]
+    qd, zero = np.gradient(q, t, axis=0), np.zeros(1)
+    two = np.concatenate([np.arange(n - 1), np.arange(1, n)])
+    q, qd, t = q[two], qd[two], t[two]
+    return Piece(0, 10.0 / n, t, q, qd, 0 * q, q, q, {}, None, None, slice(0, len(t)), zero, zero)
+
+
+def sized(text: str, n: int = 2000) -> dict:
+    return {shape.name: shape for shape in Formula(text).sized(swing(n), n, 0)}
+
+
+def test_an_offset_is_searched_where_its_signal_is():
+    for text, low, high in (("h*exp(-((q-c)/w)**2)", -1.8, 1.4), ("h*exp(-((q+c)/w)**2)", -1.4, 1.8), ("h*max(c-q, 0)", -1.8, 1.4), ("h*tanh((2*q-c)/w)", -3.6, 2.8)):
+        c = sized(text)["c"]
+        np.testing.assert_allclose([c.low, c.high], [low, high], atol=1e-3)
+
+
+def test_a_scale_goes_with_its_signals_size():
+    for text in ("h*tanh(q/w)", "h*exp(-abs(q)/w)*s", "h*tanh(q*w)"):
+        w, twice = sized(text)["w"], sized(text.replace("q", "(2*q)"))["w"]
+        factor = 0.5 if "*w" in text else 2.0
+        np.testing.assert_allclose([twice.low, twice.high], [factor * w.low, factor * w.high])
+        assert min(abs(at) for at in w.values(w.low, w.high)) <= 0.1 <= 1.0 <= w.high
+
+
+def test_a_sign_is_searched_where_it_matters():
+    low = lambda text, name: sized(text)[name].low  # noqa: E731
+    assert low("h*exp(-((q-c)/w)**2)", "w") > 0 and low("h*tanh((q-c)/w)", "w") > 0 and low("h*sin(k*q+p)", "k") > 0
+    assert low("h*exp(r*q)", "r") < 0 and low("h/(1+exp(-(q-c)/w))", "w") < 0 and low("h*exp(-b*abs(qd))*s", "b") < 0
+    assert low("h*log(b+abs(qd))", "b") > 0 and low("h*qd/(v+abs(qd))", "v") > 0  # what must not vanish
+
+
+def test_cycles_are_counted_by_span_and_sampling():
+    k = sized("h*sin(k*q + p)")["k"]
+    steps = np.diff(k.values(k.low, k.high))
+    assert np.all(steps * 1.6 <= 0.5 * np.pi * 1.01)  # none is missed
+    travel = np.sqrt(np.mean(np.diff(swing().q[:1999, 0]) ** 2))
+    assert k.high == pytest.approx(0.5 * np.pi / travel, rel=0.01)
+    assert sized("h*sin(k*t + p)", 4000)["k"].high <= 2000 * 0.5 * np.pi / 10.0 * 1.01
+
+
+def test_exponents():
+    assert (sized("h*abs(q)**n*s")["n"].low, sized("h*abs(q)**n*s")["n"].high) == (0.05, 6.0)
+    assert sized("h*(2+q)**n")["n"].low == -6.0  # of what stays clear of zero
+
+
+def test_every_formula_has_ranges_that_can_be_tried():
+    for text in ["a*atan(b*q+c)", "a*q/sqrt(q**2+w**2)", "a*exp(b*sin(k*q))", "a*cos(q/p)", "a*min(max(q,l),u)", "a*2**(k*q)", "a*(1+b*q)**n", "a*log(b*q+c)", "a/b*q", "a*sqrt(q+b)"]:
+        formula = Formula(text)
+        shapes = formula.sized(swing(), 2000, 0)
+        for shape in shapes:
+            tried = shape.values(shape.low, shape.high)
+            assert shape.low < shape.high and len(tried) >= 5 and tried.min() >= shape.low - 1e-9 and tried.max() <= shape.high + 1e-9, (text, shape)
+            narrow = shape.values(*sorted((tried[1], tried[-2])))
+            assert len(narrow) >= 2 and narrow.min() >= tried[1] - 1e-9
+
+
+# ---- found
+
+
+def bump(columns, q0=-0.23, w=0.12, h=0.8):
+    return {**columns, "tau_elbow": columns["tau_elbow"] + h * np.exp(-(((columns["q_elbow"] - q0) / w) ** 2))}
+
+
+FORMULA = {"formula": "h*exp(-((q-q0)/w)**2)", "joints": ["elbow"]}
+
+
+def fitted(said) -> tuple[dict, dict]:
+    import json
+
+    assert said.status == 0, said.err
+    document = json.loads(said.out)
+    return {entry["name"].rpartition(".")[2]: entry for entry in document["parameters"] if entry["name"].startswith("formula.")}, document["certificate"]
+
+
+def test_a_negative_value_inside_a_formula_is_found(experiment, cli):
+    folder = experiment(config={"model.effects": ["viscous", "coulomb", FORMULA]}, train=bump, test=bump)
+    values, certificate = fitted(cli("fit", folder, "--json"))
+    assert certificate["globally_optimal"]
+    for name, truth in (("q0", -0.23), ("w", 0.12), ("h", 0.8)):
+        assert abs(values[name]["value"] - truth) < 5 * values[name]["std"] < 0.2
+    given = {entry["name"]: entry for entry in certificate["given"]}
+    assert set(given) == {"formula.elbow.q0", "formula.elbow.w"}
+    assert all(entry["starts"] > 100 and entry["profile"] > 10 and not entry["at_edge"] and not entry["held"] for entry in given.values())
+    said = cli("fit", folder)
+    assert "proven given the shape values" in said.out and "started from" in said.out and "the profile over each was checked" in said.out
+
+
+def test_start_and_within(experiment, cli):
+    entry = {**FORMULA, "q0": {"start": 0.1, "within": [-1, 1]}, "w": {"within": [0.2, 0.5]}}
+    folder = experiment(config={"model.effects": ["viscous", "coulomb", entry]}, train=bump, test=bump)
+    values, certificate = fitted(cli("fit", folder, "--json"))
+    given = {e["name"]: e for e in certificate["given"]}
+    assert given["formula.elbow.q0"]["range"] == [-1, 1] and given["formula.elbow.w"]["range"] == [0.2, 0.5]
+    assert abs(values["q0"]["value"] + 0.23) < 0.05 and values["w"]["value"] == pytest.approx(0.2) and given["formula.elbow.w"]["at_edge"]
+    said = cli("fit", folder)
+    assert "formula.elbow.w = 0.2 SI is at the edge of its range, 0.2 to 0.5" in said.out
+    assert pipeline.load(said.run / "experiment.yaml").model == pipeline.load(folder).model
+
+
+def test_other_effects_are_searched_where_the_user_says(experiment, cli):
+    written = ["viscous", "coulomb", {"stribeck": {"joints": ["elbow"], "vs": {"within": [0.3, 0.4]}}}, {"delay": {"joints": ["elbow"], "d": {"within": [-0.001, 0.002]}}}]
+    folder = experiment(config={"model.effects": written})
+    import json
+
+    given = {e["name"]: e for e in json.loads(cli("fit", folder, "--json").out)["certificate"]["given"]}
+    assert given["stribeck.elbow.vs"]["range"] == [0.3, 0.4] and given["delay.elbow.d"]["range"] == [-0.001, 0.002]
+
+
+def test_a_candidate_is_questioned_where_it_can_be_found(experiment, cli):
+    """Its values are placed as in a fit; what is held stays so, in the model and in the command; what is no number at most values says nothing."""
+    import json
+
+    candidates = [{**FORMULA, "w": 0.12}, {"formula": "g*log(q-b)", "name": "odd"}]
+    config = {"model.candidates": candidates, "data.train": ["train.csv"], "data.test": ["test.csv"]}
+    said = json.loads(cli("diagnose", experiment(config=config, train=bump, test=bump), "--json").out)
+    best = next(f for f in said["findings"] if f["joint"] == "elbow")
+    assert best["effect"] == "formula" and abs(best["parameters"]["formula.elbow.q0"]["value"] + 0.23) < 0.02
+    assert "--option w=0.12" in best["command"] and best["parameters"]["formula.elbow.w"]["value"] == 0.12
+
+
+def test_add_takes_start_and_within(experiment, cli):
+    import shlex
+
+    folder = experiment(train=bump, test=bump)
+    options = ["formula=h*exp(-((q-q0)/w)**2)", "q0={start: 0.1, within: [-1, 1]}"]
+    said = cli("add", folder, "formula", "--joint", "elbow", *(word for option in options for word in ("--option", option)))
+    assert said.status == 0, said.err
+    entry = pipeline.load(folder).model.effects[-1]
+    assert entry.options["q0"] == {"start": 0.1, "within": [-1, 1]}
+    from sysid.addition import command
+
+    words = shlex.split(command(folder / "config.yaml", "formula", ["elbow"], entry.options))
+    from sysid.loop import options as read
+
+    given = read([word for before, word in zip(words, words[1:]) if before == "--option"])
+    assert given == entry.options
 
 
 # ---- through the experiment file
@@ -182,6 +371,15 @@ FAULTS = {
     "name taken": ([{"formula": "a*q", "name": "viscous"}], ["name 'viscous'"]),
     "name of nothing": ([{"formula": "a*q", "name": "../x"}], ["name '../x'"]),
     "name no text": ([{"formula": "a*q", "name": 3}], ["name '3'"]),
+    "nothing asked": ([{"formula": "a*sin(b*q)", "b": {}}], ["formula.b", "neither start nor within", "{start: number, within: [low, high]}"]),
+    "asked oddly": ([{"formula": "a*sin(b*q)", "b": {"begin": 3}}], ["formula.b", "'begin'", "within: [low, high]"]),
+    "no range": ([{"formula": "a*sin(b*q)", "b": {"within": 3}}], ["formula.b.within", "[low, high]"]),
+    "range the wrong way": ([{"formula": "a*sin(b*q)", "b": {"within": [3, 1]}}], ["formula.b.within", "the low below the high"]),
+    "start outside": ([{"formula": "a*sin(b*q)", "b": {"start": 4, "within": [1, 3]}}], ["formula.b.start is 4", "outside [1.0, 3.0]"]),
+    "a coefficient": ([{"formula": "a*sin(b*q)", "a": 3}], ["a is a coefficient of the formula", "line", "formula, name, b, joints"]),
+    "not in the formula": ([{"formula": "a*sin(bb*q)", "b": {"start": 3}}], ["unknown key 'b'", "bb", "line"]),
+    "below zero": ([{"stribeck": {"vs": {"within": [-1, 1]}}}], ["stribeck.vs may be -1", "above zero"]),
+    "mistyped": ([{"formula": "a*sin(qdot*b)"}], ["'qdot'", "qd", "line"]),
     "held by text": ([{"formula": "a*sin(b*q)", "b": "x"}], ["formula.b", "'x'"]),
     "not finite": ([{"formula": "a*log(0 - q**2)"}], ["log(0 - q ** 2)", "no finite number"]),
     "idle value": ([{"warmup": {"signal": "heat", "T": 3}}], ["warmup", "no T"]),

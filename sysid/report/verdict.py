@@ -6,7 +6,7 @@ import math
 
 from ..diagnose.diagnosis import Diagnosis
 from ..effect import describe
-from ..estimate import Fit, given_shapes
+from ..estimate import Fit, given_shapes, said_of_shapes
 from ..statement.text import percent
 from .words import (
     SPACE,
@@ -47,6 +47,8 @@ def verdict(fit: Fit, diagnosis: Diagnosis, document: dict) -> tuple[str, str, l
     )
     given = given_shapes(fit)
     proof = f"The fit is {proven}{f', {given}' if given else ''}."
+    if said := said_of_shapes(fit):
+        proof += f" {text('. '.join(said))}."
     if not fit.solution.converged:
         proof = "<strong>The fit did not converge: nothing below is to be trusted.</strong>"
     bodies = (

@@ -1,0 +1,66 @@
+"""A formula's tree: its parts, its names, and what it is worth over arrays."""
+
+from __future__ import annotations
+
+import ast
+
+import numpy as np
+
+from .words import FUNCTIONS
+
+OPERATIONS = {
+    ast.Add: np.add,
+    ast.Sub: np.subtract,
+    ast.Mult: np.multiply,
+    ast.Div: np.divide,
+    ast.Pow: np.power,
+}
+
+
+def names_of(node: ast.expr) -> set[str]:
+    """The names in a tree, but not its functions'."""
+    if isinstance(node, ast.Name):
+        return {node.id}
+    return set().union(*(names_of(part) for part in operands(node)))
+
+
+def terms(node: ast.expr) -> list[ast.expr]:
+    """The terms of a sum."""
+    if isinstance(node, ast.BinOp) and isinstance(node.op, (ast.Add, ast.Sub)):
+        return terms(node.left) + terms(node.right)
+    return terms(node.operand) if isinstance(node, ast.UnaryOp) else [node]
+
+
+def operands(node: ast.expr) -> list[ast.expr]:
+    """The parts of a piece of a tree."""
+    if isinstance(node, ast.BinOp):
+        return [node.left, node.right]
+    return (
+        [node.operand]
+        if isinstance(node, ast.UnaryOp)
+        else node.args
+        if isinstance(node, ast.Call)
+        else []
+    )
+
+
+def value(node: ast.expr, known: dict):
+    """What a tree is worth, with the names' values."""
+    if isinstance(node, ast.Constant):
+        return float(node.value)
+    if isinstance(node, ast.Name):
+        return known[node.id]
+    parts = [value(part, known) for part in operands(node)]
+    if isinstance(node, ast.UnaryOp):
+        return np.negative(parts[0]) if isinstance(node.op, ast.USub) else parts[0]
+    return (FUNCTIONS[node.func.id] if isinstance(node, ast.Call) else OPERATIONS[type(node.op)])(
+        *parts
+    )
+
+
+def culprit(node: ast.expr, known: dict) -> ast.expr:
+    """The smallest part of a tree that is not finite."""
+    for part in operands(node):
+        if not np.isfinite(value(part, known)).all():
+            return culprit(part, known)
+    return node

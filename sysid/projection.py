@@ -1,0 +1,103 @@
+"""What the linear parameters of a model leave of a column: least squares with the prior, on rows
+that stand in memory.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .objective import add_blocks
+
+
+def prior_hessian(found) -> np.ndarray:
+    """The prior's Hessian (size, size) where a model settled, zero for coefficients."""
+    out = np.zeros((found.model.size, found.model.size))
+    objective = found.problem.objective
+    return add_blocks(out, objective.beside_data(found.x)) if objective.says else out
+
+
+class Projection:
+    """What the linear parameters leave of a signature: least squares with the prior, the same for
+    every candidate.
+    """
+
+    def __init__(self, columns, residual, hessian, weights, positive=None):
+        """columns (dof, n, size), residual (n, dof) at the optimum, hessian (size, size) of the
+        prior, weights (dof,); positive: {parameter: value at the optimum} of those that must not
+        fall below zero."""
+        self.columns, self.residual, self.weights = columns, residual, np.asarray(weights)
+        self.positive = dict(positive or {})
+        self._system = sum(2.0 * w**2 * a.T @ a for w, a in zip(self.weights, columns)) + hessian
+        self.inverse = inverted(self._system)
+        self._inverses: dict[tuple[int, ...], np.ndarray] = {}
+        # where a parameter is held at zero the objective still falls away from it: it is no
+        # stationary point
+        self._pull = np.zeros(len(self._system))
+        for k in self.positive:
+            self._pull[k] = sum(
+                2.0 * w**2 * a[:, k] @ r for w, a, r in zip(self.weights, columns, residual.T)
+            )
+
+    def _rest(self, pinned: tuple[int, ...]) -> np.ndarray:
+        """The inverse (size, size) where some parameters may not move, zero for these."""
+        if pinned not in self._inverses:
+            rest = np.setdiff1d(np.arange(len(self._system)), pinned)
+            self._inverses[pinned] = np.zeros_like(self._system)
+            self._inverses[pinned][np.ix_(rest, rest)] = inverted(self._system[np.ix_(rest, rest)])
+        return self._inverses[pinned]
+
+    def step(self, columns, joint: int):
+        """Least squares when columns (n, k) of a joint, or (dof, n, k) of the robot, come in.
+
+        Returns:
+            their coefficients c (k,); the change (size,) of everything else; what everything else
+            absorbs of them (size, k); what the objective falls by; which share (k,) of each
+            column's square everything else cannot absorb.
+        """
+        cross, square, right = 0.0, 0.0, 0.0
+        for j in range(len(self.weights)) if columns.ndim == 3 else [joint]:
+            own = columns[j] if columns.ndim == 3 else columns
+            w = 2.0 * self.weights[j] ** 2
+            cross = cross + w * (self.columns[j].T @ own)
+            square = square + w * (own.T @ own)
+            right = right + w * (own.T @ self.residual[:, j])
+        absorbed = self.inverse @ cross
+        system = square - cross.T @ absorbed
+        size = np.diagonal(square)
+        visible = np.clip(np.diagonal(system), 0.0, None) / np.where(size > 0, size, 1.0)
+        pinned, gone, inverse = (), np.zeros(len(self._system)), self.inverse
+        for _ in range(len(self.positive) + 1):
+            # the least of 1/2 d'Hd - pull'd + d'Xc + 1/2 c'Sc - right'c, with the pinned d taking
+            # their parameters to zero
+            base = inverse @ (self._pull + self._system @ gone)
+            c = inverted(system) @ (right + cross.T @ gone - cross.T @ base)
+            change = base - absorbed @ c - gone
+            # friction that would help by turning negative is taken to zero, and stays there
+            below = [
+                k
+                for k, value in self.positive.items()
+                if k not in pinned and value + change[k] < -1e-9 * abs(value)
+            ]
+            if not below:
+                break
+            pinned = tuple(sorted({*pinned, *below}))
+            gone[list(pinned)] = [self.positive[k] for k in pinned]
+            inverse = self._rest(pinned)
+            absorbed = inverse @ cross
+            system = square - cross.T @ absorbed
+        gain = float(c @ right + self._pull @ change) - 0.5 * float(
+            c @ square @ c + 2.0 * change @ cross @ c + change @ self._system @ change
+        )
+        return c, change, absorbed, gain, visible
+
+
+def inverted(system: np.ndarray) -> np.ndarray:
+    """Inverse of a positive semidefinite matrix on its range."""
+    diagonal = np.diagonal(system)
+    there = diagonal > 1e-100
+    scale = np.sqrt(np.where(there, diagonal, 1.0))
+    values, vectors = np.linalg.eigh(
+        np.where(np.outer(there, there), system, 0.0) / np.outer(scale, scale)
+    )
+    keep = values > max(1e-11 * values[-1], 1e-100)
+    return (vectors[:, keep] / values[keep]) @ vectors[:, keep].T / np.outer(scale, scale)
