@@ -40,7 +40,7 @@ def _root(
 ) -> None:
     """Keeps `sysid fit` a command of its own however many there are."""
     if context.invoked_subcommand is None:
-        raise SysidError("which command? `sysid check EXPERIMENT` looks at logs, `sysid fit EXPERIMENT` identifies, `sysid diagnose EXPERIMENT` names what is missing; `sysid --help` lists all")
+        raise SysidError("which command? `sysid init URDF LOG...` begins with a robot and its logs, `sysid check EXPERIMENT` looks at logs, `sysid fit EXPERIMENT` identifies, `sysid diagnose EXPERIMENT` names what is missing; `sysid --help` lists all")
 
 
 @app.command()
