@@ -67,9 +67,7 @@ def _of_xacro(path: Path) -> Machine:
         ) from None
     try:
         text = XacroDoc.from_file(str(path)).to_urdf_string()
-    except (
-        Exception
-    ) as error:  # xacro raises what it likes: on its syntax, a package or a file that is not there
+    except Exception as error:  # xacro raises what it likes: of syntax, packages, missing files
         said = (str(error).splitlines() or [type(error).__name__])[0]
         raise RobotError(
             f"xacro cannot expand it ({said})",
