@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sysid import config, pipeline
+from sysid import pipeline
 from sysid.init import text, units, words
 from tests.conftest import JOINTS, URDF, csv
-from tests.log_formats import write_aloha, write_bag1, write_bag2, write_droid, write_lerobot
+from tests.log_formats import write_aloha, write_bag1, write_droid, write_lerobot
 from tests.test_readers import turned, with_bag
 
 
@@ -176,7 +176,7 @@ def test_the_measured_rather_than_the_commanded(experiment, cli):
     folder = experiment(train=only, test=only, name="asked")
     found, made = begun(cli, folder, [folder / "train.csv", folder / "test.csv"])
     assert made.data.columns.torque == "tau_target_{joint}"
-    assert any("commanded" in (guess["doubt"] or "") for guess in found["guesses"])
+    assert any("asked for" in (guess["doubt"] or "") for guess in found["guesses"])
 
 
 def test_any_text_in_names_stays_what_it_is(experiment, cli):
@@ -329,6 +329,39 @@ def test_joints_that_the_user_names(experiment, cli):
     cli("init", folder / "robot.urdf", *logs, "--joints", "hand", out=folder / "x").complains(
         "--joints", "'hand'", "shoulder, elbow"
     )
+
+
+def test_a_joint_whose_torque_was_not_logged_still_moves(experiment, cli):
+    """Without a column, and with one that never changes."""
+    lost = lambda c: {name: values for name, values in c.items() if name != "tau_shoulder"}
+    for name, columns in (("lost", lost), ("dead", lambda c: c | {"tau_shoulder": 0 * c["t"]})):
+        folder = experiment(train=columns, test=columns, name=name)
+        found, made = begun(cli, folder, [folder / "train.csv", folder / "test.csv"])
+        assert made.robot.joints == list(JOINTS) and made.data.unused == ["shoulder"]
+        assert pipeline.fit(made).rms("test")["elbow"] < 0.06
+
+
+def test_commanded_positions_in_place_of_torques(experiment, cli):
+    """Servos: tau = kp (command - q) - kd qd, of which command and q were logged."""
+    kp, kd = 80.0, 2.0
+
+    def asked(columns):
+        out = {"t": columns["t"]}
+        for joint in JOINTS:
+            q, tau = columns[f"q_{joint}"], columns[f"tau_{joint}"]
+            out[f"{joint}.pos"] = q
+            out[f"{joint}.goal_pos"] = q + (tau + kd * np.gradient(q, columns["t"])) / kp
+        return out
+
+    folder = experiment(train=asked, test=asked)
+    found, made = begun(cli, folder, [folder / "train.csv", folder / "test.csv"])
+    assert {j: spec.command for j, spec in made.actuator.items()} == {
+        j: f"{j}.goal_pos" for j in JOINTS
+    }
+    (why,) = [guess["why"] for guess in found["guesses"] if guess["key"] == "actuator"]
+    assert "no torque was logged" in why
+    fit = pipeline.fit(made)
+    assert fit.solution.converged and fit.predictions["test"].errors()["total"][1] < 0.1
 
 
 # ---- splits
@@ -493,7 +526,7 @@ def test_a_robot_that_needs_a_package(experiment, cli, monkeypatch):
     [
         (
             lambda c: {n: v for n, v in c.items() if not n.startswith("tau")},
-            ["no column looks like the torques or currents of shoulder, elbow"],
+            ["no column looks like the torques, currents or commands"],
         ),
         (
             lambda c: {n: v for n, v in c.items() if not n.startswith("q")},

@@ -18,6 +18,7 @@ from .guess import Draft, Guess
 from .logged import Logged, Signals, opened, read, signals
 from .split import split
 
+_COMMAND, _NONE = "command", "none"  # the signal; the column of a joint without one
 #: what a URDF knows nothing of and nearly every drive has
 _EFFECTS = ["viscous", "coulomb", "torque_bias", "armature"]
 
@@ -60,7 +61,7 @@ def draft(reference: str, names: list[str], folder: Path, wishes: Wishes) -> Dra
     notes = (*machine.notes, *_wraps(data, used, robot, angles.value))
     out = Draft(urdf, {}, notes, found.rest)
     out = out.having(*machine.guesses, *chosen, *_parts(data, clock, folder, wishes))
-    out = out.having(*clock, *_columns(found, used), angles, *_drive(found))
+    out = out.having(*clock, *_columns(found, used), angles, *_drive(found, used))
     return physics.held_against(out, found, folder)
 
 
@@ -90,34 +91,42 @@ def _parts(data: list[Logged], clock: list[Guess], folder: Path, wishes: Wishes)
 
 
 def _columns(found: Signals, used: list[str]) -> list[Guess]:
-    signals = {"position": found.position.of(used), "torque": found.torque.of(used)}
-    doubt = {
-        own: "commanded or computed, not measured, by the names"
-        for own in signals
-        if signals[own].meaning.away > 1
-    }
-    return [
-        Guess(f"data.columns.{key}", own.said, own.why, doubt.get(key, ""))
-        for key, own in signals.items()
-    ]
+    """Columns of angles and torques."""
+    angle, torque = found.position.of(used), found.torque
+    out = [Guess("data.columns.position", angle.said, angle.why)]
+    if torque.meaning.signal == _COMMAND:
+        return out
+    said = torque.pattern or [torque.columns.get(joint, _NONE) for joint in used]
+    doubt = "asked for or computed, not measured, by the names" if torque.meaning.away > 1 else ""
+    return [*out, Guess("data.columns.torque", said, torque.why, doubt)]
 
 
-def _drive(found: Signals) -> list[Guess]:
-    """What torque is, and what the drives are likely to have."""
-    out = []
-    if found.torque.meaning.signal == "current":
+def _drive(found: Signals, used: list[str]) -> list[Guess]:
+    """What stands for torque, and what the drives are likely to have."""
+    out, kind = [], found.torque.meaning.signal
+    if kind == "current":
         out.append(Guess("data.units.torque", "A", "the columns are currents by their names"))
+    if kind == _COMMAND:
+        free = {"kp": "free", "kd": "free", "delay": "free"}
+        commands = {j: c for j, c in found.torque.columns.items() if j in used}
+        why = (
+            "no torque was logged, but positions that were asked for: servos, whose gains are found"
+        )
+        tie = "masses, friction and gains share a factor until a body is known (prior.known), or kp"
+        servos = {joint: {"command": column, **free} for joint, column in commands.items()}
+        out.append(Guess("actuator", servos, why, tie))
     why = "friction, a bias and the rotors' inertia, which a URDF does not hold"
-    out.append(
-        Guess("preprocess.window", "auto", "chosen on held-out stretches of the training logs")
-    )
+    window = "chosen on held-out stretches of the training logs"
+    out.append(Guess("preprocess.window", "auto", window))
     return [*out, Guess("model.effects", _EFFECTS, why)]
 
 
 def _wraps(data: list[Logged], used: list[str], robot, unit: str) -> tuple[str, ...]:
     slides, notes = _sliding(robot), []
     for one in data:
-        for joint, count in units.wraps({j: one.q[j] for j in used}, slides, unit).items():
+        for joint, count in units.wraps(
+            {j: one.q[j] for j in used if j in one.q}, slides, unit
+        ).items():
             notes.append(
                 f"the angle of {joint} jumps by a turn {count} times in {Path(one.name).name}: "
                 "unwrap it (numpy.unwrap) before it is logged"

@@ -37,7 +37,7 @@ class Draft:
     @property
     def tree(self) -> dict:
         """The experiment file as plain values."""
-        out: dict = {"robot": {"urdf": self.urdf}, "data": {}, "preprocess": {}, "model": {}}
+        out: dict = {"robot": {"urdf": self.urdf}, "data": {}, "actuator": {}, "preprocess": {}}
         for key, guess in self.guesses.items():
             *path, last = key.split(".")
             node = out

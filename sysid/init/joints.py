@@ -44,29 +44,19 @@ def chosen(
     Raises:
         LogError: none is left.
     """
-    used, lock, whys = [], {}, []
+    used, unused, lock, whys = [], [], {}, []
     for joint, slides in zip(robot.joints, robot.prismatic):
-        parts = [one.q[joint] for one in data if joint in one.q]
-        values = np.concatenate(parts) * _si(unit, slides) if parts else None
-        travel = None if values is None else float(np.ptp(values))
-        if joint in arm and joint in signals.joints and travel > _STILL:
+        values = _logged(data, joint, _si(unit, slides))
+        travel = 0.0 if values is None else float(np.ptp(values))
+        if joint in arm and travel > _STILL:
             used.append(joint)
+            if not _told(data, joint):
+                unused.append(joint)
             continue
         lock[joint], why = _locked(robot, joint, values)
-        reason = (
-            "moves a gripper"
-            if joint not in arm
-            else "has no columns"
-            if travel is None
-            else "has no torque"
-        )
-        if joint in arm and travel is not None and travel <= _STILL:
-            reason = "stands still"
-        far = travel is not None and travel > _STILL and joint in arm
-        whys.append(
-            f"{joint} {reason}: {why}" + (f", though it travels {travel:.3g}" if far else "")
-        )
-    if not used:
+        reason = "stands still" if values is not None else "has no columns"
+        whys.append(f"{joint} {reason if joint in arm else 'moves a gripper'}: {why}")
+    if len(used) == len(unused):
         raise LogError(
             "no joint of the URDF moves in these logs with a torque beside it",
             where=data[0].name,
@@ -75,9 +65,24 @@ def chosen(
         )
     order = [joint for joint in arm if joint in used]
     out = [Guess("robot.joints", order, *_why(robot, signals, order))]
+    if unused:
+        why = "they move, and no torque of theirs was logged, or one that never changes"
+        out.append(Guess("data.unused", [joint for joint in order if joint in unused], why))
     if robot.locked:
         whys.append(f"{', '.join(robot.locked)}, by <mimic>: locked at 0")
     return order, [*out, Guess("robot.lock", lock, "; ".join(whys))] if whys else out
+
+
+def _logged(data: list[Logged], joint: str, scale: float) -> np.ndarray | None:
+    """The angles of a joint in all logs; None where one lacks it, or has it in other rows."""
+    parts = [one.q[joint] for one in data if joint in one.q]
+    whole = len(parts) == len(data) and all(len(p) == one.samples for p, one in zip(parts, data))
+    return np.concatenate(parts) * scale if whole else None
+
+
+def _told(data: list[Logged], joint: str) -> bool:
+    """Whether a joint has a torque that is more than a constant."""
+    return any(np.ptp(one.tau[joint]) > 0.0 for one in data if joint in one.tau)
 
 
 def _si(unit: str, slides: bool) -> float:

@@ -15,14 +15,14 @@ from .columns import Found, found
 from .words import is_time, words
 
 _EPISODE = "episode_index"
-_TORQUES = ("torque", "current")
+_TORQUES = ("torque", "current"), ("command",)
 
 
 @dataclass(frozen=True)
 class Signals:
-    """Which columns hold what, in every log: angles of every joint found; torque (or current) of
-    joints that have both; speed where one was logged; time, None where there is none; rest: columns
-    that nothing was made of."""
+    """Which columns hold what, in every log: angles of every joint found; torque, or what stands
+    for it (its meaning's signal: torque, current, or the command of a servo); speed where one was
+    logged; time, None where there is none; rest: columns that nothing was made of."""
 
     position: Found
     torque: Found
@@ -84,7 +84,9 @@ def signals(tables: dict[str, Table], joints: list[str], arm: int) -> Signals:
     (name, first), *others = tables.items()
     groups = found(first, joints)
     position = _best(groups, ("position",), "angles", first, joints, arm)
-    torque = _best(groups, _TORQUES, "torques or currents", first, list(position.columns), arm)
+    known = list(position.columns)
+    kinds = next((kinds for kinds in _TORQUES if any(map(groups.get, kinds))), _TORQUES[0])
+    torque = _best(groups, kinds, "torques, currents or commands", first, known, arm)
     velocity = next(
         (f for f in groups.get("velocity", []) if set(torque.columns) <= set(f.columns)), None
     )
@@ -104,7 +106,7 @@ def signals(tables: dict[str, Table], joints: list[str], arm: int) -> Signals:
 
 
 def _best(groups, kinds, what: str, table: Table, joints: list[str], arm: int) -> Found:
-    """The likeliest columns: of as many joints as there are, measured rather than commanded."""
+    """The likeliest columns: of as many joints as there are, measured rather than asked for."""
     tried = [f for kind in kinds for f in groups.get(kind, []) if set(f.columns) & set(joints)]
     if not tried and all(name.isdigit() for name in table.names):
         raise LogError(

@@ -76,33 +76,29 @@ def factors(look: Look, *, certain: bool) -> dict[str, float] | None:
 
 def held_against(out: Draft, found: Signals, folder: Path) -> Draft:
     """The draft with units that the robot's equations tell, and what `sysid check` finds in it."""
-    path = folder / "config.yaml"
-    amperes = out.guesses.get("data.units.torque")
+    path, amperes = folder / "config.yaml", out.guesses.get("data.units.torque")
+    servos = found.torque.meaning.signal == "command"
     if amperes:  # in N m, until the factors are found
         out = replace(out, guesses={k: g for k, g in out.guesses.items() if g is not amperes})
     with noticed():
         look = looked(config.experiment(out.tree, path))
         angles = out.guesses["data.units.position"]
-        if (
-            angles.value == "rad"
-            and not found.position.meaning.unit
-            and in_degrees(look, currents=amperes is not None)
-        ):
+        small = angles.value == "rad" and not found.position.meaning.unit
+        if small and in_degrees(look, currents=amperes is not None or servos):
             why = "only as degrees do such angles go with the torques of the URDF's robot"
             out = out.having(Guess(angles.key, "deg", f"{angles.why}, and {why}"))
             look = looked(config.experiment(out.tree, path))
-        scales = factors(look, certain=amperes is not None)
+        scales = None if servos else factors(look, certain=amperes is not None)
+        if scales:
+            out = out.having(*_scaled(amperes, scales, out.guesses["robot.joints"].value))
+            look = looked(config.experiment(out.tree, path))
+        faults = [fault for fault in check.faults_of(look) if fault.severity == check.ERROR]
     if amperes and scales is None:
         raise LogError(
             "the torques are currents, and the URDF's masses do not tell the drives' factors",
             allowed="columns of torque in N m",
-            do="log torques, or write data.units.torque_constant",
+            do="log torques, or write data.units.torque_constant into an experiment file",
         )
-    if scales:
-        out = out.having(*_scaled(amperes, scales, out.guesses["robot.joints"].value))
-    faults = [
-        f for f in check.check(config.experiment(out.tree, path)) if f.severity == check.ERROR
-    ]
     return replace(out, notes=(*out.notes, *dict.fromkeys(f"{f.says}: {f.do}" for f in faults)))
 
 

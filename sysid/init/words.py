@@ -48,8 +48,9 @@ def words(name: str) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class Meaning:
-    """What words say: a signal ("" where they say none), how far they are from a plain measurement
-    (0 is one; a command, an estimate count more), and the unit they name ("" for none)."""
+    """What words say: a signal ("" where they say none; "command" is a position asked for), how far
+    they are from a plain measurement (0 is one; what was asked for, or made by a model, is more),
+    and the unit they name ("" for none)."""
 
     signal: str
     away: int
@@ -69,7 +70,9 @@ def meaning(said: tuple[str, ...]) -> Meaning:
     signal = "" if "other" in signals or not found else found[0]
     away = 4 * bool(set(said) & MADE) + 2 * bool(set(said) & COMMANDED)
     away += 0 if set(said) & MEASURED or away else 1
-    kind = "torque" if signal == "current" else signal
+    if signal == "position" and set(said) & COMMANDED:
+        signal = "command"
+    kind = {"current": "torque", "command": "position"}.get(signal, signal)
     units = [UNITS[kind][word] for word in said if word in UNITS.get(kind, {})]
     if set(said) & COUNTS and signal in ("", "position"):
         return Meaning("position", away, "counts")
