@@ -40,7 +40,7 @@ def _root(
 ) -> None:
     """Keeps `sysid fit` a command of its own however many there are."""
     if context.invoked_subcommand is None:
-        raise SysidError("which command? `sysid check EXPERIMENT` looks at logs, `sysid fit EXPERIMENT` identifies, `sysid diagnose EXPERIMENT` names what is missing; `sysid --help` lists all")
+        raise SysidError("which command? `sysid init URDF LOG...` begins with a robot and its logs, `sysid check EXPERIMENT` looks at logs, `sysid fit EXPERIMENT` identifies, `sysid diagnose EXPERIMENT` names what is missing; `sysid --help` lists all")
 
 
 @app.command()
@@ -61,6 +61,31 @@ def fit(experiment: ExperimentPath, as_json: Json = False, out: Out = None, quie
         show_fit(found, document)
     if not found.solution.converged:
         raise typer.Exit(1)
+
+
+@app.command()
+def init(
+    robot: Annotated[str, typer.Argument(metavar="URDF", help="A URDF, xacro or MJCF file.")],
+    logs: Annotated[list[str], typer.Argument(metavar="LOG...", help="Logs: files, folders, patterns.")],
+    out: Annotated[Optional[Path], typer.Option("--out", help="The experiment folder to write (default: named as the URDF).")] = None,  # noqa: UP045
+    joints: Annotated[Optional[str], typer.Option("--joints", metavar="A,B,...", help="The joints that the columns are of, in their order.")] = None,  # noqa: UP045
+    topic: Annotated[Optional[str], typer.Option("--topic", help="The topic of a bag, where several have joint states.")] = None,  # noqa: UP045
+    rate: Annotated[Optional[float], typer.Option("--rate", metavar="HZ", help="Samples a second of logs without a clock.")] = None,  # noqa: UP045
+    as_json: Json = False, quiet: Quiet = False,
+) -> None:  # fmt: skip
+    """Look at a robot and its logs, and write an experiment that says what was guessed."""
+    from . import init as beginning
+
+    if rate is not None and not 0.0 < rate < float("inf"):
+        raise SysidError("--rate must be samples a second, above 0", where=f"--rate {rate:g}")
+    wishes = beginning.Wishes(tuple(filter(None, (joints or "").split(","))), topic, rate)
+    found, file = beginning.init(robot, logs, out or Path(Path(robot).stem), wishes)
+    if as_json:
+        print(json.dumps(beginning.document(found, file), allow_nan=False))
+    elif not quiet:
+        from .terminal import show_init
+
+        show_init(found, file)
 
 
 @app.command()

@@ -45,7 +45,7 @@ def load(path: str | Path) -> Experiment:
         if path.suffix.lower() in endings:
             raise ConfigError(
                 f"{word}, and no experiment", where=str(path), allowed="a YAML file, or a folder with config.yaml",
-                do="put robot.urdf, train.csv, test.csv and an empty config.yaml into a folder and give that, or name the files in a config.yaml",
+                do="`sysid init URDF LOG...` writes one from a robot and its logs",
             )  # fmt: skip
     try:
         data = path.read_bytes()

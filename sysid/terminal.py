@@ -10,6 +10,7 @@ from rich.text import Text
 
 from .estimate import Fit, given_shapes, said_of_shapes
 from .export import exported
+from .init.text import flow
 from .statement import tables, text
 
 _LOW = 0.1  # below this share the prior, not the data, gave a parameter
@@ -30,6 +31,22 @@ def progress_bar():
             bar.update(tasks[stage], completed=share)
 
         yield report
+
+
+def show_init(found, file) -> None:
+    """What was guessed of a robot and its logs, and why."""
+    console = Console()
+    table = Table(title="guessed", title_justify="left", show_lines=False)
+    for heading in ("key", "value", "because"):
+        table.add_column(heading, overflow="fold")
+    for guess in found.guesses.values():
+        value = flow(guess.value)
+        table.add_row(guess.key, escape(value if len(value) < 80 else value[:76] + " ..."), escape(str(guess)))
+    console.print(table)
+    for note in found.notes:
+        print(f"look {note}")
+    place = file.parent
+    print(f"wrote {file}; next: sysid check {place}, sysid fit {place}")
 
 
 def show_fit(fit: Fit, document: dict) -> None:

@@ -124,7 +124,7 @@ def read(path: Path) -> Urdf:
 
 def parse(data: bytes, path: Path) -> Urdf:
     """`read` for bytes already in memory; `path` only names them in messages."""
-    root = _safe_xml(data, path)
+    root = root_of(data, path)
     if root.tag != "robot":
         raise RobotError(f"the root element is <{root.tag}>", where=str(path), allowed="<robot>", do="give a URDF, not a xacro or SDF")
     links: dict[str, Link] = {}
@@ -145,7 +145,13 @@ def parse(data: bytes, path: Path) -> Urdf:
     return Urdf(path=path, text=ElementTree.tostring(root, encoding="unicode"), links=links, joints=joints)
 
 
-def _safe_xml(data: bytes, path: Path) -> ElementTree.Element:
+def root_of(data: bytes, path: Path) -> ElementTree.Element:
+    """The root element of an XML text; `path` only names it in messages.
+
+    Raises:
+        RobotError: not XML, or XML with a document type or entities.
+    """
+
     def refuse(*_):
         raise RobotError("the XML declares a document type or entities", where=str(path), allowed="plain elements", do="remove <!DOCTYPE …>")
 

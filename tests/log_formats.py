@@ -162,7 +162,8 @@ def write_aloha(path: Path, columns) -> Path:
         file.attrs["sim"] = False
         observed = file.create_group("observations")
         observed["qpos"], observed["effort"] = matrix(columns, "q"), matrix(columns, "tau")
-        observed["qvel"] = np.zeros_like(matrix(columns, "q"))
+        moves = f"qd_{joints_of(columns)[0]}" in columns
+        observed["qvel"] = matrix(columns, "qd") if moves else np.zeros_like(matrix(columns, "q"))
         observed.create_group("images")["cam_high"] = np.zeros(
             (len(columns["t"]), 2, 2, 3), dtype=np.uint8
         )

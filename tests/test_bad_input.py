@@ -676,7 +676,7 @@ def test_notices_come_once_and_good_input_has_none(experiment, cli):
 @pytest.mark.parametrize(("name", "word"), [("log.csv", "a log"), ("day.mcap", "a log"), ("arm.urdf", "a robot"), ("arm.xml", "a robot")])
 def test_a_file_that_is_no_experiment_is_told_what_to_do(name, word, cli, tmp_path):
     (tmp_path / name).write_text("t,q\n")
-    cli("fit", tmp_path / name).complains(name, f"{word}, and no experiment", "config.yaml into a folder")
+    cli("fit", tmp_path / name).complains(name, f"{word}, and no experiment", "`sysid init URDF LOG...` writes one")
 
 
 def test_the_bare_command_says_what_to_type(monkeypatch, capfd):

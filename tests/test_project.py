@@ -17,10 +17,10 @@ ROOT = Path(__file__).resolve().parent.parent
 
 # The order of the method: a module imports only from modules above it.
 ORDER = [
-    "errors", "units", "picture", "threads", "callable_module", "inertia", "urdf", "readers", "datasets", "specs", "prior", "robot", "regressor", "outliers", "knocks", "jumps", "repeats",
+    "errors", "units", "picture", "threads", "silence", "callable_module", "inertia", "urdf", "readers", "datasets", "specs", "prior", "robot", "regressor", "outliers", "knocks", "jumps", "repeats",
     "frequencies", "clock", "segment", "events", "motor_side", "recording", "log", "smoother", "motion", "preprocess", "blocks", "two_masses", "lowpass", "flexible",
     "effect", "formula", "effects", "own_effects", "config", "model", "drives", "inverse_dynamics", "rows", "objective", "projection", "landscape", "multistart", "source", "compress", "interior", "certificate", "solve", "uncertainty", "estimate", "plausible", "shape", "bumps",
-    "filters", "results", "urdf_export", "gains", "simulate", "rollout", "pipeline", "run", "export", "check", "comparison", "transfer", "noise", "candidates", "view", "addition", "failures", "shown", "diagnose", "changes", "statement", "loop", "report", "studies", "studio", "terminal", "cli", "__main__",
+    "filters", "results", "urdf_export", "gains", "simulate", "rollout", "pipeline", "run", "export", "check", "init", "comparison", "transfer", "noise", "candidates", "view", "addition", "failures", "shown", "diagnose", "changes", "statement", "loop", "report", "studies", "studio", "terminal", "cli", "__main__",
 ]  # fmt: skip
 # Late imports that close a loop on purpose: a path that names a data set, a prior that is a previous run, the effects
 # that an effect's contract finds.
@@ -66,7 +66,7 @@ def test_the_diagnosis_can_be_read():
     assert not long and not wide and total < 1500, (long, wide, total)
 
 
-BESIDE = ["blocks", "changes", "check", "failures", "flexible", "lowpass", "noise", "statement"]
+BESIDE = ["blocks", "changes", "check", "failures", "flexible", "init", "lowpass", "noise", "statement"]
 
 
 @pytest.mark.parametrize("room", BESIDE)

@@ -430,3 +430,26 @@ def test_packed_files(tmp_path, arm_logs):
     (tmp_path / "c.csv.gz").write_bytes(gzip.compress(b"t,q_shoulder\n0,x\n"))
     with pytest.raises(LogError, match=r"c\.csv\.gz: joint 'elbow' has no column"):
         read(tmp_path / "c.csv.gz")
+
+
+@pytest.mark.parametrize("kind", [k for k in FORMATS if k not in ("bag folder", "LeRobot v3")])
+def test_corrupt_files_end_in_one_line(tmp_path, arm_logs, kind):
+    """Bytes turned over or cut off anywhere: the file is read, or refused as a log."""
+    name, write, _ = FORMATS[kind]
+    short = {column: values[:40] for column, values in arm_logs[0].items()}
+    path = tmp_path / name.format("whole")
+    write(path, short)
+    if path.is_dir():
+        (path,) = path.rglob("*.parquet")
+    whole, rng = path.read_bytes(), np.random.default_rng(4)
+    for trial in range(40):
+        data = np.frombuffer(whole, dtype=np.uint8).copy()
+        data[rng.integers(len(data), size=1 + trial % 9)] = rng.integers(256, dtype=np.uint8)
+        cut = rng.integers(1, len(data)) if trial % 4 == 0 else len(data)
+        broken = tmp_path / f"{trial}{''.join(path.suffixes)}"
+        broken.write_bytes(data[:cut].tobytes())
+        try:
+            table = open_table(broken)
+            table.load([column for column in table.names if table.width(column) == 1][:6])
+        except LogError as error:
+            assert len(str(error).splitlines()) == 1 and str(tmp_path) in str(error)

@@ -17,7 +17,7 @@ from ..callable_module import callable_module
 from ..pipeline import noticed
 from ..specs import Experiment
 from .fault import ERROR, WARNING, Fault
-from .look import looked
+from .look import Look, looked
 
 #: the user can be told of these
 FAULTS = (
@@ -39,7 +39,12 @@ def check(experiment: Experiment) -> list[Fault]:
         SysidError: what cannot be read at all.
     """
     with noticed():
-        found = list(_found(looked(experiment)))
+        return faults_of(looked(experiment))
+
+
+def faults_of(look: Look) -> list[Fault]:
+    """The faults of logs that were looked at, the gravest first."""
+    found = list(_found(look))
     return sorted(found, key=lambda fault: (fault.severity != ERROR, FAULTS.index(fault.fault)))
 
 
@@ -79,4 +84,4 @@ def document(found: list[Fault]) -> dict:
 
 callable_module(__name__, "", "check")  # `sysid.check(experiment)`
 
-__all__ = ["ERROR", "FAULTS", "WARNING", "Fault", "check", "document"]
+__all__ = ["ERROR", "FAULTS", "WARNING", "Fault", "check", "document", "faults_of"]

@@ -42,17 +42,15 @@ class BagTable(Table):
                 found = [c for c in bag.connections if c.msgtype == _TYPE and c.msgcount]
                 kept = [c for c in found if c.topic == self._topic(found, bag, topic)]
                 rows = [(at, decode(raw)) for _, at, raw in bag.messages(kept)]
+            self._collect(rows)
         except LogError:
             raise
-        except (
-            Exception
-        ) as error:  # on corrupt bytes the library raises whatever struct, SQLite, lz4 raise
+        except Exception as error:  # corrupt bytes: whatever struct, SQLite or lz4 raise
             said = (str(error).splitlines() or [type(error).__name__])[0]
             raise LogError(
                 f"cannot be read as a ROS bag ({said})", where=str(path),
                 do="record it again, or repair it with `ros2 bag reindex` or `rosbag reindex`",
             ) from None  # fmt: skip
-        self._collect(rows)
 
     @property
     def files(self) -> tuple[Path, ...]:

@@ -16,6 +16,7 @@ _DEEPEST = 50
 _STATE, _STAMP = "observation/robot_state/", "observation/timestamp/robot_state/"
 #: what kinds of file call their signals, the first of each that is there; ALOHA and DROID
 _USUAL = {
+    "command": ("action", "action/joint_position"),
     "time": (_STAMP + "robot_timestamp",),
     "position": ("observations/qpos", _STATE + "joint_positions"),
     "velocity": ("observations/qvel", _STATE + "joint_velocities"),

@@ -17,6 +17,7 @@ _USUAL = {
     "position": "observation.state",
     "velocity": "observation.velocity",
     "torque": "observation.effort",
+    "command": "action",
 }
 
 
@@ -26,7 +27,7 @@ def is_dataset(path: Path) -> bool:
 
 
 def usual(names: list[str], elements: dict[str, list[str]]) -> dict[str, str]:
-    """What a table with these columns says of time, position, velocity and torque; {} where it is
+    """What a table with these columns says of time, position, velocity, torque and commanded position; {} where it is
     not LeRobot's.
 
     Args:

@@ -9,6 +9,7 @@ import lzma
 import shutil
 import tempfile
 import weakref
+import zlib
 from pathlib import Path
 
 from ..errors import LogError
@@ -46,7 +47,7 @@ class PackedTable(Table):
                             do="unpack it yourself if it is meant so",
                         )  # fmt: skip
                     file.write(chunk)
-        except (OSError, EOFError, lzma.LZMAError) as error:
+        except (OSError, EOFError, lzma.LZMAError, zlib.error) as error:
             raise LogError(
                 f"cannot be unpacked ({error})", where=str(self.path), do="pack it again"
             ) from None

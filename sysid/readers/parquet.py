@@ -1,12 +1,10 @@
 """Parquet: only the columns that are asked for are read, one at a time. A column of lists of one length is a matrix."""
 
-import os
-from contextlib import contextmanager
-
 import numpy as np
 import polars as pl
 
 from ..errors import LogError
+from ..silence import silenced
 from . import lerobot
 from .table import Table
 
@@ -20,7 +18,7 @@ class ParquetTable(Table):
     def __init__(self, path):
         self.path = path
         try:
-            with _silent():
+            with silenced():
                 self._schema = pl.read_parquet_schema(path)
                 self._widths = {name: width for name, kind in self._schema.items() if (width := self._width(name, kind))}
         except _CORRUPT as error:
@@ -75,7 +73,7 @@ class ParquetTable(Table):
             raise LogError(f"column {name!r} holds {kind}", where=str(self.path), allowed="numbers, or lists of numbers of one length")
         try:
             # column by column, so that the file never stands in memory beside the arrays
-            with _silent():
+            with silenced():
                 values = pl.read_parquet(self.path, columns=[name], use_statistics=False)[name]
                 self._check_null(name, values, 1)
                 if isinstance(kind, pl.List) and (other := values.list.len() != width).any():
@@ -96,16 +94,3 @@ class ParquetTable(Table):
         if values.null_count():
             row = int(values.is_null().arg_max()) // width
             raise LogError("a value is missing", where=f"{self.path} column {name!r} row {row}", do="leave the row out")
-
-
-@contextmanager
-def _silent():
-    """Keeps native code off standard error."""
-    kept, nothing = os.dup(2), os.open(os.devnull, os.O_WRONLY)
-    os.dup2(nothing, 2)
-    try:
-        yield
-    finally:
-        os.dup2(kept, 2)
-        os.close(kept)
-        os.close(nothing)

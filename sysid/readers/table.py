@@ -13,7 +13,7 @@ from ..errors import LogError
 class Table(ABC):
     """Named columns of a file. Matrices (n, k) go by their name, and column by column as `name[0]` …
 
-    usual: what the format itself calls its signals, {"time", "position", "velocity" or "torque": a column, or a pattern with
+    usual: what the format itself calls its signals, {"time", "position", "velocity", "torque" or "command": a column, or a pattern with
         {joint}}; it stands in for the defaults of an experiment. clock: the unit of that time where the format says it.
     """
 

@@ -1,0 +1,98 @@
+"""A robot and its logs -> an experiment folder, with what was guessed and why.
+
+words.py    what names of columns say
+columns.py  columns and joints -> which column is which joint's
+logged.py   the logs, opened and read
+robots.py   URDF, xacro or MJCF -> URDF
+joints.py   which joints are identified, which are locked where
+units.py    units and rate by the numbers
+split.py    what trains, what is held out
+physics.py  units by the robot's equations
+draft.py    the experiment, guess by guess
+text.py     its YAML, with the reasons
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import uuid
+from pathlib import Path
+
+from ..errors import SysidError
+from . import text
+from .draft import Wishes, draft
+from .guess import Draft
+
+
+def init(
+    reference: str, logs: list[str], out: Path, wishes: Wishes | None = None
+) -> tuple[Draft, Path]:
+    """Write an experiment folder for a robot and its logs; returns what was guessed and the file.
+
+    Args:
+        reference: URDF, xacro or MJCF. logs: files, folders, patterns. out: the folder, new or
+        without config.yaml.
+
+    Raises:
+        SysidError: something cannot be guessed or read, or a file would be overwritten. Nothing is
+        written then.
+    """
+    if (out / "config.yaml").exists():
+        raise SysidError(
+            "there is an experiment already",
+            where=str(out / "config.yaml"),
+            do="give another folder with --out, or remove it",
+        )
+    # beside the folder, so that paths from inside are the same
+    work = out.absolute().parent / f".{uuid.uuid4().hex}"
+    try:
+        work.mkdir(parents=True)
+        found = draft(reference, logs, work, wishes or Wishes())
+        command = (
+            f"sysid init {Path(reference).name} {' '.join(Path(log).name for log in logs[:4])}"
+            + (" ..." if len(logs) > 4 else "")
+        )
+        (work / "config.yaml").write_text(text.yaml(found, command), encoding="utf-8")
+        _moved(work, out)
+    except OSError as error:
+        raise SysidError(
+            f"cannot be written ({error.strerror})",
+            where=str(out),
+            do="free the disk or give another --out",
+        ) from None
+    finally:
+        shutil.rmtree(work, ignore_errors=True)
+    return found, out / "config.yaml"
+
+
+def _moved(work: Path, out: Path) -> None:
+    """Bring what was written into its folder, config.yaml last; what is there stays."""
+    out.mkdir(exist_ok=True)
+    for name in ("robot.urdf", "config.yaml"):
+        source, target = work / name, out / name
+        if not source.exists():
+            continue
+        if target.exists() and target.read_bytes() != source.read_bytes():
+            raise SysidError(
+                "the file is there already", where=str(target), do="give another folder with --out"
+            )
+        os.replace(source, target)
+
+
+def document(found: Draft, file: Path) -> dict:
+    """The document of `sysid init --json`."""
+    guesses = [
+        {"key": g.key, "value": g.value, "why": g.why, "doubt": g.doubt or None}
+        for g in found.guesses.values()
+    ]
+    return {
+        "experiment": str(file),
+        "robot": found.urdf,
+        "guesses": guesses,
+        "look": list(found.notes),
+        "unused_columns": list(found.rest),
+    }
+
+
+__all__ = ["Draft", "Wishes", "document", "draft", "init"]

@@ -1,0 +1,174 @@
+"""Names of columns and joints -> which column holds which joint's angle, speed and torque.
+
+By the joint's name where columns carry it, whatever stands before and behind; else by numbers or
+places in a matrix, which count the joints in the order of the URDF.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+from ..readers.table import Table
+from .words import Meaning, meaning, words
+
+
+@dataclass(frozen=True)
+class Found:
+    """Columns of one signal. columns: {joint: column}; pattern: with {joint}, where one says it
+    all; counted: they were given to joints by their number, not by a name; more: numbered columns
+    beyond the joints; meaning: what their names say."""
+
+    columns: dict[str, str]
+    pattern: str | None
+    counted: bool
+    more: tuple[str, ...]
+    meaning: Meaning
+
+    @property
+    def said(self):
+        """What an experiment file says of them."""
+        return self.pattern or list(self.columns.values())
+
+    @property
+    def why(self) -> str:
+        """How their joints were found."""
+        if not self.counted:
+            return "the columns carry the joints' names"
+        own = [*self.columns.values(), *self.more]
+        named = own[0] if len(own) == 1 else f"{own[0]} to {own[-1]}"
+        return f"{named}, taken in the order of the URDF's joints"
+
+    def of(self, joints: Iterable[str]) -> Found:
+        """The columns of some of the joints."""
+        return replace(self, columns={joint: self.columns[joint] for joint in joints})
+
+
+def found(table: Table, joints: list[str]) -> dict[str, list[Found]]:
+    """What a table has of each signal, {signal: the likeliest first}.
+
+    Args:
+        joints: names of what may move, in the order of the URDF, grippers last.
+    """
+    groups: dict[str, list[Found]] = {}
+    for entry in [*_usual(table, joints), *_named(table, joints), *_counted(table, joints)]:
+        groups.setdefault(entry.meaning.signal, []).append(entry)
+    # stable: what covers more joints, what is measured, what is found by name comes first
+    for entries in groups.values():
+        entries.sort(key=lambda f: (-len(f.columns), f.meaning.away))
+    return groups
+
+
+def _usual(table: Table, joints: list[str]) -> Iterable[Found]:
+    """What the format itself says; of names that are not the joints' nothing."""
+    for signal, pattern in table.usual.items():
+        if signal == "time" or "{joint}" not in pattern:
+            continue
+        columns = {j: c for j in joints if (c := pattern.replace("{joint}", j)) in table.names}
+        if columns:
+            yield Found(columns, pattern, False, (), Meaning(signal, -1, ""))
+
+
+def _bases(table: Table) -> dict[str, str]:
+    """{matrix or what the names of its elements begin with: signal}, as the format says."""
+    return {pattern.removesuffix(".{joint}"): signal for signal, pattern in table.usual.items()}
+
+
+def _named(table: Table, joints: list[str]) -> Iterable[Found]:
+    """Columns that carry the names of joints, grouped by what else their names say."""
+    known = _aliases(joints)
+    by_rest: dict[tuple, dict[str, str]] = {}
+    for column in _single(table):
+        said = words(column)
+        hits = [
+            (len(alias), alias, joint) for alias, joint in known.items() if _at(said, alias) >= 0
+        ]
+        if not hits:
+            continue
+        _, alias, joint = max(hits)
+        at = _at(said, alias)
+        rest = (*said[:at], "{joint}", *said[at + len(alias) :])
+        by_rest.setdefault(rest, {}).setdefault(joint, column)
+    for rest, columns in by_rest.items():
+        means = meaning(tuple(word for word in rest if word != "{joint}"))
+        bases = {column.rpartition(".")[0] for column in columns.values()} & set(_bases(table))
+        if bases:
+            means = Meaning(_bases(table)[bases.pop()], -1, "")
+        if means.signal:
+            ordered = {joint: columns[joint] for joint in joints if joint in columns}
+            yield Found(ordered, _pattern(ordered), False, (), means)
+
+
+def _counted(table: Table, joints: list[str]) -> Iterable[Found]:
+    """Numbered columns q1, q2, ... or q_0, q_1, ..., and the columns of a matrix."""
+    by_name: dict[tuple, dict[int, str]] = {}
+    for column in _single(table):
+        said = words(column)
+        if said and said[-1].isdigit():
+            by_name.setdefault(said[:-1], {}).setdefault(int(said[-1]), column)
+        elif len(digits := [k for k, word in enumerate(said) if word.isdigit()]) == 1:
+            rest = (*said[: digits[0]], *said[digits[0] + 1 :])
+            by_name.setdefault(rest, {}).setdefault(int(said[digits[0]]), column)
+    for name in table.names:
+        if table.width(name) > 1:
+            by_name[(*words(name), "[]")] = {k: f"{name}[{k}]" for k in range(table.width(name))}
+    for rest, columns in by_name.items():
+        means, numbers = meaning(rest), sorted(columns)
+        matrix = rest[-1:] == ("[]",)
+        if matrix and (signal := _bases(table).get(columns[0].removesuffix("[0]"))):
+            means = Meaning(signal, -1, "")
+        whole = numbers == list(range(numbers[0], numbers[0] + len(numbers)))
+        if not means.signal or numbers[0] not in (0, 1) or not whole:
+            continue
+        ordered = [columns[k] for k in numbers]
+        yield Found(dict(zip(joints, ordered)), None, True, tuple(ordered[len(joints) :]), means)
+
+
+def _single(table: Table) -> list[str]:
+    """Columns that are no part of a matrix."""
+    matrices = tuple(f"{name}[" for name in table.names if table.width(name) > 1)
+    return [n for n in table.names if table.width(n) == 1 and not n.startswith(matrices or ("\0",))]
+
+
+def _at(said: tuple, part: tuple) -> int:
+    """Where a run of words stands among others; -1 where it does not."""
+    places = range(len(said) - len(part) + 1)
+    return next((k for k in places if said[k : k + len(part)] == part), -1)
+
+
+def _aliases(joints: list[str]) -> dict[tuple, str]:
+    """{words: joint}: its own name, and without what the names of all joints begin or end with."""
+    whole = [words(joint) for joint in joints]
+    before, behind = _shared(whole), _shared([w[::-1] for w in whole])
+    out: dict[tuple, str] = {}
+    twice = set()
+    for joint, own in zip(joints, whole):
+        short = len(own) - behind
+        for alias in {own, own[before:], own[:short], own[before:short]}:
+            # a number alone is no name: which joint it counts is another question
+            if alias and not all(word.isdigit() for word in alias):
+                twice |= {alias} if out.get(alias, joint) != joint else set()
+                out[alias] = joint
+    return {alias: joint for alias, joint in out.items() if alias not in twice}
+
+
+def _shared(all_words: list[tuple]) -> int:
+    """How many words all of several names begin with; 0 of one name alone."""
+    if len(all_words) < 2:
+        return 0
+    count = 0
+    for group in zip(*all_words):
+        if len(set(group)) > 1:
+            break
+        count += 1
+    return min(count, min(map(len, all_words)) - 1)
+
+
+def _pattern(columns: dict[str, str]) -> str | None:
+    """The pattern of columns that hold their joints' names as they are."""
+    patterns = {c.replace(j, "{joint}") for j, c in columns.items() if c.count(j) == 1}
+    if len(patterns) != 1:
+        return None
+    (pattern,) = patterns
+    same = all(pattern.replace("{joint}", j) == c for j, c in columns.items())
+    return pattern if same and pattern.count("{joint}") == 1 else None

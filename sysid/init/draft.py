@@ -1,0 +1,134 @@
+"""A robot and logs -> the experiment that they seem to be, with every guess and its reason."""
+
+from __future__ import annotations
+
+import os
+import warnings
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from .. import datasets
+from .. import robot as machines
+from ..errors import SysidWarning
+from ..specs import RobotSpec
+from . import joints, physics, robots, units
+from .guess import Draft, Guess
+from .logged import Logged, Signals, opened, read, signals
+from .split import split
+
+_COMMAND, _NONE = "command", "none"  # the signal; the column of a joint without one
+#: what a URDF knows nothing of and nearly every drive has
+_EFFECTS = ["viscous", "coulomb", "torque_bias", "armature"]
+
+
+@dataclass(frozen=True)
+class Wishes:
+    """What a user states after all: joints, a bag's topic, the rate [Hz] of logs without a
+    clock."""
+
+    joints: tuple[str, ...] = ()
+    topic: str | None = None
+    rate: float | None = None
+
+
+def draft(reference: str, names: list[str], folder: Path, wishes: Wishes) -> Draft:
+    """Look at a robot and its logs.
+
+    Args:
+        reference: URDF, xacro or MJCF, as `urdf.locate` takes it. names: logs. folder: where the
+        experiment will
+            stand; robot.urdf is written there where the robot's file is no URDF.
+
+    Raises:
+        SysidError: what cannot be guessed, or cannot be read once it was.
+    """
+    machine = robots.read(reference)
+    urdf = "robot.urdf" if machine.written else _moved(reference, folder)
+    if machine.written:
+        (folder / "robot.urdf").write_text(machine.written, encoding="utf-8")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SysidWarning)  # joints that mimic others are told below
+        robot = machines.load(RobotSpec(urdf=urdf), folder)
+    arm, hands = joints.arm_and_hands(robot, wishes.joints)
+    tables = opened(names, wishes.topic)
+    found = signals(tables, [*arm, *hands], len(arm))
+    data = read(tables, found)
+    angles = _angles(data, found, robot)
+    used, chosen = joints.chosen(robot, found, data, arm, angles.value)
+    clock = units.clock(data, found, wishes.rate)
+    notes = (*machine.notes, *_wraps(data, used, robot, angles.value))
+    out = Draft(urdf, {}, notes, found.rest)
+    out = out.having(*machine.guesses, *chosen, *_parts(data, clock, folder, wishes))
+    out = out.having(*clock, *_columns(found, used), angles, *_drive(found, used))
+    return physics.held_against(out, found, folder)
+
+
+def _moved(reference: str, folder: Path) -> str:
+    """A file's path from the experiment's folder; other references as they are."""
+    if "://" in reference or datasets.reference(reference) is not None:
+        return reference
+    return Path(os.path.relpath(Path(reference).resolve(), folder.resolve())).as_posix()
+
+
+def _angles(data: list[Logged], found: Signals, robot) -> Guess:
+    q = {joint: np.concatenate([one.q[joint] for one in data]) for joint in found.joints}
+    return units.position_unit(q, _sliding(robot), found.position.meaning.unit)
+
+
+def _sliding(robot) -> dict[str, bool]:
+    return dict(zip(robot.joints, map(bool, robot.prismatic)))
+
+
+def _parts(data: list[Logged], clock: list[Guess], folder: Path, wishes: Wishes) -> list[Guess]:
+    """data.train and data.test."""
+    said = {guess.key: guess.value for guess in clock}
+    topic = {"topic": wishes.topic} if wishes.topic else {}
+    entries = [{"file": _moved(one.name, folder), **topic} for one in data]
+    seconds = [units.seconds(one.t, one.samples, one.table.clock, said) for one in data]
+    return list(split(entries, seconds, [one.episodes for one in data]).values())
+
+
+def _columns(found: Signals, used: list[str]) -> list[Guess]:
+    """Columns of angles and torques."""
+    angle, torque = found.position.of(used), found.torque
+    out = [Guess("data.columns.position", angle.said, angle.why)]
+    if torque.meaning.signal == _COMMAND:
+        return out
+    said = torque.pattern or [torque.columns.get(joint, _NONE) for joint in used]
+    doubt = "asked for or computed, not measured, by the names" if torque.meaning.away > 1 else ""
+    return [*out, Guess("data.columns.torque", said, torque.why, doubt)]
+
+
+def _drive(found: Signals, used: list[str]) -> list[Guess]:
+    """What stands for torque, and what the drives are likely to have."""
+    out, kind = [], found.torque.meaning.signal
+    if kind == "current":
+        out.append(Guess("data.units.torque", "A", "the columns are currents by their names"))
+    if kind == _COMMAND:
+        free = {"kp": "free", "kd": "free", "delay": "free"}
+        commands = {j: c for j, c in found.torque.columns.items() if j in used}
+        why = (
+            "no torque was logged, but positions that were asked for: servos, whose gains are found"
+        )
+        tie = "masses, friction and gains share a factor until a body is known (prior.known), or kp"
+        servos = {joint: {"command": column, **free} for joint, column in commands.items()}
+        out.append(Guess("actuator", servos, why, tie))
+    why = "friction, a bias and the rotors' inertia, which a URDF does not hold"
+    window = "chosen on held-out stretches of the training logs"
+    out.append(Guess("preprocess.window", "auto", window))
+    return [*out, Guess("model.effects", _EFFECTS, why)]
+
+
+def _wraps(data: list[Logged], used: list[str], robot, unit: str) -> tuple[str, ...]:
+    slides, notes = _sliding(robot), []
+    for one in data:
+        for joint, count in units.wraps(
+            {j: one.q[j] for j in used if j in one.q}, slides, unit
+        ).items():
+            notes.append(
+                f"the angle of {joint} jumps by a turn {count} times in {Path(one.name).name}: "
+                "unwrap it (numpy.unwrap) before it is logged"
+            )
+    return tuple(notes)

@@ -1,0 +1,118 @@
+"""What the URDF's robot says of units that no name tells: degrees in small motion, and torques that
+are no joint's.
+
+A log read as it stands is held against the equations of `sysid check`: the URDF's torque with
+masses up to three times off, inertia of motors, friction and a bias.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from .. import check, config
+from ..check.equations import Equations, Reading
+from ..check.look import Look, looked
+from ..errors import LogError
+from ..pipeline import noticed
+from .guess import Draft, Guess
+from .logged import Signals
+
+_BETTER = 1.0  # log of the squares a joint: what is left falls to a third of its power
+_TAKES = 0.01  # of a joint's torque squared: less of the URDF's torque tells no factor
+
+
+def in_degrees(look: Look, *, currents: bool) -> bool:
+    """Whether the angles, taken for rad, explain the torque as degrees, and not as they are.
+
+    Args:
+        currents: the torques may have any factor. Otherwise the URDF's robot must also need more
+        torque than there
+            is at all, were the angles rad.
+    """
+    equations = look.equations
+    if equations is None:
+        return False
+    plain = Reading.plain(look.robot.dof)
+    turning = ~np.asarray(look.robot.prismatic)
+    turned = replace(plain, angle_factor=tuple(np.where(turning, np.pi / 180.0, 1.0)))
+    as_rad, as_deg = (equations.scored(reading, free=currents) for reading in (plain, turned))
+    known = as_rad.known & as_deg.known & turning
+    gain = np.log(as_rad.left / as_deg.left)[known]
+    impossible = (as_rad.left > as_rad.whole)[known]
+    if not known.any() or not (currents or np.mean(impossible) > 0.5):
+        return False
+    return bool(gain.sum() > _BETTER * known.sum())
+
+
+def factors(look: Look, *, certain: bool) -> dict[str, float] | None:
+    """Factors that bring the logged torques to the joints' side, by the masses of the URDF; None
+    where the torques are the joints' as they are, or where nothing can be told.
+
+    Args:
+        certain: the torques are currents. Otherwise most joints must show it: a third of the URDF's
+        masses already
+            needs more torque than was logged at all, and a smaller factor explains what was.
+    """
+    equations: Equations | None = look.equations
+    if equations is None:
+        return None
+    plain = Reading.plain(look.robot.dof)
+    bounded, free = equations.scored(plain), equations.scored(plain, free=True)
+    known = bounded.known & free.known
+    if not certain:
+        off = (bounded.left > bounded.whole) & (np.log(bounded.left / free.left) > _BETTER)
+        if np.sum(off & known) <= 0.5 * np.sum(known):
+            return None
+    tells = known & (free.factor > 0.0) & (free.taken > _TAKES)
+    if not tells.any():
+        return None
+    own = np.where(tells, 1.0 / np.where(tells, free.factor, 1.0), 0.0)
+    usual = float(np.exp(np.median(np.log(own[tells]))))
+    return {joint: float(f"{value or usual:.3g}") for joint, value in zip(look.robot.joints, own)}
+
+
+def held_against(out: Draft, found: Signals, folder: Path) -> Draft:
+    """The draft with units that the robot's equations tell, and what `sysid check` finds in it."""
+    path, amperes = folder / "config.yaml", out.guesses.get("data.units.torque")
+    servos = found.torque.meaning.signal == "command"
+    if amperes:  # in N m, until the factors are found
+        out = replace(out, guesses={k: g for k, g in out.guesses.items() if g is not amperes})
+    with noticed():
+        look = looked(config.experiment(out.tree, path))
+        angles = out.guesses["data.units.position"]
+        small = angles.value == "rad" and not found.position.meaning.unit
+        if small and in_degrees(look, currents=amperes is not None or servos):
+            why = "only as degrees do such angles go with the torques of the URDF's robot"
+            out = out.having(Guess(angles.key, "deg", f"{angles.why}, and {why}"))
+            look = looked(config.experiment(out.tree, path))
+        scales = None if servos else factors(look, certain=amperes is not None)
+        if scales:
+            out = out.having(*_scaled(amperes, scales, out.guesses["robot.joints"].value))
+            look = looked(config.experiment(out.tree, path))
+        faults = [fault for fault in check.faults_of(look) if fault.severity == check.ERROR]
+    if amperes and scales is None:
+        raise LogError(
+            "the torques are currents, and the URDF's masses do not tell the drives' factors",
+            allowed="columns of torque in N m",
+            do="log torques, or write data.units.torque_constant into an experiment file",
+        )
+    return replace(out, notes=(*out.notes, *dict.fromkeys(f"{f.says}: {f.do}" for f in faults)))
+
+
+def _scaled(amperes: Guess | None, scales: dict[str, float], joints: list[str]) -> list[Guess]:
+    """The factors of the torques, as torque constants."""
+    why = "with the URDF's masses the joints need far more torque than was logged: these are "
+    why += "currents, or torques of the motors; A stands for either"
+    factor = (
+        "brings each joint's torques to those of the URDF's masses, so that these stay as heavy"
+    )
+    doubt = (
+        "where you know it, put in the gear's ratio, times the torque constant [N m/A] of a current"
+    )
+    return [
+        Guess("data.units.torque", "A", amperes.why if amperes else why),
+        Guess("data.units.torque_constant", {j: scales[j] for j in joints}, factor, doubt),
+    ]
