@@ -20,6 +20,7 @@ from .estimate import Fit, Problem, pose
 from .inertia import DIVERGENCES
 from .model import Model, moving_coefficients
 from .motion import Motion
+from .prior_weight import number, with_weight
 from .objective import add_blocks
 from .specs import Experiment
 
@@ -61,7 +62,7 @@ def settle(experiment: Experiment, model: Model, motion: Motion, prior: np.ndarr
         tolerance: share of the objective by which a step must lower it for another to follow.
     """
     stride = stride or row.stride_for(motion, _MOST_ROWS)
-    lighter = experiment.model_copy(update={"prior": experiment.prior.model_copy(update={"weight": experiment.prior.weight / stride})})
+    lighter = with_weight(experiment, number(experiment) / stride)
     moving = moving_coefficients(model, motion)
 
     def solved(candidate: Model) -> Settled:

@@ -14,6 +14,7 @@ class Spring(TorqueEffect):
     tied_with = ("cable", "torque_bias", "gravity on a joint that swings a little")
     separate_by = "another payload: gravity grows with it, a spring does not"
     source = "Hooke's law"
+    mimics_mass = True
     elementwise = True
 
     k = Linear("N m/rad", lower=0, says="stiffness")
