@@ -7,7 +7,7 @@ certificate works on them.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -150,19 +150,33 @@ class Compressed:
         return out
 
     def first(self, size: int) -> "Compressed":
-        """The same data with the first `size` parameters alone: the columns of a triangle are a
+        """The same data with the first `size` parameters alone."""
+        return self.only(range(size))
+
+    def only(self, parameters: Sequence[int]) -> "Compressed":
+        """The same data with some parameters alone, in this order: the columns of a triangle are a
         smaller problem's."""
-        factors = []
+        place, factors = {k: number for number, k in enumerate(parameters)}, []
         for factor in self.factors:
-            kept = np.flatnonzero(factor.columns < size)
-            rows = triangle(np.asfortranarray(factor.triangle[:, np.append(kept, factor.triangle.shape[1] - 1)]))
-            factors.append(Factor(factor.joint, factor.block, factor.columns[kept], rows, factor.rows))
-        return Compressed(size, self.joints, tuple(factors), self.samples)
+            kept = [at for at, k in enumerate(factor.columns.tolist()) if k in place]
+            columns = np.array([place[factor.columns[at]] for at in kept], dtype=int)
+            rows = triangle(np.asfortranarray(factor.triangle[:, [*kept, factor.triangle.shape[1] - 1]]))
+            factors.append(Factor(factor.joint, factor.block, columns, rows, factor.rows))
+        return Compressed(len(place), self.joints, tuple(factors), self.samples)
 
     def without(self, blocks) -> "Compressed":
         """The same data with some blocks left out."""
         leave = set(blocks)
         kept = tuple(factor for factor in self.factors if factor.block not in leave)
+        return Compressed(self.size, self.joints, kept, self.samples)
+
+    def gathered(self, parts: Sequence[Sequence[int]]) -> "Compressed":
+        """The same data in fewer blocks: each of the parts, lists of blocks, becomes one."""
+        place = {int(block): number for number, part in enumerate(parts) for block in part}
+        heaps: dict[tuple[int, int], list[Factor]] = {}
+        for factor in self.factors:
+            heaps.setdefault((place[factor.block], factor.joint), []).append(factor)
+        kept = tuple(replace(_merged(heap, joint), block=block) for (block, joint), heap in heaps.items())
         return Compressed(self.size, self.joints, kept, self.samples)
 
 

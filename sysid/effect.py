@@ -116,6 +116,7 @@ class Effect(ABC):
     options: {name: what it says} of the keys beside `joints` that an experiment file may give.
     tied_with: words of the vocabulary that look alike; `separate_by`: the experiment that tells them apart.
     reach: samples on either side of a row that its columns look at; memory: they look back to the start of the log.
+    mimics_mass: bodies take its place where a model lacks it, and their masses are off.
     uses_load: they need `motion.load` (n, dof), the torque that the bodies alone are predicted to need.
     elementwise: each row of its columns follows from the joint's own q, qd, qdd and load in that row, and shape values may
         be arrays along the rows: joints can then be treated as samples of one joint.
@@ -138,6 +139,7 @@ class Effect(ABC):
     reach: ClassVar[int] = 0
     memory: ClassVar[bool] = False
     uses_load: ClassVar[bool] = False
+    mimics_mass: ClassVar[bool] = False
     elementwise: ClassVar[bool] = False
     simulators: ClassVar[dict[str, str]] = {}
     given_coefficients: Mapping[str, float] = MappingProxyType({})

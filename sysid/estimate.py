@@ -18,6 +18,7 @@ from .model import Model, moving_coefficients
 from .motion import Motion
 from .multistart import Searched
 from .objective import Objective, posed
+from .prior_weight import PriorWeight, number, with_weight
 from .robot import Robot
 from .solve import Coordinates, Solution, solve
 from .specs import Experiment
@@ -119,7 +120,8 @@ class Fit:
     """What identification found.
 
     pi (bodies, 10) about the joints' frames, `prior` the same before any data, `known` (bodies, 10, 10) the Hessian by which some are held to it, or None; coefficients of the effects in `model.coefficients`' order;
-    x both in one vector. `shape_std` of the model's shape values, NaN where held or undetermined. `predictions` by "train" and "test". `notices`: what was decided on the way.
+    x both in one vector. `experiment` has the prior's weight as a number; `strength` says whether it was chosen. `shape_std` of the model's shape values, NaN where held or undetermined. `predictions` by "train" and "test". `notices`: what was decided on the way.
+    `masses`: links that are far from their URDF's, as `masses.document` has them; empty where none is.
     `drives`: what was free of the drives, as found; `rollout`: {joint: RMS [rad or m]} by which they, let go, miss the test logs.
     `searched`: what was done about the shape values.
     """
@@ -136,6 +138,7 @@ class Fit:
     compressed: Compressed
     physically_consistent: bool
     prior: np.ndarray
+    strength: PriorWeight
     known: np.ndarray | None = None
     shape_std: np.ndarray = field(default_factory=lambda: np.zeros(0))
     predictions: dict[str, Prediction] = field(default_factory=dict)
@@ -143,6 +146,7 @@ class Fit:
     left_out: dict[str, dict[str, int]] = field(default_factory=dict)
     seconds: dict[str, float] = field(default_factory=dict)
     filters: dict = field(default_factory=dict)
+    masses: dict = field(default_factory=dict)
     logs: tuple[dict, ...] = ()
     events: tuple[dict, ...] = ()
     notices: tuple[str, ...] = ()
@@ -278,7 +282,7 @@ def pose(experiment: Experiment, model: Model, compressed: Compressed, moving: n
         weights: (joints,) that multiply the rows of each joint, or None.
     """
     spec = experiment
-    objective = posed(compressed.total(weights), DIVERGENCES[spec.prior.divergence](prior), spec.prior.weight, known_bodies(spec, model))
+    objective = posed(compressed.total(weights), DIVERGENCES[spec.prior.divergence](prior), number(spec), known_bodies(spec, model))
     positive = np.array([c.positive for c in model.coefficients], dtype=bool)
     held = ~moving | undetermined(objective, model, moving)
     coordinates = Coordinates(PARAMETERIZATIONS[spec.model.inertia](), model.bodies, positive, held)
@@ -357,6 +361,7 @@ def identify(experiment: Experiment, model: Model, motion: Motion, data: Compres
         data: the training logs; where it holds slopes of shape values after the model's own parameters, these count in
             the uncertainty.
     """
+    experiment = with_weight(experiment, number(experiment))
     compressed = data if data.size == model.size else data.first(model.size)
     moving = moving_coefficients(model, motion)
     problem = pose(experiment, model, compressed, moving, prior)
@@ -383,7 +388,7 @@ def identify(experiment: Experiment, model: Model, motion: Motion, data: Compres
     return Fit(
         experiment=experiment, model=model, x=solution.x, objective=solution.objective, solution=solution,
         certificate=certificate, held=held, weights=problem.weights, compressed=compressed,
-        uncertainty=kept, shape_std=shape_std, prior=prior, known=problem.objective.known,
+        uncertainty=kept, shape_std=shape_std, prior=prior, known=problem.objective.known, strength=PriorWeight(number(experiment)),
         physically_consistent=bool(is_consistent(solution.x[:count].reshape(-1, 10)).all()),
     )  # fmt: skip
 

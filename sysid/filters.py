@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from . import interior
-from .blocks import standard_error
+from .blocks import within_one_error
 from .compress import Compressed, compress
 from .errors import SysidError, SysidWarning
 from .estimate import pose
@@ -87,12 +87,10 @@ def _widest_edge(spec: PreprocessSpec, key: str, candidates, logs) -> float:
 def _best(tried: list[dict], key: str, usual: float) -> float:
     """The candidate of least held-out error; among those within one standard error of it, the one nearest the usual."""
     least = min(tried, key=lambda entry: entry["relative_error"])
-    tied = []
-    for entry in tried:
-        difference = np.array(entry["folds"]) - np.array(least["folds"]) if len(entry["folds"]) == len(least["folds"]) else np.array([np.inf])
-        error = standard_error(difference) / len(difference) if len(difference) > 1 else 0.0
-        if difference.mean() <= error:
-            tied.append(entry[key])
+    # a candidate that is missing folds cannot be compared
+    alike = [entry for entry in tried if len(entry["folds"]) == len(least["folds"])]
+    kept = within_one_error([entry["folds"] for entry in alike], alike.index(least))
+    tied = [entry[key] for entry, within in zip(alike, kept) if within]
     return min(tied, key=lambda value: abs(np.log(value / usual)))
 
 

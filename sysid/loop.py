@@ -151,9 +151,9 @@ def add(
     after = config.loads(text, file)
     pipeline.build(after)
     before_fit = pipeline.fit(experiment, progress=progress)
-    after_fit = pipeline.fit(after, progress=progress)
+    after_fit, compared = pipeline.refit(after, before_fit, progress=progress)
     differences = tuple(comparison.compare(before_fit, after_fit, ("before", "after")))
-    rises = comparison.rises(before_fit, after_fit, joints)
+    rises = comparison.rises(before_fit, compared, joints)
     if rises and not force:
         return Added(after, before_fit, after_fit, differences, rises, refused=True)
     history = read_history(run)

@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from . import config, drives, events, gains, model, robot, rollout, shape
+from . import config, drives, events, gains, held_apart, masses, model, robot, rollout, shape
 from . import filters as filtering
 from . import log as logs
 from .bumps import bumps
@@ -32,8 +32,9 @@ from .motion import Motion
 from .multistart import Searched
 from .plausible import implausible
 from .preprocess import prepare
+from .prior_weight import PriorWeight, is_auto, with_weight
 from .robot import Robot
-from .specs import Experiment, LogSpec
+from .specs import AUTO, Experiment, LogSpec
 from .threads import single_threaded
 
 #: called with the stage's name and the share of it done, 0 to 1
@@ -93,11 +94,12 @@ def read_all(experiment: Experiment) -> Read:
 
 
 @single_threaded
-def fit(experiment: Experiment, *, filters: dict | None = None, progress: Progress | None = None, measured: Read | None = None) -> Fit:
+def fit(experiment: Experiment, *, filters: dict | None = None, strength: PriorWeight | None = None, progress: Progress | None = None, measured: Read | None = None) -> Fit:
     """Identify an experiment: everything from its logs to its errors on held-out data.
 
     Args:
-        filters: what an earlier fit of the same logs chose, `Fit.filters`; by default the filters are compared again.
+        filters, strength: what an earlier fit of the same logs chose, `Fit.filters` and `Fit.strength`; by default filters
+            are compared again, and the weight of the prior is chosen where the experiment says so.
         measured: its logs, where they are at hand.
 
     Raises:
@@ -105,6 +107,7 @@ def fit(experiment: Experiment, *, filters: dict | None = None, progress: Progre
             is `fit.solution.converged`.
     """
     tell = progress or (lambda stage, share: None)
+    experiment = experiment if strength is None else with_weight(experiment, strength.value)
     seconds: dict[str, float] = {}
     with noticed() as notices:
         experiment = started(experiment)
@@ -125,15 +128,22 @@ def fit(experiment: Experiment, *, filters: dict | None = None, progress: Progre
         _tell_left_out(motion, preprocess)
         disturbed = _tell_events("train", motion)
         with _timed(seconds, "shape"):
-            structure, slopes, searched = _settled(experiment, structure, motion, prior)
+            structure, slopes, searched, weight = _settled(experiment, structure, motion, prior)
         with _timed(seconds, "compress"):  # the regressor is built and reduced chunk by chunk, never whole
             compressed = compress(slopes or structure, motion, progress=lambda share: tell("compress", share))
+        with _timed(seconds, "weight"):
+            weight = weight or _strength(experiment, structure, motion, compressed, prior)
         with _timed(seconds, "solve"):
-            found = identify(experiment, structure, motion, compressed, prior)
+            found = identify(with_weight(experiment, weight.value), structure, motion, compressed, prior)
+            found = replace(found, strength=strength or weight)
         if not found.physically_consistent:
             names = [body.name for body, possible in zip(machine.bodies, is_consistent(found.pi)) if not possible]
             warnings.warn(SysidWarning(f"impossible bodies: {', '.join(names)}; identified.urdf will not serve a simulator. model.inertia: log-cholesky keeps them possible"), stacklevel=2)
         _tell_undetermined(found, motion)
+        with _timed(seconds, "masses"):  # what other fits are compared with has been asked what it lacks
+            heavy = masses.implausible(found, motion if filters is None else None)
+        if heavy is not None:
+            warnings.warn(SysidWarning(heavy.says), stacklevel=2)
         with _timed(seconds, "predict"):
             predictions = {"train": predict(structure, found.x, motion)}
             samples, left_out = {"train": motion.samples}, {"train": _left_out(motion)}
@@ -154,9 +164,26 @@ def fit(experiment: Experiment, *, filters: dict | None = None, progress: Progre
         for text in implausible(replace(found, predictions=predictions)):
             warnings.warn(SysidWarning(text), stacklevel=2)
     return replace(
-        found, predictions=predictions, samples=samples, left_out=left_out, seconds=seconds, filters=chosen, logs=tuple(provenance),
-        notices=tuple(notices), events=tuple(disturbed), drives=tuple(told), rollout=let_go, searched=searched,
+        found, masses=masses.document(heavy), predictions=predictions, samples=samples, left_out=left_out, seconds=seconds, filters=chosen,
+        logs=tuple(provenance), notices=tuple(notices), events=tuple(disturbed), drives=tuple(told), rollout=let_go, searched=searched,
     )  # fmt: skip
+
+
+def refit(experiment: Experiment, before: Fit, *, filters: dict | None = None, **how) -> tuple[Fit, Fit]:
+    """Fit an experiment that grew from a fitted one: as its file says, and under that one's prior, by which the two are compared.
+
+    Where the weight of the prior is chosen, what was missing before may let it be another: the second fit is the first
+    where it is the same.
+
+    Args:
+        filters, how: as of `fit`.
+    """
+    if before.strength.auto:
+        experiment = with_weight(experiment, AUTO)
+    after = fit(experiment, filters=filters, **how)
+    if after.strength.value == before.strength.value:
+        return after, after
+    return after, fit(experiment, filters=after.filters, strength=before.strength, **how)
 
 
 def predict_log(found: Fit, log: str | LogSpec) -> Prediction:
@@ -169,9 +196,10 @@ def predict_log(found: Fit, log: str | LogSpec) -> Prediction:
 
 @dataclass(frozen=True)
 class Prepared:
-    """What studies work on: an experiment's logs as triangles, with the model, the prior (bodies, 10), and which
-    coefficients (coefficients,) belong to joints that move."""
+    """What studies work on: an experiment, the weight of its prior a number, its logs as triangles, with the model, the
+    prior (bodies, 10), and which coefficients (coefficients,) belong to joints that move."""
 
+    experiment: Experiment
     model: Model
     motion: Motion
     train: Compressed
@@ -192,41 +220,48 @@ def prepared(experiment: Experiment) -> Prepared:
             preprocess = filtering.settled(preprocess, filtering.compare(experiment, structure, train, prior))
         motion = prepare(train, preprocess, machine.joints)
         _tell_still(motion)
-        structure, *_ = _settled(experiment, structure, motion, prior)
+        structure, _, _, strength = _settled(experiment, structure, motion, prior)
         held_out = prepare(read(experiment, machine, experiment.data.test), preprocess, machine.joints)
         train_data, test_data = compress(structure, motion), compress(structure, held_out)
-    return Prepared(structure, motion, train_data, test_data, prior, moving_coefficients(structure, motion), tuple(notices))
+        strength = strength or _strength(experiment, structure, motion, train_data, prior)
+    return Prepared(with_weight(experiment, strength.value), structure, motion, train_data, test_data, prior, moving_coefficients(structure, motion), tuple(notices))
 
 
 _PASSES, _NEAR = 3, 0.1  # refinements on all rows; of a standard deviation
 
 
-def _settled(experiment: Experiment, structure: Model, motion: Motion, prior) -> tuple[Model, Linearised | None, tuple[Searched, ...]]:
+def _settled(experiment: Experiment, structure: Model, motion: Motion, prior) -> tuple[Model, Linearised | None, tuple[Searched, ...], PriorWeight | None]:
     """The model measured by a motion, its shape values found: on rows that fit in memory, then by Gauss-Newton steps on all
-    of them. And its slopes there, None where no shape value is free, and what was done to find them."""
+    of them. Its slopes there, None where no shape value is free, and what was done to find them. And the prior's weight, None
+    where it had no part in it."""
     structure = structure.measured_by(motion)
     if not (structure.shape_values or structure.uses_load):
-        return structure, None, ()
-    found = shape.settle(experiment, structure, motion, prior, profile=True)
+        return structure, None, (), None
+    strength = _strength(experiment, structure, motion, compress(structure, motion), prior) if is_auto(experiment) else None
+    weighed = experiment if strength is None else with_weight(experiment, strength.value)
+    found = shape.settle(weighed, structure, motion, prior, profile=True)
     bodies, searched = found.x[: 10 * structure.bodies].reshape(-1, 10), found.searched
-    if (scaled := rescaled(found.model, experiment, bodies, prior)) is not found.model:
-        found = shape.settle(experiment, scaled, motion, prior, grid=False)
+    if (scaled := rescaled(found.model, weighed, bodies, prior)) is not found.model:
+        found = shape.settle(weighed, scaled, motion, prior, grid=False)
     structure, slopes = found.model, Linearised(found.model, found.x)
     if not slopes.free:
-        return structure, None, searched
+        return structure, None, searched, None
     best = None
-    for _ in range(_PASSES):
+    for number in range(_PASSES):
         try:
             data = compress(slopes, motion)
         except NotFinite:
             if best is None:
                 raise
-            return *best[1:], searched  # of a formula, the last step left its domain
-        fit = identify(experiment, structure, motion, data, prior)
+            return best[1], best[2], searched, best[3]  # of a formula, the last step left its domain
+        if number == 0:  # what was missing before is in the model now
+            strength = _strength(experiment, structure, motion, data, prior)
+            weighed = with_weight(experiment, strength.value)
+        fit = identify(weighed, structure, motion, data, prior)
         # blows make valleys narrower than a step, and slopes say little at a corner: the last step is taken back
         if best is not None and (structure.deflects or not structure.uses_load) and fit.objective > best[0]:
-            return *best[1:], searched
-        best = fit.objective, structure, slopes
+            return best[1], best[2], searched, best[3]
+        best = fit.objective, structure, slopes, strength
         change = shape.correction(fit, data)
         values = np.array(structure.shapes)
         low, high = (np.array([getattr(v, end) for v in structure.shape_values]) for end in ("low", "high"))
@@ -238,7 +273,15 @@ def _settled(experiment: Experiment, structure: Model, motion: Motion, prior) ->
         std = fit.shape_std[slopes.free]
         if not np.any(np.abs(change) > _NEAR * np.where(np.isfinite(std), std, np.inf)):
             break
-    return structure, slopes, searched
+    return structure, slopes, searched, strength
+
+
+def _strength(experiment: Experiment, structure: Model, motion: Motion, data: Compressed, prior) -> PriorWeight:
+    """The weight of the prior on training data, which may hold slopes of shape values after the model's own parameters."""
+    if not is_auto(experiment):
+        return PriorWeight(experiment.prior.weight)
+    data = data if data.size == structure.size else data.first(structure.size)
+    return held_apart.chosen(experiment, structure, data, moving_coefficients(structure, motion), prior)
 
 
 def _tell_undetermined(found: Fit, motion: Motion) -> None:
@@ -335,4 +378,4 @@ def _timed(seconds: dict[str, float], stage: str):
     seconds[stage] = time.perf_counter() - start
 
 
-__all__ = ["Read", "build", "fit", "load", "predict_log", "prepared", "read", "read_all"]
+__all__ = ["Read", "build", "fit", "load", "predict_log", "prepared", "read", "read_all", "refit"]

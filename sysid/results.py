@@ -21,6 +21,7 @@ from pathlib import Path
 
 import numpy as np
 
+from . import prior_weight
 from .errors import ConfigError, SysidError
 from .estimate import Fit, at_edge
 from .filters import settled
@@ -73,6 +74,8 @@ def document(fit: Fit, run: str | Path = "") -> dict:
         "rollout": fit.rollout,
         "weights": None if fit.weights is None else dict(zip(fit.joints, fit.weights.tolist())),
         "filter": fit.filters,
+        "prior": prior_weight.document(fit.strength),
+        "implausible_masses": fit.masses or None,
         "robot": {"joints": list(fit.joints), "locked": fit.model.robot.locked},
         "notices": list(fit.notices),
         "logs": list(fit.logs),

@@ -25,6 +25,7 @@ from .model import Model, moving_coefficients
 from .motion import Motion
 from .multistart import Searched
 from .objective import add_blocks
+from .prior_weight import number, with_weight
 from .projection import Projection, inverted, prior_hessian
 from .specs import Experiment
 
@@ -79,7 +80,7 @@ def settle(
         NotFinite: an effect is no finite number wherever it was tried.
     """
     stride = stride or row.stride_for(motion, _MOST_ROWS)
-    lighter = experiment.model_copy(update={"prior": experiment.prior.model_copy(update={"weight": experiment.prior.weight / stride})})
+    lighter = with_weight(experiment, number(experiment) / stride)
     moving = moving_coefficients(model, motion)
 
     def solved(candidate: Model) -> Settled:

@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 
+AUTO = "auto"
 _LARGEST = 1e12  # nothing of a robot is larger in SI units, and its square is still a number
 
 
@@ -42,6 +43,16 @@ def _auto_or_positive(value: Any) -> Any:
     if _is_number(value) and value > 0:
         return float(value)
     raise ValueError("must be a positive number or auto")
+
+
+def _weight(value: Any) -> Any:
+    if value == AUTO:
+        return value
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        raise ValueError("must be a number or auto")
+    if value < 0:
+        raise ValueError("must be greater than or equal to 0, or auto")
+    return float(_finite(value))
 
 
 def _standstill(value: Any) -> Any:
@@ -366,7 +377,7 @@ class PriorSpec(_Spec):
     """What the bodies are believed to be before any data, and how strongly; `known` bodies are exactly that."""
 
     divergence: Literal["log-det", "pullback", "euclidean"] = "log-det"
-    weight: Annotated[float, AfterValidator(_finite), Field(ge=0)] = 1.0e-2
+    weight: Annotated[Any, BeforeValidator(_weight)] = AUTO
     source: Text = "urdf"
     known: list[str] = []
 

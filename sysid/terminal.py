@@ -84,6 +84,7 @@ def show_fit(fit: Fit, document: dict) -> None:
     by = "given by the prior rather than the data" if fit.experiment.prior.weight > 0 else "not determined by the data"
     print(f"{len(document['parameters'])} parameters, {weak} of them {by} (from_data below {_LOW:g})")
     _show_filter(document["filter"])
+    print(document["prior"]["says"])
     _show_notices(document)
     print(f"run folder: {document['run']}")
 

@@ -2,7 +2,11 @@
 
 The prior enters as what it claims to know, noise as blocks of time know it (`blocks.covariance`):
 
-    cov = C + 2 sigma^2 H^-1 P H^-1,      H = 2 R'R + P,  P the prior's Hessian, C the noise's.
+    cov = C + 2 sigma^2 w H^-1 P H^-1,      H = 2 R'R + P,  P the prior's Hessian, C the noise's.
+
+A strong prior is chosen for what it does to the error; it does not know the bodies better for it. However
+strong, it claims no more than that they are within a factor of the URDF's (`prior_weight.weakest`): w is
+its weight over that of a prior that claims as much, or one.
 """
 
 from dataclasses import dataclass
@@ -12,6 +16,7 @@ import numpy as np
 from . import blocks
 from .compress import Compressed
 from .objective import Objective, add_blocks
+from .prior_weight import weakest
 
 
 @dataclass(frozen=True)
@@ -40,9 +45,11 @@ def estimate(objective: Objective, compressed: Compressed, x: np.ndarray, fixed:
     misfit = objective.misfit(x)
     variance = float(misfit @ misfit) / max(int(compressed.rows.sum()) - len(free), 1)
     pick = np.ix_(free, free)
+    least = weakest(variance) if objective.divergence.relative else np.inf
+    claim = max(1.0, objective.weight / least) if least > 0.0 else 1.0
     inverse, undetermined = _inverse(data[pick] + prior[pick])
     covariance = np.full((size, size), np.nan)
-    covariance[pick] = _noise(compressed, x, weights, data + prior, free) + 2.0 * variance * inverse @ prior[pick] @ inverse
+    covariance[pick] = _noise(compressed, x, weights, data + prior, free) + 2.0 * variance * claim * inverse @ prior[pick] @ inverse
     total = np.diagonal(inverse)
     from_noise = np.einsum("ij,jk,ki->i", inverse, data[pick], inverse)
     share = np.zeros(size)

@@ -21,7 +21,7 @@ from .deviations import (
 )
 from .numbering import FEWEST, MOST, SHORTEST, divided, folds, memory, numbered, summed
 from .parameters import covariance
-from .rivals import SAME, chances, confidence_set
+from .rivals import SAME, chances, confidence_set, within_one_error
 
 __all__ = [
     "FEWEST",
@@ -43,5 +43,6 @@ __all__ = [
     "slope_chance",
     "standard_error",
     "summed",
+    "within_one_error",
     "z_score",
 ]

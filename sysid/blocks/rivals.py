@@ -5,6 +5,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from .deviations import standard_error
+
 SAME = 1e-6  # of a loss: a difference below it is how numbers are rounded, or a solver's tolerance
 
 
@@ -51,3 +53,19 @@ def chances(losses, rng: np.random.Generator, *, draws: int = 4000) -> np.ndarra
     least = drawn.min(1, keepdims=True)
     best = drawn <= least + SAME * np.abs(least)  # what is the same, but for rounding, shares
     return (best / best.sum(1, keepdims=True)).mean(0)
+
+
+def within_one_error(errors, best: int | None = None) -> np.ndarray:
+    """(models,) bool: those that lose no more than the best by more than one standard error of the
+    difference.
+
+    Args:
+        errors: (models, blocks) mean loss of each in blocks held apart. Of a single block no
+            standard error can be told: the best is alone.
+        best: which it is, where it is not the one of least mean.
+    """
+    errors = np.asarray(errors)
+    difference = errors - errors[np.argmin(errors.mean(1)) if best is None else best]
+    if errors.shape[1] < 2:
+        return difference[:, 0] <= 0.0
+    return difference.sum(1) <= standard_error(difference.T)

@@ -10,6 +10,8 @@ import numpy as np
 
 from .. import log as logs
 from .. import pipeline, robot
+from ..errors import SysidError
+from ..estimate import Fit
 from ..lowpass import lowpassed, stride_of, widest
 from ..model import Model, build
 from ..motion import Motion
@@ -88,6 +90,17 @@ class Look:
             stride_of(motion, cutoff),
         )
         return Seen(motion, stride, model, stack(model, motion, stride))
+
+    @cached_property
+    def fit(self) -> Fit | None:
+        """The experiment fitted as it is; None where it cannot be."""
+        parts = ([log.log for log in self.part(name)] for name in ("train", "test"))
+        if self.experiment.preprocess.events == "keep":
+            parts = ([replace(log, events=()) for log in part] for part in parts)
+        try:
+            return pipeline.fit(self.experiment, measured=pipeline.Read(*parts, ()))
+        except SysidError:
+            return None
 
     @cached_property
     def equations(self) -> Equations | None:

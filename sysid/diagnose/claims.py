@@ -62,24 +62,24 @@ def claimed(
         fit: of the experiment as it is. measured: its logs.
     """
 
-    def with_(last: Fit, member: Member) -> Fit:  # filtered as the first one was
+    def with_(last: Fit, member: Member) -> tuple[Fit, Fit]:  # and under the last one's prior
         name, joints, options = spelled(member.candidate, where(member, fit))
-        experiment = grown(last.experiment, name, joints, options, every=fit.joints)
-        return pipeline.fit(experiment, filters=fit.filters, progress=tell, measured=measured)
+        spec = grown(last.experiment, name, joints, options, every=fit.joints)
+        return pipeline.refit(spec, last, filters=fit.filters, progress=tell, measured=measured)
 
     claims: list[Claim] = []
     refused: list[Refused] = []
     last = fit
     for step in steps:
         head, *tied = step.choice.members
-        after = with_(last, head[0])
-        if (why := _nothing(last, after, head[0])) is not None:
+        after, compared = with_(last, head[0])
+        if (why := _nothing(last, compared, head[0])) is not None:
             refused.append(Refused(head[0].candidate.name, where(head[0], fit), why))
             continue
         found = [(*head, after)]
         for member, chance in tied[: _FITTED - 1]:
             if chance >= _LIKELY:
-                found.append((member, chance, with_(last, member)))
+                found.append((member, chance, with_(last, member)[0]))
         findings = [finding(last, then, m, chance, step, len(claims)) for m, chance, then in found]
         named = [(m.candidate.name, where(m, fit), chance) for m, chance in step.choice.members]
         claims.append(Claim(step, tuple(findings), last, after, tuple(named)))

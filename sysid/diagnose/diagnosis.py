@@ -81,7 +81,7 @@ def diagnose(
     measured, extra = pipeline.read_all(experiment), own_effects(experiment)
     fit = fit or pipeline.fit(experiment, progress=progress, measured=measured)
     with pipeline.noticed():
-        view = first_view(experiment, fit, measured.train)
+        view = first_view(fit.experiment, fit, measured.train)
         steps, asked, _, undecided = select.search(view, extra, level=level, tell=tell)
         claims, refused = claiming.claimed(steps, fit, measured, tell)
         refused += [claiming.undecided(choice, fit) for choice in undecided[-1:]]

@@ -16,6 +16,7 @@ class Armature(TorqueEffect):
     tied_with = ("the link's moment of inertia on a first joint that does not tilt",)
     separate_by = "a chirp in two poses of the joints behind it"
     source = "Featherstone 2008, section 9.6"
+    mimics_mass = True
     elementwise = True
     simulators = {"armature": "Ia"}
 

@@ -17,6 +17,7 @@ class GravityTilt(MotionEffect):
     tied_with = ("torque_bias", "encoder_offset", "centre of mass of the first links")
     separate_by = "level the base, or turn the first joint through a full circle"
     source = "elementary; no reference"
+    mimics_mass = True
     scope = "robot"
     simulators = {"gravity": "*"}
 

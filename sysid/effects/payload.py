@@ -19,6 +19,7 @@ class Payload(LinkEffect):
     tied_with = ("the link that holds it, exactly in a single log", "torque_gain")
     separate_by = "the same motion with the payload and without"
     source = "Swevers, Verdonck, Naumer, Pieters & Biber 2002"
+    mimics_mass = True
     options = {
         "link": "the link that holds it (default: the last)",
         "logs": "the logs that have it, by their names under `data` (default: all)",

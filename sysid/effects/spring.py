@@ -14,6 +14,7 @@ class Spring(TorqueEffect):
     tied_with = ("cable", "torque_bias", "gravity on a joint that swings a little")
     separate_by = "another payload: gravity grows with it, a spring does not"
     source = "Hooke's law"
+    mimics_mass = True
     elementwise = True
     simulators = {"stiffness": "k", "torque": "c"}
 

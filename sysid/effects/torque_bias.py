@@ -14,6 +14,7 @@ class TorqueBias(TorqueEffect):
     tied_with = ("asymmetric_coulomb", "gravity on a joint that always holds the same load")
     separate_by = "torque at rest, and slow sweeps both ways"
     source = "Janot, Gautier & Brunot 2019 (the offset of EMPS)"
+    mimics_mass = True
     elementwise = True
 
     b = Linear("N m", says="offset")

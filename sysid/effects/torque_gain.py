@@ -12,6 +12,7 @@ class TorqueGain(SensorEffect):
     tied_with = ("load_friction", "torque_saturation", "masses, exactly where all joints share the gain")
     separate_by = "a payload of known mass"
     source = "Gautier & Briot 2014"
+    mimics_mass = True
 
     e = Shape("1", -0.6, 1.5, start=0.0, says="share by which the signal is too large")
 

@@ -33,6 +33,8 @@ class Divergence(ABC):
     name: str
     #: True where d/gamma is a self-concordant barrier of the possible bodies
     barrier = False
+    #: True where a body's change counts as a share of the prior body
+    relative = True
 
     def __init__(self, prior):
         self.prior = np.array(prior, dtype=float)
@@ -112,6 +114,8 @@ class Euclidean(_Quadratic):
     """1/2 ||pi - prior||^2 of the ten numbers, units ignored: depends on frame and units; for comparison."""
 
     name = "euclidean"
+
+    relative = False
 
     def _constant_metric(self):
         return np.broadcast_to(np.eye(10), self.prior.shape[:-1] + (10, 10)).copy()

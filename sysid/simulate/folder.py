@@ -19,7 +19,7 @@ from .. import config
 from ..errors import SysidError, SysidWarning
 from ..robot import Robot
 from ..robot import load as robot_of
-from ..specs import Experiment, PreprocessSpec
+from ..specs import AUTO, Experiment, PreprocessSpec
 from .run import SimulatedLog, Simulation
 
 _LOG = re.compile(r"(train|train_[0-9]+|test)\.csv")
@@ -124,7 +124,7 @@ def _config(experiment: Experiment, robot: Robot, logs: list[str]) -> str:
         "data": {"train": [name for name in logs if name != "test.csv"], "test": ["test.csv"]},
         "preprocess": preprocess.model_dump(exclude_none=True),
         "model": {"inertia": experiment.model.inertia, "effects": effects},
-        "prior": {**experiment.prior.model_dump(exclude_none=True), "source": "urdf"},
+        "prior": {**experiment.prior.model_dump(exclude_none=True), "weight": AUTO, "source": "urdf"},
         "solver": experiment.solver.model_dump(exclude_none=True),
     }
     stream = io.StringIO()

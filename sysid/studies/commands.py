@@ -68,8 +68,9 @@ def study_restarts(experiment: Experiment, out: Path, *, count: int, seed: int, 
 def study_prior(experiment: Experiment, out: Path, *, jobs: int, progress: Tell) -> dict:
     """The prior's weight by cross-validation; writes study.json and the curve into `out`."""
     found = prepared(experiment)
+    experiment = found.experiment
     weights = sorted({*prior.WEIGHTS, *([experiment.prior.weight] if experiment.prior.weight > 0 else [])})
-    settings = {"study": "prior", "experiment": experiment.model_dump(mode="json"), "data": _triangle_hash(found.train), "versions": results.versions()}
+    settings = {"study": "prior", "errors": "by joint", "experiment": experiment.model_dump(mode="json"), "data": _triangle_hash(found.train), "versions": results.versions()}
     journal = Journal(out / "journal.jsonl", settings)
     tasks = [(repr(weight), (experiment, found.model, found.train, found.prior, found.moving, weight)) for weight in weights]
     done = run(journal, tasks, prior.one, jobs=jobs, progress=lambda share: progress("weights", share))

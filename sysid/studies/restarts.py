@@ -31,6 +31,7 @@ class Shared:
 def share(experiment: Experiment) -> Shared:
     """Read and compress both sets of logs, and pose the problem. Raises SysidError."""
     found = prepared(experiment)
+    experiment = found.experiment
     problem = pose(experiment, found.model, found.train, found.moving, found.prior)
     if experiment.solver.weighting == "noise":
         weights = noise_weights(found.train, problem.solve(experiment).x)

@@ -16,6 +16,7 @@ from ..estimate import Fit, inverse
 from ..lowpass import again, calm, lowpassed, narrowed, stride_of, widest
 from ..model import Model
 from ..motion import Motion
+from ..prior_weight import USUAL, with_weight
 from ..shape import Settled, settle
 from ..source import Source
 from ..specs import Experiment
@@ -169,9 +170,13 @@ def first_view(experiment: Experiment, fit: Fit, logs=None) -> View:
     """The fitted model on the training logs, and on the same with the noise of the angles drawn
     once more; in the widest band that this noise leaves.
 
+    A weight of the prior that was chosen bends the bodies by as much as one standard error allows.
+    A diagnosis is finer than that and would call it missing physics: it asks under the usual one.
+
     Args:
         logs: the training logs, where they are at hand.
     """
+    experiment = with_weight(experiment, USUAL) if fit.strength.auto else experiment
     if logs is None:
         logs = pipeline.read(experiment, fit.model.robot, experiment.data.train)
     cutoff = widest(logs)

@@ -34,10 +34,14 @@ _PASSES = 3  # the last two with every joint weighted by what the one before lef
 
 
 def find(look: Look) -> Iterator[Fault]:
-    """mass_implausible."""
+    """mass_implausible: by the torque that holds each link, and by a fit of the experiment as it
+    is, which says what brings masses back."""
     if look.seen is None:
         return
     times, error, felt = weights(look.seen)
+    far = {} if look.fit is None else look.fit.masses
+    cured = {link["link"] for link in far["far"]} if far.get("effect") else set()
+    held = set()
     for b, body in enumerate(look.robot.bodies):
         own, se = float(times[b]), float(error[b])
         low, high = own - _CLEAR * se, own + _CLEAR * se
@@ -45,6 +49,7 @@ def find(look: Look) -> Iterator[Fault]:
         implausible = low > _WEIGHT[1] or (high < _WEIGHT[0] and own > -_WEIGHT[0])
         if body.kind != "link" or felt[b] < _FELT or not implausible:
             continue
+        held.add(body.name)
         word = (
             "a payload that the URDF lacks, or its mass"
             if own > 1.0
@@ -57,9 +62,16 @@ def find(look: Look) -> Iterator[Fault]:
                 f"the link of {body.joint} weighs {own:.2g} +- {se:.1g} times what the "
                 "URDF says, by the torque that holds it"
             ),
-            f"check {word}",
+            far["do"] if body.name in cured else f"check {word}",
             body.joint,
         )
+    for link in far.get("far", ()):
+        if link["link"] not in held:
+            says = (
+                f"a fit gives the link of {link['joint']} {link['mass']:.3g} kg, the URDF "
+                f"{link['urdf']:.3g} kg"
+            )
+            yield Fault("mass_implausible", WARNING, says, far["do"], link["joint"])
 
 
 def weights(seen: Seen) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

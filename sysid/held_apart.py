@@ -1,0 +1,199 @@
+"""How strong should the prior be? `prior.weight: auto`.
+
+The training logs are cut into stretches of time; each is predicted by fits, one a weight, that
+never saw it. The strongest prior is taken whose error on these stretches is within one standard
+error of the best, each joint's error in units of its own: what the log does not determine stays
+near its prior, and what it does is not bent by more than the log itself could tell. Stretches are
+made of triangles, so a fit of all but one costs a solve, not a pass over the samples. Test logs
+are not touched.
+
+Source: Breiman, Friedman, Olshen & Stone 1984, 3.4.3 (one standard error), here of differences
+between weights on the same stretches, in which what all weights share cancels.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .blocks import standard_error, within_one_error
+from .compress import Compressed
+from .estimate import Problem, noise_weights, pose
+from .interior import minimise
+from .model import Model
+from .prior_weight import USUAL, PriorWeight, is_auto, weakest, with_weight
+from .specs import Experiment
+
+_STRETCHES = 8
+FEWEST = 3  # of fewer no standard error can be told
+_DECADES = 12  # below the strongest: weaker than that a prior is rounding of what the data say
+_CLEAR = 3.0  # standard errors above the best: no weight beyond it will be within one
+_NOTHING = 1e-4  # of an error: what a tenth of a weight changes where it has ceased to matter
+_TOLERANCE = 1e-6  # its square, as a share of the objective, is far below any standard error
+
+
+@dataclass(frozen=True)
+class HeldApart:
+    """Stretches of a log held apart: of each the problem without it, and its triangles; and the
+    joints' weights (joints,)."""
+
+    problems: tuple[Problem, ...]
+    stretches: tuple[Compressed, ...]
+    weights: np.ndarray
+
+    @property
+    def rows(self) -> np.ndarray:
+        """(stretches, joints) rows that count."""
+        return np.array([stretch.rows for stretch in self.stretches])
+
+    def squares(self, weight: float, tolerance: float = _TOLERANCE) -> np.ndarray:
+        """(stretches, joints) sum of squared residuals of each, under fits of the others with a
+        prior of `weight`."""
+        out = []
+        for problem, stretch in zip(self.problems, self.stretches):
+            x = solved(problem, weight, tolerance)
+            out.append(stretch.squares(x))
+        return np.array(out)
+
+
+def solved(problem: Problem, weight: float, tolerance: float = _TOLERANCE) -> np.ndarray:
+    """The parameters (size,) of a problem under another weight of its prior."""
+    coordinates, objective = problem.coordinates, replace(problem.objective, weight=weight)
+    positive, held = coordinates.positive, coordinates.held
+    start = coordinates.physical(problem.start)
+    return minimise(objective, positive, held, start, tolerance=tolerance)[0][-1]
+
+
+def held_apart(
+    experiment: Experiment, model: Model, data: Compressed, moving, prior, weights=None
+) -> HeldApart:
+    """The stretches of a log.
+
+    Args:
+        moving: (coefficients,) bool. prior: (bodies, 10). weights: (joints,) or None.
+    """
+    parts = np.array_split(np.arange(data.blocks), min(_STRETCHES, data.blocks))
+    data, numbers = data.gathered(parts), range(len(parts))
+    problems = [pose(experiment, model, data.without([k]), moving, prior, weights) for k in numbers]
+    alone = [data.without(set(numbers) - {k}) for k in numbers]
+    scale = np.ones(data.joints) if weights is None else np.asarray(weights)
+    return HeldApart(tuple(problems), tuple(alone), scale)
+
+
+def chosen(experiment: Experiment, model: Model, data: Compressed, moving, prior) -> PriorWeight:
+    """The weight of an experiment's prior: as given, or chosen on its training data.
+
+    Args:
+        moving: (coefficients,) bool. prior: (bodies, 10).
+    """
+    if not is_auto(experiment):
+        return PriorWeight(experiment.prior.weight)
+    if data.blocks < FEWEST:
+        return PriorWeight(USUAL, auto=True)
+    found = strongest(held_apart(experiment, model, data, moving, prior))
+    if experiment.solver.weighting != "noise":
+        return found
+    whole = pose(with_weight(experiment, found.value), model, data, moving, prior)
+    weights = noise_weights(data, solved(whole, found.value))
+    return strongest(held_apart(experiment, model, data, moving, prior, weights))
+
+
+def strongest(apart: HeldApart) -> PriorWeight:
+    """The strongest prior within one standard error of the best, and none that is weaker than what
+    a URDF says at all: by decades from the middle of what a prior can be, both ways, up to where
+    the error stands clear above the best or changes no more."""
+    top = int(np.ceil(np.log10(_greatest(apart.problems[0]))))
+    middle, rows = top - _DECADES // 2, apart.rows
+    found = {float(f"1e{middle}"): apart.squares(float(f"1e{middle}"))}
+    for way in (range(middle + 1, top + 1), range(middle - 1, top - _DECADES - 1, -1)):
+        for power in way:
+            weight, last = float(f"1e{power}"), float(f"1e{power - way.step}")
+            if way.step < 0 and last < _weakest(apart, found):
+                break
+            found[weight] = apart.squares(weight)
+            errors, best = judged(np.array([*found.values()]), rows)
+            own, before = (errors[[*found].index(w)] for w in (weight, last))
+            worse = own - errors[best]
+            if worse.sum() > _CLEAR * standard_error(worse):
+                break
+            if way.step < 0 and abs(own.mean() - before.mean()) <= _NOTHING * before.mean():
+                break
+    for step in (_below, _above):
+        _try(apart, found, step(_least(found, rows)))
+    _try(apart, found, _above(_within(found, rows)))
+    value, least = _within(found, rows), _weakest(apart, found)
+    if bounded := value < least:
+        value = float(f"1e{int(np.floor(np.log10(least)))}")
+        while value < least:
+            value = _above(value)
+        _try(apart, found, value)
+    tried = tuple(sorted(found))
+    errors, _ = judged(np.array([found[w] for w in tried]), rows)
+    return PriorWeight(value, True, tried, errors, bounded)
+
+
+def _weakest(apart: HeldApart, found: dict[float, np.ndarray]) -> float:
+    """As `prior_weight.weakest`, with the noise that the best leaves; 0 where the divergence does
+    not count in shares of a body."""
+    if not apart.problems[0].objective.divergence.relative:
+        return 0.0
+    squares = found[_least(found, apart.rows)]
+    return weakest(float(np.sum(squares * apart.weights**2) / max(apart.rows.sum(), 1)))
+
+
+def _try(apart: HeldApart, found: dict[float, np.ndarray], weight: float) -> None:
+    if weight not in found:
+        found[weight] = apart.squares(weight)
+
+
+def judged(squares, rows) -> tuple[np.ndarray, int]:
+    """Errors (weights, stretches) and the number of the least: mean squares in units of what this
+    one leaves each joint, so that a loud joint, or one that lacks something, does not drown what a
+    prior costs the quiet ones. The least has the greatest likelihood of joints whose noise nobody
+    knows: the sum of the logarithms of their squares is least.
+
+    Args:
+        squares: (weights, stretches, joints). rows: (stretches, joints) that count.
+    """
+    squares, counts = np.asarray(squares, dtype=float), np.asarray(rows)
+    level = squares.sum(1) / np.maximum(counts.sum(0), 1)
+    seen = np.flatnonzero(counts.sum(0) * level.min(0) > 0.0)
+    best = int(np.argmin((np.log(level[:, seen]) * counts.sum(0)[seen]).sum(1)))
+    scaled = (squares[:, :, seen] / level[best, seen]).sum(2)
+    return scaled / np.maximum(counts[:, seen].sum(1), 1), best
+
+
+def _least(found: dict[float, np.ndarray], rows) -> float:
+    return [*found][judged(np.array([*found.values()]), rows)[1]]
+
+
+def _within(found: dict[float, np.ndarray], rows) -> float:
+    errors, best = judged(np.array([*found.values()]), rows)
+    return max(w for w, kept in zip(found, within_one_error(errors, best)) if kept)
+
+
+def _above(weight: float) -> float:
+    """The next of 1, 3, 10, 30, ..."""
+    digit, power = f"{weight:.0e}".split("e")
+    return float(f"3e{power}" if digit == "1" else f"1e{int(power) + 1}")
+
+
+def _below(weight: float) -> float:
+    """The one before."""
+    digit, power = f"{weight:.0e}".split("e")
+    return float(f"1e{power}" if digit == "3" else f"3e{int(power) - 1}")
+
+
+def _greatest(problem: Problem) -> float:
+    """The weight at which the prior is as stiff as the data in the direction that they tell best:
+    beyond it nothing is left of them. Bodies that are known are no data's."""
+    objective = problem.objective
+    metric = np.asarray(objective.divergence.hessian(objective.divergence.prior))
+    columns = objective.triangle[:, : 10 * objective.bodies].reshape(-1, objective.bodies, 10)
+    roots = np.linalg.inv(np.linalg.cholesky(metric))
+    scaled = np.einsum("rbk,blk->rbl", columns, roots)
+    if objective.known is not None:
+        scaled = scaled[:, ~objective.known.any(axis=(1, 2))]
+    size = np.linalg.norm(scaled.reshape(len(scaled), -1), ord=2) if scaled.size else 0.0
+    return max(2.0 * float(size) ** 2, np.finfo(float).tiny)
