@@ -1,8 +1,10 @@
-"""The identified robot as a URDF: inertias about each link's centre of mass, friction in `<dynamics>`.
+"""The identified robot as a URDF: inertias about each link's centre of mass, friction in
+`<dynamics>`.
 
-What a URDF cannot say stays out and is told in a comment at its head: rotors, and every effect but viscous and Coulomb
-friction. Links that do not move against each other are one body to identification; the whole body stands in the link that
-its joint moves, and the others lose their inertia. Locked joints become fixed at their angle.
+What a URDF cannot say stays out and is told in a comment at its head: rotors, and every effect but
+viscous and Coulomb friction. Links that do not move against each other are one body to
+identification; the whole body stands in the link that its joint moves, and the others lose their
+inertia. Locked joints become fixed at their angle.
 """
 
 import io
@@ -12,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
+from .drives import DRIVE_EFFECTS
 from .estimate import Fit
 from .inertia import pseudo
 
@@ -22,15 +25,21 @@ def identified_urdf(fit: Fit, folder: Path | None = None) -> bytes:
     """URDF text of the fit.
 
     Args:
-        folder: where it will stand; meshes that the source names relative to itself are named from there.
+        folder: where it will stand; meshes that the source names relative to itself are named from
+        there.
     """
     robot = fit.model.robot
     known = {c.name: float(value) for c, value in zip(fit.model.coefficients, fit.coefficients)}
-    dynamics = {name: (known.get(f"viscous.{name}.Fv", 0.0), known.get(f"coulomb.{name}.Fc", 0.0)) for name in robot.joints}
+    dynamics = {
+        name: (known.get(f"viscous.{name}.Fv", 0.0), known.get(f"coulomb.{name}.Fc", 0.0))
+        for name in robot.joints
+    }
     return text(tree(robot, fit.pi[: robot.dof], dynamics, folder=folder), _unsaid(fit))
 
 
-def tree(robot, links, dynamics: dict[str, tuple[float, float]], *, zero=None, folder: Path | None = None):
+def tree(
+    robot, links, dynamics: dict[str, tuple[float, float]], *, zero=None, folder: Path | None = None
+):
     """The robot's URDF with other bodies and friction, as yourdfpy writes it (an lxml tree).
 
     Args:
@@ -44,19 +53,25 @@ def tree(robot, links, dynamics: dict[str, tuple[float, float]], *, zero=None, f
     def named(file: str) -> str:
         if folder is None or "://" in file or os.path.isabs(file):
             return file
-        return Path(os.path.relpath((robot.source.path.parent / file).resolve(), Path(folder).resolve())).as_posix()
+        return Path(
+            os.path.relpath((robot.source.path.parent / file).resolve(), Path(folder).resolve())
+        ).as_posix()
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         document = yourdfpy.URDF.load(
-            io.BytesIO(robot.source.text.encode()), build_scene_graph=False, load_meshes=False, filename_handler=named
+            io.BytesIO(robot.source.text.encode()),
+            build_scene_graph=False,
+            load_meshes=False,
+            filename_handler=named,
         )
     links_there = {link.name: link for link in document.robot.links}
     joints = {joint.name: joint for joint in document.robot.joints}
     for name, angle in robot.locked.items():
         joint = joints[name]
         joint.origin = _moved(joint, angle)
-        joint.type, joint.limit, joint.dynamics, joint.mimic, joint.axis = "fixed", None, None, None, None
+        joint.type, joint.axis = "fixed", None
+        joint.limit, joint.dynamics, joint.mimic = None, None, None
     carried = _carriers(robot)
     for name, link in links_there.items():
         if carried.get(name) is not None:
@@ -98,20 +113,30 @@ def _unsaid(fit: Fit) -> str:
     values |= {v.name: (float(at), v.unit) for v, at in zip(model.shape_values, model.shapes)}
     left = []
     for effect, joints in model.terms:
-        if effect.simulators and set(effect.simulators) <= SAYS:
+        known = effect.simulators and set(effect.simulators) <= SAYS
+        if known or isinstance(effect, DRIVE_EFFECTS):
             continue
         for joint in joints:
             name = f"{effect.name}.{'*' if joint < 0 else robot.joints[joint]}"
-            own = ", ".join(f"{key.rpartition('.')[2]} = {at:.6g} {unit}" for key, (at, unit) in values.items() if key.startswith(f"{name}."))
+            own = ", ".join(
+                f"{key.rpartition('.')[2]} = {at:.6g} {unit}"
+                for key, (at, unit) in values.items()
+                if key.startswith(f"{name}.")
+            )
             left.append(f"  {name}: {own}")
     for body, pi in zip(robot.bodies[robot.dof :], fit.pi[robot.dof :]):
         axis = robot.subspaces[body.row, 3:]
         about = float(axis @ pseudo.rotational_inertia(pi) @ axis)
-        felt = [f"{about * ratio**2:.6g} kg m^2 about {joint}" for joint, ratio in zip(robot.joints, robot.transmission[body.row]) if ratio]
+        felt = [
+            f"{about * ratio**2:.6g} kg m^2 about {joint}"
+            for joint, ratio in zip(robot.joints, robot.transmission[body.row])
+            if ratio
+        ]
         left.append(f"  {body.name}: {pi[0]:.6g} kg, reflected {', '.join(felt)}")
     if not left:
         return f"{robot.name}, as sysid identified it."
-    return "\n".join([f"{robot.name}, as sysid identified it. A URDF cannot say:", *left, "`sysid export` says more of it to a simulator.\n"])
+    first = f"{robot.name}, as sysid identified it. A URDF cannot say:"
+    return "\n".join([first, *left, "`sysid export` says more of it to a simulator.\n"])
 
 
 def _carriers(robot) -> dict[str, str | None]:
@@ -130,7 +155,8 @@ def _carriers(robot) -> dict[str, str | None]:
 
 
 def _moved(joint, angle: float) -> np.ndarray:
-    """The origin (4, 4) of a joint that stands at an angle [rad or m] where it now stands at zero."""
+    """The origin (4, 4) of a joint that stands at an angle [rad or m] where it now stands at
+    zero."""
     axis = np.array([1.0, 0.0, 0.0] if joint.axis is None else joint.axis, dtype=float)
     axis = axis / np.linalg.norm(axis)
     motion = np.eye(4)
