@@ -10,15 +10,17 @@ import numpy as np
 import pytest
 
 import sysid
-from sysid import effect, inverse_dynamics, regressor
-from sysid.export import FORMATS, Check, document, isaaclab
+from sysid import effect, inverse_dynamics, pipeline, regressor
+from sysid.errors import SysidError
+from sysid.export import FORMATS, Check, document, isaaclab, mjcf
 from sysid.export.cost import costs
+from sysid.export.motors import Motor
 from sysid.export.stated import stated
 from sysid.inertia import pseudo
 from sysid.inertia.consistency import is_consistent
 from sysid.model import ROBOT, Model
 from sysid.run import Run
-from sysid.specs import Experiment
+from sysid.specs import Experiment, RobotSpec
 from tests import robots, servos
 from tests.test_inertia import random_bodies
 
@@ -250,7 +252,6 @@ def test_the_leg_on_its_test_log(leg_run, tmp_path, to):
 
 
 def test_costs_are_the_torque_of_each_effect(leg_run):
-    from sysid import pipeline
     from sysid.preprocess import prepare
 
     _, folder = leg_run
@@ -366,6 +367,64 @@ def test_servos_come_out_as_servos(servo_run, tmp_path):
     )
 
 
+def test_exported_servos_follow_the_test_log(servo_run, tmp_path):
+    """Let go in MuJoCo with nothing but the logged commands; the log was written by MuJoCo too."""
+    import mujoco
+
+    sysid.export(servo_run, "mjcf", tmp_path)
+    model = mujoco.MjModel.from_xml_path(str(tmp_path / "robot.xml"))
+    log = np.genfromtxt(servo_run.parent / "test.csv", delimiter=",", names=True)
+    q, asked = (
+        np.column_stack([log[f"{kind}_joint_{k}"] for k in (1, 2)]) for kind in ("q", "cmd")
+    )
+    model.opt.timestep, model.opt.integrator = 5e-4, mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    model.dof_solref[:, 0] = 2.0 * model.opt.timestep  # friction as stiff as the step allows
+    data, found = mujoco.MjData(model), []
+    data.qpos[:] = q[0]
+    for command in asked:
+        found.append(np.array(data.qpos))
+        data.ctrl[:] = command
+        mujoco.mj_step(model, data, 4)
+    missed = np.sqrt(np.mean((np.array(found) - q) ** 2, axis=0))
+    assert (missed < 0.01 * np.ptp(q, axis=0)).all()
+
+
+def test_a_dc_motor_is_driven_by_its_voltage(leg_run, tmp_path):
+    import mujoco
+
+    run = sysid.read_run(leg_run[1])
+    said = stated(run.model, run.x, mjcf.KNOWS)
+    drive = {"hip": Motor("hip", False, gain=0.8, damping=0.3, delay=0.0)}
+    (content,) = mjcf.files(replace(said, motors=drive), "", tmp_path).values()
+    data = mujoco.MjData(model := mujoco.MjModel.from_xml_string(content.decode()))
+    data.qvel[1], data.ctrl[:] = 2.0, [1.0, 5.0, 3.0]
+    mujoco.mj_forward(model, data)
+    np.testing.assert_allclose(data.actuator_force, [1.0, 0.8 * 5.0 - 0.3 * 2.0, 3.0])
+
+
+@pytest.mark.study
+def test_every_example_robot_comes_back(tmp_path):
+    """All robots of example-robot-data that have at most 40 joints and a base that stands."""
+    from sysid import robot, urdf
+
+    root, count = urdf._example_root(), 0
+    for path in sorted(root.rglob("*.urdf")):
+        try:
+            with pipeline.noticed():
+                machine = robot.load(
+                    RobotSpec(urdf=f"example-robot-data://{path.relative_to(root)}")
+                )
+        except SysidError:
+            continue
+        if machine.dof <= 40:
+            model = built(machine, ["viscous", "coulomb", "armature"])
+            for to in FORMATS:
+                found = sysid.export(run_of(tmp_path, *model), to, tmp_path / to)
+                assert found.check.agrees, f"{path.name}: {found}"
+            count += 1
+    assert count > 50
+
+
 def test_the_command(leg_run, tmp_path, cli):
     said = cli("export", leg_run[1], "--to", "mjcf", "--json", out=tmp_path)
     told = json.loads(said.out)
@@ -398,8 +457,6 @@ def test_a_simulator_that_is_missing_or_disagrees(leg_run, tmp_path, cli, monkey
     )
     assert (tmp_path / "robot.xml").is_file()
     monkeypatch.undo()
-    from sysid.export import mjcf
-
     real = mjcf.files
     monkeypatch.setattr(
         mjcf,
