@@ -471,6 +471,15 @@ def test_a_simulator_that_is_missing_or_disagrees(leg_run, tmp_path, cli, monkey
     assert not Check("x", 1, {"a": float("nan")}, None).agrees
 
 
+def test_a_fit_is_exported_as_its_run_folder_is(experiment, tmp_path):
+    folder = experiment(config={"robot.lock": {}, "preprocess.window": "auto"})
+    fit = sysid.fit(sysid.load(folder))
+    sysid.write(fit, tmp_path / "run")
+    one, two = (sysid.export(what, "mjcf", tmp_path / "out") for what in (fit, tmp_path / "run"))
+    assert one.check.agrees and two.check.agrees and one.check.samples == two.check.samples
+    assert one.together == pytest.approx(two.together, rel=1e-6)
+
+
 def test_document_is_strict_json(leg_run, tmp_path):
     found = sysid.export(leg_run[1], "sdf", tmp_path)
     json.dumps(document(found), allow_nan=False)

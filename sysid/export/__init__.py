@@ -17,6 +17,8 @@ import numpy as np
 from .. import pipeline
 from ..callable_module import callable_module
 from ..errors import SysidError, SysidWarning
+from ..estimate import Fit
+from ..filters import settled
 from ..inertia.consistency import is_consistent
 from ..motion import Motion
 from ..preprocess import prepare
@@ -78,11 +80,11 @@ def told(check: Check) -> str:
     return f"inverse dynamics of {check.by} within {worst:.1e} of ours on {check.samples} samples"
 
 
-def export(run: Run | str | Path, to: str, out: str | Path) -> Export:
+def export(run: Run | Fit | str | Path, to: str, out: str | Path) -> Export:
     """Write an identified model for a simulator, and ask the simulator.
 
     Args:
-        run: a run folder of `sysid fit`, or what `sysid.read_run` read.
+        run: a run folder of `sysid fit`, or what `sysid.read_run` read or `sysid.fit` found.
         to: mjcf, sdf, drake or isaaclab.
         out: the folder to write into.
 
@@ -95,7 +97,7 @@ def export(run: Run | str | Path, to: str, out: str | Path) -> Export:
             allowed=", ".join(FORMATS),
             do="give one of them with --to",
         )
-    found = run if isinstance(run, Run) else read_run(run)
+    found = read_run(run) if isinstance(run, (str, Path)) else run
     where = folder(out)
     form = import_module(f".{to}", __name__)
     model, x = joint_side(found.model, found.x)
@@ -118,19 +120,20 @@ def export(run: Run | str | Path, to: str, out: str | Path) -> Export:
     return Export(to, tuple(written.values()), check, left, together, tuple(notes))
 
 
-def _test_motion(run: Run) -> tuple[Motion | None, str | None]:
+def _test_motion(run: Run | Fit) -> tuple[Motion | None, str | None]:
     """The test logs of a run, or why there are none."""
     robot, spec = run.model.robot, run.experiment
+    filters = settled(spec.preprocess, run.filters) if isinstance(run, Fit) else spec.preprocess
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", SysidWarning)
             logs = pipeline.read(spec, robot, spec.data.test)
-            return prepare(logs, spec.preprocess, robot.joints), None
+            return prepare(logs, filters, robot.joints), None
     except SysidError as error:
         return None, str(error)
 
 
-def _samples(run: Run, motion: Motion | None) -> list[np.ndarray]:
+def _samples(run: Run | Fit, motion: Motion | None) -> list[np.ndarray]:
     """q, qd, qdd (n, dof) of the test logs; drawn where there are none."""
     if motion is None:
         return list(np.random.default_rng(0).normal(size=(3, 500, len(run.joints))))

@@ -81,8 +81,10 @@ class Stated:
         drive, data = self.robot.transmission, self._model.createData()
         at = {name: own if name in self.knows else 0.0 for name, own in self.terms.items()}
         true = q + at["zero"]
-        samples = zip(true @ drive.T, qd @ drive.T, qdd @ drive.T)
-        out = np.array([pin.rnea(self._model, data, *sample) for sample in samples]) @ drive
+        full = np.empty((len(q), len(drive)))
+        for k, sample in enumerate(zip(true @ drive.T, qd @ drive.T, qdd @ drive.T)):
+            full[k] = pin.rnea(self._model, data, *sample)
+        out = full @ drive
         out += at["damping"] * qd + at["drag"] * np.abs(qd) * qd + at["friction"] * np.sign(qd)
         out += at["armature"] * qdd + at["stiffness"] * true + at["torque"]
         for shaft in self.shafts:
