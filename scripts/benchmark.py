@@ -14,7 +14,7 @@ memory  Peak memory of `sysid fit` on the leg's log and on one 50 times as long,
 diagnose  The whole `sysid diagnose configs/cheetah3.yaml` process, the whole catalogue on every joint, over `sysid fit` on
         the same experiment, in turns. At most 10 is the aim.
 torque  `torque(q, qd, qdd)` of a seven-joint arm with viscous and Coulomb friction beside a bare `pin.rnea` of its bodies, one
-        sample a call, in turns; and a million samples at once, per sample.
+        sample a call, in turns; and a million samples at once, per sample. Processor time of one thread.
 cpu     Processor time of `sysid.fit` and `sysid.write` in a Python process over that of the command `sysid fit`, with nothing
         said of threads in the environment. At most 1.2 is the aim.
 solve   On the leg's compressed problem: 20 random starts over one fit's solve (compression not counted), and cvxpy +
@@ -171,7 +171,7 @@ def diagnose_over_fit(runs: int) -> dict:
 
 
 def torque(repeats: int) -> dict:
-    """One sample a call, ours and Pinocchio's in turns, and a million samples at once; medians, after a warm-up."""
+    """One sample a call, ours and Pinocchio's in turns, and a million samples at once; processor time, medians, after a warm-up."""
     sys.path.insert(0, str(ROOT))
     import numpy as np
     import pinocchio as pin
@@ -186,15 +186,15 @@ def torque(repeats: int) -> dict:
     one, data, calls = [np.array(x[0]) for x in samples], machine.model.createData(), 2000
     spent: dict[str, list[float]] = {"ours": [], "bare": [], "many": []}
     for _ in range(repeats + 1):
-        start = time.perf_counter()
+        start = time.process_time()
         for _ in range(calls):
             pin.rnea(machine.model, data, *one)
-        middle = time.perf_counter()
+        middle = time.process_time()
         for _ in range(calls):
             ours(*one)
-        end = time.perf_counter()
+        end = time.process_time()
         ours(*samples)
-        for name, seconds, count in (("bare", middle - start, calls), ("ours", end - middle, calls), ("many", time.perf_counter() - end, samples.shape[1])):
+        for name, seconds, count in (("bare", middle - start, calls), ("ours", end - middle, calls), ("many", time.process_time() - end, samples.shape[1])):
             spent[name].append(1e6 * seconds / count)
     bare, own, many = (statistics.median(spent[name][1:]) for name in ("bare", "ours", "many"))
     return {"microseconds": own, "rnea_microseconds": bare, "samples": samples.shape[1], "microseconds_a_sample": many}
