@@ -5,6 +5,7 @@ import json
 import os
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 
@@ -262,6 +263,12 @@ def test_the_rate_of_logs_without_a_clock(experiment, cli, arm_logs):
     assert made.data.rate == 200.0
     path = write_aloha(folder / "a.hdf5", arm_logs[0])  # speeds are zero
     assert begun(cli, folder, [path], out="aloha")[1].data.rate == 50.0
+    with h5py.File(path, "r+") as file:
+        file.attrs["dt"] = 0.005
+    assert begun(cli, folder, [path], out="attribute")[1].data.rate == 200.0
+    for log in (path, folder / "test.csv", write_bag1(folder / "a.bag", arm_logs[0])):
+        _, made = begun(cli, folder, [log], "--rate", "199", out=f"stated {log.suffix}")
+        assert made.data.rate == 199.0
 
 
 # ---- joints

@@ -409,6 +409,16 @@ def test_droid_has_a_clock_of_whole_nanoseconds(tmp_path, arm_logs):
     name = "observation/timestamp/robot_state/robot_timestamp"
     np.testing.assert_array_equal(open_table(path).load([name])[name], stamps(arm_logs[0]))
     assert stamps(arm_logs[0])[0] > 2**53 and SECOND == 10**9
+    import h5py
+
+    with h5py.File(
+        path, "r+"
+    ) as file:  # the robot's stamps were not kept, those of the computer were
+        group = file["observation/timestamp/robot_state"]
+        del group["robot_timestamp_nanos"]
+        group["read_start"] = stamps(arm_logs[0]) // 1_000_000
+    (segment,) = read(path).segments
+    np.testing.assert_allclose(segment.t, arm_logs[0]["t"], rtol=0, atol=1e-3)
 
 
 # ---- packed files
