@@ -591,7 +591,10 @@ def test_what_a_person_sees(experiment, cli):
     folder = experiment()
     said = cli("init", folder / "robot.urdf", folder / "train.csv", out=folder / "mine")
     assert said.status == 0 and "data.units.position" in said.out and "sysid fit" in said.out
-    for given in (folder / "train.csv", folder / "robot.urdf", folder / "a.mcap"):
+    (folder / "bag").mkdir()
+    (folder / "bag/metadata.yaml").write_text("")
+    (folder / "config.yaml").unlink()
+    for given in (folder / "train.csv", folder / "robot.urdf", folder / "bag", folder):
         cli("fit", given).complains("no experiment", "`sysid init URDF LOG...`")
 
 
