@@ -579,6 +579,14 @@ def test_logs_of_two_kinds(experiment, cli, arm_logs):
     ).complains("a.bag", "has no column 'q_shoulder'")
 
 
+def test_what_was_mended_in_reading_is_told(experiment, cli, arm_logs):
+    folder = experiment()
+    messages = [(row, JOINTS if row % 100 else JOINTS[:1]) for row in range(600)]
+    path = write_bag1(folder / "a.bag", arm_logs[0], messages=messages)
+    found, _ = begun(cli, folder, [path])
+    assert any("6 of 600 messages lack some of the joints" in note for note in found["look"])
+
+
 def test_wrapped_angles_are_told(experiment, cli):
     wrapped = lambda c: c | {"q_elbow": (c["q_elbow"] + np.pi + 2.9) % (2 * np.pi) - np.pi}
     folder = experiment(train=wrapped, test=wrapped)
