@@ -16,7 +16,7 @@ from . import datasets
 from .effect import find, vocabulary
 from .errors import ConfigError
 from .formula import parse
-from .readers import listed
+from .readers import is_log_folder, listed
 from .specs import EffectSpec, Experiment, LogSpec, is_own
 
 _LARGEST_FILE = 1_000_000  # bytes
@@ -40,13 +40,15 @@ def load(path: str | Path) -> Experiment:
     Raises:
         ConfigError: with the line, the key, and what is allowed there.
     """
-    path = file_of(path)
-    for word, endings in (("a log", _LOGS), ("a robot", _ROBOTS)):
-        if path.suffix.lower() in endings:
-            raise ConfigError(
-                f"{word}, and no experiment", where=str(path), allowed="a YAML file, or a folder with config.yaml",
-                do="`sysid init URDF LOG...` writes one from a robot and its logs",
-            )  # fmt: skip
+    given, path = Path(path), file_of(path)
+    word = "a log" if path.suffix.lower() in _LOGS else "a robot" if path.suffix.lower() in _ROBOTS else ""
+    if given.is_dir() and not path.is_file():
+        word = "a log" if is_log_folder(given) else "a folder without config.yaml"
+    if word:
+        raise ConfigError(
+            f"{word}, and no experiment", where=str(given), allowed="a YAML file, or a folder with config.yaml",
+            do="`sysid init URDF LOG...` writes one from a robot and its logs",
+        )  # fmt: skip
     try:
         data = path.read_bytes()
     except OSError as error:

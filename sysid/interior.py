@@ -142,9 +142,12 @@ def minimise(objective: Objective, positive: np.ndarray, held: np.ndarray, start
                 best = small
         # predictor: straight for the final targets; how far it gets sets how far the corrector aims
         straight = _change(solve, slope, scaled, _aim(scaled, bound, floor_j, floor_c, None), fixed, bound)
-        mu = (np.sum(scaled.weights**2) + squares_c.sum()) / size
-        level = (1.0 - min(1.0, _reach(straight, scaled, bound))) ** 3 * mu
-        levels = max(level, floor_j), max(level, floor_c)
+        ahead = (1.0 - min(1.0, _reach(straight, scaled, bound))) ** 3
+        mu_j, mu_c = np.mean(scaled.weights**2), squares_c.sum() / max(int(bound.sum()), 1)
+        if not barrier:
+            mu_j = mu_c = (np.sum(scaled.weights**2) + squares_c.sum()) / size
+        # bodies under a barrier stay at its weight, however little is left of the coefficients' complementarity
+        levels = max(ahead * mu_j, floor_j), max(ahead * mu_c, floor_c)
         change = _change(solve, slope, scaled, _aim(scaled, bound, *levels, straight), fixed, bound)
         keep = 1.0 - np.clip(_PER_GAP * loose / value, _LEAST, _LEAVE)
         length = min(1.0, keep * _reach(change, scaled, bound))

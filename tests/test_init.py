@@ -5,6 +5,7 @@ import json
 import os
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 
@@ -262,6 +263,12 @@ def test_the_rate_of_logs_without_a_clock(experiment, cli, arm_logs):
     assert made.data.rate == 200.0
     path = write_aloha(folder / "a.hdf5", arm_logs[0])  # speeds are zero
     assert begun(cli, folder, [path], out="aloha")[1].data.rate == 50.0
+    with h5py.File(path, "r+") as file:
+        file.attrs["dt"] = 0.005
+    assert begun(cli, folder, [path], out="attribute")[1].data.rate == 200.0
+    for log in (path, folder / "test.csv", write_bag1(folder / "a.bag", arm_logs[0])):
+        _, made = begun(cli, folder, [log], "--rate", "199", out=f"stated {log.suffix}")
+        assert made.data.rate == 199.0
 
 
 # ---- joints
@@ -572,6 +579,14 @@ def test_logs_of_two_kinds(experiment, cli, arm_logs):
     ).complains("a.bag", "has no column 'q_shoulder'")
 
 
+def test_what_was_mended_in_reading_is_told(experiment, cli, arm_logs):
+    folder = experiment()
+    messages = [(row, JOINTS if row % 100 else JOINTS[:1]) for row in range(600)]
+    path = write_bag1(folder / "a.bag", arm_logs[0], messages=messages)
+    found, _ = begun(cli, folder, [path])
+    assert any("6 of 600 messages lack some of the joints" in note for note in found["look"])
+
+
 def test_wrapped_angles_are_told(experiment, cli):
     wrapped = lambda c: c | {"q_elbow": (c["q_elbow"] + np.pi + 2.9) % (2 * np.pi) - np.pi}
     folder = experiment(train=wrapped, test=wrapped)
@@ -584,7 +599,10 @@ def test_what_a_person_sees(experiment, cli):
     folder = experiment()
     said = cli("init", folder / "robot.urdf", folder / "train.csv", out=folder / "mine")
     assert said.status == 0 and "data.units.position" in said.out and "sysid fit" in said.out
-    for given in (folder / "train.csv", folder / "robot.urdf", folder / "a.mcap"):
+    (folder / "bag").mkdir()
+    (folder / "bag/metadata.yaml").write_text("")
+    (folder / "config.yaml").unlink()
+    for given in (folder / "train.csv", folder / "robot.urdf", folder / "bag", folder):
         cli("fit", given).complains("no experiment", "`sysid init URDF LOG...`")
 
 

@@ -11,7 +11,7 @@ import pytest
 from sysid import log, pipeline, specs
 from sysid.errors import LogError, SysidWarning
 from sysid.readers import listed, open_table
-from tests.conftest import JOINTS, csv
+from tests.conftest import JOINTS, csv, write_table
 from tests.log_formats import (
     SECOND,
     stamps,
@@ -122,6 +122,18 @@ def test_stamps_of_a_bag_are_exact_and_jitter_is_told(tmp_path, arm_logs):
     with pytest.warns(SysidWarning) as told:
         read(tmp_path / "run")
     assert any("resampled" in str(w.message) for w in told)
+
+
+def test_jittered_stamps_are_mended_alike(tmp_path, arm_logs):
+    """The same whole ns in Parquet and in an mcap whose messages name the joints in any order."""
+    jitter = np.random.default_rng(0).normal(0.0, 5e-4, 600)
+    columns = arm_logs[0] | {"t": arm_logs[0]["t"] + jitter}
+    bag = write_bag2(tmp_path / "run", columns, order=turned)
+    table = write_table(tmp_path / "log.parquet", columns | {"t": stamps(columns)})
+    with pytest.warns(SysidWarning):
+        (one,), (other,) = read(bag).segments, read(table, units={"time": "ns"}).segments
+    for name in ("t", "q", "tau"):
+        np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
 
 
 def test_an_arm_and_a_gripper_on_one_topic(tmp_path, arm_logs):
@@ -409,6 +421,16 @@ def test_droid_has_a_clock_of_whole_nanoseconds(tmp_path, arm_logs):
     name = "observation/timestamp/robot_state/robot_timestamp"
     np.testing.assert_array_equal(open_table(path).load([name])[name], stamps(arm_logs[0]))
     assert stamps(arm_logs[0])[0] > 2**53 and SECOND == 10**9
+    import h5py
+
+    with h5py.File(
+        path, "r+"
+    ) as file:  # the robot's stamps were not kept, those of the computer were
+        group = file["observation/timestamp/robot_state"]
+        del group["robot_timestamp_nanos"]
+        group["read_start"] = stamps(arm_logs[0]) // 1_000_000
+    (segment,) = read(path).segments
+    np.testing.assert_allclose(segment.t, arm_logs[0]["t"], rtol=0, atol=1e-3)
 
 
 # ---- packed files

@@ -170,3 +170,24 @@ def test_interior_point_alone_from_anywhere():
 def test_one_iteration_is_not_convergence():
     experiment, problem = posed(leg(), solver={"max_iterations": 1})
     assert not problem.solve(experiment).converged
+
+
+@pytest.mark.parametrize("weight", [1e-2, 1.0, 1e2, 1e4])
+def test_coefficients_at_zero_beside_a_strong_prior(weight):
+    """Frictionless and nearly without noise: what is left of the coefficients falls while the bodies stay at the prior's weight."""
+    from sysid import config, robot
+    from sysid.compress import compress
+    from sysid.model import build
+    from sysid.preprocess import prepare
+    from tests.problems import UR5, arm_log
+
+    effects = ["viscous", "coulomb", "torque_bias", "armature"]
+    experiment = config.experiment({"robot": {"urdf": UR5}, "model": {"effects": effects}})
+    machine = robot.load(experiment.robot)
+    structure = build(machine, experiment.model.effects)
+    log = arm_log(machine, np.random.default_rng(1), noise=1e-3, viscous=0.0, coulomb=0.0)
+    motion = prepare([log], experiment.preprocess, machine.joints)
+    case = experiment, structure, motion, compress(structure, motion), np.array(machine.prior)
+    changed, problem = posed(case, prior={"weight": weight})
+    solution = problem.solve(changed)
+    assert solution.converged and solution.iterations < 40

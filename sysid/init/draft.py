@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import warnings
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,7 +10,7 @@ import numpy as np
 
 from .. import datasets
 from .. import robot as machines
-from ..errors import SysidWarning
+from ..pipeline import noticed
 from ..specs import RobotSpec
 from . import joints, physics, robots, units
 from .guess import Draft, Guess
@@ -48,17 +47,17 @@ def draft(reference: str, names: list[str], folder: Path, wishes: Wishes) -> Dra
     urdf = "robot.urdf" if machine.written else _moved(reference, folder)
     if machine.written:
         (folder / "robot.urdf").write_text(machine.written, encoding="utf-8")
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", SysidWarning)  # joints that mimic others are told below
+    with noticed():  # joints that mimic others are told below
         robot = machines.load(RobotSpec(urdf=urdf), folder)
     arm, hands = joints.arm_and_hands(robot, wishes.joints)
-    tables = opened(names, wishes.topic)
-    found = signals(tables, [*arm, *hands], len(arm))
-    data = read(tables, found)
+    with noticed() as mended:
+        tables = opened(names, wishes.topic)
+        found = signals(tables, [*arm, *hands], len(arm))
+        data = read(tables, found)
     angles = _angles(data, found, robot)
     used, chosen = joints.chosen(robot, found, data, arm, angles.value)
     clock = units.clock(data, found, wishes.rate)
-    notes = (*machine.notes, *_wraps(data, used, robot, angles.value))
+    notes = (*machine.notes, *mended, *_wraps(data, used, robot, angles.value))
     out = Draft(urdf, {}, notes, found.rest)
     out = out.having(*machine.guesses, *chosen, *_parts(data, clock, folder, wishes))
     out = out.having(*clock, *_columns(found, used), angles, *_drive(found, used))

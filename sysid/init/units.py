@@ -46,7 +46,7 @@ def seconds(t, samples: int, clock: str | None, said: dict) -> float:
         t: (n,) as logged, or None. clock: its unit where the format says it. said: {key: value} of
         what was guessed.
     """
-    if t is None:
+    if "data.rate" in said:
         return samples / said["data.rate"]
     steps = np.diff(t)
     # episodes begin anew
@@ -117,13 +117,17 @@ def rate_of(q: dict[str, np.ndarray], qd: dict[str, np.ndarray]) -> float | None
 
 def clock(data: list[Logged], found: Signals, stated: float | None) -> list[Guess]:
     """The column of time and its unit, or the rate of logs without one."""
+    if stated is not None:
+        return [Guess("data.rate", stated, "stated with --rate")]
     if found.time is not None:
         own = found.time == data[0].table.usual.get("time")
         why = "the clock of the log's format" if own else "its name says so"
         out = [Guess("data.columns.time", found.time, why)]
         return out if own and data[0].table.clock else [*out, time_unit(data[0].t, found.time)]
-    if stated is not None:
-        return [Guess("data.rate", stated, "stated with --rate, as the logs have no clock")]
+    if (rate := data[0].table.rate) is not None:
+        return [
+            Guess("data.rate", rate, "the logs have no clock; an attribute of the file says so")
+        ]
     rates = [rate for one in data if one.qd and (rate := rate_of(one.q, one.qd))]
     if rates:
         rate = float(f"{np.median(rates):.{_DIGITS}g}")
@@ -133,6 +137,8 @@ def clock(data: list[Logged], found: Signals, stated: float | None) -> list[Gues
         why = "the logs have no clock; ALOHA takes 50 samples a second"
         return [Guess("data.rate", _ALOHA_RATE, why, "state another with --rate")]
     raise LogError(
-        "no column is a clock, and nothing tells the rate", where=data[0].name,
-        allowed="a column t, time or timestamp", do="state the rate with --rate HZ",
-    )  # fmt: skip
+        "no column is a clock, and nothing tells the rate",
+        where=data[0].name,
+        allowed="a column t, time or timestamp",
+        do="state the rate with --rate HZ",
+    )

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from ..errors import LogError
 from . import lerobot, listing
-from .listing import listed
+from .listing import is_log_folder, listed
 from .table import Table
 
 
@@ -67,4 +67,4 @@ def _open_folder(path: Path, topic: str | None) -> Table:
     )  # fmt: skip
 
 
-__all__ = ["Table", "listed", "open_table"]
+__all__ = ["Table", "is_log_folder", "listed", "open_table"]

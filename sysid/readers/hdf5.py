@@ -13,11 +13,20 @@ from .table import ArrayTable
 _MOST_VALUES = 10**9  # of one dataset: HDF5 may promise more than any memory holds, in a few bytes
 _DEEPEST = 50
 
-_STATE, _STAMP = "observation/robot_state/", "observation/timestamp/robot_state/"
+_STATE, _STAMP = "observation/robot_state/", "observation/timestamp/"
+#: clocks of DROID and their units, the robot's own first
+_CLOCKS = {
+    _STAMP + "robot_state/robot_timestamp": "ns",
+    _STAMP + "robot_state/read_start": "ms",
+    _STAMP + "control/step_start": "ms",
+}
+#: attributes of a file that say how often it was written: samples a second, and seconds a sample
+_RATES = ("fps", "hz", "rate", "frequency", "freq", "sample_rate", "control_frequency")
+_PERIODS = ("dt", "period", "timestep", "control_dt")
 #: what kinds of file call their signals, the first of each that is there; ALOHA and DROID
 _USUAL = {
     "command": ("action", "action/joint_position"),
-    "time": (_STAMP + "robot_timestamp",),
+    "time": tuple(_CLOCKS),
     "position": ("observations/qpos", _STATE + "joint_positions"),
     "velocity": ("observations/qvel", _STATE + "joint_velocities"),
     "torque": (
@@ -35,8 +44,6 @@ class Hdf5Table(ArrayTable):
     A pair of datasets `x_seconds` and `x_nanos` is also one column `x` in whole ns.
     """
 
-    clock = "ns"  # of the only clock that a kind of file above has
-
     def __init__(self, path: Path):
         import h5py
 
@@ -47,6 +54,7 @@ class Hdf5Table(ArrayTable):
             for name, dataset in contained(self._file, str(path)):
                 if np.issubdtype(dataset.dtype, np.number) and 0 < dataset.size <= _MOST_VALUES:
                     self._datasets[name] = dataset
+            self.rate = _rate(dict(self._file.attrs))
         except LogError:
             raise
         except Exception as error:  # h5py raises what it likes on corrupt bytes
@@ -59,6 +67,7 @@ class Hdf5Table(ArrayTable):
             key: [name for name in names if name in self.names] for key, names in _USUAL.items()
         }
         self.usual = {key: names[0] for key, names in there.items() if names}
+        self.clock = _CLOCKS.get(self.usual.get("time"))
 
     def _unreadable(self, what: str, error: Exception) -> LogError:
         said = (str(error).splitlines() or [type(error).__name__])[0]
@@ -83,6 +92,15 @@ class Hdf5Table(ArrayTable):
             return self._datasets[name][()]
         except Exception as error:  # as above
             raise self._unreadable(f"dataset {name!r}", error) from None
+
+
+def _rate(attributes: dict) -> float | None:
+    """Samples a second, as the attributes of a file say."""
+    said = {str(name).lower(): value for name, value in attributes.items() if np.size(value) == 1}
+    said = {n: float(v) for n, v in said.items() if np.asarray(v).dtype.kind in "iuf" and v > 0}
+    rates = [said[name] for name in _RATES if name in said]
+    rates += [1.0 / said[name] for name in _PERIODS if name in said]
+    return rates[0] if rates and np.isfinite(rates[0]) else None
 
 
 def contained(group, where: str, prefix: str = "", seen: set | None = None, depth: int = 0):

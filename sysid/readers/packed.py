@@ -32,6 +32,7 @@ class PackedTable(Table):
         self._unpack()
         self._table = self._told(lambda: open_inner(self._unpacked))
         self.names, self.usual, self.clock = self._table.names, self._table.usual, self._table.clock
+        self.rate = self._table.rate
 
     def _unpack(self) -> None:
         most = max(_ANY, _MOST * self.path.stat().st_size)

@@ -13,14 +13,16 @@ from ..errors import LogError
 class Table(ABC):
     """Named columns of a file. Matrices (n, k) go by their name, and column by column as `name[0]` …
 
-    usual: what the format itself calls its signals, {"time", "position", "velocity", "torque" or "command": a column, or a pattern with
-        {joint}}; it stands in for the defaults of an experiment. clock: the unit of that time where the format says it.
+    usual: what the format itself calls its signals, {"time", "position", "velocity", "torque" or "command": a column, or a
+        pattern with {joint}}; it stands in for the defaults of an experiment. clock: the unit of that time where the format
+        says it. rate: samples a second, where a file without a clock says it.
     """
 
     path: Path
     names: list[str]
     usual: Mapping[str, str] = MappingProxyType({})
     clock: str | None = None
+    rate: float | None = None
 
     @property
     def files(self) -> tuple[Path, ...]:
