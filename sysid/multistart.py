@@ -14,7 +14,7 @@ Source: Marti, Lozano-Duran & Savage, Multi-start methods, Handbook of Heuristic
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations, product
 
 import numpy as np
@@ -44,6 +44,10 @@ class Searched:
     starts: int
     profile: int
     lower: bool
+
+    def checked_again(self, other: Searched) -> Searched:
+        """This, with another check of the profile after it."""
+        return replace(self, profile=other.profile, lower=self.lower or other.lower)
 
 
 @dataclass(frozen=True)
