@@ -127,7 +127,7 @@ def written(folder: Path, text: str, values: dict, motions: dict, rng, size: flo
         np.savetxt(folder / f"{name}.csv", np.column_stack(list(named.values())), delimiter=",", header=",".join(named), comments="", fmt="%.17g")
     config = {
         "data": {"columns": COLUMNS}, "preprocess": {"filter": "none", "events": "keep", "standstill": "keep"},
-        "model": {"effects": ["viscous", "coulomb", {"formula": text, "joints": ["shoulder"]}]},
+        "model": {"effects": ["viscous", "coulomb", {"formula": text, "joints": ["shoulder"]}]}, "prior": {"weight": 1e-2},
     }  # fmt: skip
     with (folder / "config.yaml").open("w") as stream:
         YAML().dump(config, stream)

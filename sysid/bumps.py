@@ -17,9 +17,9 @@ from .log import Log
 from .lowpass import lowpassed, stride_of, widest
 from .model import build
 from .outliers import BURST, CHANCE, bursts, ratio, surprise
+from .projection import inverted
 from .robot import Robot
 from .rows import Rows, stack
-from .shape import inverted
 from .specs import EffectSpec
 
 _EFFECTS = ("viscous", "coulomb", "torque_bias")  # what any joint has

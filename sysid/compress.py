@@ -13,6 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from .blocks import divided
+from .effect import NotFinite
 from .model import Model
 from .motion import Motion
 from .rows import difference_step
@@ -61,11 +62,10 @@ class Linearised:
 
     @cached_property
     def _beside(self) -> list[tuple[Model, float]]:
-        out = []
-        for k in self.free:
-            step = difference_step(self.model.shape_values[k], self.model.shapes[k])
-            out.append((self.model.with_shapes([s + step * (i == k) for i, s in enumerate(self.model.shapes)]), step))
-        return out
+        return [self._stepped(k, difference_step(self.model.shape_values[k], self.model.shapes[k])) for k in self.free]
+
+    def _stepped(self, k: int, step: float) -> tuple[Model, float]:
+        return self.model.with_shapes([s + step * (i == k) for i, s in enumerate(self.model.shapes)]), step
 
     def remembered(self, piece) -> list[dict]:
         """What the model remembers of a piece, at its shape values and a step beside each."""
@@ -75,8 +75,13 @@ class Linearised:
         """As `Model.columns`, with the slopes after the others."""
         out = self.model.columns(piece, rows, remembered[0])
         slopes: list[list[np.ndarray]] = [[] for _ in out]
-        for (beside, step), known in zip(self._beside, remembered[1:]):
-            for joint, values in enumerate(beside.columns(piece, rows, known)):
+        for k, (beside, step), known in zip(self.free, self._beside, remembered[1:]):
+            try:
+                moved = beside.columns(piece, rows, known)
+            except NotFinite:  # at the end of a formula's domain the slope is that of the other side
+                beside, step = self._stepped(k, -step)
+                moved = beside.columns(piece, rows)
+            for joint, values in enumerate(moved):
                 slopes[joint].append(self.x[self.model.support(joint)] @ (values - out[joint]) / step)
         return [np.concatenate([values, *(s[None] for s in own)]) for values, own in zip(out, slopes)]
 

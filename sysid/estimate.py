@@ -155,7 +155,7 @@ class Fit:
     searched: tuple[Searched, ...] = ()
 
     def __repr__(self) -> str:
-        said = ["converged" if self.solution.converged else "not converged", *(["proven optimal"] if self.certificate.globally_optimal else [])]
+        said = ["converged" if self.solution.converged else "not converged", *([f"proven optimal {given_shapes(self)}".strip()] if self.certificate.globally_optimal else [])]
         errors = ", ".join(f"{joint} {rms:.4g}" for joint, rms in zip(self.joints, self.predictions["test"].told()) if rms is not None) if "test" in self.predictions else "none"
         return f"<Fit of {self.experiment.name}: {len(self.x)} parameters, {', '.join(said)}; RMS on the test logs: {errors}>"
 

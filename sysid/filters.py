@@ -19,6 +19,7 @@ from .estimate import pose
 from .events import usable
 from .log import Log
 from .model import Model, moving_coefficients
+from .multistart import finite
 from .preprocess import prepare
 from .smoother import Smoother
 from .specs import Experiment, PreprocessSpec
@@ -116,7 +117,7 @@ def _middle(log: Log) -> Log:
 
 def _held_out(experiment: Experiment, spec: PreprocessSpec, model: Model, logs, prior, edge: float) -> dict:
     motion = prepare(logs, spec, model.robot.joints)
-    model = model.measured_by(motion)
+    model = finite(model.measured_by(motion), motion)
     motion = replace(motion, pieces=tuple(_trimmed(piece, logs[piece.log].segments[0], edge) for piece in motion.pieces))
     # against the torque as logged, over every row: what a filter smooths away or masks it has not explained
     # but for what disturbed the logs, as far as the widest candidate sees of it

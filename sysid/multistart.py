@@ -14,7 +14,7 @@ Source: Marti, Lozano-Duran & Savage, Multi-start methods, Handbook of Heuristic
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations, product
 
 import numpy as np
@@ -44,6 +44,10 @@ class Searched:
     starts: int
     profile: int
     lower: bool
+
+    def checked_again(self, other: Searched) -> Searched:
+        """This, with another check of the profile after it."""
+        return replace(self, profile=other.profile, lower=self.lower or other.lower)
 
 
 @dataclass(frozen=True)
@@ -208,40 +212,33 @@ def _spread(own: np.ndarray, here: float) -> np.ndarray:
 
 
 def finite(model: Model, motion: Motion) -> Model:
-    """A model with the shape values of each torque effect where it is a finite number, of those
-    that are tried the one nearest to the middle.
+    """A model with the shape values of each torque effect where it is a finite number: as they are,
+    or of those that are tried the ones nearest to the middle.
 
     Raises:
-        NotFinite: there is none.
+        NotFinite: there are none.
     """
-    pieces = row.seen(model, motion)
-    for block in dict.fromkeys((v.term, v.joint) for v in model.shape_values if not v.held):
-        effect, (term, joint) = model.terms[block[0]][0], block
-        own = [
-            k for k, v in enumerate(model.shape_values) if (v.term, v.joint) == block and not v.held
-        ]
-        if not isinstance(effect, TorqueEffect):
-            continue
-        values = [model.shape_values[k] for k in own]
-        where, sets = _sets(
-            [np.asarray(v.shape.values(v.low, v.high), dtype=float) for v in values]
-        )
-        order = np.argsort(np.abs(where - 0.5).sum(1), kind="stable")
-        for at in [[model.shapes[k] for k in own], *sets[order]]:
-            shapes = {
-                **model.shapes_of(term, joint),
-                **{v.shape.name: float(x) for v, x in zip(values, at)},
-            }
-            try:
-                for piece in pieces:
-                    effect.columns(piece, joint, **shapes)
-            except NotFinite as error:
-                refused = error
-                continue
-            model = model.with_shapes(
-                [dict(zip(own, at)).get(k, s) for k, s in enumerate(model.shapes)]
-            )
-            break
-        else:
-            raise refused
+    found = dict.fromkeys((v.term, v.joint) for v in model.shape_values if not v.held)
+    blocks = [block for block in found if isinstance(model.terms[block[0]][0], TorqueEffect)]
+    pieces = row.seen(model, motion) if blocks else []
+    for block in blocks:
+        model = _finite(model, pieces, *block)
     return model
+
+
+def _finite(model: Model, pieces: list, term: int, joint: int) -> Model:
+    effect, values = model.terms[term][0], model.shape_values
+    own = [k for k, v in enumerate(values) if (v.term, v.joint) == (term, joint) and not v.held]
+    where, sets = _sets([values[k].shape.values(values[k].low, values[k].high) for k in own])
+    nearest = sets[np.argsort(np.abs(where - np.median(where, axis=0)).sum(1), kind="stable")]
+    for at in [[model.shapes[k] for k in own], *nearest]:
+        moved = dict(zip(own, map(float, at)))
+        tried = model.with_shapes([moved.get(k, s) for k, s in enumerate(model.shapes)])
+        try:
+            for piece in pieces:
+                effect.columns(piece, joint, **tried.shapes_of(term, joint))
+        except NotFinite as error:
+            refused = error
+        else:
+            return tried
+    raise refused

@@ -29,7 +29,7 @@ from .estimate import Fit, Prediction, identify, predict
 from .inertia.consistency import is_consistent
 from .model import Model, moving_coefficients
 from .motion import Motion
-from .multistart import Searched
+from .multistart import Searched, finite
 from .plausible import implausible
 from .preprocess import prepare
 from .prior_weight import PriorWeight, is_auto, with_weight
@@ -234,7 +234,7 @@ def _settled(experiment: Experiment, structure: Model, motion: Motion, prior) ->
     """The model measured by a motion, its shape values found: on rows that fit in memory, then by Gauss-Newton steps on all
     of them. Its slopes there, None where no shape value is free, and what was done to find them. And the prior's weight, None
     where it had no part in it."""
-    structure = structure.measured_by(motion)
+    structure = finite(structure.measured_by(motion), motion)
     if not (structure.shape_values or structure.uses_load):
         return structure, None, (), None
     strength = _strength(experiment, structure, motion, compress(structure, motion), prior) if is_auto(experiment) else None
@@ -255,8 +255,13 @@ def _settled(experiment: Experiment, structure: Model, motion: Motion, prior) ->
                 raise
             return best[1], best[2], searched, best[3]  # of a formula, the last step left its domain
         if number == 0:  # what was missing before is in the model now
-            strength = _strength(experiment, structure, motion, data, prior)
+            before, strength = strength, _strength(experiment, structure, motion, data, prior)
             weighed = with_weight(experiment, strength.value)
+            if before is not None and before.value != strength.value:
+                again = shape.settle(weighed, structure, motion, prior, grid=False, profile=True)
+                searched = tuple(one.checked_again(other) for one, other in zip(searched, again.searched))
+                structure, slopes = again.model, Linearised(again.model, again.x)
+                data = compress(slopes, motion)
         fit = identify(weighed, structure, motion, data, prior)
         # blows make valleys narrower than a step, and slopes say little at a corner: the last step is taken back
         if best is not None and (structure.deflects or not structure.uses_load) and fit.objective > best[0]:

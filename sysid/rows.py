@@ -112,8 +112,12 @@ def tangents(model: Model, motion: Motion, x, stride: int, use: np.ndarray, midd
         if isinstance(effect, TorqueEffect):  # all else stays
             pieces = seen(model, motion) if pieces is None else pieces
             at = model.shapes_of(value.term, value.joint)
-            tried = [at, {**at, value.shape.name: model.shapes[k] + step}]
-            here, there = signatures(model, motion, pieces, effect, value.joint, tried, stride, use)
+            asked = lambda h: signatures(model, motion, pieces, effect, value.joint, [at, {**at, value.shape.name: model.shapes[k] + h}], stride, use)  # noqa: B023, E731
+            try:
+                here, there = asked(step)
+            except NotFinite:  # at the end of a formula's domain the slope is that of the other side
+                step = -step
+                here, there = asked(step)
             own = [i for i, c in enumerate(model.coefficients) if (c.effect, c.joint) == (effect.name, value.joint)]
             out[value.joint, :, k] = (there - here) @ np.asarray(x)[10 * model.bodies :][own] / step
             continue

@@ -17,22 +17,20 @@ import numpy as np
 from . import multistart
 from . import rows as row
 from .compress import Compressed, Factor, triangle
-from .effect import Deflection, NotFinite, TorqueEffect
+from .effect import Deflection, NotFinite
 from .estimate import Fit, Problem, pose
 from .inertia import DIVERGENCES
-from .landscape import at_zero, landscape
 from .model import Model, moving_coefficients
 from .motion import Motion
 from .multistart import Searched
 from .objective import add_blocks
 from .prior_weight import number, with_weight
 from .projection import Projection, inverted, prior_hessian
+from .shape_search import Search
 from .specs import Experiment
 
 _MOST_ROWS, _STEPS, _SETTLED = 6000, 12, 1e-7
 _LEAST_SHARE = 0.25  # of the way to another load
-_SOLVED = 3  # of the best places, which are solved with every bound kept
-_ROUNDS, _LOWER, _POINTS = 4, 1e-8, 8  # of profiles; a share of the objective that is lower; values where each is a fit of its own
 
 
 @dataclass(frozen=True)
@@ -100,102 +98,21 @@ def settle(
         return best
     if model.uses_load:
         best = solved(best.model.with_reference(_bodies(best)))
+    search = Search(motion, weights, attempted, lambda found: _descended(found, motion, attempted, weights, tolerance))
     tally = {}
     if grid:
-        for block in _blocks(best.model, motion):
-            best, tally[block] = _started(best, motion, block, weights, attempted)
+        best, tally = search.started(best)
         for term, (effect, joints) in enumerate(best.model.terms):
             for joint in joints if isinstance(effect, Deflection) else ():
-                if (tried := _from_tries(best, motion, term, joint, weights)) is not None:
+                tried, count = _from_tries(best, motion, term, joint, weights)
+                tally[term, joint] = 1 + count
+                if tried is not None:
                     best = min(best, solved(tried), key=lambda s: s.objective)
-    best = _descended(best, motion, attempted, weights, tolerance)
+    best = search.descended(best)
     if profile:
-        best = _profiled(best, motion, weights, attempted, tally, tolerance)
+        best, searched = search.profiled(best, tally)
+        best = replace(best, searched=searched)
     return best
-
-
-def _blocks(model: Model, motion: Motion) -> list[tuple[int, int]]:
-    """(term, joint) of torque effects with free shape values, on joints that move: what is searched together."""
-    moves = [joint not in (*motion.still, *motion.unused) for joint in model.robot.joints]
-    blocks = [
-        (v.term, v.joint) for v in model.shape_values
-        if isinstance(model.terms[v.term][0], TorqueEffect) and model.terms[v.term][0].coefficients() and moves[v.joint] and not v.held
-    ]  # fmt: skip
-    return list(dict.fromkeys(blocks))
-
-
-def _own(model: Model, block: tuple[int, int]) -> list[int]:
-    """Which of a model's shape values are a block's, and free."""
-    return [k for k, v in enumerate(model.shape_values) if (v.term, v.joint) == block and not v.held]
-
-
-def _tried(model: Model, own: list[int]) -> list[np.ndarray]:
-    values = [model.shape_values[k] for k in own]
-    angle = None if model.scales is None else float(model.scales.angle[values[0].joint])
-    return [np.asarray(v.shape.values(v.low, v.high, angle), dtype=float) for v in values]
-
-
-def _placed(model: Model, own: list[int], values) -> Model:
-    at = dict(zip(own, map(float, values)))
-    return model.with_shapes([at.get(k, s) for k, s in enumerate(model.shapes)])
-
-
-def _started(best: Settled, motion: Motion, block, weights, attempted) -> tuple[Settled, int]:
-    """A block of shape values started from many places: the best of them, and how many there were."""
-    own, count = _own(best.model, block), 0
-    wanted = [best.model.shape_values[k].begin for k in own]
-    for pinned in (False, True):  # first as if no coefficient had a bound, then with those that came to it
-        if pinned and not at_zero(best):
-            break
-        fine = landscape(best, motion, *block, weights, pinned=pinned)
-        rough = landscape(best, motion, *block, weights, pinned=pinned, rows=multistart.ROWS)
-        begin = [fine.here, [here if at is None else at for here, at in zip(fine.here, wanted)]]
-        found, sets = multistart.places(rough, fine, _tried(best.model, own), begin)
-        count += sets
-        for place in found[:_SOLVED]:
-            solution = attempted(_placed(best.model, own, place.values))
-            best = solution if solution is not None and solution.objective < best.objective else best
-    return best, count
-
-
-def _profiled(best: Settled, motion: Motion, weights, attempted, tally: dict, tolerance: float) -> Settled:
-    """The model after the profile over each shape value was checked, and gone on from where it is lower."""
-    lower, points = set(), {}
-    for _ in range(_ROUNDS):
-        before = best
-        for block in _blocks(best.model, motion):
-            own = _own(best.model, block)
-            for pinned in (True, False) if at_zero(best) else (True,):
-                fine = landscape(best, motion, *block, weights, pinned=pinned)
-                place, counts = multistart.lower_on_profile(fine, _tried(best.model, own), _LOWER)
-                points |= dict(zip(own, counts))
-                found = None if place is None else attempted(_placed(best.model, own, place.values))
-                further = _gone_on(best, found, motion, weights, attempted, tolerance)
-                lower |= set(own) if further is not best else set()
-                best = further
-        for k, value in enumerate(best.model.shape_values):
-            if k in points and (value.term, value.joint) in tally or value.held or (value.term, value.joint) in _blocks(best.model, motion):
-                continue
-            tried = [attempted(_placed(best.model, [k], [at])) for at in np.linspace(value.low, value.high, _POINTS)]
-            points[k] = _POINTS
-            found = min((one for one in tried if one is not None), key=lambda s: s.objective, default=None)
-            further = _gone_on(best, found, motion, weights, attempted, tolerance)
-            lower |= {k} if further is not best else set()
-            best = further
-        if best is before:
-            break
-    done = tuple(
-        Searched(v.name, tally.get((v.term, v.joint), 1), points.get(k, 0), k in lower)
-        for k, v in enumerate(best.model.shape_values) if not v.held
-    )  # fmt: skip
-    return replace(best, searched=done)
-
-
-def _gone_on(best: Settled, found: Settled | None, motion: Motion, weights, attempted, tolerance: float) -> Settled:
-    """The better of two, the search gone on from the other where it is lower."""
-    if found is None or not found.objective < best.objective * (1.0 - _LOWER):
-        return best
-    return _descended(found, motion, attempted, weights, tolerance)
 
 
 def correction(fit: Fit, data: Compressed) -> np.ndarray:
@@ -223,9 +140,9 @@ def _bodies(found: Settled) -> np.ndarray:
     return found.x[: 10 * found.model.bodies].reshape(-1, 10)
 
 
-def _from_tries(found: Settled, motion: Motion, term: int, joint: int, weights) -> Model | None:
+def _from_tries(found: Settled, motion: Motion, term: int, joint: int, weights) -> tuple[Model | None, int]:
     """The model with the best of the values that a deflection says to try, where it does nothing yet and none is held: on the
-    other side of a resonance no step from there arrives."""
+    other side of a resonance no step from there arrives. And how many were tried."""
     model, rows = found.model, found.rows
     effect = model.terms[term][0]
     own = {v.shape.name: k for k, v in enumerate(model.shape_values) if (v.term, v.joint) == (term, joint)}
@@ -233,7 +150,7 @@ def _from_tries(found: Settled, motion: Motion, term: int, joint: int, weights) 
     tried = effect.tries({v.shape.name: (v.low, v.high) for v in values})
     busy = any(v.held or model.shapes[k] != v.shape.start for k, v in zip(own.values(), values) if v.held or v.shape.start is not None)
     if busy or not tried:
-        return None
+        return None, 0
     scale = np.ones(model.robot.dof) if weights is None else np.asarray(weights)
     projection = Projection(rows.columns, rows.residual(found.x), prior_hessian(found), scale)
     gains = []
@@ -241,9 +158,9 @@ def _from_tries(found: Settled, motion: Motion, term: int, joint: int, weights) 
         c, _, _, gain, _ = projection.step(change[:, :, None], joint)
         gains.append(gain if c[0] > 0 else 0.0)
     if not max(gains) > 0:
-        return None
+        return None, len(tried)
     best = {own[name]: at for name, at in tried[int(np.argmax(gains))].items()}
-    return model.with_shapes([best.get(k, s) for k, s in enumerate(model.shapes)])
+    return model.with_shapes([best.get(k, s) for k, s in enumerate(model.shapes)]), len(tried)
 
 
 def _descended(best: Settled, motion: Motion, solved, weights, tolerance: float) -> Settled:

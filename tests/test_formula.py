@@ -283,6 +283,28 @@ def test_a_negative_value_inside_a_formula_is_found(experiment, cli):
     assert "proven given the shape values" in said.out and "started from" in said.out and "the profile over each was checked" in said.out
 
 
+def test_a_formula_is_fitted_up_to_the_end_of_its_domain(experiment, cli):
+    """Of sqrt(q - b) no b above the least angle is a number: begun there or led there, the search goes on where it is one."""
+    entry = {"formula": "g*sqrt(q-b)", "joints": ["elbow"], "name": "root"}
+    end = {}
+
+    def rooted(columns):
+        end.setdefault("b", columns["q_elbow"].min() - 0.002)
+        return {**columns, "tau_elbow": columns["tau_elbow"] + 0.9 * np.sqrt(np.maximum(columns["q_elbow"] - end["b"], 0.0))}
+
+    config = {"model.effects": ["viscous", "coulomb", entry], "data.test": [{"file": "train.csv", "start": 1}], "prior.weight": "auto"}
+    document = json_of(cli("fit", experiment(config=config, train=rooted), "--json"))
+    value = next(p for p in document["parameters"] if p["name"] == "root.elbow.b")
+    assert end["b"] - 0.1 < value["value"] < end["b"] + 0.004 and document["converged"]
+
+
+def json_of(said) -> dict:
+    import json
+
+    assert said.status == 0, said.err
+    return json.loads(said.out)
+
+
 def test_start_and_within(experiment, cli):
     entry = {**FORMULA, "q0": {"start": 0.1, "within": [-1, 1]}, "w": {"within": [0.2, 0.5]}}
     folder = experiment(config={"model.effects": ["viscous", "coulomb", entry]}, train=bump, test=bump)

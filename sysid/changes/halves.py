@@ -11,7 +11,7 @@ import numpy as np
 
 from ..blocks import folds, summed, z_score
 from ..model import ROBOT
-from ..shape import inverted
+from ..projection import inverted
 
 BLOCKS, _MOST = 24, 12  # blocks, over the whole log; changes
 _SUPPORT = 3.0  # standard errors

@@ -12,7 +12,7 @@ from ..motion import Piece
 from .ranges import ranges
 from .search_range import Range
 from .text import OTHER, parse, refused
-from .tree import culprit, names_of, value
+from .tree import culprit, names_of, signed_terms, value
 from .words import near
 
 
@@ -41,12 +41,15 @@ class Formula(TorqueEffect):
             )
         self.name, self.text, self.parsed = name, text, parse(text, signals)
         self.equation = f"tau = {text}"
-        self.uses_load = bool(names_of(self.parsed.tree) & {"load", "tau_load"})
+        self._names = names_of(self.parsed.tree)
+        parts = [(sign, term, names_of(term)) for sign, term in signed_terms(self.parsed.tree)]
+        self._parts = [[p[:2] for p in parts if name in p[2]] for name in self.parsed.linear]
+        self.uses_load = bool(self._names & {"load", "tau_load"})
         self.joints: tuple[str, ...] = ()
 
     @property
     def instantaneous(self):
-        return "t" not in names_of(self.parsed.tree) and not self.parsed.signals
+        return "t" not in self._names and not self.parsed.signals
 
     def coefficients(self):
         return tuple(
@@ -117,7 +120,8 @@ class Formula(TorqueEffect):
         out = np.empty((len(linear), len(motion.t)))
         with np.errstate(all="ignore"):
             for k, name in enumerate(linear):
-                out[k] = value(self.parsed.tree, {**known, **shapes, **self._alone(name)})
+                values = {**known, **shapes, **self._alone(name)}
+                out[k] = sum(sign * value(term, values) for sign, term in self._parts[k])
         return out
 
     def _alone(self, name: str) -> dict[str, float]:
@@ -125,7 +129,7 @@ class Formula(TorqueEffect):
 
     def _known(self, motion: Piece, joint: int) -> dict:
         """The values of the formula's variables."""
-        parsed, needed = self.parsed, names_of(self.parsed.tree)
+        parsed = self.parsed
         known = {
             "q": motion.q[:, joint],
             "qd": motion.qd[:, joint],
@@ -133,7 +137,7 @@ class Formula(TorqueEffect):
             "t": motion.t,
             "pi": np.pi,
         }
-        if "s" in needed:
+        if "s" in self._names:
             known["s"] = motion.direction(joint)
         if self.uses_load:
             known["load"] = known["tau_load"] = motion.load[:, joint]

@@ -32,7 +32,7 @@ import numpy as np
 from . import search_range
 from .search_range import CYCLES, SMALL, Range
 from .signs import one_sided
-from .tree import names_of, value
+from .tree import names_of, signed_terms, value
 
 _LEAST = 0.1  # of an argument
 _WIDE = 30.0  # of an argument that only other such values are beside
@@ -132,7 +132,7 @@ def _visit(node: ast.expr, wanted: Wanted, search: _Search) -> None:
         own = wanted if node.func.id == "abs" else _WANTED.get(node.func.id, _PLAIN)
         _visit(node.args[0], own, search)
     elif isinstance(node.op, (ast.Add, ast.Sub)):
-        _sum(_terms(node), wanted, search)
+        _sum(signed_terms(node), wanted, search)
     elif isinstance(node.op, ast.Pow):
         _power(node, wanted, search)
     else:
@@ -220,15 +220,6 @@ def _multiple(signal: np.ndarray, exponent: int, wanted: Wanted, rows: int) -> R
     most = wanted.most or finest
     ends = (least / size, most / size) if exponent > 0 else (size / most, size / least)
     return search_range.size(*ends)
-
-
-def _terms(node: ast.expr, sign: float = 1.0) -> list[tuple[float, ast.expr]]:
-    if isinstance(node, ast.BinOp) and isinstance(node.op, (ast.Add, ast.Sub)):
-        other = sign if isinstance(node.op, ast.Add) else -sign
-        return _terms(node.left, sign) + _terms(node.right, other)
-    if isinstance(node, ast.UnaryOp):
-        return _terms(node.operand, -sign if isinstance(node.op, ast.USub) else sign)
-    return [(sign, node)]
 
 
 def _factors(node: ast.expr, exponent: int = 1) -> list[tuple[int, ast.expr]]:

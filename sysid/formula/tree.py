@@ -26,9 +26,17 @@ def names_of(node: ast.expr) -> set[str]:
 
 def terms(node: ast.expr) -> list[ast.expr]:
     """The terms of a sum."""
+    return [term for _, term in signed_terms(node)]
+
+
+def signed_terms(node: ast.expr, sign: float = 1.0) -> list[tuple[float, ast.expr]]:
+    """The terms of a sum, each with the sign before it."""
     if isinstance(node, ast.BinOp) and isinstance(node.op, (ast.Add, ast.Sub)):
-        return terms(node.left) + terms(node.right)
-    return terms(node.operand) if isinstance(node, ast.UnaryOp) else [node]
+        other = sign if isinstance(node.op, ast.Add) else -sign
+        return signed_terms(node.left, sign) + signed_terms(node.right, other)
+    if isinstance(node, ast.UnaryOp):
+        return signed_terms(node.operand, -sign if isinstance(node.op, ast.USub) else sign)
+    return [(sign, node)]
 
 
 def operands(node: ast.expr) -> list[ast.expr]:

@@ -10,7 +10,8 @@ import numpy as np
 
 from .. import rows as row
 from ..lowpass import calm
-from ..shape import Settled, inverted, prior_hessian
+from ..projection import inverted, prior_hessian
+from ..shape import Settled
 from ..source import Source
 
 _FIRST = 1e-6  # share of a direction: less is none, and what is left of it rounding

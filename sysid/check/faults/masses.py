@@ -9,8 +9,8 @@ import numpy as np
 
 from ... import blocks
 from ...model import build
+from ...projection import inverted
 from ...rows import stack
-from ...shape import inverted
 from ..fault import WARNING, Fault
 from ..look import Look, Seen
 
