@@ -8,10 +8,12 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
+TICK = 0.002  # s, in which delays are counted
+
 
 @dataclass(frozen=True)
 class Servos:
-    """What is true of an arm's drives: each (dof,), delay in samples of the log."""
+    """What is true of an arm's drives: each (dof,), delay in ticks of 2 ms."""
 
     kp: np.ndarray
     kd: np.ndarray
@@ -50,37 +52,71 @@ def draw(rng, dof: int) -> Servos:
     )  # fmt: skip
 
 
-def commands(rng, seconds: float, rate: float, dof: int) -> tuple[np.ndarray, np.ndarray]:
-    """t (n,), commands (n, dof): sums of sines that come up from rest."""
-    t = np.arange(0.0, seconds, 1.0 / rate)
+def commands(rng, seconds: float, period: float, dof: int, jerk: float = 0.0) -> np.ndarray:
+    """Commands (n, dof), one a period [s]: sums of sines that come up from rest; `jerk`: the deviation [rad] of a
+    random step that each takes on top, as a policy's do."""
+    t = np.arange(0.0, seconds, period)
     q = np.zeros((len(t), dof))
     for j in range(dof):
         for f in rng.uniform(0.2, 2.5, 6):
             q[:, j] += rng.uniform(0.1, 0.35) / (1.0 + f) * np.sin(2.0 * np.pi * f * t + rng.uniform(0.0, 6.0))
-    return t, q * np.minimum(t, 1.0)[:, None]
+    if jerk:
+        q += rng.normal(0.0, jerk, q.shape)
+    return q * np.minimum(t, 1.0)[:, None]
 
 
-def run(urdf: str, servos: Servos, rng, seconds: float = 12.0, rate: float = 500.0, noise: float = 1e-4, fine: int = 10, springs=()):
-    """t, commands and angles as logged (n, dof); springs: (joint, N m/rad) that the arm has beside its drives."""
-    spec = mujoco.MjSpec.from_string(urdf)
-    spec.option.timestep, spec.option.integrator = 1.0 / rate / fine, mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+def compiled(urdf: str | mujoco.MjSpec, servos: Servos, step: float, springs=()) -> mujoco.MjModel:
+    """An arm in MuJoCo with its drives' inertia, damping and friction, in steps [s]."""
+    spec = mujoco.MjSpec.from_string(urdf) if isinstance(urdf, str) else urdf
+    spec.option.timestep, spec.option.integrator = step, mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_LIMIT
     model = spec.compile()
-    dof = model.nv
     model.dof_armature[:], model.dof_damping[:], model.dof_frictionloss[:] = servos.armature, servos.viscous + servos.kd, servos.coulomb
-    model.dof_solref[:, 0] = 2.0 * model.opt.timestep  # friction as stiff as the step allows
+    model.dof_solref[:, 0] = 2.0 * step  # friction as stiff as the step allows
     for joint, stiffness in springs:
         model.jnt_stiffness[joint] = stiffness
+    return model
+
+
+def let_go(model: mujoco.MjModel, kp, acting: np.ndarray, fine: int, start=None, limit: float = np.inf) -> np.ndarray:
+    """Angles (n, dof) at the beginning of every `fine` steps under commands that act in each step (n fine, dof).
+
+    Args:
+        start: (q, qd) of the first; at rest at zero without. limit: most that a servo gives [N m].
+    """
     data = mujoco.MjData(model)
-    t, asked = commands(rng, seconds, rate, dof)
-    out = np.zeros_like(asked)
-    for k in range(len(t)):
-        out[k] = data.qpos
-        acts = asked[max(k - servos.delay, 0)]
-        for _ in range(fine):
-            data.qfrc_applied[:] = servos.kp * (acts - data.qpos)
-            mujoco.mj_step(model, data)
-    return t, asked, out + noise * rng.normal(size=out.shape)
+    if start is not None:
+        data.qpos[:], data.qvel[:] = start
+    out = np.zeros((len(acting) // fine, model.nv))
+    for k, command in enumerate(acting):
+        if k % fine == 0:
+            out[k // fine] = data.qpos
+        data.qfrc_applied[:] = np.clip(kp * (command - data.qpos), -limit, limit)
+        mujoco.mj_step(model, data)
+    return out
+
+
+def run(
+    urdf: str, servos: Servos, rng, seconds: float = 12.0, rate: float = 500.0, noise: float = 1e-4, fine: int = 10, springs=(),
+    period: float | None = None, jerk: float = 0.0, bits: int | None = None, limit: float = np.inf,
+):  # fmt: skip
+    """t, commands and angles as logged (n, dof).
+
+    Args:
+        fine: steps of MuJoCo in a sample of the log. springs: (joint, N m/rad) that the arm has beside its drives.
+        period: how long a command is held [s], a sample by default. bits: of an encoder. limit: of the drives [N m].
+    """
+    model = compiled(urdf, servos, 1.0 / rate / fine, springs)
+    period = 1.0 / rate if period is None else period
+    given = commands(rng, seconds, period, model.nv, jerk)
+    t = np.arange(0.0, seconds, 1.0 / rate)
+    held = lambda at: given[np.clip((at / period + 1e-6).astype(int), 0, len(given) - 1)]  # noqa: E731
+    steps = np.arange(len(t) * fine) / rate / fine
+    q = let_go(model, servos.kp, held(np.maximum(steps - servos.delay * TICK, 0.0)), fine, limit=limit)
+    q = q + noise * rng.normal(size=q.shape)
+    if bits is not None:
+        q = np.round(q / (2.0 * np.pi) * 2**bits) * 2.0 * np.pi / 2**bits
+    return t, held(t), q
 
 
 def write(folder: Path, seed: int, dof: int, config: str, **options) -> Servos:
@@ -89,9 +125,13 @@ def write(folder: Path, seed: int, dof: int, config: str, **options) -> Servos:
     urdf, servos = arm_urdf(rng, dof), draw(rng, dof)
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "robot.urdf").write_text(urdf)
-    for part in ("train", "test"):
-        t, asked, q = run(urdf, servos, rng, **options)
-        names = ["t"] + [f"{kind}_joint_{j + 1}" for kind in ("q", "cmd") for j in range(dof)]
-        np.savetxt(folder / f"{part}.csv", np.column_stack([t, q, asked]), delimiter=",", header=",".join(names), comments="")
     (folder / "config.yaml").write_text(config)
+    for part in ("train", "test"):
+        record(folder / f"{part}.csv", *run(urdf, servos, rng, **options))
     return servos
+
+
+def record(path: Path, t, asked, q) -> None:
+    """A log of commands and angles (n, dof) as a CSV."""
+    names = ["t"] + [f"{kind}_joint_{j + 1}" for kind in ("q", "cmd") for j in range(q.shape[1])]
+    np.savetxt(path, np.column_stack([t, q, asked]), delimiter=",", header=",".join(names), comments="")
