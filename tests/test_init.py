@@ -193,6 +193,27 @@ def test_any_text_in_names_stays_what_it_is(experiment, cli):
     assert text.flow({"on": "off", "1": "a b", "n": -1.5}) == '{"on": "off", "1": a b, "n": -1.5}'
 
 
+def test_joint_states_as_rostopic_prints_them(experiment, cli):
+    """The first row names the joint of each number, which need not be the URDF's order."""
+
+    def printed(columns):
+        rows = [
+            "%time,field.header.stamp,field.name0,field.name1,field.position0,field.position1,"
+            "field.effort0,field.effort1"
+        ]
+        values = [columns[name] for name in ("q_elbow", "q_shoulder", "tau_elbow", "tau_shoulder")]
+        for t, *row in zip(columns["t"], *values):
+            stamp = 1_700_000_000_000_000_000 + round(1e9 * t)
+            rows.append(",".join(map(str, [stamp, stamp, "elbow", "shoulder", *row])))
+        return "\n".join(rows) + "\n"
+
+    folder = experiment(train=printed, test=printed)
+    _, made = begun(cli, folder, [folder / "train.csv", folder / "test.csv"])
+    assert made.data.columns.position == ["field.position1", "field.position0"]
+    assert (made.data.columns.time, made.data.units.time) == ("%time", "ns")
+    assert pipeline.fit(made).rms("test")["elbow"] < 0.06
+
+
 # ---- units
 
 

@@ -112,8 +112,13 @@ def _counted(table: Table, joints: list[str]) -> Iterable[Found]:
     for name in table.names:
         if table.width(name) > 1:
             by_name[(*words(name), "[]")] = {k: f"{name}[{k}]" for k in range(table.width(name))}
+    labels = _labels(table)
     for rest, columns in by_name.items():
         means, numbers = meaning(rest), sorted(columns)
+        if means.signal and set(numbers) <= set(labels):
+            told = {joint: c for k, c in columns.items() if (joint := labels[k]) in joints}
+            yield Found({j: told[j] for j in joints if j in told}, None, False, (), means)
+            continue
         matrix = rest[-1:] == ("[]",)
         if matrix and (signal := _bases(table).get(columns[0].removesuffix("[0]"))):
             means = Meaning(signal, -1, "")
@@ -122,6 +127,25 @@ def _counted(table: Table, joints: list[str]) -> Iterable[Found]:
             continue
         ordered = [columns[k] for k in numbers]
         yield Found(dict(zip(joints, ordered)), None, True, tuple(ordered[len(joints) :]), means)
+
+
+def _labels(table: Table) -> dict[int, str]:
+    """The joint of each number where the first row of a CSV file names it: `rostopic echo -p`
+    writes field.name0, ..., field.position0, ..."""
+    named = {
+        int(w[-1]): n
+        for n in table.names
+        if (w := words(n))[-2:-1] == ("name",) and w[-1].isdigit()
+    }
+    if not named or table.path.suffix.lower() != ".csv":
+        return {}
+    import polars as pl
+
+    try:
+        frame = pl.read_csv(table.path, n_rows=1, infer_schema=False, columns=list(named.values()))
+    except pl.exceptions.PolarsError:
+        return {}
+    return {k: str(frame[name].first()) for k, name in named.items() if frame.height}
 
 
 def _single(table: Table) -> list[str]:
