@@ -1,11 +1,13 @@
-"""Are formulas' inner values found? Formulas with drawn terms and drawn true values, against 200 random starts each.
+"""Are formulas' inner values found? Formulas with drawn terms and drawn true values, against 200
+random starts each.
 
     python scripts/formula_study.py --formulas 50 --seed 1 --starts 200 --out formula_study.json
 
-Each formula is one term or two, on one joint of a planar arm that moves on a Fourier series; the experiment gives neither
-`start` nor `within`. The fit's objective is held against the best of random starts: values drawn evenly over the same
-ranges (half of them by ratios where a range leaves zero out), each refined by SciPy's bounded least squares on the
-residual that the linear parameters leave, and the best of these solved as a fit solves them.
+Each formula is one term or two, on one joint of a planar arm that moves on a Fourier series; the
+experiment gives neither `start` nor `within`. The fit's objective is held against the best of
+random starts: values drawn evenly over the same ranges (half of them by ratios where a range leaves
+zero out), each refined by SciPy's bounded least squares on the residual that the linear parameters
+leave, and the best of these solved as a fit solves them.
 """
 
 from __future__ import annotations
@@ -33,9 +35,11 @@ URDF = """<robot name="arm">
     <inertia ixx="0.02" ixy="0" ixz="0" iyy="0.021" iyz="0" izz="0.003"/></inertial></link>
   <link name="lower"><inertial><origin xyz="0 0 -0.15"/><mass value="0.8"/>
     <inertia ixx="0.007" ixy="0" ixz="0" iyy="0.0072" iyz="0" izz="0.001"/></inertial></link>
-  <joint name="shoulder" type="revolute"><parent link="base"/><child link="upper"/><origin xyz="0 0 1"/><axis xyz="0 1 0"/>
+  <joint name="shoulder" type="revolute">
+    <parent link="base"/><child link="upper"/><origin xyz="0 0 1"/><axis xyz="0 1 0"/>
     <limit lower="-9" upper="9" effort="90" velocity="90"/></joint>
-  <joint name="elbow" type="revolute"><parent link="upper"/><child link="lower"/><origin xyz="0 0 -0.4"/><axis xyz="0 1 0"/>
+  <joint name="elbow" type="revolute">
+    <parent link="upper"/><child link="lower"/><origin xyz="0 0 -0.4"/><axis xyz="0 1 0"/>
     <limit lower="-9" upper="9" effort="90" velocity="90"/></joint>
 </robot>
 """
@@ -43,8 +47,9 @@ JOINTS = ("shoulder", "elbow")
 NOISE, RATE, SECONDS = 0.02, 200.0, 8.0
 COLUMNS = {"time": "t", "velocity": "qd_{joint}", "acceleration": "qdd_{joint}"}
 
-# A term, with what each inner value is drawn as: a place on the angle or the speed, a share of their span or size, a
-# count of cycles, a phase, a power, a sign. `#` numbers the names of a second term.
+# A term, with what each inner value is drawn as: a place on the angle or the speed, a share of
+# their span or size, a count of cycles, a phase, a power, a sign. `#` numbers the names of a second
+# term.
 TERMS = {
     "h#*exp(-((q-c#)/w#)**2)": {"c": "place q", "w": "width q"},
     "h#*exp(-((qd-c#)/w#)**2)": {"c": "place qd", "w": "width qd"},
@@ -75,18 +80,26 @@ TERMS = {
 
 def drawn(rng: np.random.Generator, kind: str, signals: dict) -> float:
     """A true value."""
-    *_, kind_, which = ["", *kind.split()] if " " in kind else ["", kind, "q"]
-    x = signals[which]
+    words = kind.split()
+    x = signals[words[-1] if len(words) > 1 else "q"]
     low, high = float(x.min()), float(x.max())
     span, size = high - low, max(abs(low), abs(high))
-    share = float(np.exp(rng.uniform(np.log(0.05), np.log(0.6))))
     sign = float(rng.choice([-1.0, 1.0]))
-    return {
-        "place": lambda: rng.uniform(low, high), "width": lambda: share * (sign if kind.startswith("signed") else 1.0) * span,
-        "rate": lambda: sign * rng.uniform(0.5, 4.0) / size, "steep": lambda: rng.uniform(1.0, 20.0) / size, "shift": lambda: rng.uniform(-3, 3),
-        "cycles": lambda: 2.0 * np.pi * rng.uniform(1.5, 12.0) / span, "phase": lambda: rng.uniform(-np.pi, np.pi), "power": lambda: rng.uniform(0.3, 3.0),
-        "low": lambda: rng.uniform(0.1, 0.8) * low, "high": lambda: rng.uniform(0.1, 0.8) * high,
-    }[kind_]()  # fmt: skip
+    width = float(np.exp(rng.uniform(np.log(0.05), np.log(0.6)))) * span
+    drawers = {
+        "place": lambda: rng.uniform(low, high),
+        "width": lambda: width,
+        "signed": lambda: sign * width,
+        "rate": lambda: sign * rng.uniform(0.5, 4.0) / size,
+        "steep": lambda: rng.uniform(1.0, 20.0) / size,
+        "shift": lambda: rng.uniform(-3.0, 3.0),
+        "cycles": lambda: 2.0 * np.pi * rng.uniform(1.5, 12.0) / span,
+        "phase": lambda: rng.uniform(-np.pi, np.pi),
+        "power": lambda: rng.uniform(0.3, 3.0),
+        "low": lambda: rng.uniform(0.1, 0.8) * low,
+        "high": lambda: rng.uniform(0.1, 0.8) * high,
+    }
+    return drawers[words[0]]()
 
 
 def formula(rng: np.random.Generator, signals: dict) -> tuple[str, dict[str, float]]:
@@ -95,7 +108,10 @@ def formula(rng: np.random.Generator, signals: dict) -> tuple[str, dict[str, flo
     for k, term in enumerate(rng.choice(list(TERMS), size=int(rng.integers(1, 3)), replace=False)):
         letter = "ab"[k]
         parts.append(term.replace("#", letter))
-        values |= {f"{name}{letter}": float(drawn(rng, kind, signals)) for name, kind in TERMS[term].items()}
+        values |= {
+            f"{name}{letter}": float(drawn(rng, kind, signals))
+            for name, kind in TERMS[term].items()
+        }
     return " + ".join(parts), values
 
 
@@ -117,17 +133,39 @@ def written(folder: Path, text: str, values: dict, motions: dict, rng, size: flo
     (folder / "robot.urdf").write_text(URDF)
     machine = robot.load(specs.RobotSpec(urdf=str(folder / "robot.urdf")))
     for name, (t, q, qd, qdd) in motions.items():
-        tau = regressor.torque(machine, 1.2 * machine.prior, q, qd, qdd) + 0.3 * qd + 0.2 * np.sign(qd)
+        tau = (
+            regressor.torque(machine, 1.2 * machine.prior, q, qd, qdd)
+            + 0.3 * qd
+            + 0.2 * np.sign(qd)
+        )
         zero = np.zeros(2)
-        piece = Piece(0, 1 / RATE, t, q, qd, qdd, tau, tau, {}, None, None, slice(0, len(t)), zero, zero)
+        piece = Piece(
+            0, 1 / RATE, t, q, qd, qdd, tau, tau, {}, None, None, slice(0, len(t)), zero, zero
+        )
         columns = Formula(text).columns(piece, 0, **values)
         tau[:, 0] += sum(size * c / max(np.sqrt(np.mean(c**2)), 1e-9) for c in columns)
         tau += NOISE * rng.normal(size=tau.shape)
-        named = {"t": t, **{f"{word}_{j}": x[:, k] for word, x in (("q", q), ("qd", qd), ("qdd", qdd), ("tau", tau)) for k, j in enumerate(JOINTS)}}
-        np.savetxt(folder / f"{name}.csv", np.column_stack(list(named.values())), delimiter=",", header=",".join(named), comments="", fmt="%.17g")
+        named = {
+            "t": t,
+            **{
+                f"{word}_{j}": x[:, k]
+                for word, x in (("q", q), ("qd", qd), ("qdd", qdd), ("tau", tau))
+                for k, j in enumerate(JOINTS)
+            },
+        }
+        np.savetxt(
+            folder / f"{name}.csv",
+            np.column_stack(list(named.values())),
+            delimiter=",",
+            header=",".join(named),
+            comments="",
+            fmt="%.17g",
+        )
     config = {
-        "data": {"columns": COLUMNS}, "preprocess": {"filter": "none", "events": "keep", "standstill": "keep"},
-        "model": {"effects": ["viscous", "coulomb", {"formula": text, "joints": ["shoulder"]}]}, "prior": {"weight": 1e-2},
+        "data": {"columns": COLUMNS},
+        "preprocess": {"filter": "none", "events": "keep", "standstill": "keep"},
+        "model": {"effects": ["viscous", "coulomb", {"formula": text, "joints": ["shoulder"]}]},
+        "prior": {"weight": 1e-2},
     }  # fmt: skip
     with (folder / "config.yaml").open("w") as stream:
         YAML().dump(config, stream)
@@ -141,7 +179,18 @@ def case(rng: np.random.Generator, folder: Path) -> tuple[Path, str, dict]:
         t, q, qd, _ = motions["train"]
         text, values = formula(rng, {"q": q[:, 0], "qd": qd[:, 0], "t": t})
         try:
-            return written(folder, text, values, motions, rng, float(np.exp(rng.uniform(np.log(0.1), np.log(2.0))))), text, values
+            return (
+                written(
+                    folder,
+                    text,
+                    values,
+                    motions,
+                    rng,
+                    float(np.exp(rng.uniform(np.log(0.1), np.log(2.0)))),
+                ),
+                text,
+                values,
+            )
         except NotFinite:
             continue
 
@@ -154,11 +203,15 @@ def random_starts(found, rng: np.random.Generator, starts: int) -> tuple[float, 
     low, high = (np.array([getattr(v, end) for v in values]) for end in ("low", "high"))
     effect, joint = model.terms[values[0].term][0], values[0].joint
     stacked = rows.stack(model, motion, 1)
-    own = [10 * model.bodies + k for k, c in enumerate(model.coefficients) if c.effect == effect.name]
+    own = [
+        10 * model.bodies + k for k, c in enumerate(model.coefficients) if c.effect == effect.name
+    ]
     rest = np.setdiff1d(np.arange(model.size), own)
     # the prior about the fit's bodies as rows of its own
     hessian = np.zeros((model.size, model.size))
-    objective = pose(experiment, model, compress(model, motion), moving_coefficients(model, motion), prior).objective
+    objective = pose(
+        experiment, model, compress(model, motion), moving_coefficients(model, motion), prior
+    ).objective
     for b, block in enumerate(objective.prior_hessian(found.x)):
         hessian[10 * b : 10 * b + 10, 10 * b : 10 * b + 10] = block
     sizes, axes = np.linalg.eigh(0.5 * hessian[np.ix_(rest, rest)])
@@ -175,7 +228,9 @@ def random_starts(found, rng: np.random.Generator, starts: int) -> tuple[float, 
 
     def residual(at):
         try:
-            made = effect.columns(piece, joint, **{v.shape.name: float(x) for v, x in zip(values, at)}).T
+            made = effect.columns(
+                piece, joint, **{v.shape.name: float(x) for v, x in zip(values, at)}
+            ).T
         except NotFinite:
             return 1e3 * left
         norm = np.linalg.norm(made, axis=0)
@@ -191,15 +246,31 @@ def random_starts(found, rng: np.random.Generator, starts: int) -> tuple[float, 
     for k in range(starts):
         u = rng.uniform(size=len(values))
         by_ratio = (low > 0) & (k % 2 == 1)
-        at = np.where(by_ratio, np.exp(np.log(np.maximum(low, 1e-300)) * (1 - u) + np.log(np.maximum(high, 1e-300)) * u), low + u * (high - low))
-        got = least_squares(residual, at, bounds=(low, high), x_scale=np.maximum(np.abs(at), 1e-3 * (high - low)), max_nfev=100)
+        at = np.where(
+            by_ratio,
+            np.exp(
+                np.log(np.maximum(low, 1e-300)) * (1 - u) + np.log(np.maximum(high, 1e-300)) * u
+            ),
+            low + u * (high - low),
+        )
+        got = least_squares(
+            residual,
+            at,
+            bounds=(low, high),
+            x_scale=np.maximum(np.abs(at), 1e-3 * (high - low)),
+            max_nfev=100,
+        )
         ended.append((2.0 * got.cost, got.x))
     ended.sort(key=lambda pair: pair[0])
     best = (np.inf, [])
     for _, at in ended[:3]:
         own_values = iter(at)
-        tried = model.with_shapes([s if v.held else next(own_values) for v, s in zip(model.shape_values, model.shapes)])
-        problem = pose(experiment, tried, compress(tried, motion), moving_coefficients(tried, motion), prior)
+        tried = model.with_shapes(
+            [s if v.held else next(own_values) for v, s in zip(model.shape_values, model.shapes)]
+        )
+        problem = pose(
+            experiment, tried, compress(tried, motion), moving_coefficients(tried, motion), prior
+        )
         best = min(best, (problem.solve(experiment).objective, at.tolist()))
     return best
 
@@ -207,7 +278,11 @@ def random_starts(found, rng: np.random.Generator, starts: int) -> tuple[float, 
 def found_motion(found):
     """The training motion of a fit, read again."""
     machine = found.model.robot
-    return pipeline.prepare(pipeline.read(found.experiment, machine, found.experiment.data.train), found.experiment.preprocess, machine.joints)
+    return pipeline.prepare(
+        pipeline.read(found.experiment, machine, found.experiment.data.train),
+        found.experiment.preprocess,
+        machine.joints,
+    )
 
 
 @single_threaded
@@ -232,11 +307,12 @@ def main() -> None:
         names = [v.shape.name for v in found.model.shape_values]
         excess = found.objective / best - 1.0
         told.append({
-            "formula": text, "truth": values, "found": dict(zip(names, found.model.shapes)), "random": dict(zip(names, at)),
-            "objective": found.objective, "best_of_random": best, "excess": excess, "seconds": seconds,
-            "proven": found.certificate.globally_optimal,
+            "formula": text, "truth": values, "found": dict(zip(names, found.model.shapes)),
+            "random": dict(zip(names, at)), "objective": found.objective, "best_of_random": best,
+            "excess": excess, "seconds": seconds, "proven": found.certificate.globally_optimal,
         })  # fmt: skip
-        print(f"{number:3d} {'ok  ' if excess < 1e-6 else 'ABOVE'} {excess:+.1e} {seconds:5.1f} s  {text}", flush=True)
+        mark = "ok  " if excess < 1e-6 else "ABOVE"
+        print(f"{number:3d} {mark} {excess:+.1e} {seconds:5.1f} s  {text}", flush=True)
     good = sum(one["excess"] < 1e-6 for one in told)
     print(f"{good} of {len(told)} within 1e-6 of the best of {given.starts} random starts")
     if given.out:
