@@ -142,7 +142,8 @@ def minimise(objective: Objective, positive: np.ndarray, held: np.ndarray, start
                 best = small
         # predictor: straight for the final targets; how far it gets sets how far the corrector aims
         straight = _change(solve, slope, scaled, _aim(scaled, bound, floor_j, floor_c, None), fixed, bound)
-        mu = (np.sum(scaled.weights**2) + squares_c.sum()) / size
+        # what is left to go: bodies end at the prior's weight, which, where it is strong, is no measure for the coefficients
+        mu = (np.sum(np.maximum(scaled.weights**2 - barrier, 0.0)) + squares_c.sum()) / size
         level = (1.0 - min(1.0, _reach(straight, scaled, bound))) ** 3 * mu
         levels = max(level, floor_j), max(level, floor_c)
         change = _change(solve, slope, scaled, _aim(scaled, bound, *levels, straight), fixed, bound)
