@@ -123,7 +123,7 @@ def strongest(apart: HeldApart) -> PriorWeight:
         _try(apart, found, step(_least(found, rows)))
     _try(apart, found, _above(_within(found, rows)))
     value, least = _within(found, rows), _weakest(apart, found)
-    if bounded := value < least:
+    if bounded := bool(value < least):
         value = float(f"1e{int(np.floor(np.log10(least)))}")
         while value < least:
             value = _above(value)

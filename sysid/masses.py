@@ -87,10 +87,16 @@ def document(found: Masses | None) -> dict:
 
 
 def far(robot: Robot, pi) -> list[int]:
-    """Numbers of the links of pi (bodies, 10) whose mass is not plausible."""
+    """Numbers of the links of pi (bodies, 10) whose mass is not plausible; a link of which the URDF
+    states no mass has none that it could be far from."""
     times = np.abs(np.log(np.maximum(pi[:, 0], 1e-300) / robot.prior[:, 0]))
     links = [b for b, body in enumerate(robot.bodies) if body.kind == "link"]
-    return [b for b in links if times[b] > np.log(PLAUSIBLE)]
+    return [b for b in links if times[b] > np.log(PLAUSIBLE) and _stated(robot, b)]
+
+
+def _stated(robot: Robot, b: int) -> bool:
+    link = robot.source.links.get(robot.bodies[b].name)
+    return link is None or (link.inertial is not None and link.inertial[0] > 0.0)
 
 
 def implausible(found: Fit, motion: Motion | None) -> Masses | None:

@@ -8,11 +8,12 @@ import pytest
 
 from sysid import masses, pipeline, regressor
 from sysid.check import check
+from sysid.errors import SysidWarning
 from sysid.estimate import identify
 from sysid.held_apart import chosen
 from sysid.model import build, moving_coefficients
 from sysid.prior_weight import with_weight
-from tests.conftest import JOINTS, motion
+from tests.conftest import JOINTS, URDF, motion
 from tests.problems import arm, fourier_motion
 from tests.test_prior_weight import auto, compressed
 
@@ -93,6 +94,16 @@ def test_a_weak_prior_is_told_to_choose():
         and found.weight > 1e3
         and "`prior.weight: auto`" in found.says
     )
+
+
+def test_a_link_without_a_stated_mass_is_far_from_none(experiment):
+    """Its prior is a guess; the other's mass is what the URDF says."""
+    parts = URDF.partition('<link name="lower">')
+    bare = parts[0] + parts[1] + parts[2].partition("</inertial>")[2]
+    folder = experiment(urdf=bare)
+    with pytest.warns(SysidWarning, match="'lower' states no inertia"):
+        machine, *_ = pipeline.build(pipeline.load(folder))
+    assert masses.far(machine, 10.0 * machine.prior) == [0]
 
 
 def geared(seed: int):

@@ -174,6 +174,20 @@ def test_what_the_motion_does_not_excite_stays_at_its_prior():
     assert away(fitted(case, 1e-2)) > 0.3 and away(fitted(case)) < 0.02
 
 
+@pytest.mark.parametrize("weight", [1e-2, 1.0, 1e3, 1e6])
+def test_a_strong_prior_beside_friction_that_is_nought_is_solved(weight):
+    """A UR5 without friction: half of the coefficients go to zero while the prior holds the bodies
+    however firmly; the optimum is found and proven."""
+    experiment, structure, *_, prior = arm()
+    t, q, qd, qdd = fourier_motion(np.random.default_rng(3), 10.0, 200.0, 6)
+    pi = LogCholesky(prior).parameters(np.random.default_rng(8).normal(scale=0.2, size=(6, 10)))
+    tau = regressor.torque(structure.robot, pi, q, qd, qdd)
+    tau += 0.3 * np.random.default_rng(1).normal(size=q.shape)
+    fit = fitted(compressed(experiment, structure, t, q, tau), weight)
+    assert fit.solution.converged and fit.certificate.globally_optimal
+    assert len(fit.certificate.at_zero) >= 3 and fit.solution.iterations < 40
+
+
 def test_where_nothing_can_be_held_apart_the_paper_s_weight_stands():
     experiment, model, motion, data, prior = arm()
     short = data.without(range(2, data.blocks))
