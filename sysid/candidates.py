@@ -285,6 +285,6 @@ def _sensed(source, candidate: Candidate, shapes: dict[str, float]) -> np.ndarra
                 for h in (0.0, step)
             ]
             slope = (read[1] - read[0])[0] / step
-            own.append(slope[kept] if piece.smoother is None else piece.smoother.at(slope, kept))
+            own.append(piece.settled(slope, kept, candidate.joint))
         out.append(np.stack(own, axis=1))
     return np.concatenate(out) * source.use[:, [candidate.joint]]

@@ -207,6 +207,12 @@ def _edges(motion: Motion) -> list[np.ndarray]:
     return [p.core.start + np.arange(n + 1) * p.samples // n for p, n in zip(pieces, counts)]
 
 
+def _kept(start: int, stop: int, origin: int, every: int) -> tuple[slice, slice]:
+    """Of the rows from start up to stop every so many, counted from origin: which of the piece, and which of those kept."""
+    first, last = (-(-(row - origin) // every) for row in (start, stop))
+    return slice(origin + first * every, stop, every), slice(first, last)
+
+
 def compress(model: Model | Linearised, motion: Motion, *, thin: int = 1, progress: Callable[[float], None] | None = None) -> Compressed:
     """Reduce a motion under a model to triangles.
 
@@ -224,17 +230,22 @@ def compress(model: Model | Linearised, motion: Motion, *, thin: int = 1, progre
         remembered = model.remembered(piece)
         for first in range(0, len(edges) - 1, many):
             within = edges[first : first + many + 1].tolist()
-            # rows that are not wanted need no columns, unless a filter runs over them
-            wanted = slice(within[0], within[-1], 1 if filtered else thin)
+            # rows that are not wanted need no columns, unless a filter runs over them; of those that a low-pass
+            # makes alike, one stands for `every`
+            every = piece.smoother.every if filtered and thin == 1 else 1
+            wanted = slice(within[0], within[-1], every if filtered else thin)
             columns = model.columns(piece, wanted, remembered)
             for start, stop in zip(within, within[1:]):
-                own = slice(start, stop, thin)
-                part = slice(start - within[0], stop - within[0], thin) if filtered else slice(None)
+                if every > 1:
+                    own, part = _kept(start, stop, within[0], every)
+                else:
+                    own = slice(start, stop, thin)
+                    part = slice(start - within[0], stop - within[0], thin) if filtered else slice(None)
                 for joint, (values, support) in enumerate(zip(columns, supports)):
                     stacked = np.concatenate([values[:, part], piece.tau[None, own, joint]])
                     if piece.use is not None:
                         stacked = stacked[:, piece.use[own, joint]]
-                    factors.append(Factor(joint, block, support, triangle(stacked.T), stacked.shape[1]))
+                    factors.append(Factor(joint, block, support, np.sqrt(every) * triangle(stacked.T), every * stacked.shape[1]))
                 block += 1
             done += within[-1] - within[0]
             if progress:

@@ -18,6 +18,7 @@ from .effects.viscous import Viscous
 from .errors import ConfigError
 from .inertia import DIVERGENCES
 from .model import Model
+from .robot import Robot
 from .specs import Experiment, FreeFactor
 
 _SCALES = 7.0  # of the logarithm of a scale: three decades either way
@@ -226,6 +227,19 @@ def factors(experiment: Experiment, model: Model) -> dict[str, float]:
         joint: motor_side.started(factor) / (1.0 + shapes.get(f"{FreeGain.name}.{joint}.e", 0.0) * isinstance(factor, FreeFactor))
         for joint, factor in leading_factors(experiment).items()
     }  # fmt: skip
+
+
+def slowest(experiment: Experiment, robot: Robot, prior, q) -> float:
+    """The lowest frequency [Hz] at which a joint swings on its servo, with the bodies at rest (bodies, 10), over angles q (n, dof);
+    infinite where no joint has a servo."""
+    import pinocchio as pin
+
+    own = {robot.joints.index(j): motor_side.drive(spec).start for j, spec in experiment.actuator.items() if spec.command is not None}
+    tree, G = robot.with_inertias(prior), np.asarray(robot.transmission)
+    data = tree.createData()
+    inertia = np.mean([np.diagonal(G.T @ pin.crba(tree, data, G @ at) @ G) for at in q], axis=0)
+    swings = [np.sqrt(abs(kp) / inertia[j]) / (2.0 * np.pi) for j, kp in own.items() if inertia[j] > 0.0]
+    return min(swings, default=np.inf)
 
 
 def scale_is_told(experiment: Experiment, joints: tuple[str, ...]) -> bool:

@@ -247,7 +247,12 @@ class MotionEffect(Effect):
 
 
 class SensorEffect(Effect):
-    """A linear operator on the predicted torque of a joint. It has shape values alone, each with a `start`."""
+    """A linear operator on the predicted torque of a joint. It has shape values alone, each with a `start`.
+
+    constant_gain: it multiplies torque by one number, and may do so behind any filter.
+    """
+
+    constant_gain: ClassVar[bool] = False
 
     @abstractmethod
     def sensed(self, torque: np.ndarray, step: float, **shapes: float) -> np.ndarray:

@@ -14,10 +14,12 @@ import numpy as np
 from . import interior
 from .blocks import within_one_error
 from .compress import Compressed, compress
+from .drives import slowest
 from .errors import SysidError, SysidWarning
 from .estimate import pose
 from .events import usable
 from .log import Log
+from .lowpass import band
 from .model import Model, moving_coefficients
 from .multistart import finite
 from .preprocess import prepare
@@ -27,6 +29,9 @@ from .specs import Experiment, PreprocessSpec
 _WINDOWS = (0.02, 0.03, 0.05, 0.07, 0.1, 0.15, 0.2, 0.3, 0.4, 0.6, 0.8)  # s
 _CUTOFFS = (1.0, 1.5, 2.0, 3.0, 5.0, 7.0, 10.0, 15.0, 20.0, 30.0, 50.0, 100.0)  # Hz
 _FOLDS = 4
+# Windows of an angle, a cycle of the low-pass on both sides. A polynomial of order 4 is -3 dB at 1.56 / window: friction's jump is smeared
+# over a short time only, and the noise that comes through stays behind the low-pass.
+_ANGLES, _POSES = 12.0, 50
 # Enough to rank filters; a long log need not be read whole for it.
 _MOST_SAMPLES, _ROWS = 30_000, 5_000
 
@@ -40,6 +45,8 @@ def compare(experiment: Experiment, model: Model, logs: Sequence[Log], prior) ->
         double the value where it was given, the whole grid where it was `auto`.
     """
     spec = experiment.preprocess
+    if lowpassed(experiment):
+        return _of_the_motion(experiment, model, logs, prior)
     said = {"filter": spec.filter, "torque": spec.torque, "standstill": spec.standstill}
     if spec.filter == "none":
         return {**said, "chosen": "given", "held_out": []}
@@ -65,6 +72,32 @@ def compare(experiment: Experiment, model: Model, logs: Sequence[Log], prior) ->
             warnings.warn(SysidWarning(f"preprocess.{key}: auto chose {value:g}, the end of what was tried; give a number to go further"), stacklevel=2)
     shown = [{name: entry[name] for name in (key, "relative_error", "rms")} for entry in tried]
     return {**said, "order": spec.order, key: value, "chosen": "held-out error" if automatic else "given", "held_out": shown}
+
+
+def lowpassed(experiment: Experiment) -> bool:
+    """Whether both sides of an experiment go under a low-pass: where it says so, and where a joint's torque is made of its own angle, a
+    servo's, and it says nothing of filters."""
+    spec = experiment.preprocess
+    servo = any(actuator.command is not None for actuator in experiment.actuator.values())
+    return spec.filter != "none" and (spec.torque == "low-pass" or (servo and not spec.model_fields_set & {"filter", "window", "cutoff", "torque"}))
+
+
+def _of_the_motion(experiment: Experiment, model: Model, logs: Sequence[Log], prior) -> dict:
+    """The filters that a motion asks for: both sides as far as its joints' speeds go, or an octave beyond where its slowest servo swings,
+    as from there on noise of the angles, which inertia makes torque of, grows with the square of frequency; the angles far beyond.
+    """
+    spec, segments = experiment.preprocess, [segment for log in logs for segment in log.segments]
+    own = {key for key in ("window", "cutoff") if key in spec.model_fields_set and getattr(spec, key) != "auto"}
+    cutoff, step = spec.cutoff, max(segment.step for segment in segments)
+    if "cutoff" not in own:
+        longest = max(segments, key=lambda s: len(s.t))
+        q = longest.q[:: -(-len(longest.q) // _POSES)]
+        cutoff = max(min(band(logs), 2.0 * slowest(experiment, model.robot, prior, q)), 1.0 / (longest.step * len(longest.t)))
+    window = spec.window if "window" in own else max(1.0 / (_ANGLES * cutoff), 2.0 * (spec.order // 2) * step)
+    return {
+        "filter": spec.filter, "torque": "low-pass", "standstill": spec.standstill, "order": spec.order, "window": window, "cutoff": cutoff,
+        "chosen": "given" if own == {"window", "cutoff"} else "the motion's band", "held_out": [],
+    }  # fmt: skip
 
 
 def _widest_edge(spec: PreprocessSpec, key: str, candidates, logs) -> float:
@@ -97,7 +130,7 @@ def _best(tried: list[dict], key: str, usual: float) -> float:
 
 def settled(spec: PreprocessSpec, chosen: dict) -> PreprocessSpec:
     """The preprocessing with `auto` replaced by what was chosen."""
-    return spec.model_copy(update={key: chosen[key] for key in ("window", "cutoff") if key in chosen})
+    return spec.model_copy(update={key: chosen[key] for key in ("window", "cutoff", "torque") if key in chosen})
 
 
 def _middle(log: Log) -> Log:

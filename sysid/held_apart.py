@@ -19,7 +19,7 @@ import numpy as np
 
 from .blocks import standard_error, within_one_error
 from .compress import Compressed
-from .estimate import Problem, noise_weights, pose
+from .estimate import Problem, known_bodies, noise_weights, pose
 from .interior import minimise
 from .model import Model
 from .prior_weight import USUAL, PriorWeight, is_auto, weakest, with_weight
@@ -89,7 +89,7 @@ def chosen(experiment: Experiment, model: Model, data: Compressed, moving, prior
     """
     if not is_auto(experiment):
         return PriorWeight(experiment.prior.weight)
-    if data.blocks < FEWEST:
+    if data.blocks < FEWEST or len(known_bodies(experiment, model)) == model.bodies:
         return PriorWeight(USUAL, auto=True)
     found = strongest(held_apart(experiment, model, data, moving, prior))
     if experiment.solver.weighting != "noise":

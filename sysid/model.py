@@ -309,7 +309,7 @@ class Model:
         if remembered is None:
             remembered = self.remembered(piece)
         part = self._seen(piece, wide, remembered)
-        rigid = self._bodies_of(piece, rows, part, inner, keep)
+        rigid = self._bodies_of(piece, rows, part, wide, inner, keep)
         by_joint: list[list[np.ndarray]] = [[] for _ in self.robot.joints]
         for term, (effect, joints) in enumerate(self.terms):
             for joint in joints:
@@ -322,26 +322,27 @@ class Model:
                         own.append(values)
         out = []
         for joint, effects in enumerate(by_joint):
-            own = [self._settled(piece, inner, self.sensed(np.concatenate(effects), piece.step, joint))] if effects else []
+            own = [piece.settled(self.sensed(np.concatenate(effects), piece.step, joint), inner, joint, wide.start)] if effects else []
             out.append(np.concatenate([rigid[joint], *own]))
         return out
 
-    def _bodies_of(self, piece: Piece, rows: slice, part: Piece, inner: slice, keep: bool) -> list[np.ndarray]:
+    def _bodies_of(self, piece: Piece, rows: slice, part: Piece, wide: slice, inner: slice, keep: bool) -> list[np.ndarray]:
         """The bodies' columns (support, n) in each joint's torque at rows of a piece, seen as `part`, filtered."""
         # with what they were made of, so that nothing else comes to its place
         key = (id(piece.q), id(piece.smoother), rows.start, rows.stop, rows.step)
-        moved = any(isinstance(effect, (MotionEffect, SensorEffect)) for effect, _ in self.terms)
+        moved = any(isinstance(effect, MotionEffect) or (isinstance(effect, SensorEffect) and not effect.constant_gain) for effect, _ in self.terms)
+        gained = lambda out: [self.sensed(own, piece.step, joint) for joint, own in enumerate(out)]  # noqa: E731
         if not moved and key in self._rigid:
-            return self._rigid[key][2]
+            return gained(self._rigid[key][2])
         inertial = regressor.columns(self.robot, part.q, part.qd, part.qdd, gravity=part.gravity, deflection=part.deflection)
         out = []
         for joint in range(self.robot.dof):
             bodies = self.support(joint)
             own = inertial[joint, bodies[bodies < inertial.shape[1]]]
-            out.append(self._settled(piece, inner, self.sensed(own, piece.step, joint)))
+            out.append(piece.settled(self.sensed(own, piece.step, joint) if moved else own, inner, joint, wide.start))
         if keep and not moved:
             self._rigid[key] = (piece.q, piece.smoother, out)
-        return out
+        return out if moved else gained(out)
 
     def torque(self, piece: Piece, pi, c, stride: int = 1) -> np.ndarray:
         """Predicted torque (samples, dof) over a piece's core, of bodies pi (bodies, 10) and coefficients c.
@@ -369,7 +370,7 @@ class Model:
                     k += size
             for joint in range(self.robot.dof):
                 predicted[joint] = self.sensed(predicted[None, joint], piece.step, joint)[0]
-            settled = self._settled(piece, inner, predicted).T
+            settled = np.stack([piece.settled(own, inner, joint, wide.start) for joint, own in enumerate(predicted)], axis=1)
             start = (rows.start - piece.core.start) // stride
             out[start : start + len(settled)] = settled
         return out
@@ -380,11 +381,6 @@ class Model:
             if isinstance(effect, SensorEffect) and joint in joints:
                 values = effect.sensed(values, step, **self.shapes_of(term, joint))
         return values
-
-    @staticmethod
-    def _settled(piece: Piece, inner: slice, values) -> np.ndarray:
-        """Columns computed on widened rows, filtered as torque was and cut back to the rows."""
-        return values[..., inner] if piece.smoother is None else piece.smoother.at(values, inner)
 
     def _widened(self, piece: Piece, rows: slice) -> tuple[slice, slice]:
         """Rows with the margin that filters and effects need for them to come out as over the whole piece, and where the

@@ -9,6 +9,8 @@ import numpy as np
 from .events import Event
 from .smoother import Smoother
 
+_NO_WEIGHT = 1e-9
+
 
 @dataclass(frozen=True)
 class Piece:
@@ -19,6 +21,8 @@ class Piece:
     after `core`, whose filtered values the filter needs but which are not used. `rest` (dof,) [rad/s or m/s] is the
     speed that rounding makes of a constant angle; `noise` (dof,) [rad or m] what the filter took off the angles, RMS, or an
     estimate of their noise from that. `sight` is the filter that the angles were seen through, where it matters: torque was not.
+
+    `weight` (n, dof) is what each row counts in the filter of both sides, None where all count alike: an average over what counts.
 
     What a model adds: `load` (n, dof) the torque that its bodies alone need; `gravity` (3,) or None for the robot's own;
     `deflection` (3, n, dof), how far each link is behind its motor in q, qd and qdd, or None.
@@ -43,11 +47,22 @@ class Piece:
     load: np.ndarray | None = None
     gravity: np.ndarray | None = None
     deflection: np.ndarray | None = None
+    weight: np.ndarray | None = None
 
     def direction(self, joint: int) -> np.ndarray:
         """sign(qd) (n,) of a joint, zero where the filter of a constant angle leaves nothing but rounding."""
         qd = self.qd[:, joint]
         return np.where(np.abs(qd) > self.rest[joint], np.sign(qd), 0.0)
+
+    def settled(self, values, rows: slice, joint: int, first: int = 0) -> np.ndarray:
+        """Values (..., n) that stand for a joint's torque on the rows from `first` on, at some of these, as both sides of the
+        equation see them."""
+        if self.smoother is None:
+            return values[..., rows]
+        if self.weight is None:
+            return self.smoother.at(values, rows)
+        own = self.weight[first : first + values.shape[-1], joint]
+        return self.smoother.at(values * own, rows) / np.maximum(self.smoother.at(own, rows), _NO_WEIGHT)
 
     def part(self, rows: slice) -> Piece:
         """The rows `rows`, without margins."""
@@ -55,7 +70,7 @@ class Piece:
             self, t=self.t[rows], q=self.q[rows], qd=self.qd[rows], qdd=self.qdd[rows], tau=self.tau[rows],
             measured=self.measured[rows], signals={name: values[rows] for name, values in self.signals.items()},
             use=None if self.use is None else self.use[rows], core=slice(0, len(self.t[rows])),
-            load=None if self.load is None else self.load[rows],
+            load=None if self.load is None else self.load[rows], weight=None if self.weight is None else self.weight[rows],
             deflection=None if self.deflection is None else self.deflection[:, rows],
         )  # fmt: skip
 

@@ -3,7 +3,8 @@
 Savitzky-Golay takes q, qd and qdd from one and the same fitted polynomial and leaves torque alone, as the paper
 does. A zero-phase Butterworth filters the angle once and takes central differences of it. With `torque: same`
 the filter that the angles saw also goes over torque and over every column that is not a smooth function of
-the filtered motion, so that both sides of the equation of motion see one filter.
+the filtered motion, so that both sides of the equation of motion see one filter. With `torque: low-pass` that is a low-pass of
+its own, at `cutoff`: the noise of derivatives grows with frequency, and beyond the motion's band there is nothing else.
 """
 
 import warnings
@@ -14,6 +15,7 @@ import numpy as np
 
 from .errors import ConfigError, LogError, SysidWarning
 from .events import Event, mended, usable
+from .gaussian import HIGHEST, Gaussian
 from .jumps import jumps
 from .log import Log
 from .motion import Motion, Piece
@@ -26,6 +28,8 @@ from .specs import PreprocessSpec
 _STANDSTILL_SHARE, _STANDSTILL_MOST = 0.05, 0.03
 # A joint never moves where its filtered angle travels less than its own noise would make it, or than this [rad or m].
 _NEVER_MOVES, _NOISE_TRAVEL = 1e-6, 6.0
+_MOST = 0.5  # of the weight that a low-pass has
+_KEPT_A_CYCLE = 8.0  # rows a cycle of a low-pass: what it lets through at half as many is 0.4 %
 _ROUNDING = 1e-9  # share of a joint's top speed that is none
 
 
@@ -54,6 +58,8 @@ def prepare(logs: Sequence[Log], spec: PreprocessSpec, joints: tuple[str, ...]) 
     elif spec.standstill != "keep":
         threshold = standstill_speed(pieces) if spec.standstill == "mask" else spec.standstill
         pieces = [without_standstill(piece, threshold, 0 if piece.smoother is None else piece.smoother.reach) for piece in pieces]
+    if spec.torque == "low-pass" and spec.filter != "none":
+        pieces = [under_lowpass(piece, spec) for piece in pieces]
     events = tuple(event for log in logs for event in log.events)
     return replace(assembled(joints, pieces, stuck, unused_of(logs)), events=events, disturbed=disturbed)
 
@@ -97,9 +103,19 @@ def _with_rows(pieces: Sequence[Piece], before: Sequence[Piece]) -> tuple[list[P
     return [replace(piece, use=piece.use | (stuck & own)) for piece, own in zip(pieces, had)], stuck
 
 
+def on_both_sides(spec: PreprocessSpec, step: float) -> Smoother | Gaussian | None:
+    """The filter that goes over torque and over what is predicted, None where torque is as logged."""
+    if spec.filter == "none" or spec.torque == "raw":
+        return None
+    if spec.torque == "same":
+        return Smoother(spec, step)
+    cutoff = min(spec.cutoff, HIGHEST / step)
+    return Gaussian(cutoff, step, every=max(1, int(1.0 / (_KEPT_A_CYCLE * cutoff * step))))
+
+
 def _needs(spec: PreprocessSpec, step: float) -> int:
-    smoother = Smoother(spec, step)
-    return (4 if spec.torque == "same" else 2) * smoother.reach + 1
+    sides = on_both_sides(spec, step)
+    return 2 * Smoother(spec, step).reach + (0 if sides is None else 2 * sides.reach) + 1
 
 
 def _piece(number: int, segment: Segment, spec: PreprocessSpec) -> Piece | None:
@@ -114,15 +130,15 @@ def _piece(number: int, segment: Segment, spec: PreprocessSpec) -> Piece | None:
         q, qd, qdd = smoother.differentiate(segment.q)
     edge = smoother.reach
     rows = slice(edge, len(segment.t) - edge)
-    both = spec.torque == "same" and spec.filter != "none"
-    tau = smoother(segment.tau) if both else segment.tau
+    sides = smoother if spec.torque == "same" and spec.filter != "none" else None  # a low-pass comes last
+    tau = segment.tau if sides is None else sides(segment.tau)
     n = rows.stop - rows.start
-    margin = edge if both else 0
+    margin = 0 if sides is None else sides.reach
     return Piece(
         log=number, step=segment.step, t=segment.t[rows], q=q[rows], qd=qd[rows], qdd=qdd[rows], tau=tau[rows],
         measured=segment.tau[rows], signals={name: values[rows] for name, values in segment.signals.items()}, use=None,
-        smoother=smoother if both else None, core=slice(margin, n - margin), rest=np.zeros(q.shape[1]),
-        noise=np.sqrt(np.mean((segment.q[rows] - q[rows]) ** 2, axis=0)), sight=None if both or spec.filter == "none" else smoother,
+        smoother=sides, core=slice(margin, n - margin), rest=np.zeros(q.shape[1]),
+        noise=np.sqrt(np.mean((segment.q[rows] - q[rows]) ** 2, axis=0)), sight=None if sides is not None or spec.filter == "none" else smoother,
     )  # fmt: skip
 
 
@@ -180,6 +196,32 @@ def clear_of_reversals(pieces, spec: PreprocessSpec) -> list[Piece]:
         bent = turns(piece.qd) | jumps(piece.measured, smoother.reach)
         out.append(without_standstill(piece, np.where(bent, np.inf, threshold), reach))
     return out
+
+
+def under_lowpass(piece: Piece, spec: PreprocessSpec) -> Piece:
+    """The piece with a low-pass on both sides. Rows that do not count are seen by no other: what the low-pass averages are the rows
+    that do, and its weight rises from nothing beside the others within the angles' own window, as an edge would let their noise in.
+    A row counts where most of what is seen about it does.
+
+    Source: weights that vanish at the ends, Shinbrot 1957 (modulating functions).
+    """
+    sides, n = on_both_sides(spec, piece.step), len(piece.t)
+    weight = None
+    if piece.use is not None and not piece.use.all():
+        weight = np.sin(0.5 * np.pi * np.minimum(_apart(piece.use) * piece.step / spec.window, 1.0)) ** 2
+    out = replace(piece, smoother=sides, weight=weight, core=slice(sides.reach, n - sides.reach), sight=None)
+    whole = slice(0, n)
+    tau = np.stack([out.settled(own, whole, j) for j, own in enumerate(piece.tau.T)], axis=1)
+    use = None if weight is None else sides(weight, axis=0) > _MOST
+    return replace(out, tau=tau, use=use)
+
+
+def _apart(use) -> np.ndarray:
+    """How many rows (n, dof) each is from one that does not count."""
+    number = np.arange(len(use), dtype=float)[:, None]
+    before = np.maximum.accumulate(np.where(use, -np.inf, number), axis=0)
+    after = np.minimum.accumulate(np.where(use, np.inf, number)[::-1], axis=0)[::-1]
+    return np.minimum(number - before, after - number)
 
 
 def turns(qd) -> np.ndarray:

@@ -186,7 +186,7 @@ def secants(model: Model, motion: Motion, known: list[Bent], effect, tried: list
     for piece, rows, one, own in zip(motion.pieces, starts(motion, stride), known, apart):
         far = np.stack(own)
         read = [model.sensed(np.einsum("on,ton->tn", one.slopes[:, j], far), piece.step, j) for j in range(model.robot.dof)]
-        out.append(np.stack([entry[..., rows] if piece.smoother is None else piece.smoother.at(entry, rows) for entry in read], axis=1))
+        out.append(np.stack([piece.settled(entry, rows, j) for j, entry in enumerate(read)], axis=1))
     return np.concatenate(out, axis=-1) * use.T
 
 
@@ -209,7 +209,7 @@ def signatures(model: Model, motion: Motion, pieces: list, effect, joint: int, t
         stacked = np.concatenate([v if v.ndim == 3 else v[None] for v in values], axis=1)
         joints = range(model.robot.dof) if joint < 0 else [joint]
         read = [model.sensed(entry, piece.step, j) for entry, j in zip(stacked, joints)]
-        out.append(np.stack([entry[..., rows] if piece.smoother is None else piece.smoother.at(entry, rows) for entry in read]))
+        out.append(np.stack([piece.settled(entry, rows, j) for j, entry in zip(joints, read)]))
     joined = np.moveaxis(np.concatenate(out, axis=-1), 1, 2)
     joined = joined * (use[:, [joint]] if joint >= 0 else use.T[:, :, None])
     k = joined.shape[2] // len(tried)

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from . import multistart
-from .effect import TorqueEffect
+from .effect import SensorEffect, TorqueEffect
 from .landscape import at_zero, landscape
 from .model import Model
 from .motion import Motion
@@ -81,8 +81,10 @@ class Search:
                 lower |= set(own) if further is not best else set()
                 best = further
             for k, value in enumerate(best.model.shape_values):
-                if value.held or (value.term, value.joint) in free:
-                    continue
+                effect = best.model.terms[value.term][0]
+                factor = isinstance(effect, SensorEffect) and effect.constant_gain
+                if value.held or factor or (value.term, value.joint) in free:
+                    continue  # over a factor the objective has one hollow
                 further, points[k] = self._along_value(best, k, value)
                 lower |= {k} if further is not best else set()
                 best = further

@@ -44,6 +44,8 @@ def _convolved(values, weights) -> np.ndarray:
 class Smoother:
     """A linear, zero-phase filter over samples, with the reach [samples] of its memory."""
 
+    every = 1  # of how many samples it leaves one worth keeping
+
     def __init__(self, spec: PreprocessSpec, step: float):
         self.kind, self.order, self.step = spec.filter, spec.order, step
         if self.kind == "savitzky-golay":

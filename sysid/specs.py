@@ -343,7 +343,7 @@ class PreprocessSpec(_Spec):
     order: Annotated[int, Field(ge=1, le=12)] = 4
     window: Annotated[Any, BeforeValidator(_auto_or_positive)] = 0.1
     cutoff: Annotated[Any, BeforeValidator(_auto_or_positive)] = 10.0
-    torque: Literal["raw", "same"] = "raw"
+    torque: Literal["raw", "same", "low-pass"] = "raw"
     standstill: Annotated[Any, BeforeValidator(_standstill)] = "auto"
     events: Literal["mask", "keep"] = "mask"
 

@@ -20,12 +20,10 @@ import numpy as np
 
 from .. import pipeline
 from ..candidates import candidates, own_effects
-from ..estimate import Fit, predict
+from ..estimate import Fit
 from ..failures import Failure, HeldOut, failures
-from ..filters import settled
 from ..lowpass import lowpassed
-from ..noise import NoiseFloor, filtered, floors_of, of_angles
-from ..preprocess import prepare
+from ..noise import NoiseFloor, floors_of_fit
 from ..shown import ShownDiagnosis
 from ..specs import Experiment
 from ..transfer import transfers
@@ -89,7 +87,9 @@ def diagnose(
         if (test := lowpassed(measured.test, fit.joints, view.cutoff)) is None:
             raise too_short()
         first, then = (HeldOut(one.settled, test) for one in (view, after))
-        found, weighed = _floors(experiment, last, after, (measured.train, measured.test))
+        x = after.settled.x + after.design.change[: after.model.size]
+        parts = measured.train, measured.test
+        found, weighed = floors_of_fit(experiment, last, after.model, x, parts)
         said = verdicts(fit, claims, after.unknown, found, refused, transfers(last), weighed)
         errors = last.rms("test").values()
         levels = np.array([e if f.rms is None else f.rms for f, e in zip(found, errors)])
@@ -98,20 +98,6 @@ def diagnose(
         events, notices = (*view.motion.events, *test.events), tuple(_notices(claims, refused))
         told = tuple(claims), tuple(said), tuple(could), tuple(where), events, view, first, then
         return Diagnosis(fit, dict(zip(fit.joints, found)), *told, tuple(refused), notices)
-
-
-def _floors(experiment: Experiment, fit: Fit, view: View, logs) -> tuple[list[NoiseFloor], dict]:
-    """Each joint's noise floor, as the fit sees its torque: of what the view's model leaves, in
-    whose parameters loud joints do not drown quiet ones; and {joint: the RMS of that}."""
-    spec = settled(experiment.preprocess, fit.filters)
-    motions = [prepare(part, spec, fit.joints) for part in logs]
-    x = view.settled.x + view.design.change[: view.model.size]
-    told = [predict(view.model, x, motion) for motion in motions]
-    pieces = [piece for motion in motions for piece in motion.pieces]
-    predicted = np.concatenate([one.predicted for one in told])
-    found = floors_of(pieces, predicted, angles=of_angles(logs, spec, fit))
-    left = np.max([one.errors()["rms"] for one in told], axis=0)
-    return filtered(found, pieces[0].smoother), dict(zip(fit.joints, left))
 
 
 def _notices(claims, refused) -> Iterator[str]:

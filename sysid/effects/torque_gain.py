@@ -13,6 +13,7 @@ class TorqueGain(SensorEffect):
     separate_by = "a payload of known mass"
     source = "Gautier & Briot 2014"
     mimics_mass = True
+    constant_gain = True
 
     e = Shape("1", -0.6, 1.5, start=0.0, says="share by which the signal is too large")
 

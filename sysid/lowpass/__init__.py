@@ -7,7 +7,6 @@ then torque and every predicted column go through one and the same zero-phase Ga
 whose memory is short and finite; rows where a joint stands still, where friction is whatever
 balances the rest, are left out for that joint, widened by what the filters see of them.
 
-    gaussian.py  the low-pass
     motion.py    logs under it, and the band that a motion asks for
     angles.py    the noise of the angles: how large it is, and drawn once more
     calm.py      the motion without it
@@ -15,7 +14,7 @@ balances the rest, are left out for that joint, widened by what the filters see 
 
 from .angles import again, angle_noise
 from .calm import KEPT, calm
-from .gaussian import Gaussian
+from ..gaussian import Gaussian
 from .motion import LEAST, band, lowpassed, narrowed, stride_of, widest
 
 __all__ = [

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from .gaussian import HIGHEST, Gaussian
+from ..gaussian import HIGHEST, Gaussian
 
 _WINDOW = 0.1  # s
 _BAND = 4.0  # the angles' own low-pass, as a multiple of the cutoff

@@ -22,7 +22,7 @@ from ..preprocess import (
 )
 from ..smoother import differences
 from .angles import noise_of
-from .gaussian import HIGHEST, Gaussian
+from ..gaussian import HIGHEST, Gaussian
 
 LEAST = 15.0  # Hz: where friction's laws and ripple still show, several times what an arm moves at
 _MOTION = 4.0  # and this many times the motion's own bandwidth, if that is more

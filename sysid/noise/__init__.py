@@ -9,11 +9,16 @@ without a perfect model.
     spectrum.py          noise from the spectrum of the rest, weighed over models of its colour
     floor.py             all of it, and whether the answer is sure enough to be given
     of_angles.py         what the noise of the angles makes of the torque, drawn once more
+    of_fit.py            the floors of a fit's joints
     of_pieces.py         the floors of a motion's pieces, and behind a fit's filter
 """
 
 from .floor import NoiseFloor, floor, floors
 from .of_angles import OfAngles, of_angles
+from .of_fit import floors_of_fit
 from .of_pieces import filtered, floors_of
 
-__all__ = ["NoiseFloor", "OfAngles", "filtered", "floor", "floors", "floors_of", "of_angles"]
+__all__ = [
+    "NoiseFloor", "OfAngles", "filtered", "floor", "floors", "floors_of", "floors_of_fit",
+    "of_angles",
+]  # fmt: skip

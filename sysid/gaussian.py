@@ -12,15 +12,15 @@ HIGHEST = 0.3  # of the sampling rate: the last cutoff at which the kernel still
 
 class Gaussian:
     """A zero-phase low-pass with a Gaussian kernel: -3 dB at the cutoff, no ringing, a finite
-    memory of `reach` samples."""
+    memory of `reach` samples. `every`: of how many samples it leaves one worth keeping."""
 
     kind = "gaussian"
 
-    def __init__(self, cutoff: float, step: float):
+    def __init__(self, cutoff: float, step: float, every: int = 1):
         sigma = math.sqrt(math.log(2.0)) / (
             2.0 * math.pi * cutoff * step
         )  # samples: |H| = exp(-(2 pi f sigma)^2 / 2)
-        self.cutoff, self.step = cutoff, step
+        self.cutoff, self.step, self.every = cutoff, step, every
         self.reach = math.ceil(_WIDTH * sigma)
         weights = np.exp(-0.5 * (np.arange(-self.reach, self.reach + 1) / sigma) ** 2)
         self.weights = weights / weights.sum()

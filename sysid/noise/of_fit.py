@@ -1,0 +1,40 @@
+"""The noise floors of a fit's joints, as the fit sees their torque."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..estimate import Fit, predict
+from ..filters import settled
+from ..log import Log
+from ..model import Model
+from ..preprocess import on_both_sides, prepare
+from ..specs import Experiment
+from .floor import NoiseFloor
+from .of_angles import of_angles
+from .of_pieces import filtered, floors_of
+
+
+def floors_of_fit(
+    experiment: Experiment, fit: Fit, model: Model, x, logs: Sequence[Sequence[Log]]
+) -> tuple[list[NoiseFloor], dict[str, float]]:
+    """Each joint's noise floor, and {joint: RMS of what the model leaves}, as the fit sees torque.
+
+    A low-pass on both sides leaves nothing of the frequencies at which noise is told from motion:
+    what it carries through is told of the torque as logged.
+
+    Args:
+        model, x (size,): whose residual is looked at; in its parameters loud joints should not
+            drown quiet ones. logs: of each part.
+    """
+    spec = settled(experiment.preprocess, fit.filters)
+    plain = spec.model_copy(update={"torque": "raw"}) if spec.torque == "low-pass" else spec
+    motions = [prepare(part, plain, fit.joints) for part in logs]
+    told = [predict(model, x, motion) for motion in motions]
+    pieces = [piece for motion in motions for piece in motion.pieces]
+    predicted = np.concatenate([one.predicted for one in told])
+    found = floors_of(pieces, predicted, angles=of_angles(logs, plain, fit))
+    if plain is not spec:
+        told = [predict(model, x, prepare(part, spec, fit.joints)) for part in logs]
+    left = np.max([one.errors()["rms"] for one in told], axis=0)
+    return filtered(found, on_both_sides(spec, pieces[0].step)), dict(zip(fit.joints, left))
