@@ -32,6 +32,7 @@ _PRICE = 1e4  # of log det M for going beyond a limit by as much as the limit
 _CHECKED = 1000.0  # Hz at which limits are kept
 _CLOSE = 100.0  # Hz at which distances are: between two looks a link's point moves a few mm
 _LOOKED = 50.0  # Hz at which they are while the motion is sought
+_SIGHT = 0.03  # m beyond the clearance: pairs that a step minds; of others it is looked at afterwards
 _BISECTIONS = 12
 _LARGEST = 0.5  # of the range: amplitudes of a random start
 
@@ -194,15 +195,10 @@ def _look(problem: Problem, z, grid: _Grid, radius: float) -> _Look:
     change = np.einsum("p,jpvn->jvn", x, slopes.change).reshape(dof, 3, dof, -1)
     pull = np.einsum("jrin,rnz->njiz", change, basis[:3])
     clearance = problem.limits.clearance
-    near = problem.geometry.near(grid.poses @ z.T, clearance + radius * _reach(problem))
+    near = problem.geometry.near(grid.poses @ z.T, clearance + _SIGHT)
     lacks = max((clearance - d for _, d, _ in near), default=0.0) / max(clearance, 1e-3)
     over = float(np.maximum(shares(problem, motion, own) - 1.0, 0.0).max())
     return _Look(z, told, slope, motion, own, pull, near, max(over, 0.1 * lacks, 0.0))
-
-
-def _reach(problem: Problem) -> float:
-    """How near [m] a pair must be for a step of one radian to matter."""
-    return 0.3 * float(np.linalg.norm(problem.known.model.robot.translations, axis=1).sum())
 
 
 def _step(problem: Problem, at: _Look, grid: _Grid, radius: float) -> np.ndarray | None:
