@@ -108,6 +108,41 @@ def check(experiment: ExperimentPath, as_json: Json = False, out: Out = None, qu
 
 
 @app.command()
+def design(
+    experiment: ExperimentPath,
+    out: Annotated[Path, typer.Option("--out", help="The folder to write: trajectory.csv, trajectory.yaml, design.json.")],
+    separate: Annotated[Optional[str], typer.Option("--separate", metavar="A:JOINT,B:JOINT", help="Suspects to tell apart, each effect:joint (* for the robot).")] = None,  # noqa: UP045
+    duration: Annotated[float, typer.Option("--duration", help="Seconds of motion.")] = 20.0,
+    limits: Annotated[Optional[Path], typer.Option("--limits", help="A YAML file of limits beside the URDF's: position, velocity, acceleration, jerk, torque by joint; margin, clearance, floor.")] = None,  # noqa: UP045
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of the starts.")] = 0,
+    as_json: Json = False, quiet: Quiet = False,
+) -> None:  # fmt: skip
+    """The next motion to log: the most informative within the limits, or the one that separates suspects."""
+    from . import design as designing
+    from . import pipeline, results
+
+    spec, folder = pipeline.load(experiment), results.folder(out)
+    suspects = [_suspect(text) for text in separate.split(",")] if separate else []
+    bounds = designing.read_limits(limits) if limits else None
+    with _progress(quiet or as_json) as progress:
+        found = designing.design(spec, duration=duration, separate=suspects, limits_spec=bounds, seed=seed, progress=progress)
+    document = designing.write(found, folder)
+    if as_json:
+        print(json.dumps(document, allow_nan=False))
+    elif not quiet:
+        from .terminal import show_design
+
+        show_design(document)
+
+
+def _suspect(text: str) -> tuple[str, str]:
+    effect, colon, joint = text.strip().partition(":")
+    if not (effect and colon and joint):
+        raise SysidError(f"--separate {text!r}", allowed="effect:joint,effect:joint, as in stribeck:hip,presliding:hip")
+    return effect, joint
+
+
+@app.command()
 def compare(
     experiments: Annotated[list[Path], typer.Argument(metavar="EXPERIMENT...", help="One or more experiments with the same test logs.")],
     as_json: Json = False, out: Out = None, quiet: Quiet = False,
@@ -150,6 +185,7 @@ def simulate(
     spikes: Annotated[float, typer.Option("--spikes", help="Wrong samples in the torque, a second and joint.")] = 0.0,
     brakes: Annotated[bool, typer.Option("--brakes", help="A joint that rests is braked: its torque reads 0, its angle is frozen (with --motion moves).")] = False,
     jitter: Annotated[float, typer.Option("--jitter", help="Milliseconds (standard deviation) that samples come early or late; a slow logger: --rate 100 --jitter 2.")] = 0.0,
+    trajectory: Annotated[Optional[Path], typer.Option("--trajectory", help="A motion for the training log to play, trajectory.csv of `sysid design`; the same seed and --duration make the same robot.")] = None,  # noqa: UP045
     current: Annotated[Optional[str], typer.Option("--current", metavar="STEP", help="Step of the logged torque [N m], or a share of each joint's peak, as in 2%.")] = None,  # noqa: UP045
     as_json: Json = False, quiet: Quiet = False,
 ) -> None:  # fmt: skip
@@ -163,6 +199,7 @@ def simulate(
         found = simulation.simulate(
             robot, hide=hidden, seed=seed, duration=duration, rate=rate, noise=noise, colour=colour, encoder=encoder, speed=speed, progress=progress,
             motion=motion, logs=logs, knocks=knocks, spikes=spikes, brakes=brakes, jitter=jitter, current=current,
+            trajectory=None if trajectory is None else simulation.read_trajectory(trajectory, robot.joints),
         )  # fmt: skip
     simulation.write(found, spec, folder)
     if as_json:

@@ -69,13 +69,13 @@ def loads(text: str, path: Path) -> Experiment:
         tree = {}
     if not isinstance(tree, dict):
         raise ConfigError("the file holds no mapping", where=str(path), allowed=", ".join(_keys(Experiment)))
-    plain = _plain(tree)
-    if "path" in plain:
+    told = plain(tree)
+    if "path" in told:
         raise _unknown_key(tree, ("path",), path)
-    return experiment(plain, path, tree)
+    return experiment(told, path, tree)
 
 
-def experiment(plain: dict, path: Path = Path("experiment.yaml"), tree=None) -> Experiment:
+def experiment(given: dict, path: Path = Path("experiment.yaml"), tree=None) -> Experiment:
     """The experiment that nested mappings and lists are, with effects in the file's short forms.
 
     Args:
@@ -84,17 +84,17 @@ def experiment(plain: dict, path: Path = Path("experiment.yaml"), tree=None) -> 
     Raises:
         ConfigError: as `load`.
     """
-    given = tree if tree is not None else plain
-    if isinstance(model := plain.get("model"), dict):
+    lines = tree if tree is not None else given
+    if isinstance(model := given.get("model"), dict):
         model = dict(model)
         for key in ("effects", "candidates"):
             if isinstance(entries := model.get(key), list):
-                model[key] = [_effect(entry, ("model", key, k), given, path) for k, entry in enumerate(entries)]
-        plain = {**plain, "model": model}
+                model[key] = [_effect(entry, ("model", key, k), lines, path) for k, entry in enumerate(entries)]
+        given = {**given, "model": model}
     try:
-        return _listed(Experiment.model_validate({**plain, "path": path}))
+        return _listed(Experiment.model_validate({**given, "path": path}))
     except ValidationError as error:
-        raise _named(error, given, path) from None
+        raise _named(error, lines, path) from None
 
 
 def _listed(experiment: Experiment) -> Experiment:
@@ -230,12 +230,12 @@ def _check_events(events, where: str) -> None:
             )
 
 
-def _plain(node):
+def plain(node):
     """ruamel's round-trip nodes as plain Python values."""
     if isinstance(node, dict):
-        return {_plain(key): _plain(value) for key, value in node.items()}
+        return {plain(key): plain(value) for key, value in node.items()}
     if isinstance(node, list):
-        return [_plain(item) for item in node]
+        return [plain(item) for item in node]
     if isinstance(node, bool) or node is None:
         return node
     for kind in (int, float, str):
@@ -250,7 +250,7 @@ def _line(tree, location: tuple) -> int | None:
     for step in location:
         try:
             if isinstance(node, dict) and step not in node:
-                if same := [key for key in node if str(_plain(key)) == str(step)]:
+                if same := [key for key in node if str(plain(key)) == str(step)]:
                     step = same[0]  # pydantic shows a key that is no text as text
                 else:
                     (node,) = node.values()  # an effect's options stand under its name

@@ -119,6 +119,29 @@ def show_check(document: dict) -> None:
         print(f"{errors} error{'s' * (errors > 1)}, {all_ - errors} warning{'s' * (all_ - errors != 1)}: a fit of these logs would be wrong")
 
 
+_SHOWN_STD = 20  # parameters whose deviation falls most
+
+
+def show_design(document: dict) -> None:
+    """What a designed motion promises, and what is left of its limits."""
+    best = document["criterion"]["random_best"]
+    beside = "" if best is None else f", {document['criterion']['log_det'] - best:.1f} above the best of the random motions it began from"
+    print(f"{document['duration']:g} s of motion; log det of the information {document['criterion']['log_det']:.1f}{beside}")
+    left = [f"{name} {100 * share:.1f} %" for name, share in document["margins"].items() if name != "collision"]
+    near = document["margins"].get("collision")
+    print(f"left of the limits: {', '.join(left)}" + ("" if near is None else f"; links keep {near:.3g} m apart"))
+    for pair in document["separates"]:
+        print(f"{pair['a']} and {pair['b']} will be told apart with probability {pair['probability']:.2f}")
+    told = [(name, s) for name, s in document["expected_std"].items() if s["now"] and s["now"] > 0.0]
+    told.sort(key=lambda one: one[1]["after"] / one[1]["now"])
+    if told:
+        print("standard deviations that fall most, now and after:")
+        for name, s in told[:_SHOWN_STD]:
+            print(f"  {name}  {s['now']:.2g} -> {s['after']:.2g}")
+    _show_notices(document)
+    print(f"folder: {document['run']}")
+
+
 def show_comparison(document: dict) -> None:
     """RMS of every experiment and the differences with their standard errors."""
     console = Console()

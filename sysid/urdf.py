@@ -71,7 +71,7 @@ def locate(reference: str, folder: Path) -> Path:
     from . import datasets
 
     if reference.startswith(_EXAMPLES):
-        return _example_root() / reference.removeprefix(_EXAMPLES)
+        return example_root() / reference.removeprefix(_EXAMPLES)
     if reference.startswith(_PACKAGE):
         return _in_package(reference.removeprefix(_PACKAGE))
     if (dataset := datasets.reference(reference)) is not None:
@@ -79,11 +79,18 @@ def locate(reference: str, folder: Path) -> Path:
     return (folder / reference).resolve()
 
 
+def package_folders() -> list[Path]:
+    """The folders that packages are looked for in: where ROS does, and example-robot-data's. Raises RobotError."""
+    return [*_listed("ROS_PACKAGE_PATH"), *(folder / "share" for folder in _listed("AMENT_PREFIX_PATH")), example_root()]
+
+
+def _listed(variable: str) -> list[Path]:
+    return [Path(folder) for folder in os.environ.get(variable, "").split(os.pathsep) if folder]
+
+
 def _in_package(reference: str) -> Path:
-    listed = lambda variable: [Path(folder) for folder in os.environ.get(variable, "").split(os.pathsep) if folder]  # noqa: E731
-    ros = listed("ROS_PACKAGE_PATH")
     package, _, inner = reference.partition("/")
-    places = [*ros, *(folder / "share" for folder in listed("AMENT_PREFIX_PATH")), _example_root()]
+    places, ros = package_folders(), _listed("ROS_PACKAGE_PATH")
     candidates = [folder / reference for folder in places] + [folder / inner for folder in ros if folder.name == package]
     for candidate in candidates:
         if candidate.is_file():
@@ -94,7 +101,8 @@ def _in_package(reference: str) -> Path:
     )  # fmt: skip
 
 
-def _example_root() -> Path:
+def example_root() -> Path:
+    """The folder of example-robot-data's robots. Raises RobotError: it is not installed."""
     # the package installs its models beside Pinocchio's, under the same cmeel prefix
     from importlib.metadata import PackageNotFoundError, files
 

@@ -12,9 +12,9 @@ balances the rest, are left out for that joint, widened by what the filters see 
     calm.py      the motion without it
 """
 
+from ..gaussian import Gaussian
 from .angles import again, angle_noise
 from .calm import KEPT, calm
-from ..gaussian import Gaussian
 from .motion import LEAST, band, lowpassed, narrowed, stride_of, widest
 
 __all__ = [

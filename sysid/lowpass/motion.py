@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..events import mended
+from ..gaussian import HIGHEST, Gaussian
 from ..log import Log
 from ..motion import Motion, Piece
 from ..preprocess import (
@@ -22,7 +23,6 @@ from ..preprocess import (
 )
 from ..smoother import differences
 from .angles import noise_of
-from ..gaussian import HIGHEST, Gaussian
 
 LEAST = 15.0  # Hz: where friction's laws and ripple still show, several times what an arm moves at
 _MOTION = 4.0  # and this many times the motion's own bandwidth, if that is more

@@ -8,5 +8,9 @@
 from .folder import load, prepare, write
 from .hidden import Hidden, Scales, defaults, hidden
 from .run import SimulatedLog, Simulation, simulate
+from .trajectory import Played, read_trajectory
 
-__all__ = ["Hidden", "Scales", "SimulatedLog", "Simulation", "defaults", "hidden", "load", "prepare", "simulate", "write"]
+__all__ = [
+    "Hidden", "Played", "Scales", "SimulatedLog", "Simulation", "defaults", "hidden", "load", "prepare", "read_trajectory", "simulate",
+    "write",
+]  # fmt: skip

@@ -19,6 +19,7 @@ from . import truth as drawn
 from .hidden import CATALOGUE, Hidden, Scales, check, settled
 from .nuisances import Nuisances
 from .plant import Plant, Truth
+from .trajectory import Played
 
 USUAL = 20.0  # s of the motion that says what a robot's joints are like, where its logs are poor or short
 LEAD = 1.0  # s before logging starts: a robot at rest has no friction law
@@ -79,7 +80,7 @@ def simulate(
     noise: float | None = None, colour: float | None = None, share: float = 0.5, encoder: int | None = None,
     speed: float | None = None, band: tuple[float, float] | None = None, progress: Callable[[str, float], None] | None = None,
     motion: str = "exciting", logs: int = 1, knocks: int = 0, spikes: float = 0.0, brakes: bool = False, jitter: float = 0.0,
-    current: float | str | None = None,
+    current: float | str | None = None, trajectory: Played | None = None,
 ) -> Simulation:  # fmt: skip
     """Simulate training logs and a test log. Everything follows from the arguments.
 
@@ -99,6 +100,8 @@ def simulate(
         brakes: joints that rest are braked: their torque reads nothing then, and their angle stands still.
         jitter: standard deviation [ms] of the instants at which the logger samples.
         current: step [N m] that the logged torque comes in, or a share of each joint's peak torque, as in "2%".
+        trajectory: a motion for the first training log to play in place of a drawn one; the robot is the one that is
+            drawn without it.
 
     Raises:
         SysidError: an argument that cannot be, or a robot that does not follow its reference.
@@ -130,6 +133,12 @@ def simulate(
     std = drawn.noise_std(scales, random("friction"), noise)
     steps = drawn.encoder_steps(robot, encoder)
     sensor = _Sensor(scales, steps, keep, std, colour, share, nuisance)
+    if trajectory is not None:
+        first = next(iter(places))
+        references[first] = trajectory.reference(times(trajectory.duration))
+        r = references[first]
+        rigid[first] = inverse_dynamics(robot, robot.prior, r.q, r.qd, r.qdd)
+        masses[first] = drawn.mass_matrices(robot, r.q[:: control.STRIDE])
     found, bursts = {}, {}
     for name, (part, k) in places.items():
         reference, events = references[name], random(f"{part} events", k)

@@ -1,0 +1,75 @@
+"""What a model's parameters do to the torques of an instant, and how that changes with the motion.
+
+Only effects of the instant take part: what looks back in time has no column that a pose and its
+rates alone give. The change is by differences in q, qd and qdd of every joint, all of them in one
+pass over stacked copies of the motion.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..effect import MotionEffect, SensorEffect
+from ..model import Model
+from ..motion import Piece
+
+_STEP = 1e-6  # rad, rad/s, rad/s^2 or metres: forward differences of smooth columns
+
+
+def of_the_instant(model: Model) -> Model:
+    """The model without effects that look back in time, or at anything but the motion."""
+    for effect, joints in model.terms:
+        if effect.memory or effect.reach or not effect.instantaneous:
+            for joint in joints:
+                model = model.without(effect.name, joint)
+    return model
+
+
+def piece(q, qd, qdd, step: float = 1.0) -> Piece:
+    """Samples (n, dof) as effects see them."""
+    n, dof = q.shape
+    zero = np.zeros((n, dof))
+    return Piece(
+        log=0, step=step, t=step * np.arange(n), q=q, qd=qd, qdd=qdd, tau=zero, measured=zero,
+        signals={}, use=None, smoother=None, core=slice(0, n), rest=np.zeros(dof),
+        noise=np.zeros(dof),
+    )  # fmt: skip
+
+
+def columns(model: Model, q, qd, qdd) -> np.ndarray:
+    """(dof, size, n) of a model of the instant."""
+    n = len(q)
+    found = model.columns(piece(q, qd, qdd), slice(0, n))
+    out = np.zeros((model.robot.dof, model.size, n))
+    for joint, own in enumerate(found):
+        out[joint, model.support(joint)] = own
+    return out
+
+
+@dataclass(frozen=True)
+class Slopes:
+    """Columns (dof, size, n) of a motion and how they change: `change` (dof, size, 3 dof, n) per
+    unit of q, then qd, then qdd of each joint."""
+
+    here: np.ndarray
+    change: np.ndarray
+
+    @classmethod
+    def of(cls, model: Model, q, qd, qdd) -> Slopes:
+        """At samples (n, dof)."""
+        n, dof = q.shape
+        stacked = np.repeat(np.stack([q, qd, qdd])[:, None], 1 + 3 * dof, axis=1)
+        for rate in range(3):
+            for joint in range(dof):
+                stacked[rate, 1 + rate * dof + joint, :, joint] += _STEP
+        whole = columns(model, *stacked.reshape(3, -1, dof))
+        whole = whole.reshape(*whole.shape[:2], 1 + 3 * dof, n)
+        here = whole[:, :, 0]
+        return cls(here, (whole[:, :, 1:] - here[:, :, None]) / _STEP)
+
+
+def is_of_the_torque(effect) -> bool:
+    """Whether an effect is a column, not a change of the motion or of the sensor."""
+    return not isinstance(effect, (MotionEffect, SensorEffect))

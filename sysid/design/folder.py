@@ -1,0 +1,73 @@
+"""The files of a design: trajectory.csv, trajectory.yaml (a ROS JointTrajectory), design.json."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+
+import numpy as np
+
+from ..results import folder, number, versions, write_atomically, write_json
+from .designed import Design
+
+_POINTS = 20.0  # Hz of the ROS trajectory's points, between which a controller interpolates
+
+
+def document(found: Design, run: str | Path = "") -> dict:
+    """The document of `sysid design`."""
+    return {
+        "duration": found.family.duration,
+        "criterion": {"log_det": found.log_det, "random_best": number(found.random_best)},
+        "margins": found.margins,
+        "expected_std": found.deviations,
+        "separates": [{"a": p.a, "b": p.b, "probability": p.probability} for p in found.pairs],
+        "coefficients": {
+            "rounds": found.family.rounds,
+            "harmonics": found.family.harmonics,
+            "joints": dict(zip(found.joints, found.coefficients.tolist())),
+        },
+        "notices": list(found.said),
+        "versions": versions(),
+        "run": str(run),
+    }
+
+
+def write(found: Design, out: str | Path) -> dict:
+    """Write a design's folder; returns the document of design.json. Raises SysidError."""
+    path = folder(out)
+    told = document(found, path)
+    for name, text in (("trajectory.csv", _csv(found)), ("trajectory.yaml", _ros(found))):
+        write_atomically(path / name, lambda p, text=text: p.write_text(text, encoding="utf-8"))
+    write_json(path / "design.json", told)
+    return told
+
+
+def _csv(found: Design) -> str:
+    names = ["t", *(f"{kind}_{j}" for kind in ("q", "qd", "qdd") for j in found.joints)]
+    stream = io.StringIO()
+    table = np.column_stack([found.t, found.q, found.qd, found.qdd])
+    np.savetxt(stream, table, fmt="%.12g", delimiter=",", header=",".join(names), comments="")
+    return stream.getvalue()
+
+
+def _ros(found: Design) -> str:
+    from ruamel.yaml import YAML
+
+    every = max(1, int(round((found.t[1] - found.t[0]) ** -1 / _POINTS)))
+    rows = np.unique(np.append(np.arange(0, len(found.t), every), len(found.t) - 1))
+    points = [
+        {
+            "positions": found.q[k].tolist(),
+            "velocities": found.qd[k].tolist(),
+            "accelerations": found.qdd[k].tolist(),
+            "time_from_start": {
+                "sec": int(found.t[k]), "nanosec": int(round(1e9 * (found.t[k] % 1.0))),
+            },
+        }
+        for k in rows
+    ]  # fmt: skip
+    stream, writer = io.StringIO(), YAML()
+    writer.default_flow_style = None
+    writer.width = 4096
+    writer.dump({"joint_names": list(found.joints), "points": points}, stream)
+    return stream.getvalue()

@@ -1,0 +1,254 @@
+"""Designed motions: at rest at both ends, within every limit, and telling more than chance does."""
+
+import json
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from sysid import config, pipeline, robot
+from sysid import model as models
+from sysid.design import collision, design, document, limits, solve
+from sysid.design.columns import Slopes, columns, of_the_instant
+from sysid.design.fourier import Fourier
+from sysid.design.information import Known, gram, log_det, log_det_with_slope, own_size
+from sysid.design.limits import LimitsSpec
+from sysid.simulate import load, read_trajectory, simulate
+from sysid.specs import EffectSpec, RobotSpec
+from tests.conftest import URDF
+
+UR5 = "example-robot-data://ur_description/urdf/ur5_robot.urdf"
+
+
+def test_harmonics_begin_and_end_at_rest_and_are_derivatives_of_each_other():
+    rng = np.random.default_rng(0)
+    family = Fourier(10.0, 5, 2, 3)
+    z = rng.normal(size=(3, family.size))
+    q, qd, qdd, jerk = family.motion(z, np.array([0.0, 10.0]))
+    np.testing.assert_allclose(qd, 0.0, atol=1e-12)
+    np.testing.assert_allclose(qdd, 0.0, atol=1e-11)
+    np.testing.assert_allclose(q[0], q[1], atol=1e-12)
+    t, h = rng.uniform(0.5, 9.5, 20), 1e-5
+    here, before, after = (family.motion(z, t + s) for s in (0.0, -h, h))
+    for k in range(3):
+        np.testing.assert_allclose((after[k] - before[k]) / (2.0 * h), here[k + 1], rtol=1e-6, atol=1e-6)
+
+
+@pytest.fixture(scope="module")
+def arm(tmp_path_factory):
+    """A planar arm with friction in the model, and what is known of it before any log."""
+    file = tmp_path_factory.mktemp("design") / "robot.urdf"
+    file.write_text(URDF)
+    machine = robot.load(RobotSpec(urdf=str(file)))
+    model = models.build(machine, [EffectSpec(name="viscous"), EffectSpec(name="coulomb")])
+    x = np.concatenate([machine.prior.ravel(), [0.3, 0.1, 0.2, 0.15]])
+    torque = np.array([10.0, 3.0])
+    return Known(model, x, np.array([0.05, 0.02]), own_size(model, machine.prior, x, torque))
+
+
+def test_log_det_and_its_slope(arm):
+    """Against differences of the criterion itself, in coordinates of a motion."""
+    family = Fourier(8.0, 4, 2, 2)
+    t = (np.arange(64) + 0.5) * 8.0 / 64
+    rng = np.random.default_rng(1)
+    z = 0.4 * rng.normal(size=(2, family.size))
+    basis = family.basis(t)
+    slopes = Slopes.of(arm.model, *(basis @ z.T)[:3])
+    told, by_node = log_det_with_slope(arm, slopes, np.full(64, 100.0))
+    slope = np.einsum("rin,rnz->iz", by_node.reshape(3, 2, -1), basis[:3])
+    value = lambda z: log_det(arm.before + gram(arm, *family.motion(z, t)[:3], 6400.0))  # noqa: E731
+    assert told == pytest.approx(value(z), rel=1e-12)
+    for _ in range(3):
+        way = rng.normal(size=z.shape)
+        numeric = (value(z + 1e-5 * way) - value(z - 1e-5 * way)) / 2e-5
+        assert float(np.sum(slope * way)) == pytest.approx(numeric, rel=1e-4, abs=1e-3)
+
+
+def test_columns_of_a_design_are_the_fit_s(arm):
+    rng = np.random.default_rng(2)
+    q, qd, qdd = rng.normal(size=(3, 5, 2))
+    found = np.einsum("jpn,p->nj", columns(arm.model, q, qd, qdd), arm.x)
+    machine = arm.model.robot
+    data = machine.model.createData()
+    truth = np.array([pin.rnea(machine.model, data, *row) for row in zip(q, qd, qdd)])
+    truth += qd * [0.3, 0.1] + np.sign(qd) * [0.2, 0.15]
+    np.testing.assert_allclose(found, truth, rtol=1e-9, atol=1e-9)
+    delayed = arm.model.with_effect(models.find("delay"), (0,))
+    assert of_the_instant(delayed).names == arm.model.names
+
+
+def test_hulls_are_as_near_as_a_quadratic_program_says():
+    """coal's own convex representation of a mesh is not: that is why hulls are made anew."""
+    import cvxpy
+
+    machine = robot.load(RobotSpec(urdf=UR5))
+    shapes = collision.geometry(machine)
+    rng = np.random.default_rng(3)
+    checked = 0
+    for pose in rng.uniform(-2.5, 2.5, (40, 6)):
+        distances, _, found = shapes._at(pose)
+        k = int(np.argmin(distances))
+        pair = shapes.shapes.collisionPairs[k]
+        ends = []
+        for which in (pair.first, pair.second):
+            shape, placed = shapes.shapes.geometryObjects[which].geometry, found.oMg[which]
+            ends.append(collision._corners(shape) @ placed.rotation.T + placed.translation)
+        a, b = (cvxpy.Variable(len(end), nonneg=True) for end in ends)
+        gap = cvxpy.norm(ends[0].T @ a - ends[1].T @ b)
+        truth = cvxpy.Problem(cvxpy.Minimize(gap), [cvxpy.sum(a) == 1, cvxpy.sum(b) == 1]).solve(solver="CLARABEL")
+        assert max(distances[k], 0.0) == pytest.approx(truth, abs=1e-5)
+        checked += 1
+    assert checked == 40
+
+
+def test_distances_and_their_slopes():
+    machine = robot.load(RobotSpec(urdf=UR5))
+    shapes = collision.geometry(machine).about(np.array([0.0, -1.5, 1.5, -1.5, -1.5, 0.0]))
+    rng = np.random.default_rng(4)
+    off = []
+    for pose in rng.uniform(-2.5, 2.5, (30, 6)):
+        for _, distance, slope in shapes.near(pose[None], 0.05):
+            way = rng.normal(size=6)
+            ends = [shapes.near((pose + s * 1e-4 * way)[None], 0.2) for s in (1.0, -1.0)]
+            pairs = [min((one[1] for one in end), key=lambda d: abs(d - distance)) for end in ends]
+            off.append(abs((pairs[0] - pairs[1]) / 2e-4 - slope @ way) / max(np.linalg.norm(slope), 1e-3))
+    assert len(off) > 10 and np.median(off) < 1e-3
+
+
+@pytest.fixture(scope="module")
+def poor(tmp_path_factory):
+    """A folder with a poor first log of a planar arm, and the arm."""
+    from sysid import simulate as simulation
+
+    folder = tmp_path_factory.mktemp("poor")
+    (folder / "robot.urdf").write_text(URDF)
+    (folder / "plain.yaml").write_text("robot: {urdf: robot.urdf}\n")
+    spec, machine, _ = load(folder / "plain.yaml")
+    found = simulate(machine, seed=3, duration=6.0, rate=250.0, motion="sines")
+    simulation.write(found, spec, folder / "log")
+    return folder / "log", machine
+
+
+@pytest.fixture(scope="module")
+def designed(poor):
+    return design(pipeline.load(poor[0]), duration=8.0, separate=[("stribeck", "shoulder"), ("spring", "shoulder")])
+
+
+def test_a_design_keeps_to_every_limit_as_an_independent_check_sees_it(poor, designed):
+    """Positions, speeds, torque by Pinocchio and friction by hand, at a kilohertz."""
+    machine = poor[1]
+    family = designed.family
+    t = np.arange(0.0, 8.0, 1e-3)
+    w = 2.0 * np.pi * family.rounds / family.duration * np.arange(1, family.harmonics + 1)
+    c, a, b = np.split(designed.coefficients, [1, 1 + family.harmonics], axis=1)
+    angle = w * t[:, None]
+    q = (c.T + np.sin(angle) @ a.T + np.cos(angle) @ b.T)
+    qd = np.cos(angle) @ (w * a).T - np.sin(angle) @ (w * b).T
+    qdd = -np.sin(angle) @ (w**2 * a).T - np.cos(angle) @ (w**2 * b).T
+    own = [machine.source.joints[j] for j in machine.joints]
+    assert (np.abs(q) <= [0.95 * j.limits[1] + 1e-9 for j in own]).all()
+    assert (np.abs(qd) <= [0.95 * j.velocity + 1e-9 for j in own]).all()
+    fit = pipeline.fit(pipeline.load(poor[0]))
+    model = machine.with_inertias(fit.pi)
+    data = model.createData()
+    torque = np.array([pin.rnea(model, data, *row) for row in zip(q[::5], qd[::5], qdd[::5])])
+    found = dict(zip([c.name for c in fit.model.coefficients], fit.coefficients))
+    of = lambda word: np.array([found.get(f"{word.split('.')[0]}.{j}.{word.split('.')[1]}", 0.0) for j in machine.joints])  # noqa: E731
+    torque += qd[::5] * of("viscous.Fv") + np.sign(qd[::5]) * of("coulomb.Fc") + qdd[::5] * of("armature.Ia")
+    assert (np.abs(torque) <= [0.95 * j.effort * (1.0 + 1e-6) for j in own]).all()
+    for kind, value in (("velocity", 1.0 - np.max(np.abs(qd) / [j.velocity for j in own])), ("torque", 1.0 - np.max(np.abs(torque) / [j.effort for j in own]))):
+        assert designed.margins[kind] == pytest.approx(value, abs=2e-3)
+
+
+def test_a_design_tells_more_than_random_motions(designed):
+    assert designed.log_det > designed.random_best + 5.0
+    assert all(0.0 <= s["after"] <= s["now"] for s in designed.deviations.values())
+
+
+def test_its_files(poor, designed, tmp_path):
+    from ruamel.yaml import YAML
+
+    from sysid.design import write
+
+    told = write(designed, tmp_path / "next")
+    assert told == document(designed, tmp_path / "next")
+    json.dumps(told, allow_nan=False)
+    played = read_trajectory(tmp_path / "next" / "trajectory.csv", poor[1].joints)
+    assert played.duration == pytest.approx(8.0) and len(played.t) == 2001  # at the log's rate
+    np.testing.assert_allclose(played.q, designed.q, atol=1e-10)
+    ros = YAML(typ="safe").load((tmp_path / "next" / "trajectory.yaml").read_text())
+    assert ros["joint_names"] == list(poor[1].joints)
+    assert ros["points"][0]["velocities"] == pytest.approx([0.0, 0.0], abs=1e-9)
+    assert ros["points"][-1]["time_from_start"] == {"sec": 8, "nanosec": 0}
+
+
+def test_the_same_seed_is_the_same_motion(poor, designed):
+    again = design(pipeline.load(poor[0]), duration=8.0, separate=[("stribeck", "shoulder"), ("spring", "shoulder")])
+    np.testing.assert_array_equal(again.coefficients, designed.coefficients)
+
+
+def test_pairs_are_told_apart_or_said_not_to_be(poor, designed):
+    (pair,) = designed.pairs
+    assert {pair.a, pair.b} == {"stribeck:shoulder", "spring:shoulder"} and pair.probability > 0.9
+    twins = design(pipeline.load(poor[0]), duration=4.0, separate=[("torque_bias", "elbow"), ("asymmetric_coulomb", "elbow")])
+    assert twins.pairs[0].probability < 0.1  # beside Coulomb friction they are one column
+
+
+def test_the_promised_deviations_are_achieved(poor, designed):
+    """A simulated robot plays the motion; its log with the first one is fitted."""
+    folder, _ = poor
+    spec, machine, _ = load(folder.parent / "plain.yaml")
+    from sysid import simulate as simulation
+
+    played = simulation.Played(designed.t, designed.q)
+    found = simulate(machine, seed=3, duration=6.0, rate=250.0, motion="sines", trajectory=played)
+    assert found.truth["inertias"] == json.loads((folder / "truth.json").read_text())["inertias"]
+    simulation.write(found, spec, folder.parent / "next")
+    tree = (folder / "config.yaml").read_text().replace("train: [train.csv]", f"train: [train.csv, {folder.parent / 'next' / 'train.csv'}]")
+    assert "next" in tree
+    both = pipeline.fit(config.loads(tree, folder / "config.yaml"))
+    std = dict(zip(both.model.names, both.uncertainty.std))
+    now = {name: s for name, s in designed.deviations.items() if s["after"] < 0.5 * s["now"] and np.isfinite(std[name])}
+    ratio = np.array([std[name] / s["after"] for name, s in now.items()])
+    assert len(ratio) and 0.4 < np.median(ratio) < 2.5
+
+
+WRONG = {
+    "separate": (dict(separate=[("stribeck", "wrist")]), "wrist"),
+    "effect": (dict(separate=[("stribek", "elbow")]), "stribek:elbow"),
+    "duration": (dict(duration=0.5), "--duration"),
+    "joint": (dict(limits_spec=LimitsSpec(velocity={"wrist": 1.0})), "wrist"),
+    "empty": (dict(limits_spec=LimitsSpec(position={"elbow": [4.0, 5.0]})), "holds nothing"),
+    "torque": (dict(limits_spec=LimitsSpec(torque={"shoulder": 1e-4, "elbow": 1e-4}), duration=4.0), "no motion keeps to the limits"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_what_cannot_be_designed_is_said_in_one_line(poor, name):
+    options, said = WRONG[name]
+    with pytest.raises(config.ConfigError) as error:
+        design(pipeline.load(poor[0]), **options)
+    assert said in str(error.value) and "\n" not in str(error.value)
+
+
+def test_without_any_log_the_urdf_is_what_is_known(poor, tmp_path):
+    (tmp_path / "robot.urdf").write_text(URDF)
+    found = design(config.loads("robot: {urdf: robot.urdf}\n", tmp_path / "config.yaml"), duration=4.0)
+    assert found.log_det > found.random_best and found.deviations == {} and any("no log yet" in text for text in found.said)
+
+
+def test_a_limits_file(tmp_path):
+    (tmp_path / "l.yaml").write_text("velocity: {elbow: 1.5}\nfloor: 0.1\nmargin: 0.1\n")
+    assert limits.read(tmp_path / "l.yaml").velocity == {"elbow": 1.5}
+    for text, said in (("velocity: {elbow: -1}", "velocity.elbow"), ("speed: {elbow: 1}", "speed"), ("margin: 2", "margin")):
+        (tmp_path / "l.yaml").write_text(text)
+        with pytest.raises(config.ConfigError, match=said):
+            limits.read(tmp_path / "l.yaml")
+
+
+def test_a_floor_is_kept_above(arm):
+    machine = arm.model.robot
+    shapes = collision.geometry(machine, floor=0.25)
+    low = shapes.least(np.array([[0.0, 0.0], [1.5, 0.0]]))
+    assert low[0] < low[1]  # hanging down from a metre, the arm ends at a quarter of one or so
+    assert solve.Found(Fourier(4.0, 5, 1, 2), np.zeros((2, 9)), 0.0).value == 0.0
