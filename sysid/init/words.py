@@ -27,8 +27,18 @@ MADE = {"ext", "external", "residual", "model", "gravity", "coriolis", "ff", "fe
 MADE |= {"estimated", "friction", "prev", "previous"}
 MEASURED = {"measured", "meas", "actual", "act", "state", "observed", "observation", "observations"}
 TIME = {"t", "time", "times", "timestamp", "timestamps", "stamp", "stamps", "clock"}
-_BESIDE_TIME = {"ros", "field", "header", "system", "robot", "unix", "epoch", "log", "since"}
-_BESIDE_TIME |= {"start"}
+_BESIDE_TIME = {
+    "ros",
+    "field",
+    "header",
+    "system",
+    "robot",
+    "unix",
+    "epoch",
+    "log",
+    "since",
+    "start",
+}
 COUNTS = {"enc", "encoder", "count", "counts", "tick", "ticks"}
 #: {word: unit}
 UNITS = {
