@@ -1,4 +1,6 @@
-"""Shape values found from many places: the landscape against solved problems, searches against what they must find."""
+"""Shape values found from many places: the landscape against solved problems, searches against what
+they must find.
+"""
 
 from functools import cache
 from types import SimpleNamespace
@@ -15,7 +17,9 @@ from tests.problems import UR5, arm_log
 
 @cache
 def bumped(text="h*exp(-((q-c)/w)**2)", values=(("c", -0.4), ("w", 0.15)), coulomb=1.0):
-    """A UR5 whose third joint has a formula's torque: experiment, model, motion, prior, and the number of the joint."""
+    """A UR5 whose third joint has a formula's torque: experiment, model, motion, prior, and the
+    number of the joint.
+    """
     effects = ["viscous", "coulomb", {"formula": text, "joints": ["elbow_joint"]}]
     experiment = config.experiment({"robot": {"urdf": UR5}, "model": {"effects": effects}})
     machine, structure, prior = pipeline.build(experiment)
@@ -24,17 +28,29 @@ def bumped(text="h*exp(-((q-c)/w)**2)", values=(("c", -0.4), ("w", 0.15)), coulo
     joint = machine.joints.index("elbow_joint")
     piece = prepare([log], experiment.preprocess, machine.joints).pieces[0]
     effect = structure.terms[-1][0]
-    whole = SimpleNamespace(**{**vars(piece), "q": segment.q, "qd": 0 * segment.q, "qdd": 0 * segment.q, "t": segment.t})
+    whole = SimpleNamespace(
+        **{**vars(piece), "q": segment.q, "qd": 0 * segment.q, "qdd": 0 * segment.q, "t": segment.t}
+    )
     segment.tau[:, joint] += 2.0 * effect.columns(whole, joint, **dict(values))[0]
     motion = prepare([log], experiment.preprocess, machine.joints)
-    return experiment, build(machine, experiment.model.effects).measured_by(motion), motion, prior, joint
+    return (
+        experiment,
+        build(machine, experiment.model.effects).measured_by(motion),
+        motion,
+        prior,
+        joint,
+    )
 
 
 @pytest.mark.parametrize("weights", [None, (1.0, 0.5, 2.0, 1.0, 1.0, 3.0)])
 def test_a_landscape_is_what_solving_gives(weights):
-    """Far from the bounds, and with a prior that is hardly curved, what it says the objective falls by is what the solver finds."""
+    """Far from the bounds, and with a prior that is hardly curved, what it says the objective falls
+    by is what the solver finds.
+    """
     experiment, model, motion, prior, joint = bumped()
-    settled = lambda at: shape.settle(experiment, model.with_shapes(at), motion, prior, weights=weights, hold=True)  # noqa: E731
+    settled = lambda at: shape.settle(
+        experiment, model.with_shapes(at), motion, prior, weights=weights, hold=True
+    )  # noqa: E731
     found = settled((0.1, 0.3))
     seen = landscape(found, motion, 2, joint, weights)
     places = np.array([[0.1, 0.3], [-0.4, 0.15], [-0.3, 0.4], [0.5, 0.05], [-0.6, 1.0]])
@@ -43,31 +59,43 @@ def test_a_landscape_is_what_solving_gives(weights):
     assert abs(seen.gains(places[:1])[0]) < 1e-8 * found.objective
     system, right = seen.slopes(places[2])
     step = 1e-5
-    slope = [(seen.gains((places[2] + d)[None]) - seen.gains((places[2] - d)[None]))[0] / (2 * step) for d in step * np.eye(2)]
+    slope = [
+        (seen.gains((places[2] + d)[None]) - seen.gains((places[2] - d)[None]))[0] / (2 * step)
+        for d in step * np.eye(2)
+    ]
     np.testing.assert_allclose(right, slope, rtol=1e-3)
 
 
 def test_a_coefficient_at_zero_answers_as_the_bound_has_it():
-    """Friction that would have to be negative stays at zero where it is pinned, and is free where it is not."""
+    """Friction that would have to be negative stays at zero where it is pinned, and is free where
+    it is not.
+    """
     experiment, model, motion, prior, joint = bumped(coulomb=-0.5)
     found = shape.settle(experiment, model, motion, prior, hold=True)
     assert pinned(found, motion, joint, True) < pinned(found, motion, joint, False)
 
 
 def pinned(found, motion, joint, how) -> float:
-    return float(landscape(found, motion, 2, joint, None, pinned=how).gains(np.array([[-0.4, 0.15]]))[0])
+    return float(
+        landscape(found, motion, 2, joint, None, pinned=how).gains(np.array([[-0.4, 0.15]]))[0]
+    )
 
 
 def test_the_best_of_many_hollows_is_found():
     experiment, model, motion, prior, joint = bumped()
     found = shape.settle(experiment, model, motion, prior, profile=True)
     np.testing.assert_allclose(found.model.shapes, [-0.4, 0.15], atol=0.01)
-    assert [(s.name, s.lower) for s in found.searched] == [("formula.elbow_joint.c", False), ("formula.elbow_joint.w", False)]
+    assert [(s.name, s.lower) for s in found.searched] == [
+        ("formula.elbow_joint.c", False),
+        ("formula.elbow_joint.w", False),
+    ]
     assert all(s.starts > 300 and s.profile > 10 for s in found.searched)
 
 
 def test_where_a_profile_is_lower_the_search_goes_on():
-    """Begun in the wrong hollow and started from nowhere else, the profile leads to the right one, and it is said."""
+    """Begun in the wrong hollow and started from nowhere else, the profile leads to the right one,
+    and it is said.
+    """
     experiment, model, motion, prior, joint = bumped()
     wrong = shape.settle(experiment, model.with_shapes((1.0, 0.1)), motion, prior, grid=False)
     right = shape.settle(experiment, wrong.model, motion, prior, grid=False, profile=True)
@@ -77,20 +105,26 @@ def test_where_a_profile_is_lower_the_search_goes_on():
 
 
 def made(function, low, high) -> Landscape:
-    """A landscape of one coefficient in which nothing else answers: gain = (c'y)^2 / (2 c'c) of columns function(x, values)."""
+    """A landscape of one coefficient in which nothing else answers: gain = (c'y)^2 / (2 c'c) of
+    columns function(x, values).
+    """
     x = np.linspace(-1.0, 1.0, 400)
     target = function(x, np.array([0.31, 0.2])[: len(low)])
-    columns = lambda values: np.stack([function(x, at)[:, None] for at in values], axis=1)  # noqa: E731
+    each = lambda at: function(x, at)[:, None]  # noqa: E731
+    columns = lambda values: np.stack([each(at) for at in values], axis=1)  # noqa: E731
     low, high = np.array(low), np.array(high)
     return Landscape(
-        tuple("ab"[: len(low)]), low, high, 1e-3 * (high - low), 0.5 * (low + high), columns, np.zeros(1, dtype=bool),
+        tuple("ab"[: len(low)]), low, high, 1e-3 * (high - low), 0.5 * (low + high),
+        columns, np.zeros(1, dtype=bool),
         np.zeros((400, 0)), target, 0.0, 0.5 * float(target @ target),
     )  # fmt: skip
 
 
 HOLLOWS = {
-    "bump": (2, lambda x, a: np.exp(-(((x - a[0]) / a[1]) ** 2))), "corner": (1, lambda x, a: np.maximum(x - a[0], 0.0)),
-    "jump": (1, lambda x, a: np.sign(x - a[0])), "waves": (2, lambda x, a: np.sin(40.0 * a[0] * x + 20.0 * a[1])),
+    "bump": (2, lambda x, a: np.exp(-(((x - a[0]) / a[1]) ** 2))),
+    "corner": (1, lambda x, a: np.maximum(x - a[0], 0.0)),
+    "jump": (1, lambda x, a: np.sign(x - a[0])),
+    "waves": (2, lambda x, a: np.sin(40.0 * a[0] * x + 20.0 * a[1])),
 }  # fmt: skip
 
 
@@ -105,6 +139,8 @@ def test_hollows_corners_jumps_and_waves(name):
 
 def test_what_is_no_number_is_passed_by():
     seen = made(lambda x, a: np.sqrt(np.where(x + a[0] >= 0, x + a[0], np.nan)), [-3.0], [3.0])
-    seen = Landscape(**{**vars(seen), "target": np.sqrt(np.linspace(-1, 1, 400) + 1.5), "objective": 300.0})
+    seen = Landscape(
+        **{**vars(seen), "target": np.sqrt(np.linspace(-1, 1, 400) + 1.5), "objective": 300.0}
+    )
     found, _ = multistart.places(seen, seen, [np.linspace(-3.0, 3.0, 13)], [seen.here])
     assert found[0].values[0] == pytest.approx(1.5, abs=1e-4)
