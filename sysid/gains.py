@@ -5,7 +5,7 @@ without any sign or prior, a command that acts d late leaves
 
     || (1 - P) (command(t - d) - q) ||,
 
-and the delay is where that is least: P is the same for all d. The factor starts where the URDF's bodies need the torque that
+and the delay is where that is least, over all joints together (see `delays`): P is the same for all d. The factor starts where the URDF's bodies need the torque that
 it makes; the fit goes on from there, with all bodies free.
 """
 
@@ -26,6 +26,7 @@ _HAS = ("armature", "viscous", "coulomb", "torque_bias")  # what any joint has
 _LATEST = 0.1  # s: a command that acts later is no servo's
 _TRIED = 41  # delays before the least is refined
 _FEWEST = 100  # rows
+_CLEARLY = 0.5  # of what is left with the delay that all share: noise of a coarse encoder shifts one joint's own by tens of ms
 _SINGULAR = 1e-9  # of the largest singular value of columns of one size
 
 
@@ -51,8 +52,8 @@ def started(experiment: Experiment, machine: Robot) -> Experiment:
         # the command alone, as a voltage would be read: what is left of servo - command is the angle under one low-pass
         alone = {j: _command(spec) for j, spec in plain.items()}
         commands = motion_of(alone)
-        for joint in late:
-            delay = _delay(found, motion, commands, machine.joints.index(joint), motor_side.drive(plain[joint]))
+        left = [_left(found, motion, commands, machine.joints.index(j), motor_side.drive(plain[j])) for j in late]
+        for joint, delay in zip(late, delays(left)):
             own = FreeFactor(start=delay) if delay > 0.0 else 0.0
             actuators[joint] = actuators[joint].model_copy(update={"delay": own})
         motion = motion_of({j: replace_delay(spec, actuators[j]) for j, spec in plain.items()})
@@ -121,8 +122,34 @@ def _start(found: rows.Rows, machine: Robot, joint: str) -> float:
     return float(size[0] / max(np.linalg.norm(found.tau[use, j]), 1e-300))
 
 
-def _delay(found: rows.Rows, motion: Motion, commands: Motion, j: int, own: motor_side.Drive) -> float:
-    """The delay [s] of a joint's command at which its own columns leave least of its torque."""
+def delays(left: list) -> list[float]:
+    """Where each joint's delay [s] starts: where all leave least of their torques, as one controller commands them; where its own is
+    least, if that is less than half of it. What is left to find is near.
+
+    Args:
+        left: of each joint, what its columns leave at a delay; None where there is too little to tell.
+    """
+    told = [one for one in left if one is not None]
+    if not told:
+        return [0.0] * len(left)
+
+    def least(ones) -> float:
+        total = lambda delay: float(sum(np.log(max(one(delay), 1e-300)) for one in ones))  # noqa: E731
+        tried = np.linspace(0.0, _LATEST, _TRIED)
+        best = int(np.argmin([total(delay) for delay in tried]))
+        low, high = tried[max(best - 1, 0)], tried[min(best + 1, _TRIED - 1)]
+        refined = minimize_scalar(total, bounds=(low, high), method="bounded", options={"xatol": 1e-6})
+        return float(refined.x) if refined.fun < total(0.0) else 0.0
+
+    together, out = least(told), []
+    for one in left:
+        alone = together if one is None or len(told) == 1 else least([one])
+        out.append(alone if one is not None and one(alone) < _CLEARLY * one(together) else together)
+    return out
+
+
+def _left(found: rows.Rows, motion: Motion, commands: Motion, j: int, own: motor_side.Drive):
+    """What a joint's own columns leave of its torque where its command acts a delay [s] late; None where rows are too few."""
     use = found.use[:, j]
     columns = found.columns[j]
     columns = columns[:, columns.any(axis=0)]
@@ -134,7 +161,7 @@ def _delay(found: rows.Rows, motion: Motion, commands: Motion, j: int, own: moto
             angles[part] = (command.tau[:, j] - piece.tau[:, j] / own.start)[found.index[part]]
         use = use & ~((found.piece == found.piece[part[0]]) & (found.t < piece.t[0] + _LATEST)) if len(part) else use
     if use.sum() < _FEWEST:
-        return 0.0
+        return None
     scaled = columns[use] / np.maximum(np.linalg.norm(columns[use], axis=0), 1e-300)
     basis, values, _ = np.linalg.svd(scaled, full_matrices=False)
     basis = basis[:, values > _SINGULAR * values[0]]
@@ -146,8 +173,4 @@ def _delay(found: rows.Rows, motion: Motion, commands: Motion, j: int, own: moto
         torque = (acts - angles)[use]
         return float(np.linalg.norm(torque - basis @ (basis.T @ torque)))
 
-    tried = np.linspace(0.0, _LATEST, _TRIED)
-    best = int(np.argmin([left(delay) for delay in tried]))
-    low, high = tried[max(best - 1, 0)], tried[min(best + 1, _TRIED - 1)]
-    refined = minimize_scalar(left, bounds=(low, high), method="bounded", options={"xatol": 1e-6})
-    return float(refined.x) if refined.fun < left(0.0) else 0.0
+    return left

@@ -92,6 +92,9 @@ def show_fit(fit: Fit, document: dict) -> None:
 def _show_filter(chosen: dict) -> None:
     key = "window" if "window" in chosen else "cutoff"
     unit = "s" if key == "window" else "Hz"
+    if chosen["torque"] == "low-pass" and chosen["filter"] != "none":
+        print(f"filter: {chosen['filter']}, window {chosen['window']:g} s; both sides under a low-pass at {chosen['cutoff']:g} Hz ({chosen['chosen']})")
+        return
     if not chosen["held_out"]:
         print(f"filter: {chosen['filter']}")
         return

@@ -276,3 +276,14 @@ def test_the_scale_is_told_by_one_known_torque():
     spec = {"actuator": {"a": {"command": "c", "kp": "free"}, "b": {"command": "c", "kp": 3.0}}}
     experiment = config.experiment(spec)
     assert drives.scale_is_told(experiment, ("a", "b")) and not drives.scale_is_told(experiment, ("a",))
+
+
+def test_a_delay_starts_where_all_joints_leave_least():
+    """A joint whose own is shallow goes with the others; one that is clearly elsewhere does not."""
+    from sysid.gains import delays
+
+    deep = lambda at: lambda d: 0.01 + abs(d - at)  # noqa: E731
+    shallow = lambda d: 1.0 + 0.5 * abs(d - 0.08)  # noqa: E731
+    np.testing.assert_allclose(delays([deep(0.017), shallow, None]), 0.017, atol=1e-4)
+    np.testing.assert_allclose(delays([deep(0.017), deep(0.019), deep(0.06)])[2], 0.06, atol=1e-4)
+    assert delays([None]) == [0.0]
