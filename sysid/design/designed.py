@@ -38,6 +38,7 @@ _ROUNDS = (1, 2, 4, 8)  # of the slowest harmonic
 _FASTEST = 0.25  # of a period of the filter's window: what it still lets through of the fastest
 _WINDOW = 0.1  # s, where none is known
 _DRAWN = 4  # random motions for each number of rounds; the best is where the search begins
+_IMPROVED = 2  # numbers of rounds from which it begins: those whose best random motion tells most
 _GUESSED = 0.02  # of a joint's torque: its noise, where no log says
 _RATE = 500.0  # Hz, where no log says
 
@@ -216,20 +217,19 @@ def _searched(problem: Problem, base: _Basis, seed: int, tell) -> tuple[Found, f
     fastest = _FASTEST / base.window
     duration = problem.family.duration
     rounds = [r for r in _ROUNDS if r * HARMONICS / duration <= fastest] or [1]
-    rng, best, random_best = np.random.default_rng(seed), None, -np.inf
-    for number, own in enumerate(rounds):
+    rng, best, starts = np.random.default_rng(seed), None, []
+    for own in rounds:
         posed = replace(problem, family=replace(problem.family, rounds=own))
-        starts = []
-        for _ in range(_DRAWN):
-            z = solve.shrunk(posed, solve.drawn(posed, base.pose, rng))
-            if z is not None:
-                starts.append((solve.value(posed, z), z))
-        if not starts:
-            continue
-        random_best = max(random_best, max(value for value, _ in starts))
-        report = lambda share, number=number: tell("design", (number + share) / len(rounds))  # noqa: E731
+        drawn = [solve.shrunk(posed, solve.drawn(posed, base.pose, rng)) for _ in range(_DRAWN)]
+        told = [(solve.value(posed, z), z) for z in drawn if z is not None]
+        if told:
+            starts.append((*max(told, key=lambda one: one[0]), posed))
+    random_best = max((one[0] for one in starts), default=-np.inf)
+    starts = sorted(starts, key=lambda one: -one[0])[:_IMPROVED]
+    for number, (_, z, posed) in enumerate(starts):
+        report = lambda share, number=number: tell("design", (number + share) / len(starts))  # noqa: E731
         try:
-            found = solve.improved(posed, max(starts, key=lambda one: one[0])[1], report)
+            found = solve.improved(posed, z, report)
         except KeyboardInterrupt:
             if best is None:
                 raise
