@@ -122,6 +122,7 @@ def show_check(document: dict) -> None:
         print(f"{errors} error{'s' * (errors > 1)}, {all_ - errors} warning{'s' * (all_ - errors != 1)}: a fit of these logs would be wrong")
 
 
+_NEVER = 0.05  # probability below which a motion is no answer
 _SHOWN_STD = 20  # parameters whose deviation falls most
 
 
@@ -134,6 +135,9 @@ def show_design(document: dict) -> None:
     near = document["margins"].get("collision")
     print(f"left of the limits: {', '.join(left)}" + ("" if near is None else f"; links keep {near:.3g} m apart"))
     for pair in document["separates"]:
+        if pair["probability"] < _NEVER:
+            print(f"{pair['a']} and {pair['b']}: no motion within these limits is likely to tell them apart; `sysid effects` says what else does")
+            continue
         print(f"{pair['a']} and {pair['b']} will be told apart with probability {pair['probability']:.2f}")
     told = [(name, s) for name, s in document["expected_std"].items() if s["now"] and s["now"] > 0.0]
     told.sort(key=lambda one: one[1]["after"] / one[1]["now"])

@@ -166,6 +166,8 @@ def test_no_name_is_cut_and_commands_are_whole(monkeypatch, capsys, columns):
         *tables.suspects(said),
         *tables.shown(said, JOINTS, columns),
     }
+    wide |= {line for line in out.splitlines() if line.startswith("sysid design ")}
+    assert any("--separate" in line for line in wide)
     assert not [line for line in out.splitlines() if len(line) > columns and line not in wide]
     for entry in said["verdict"]:
         assert f"{entry['joint']}: {entry['status']}" in " ".join(out.split())
@@ -188,8 +190,9 @@ def test_each_joint_is_said_in_a_paragraph():
     assert "add x spring" not in first and "a1 = 1.235 +- 0.012 N m, k = 101 1/rad" in first
     assert (
         "cannot tell it (60 %) from spring (30 %) or payload of the whole robot (10 %) "
-        "to separate them: creep" in first
+        "to separate them: creep; or the motion of sysid design " in first
     )
+    assert f"--separate 'cogging:{FIRST},spring:{FIRST},payload:*' --out next add it with" in first
     assert (
         first.index("sysid add")
         < first.index("the motion predicts 3 % of what is left")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shlex
 import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -116,8 +117,19 @@ def _head(f: dict, of: Told, joint: str, width: int, said: dict[str, str]) -> li
         rest = listed([f"{placed(e, j, f['joint'])} ({percent(p)})" for e, j, p in others], "or")
         words = f"  these logs cannot tell it ({percent(f['probability'])}) from {rest}"
         out += wrapped(words, width, "    ")
-        out += wrapped(f"  to separate them: {f['separate_by']}", width, "    ")
+        out += wrapped(f"  to separate them: {f['separate_by']}; or the motion of", width, "    ")
+        out.append(_designs(f, others))
     return [*out, "  add it with", f["command"]]
+
+
+def _designs(f: dict, others) -> str:
+    """What is typed for a motion that separates an effect from those it is not told from."""
+    likely = [(e, j) for e, j, p in others if p >= 0.01] or [others[0][:2]]  # others: "less than"
+    suspects = [f"{e}:{j}" for e, j in ((f["effect"], f["joint"]), *likely)]
+    target = shlex.split(f["command"])[2]
+    return shlex.join(
+        ["sysid", "design", target, "--separate", ",".join(suspects), "--out", "next"]
+    )
 
 
 def _options(f: dict) -> str:
