@@ -6,6 +6,7 @@
     sysid.diagnose(experiment, fit=fit)
     fit.to_dataframe(), fit.plot()
     fit.rms("test"), fit.x, fit.uncertainty.std
+    sysid.design(experiment, duration=20.0).plot()
     sysid.predict(fit, "another_log.csv").residual
     sysid.compare(fit, another_fit)
     sysid.write(fit, "runs/mine")
@@ -19,7 +20,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from . import check, diagnose, export
+    from . import check, design, diagnose, export
     from .comparison import Difference, compare
     from .errors import SysidError, SysidWarning
     from .estimate import Fit, Prediction
@@ -34,7 +35,7 @@ _WHERE = {
     "write": ("results", "write"), "compare": ("comparison", "compare"), "Difference": ("comparison", "Difference"),
     "Experiment": ("config", "Experiment"), "Fit": ("estimate", "Fit"), "Prediction": ("estimate", "Prediction"),
     "read_run": ("run", "read_run"), "Run": ("run", "Run"),
-    "check": ("check", None), "diagnose": ("diagnose", None), "export": ("export", None), "SysidError": ("errors", "SysidError"), "SysidWarning": ("errors", "SysidWarning"),
+    "check": ("check", None), "design": ("design", None), "diagnose": ("diagnose", None), "export": ("export", None), "SysidError": ("errors", "SysidError"), "SysidWarning": ("errors", "SysidWarning"),
 }  # fmt: skip
 
 
@@ -51,6 +52,6 @@ def __dir__():
 
 
 __all__ = [
-    "Difference", "Experiment", "Fit", "Prediction", "Run", "SysidError", "SysidWarning", "check", "compare", "diagnose", "export", "fit",
-    "load", "predict", "read_run", "write",
+    "Difference", "Experiment", "Fit", "Prediction", "Run", "SysidError", "SysidWarning", "check", "compare", "design", "diagnose", "export",
+    "fit", "load", "predict", "read_run", "write",
 ]

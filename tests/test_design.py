@@ -252,3 +252,15 @@ def test_a_floor_is_kept_above(arm):
     low = shapes.least(np.array([[0.0, 0.0], [1.5, 0.0]]))
     assert low[0] < low[1]  # hanging down from a metre, the arm ends at a quarter of one or so
     assert solve.Found(Fourier(4.0, 5, 1, 2), np.zeros((2, 9)), 0.0).value == 0.0
+
+
+def test_a_design_shows_itself(poor, designed, tmp_path):
+    import sysid
+
+    assert "design" in dir(sysid) and sysid.design.__doc__
+    assert len(repr(designed)) < 200 and "stribeck" in repr(designed)
+    table = designed.to_dataframe()
+    assert table.columns[:3] == ["t", "q_shoulder", "q_elbow"] and len(table) == len(designed.t)
+    designed.plot().savefig(tmp_path / "design.png")
+    again = sysid.design(sysid.load(poor[0]), duration=4.0)
+    assert again.family.duration == 4.0

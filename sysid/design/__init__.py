@@ -1,4 +1,4 @@
-"""The next motion to log: the most informative within the limits, or the one that separates suspects.
+"""The next motion to log: the most informative within its limits, or one that separates suspects.
 
 fourier.py      motions: sums of harmonics, at rest at both ends
 limits.py       positions, speeds, accelerations, jerks, torques, clearance, floor
@@ -7,12 +7,18 @@ columns.py      what parameters do to an instant's torque, and how that changes 
 information.py  log det M of a motion, and its slope
 solve.py        linear programs within a trust region, several starts
 promise.py      deviations now and after, and which suspects will be told apart
+basis.py        what a design starts from
 designed.py     all of it on one page
+result.py       a motion and what it promises
 folder.py       the files
 """
 
-from .designed import Design, design
+from ..callable_module import callable_module
+from .designed import design
 from .folder import document, write
 from .limits import read as read_limits
+from .result import Design
+
+callable_module(__name__, "", "design")  # `sysid.design(experiment)`
 
 __all__ = ["Design", "design", "document", "read_limits", "write"]

@@ -119,7 +119,9 @@ class Geometry:
         """Velocity Jacobian (3, nv) of a point [m, base frame] that moves with a joint."""
         if joint == 0:
             return np.zeros((3, self.model.nv))
-        jacobian = pin.getJointJacobian(self.model, data, joint, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)
+        jacobian = pin.getJointJacobian(
+            self.model, data, joint, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+        )
         arm = place - data.oMi[joint].translation
         return jacobian[:3] + np.cross(jacobian[3:], arm, axisa=0).T
 
@@ -134,9 +136,13 @@ def _corners(shape) -> np.ndarray:
 
 
 def geometry(robot: Robot, floor: float | None = None) -> Geometry:
-    """What a robot's links look like. Warns where the URDF does not say, or its meshes are not to be found."""
+    """What a robot's links look like. Warns where the URDF does not say, or its meshes are not to
+    be found."""
     model = _model(robot)
-    shapes, source = _stated(robot, model), "the URDF's collision geometry, meshes as their convex hulls"
+    shapes, source = (
+        _stated(robot, model),
+        "the URDF's collision geometry, meshes as their convex hulls",
+    )
     if shapes is None or not shapes.ngeoms:
         shapes, source = _capsules(robot, model), "capsules as thick as the links' inertia says"
         warnings.warn(
@@ -167,7 +173,9 @@ def _tree(robot: Robot) -> ElementTree.Element:
             child.set("type", "revolute")
             for limit in child.findall("limit"):
                 child.remove(limit)
-            ElementTree.SubElement(child, "limit", lower="-1e9", upper="1e9", effort="1e9", velocity="1e9")
+            ElementTree.SubElement(
+                child, "limit", lower="-1e9", upper="1e9", effort="1e9", velocity="1e9"
+            )
     return root
 
 
@@ -187,7 +195,9 @@ def _stated(robot: Robot, model: pin.Model) -> pin.GeometryModel | None:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            shapes = pin.buildGeomFromUrdfString(whole, text, pin.GeometryType.COLLISION, package_dirs=folders)
+            shapes = pin.buildGeomFromUrdfString(
+                whole, text, pin.GeometryType.COLLISION, package_dirs=folders
+            )
     except (ValueError, RuntimeError):
         return None
     for shape in shapes.geometryObjects:
@@ -203,8 +213,8 @@ def _stated(robot: Robot, model: pin.Model) -> pin.GeometryModel | None:
 
 
 def _hull(mesh: coal.BVHModelBase) -> coal.Convex:
-    """The convex hull of a mesh. Its own `buildConvexRepresentation` gives hulls whose distances are wrong by centimetres
-    (coal 3.0); this one's are those of a quadratic program over the same points."""
+    """The convex hull of a mesh. Its own `buildConvexRepresentation` gives hulls whose distances are
+    wrong by centimetres (coal 3.0); this one's are those of a quadratic program over its points."""
     points = coal.StdVec_Vec3s()
     for point in np.array(mesh.vertices()):
         points.append(point)
@@ -221,11 +231,23 @@ def _capsules(robot: Robot, model: pin.Model) -> pin.GeometryModel:
         mass, com, central = pseudo.to_central(pi)
         # a rod's moment about its own axis is m r^2 / 2
         radius = max(float(np.sqrt(2.0 * np.linalg.eigvalsh(central)[0] / mass)), _THINNEST)
-        ends = [model.jointPlacements[k].translation for k in range(1, model.njoints) if model.parents[k] == joint]
+        ends = [
+            model.jointPlacements[k].translation
+            for k in range(1, model.njoints)
+            if model.parents[k] == joint
+        ]
         for end in ends or [2.0 * com]:
             length = float(np.linalg.norm(end))
-            turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), np.asarray(end, dtype=float)) if length > 0 else pin.Quaternion.Identity()
+            turn = (
+                pin.Quaternion.FromTwoVectors(
+                    np.array([0.0, 0.0, 1.0]), np.asarray(end, dtype=float)
+                )
+                if length > 0
+                else pin.Quaternion.Identity()
+            )
             placed = pin.SE3(turn.matrix(), 0.5 * np.asarray(end, dtype=float))
             shape = coal.Capsule(radius, max(length - 2.0 * radius, 0.0))
-            shapes.addGeometryObject(pin.GeometryObject(f"{body.name}_{shapes.ngeoms}", joint, placed, shape))
+            shapes.addGeometryObject(
+                pin.GeometryObject(f"{body.name}_{shapes.ngeoms}", joint, placed, shape)
+            )
     return shapes

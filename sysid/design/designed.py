@@ -1,72 +1,40 @@
 """An experiment, its logs and its limits -> the next motion, with what it promises.
 
-    fit of the logs that exist (or, without any, the URDF) -> model, noise, information so far
-    limits and shapes of links -> what a motion must keep to
-    random motions within the limits -> starts, and the yardstick
-    linear programs -> the motion
-    fit + motion -> deviations now and after, and which suspects will be told apart
+fit of the logs that exist (or, without any, the URDF) -> model, noise, information so far
+limits and shapes of links -> what a motion must keep to
+random motions within the limits -> starts, and the yardstick
+linear programs -> the motion
+fit + motion -> deviations now and after, and which suspects will be told apart
 """
 
 from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from .. import pipeline
-from ..candidates import Candidate, candidates, own_effects
-from ..errors import ConfigError, LogError, SysidWarning
+from ..errors import ConfigError, SysidWarning
 from ..estimate import Fit
-from ..filters import settled
-from ..model import ROBOT, Model
-from ..motion import Motion
-from ..preprocess import prepare
 from ..specs import Experiment
 from . import promise, solve
+from .basis import Basis, basis
 from .collision import Geometry, geometry
-from .columns import columns, is_of_the_torque, of_the_instant
+from .columns import columns, of_the_instant
 from .fourier import Fourier
-from .information import Known, gram, own_size
+from .information import gram
 from .limits import Limits, LimitsSpec, limits
-from .promise import Pair, played, spelled
+from .promise import played, spelled
+from .result import Design
 from .solve import Found, Problem
 
 HARMONICS = 5
 _ROUNDS = (1, 2, 4, 8)  # of the slowest harmonic
 _FASTEST = 0.25  # of a period of the filter's window: what it still lets through of the fastest
-_WINDOW = 0.1  # s, where none is known
 _DRAWN = 4  # random motions for each number of rounds; the best is where the search begins
 _IMPROVED = 2  # numbers of rounds from which it begins: those whose best random motion tells most
-_GUESSED = 0.02  # of a joint's torque: its noise, where no log says
-_RATE = 500.0  # Hz, where no log says
-
-
-@dataclass(frozen=True)
-class Design:
-    """A motion and what it promises.
-
-    t (n,) [s]; q, qd, qdd (n, dof); torque (n, dof) as predicted, and its deviation; log_det of the
-    information, and that of the best random motion; deviations: {parameter: {now, after}}; pairs of
-    suspects; margins: shares of each range that are left, and metres. said: what to know of it.
-    """
-
-    joints: tuple[str, ...]
-    family: Fourier
-    coefficients: np.ndarray
-    t: np.ndarray
-    q: np.ndarray
-    qd: np.ndarray
-    qdd: np.ndarray
-    torque: np.ndarray
-    log_det: float
-    random_best: float
-    deviations: dict[str, dict[str, float]]
-    pairs: tuple[Pair, ...]
-    margins: dict[str, float]
-    limits: Limits
-    said: tuple[str, ...]
 
 
 def design(
@@ -87,7 +55,7 @@ def design(
     if not 2.0 <= duration <= 600.0:
         raise ConfigError(f"--duration {duration:g}", allowed="2 to 600 s")
     with pipeline.noticed() as notices:
-        base = _basis(experiment, separate, tell)
+        base = basis(experiment, separate, tell)
         seen = None if base.fit is None else _greatest(base.fit)
         bounds = limits(base.robot, limits_spec, seen)
         family = Fourier(duration, HARMONICS, 1, base.robot.dof)
@@ -99,120 +67,12 @@ def design(
     return _told(base, replace(problem, family=found.family), bounds, found, random_best, notices)
 
 
-@dataclass(frozen=True)
-class _Basis:
-    """What a design starts from."""
-
-    robot: object
-    fit: Fit | None
-    motion: Motion | None
-    known: Known
-    pose: np.ndarray
-    rate: float
-    window: float
-    suspects: list[Candidate]
-
-
-def _basis(experiment: Experiment, separate, tell) -> _Basis:
-    machine, structure, prior = pipeline.build(experiment)
-    fit = motion = None
-    if _has_logs(experiment):
-        read = pipeline.read_all(experiment)
-        fit = pipeline.fit(experiment, progress=tell, measured=read)
-        spec = settled(fit.experiment.preprocess, fit.filters)
-        motion = prepare(read.train, spec, machine.joints)
-        structure, x = fit.model, fit.x
-        noise = np.maximum(np.array(list(fit.rms("test").values())), 1e-9)
-        pose = np.concatenate([p.q for p in motion.pieces]).mean(axis=0)
-        rate = 1.0 / motion.pieces[0].step
-        window = float(fit.filters.get("window", _WINDOW))
-    else:
-        warnings.warn(
-            SysidWarning(
-                "there is no log yet: the design rests on the URDF, with noise of "
-                f"{100 * _GUESSED:g} % of each joint's torque limit"
-            ),
-            stacklevel=2,
-        )
-        x = np.concatenate([prior.ravel(), np.zeros(len(structure.coefficients))])
-        effort = np.array([machine.source.joints[j].effort for j in machine.joints])
-        noise = _GUESSED * np.where(np.isfinite(effort) & (effort > 0.0), effort, 10.0)
-        low, high = np.where(np.isfinite(machine.limits.T), machine.limits.T, [[-1.0], [1.0]])
-        pose = np.clip(np.zeros(machine.dof), 0.9 * low + 0.1 * high, 0.1 * low + 0.9 * high)
-        rate, window = experiment.data.rate or _RATE, _WINDOW
-    suspects = _suspects(experiment, structure, separate)
-    known = _known(structure, fit, x, noise, prior, suspects)
-    return _Basis(machine, fit, motion, known, pose, rate, window, suspects)
-
-
-def _has_logs(experiment: Experiment) -> bool:
-    """Whether the training logs are there: all of them, or none."""
-    named = [name for log in experiment.data.train for name in log.names]
-    there = [(experiment.folder / name).exists() or ":" in name for name in named]
-    if any(there) and not all(there):
-        missing = named[there.index(False)]
-        raise LogError("there is no such file", where=missing, do="check data.train")
-    return all(there)
-
-
-def _suspects(experiment: Experiment, model: Model, separate) -> list[Candidate]:
-    joints = model.robot.joints
-    every = candidates(model, own_effects(experiment))
-    out = []
-    for effect, joint in separate:
-        if joint != "*" and joint not in joints:
-            raise ConfigError(
-                f"--separate names the joint {joint!r}", allowed=", ".join((*joints, "*")),
-                do="correct the joint",
-            )  # fmt: skip
-        number = ROBOT if joint == "*" else joints.index(joint)
-        own = [c for c in every if c.key == (effect, number)]
-        if not own:
-            there = sorted({c.name for c in every if c.joint == number})
-            raise ConfigError(
-                f"--separate names {effect}:{joint}, which is no effect that the model lacks there",
-                allowed=", ".join(there), do="correct the effect",
-            )  # fmt: skip
-        out.append(own[0])
-    return out
-
-
-def _known(model: Model, fit: Fit | None, x, noise, prior, suspects) -> Known:
-    """What a design asks of: the model's instant, with the suspects that are columns of it."""
-    instant = of_the_instant(model)
-    values = dict(zip(model.names, x))
-    own = np.array([values[name] for name in instant.names])
-    typical = np.maximum(20.0 * noise, 1e-6)
-    if fit is not None:
-        typical = np.sqrt(np.mean(fit.predictions["train"].measured ** 2, axis=0))
-    before = own_size(instant, prior, own, np.maximum(typical, 1e-9))
-    if fit is not None:
-        places = [model.names.index(name) for name in instant.names]
-        for factor in fit.compressed.by_joint:
-            whole = np.zeros((len(factor.triangle), model.size))
-            whole[:, factor.columns] = factor.triangle[:, :-1]
-            rows = whole[:, places] / noise[factor.joint]
-            before = before + rows.T @ rows
-    grown = instant
-    for suspect in suspects:
-        effect = suspect.effect
-        if is_of_the_torque(effect) and effect.instantaneous and not effect.uses_load:
-            grown = grown.with_effect(effect, (suspect.joint,))
-    if grown.size > instant.size:
-        more = grown.size - instant.size
-        x_grown = np.append(own, np.zeros(more))
-        whole = own_size(grown, prior, x_grown, np.maximum(typical, 1e-9))
-        whole[: instant.size, : instant.size] = before
-        return Known(grown, x_grown, noise, whole)
-    return Known(instant, own, noise, before)
-
-
 def _greatest(fit: Fit) -> np.ndarray:
     parts = [p.measured for p in fit.predictions.values()]
     return np.max([np.abs(m).max(axis=0) for m in parts], axis=0)
 
 
-def _searched(problem: Problem, base: _Basis, seed: int, tell) -> tuple[Found, float]:
+def _searched(problem: Problem, base: Basis, seed: int, tell) -> tuple[Found, float]:
     """The best motion of all starts, and log det M of the best random one."""
     fastest = _FASTEST / base.window
     duration = problem.family.duration
@@ -257,10 +117,14 @@ def _why(problem: Problem, pose) -> str:
         j = int(np.argmax(held / own.torque))
         return f"holding {joints[j]} against gravity needs {held[j]:.3g} of {own.torque[j]:.3g}"
     near = float(problem.geometry.least(pose[None])[0])
-    return f"links come within {near:.3g} m of each other or the floor, allowed is {own.clearance:g}"
+    return (
+        f"links come within {near:.3g} m of each other or the floor, allowed is {own.clearance:g}"
+    )
 
 
-def _told(base: _Basis, problem: Problem, bounds: Limits, found: Found, random_best, notices) -> Design:
+def _told(
+    base: Basis, problem: Problem, bounds: Limits, found: Found, random_best, notices
+) -> Design:
     family = found.family
     t = np.arange(int(round(family.duration * base.rate)) + 1) / base.rate
     q, qd, qdd, _ = family.motion(found.z, t)

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ..results import folder, number, versions, write_atomically, write_json
-from .designed import Design
+from .result import Design
 
 _POINTS = 20.0  # Hz of the ROS trajectory's points, between which a controller interpolates
 

@@ -16,7 +16,9 @@ from ..simulate.motion import room, top_speeds
 from ..specs import Number, Positive
 
 _MARGIN = 0.05  # of a range is kept free: what a controller overshoots by
-_CLEARANCE = 0.01  # m between links: a centimetre, about what hulls of meshes and a controller err by
+_CLEARANCE = (
+    0.01  # m between links: a centimetre, about what hulls of meshes and a controller err by
+)
 _RISE = 0.2  # s from rest to top speed, where nothing limits the acceleration: a quick arm's
 _FILE = 1_000_000  # bytes
 
@@ -146,8 +148,9 @@ def _positions(robot: Robot, spec: LimitsSpec, said: list[str]) -> np.ndarray:
                 said.append(f"{joint} has no position limits: {out[j, 0]:.3g} to {out[j, 1]:.3g}")
         if joint in spec.position:
             low, high = spec.position[joint]
-            out[j] = max(out[j, 0], low) if np.isfinite(robot.limits[j, 0]) else low, (
-                min(out[j, 1], high) if np.isfinite(robot.limits[j, 1]) else high
+            out[j] = (
+                max(out[j, 0], low) if np.isfinite(robot.limits[j, 0]) else low,
+                (min(out[j, 1], high) if np.isfinite(robot.limits[j, 1]) else high),
             )
         if not out[j, 0] < out[j, 1]:
             raise ConfigError(

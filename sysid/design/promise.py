@@ -1,7 +1,7 @@
 """What a designed log will tell: deviations now and after, and which suspects it will tell apart.
 
-Standard deviations are those of the fit's own estimator, (H^-1 S H^-1) with H the data's Hessian and
-the prior's and S what noise makes of the gradient; what the fit itself says now is scaled by how the
+Standard deviations are those of the fit's own estimator, (H^-1 S H^-1) with H the Hessian of data
+and prior and S what noise makes of the gradient; what the fit itself says now is scaled by how the
 formula falls.
 
 A suspect a that is true leaves, of its torque s_a, what the model and its rival b cannot make
@@ -55,7 +55,9 @@ def played(q, qd, qdd, step: float, template: Motion) -> Motion:
     return Motion(template.joints, (own,), (), rest, rest.astype(int))
 
 
-def pairs(fit: Fit, suspects: list[Candidate], old: Motion, new: Motion, samples: float) -> list[Pair]:
+def pairs(
+    fit: Fit, suspects: list[Candidate], old: Motion, new: Motion, samples: float
+) -> list[Pair]:
     """How likely it is that each two suspects will be told apart by the old logs with the new one.
 
     Args:
@@ -77,7 +79,9 @@ def pairs(fit: Fit, suspects: list[Candidate], old: Motion, new: Motion, samples
     for i, a in enumerate(suspects):
         for j, b in enumerate(suspects[:i]):
             probability = min(
-                _apart(parts, prior, [own[k] for own in blocks], sizes[k], [own[m] for own in blocks])
+                _apart(
+                    parts, prior, [own[k] for own in blocks], sizes[k], [own[m] for own in blocks]
+                )
                 for k, m in ((i, j), (j, i))
             )
             out.append(Pair(spelled(b, fit.joints), spelled(a, fit.joints), probability))

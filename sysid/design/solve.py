@@ -32,7 +32,9 @@ _PRICE = 1e4  # of log det M for going beyond a limit by as much as the limit
 _CHECKED = 1000.0  # Hz at which limits are kept
 _CLOSE = 100.0  # Hz at which distances are: between two looks a link's point moves a few mm
 _LOOKED = 50.0  # Hz at which they are while the motion is sought
-_SIGHT = 0.03  # m beyond the clearance: pairs that a step minds; of others it is looked at afterwards
+_SIGHT = (
+    0.03  # m beyond the clearance: pairs that a step minds; of others it is looked at afterwards
+)
 _BISECTIONS = 12
 _LARGEST = 0.5  # of the range: amplitudes of a random start
 
@@ -238,7 +240,9 @@ def _step(problem: Problem, at: _Look, grid: _Grid, radius: float) -> np.ndarray
     return found.x[:-1].reshape(dof, size) if found.status == 0 else None
 
 
-def improved(problem: Problem, start, report: Callable[[float], None] = lambda share: None) -> Found:
+def improved(
+    problem: Problem, start, report: Callable[[float], None] = lambda share: None
+) -> Found:
     """The best motion that is found from a start (dof, size)."""
     grid, z = _grid(problem, np.zeros(0)), shrunk(problem, np.array(start))
     if z is None:
@@ -290,7 +294,9 @@ def _passed(problem: Problem, z) -> np.ndarray:
     t = checked(problem)
     motion = problem.family.motion(z, t)
     over = shares(problem, motion, torque(problem, *motion[:3]))
-    found = [t[_peaks(own)] for own in np.moveaxis(over, 1, 2).reshape(-1, len(t)) if own.max() > 1.0]
+    found = [
+        t[_peaks(own)] for own in np.moveaxis(over, 1, 2).reshape(-1, len(t)) if own.max() > 1.0
+    ]
     every = int(_CHECKED // _CLOSE)
     lacks = 2.0 - problem.geometry.least(motion[0][::every]) / max(problem.limits.clearance, 1e-6)
     return np.concatenate([*found, t[::every][_peaks(lacks)], np.zeros(0)])

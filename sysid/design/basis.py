@@ -1,0 +1,134 @@
+"""What a design starts from: the fit of the logs that exist, or the URDF where there are none."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+
+import numpy as np
+
+from .. import pipeline
+from ..candidates import Candidate, candidates, own_effects
+from ..errors import ConfigError, LogError, SysidWarning
+from ..estimate import Fit
+from ..filters import settled
+from ..model import ROBOT, Model
+from ..motion import Motion
+from ..preprocess import prepare
+from ..robot import Robot
+from ..specs import Experiment
+from .columns import is_of_the_torque, of_the_instant
+from .information import Known, own_size
+
+_WINDOW = 0.1  # s, where none is known
+_GUESSED = 0.02  # of a joint's torque: its noise, where no log says
+_RATE = 500.0  # Hz, where no log says
+
+
+@dataclass(frozen=True)
+class Basis:
+    """What a design starts from."""
+
+    robot: Robot
+    fit: Fit | None
+    motion: Motion | None
+    known: Known
+    pose: np.ndarray
+    rate: float
+    window: float
+    suspects: list[Candidate]
+
+
+def basis(experiment: Experiment, separate, tell) -> Basis:
+    """What an experiment knows of its robot. Raises SysidError."""
+    machine, structure, prior = pipeline.build(experiment)
+    fit = motion = None
+    if _has_logs(experiment):
+        read = pipeline.read_all(experiment)
+        fit = pipeline.fit(experiment, progress=tell, measured=read)
+        spec = settled(fit.experiment.preprocess, fit.filters)
+        motion = prepare(read.train, spec, machine.joints)
+        structure, x = fit.model, fit.x
+        noise = np.maximum(np.array(list(fit.rms("test").values())), 1e-9)
+        pose = np.concatenate([p.q for p in motion.pieces]).mean(axis=0)
+        rate = 1.0 / motion.pieces[0].step
+        window = float(fit.filters.get("window", _WINDOW))
+    else:
+        warnings.warn(
+            SysidWarning(
+                "there is no log yet: the design rests on the URDF, with noise of "
+                f"{100 * _GUESSED:g} % of each joint's torque limit"
+            ),
+            stacklevel=2,
+        )
+        x = np.concatenate([prior.ravel(), np.zeros(len(structure.coefficients))])
+        effort = np.array([machine.source.joints[j].effort for j in machine.joints])
+        noise = _GUESSED * np.where(np.isfinite(effort) & (effort > 0.0), effort, 10.0)
+        low, high = np.where(np.isfinite(machine.limits.T), machine.limits.T, [[-1.0], [1.0]])
+        pose = np.clip(np.zeros(machine.dof), 0.9 * low + 0.1 * high, 0.1 * low + 0.9 * high)
+        rate, window = experiment.data.rate or _RATE, _WINDOW
+    suspects = _suspects(experiment, structure, separate)
+    known = _known(structure, fit, x, noise, prior, suspects)
+    return Basis(machine, fit, motion, known, pose, rate, window, suspects)
+
+
+def _has_logs(experiment: Experiment) -> bool:
+    """Whether the training logs are there: all of them, or none."""
+    named = [name for log in experiment.data.train for name in log.names]
+    there = [(experiment.folder / name).exists() or ":" in name for name in named]
+    if any(there) and not all(there):
+        missing = named[there.index(False)]
+        raise LogError("there is no such file", where=missing, do="check data.train")
+    return all(there)
+
+
+def _suspects(experiment: Experiment, model: Model, separate) -> list[Candidate]:
+    joints = model.robot.joints
+    every = candidates(model, own_effects(experiment))
+    out = []
+    for effect, joint in separate:
+        if joint != "*" and joint not in joints:
+            raise ConfigError(
+                f"--separate names the joint {joint!r}", allowed=", ".join((*joints, "*")),
+                do="correct the joint",
+            )  # fmt: skip
+        number = ROBOT if joint == "*" else joints.index(joint)
+        own = [c for c in every if c.key == (effect, number)]
+        if not own:
+            there = sorted({c.name for c in every if c.joint == number})
+            raise ConfigError(
+                f"--separate names {effect}:{joint}, which is no effect that the model lacks there",
+                allowed=", ".join(there), do="correct the effect",
+            )  # fmt: skip
+        out.append(own[0])
+    return out
+
+
+def _known(model: Model, fit: Fit | None, x, noise, prior, suspects) -> Known:
+    """What a design asks of: the model's instant, with the suspects that are columns of it."""
+    instant = of_the_instant(model)
+    values = dict(zip(model.names, x))
+    own = np.array([values[name] for name in instant.names])
+    typical = np.maximum(20.0 * noise, 1e-6)
+    if fit is not None:
+        typical = np.sqrt(np.mean(fit.predictions["train"].measured ** 2, axis=0))
+    before = own_size(instant, prior, own, np.maximum(typical, 1e-9))
+    if fit is not None:
+        places = [model.names.index(name) for name in instant.names]
+        for factor in fit.compressed.by_joint:
+            whole = np.zeros((len(factor.triangle), model.size))
+            whole[:, factor.columns] = factor.triangle[:, :-1]
+            rows = whole[:, places] / noise[factor.joint]
+            before = before + rows.T @ rows
+    grown = instant
+    for suspect in suspects:
+        effect = suspect.effect
+        if is_of_the_torque(effect) and effect.instantaneous and not effect.uses_load:
+            grown = grown.with_effect(effect, (suspect.joint,))
+    if grown.size > instant.size:
+        more = grown.size - instant.size
+        x_grown = np.append(own, np.zeros(more))
+        whole = own_size(grown, prior, x_grown, np.maximum(typical, 1e-9))
+        whole[: instant.size, : instant.size] = before
+        return Known(grown, x_grown, noise, whole)
+    return Known(instant, own, noise, before)
