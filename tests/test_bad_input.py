@@ -235,7 +235,7 @@ YAML_FAULTS = {
     "Latin-1": ("robot: {urdf: Gerät.urdf}\n".encode("latin-1"), ["config.yaml", "not UTF-8"]),
     "UTF-16": ("robot: {urdf: robot.urdf}\n".encode("utf-16"), ["config.yaml", "not UTF-8"]),
     "too large": (b"#" * 1_000_001, ["config.yaml", "1000001 bytes", "allowed: at most"]),
-    "no file": (None, ["config.yaml", "No such file", "check its name"]),
+    "no file": (None, ["a folder without config.yaml", "sysid init"]),
 }
 
 
