@@ -7,7 +7,7 @@ import math
 from ..diagnose.diagnosis import Diagnosis
 from ..effect import describe
 from ..estimate import Fit, given_shapes, said_of_shapes
-from ..statement.text import percent
+from ..statement.text import designs, percent
 from .words import (
     SPACE,
     chance,
@@ -186,7 +186,9 @@ def _claim(claim, joint: str, several: bool, document: dict) -> str:
     if others:
         words = " or ".join(f"{placed(e, j, head.joint)}{SPACE}({chance(p)})" for e, j, p in others)
         out += f" These logs cannot tell it ({chance(head.probability)}) from {words}."
-        out += f" To separate them: {text(head.candidate.effect.separate_by)}."
+        typed = designs(head.command, (head.effect, head.joint), others)
+        out += f" To separate them: {text(head.candidate.effect.separate_by)}; or the motion of "
+        out += f'<span class="by-hand"><code>{text(typed)}</code></span>.'
     return out
 
 

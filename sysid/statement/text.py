@@ -118,18 +118,17 @@ def _head(f: dict, of: Told, joint: str, width: int, said: dict[str, str]) -> li
         words = f"  these logs cannot tell it ({percent(f['probability'])}) from {rest}"
         out += wrapped(words, width, "    ")
         out += wrapped(f"  to separate them: {f['separate_by']}; or the motion of", width, "    ")
-        out.append(_designs(f, others))
+        out.append(designs(f["command"], (f["effect"], f["joint"]), others))
     return [*out, "  add it with", f["command"]]
 
 
-def _designs(f: dict, others) -> str:
-    """What is typed for a motion that separates an effect from those it is not told from."""
+def designs(added: str, head: tuple[str, str], others) -> str:
+    """What is typed for a motion that separates an effect (effect, joint), which the command
+    `added` adds, from those it is not told from: (effect, joint, probability)."""
     likely = [(e, j) for e, j, p in others if p >= 0.01] or [others[0][:2]]  # others: "less than"
-    suspects = [f"{e}:{j}" for e, j in ((f["effect"], f["joint"]), *likely)]
-    target = shlex.split(f["command"])[2]
-    return shlex.join(
-        ["sysid", "design", target, "--separate", ",".join(suspects), "--out", "next"]
-    )
+    suspects = ",".join(f"{e}:{j}" for e, j in (head, *likely))
+    target = shlex.split(added)[2]
+    return shlex.join(["sysid", "design", target, "--separate", suspects, "--out", "next"])
 
 
 def _options(f: dict) -> str:
