@@ -57,7 +57,8 @@ def design(
     with pipeline.noticed() as notices:
         base = basis(experiment, separate, tell)
         seen = None if base.fit is None else _greatest(base.fit)
-        bounds = limits(base.robot, limits_spec, seen)
+        fastest = None if base.motion is None else _fastest(base.motion)
+        bounds = limits(base.robot, limits_spec, seen, fastest)
         family = Fourier(duration, HARMONICS, 1, base.robot.dof)
         shapes = geometry(base.robot, bounds.floor).about(base.pose, bounds.clearance)
         problem = Problem(base.known, bounds.inner(), shapes, family, base.rate)
@@ -65,6 +66,11 @@ def design(
         for text in bounds.said:
             warnings.warn(SysidWarning(text), stacklevel=2)
     return _told(base, replace(problem, family=found.family), bounds, found, random_best, notices)
+
+
+def _fastest(motion) -> np.ndarray:
+    """(dof,) greatest speed of a motion."""
+    return np.max([np.abs(p.qd[p.core]).max(axis=0) for p in motion.pieces], axis=0)
 
 
 def _greatest(fit: Fit) -> np.ndarray:

@@ -101,12 +101,20 @@ def read(path: Path) -> LimitsSpec:
         ) from None  # fmt: skip
 
 
-def limits(robot: Robot, spec: LimitsSpec | None, seen: np.ndarray | None) -> Limits:
+def limits(
+    robot: Robot,
+    spec: LimitsSpec | None,
+    seen: np.ndarray | None,
+    fastest: np.ndarray | None = None,
+) -> Limits:
     """The limits of a robot: the URDF's, those of a file within them, and what takes the place of
     those that nobody states.
 
     Args:
-        seen: (dof,) the greatest torque that the robot's logs hold, None without a log.
+        seen: (dof,) the greatest torque that the robot's logs hold, None without a log; fastest:
+            (dof,) the greatest speed. Speeds stay within that, or within what a robot of this size
+            usually moves at, unless the file says more: beyond, filters, clocks and controllers
+            err by more than what is asked.
 
     Raises:
         ConfigError: a joint that is not there, a range that holds nothing.
@@ -123,7 +131,10 @@ def limits(robot: Robot, spec: LimitsSpec | None, seen: np.ndarray | None) -> Li
     said: list[str] = []
     position = _positions(robot, spec, said)
     stated = np.array([joint.velocity for joint in own])
-    velocity = _most(robot, "velocity", stated, spec.velocity, top_speeds(robot), said)
+    usual = top_speeds(robot) if fastest is None else np.maximum(top_speeds(robot), fastest)
+    asked = np.array([joint in spec.velocity for joint in robot.joints])
+    stated = np.where(asked | (stated <= 0.0), stated, np.minimum(stated, usual))
+    velocity = _most(robot, "velocity", stated, spec.velocity, usual, said)
     ramp = velocity / _RISE
     acceleration = _most(
         robot, "acceleration", np.full(robot.dof, np.inf), spec.acceleration, ramp, None
