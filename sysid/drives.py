@@ -167,16 +167,16 @@ def found(experiment: Experiment, model: Model, x, std, shape_std) -> list[Found
     Args:
         x, std (size,) of the linear parameters; shape_std (shape values,).
     """
-    shapes = {v.name: (value, s) for v, value, s in zip(model.shape_values, model.shapes, shape_std)}
+    known, spread = factors(experiment, model), {v.name: s for v, s in zip(model.shape_values, shape_std)}
     linear = dict(zip(model.names, zip(np.asarray(x).tolist(), np.asarray(std).tolist())))
     out = []
     for joint, factor in leading_factors(experiment).items():
         spec = experiment.actuator.get(joint)
         if isinstance(factor, FreeFactor):
-            e, deviation = shapes[f"torque_gain.{joint}.e"]
-            factor = value = motor_side.started(factor) / (1.0 + e)
+            value, start = known[joint], motor_side.started(factor)
+            deviation = value**2 / abs(start) * spread[f"{FreeGain.name}.{joint}.e"]  # of start / (1 + e)
             word = motor_side.leading(experiment.data.torque[joint]) if spec is None else "kp" if spec.command is not None else "k/R"
-            out.append(Found(joint, word, value, abs(value) * deviation / (1.0 + e), _unit(model, joint, spec)))
+            out.append(Found(joint, word, value, deviation, _unit(model, joint, spec)))
         if spec is None:
             continue
         own = motor_side.drive(spec)
@@ -185,7 +185,7 @@ def found(experiment: Experiment, model: Model, x, std, shape_std) -> list[Found
             out.append(Found(joint, word, *linear[f"viscous.{joint}.Fv"], model.units[model.names.index(f"viscous.{joint}.Fv")]))
         if isinstance(spec.delay, FreeFactor):
             more, deviation = linear[f"{LateCommand.name}.{joint}.c"]
-            out.append(Found(joint, "delay", own.delay + more / factor, abs(deviation / factor), "s"))
+            out.append(Found(joint, "delay", own.delay + more / known[joint], abs(deviation / known[joint]), "s"))
     for joint, entry in experiment.data.torque.items():
         out += [Found(joint, name, *linear[f"{SharedTorque.name}.{joint}.{name}"], "1") for name in entry if name not in motor_side.told(entry)]
     return out

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 
 import numpy as np
 
@@ -13,7 +12,7 @@ from .compress import Compressed
 from .errors import ConfigError
 from .inertia import DIVERGENCES, PARAMETERIZATIONS
 from .inertia.consistency import is_consistent
-from .inverse_dynamics import InverseDynamics, inverse_dynamics
+from .inverse_dynamics import WithTorque
 from .model import Model, moving_coefficients
 from .motion import Motion
 from .multistart import Searched
@@ -116,7 +115,7 @@ def _sum(values):
 
 
 @dataclass(frozen=True)
-class Fit:
+class Fit(WithTorque):
     """What identification found.
 
     pi (bodies, 10) about the joints' frames, `prior` the same before any data, `known` (bodies, 10, 10) the Hessian by which some are held to it, or None; coefficients of the effects in `model.coefficients`' order;
@@ -170,30 +169,6 @@ class Fit:
     def plot(self, part: str = "test"):
         """Measured and predicted torque of every joint on "train" or "test", as a Matplotlib figure."""
         return self.predictions[part].plot()
-
-    @cached_property
-    def inverse_dynamics(self) -> InverseDynamics:
-        """What `torque` computes with; made when it is first used."""
-        return inverse_dynamics(self.model, self.x)
-
-    def torque(self, q, qd, qdd) -> np.ndarray:
-        """Torque [N m or N] of one sample (dof,) or many (n, dof), bodies, rotors and every effect that looks at one instant.
-
-        Args:
-            q, qd, qdd: positions [rad or m], velocities and accelerations, in the order of `joints`.
-
-        Effects that look back in time, at the clock or at logged signals (presliding, backlash, elasticity, delay,
-        current_lag, external_force, warmup) are left out; `omitted` names those of this model.
-
-        Raises:
-            SysidError: shapes that are neither, or not alike.
-        """
-        return self.inverse_dynamics(q, qd, qdd)
-
-    @property
-    def omitted(self) -> tuple[str, ...]:
-        """The effects of the model that `torque` leaves out, as `effect.joint`."""
-        return self.inverse_dynamics.omitted
 
     @property
     def pi(self) -> np.ndarray:

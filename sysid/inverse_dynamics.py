@@ -13,6 +13,7 @@ so that one call serves all of them.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import pinocchio as pin
@@ -291,3 +292,37 @@ def _alike(
         for name, at in own.items():
             values[name][joint] = at
     return _Alike(effect, tuple(c), values)
+
+
+class WithTorque:
+    """What has a model and its parameters x (size,) also has the torque that they need."""
+
+    model: Model
+    x: np.ndarray
+
+    @cached_property
+    def inverse_dynamics(self) -> InverseDynamics:
+        """What `torque` computes with; made when it is first used. Threads need one each."""
+        return inverse_dynamics(self.model, self.x)
+
+    def torque(self, q, qd, qdd) -> np.ndarray:
+        """Torque [N m or N] of one sample (dof,) or many (n, dof), bodies, rotors and every effect
+        that looks at one instant.
+
+        Args:
+            q, qd, qdd: positions [rad or m], velocities and accelerations, in the order of
+                `joints`.
+
+        Effects that look back in time, at the clock or at logged signals (presliding, backlash,
+        elasticity, delay, current_lag, external_force, warmup) are left out; `omitted` names those
+        of this model.
+
+        Raises:
+            SysidError: shapes that are neither, or not alike.
+        """
+        return self.inverse_dynamics(q, qd, qdd)
+
+    @property
+    def omitted(self) -> tuple[str, ...]:
+        """The effects of the model that `torque` leaves out, as `effect.joint`."""
+        return self.inverse_dynamics.omitted

@@ -16,15 +16,13 @@ from .simulate.plant import Plant, Truth
 from .specs import Experiment
 
 _PERIOD = 1e-3  # s, at most, in which the commanded torque is constant
-_KNOWN = ("viscous", "coulomb", "armature", DriveDamping.name, LateCommand.name, "torque_gain")  # what the plant has
+_KNOWN = ("viscous", "coulomb", "armature")  # what the plant has beside the drive
 
 
 def can_roll(experiment: Experiment, model: Model) -> bool:
     """Whether the drive of every joint is known, and every effect is one that the plant has."""
     driven = set(model.robot.joints) == set(experiment.actuator)
-    return driven and all(
-        effect.name in _KNOWN and (effect.name != "torque_gain" or isinstance(effect, FreeGain)) for effect, _ in model.terms
-    )  # fmt: skip
+    return driven and all(effect.name in _KNOWN or isinstance(effect, (FreeGain, DriveDamping, LateCommand)) for effect, _ in model.terms)
 
 
 def rolled(experiment: Experiment, model: Model, x, motion: Motion) -> list[np.ndarray]:

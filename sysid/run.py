@@ -9,7 +9,6 @@ from __future__ import annotations
 import json
 import warnings
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -18,14 +17,14 @@ from . import config, pipeline
 from .errors import ConfigError, SysidWarning
 from .estimate import Prediction, units
 from .inertia import PARAMETERS
-from .inverse_dynamics import InverseDynamics, inverse_dynamics
+from .inverse_dynamics import WithTorque
 from .model import Model
 from .results import read_fit
 from .specs import Experiment
 
 
 @dataclass(frozen=True)
-class Run:
+class Run(WithTorque):
     """A run folder of `sysid fit`.
 
     experiment: that of identified.yaml, whose logs need not be there. model: robot and effects
@@ -52,33 +51,6 @@ class Run:
     def joints(self) -> tuple[str, ...]:
         """Joint names, in the order of every array."""
         return self.model.robot.joints
-
-    @cached_property
-    def inverse_dynamics(self) -> InverseDynamics:
-        """What `torque` computes with; made when it is first used. Threads need one each."""
-        return inverse_dynamics(self.model, self.x)
-
-    def torque(self, q, qd, qdd) -> np.ndarray:
-        """Torque [N m or N] of one sample (dof,) or many (n, dof), bodies, rotors and every effect
-        that looks at one instant.
-
-        Args:
-            q, qd, qdd: positions [rad or m], velocities and accelerations, in the order of
-                `joints`.
-
-        Effects that look back in time, at the clock or at logged signals (presliding, backlash,
-        elasticity, delay, current_lag, external_force, warmup) are left out; `omitted` names those
-        of this model.
-
-        Raises:
-            SysidError: shapes that are neither, or not alike.
-        """
-        return self.inverse_dynamics(q, qd, qdd)
-
-    @property
-    def omitted(self) -> tuple[str, ...]:
-        """The effects of the model that `torque` leaves out, as `effect.joint`."""
-        return self.inverse_dynamics.omitted
 
     def rms(self, part: str) -> dict[str, float | None]:
         """RMS residual of each joint on "train" or "test" [N m or N], as the fit found it; None of

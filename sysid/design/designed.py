@@ -21,12 +21,11 @@ from ..estimate import Fit
 from ..specs import Experiment
 from . import promise, solve
 from .basis import Basis, basis
-from .collision import Geometry, geometry
+from .collision import geometry
 from .columns import columns, of_the_instant
 from .fourier import Fourier
-from .information import gram
 from .limits import Limits, LimitsSpec, limits
-from .promise import played, spelled
+from .promise import played
 from .result import Design
 from .solve import Found, Problem
 
@@ -172,6 +171,3 @@ def _margins(problem: Problem, bounds: Limits, found: Found) -> dict[str, float]
     out = {name: float(1.0 - share) for name, share in zip(names, most)}
     near = float(problem.geometry.least(motion[0][::10]).min())
     return out | ({"collision": near} if np.isfinite(near) else {})
-
-
-__all__ = ["Design", "Geometry", "design", "gram", "spelled"]

@@ -36,7 +36,6 @@ _SIGHT = (
     0.03  # m beyond the clearance: pairs that a step minds; of others it is looked at afterwards
 )
 _BISECTIONS = 12
-_LARGEST = 0.5  # of the range: amplitudes of a random start
 
 
 @dataclass(frozen=True)
@@ -187,7 +186,7 @@ class _Look:
         return self.told - _PRICE * self.beyond
 
 
-def _look(problem: Problem, z, grid: _Grid, radius: float) -> _Look:
+def _look(problem: Problem, z, grid: _Grid) -> _Look:
     x, dof, basis = problem.known.x, problem.family.dof, grid.basis
     motion = basis @ z.T
     slopes = Slopes.of(problem.known.model, *motion[:3])
@@ -264,12 +263,12 @@ def improved(
 def _climbed(problem: Problem, z, grid: _Grid, steps: int, report) -> np.ndarray:
     """The best motion after so many linear programs."""
     radius = _FIRST
-    at = _look(problem, z, grid, radius)
+    at = _look(problem, z, grid)
     for step in range(steps):
         change = _step(problem, at, grid, radius)
         if change is None:
             break
-        new = _look(problem, at.z + change, grid, radius)
+        new = _look(problem, at.z + change, grid)
         if (gained := new.merit - at.merit) > 0.0:
             at, radius = new, min(1.5 * radius, _WIDEST)
             if gained < _SETTLED:
