@@ -76,6 +76,12 @@ class Linearised:
         out = self.model.columns(piece, rows, remembered[0])
         slopes: list[list[np.ndarray]] = [[] for _ in out]
         for k, (beside, step), known in zip(self.free, self._beside, remembered[1:]):
+            if (slope := self.model.gain_slope(k, step)) is not None:  # all else stays
+                own = self.model.shape_values[k].joint
+                for joint, values in enumerate(out):
+                    gained = slope * (self.x[self.model.support(joint)] @ values) if joint == own else np.zeros(values.shape[1])
+                    slopes[joint].append(gained)
+                continue
             try:
                 moved = beside.columns(piece, rows, known)
             except NotFinite:  # at the end of a formula's domain the slope is that of the other side

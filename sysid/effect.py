@@ -258,6 +258,10 @@ class SensorEffect(Effect):
     def sensed(self, torque: np.ndarray, step: float, **shapes: float) -> np.ndarray:
         """What the sensor makes of torque (k, n), sampled every `step` seconds; same shape."""
 
+    def gain(self, **shapes: float) -> float:
+        """The number by which a constant gain multiplies torque."""
+        return float(self.sensed(np.ones((1, 1)), 1.0, **shapes)[0, 0])
+
 
 class LinkEffect(WrenchEffect):
     """An effect on one link: the one that its option `link` names, by default the last."""

@@ -252,16 +252,21 @@ def pose(experiment: Experiment, model: Model, compressed: Compressed, moving: n
     """The compressed optimisation problem of an experiment.
 
     Args:
+        compressed: may hold slopes of shape values after the model's own parameters: free coefficients that begin at zero.
         moving: (coefficients,) bool, False for coefficients to hold at their prior.
         prior: (bodies, 10).
         weights: (joints,) that multiply the rows of each joint, or None.
     """
     spec = experiment
     objective = posed(compressed.total(weights), DIVERGENCES[spec.prior.divergence](prior), number(spec), known_bodies(spec, model))
-    positive = np.array([c.positive for c in model.coefficients], dtype=bool)
+    size = 10 * model.bodies + len(model.coefficients)
+    slopes = objective.triangle.shape[1] - 1 - size
+    positive = np.array([c.positive for c in model.coefficients] + [False] * slopes, dtype=bool)
+    moving = np.append(moving, np.ones(slopes, dtype=bool))
     held = ~moving | undetermined(objective, model, moving)
     coordinates = Coordinates(PARAMETERIZATIONS[spec.model.inertia](), model.bodies, positive, held)
     x = np.concatenate([prior.ravel(), _starting_coefficients(model, objective, prior, positive, held)])
+    x[size:] = 0.0
     return Problem(objective, coordinates, coordinates.theta(x), weights)
 
 
@@ -281,7 +286,7 @@ _ALIKE = 1e-6
 def undetermined(objective: Objective, model: Model, moving) -> np.ndarray:
     """(coefficients,) bool: those that no data of this kind can tell from what stands before them in the model."""
     count = 10 * model.bodies
-    out = np.zeros(len(model.coefficients), dtype=bool)
+    out = np.zeros(len(moving), dtype=bool)
     columns = objective.triangle[:, :-1]
     # bodies have a prior; only coefficients can be left without any hold
     basis = np.zeros((len(columns), 0))
@@ -305,6 +310,7 @@ def _starting_coefficients(model: Model, objective: Objective, prior, positive, 
     stated = {"viscous": robot.damping, "coulomb": robot.friction}
     urdf = np.array([stated[c.effect][c.joint] if c.effect in stated else 0.0 for c in model.coefficients])
     urdf = np.array([own if c.given is None else c.given for own, c in zip(urdf, model.coefficients)])
+    urdf = np.append(urdf, np.zeros(len(held) - len(urdf)))
     columns = objective.triangle[:, count:-1]
     rest = objective.triangle[:, -1] - objective.triangle[:, :count] @ prior.ravel()
     squares = np.sum(columns**2, axis=0)

@@ -22,6 +22,7 @@ from .compress import Compressed
 from .estimate import Problem, known_bodies, noise_weights, pose
 from .interior import minimise
 from .model import Model
+from .nearby import from_nearby
 from .prior_weight import USUAL, PriorWeight, is_auto, weakest, with_weight
 from .specs import Experiment
 
@@ -50,19 +51,28 @@ class HeldApart:
     def squares(self, weight: float, tolerance: float = _TOLERANCE) -> np.ndarray:
         """(stretches, joints) sum of squared residuals of each, under fits of the others with a
         prior of `weight`."""
-        out = []
+        out, x = [], None
         for problem, stretch in zip(self.problems, self.stretches):
-            x = solved(problem, weight, tolerance)
+            x = solved(problem, weight, tolerance, near=x)
             out.append(stretch.squares(x))
         return np.array(out)
 
 
-def solved(problem: Problem, weight: float, tolerance: float = _TOLERANCE) -> np.ndarray:
-    """The parameters (size,) of a problem under another weight of its prior."""
+def solved(
+    problem: Problem, weight: float, tolerance: float = _TOLERANCE, near: np.ndarray | None = None
+) -> np.ndarray:
+    """The parameters (size,) of a problem under another weight of its prior.
+
+    Args:
+        near: those of a problem that has most of its rows, where they are at hand.
+    """
     coordinates, objective = problem.coordinates, replace(problem.objective, weight=weight)
-    positive, held = coordinates.positive, coordinates.held
-    start = coordinates.physical(problem.start)
-    return minimise(objective, positive, held, start, tolerance=tolerance)[0][-1]
+    how = objective, coordinates.positive, coordinates.held
+    if near is not None and objective.barrier:
+        found = from_nearby(*how, near, tolerance=tolerance)
+        if found is not None:
+            return found
+    return minimise(*how, coordinates.physical(problem.start), tolerance=tolerance)[0][-1]
 
 
 def held_apart(

@@ -246,6 +246,22 @@ class Model:
         """{name: value} of the shape values of an effect on a joint."""
         return {v.shape.name: value for v, value in zip(self.shape_values, self.shapes) if (v.term, v.joint) == (term, joint)}
 
+    @property
+    def gains(self) -> list[int]:
+        """Which shape values multiply their joint's torque by one number, and are free."""
+        effects = [self.terms[value.term][0] for value in self.shape_values]
+        return [k for k, (effect, value) in enumerate(zip(effects, self.shape_values)) if isinstance(effect, SensorEffect) and effect.constant_gain and not value.held]
+
+    def gain_slope(self, k: int, step: float) -> float | None:
+        """Of a shape value that multiplies its joint's torque by one number, the slope of that number's logarithm, by a difference;
+        None of any other."""
+        if k not in self.gains:
+            return None
+        value = self.shape_values[k]
+        effect, at = self.terms[value.term][0], self.shapes_of(value.term, value.joint)
+        here, there = effect.gain(**at), effect.gain(**{**at, value.shape.name: self.shapes[k] + step})
+        return (there - here) / (step * here)
+
     def _reach(self, piece: Piece) -> int:
         """Samples on either side of a row that its columns look at."""
         return max([effect.reach for effect, _ in self.terms], default=0)

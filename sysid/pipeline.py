@@ -228,6 +228,7 @@ def prepared(experiment: Experiment) -> Prepared:
 
 
 _PASSES, _NEAR = 3, 0.1  # refinements on all rows; of a standard deviation
+_ROUNDS = 3  # of a prior's weight and the shape values under it
 
 
 def _settled(experiment: Experiment, structure: Model, motion: Motion, prior) -> tuple[Model, Linearised | None, tuple[Searched, ...], PriorWeight | None]:
@@ -237,7 +238,10 @@ def _settled(experiment: Experiment, structure: Model, motion: Motion, prior) ->
     structure = finite(structure.measured_by(motion), motion)
     if not (structure.shape_values or structure.uses_load):
         return structure, None, (), None
-    strength = _strength(experiment, structure, motion, compress(structure, motion), prior) if is_auto(experiment) else None
+    strength = None
+    if is_auto(experiment):
+        begun = Linearised(structure, np.append(prior.ravel(), np.zeros(len(structure.coefficients))))
+        strength = _strength(experiment, structure, motion, compress(begun if structure.gains else structure, motion), prior)
     weighed = experiment if strength is None else with_weight(experiment, strength.value)
     found = shape.settle(weighed, structure, motion, prior, profile=True)
     bodies, searched = found.x[: 10 * structure.bodies].reshape(-1, 10), found.searched
@@ -254,14 +258,15 @@ def _settled(experiment: Experiment, structure: Model, motion: Motion, prior) ->
             if best is None:
                 raise
             return best[1], best[2], searched, best[3]  # of a formula, the last step left its domain
-        if number == 0:  # what was missing before is in the model now
+        for _ in range(_ROUNDS if number == 0 else 0):  # what was missing before is in the model now
             before, strength = strength, _strength(experiment, structure, motion, data, prior)
             weighed = with_weight(experiment, strength.value)
-            if before is not None and before.value != strength.value:
-                again = shape.settle(weighed, structure, motion, prior, grid=False, profile=True)
-                searched = tuple(one.checked_again(other) for one, other in zip(searched, again.searched))
-                structure, slopes = again.model, Linearised(again.model, again.x)
-                data = compress(slopes, motion)
+            if before is None or before.value == strength.value:
+                break
+            again = shape.settle(weighed, structure, motion, prior, grid=False, profile=True)
+            searched = tuple(one.checked_again(other) for one, other in zip(searched, again.searched))
+            structure, slopes = again.model, Linearised(again.model, again.x)
+            data = compress(slopes, motion)
         fit = identify(weighed, structure, motion, data, prior)
         # blows make valleys narrower than a step, and slopes say little at a corner: the last step is taken back
         if best is not None and (structure.deflects or not structure.uses_load) and fit.objective > best[0]:
@@ -282,10 +287,16 @@ def _settled(experiment: Experiment, structure: Model, motion: Motion, prior) ->
 
 
 def _strength(experiment: Experiment, structure: Model, motion: Motion, data: Compressed, prior) -> PriorWeight:
-    """The weight of the prior on training data, which may hold slopes of shape values after the model's own parameters."""
+    """The weight of the prior on training data, which may hold slopes of shape values after the model's own parameters.
+
+    Gains are found anew on what is held apart, to first order: what a gain is and what the bodies weigh is one product, and
+    gains that a strong prior chose would let no other weight be better.
+    """
     if not is_auto(experiment):
         return PriorWeight(experiment.prior.weight)
-    data = data if data.size == structure.size else data.first(structure.size)
+    if data.size > structure.size:
+        free = [k for k, value in enumerate(structure.shape_values) if not value.held]
+        data = data.only([*range(structure.size), *(structure.size + at for at, k in enumerate(free) if k in structure.gains)])
     return held_apart.chosen(experiment, structure, data, moving_coefficients(structure, motion), prior)
 
 

@@ -123,6 +123,9 @@ def tangents(model: Model, motion: Motion, x, stride: int, use: np.ndarray, midd
             continue
         if middle is None:
             middle = predicted(model, motion, x, stride)
+        if (slope := model.gain_slope(k, step)) is not None:
+            out[value.joint, :, k] = slope * middle[:, value.joint] * use[:, value.joint]
+            continue
         moved = model.with_shapes([s + step * (i == k) for i, s in enumerate(model.shapes)])
         out[:, :, k] = ((predicted(moved, motion, x, stride) - middle) / step * use).T
     return out

@@ -218,8 +218,9 @@ def _renewed(best: Settled, solved, share: float) -> tuple[Settled, float]:
 def _normal(found: Settled, motion: Motion, free, scale):
     """Normal equations of the shape values on what the linear parameters leave."""
     rows = found.rows
-    slopes = row.tangents(found.model, motion, found.x, found.stride, rows.use)[:, :, free]
     residual = rows.residual(found.x)
+    predicted = rows.tau - residual  # where rows count: elsewhere no slope does
+    slopes = row.tangents(found.model, motion, found.x, found.stride, rows.use, predicted)[:, :, free]
     base = sum(2.0 * w**2 * a.T @ a for w, a in zip(scale, rows.columns)) + prior_hessian(found)
     cross = sum(2.0 * w**2 * a.T @ t for w, a, t in zip(scale, rows.columns, slopes))
     system = sum(2.0 * w**2 * t.T @ t for w, t in zip(scale, slopes)) - cross.T @ inverted(base) @ cross

@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sysid import blocks, config, held_apart, pipeline, prior_weight, regressor
-from sysid.compress import compress
+from sysid import blocks, config, held_apart, pipeline, prior_weight, regressor, shape
+from sysid.compress import Linearised, compress
 from sysid.estimate import identify
 from sysid.inertia import LogCholesky
 from sysid.log import Log
@@ -235,3 +235,25 @@ def test_a_model_with_shape_values_is_weighed_with_them():
         and fit.experiment.prior.weight == fit.strength.value
         and fit.solution.converged
     )
+
+
+def test_a_wrong_gain_does_not_speak_for_a_strong_prior(planar):
+    """What a gain is and what the bodies weigh is one product. At a gain that a strong prior chose no weaker one predicts
+    better; found anew with the bodies it lets them have the weight that they have at the right gain."""
+    entry = {"torque_gain": {"joints": ["elbow"]}}
+    experiment = auto(config.experiment({"model": {"effects": ["viscous", "coulomb", entry]}}))
+    structure = build(planar, experiment.model.effects)
+    (_, _, motion, *_), _ = made(planar, 0, noise=0.3)
+    prior = np.array(structure.robot.prior)
+    right = pipeline._strength(experiment, structure, motion, compress(structure, motion), prior)
+    stuck = shape.settle(
+        prior_weight.with_weight(experiment, 100.0 * right.value), structure, motion, prior
+    )
+    assert abs(stuck.model.shapes[0]) > 0.05  # the truth is 0
+    weight = lambda source: pipeline._strength(  # noqa: E731
+        experiment, stuck.model, motion, compress(source, motion), prior
+    ).value
+    assert weight(stuck.model) > weight(Linearised(stuck.model, stuck.x)) == right.value
+    # and the whole search ends there
+    settled, _, _, found = pipeline._settled(experiment, structure, motion, prior)
+    assert found.value == right.value and settled.shapes == pytest.approx([0.0], abs=0.01)
