@@ -89,9 +89,11 @@ def candidates(model: Model, extra=()) -> list[Candidate]:
 def _richer(model: Model, name: str, joint: int) -> list[Candidate]:
     """What may take the place of an effect that the model has; nothing where the user holds its
     shape values."""
-    ((term, effect),) = [
+    (term, effect), *_ = [
         (k, e) for k, (e, joints) in enumerate(model.terms) if e.name == name and joint in joints
     ]
+    if effect.level is not None:
+        return []  # it would have to be richer at every level
     own = [
         (v, at)
         for v, at in zip(model.shape_values, model.shapes)

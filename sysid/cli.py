@@ -22,6 +22,7 @@ app = typer.Typer(add_completion=False, invoke_without_command=True, pretty_exce
 Json = Annotated[bool, typer.Option("--json", help="One JSON document on standard output, nothing else there.")]
 Out = Annotated[Optional[Path], typer.Option("--out", help="Run folder (default runs/<experiment name>).")]  # noqa: UP045 - typer reads it
 Quiet = Annotated[bool, typer.Option("--quiet", help="No progress, no table.")]
+Level = Annotated[Optional[list[str]], typer.Option("--level", metavar="GROUP=LEVEL", help="Where effects are per group of logs: the level meant; again for another group.")]  # noqa: UP045
 ExperimentPath = Annotated[Path, typer.Argument(metavar="EXPERIMENT", help="A YAML file, or a folder with config.yaml.")]
 
 
@@ -222,6 +223,7 @@ def diagnose(
     experiment: ExperimentPath,
     model: Annotated[Optional[Path], typer.Option("--model", help="A run folder: hold its fitted model, and ask what changed.")] = None,  # noqa: UP045
     log: Annotated[Optional[list[str]], typer.Option("--log", help="With --model: the new log.")] = None,  # noqa: UP045
+    level: Level = None,
     as_json: Json = False, out: Out = None, quiet: Quiet = False,
 ) -> None:  # fmt: skip
     """Where the model fails and which effect is missing; with --model, what changed on a new log."""
@@ -231,8 +233,10 @@ def diagnose(
     if (model is None) != (not log):
         raise SysidError("--model and --log belong together", allowed="both, or neither", do="give the run folder and the new log")
     if model is not None:
-        _changed(spec, model, log, as_json, out, quiet)
+        _changed(spec, model, log, _levels(level), as_json, out, quiet)
         return
+    if level:
+        raise SysidError("--level goes with --model: a diagnosis asks all logs together", do="leave it out")
     found, said, run = _diagnosed(spec, out, quiet or as_json)
     if as_json:
         print(json.dumps(said, allow_nan=False))
@@ -264,13 +268,21 @@ def _diagnosed(spec, out: Path | None, silent: bool) -> tuple:
     return found, said, run
 
 
-def _changed(spec, model: Path, logs: list[str], as_json: bool, out: Path | None, quiet: bool) -> None:
+def _levels(texts: list[str] | None) -> dict[str, str]:
+    """{group: level} of --level options."""
+    pairs = [text.partition("=") for text in texts or []]
+    if wrong := [text for text, (group, _, level) in zip(texts or [], pairs) if not (group and level)]:
+        raise SysidError(f"--level {wrong[0]!r}", allowed="GROUP=LEVEL, as in robot=r2")
+    return {group: level for group, _, level in pairs}
+
+
+def _changed(spec, model: Path, logs: list[str], levels: dict[str, str], as_json: bool, out: Path | None, quiet: bool) -> None:
     from . import results
     from .changes import changed
     from .statement.changes import document
 
     run = results.folder(out or Path("runs") / f"{spec.name}-changed")
-    said = document(changed(spec, model, logs), run)
+    said = document(changed(spec, model, logs, levels), run)
     results.write_json(run / "changed.json", said)
     if as_json:
         print(json.dumps(said, allow_nan=False))
@@ -399,12 +411,13 @@ def export(
     run: Annotated[Path, typer.Argument(metavar="RUN", help="A run folder of `sysid fit`.")],
     to: Annotated[str, typer.Option("--to", help="mjcf, sdf, drake or isaaclab.")],
     out: Annotated[Optional[Path], typer.Option("--out", help="The folder to write into (default RUN/<format>).")] = None,  # noqa: UP045
+    level: Level = None,
     as_json: Json = False, quiet: Quiet = False,
 ) -> None:  # fmt: skip
     """Write the fitted model for a simulator, load it there again where that is installed, and tell what the format cannot say."""
     from . import export as exporting
 
-    found = exporting.export(run, to, out or run / to)
+    found = exporting.export(run, to, out or run / to, levels=_levels(level))
     said = exporting.document(found)
     if as_json:
         print(json.dumps(said, allow_nan=False))

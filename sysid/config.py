@@ -12,12 +12,12 @@ from typing import Any, get_args
 
 from pydantic import BaseModel, ValidationError
 
-from . import datasets
+from . import datasets, groups
 from .effect import find, vocabulary
 from .errors import ConfigError
 from .formula import parse
 from .readers import is_log_folder, listed
-from .specs import EffectSpec, Experiment, LogSpec, is_own
+from .specs import ENTRY, EffectSpec, Experiment, LogSpec, is_own
 
 _LARGEST_FILE = 1_000_000  # bytes
 _MOST_ALIASED_NODES = 10_000
@@ -92,15 +92,21 @@ def experiment(given: dict, path: Path = Path("experiment.yaml"), tree=None) -> 
                 model[key] = [_effect(entry, ("model", key, k), lines, path) for k, entry in enumerate(entries)]
         given = {**given, "model": model}
     try:
-        return _listed(Experiment.model_validate({**given, "path": path}))
+        return _listed(Experiment.model_validate({**given, "path": path}), lines)
     except ValidationError as error:
         raise _named(error, lines, path) from None
 
 
-def _listed(experiment: Experiment) -> Experiment:
-    """The experiment with every pattern and folder of logs spelled out, file by file."""
+def _listed(experiment: Experiment, lines) -> Experiment:
+    """The experiment with every pattern and folder of logs spelled out, file by file; a level of a group lists the logs of
+    data.train and data.test that are at it."""
     parts = {part: [one for log in getattr(experiment.data, part) for one in _each(log, experiment.folder)] for part in ("train", "test")}
-    return experiment.model_copy(update={"data": experiment.data.model_copy(update=parts)})
+    data = experiment.data.model_copy(update=parts)
+    if wrong := groups.mistake(data, experiment.model):
+        location, said = wrong
+        raise _refused(location, said, (), lines, experiment.path)
+    data = groups.resolved(data)
+    return experiment.model_copy(update={"data": data})
 
 
 def _each(log: LogSpec, folder: Path) -> list[LogSpec]:
@@ -148,9 +154,9 @@ def _known(name: str) -> str:
 
 
 def _own_keys(name: str, given) -> list[str]:
-    """The keys that an effect has beside `joints`: its options, and its shape values, which may be held or be told where to be searched."""
+    """The keys that an effect has beside those of every entry: its options, and its shape values, which may be held or be told where to be searched."""
     if is_own(name):
-        return [key for key in given if key != "joints"]  # only the file can tell; it is not run here
+        return [key for key in given if key not in ENTRY]  # only the file can tell; it is not run here
     effect = find(name)
     return [*effect.options, *(shape.name for shape in effect.shapes())]
 
@@ -164,9 +170,9 @@ def _formula(value: Any) -> dict:
     keys = ["formula", "name", *parsed.inner]
     for key in value:
         if key in parsed.linear:
-            raise ValueError(f"{key} is a coefficient of the formula: it is solved for and takes no value; allowed: {', '.join([*keys, 'joints'])}")
-        if key not in (*keys, "joints"):
-            close = difflib.get_close_matches(str(key), [*keys, "joints"], n=3, cutoff=0.4) or [*keys, "joints"]
+            raise ValueError(f"{key} is a coefficient of the formula: it is solved for and takes no value; allowed: {', '.join([*keys, *ENTRY])}")
+        if key not in (*keys, *ENTRY):
+            close = difflib.get_close_matches(str(key), [*keys, *ENTRY], n=3, cutoff=0.4) or [*keys, *ENTRY]
             raise ValueError(f"unknown key {key!r}: the formula has no such value inside; allowed: {', '.join(close)}")
     own = {key: given for key, given in value.items() if key in keys}
     return {**{key: given for key, given in value.items() if key not in own}, "name": "formula", "options": own}
@@ -262,7 +268,7 @@ def _line(tree, location: tuple) -> int | None:
 
 
 def _keys(model) -> list[str]:
-    return [name for name in model.model_fields if (model, name) not in ((Experiment, "path"), (EffectSpec, "name"), (EffectSpec, "options"))]
+    return [field.alias or name for name, field in model.model_fields.items() if (model, name) not in ((Experiment, "path"), (EffectSpec, "name"), (EffectSpec, "options"))]
 
 
 def _model_at(location: tuple):

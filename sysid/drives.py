@@ -130,6 +130,8 @@ def with_drives(model: Model, experiment: Experiment) -> Model:
             model = model.with_effect(FreeGain(factor), (joints.index(joint),))
     for joint, spec in experiment.actuator.items():
         damping, own = motor_side.drive(spec).damping, (joints.index(joint),)
+        if damping is None and any(effect.name == Viscous.name and effect.level is not None and own[0] in joints_ for effect, joints_ in model.terms):
+            raise ConfigError(f"viscous of joint {joint!r} is per group, and its drive's kd is free", where="model.effects", allowed="one of them: they are the same", do="give kd, or leave per out")
         if damping:
             model = model.with_effect(DriveDamping(damping), own)
         elif damping is None and not _has(model, Viscous.name, *own):

@@ -126,6 +126,7 @@ class Effect(ABC):
         `torque` that is constant beside a stiffness, `zero` that is added to q; and of an effect of the whole robot `gravity`
         or `inertia`, a body on a link.
     asked: {shape value: what the user says of it}.
+    group, level: of logs, at which alone it is there; None where it is in all (see `per_level`).
     """
 
     name: ClassVar[str]
@@ -138,6 +139,8 @@ class Effect(ABC):
     options: ClassVar[dict[str, str]] = {}
     reach: ClassVar[int] = 0
     memory: ClassVar[bool] = False
+    group: ClassVar[str | None] = None
+    level: ClassVar[str | None] = None
     uses_load: ClassVar[bool] = False
     mimics_mass: ClassVar[bool] = False
     elementwise: ClassVar[bool] = False
@@ -192,6 +195,10 @@ class Effect(ABC):
             ConfigError: an option names what this robot lacks, or the effect cannot stand on this joint.
         """
         return self
+
+    def present(self, motion: Piece) -> bool:
+        """Whether it is there in a motion's log."""
+        return True
 
     def variants(self, robot, joint: int) -> list[dict]:
         """The options under which it is worth trying on a joint (-1 where its scope is the robot), simplest first."""

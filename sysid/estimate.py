@@ -9,6 +9,7 @@ import numpy as np
 from . import uncertainty
 from .certificate import Certificate, certify
 from .compress import Compressed
+from .differences import difference
 from .errors import ConfigError
 from .inertia import DIVERGENCES, PARAMETERIZATIONS
 from .inertia.consistency import is_consistent
@@ -119,7 +120,7 @@ class Fit(WithTorque):
     """What identification found.
 
     pi (bodies, 10) about the joints' frames, `prior` the same before any data, `known` (bodies, 10, 10) the Hessian by which some are held to it, or None; coefficients of the effects in `model.coefficients`' order;
-    x both in one vector. `experiment` has the prior's weight as a number; `strength` says whether it was chosen. `shape_std` of the model's shape values, NaN where held or undetermined. `predictions` by "train" and "test". `notices`: what was decided on the way.
+    x both in one vector. `experiment` has the prior's weight as a number; `strength` says whether it was chosen. `shape_std` of the model's shape values, NaN where held or undetermined, `shape_covariance` with it. `predictions` by "train" and "test". `notices`: what was decided on the way.
     `masses`: links that are far from their URDF's, as `masses.document` has them; empty where none is.
     `drives`: what was free of the drives, as found; `rollout`: {joint: RMS [rad or m]} by which they, let go, miss the test logs.
     `searched`: what was done about the shape values.
@@ -140,6 +141,7 @@ class Fit(WithTorque):
     strength: PriorWeight
     known: np.ndarray | None = None
     shape_std: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    shape_covariance: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
     predictions: dict[str, Prediction] = field(default_factory=dict)
     samples: dict[str, int] = field(default_factory=dict)
     left_out: dict[str, dict[str, int]] = field(default_factory=dict)
@@ -184,6 +186,17 @@ class Fit(WithTorque):
     def joints(self) -> tuple[str, ...]:
         """Joint names."""
         return self.model.robot.joints
+
+    def difference(self, parameter: str, a: str, b: str) -> tuple[float, float]:
+        """Value of a parameter that is per group of logs at level b less that at level a, and its standard deviation.
+
+        Args:
+            parameter: its name without a level, `viscous.hip.Fv`.
+
+        Raises:
+            SysidError: there is no such parameter per group, or no such level of it.
+        """
+        return difference(self, parameter, a, b)
 
     def rms(self, part: str) -> dict[str, float]:
         """RMS residual of each joint on "train" or "test" [N m or N]."""
@@ -365,11 +378,14 @@ def identify(experiment: Experiment, model: Model, motion: Motion, data: Compres
     sure = uncertainty.estimate(objective, data, np.append(solution.x, np.zeros(slopes)), np.append(fixed, np.zeros(slopes, dtype=bool)), problem.weights)
     shape_std = np.full(len(model.shape_values), np.nan)
     shape_std[[k for k, value in enumerate(model.shape_values) if not value.held][:slopes]] = sure.std[model.size :]
+    shape_covariance = np.full((len(shape_std), len(shape_std)), np.nan)
+    told = np.ix_(*2 * [[k for k, value in enumerate(model.shape_values) if not value.held][:slopes]])
+    shape_covariance[told] = sure.covariance[model.size :, model.size :]
     kept = uncertainty.Uncertainty(sure.covariance[: model.size, : model.size], sure.std[: model.size], sure.from_data[: model.size])
     return Fit(
         experiment=experiment, model=model, x=solution.x, objective=solution.objective, solution=solution,
         certificate=certificate, held=held, weights=problem.weights, compressed=compressed,
-        uncertainty=kept, shape_std=shape_std, prior=prior, known=problem.objective.known, strength=PriorWeight(number(experiment)),
+        uncertainty=kept, shape_std=shape_std, shape_covariance=shape_covariance, prior=prior, known=problem.objective.known, strength=PriorWeight(number(experiment)),
         physically_consistent=bool(is_consistent(solution.x[:count].reshape(-1, 10)).all()),
     )  # fmt: skip
 

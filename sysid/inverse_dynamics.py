@@ -12,8 +12,10 @@ so that one call serves all of them.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from types import MappingProxyType
 
 import numpy as np
 import pinocchio as pin
@@ -26,6 +28,7 @@ from .model import ROBOT, Model
 from .motion import Piece
 from .robot import Robot
 
+_NOWHERE: Mapping[str, str] = MappingProxyType({})
 _CHUNK = 4096  # samples: the arrays of one body stay in cache
 # Up to so many samples calls one by one are faster than arrays over all of them, whose overhead is
 # about a millisecond.
@@ -213,7 +216,7 @@ def at_no_time(q, qd, qdd, load=None) -> Piece:
     )  # fmt: skip
 
 
-def inverse_dynamics(model: Model, x) -> InverseDynamics:
+def inverse_dynamics(model: Model, x, levels: Mapping[str, str] = _NOWHERE) -> InverseDynamics:
     """The inverse dynamics of a model at its parameters.
 
     Included is every effect whose torque follows from q, qd and qdd of one instant: friction and
@@ -224,7 +227,12 @@ def inverse_dynamics(model: Model, x) -> InverseDynamics:
 
     Args:
         x: (size,) of all linear parameters, as `Fit.x`.
+        levels: {group: level} of every group of logs that effects are per.
+
+    Raises:
+        SysidError: a group that effects are per is left out, or has no such level.
     """
+    model, x = model.at(levels, x)
     robot, count = model.robot, 10 * model.bodies
     pi, rest = np.asarray(x)[:count].reshape(-1, 10), np.asarray(x)[count:]
     kept: dict[str, list] = {"alike": [], "single": [], "moving": [], "sensors": []}
@@ -301,28 +309,46 @@ class WithTorque:
     x: np.ndarray
 
     @cached_property
-    def inverse_dynamics(self) -> InverseDynamics:
-        """What `torque` computes with; made when it is first used. Threads need one each."""
-        return inverse_dynamics(self.model, self.x)
+    def _made(self) -> dict[tuple, InverseDynamics]:
+        return {}
 
-    def torque(self, q, qd, qdd) -> np.ndarray:
+    def inverse_dynamics_at(self, levels: Mapping[str, str]) -> InverseDynamics:
+        """What `torque` computes with at {group: level}; made when it is first used. Threads need
+        one each."""
+        key = tuple(sorted(levels.items()))
+        if key not in self._made:
+            self._made[key] = inverse_dynamics(self.model, self.x, levels)
+        return self._made[key]
+
+    @property
+    def inverse_dynamics(self) -> InverseDynamics:
+        """`inverse_dynamics_at` of a model without effects per group."""
+        return self.inverse_dynamics_at(_NOWHERE)
+
+    def torque(self, q, qd, qdd, *, levels: Mapping[str, str] = _NOWHERE) -> np.ndarray:
         """Torque [N m or N] of one sample (dof,) or many (n, dof), bodies, rotors and every effect
         that looks at one instant.
 
         Args:
             q, qd, qdd: positions [rad or m], velocities and accelerations, in the order of
                 `joints`.
+            levels: {group: level} of every group of logs that effects are per.
 
         Effects that look back in time, at the clock or at logged signals (presliding, backlash,
         elasticity, delay, current_lag, external_force, warmup) are left out; `omitted` names those
         of this model.
 
         Raises:
-            SysidError: shapes that are neither, or not alike.
+            SysidError: shapes that are neither, or not alike; a level that is not said, or not
+                there.
         """
-        return self.inverse_dynamics(q, qd, qdd)
+        return self.inverse_dynamics_at(levels)(q, qd, qdd)
 
     @property
     def omitted(self) -> tuple[str, ...]:
         """The effects of the model that `torque` leaves out, as `effect.joint`."""
-        return self.inverse_dynamics.omitted
+        groups = self.model.groups
+        most = max(map(len, groups.values()), default=1)  # each level of each group once
+        every = [{g: own[min(k, len(own) - 1)] for g, own in groups.items()} for k in range(most)]
+        left = (name for own in every for name in self.inverse_dynamics_at(own).omitted)
+        return tuple(dict.fromkeys(left))

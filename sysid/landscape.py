@@ -177,7 +177,7 @@ def landscape(
     scale = np.ones(model.robot.dof) if weights is None else np.asarray(weights, dtype=float)
     scale = np.sqrt(2.0 * len(found.rows.t) / len(kept)) * scale
     count = 10 * model.bodies
-    linear = [(c.effect, c.joint) == (effect.name, joint) for c in model.coefficients]
+    linear = [(c.term, c.joint) == (term, joint) for c in model.coefficients]
     own = count + np.flatnonzero(linear)
     # what is held, or stands at its bound of zero, does not answer
     still = [*np.flatnonzero(found.problem.coordinates.held), *(at_zero(found) if pinned else ())]

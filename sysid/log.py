@@ -6,7 +6,7 @@ refused with its row; what can be mended (an irregular clock, a gap) is mended w
 
 import hashlib
 import warnings
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -16,6 +16,7 @@ from . import motor_side, units
 from .clock import corrected
 from .errors import LogError, SysidWarning
 from .events import Event
+from .groups import levels_of
 from .recording import Recording, recorded
 from .segment import Segment
 from .specs import ActuatorSpec, DataSpec, LogSpec
@@ -34,7 +35,7 @@ DEGREES = 4.0 * np.pi  # rad: no robot joint turns so far from zero, but its ang
 @dataclass(frozen=True)
 class Log:
     """One log: where it came from, the SHA-256 of its file (of several, of all of theirs), its segments, what disturbed them, where
-    it was looked for, the SHA-256 of each file by its name, and the joints whose torque is not used."""
+    it was looked for, the SHA-256 of each file by its name, the joints whose torque is not used, and at which level of which group it is."""
 
     name: str
     path: Path
@@ -43,6 +44,7 @@ class Log:
     events: tuple[Event, ...] = ()
     hashes: dict[str, str] = field(default_factory=dict)
     unused: tuple[str, ...] = ()
+    levels: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def samples(self) -> int:
@@ -61,7 +63,8 @@ def read(log: LogSpec, data: DataSpec, joints: tuple[str, ...], prismatic, folde
     Raises:
         LogError: the file, a column, a unit or a value is not what a log can hold.
     """
-    return assembled(measured(log, data, joints, prismatic, folder, actuators), tuple(data.unused))
+    found = assembled(measured(log, data, joints, prismatic, folder, actuators), tuple(data.unused))
+    return replace(found, levels=levels_of(data.groups, log))
 
 
 def assembled(samples: Recording, unused: tuple[str, ...] = ()) -> Log:

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import warnings
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 
 from . import own_effects, regressor, two_masses, units
-from .effect import Asked, Deflection, Effect, MotionEffect, SensorEffect, Shape, TorqueEffect, WrenchEffect, find
-from .errors import ConfigError
+from .effect import Asked, Deflection, Effect, LinkEffect, MotionEffect, SensorEffect, Shape, TorqueEffect, WrenchEffect, find
+from .errors import ConfigError, SysidError, SysidWarning
 from .formula import Formula
 from .inertia import PARAMETERS, UNITS
 from .motion import Motion, Piece
+from .per_level import at_level
 from .robot import Robot
 from .specs import is_own
 
@@ -24,7 +27,8 @@ ROBOT = -1  # the "joint" of an effect of the whole robot, called `*`
 
 @dataclass(frozen=True)
 class Coefficient:
-    """One linear coefficient of an effect on a joint (-1: on the robot). given: its value, where the user says it."""
+    """One linear coefficient of an effect on a joint (-1: on the robot). given: its value, where the user says it; term: the
+    model's, -1 where it is no model's."""
 
     effect: str
     joint: int
@@ -32,6 +36,7 @@ class Coefficient:
     unit: str
     positive: bool
     given: float | None = None
+    term: int = -1
 
 
 @dataclass(frozen=True)
@@ -128,9 +133,9 @@ class Model:
         return tuple(
             Coefficient(
                 effect.name, joint, self._name(effect, joint, linear.name), self._unit(linear.unit, joint), linear.lower == 0,
-                effect.given_coefficients.get(linear.name),
+                effect.given_coefficients.get(linear.name), term,
             )
-            for effect, joints in self.terms
+            for term, (effect, joints) in enumerate(self.terms)
             for joint in joints
             for linear in effect.coefficients()
         )
@@ -164,7 +169,8 @@ class Model:
         return self.scales.ranges[key][1]
 
     def _name(self, effect: Effect, joint: int, word: str) -> str:
-        return f"{effect.name}.{'*' if joint == ROBOT else self.robot.joints[joint]}.{word}"
+        level = "" if effect.level is None else f"[{effect.level}]"
+        return f"{effect.name}.{'*' if joint == ROBOT else self.robot.joints[joint]}.{word}{level}"
 
     def _unit(self, unit: str, joint: int) -> str:
         return units.of_joint(unit, prismatic=joint != ROBOT and bool(self.robot.prismatic[joint]))
@@ -196,13 +202,47 @@ class Model:
         return replace(grown, shapes=(*self.shapes, *initial(grown)[len(self.shapes) :]))
 
     def without(self, name: str, joint: int) -> Model:
-        """The model without an effect on a joint."""
-        kept = [(effect, tuple(j for j in joints if (effect.name, j) != (name, joint))) for effect, joints in self.terms]
+        """The model without an effect on a joint, at every level where it is per group."""
+        return self._kept(lambda effect, j: (effect.name, j) != (name, joint))
+
+    def _kept(self, wanted) -> Model:
+        """The model with those of its effects and joints that are wanted."""
+        kept = [(effect, tuple(j for j in joints if wanted(effect, j))) for effect, joints in self.terms]
         place = {term: k for k, term in enumerate(t for t, (_, joints) in enumerate(kept) if joints)}
-        own = lambda term, j: (self.terms[term][0].name, j) == (name, joint)  # noqa: E731
-        shapes = tuple(at for v, at in zip(self.shape_values, self.shapes) if not own(v.term, v.joint))
-        held = tuple(((place[term], j, word), at) for (term, j, word), at in self.held if not own(term, j))
+        own = lambda term, j: wanted(self.terms[term][0], j)  # noqa: E731
+        shapes = tuple(at for v, at in zip(self.shape_values, self.shapes) if own(v.term, v.joint))
+        held = tuple(((place[term], j, word), at) for (term, j, word), at in self.held if own(term, j))
         return replace(self, terms=tuple(k for k in kept if k[1]), shapes=shapes, held=held)
+
+    @property
+    def groups(self) -> dict[str, tuple[str, ...]]:
+        """{group: its levels} of the groups that effects are per."""
+        return {effect.group: effect.levels for effect, _ in self.terms if effect.group is not None}
+
+    def at(self, levels: Mapping[str, str], x) -> tuple[Model, np.ndarray]:
+        """The model of logs at one level of each group, and those of its parameters x (size,).
+
+        Args:
+            levels: {group: level} of every group that effects are per.
+
+        Raises:
+            SysidError: a group that is not there or is left out, or has no such level.
+        """
+        groups = self.groups
+        for group, level in levels.items():
+            if group not in groups:
+                raise SysidError(f"no effect is per {group!r}", allowed=", ".join(groups) or "no level: every effect is in all logs")
+            if level not in groups[group]:
+                raise SysidError(f"{group} has no level {level!r}", allowed=", ".join(groups[group]))
+        if missing := [group for group in groups if group not in levels]:
+            effects = [*dict.fromkeys(effect.name for effect, _ in self.terms if effect.group == missing[0])]
+            said = f"{', '.join(effects)} {'is' if len(effects) == 1 else 'are'} per {missing[0]}, and no level of it is given"
+            raise SysidError(said, allowed=", ".join(groups[missing[0]]), do=f"give {missing[0]}=LEVEL")
+        here = lambda effect: effect.group is None or effect.level == levels[effect.group]  # noqa: E731
+        kept = [*range(10 * self.bodies), *(10 * self.bodies + k for k, c in enumerate(self.coefficients) if here(self.terms[c.term][0]))]
+        own = self._kept(lambda effect, joint: here(effect))
+        terms = tuple((effect if effect.group is None else effect.plain, joints) for effect, joints in own.terms)
+        return replace(own, terms=terms), np.asarray(x)[kept]
 
     def with_shapes(self, values) -> Model:
         """The model with other shape values."""
@@ -338,7 +378,7 @@ class Model:
                         own.append(values)
         out = []
         for joint, effects in enumerate(by_joint):
-            own = [piece.settled(self.sensed(np.concatenate(effects), piece.step, joint), inner, joint, wide.start)] if effects else []
+            own = [piece.settled(self.sensed(np.concatenate(effects), piece, joint), inner, joint, wide.start)] if effects else []
             out.append(np.concatenate([rigid[joint], *own]))
         return out
 
@@ -347,7 +387,7 @@ class Model:
         # with what they were made of, so that nothing else comes to its place
         key = (id(piece.q), id(piece.smoother), rows.start, rows.stop, rows.step)
         moved = any(isinstance(effect, MotionEffect) or (isinstance(effect, SensorEffect) and not effect.constant_gain) for effect, _ in self.terms)
-        gained = lambda out: [self.sensed(own, piece.step, joint) for joint, own in enumerate(out)]  # noqa: E731
+        gained = lambda out: [self.sensed(own, piece, joint) for joint, own in enumerate(out)]  # noqa: E731
         if not moved and key in self._rigid:
             return gained(self._rigid[key][2])
         inertial = regressor.columns(self.robot, part.q, part.qd, part.qdd, gravity=part.gravity, deflection=part.deflection)
@@ -355,7 +395,7 @@ class Model:
         for joint in range(self.robot.dof):
             bodies = self.support(joint)
             own = inertial[joint, bodies[bodies < inertial.shape[1]]]
-            out.append(piece.settled(self.sensed(own, piece.step, joint) if moved else own, inner, joint, wide.start))
+            out.append(piece.settled(self.sensed(own, piece, joint) if moved else own, inner, joint, wide.start))
         if keep and not moved:
             self._rigid[key] = (piece.q, piece.smoother, out)
         return out if moved else gained(out)
@@ -385,17 +425,17 @@ class Model:
                         predicted += np.einsum("k,jkn->jn", own, effect.columns(part, self.robot, **self.shapes_of(term, joint)))
                     k += size
             for joint in range(self.robot.dof):
-                predicted[joint] = self.sensed(predicted[None, joint], piece.step, joint)[0]
+                predicted[joint] = self.sensed(predicted[None, joint], piece, joint)[0]
             settled = np.stack([piece.settled(own, inner, joint, wide.start) for joint, own in enumerate(predicted)], axis=1)
             start = (rows.start - piece.core.start) // stride
             out[start : start + len(settled)] = settled
         return out
 
-    def sensed(self, values: np.ndarray, step: float, joint: int) -> np.ndarray:
-        """What the sensor of a joint makes of torque (k, n), sampled every `step` seconds."""
+    def sensed(self, values: np.ndarray, piece: Piece, joint: int) -> np.ndarray:
+        """What the sensor of a joint makes of torque (k, n) over rows of a piece."""
         for term, (effect, joints) in enumerate(self.terms):
-            if isinstance(effect, SensorEffect) and joint in joints:
-                values = effect.sensed(values, step, **self.shapes_of(term, joint))
+            if isinstance(effect, SensorEffect) and joint in joints and effect.present(piece):
+                values = effect.sensed(values, piece.step, **self.shapes_of(term, joint))
         return values
 
     def _widened(self, piece: Piece, rows: slice) -> tuple[slice, slice]:
@@ -447,8 +487,9 @@ def chunks(piece: Piece, size: int) -> Iterator[slice]:
         yield slice(start, min(start + size, piece.core.stop))
 
 
-def build(robot: Robot, effects, folder: Path = Path(), signals=()) -> Model:
-    """The model of an experiment's `model.effects`; files of own effects are relative to `folder`, `signals` are logged.
+def build(robot: Robot, effects, folder: Path = Path(), signals=(), groups: Mapping[str, Mapping] = MappingProxyType({})) -> Model:
+    """The model of an experiment's `model.effects`; files of own effects are relative to `folder`, `signals` are logged, `groups` are
+    {group: {level: its logs}}.
 
     Raises:
         ConfigError: an effect or joint that is not there, or an effect twice on a joint, or an option it does not have, or
@@ -474,10 +515,24 @@ def build(robot: Robot, effects, folder: Path = Path(), signals=()) -> Model:
             effect = effect.bound(robot, joint)
             if is_own(spec.name):
                 own_effects.check(effect, robot, joint)
-        held |= _holds(len(terms), effect, joints)
-        terms.append((effect, tuple(joints)))
+        for own in _levels(effect, spec, groups):
+            held |= _holds(len(terms), own, joints)
+            terms.append((own, tuple(joints)))
     made = Model(robot, tuple(terms), held=tuple(held.items()))
     return made.with_shapes(initial(made))
+
+
+def _levels(effect: Effect, spec, groups: Mapping[str, Mapping]) -> list[Effect]:
+    """An effect at each level of the group that it is per, but for those that its entry excepts; itself where it is in all logs."""
+    if spec.per is None:
+        return [effect]
+    if getattr(effect, "logs", None) is not None:
+        raise ConfigError(f"model.effects: {effect.name} has both logs and per", allowed="one of them", do="leave logs out: data.groups says which logs")
+    levels = tuple(groups[spec.per])
+    own = [level for level in levels if level not in (spec.spared or ())]
+    if effect.mimics_mass and isinstance(effect, LinkEffect) and len(own) == len(levels):
+        warnings.warn(SysidWarning(f"{effect.name} is in every log: what all levels of {spec.per} share of it is the link's own, and the prior alone tells them apart; except: [LEVEL] names the logs without it"), stacklevel=2)
+    return [at_level(effect, spec.per, level, levels) for level in own]
 
 
 def found(spec, folder: Path = Path(), signals=()) -> Effect:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -16,7 +17,7 @@ _NO_WEIGHT = 1e-9
 class Piece:
     """A contiguous stretch of motion, every row usable.
 
-    log, source: number and name of the log. t (n,) [s]; q, qd, qdd (n, dof); tau (n, dof) as the fit sees it, `measured` as logged; signals {name: (n,)}; `use` (n, dof) bool, None where every row counts.
+    log, source: number and name of the log; levels {group: level} at which the experiment says it is. t (n,) [s]; q, qd, qdd (n, dof); tau (n, dof) as the fit sees it, `measured` as logged; signals {name: (n,)}; `use` (n, dof) bool, None where every row counts.
     `smoother` filters columns where torque was filtered, else None; then `margin` extra rows stand before and
     after `core`, whose filtered values the filter needs but which are not used. `rest` (dof,) [rad/s or m/s] is the
     speed that rounding makes of a constant angle; `noise` (dof,) [rad or m] what the filter took off the angles, RMS, or an
@@ -43,6 +44,7 @@ class Piece:
     rest: np.ndarray
     noise: np.ndarray
     source: str = ""
+    levels: Mapping[str, str] = field(default_factory=dict)
     sight: Smoother | None = None
     load: np.ndarray | None = None
     gravity: np.ndarray | None = None

@@ -10,14 +10,14 @@ from __future__ import annotations
 
 import time
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from . import config, drives, events, gains, held_apart, masses, model, robot, rollout, shape
+from . import config, drives, events, gains, groups, held_apart, masses, model, robot, rollout, shape
 from . import filters as filtering
 from . import log as logs
 from .bumps import bumps
@@ -54,7 +54,7 @@ def started(experiment: Experiment) -> Experiment:
 def build(experiment: Experiment) -> tuple[Robot, Model, np.ndarray]:
     """The robot, the model and the prior (bodies, 10) of an experiment. Raises RobotError, ConfigError."""
     machine = robot.load(experiment.robot, experiment.folder)
-    parts = model.build(machine, experiment.model.effects, experiment.folder, experiment.data.logged)
+    parts = model.build(machine, experiment.model.effects, experiment.folder, experiment.data.logged, experiment.data.groups)
     structure = with_drives(parts, experiment)
     return machine, structure, _prior(experiment, structure)
 
@@ -186,12 +186,20 @@ def refit(experiment: Experiment, before: Fit, *, filters: dict | None = None, *
     return after, fit(experiment, filters=after.filters, strength=before.strength, **how)
 
 
-def predict_log(found: Fit, log: str | LogSpec) -> Prediction:
-    """What a fitted model predicts on another log, read and filtered as the experiment says. Raises LogError."""
+def predict_log(found: Fit, log: str | LogSpec, *, levels: Mapping[str, str] | None = None) -> Prediction:
+    """What a fitted model predicts on another log, read and filtered as the experiment says.
+
+    Args:
+        levels: {group: level} where effects are per group of logs; a log of data.groups has its own.
+
+    Raises:
+        SysidError: no such log or level.
+    """
     spec = LogSpec(file=str(log)) if isinstance(log, (str, Path)) else log
     machine = found.model.robot
+    model, x = found.model.at({**groups.levels_of(found.experiment.data.groups, spec), **(levels or {})}, found.x)
     motion = prepare(read(found.experiment, machine, [spec]), filtering.settled(found.experiment.preprocess, found.filters), machine.joints)
-    return predict(found.model, found.x, motion)
+    return predict(model, x, motion)
 
 
 @dataclass(frozen=True)

@@ -45,7 +45,7 @@ def prepare(logs: Sequence[Log], spec: PreprocessSpec, joints: tuple[str, ...]) 
         for segment in log.segments:
             clean = replace(segment, tau=mended(segment, log.events, joints)) if log.events else segment
             if (piece := _piece(number, clean, spec)) is not None:
-                own = replace(piece, source=log.name)
+                own = replace(piece, source=log.name, levels=log.levels)
                 pieces.append(without_events(own, log.events, joints, *_reaches(spec, segment.step)) if log.events else own)
         if len(pieces) == before:
             shortest = _needs(spec, log.segments[0].step) if log.segments else 2

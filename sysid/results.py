@@ -22,6 +22,7 @@ from pathlib import Path
 import numpy as np
 
 from . import prior_weight
+from .differences import per_group, told
 from .errors import ConfigError, SysidError
 from .estimate import Fit, at_edge
 from .filters import settled
@@ -51,6 +52,7 @@ def document(fit: Fit, run: str | Path = "") -> dict:
         {"name": value.name, "value": at, "unit": value.unit, "std": number(std), "from_data": float(math.isfinite(std)), **({"held": True} if value.held else {})}
         for value, at, std in zip(fit.model.shape_values, fit.model.shapes, fit.shape_std.tolist())
     ]
+    own_groups = {"groups": groups} if (groups := per_group(fit)) else {}
     return {
         "rms": {part: dict(zip(fit.joints, fit.predictions[part].told())) for part in errors},
         "relative_error": {part: {**by_joint(part, "relative_error"), "*": number(errors[part]["total"][1])} for part in errors},
@@ -68,6 +70,7 @@ def document(fit: Fit, run: str | Path = "") -> dict:
         "samples": fit.samples,
         "left_out": fit.left_out,
         "parameters": parameters,
+        **own_groups,
         # what the effects that look at the load took for the bodies; the last step towards `parameters` is not taken again
         "load_bodies": _by_body(fit.model),
         "drives": [{"joint": d.joint, "name": d.name, "value": d.value, "std": number(d.std), "unit": d.unit} for d in fit.drives],
@@ -167,7 +170,7 @@ def write(fit: Fit, out: str | Path) -> dict:
     resolved = fit.experiment.model_copy(update={"preprocess": settled(fit.experiment.preprocess, fit.filters)})
     texts = {
         "experiment.yaml": _yaml(_relocated(resolved, path)).encode(), "identified.urdf": identified_urdf(fit, path),
-        "identified.yaml": _yaml(_identified(fit, _relocated(resolved, path))).encode(),
+        "identified.yaml": (_comments(found) + _yaml(_identified(fit, _relocated(resolved, path)))).encode(),
     }  # fmt: skip
     table = _predictions(fit)
     write_atomically(path / "predictions.parquet", lambda p: table.write_parquet(p))
@@ -205,8 +208,9 @@ def _relocated(experiment: Experiment, run: Path) -> dict:
         return Path(os.path.relpath((experiment.folder / path).resolve(), run.resolve())).as_posix()
 
     tree["robot"]["urdf"] = moved(tree["robot"]["urdf"])
-    for part in ("train", "test"):
-        for log in tree["data"][part]:
+    levels = [level for group in tree["data"]["groups"].values() for level in group.values()]
+    for listed in (tree["data"]["train"], tree["data"]["test"], *levels):
+        for log in listed:
             if "file" in log:
                 log["file"] = moved(log["file"])
             else:
@@ -223,7 +227,8 @@ def _relocated(experiment: Experiment, run: Path) -> dict:
 
 def _entry(effect: dict, moved: Callable[[str], str]) -> dict | str:
     """An entry of `model.effects` as an experiment file writes it, its paths moved."""
-    own = {**({"joints": effect["joints"]} if effect.get("joints") else {}), **effect["options"]}
+    given = {"joints": effect.get("joints"), "per": effect.get("per"), "except": effect.get("spared")}
+    own = {**{key: value for key, value in given.items() if value}, **effect["options"]}
     if "formula" in effect["options"]:
         return own
     if isinstance(own.get("logs"), list):
@@ -244,6 +249,11 @@ def _identified(fit: Fit, tree: dict) -> dict:
     for rotor in tree["robot"]["rotors"]:
         rotor["inertia"] = {"parameters": bodies[rotor["joint"]].tolist()}
     return tree
+
+
+def _comments(found: dict) -> str:
+    """What differs from level to level of groups of logs, as comments of a YAML file."""
+    return "".join(f"# {' '.join(line.split())}\n" for line in told(found.get("groups", {})))
 
 
 def _yaml(tree: dict) -> str:

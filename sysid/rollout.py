@@ -20,7 +20,9 @@ _KNOWN = ("viscous", "coulomb", "armature")  # what the plant has beside the dri
 
 
 def can_roll(experiment: Experiment, model: Model) -> bool:
-    """Whether the drive of every joint is known, and every effect is one that the plant has."""
+    """Whether the drive of every joint is known, and every effect is one that the plant has, in all logs."""
+    if model.groups:
+        return False  # the plant is one robot
     driven = set(model.robot.joints) == set(experiment.actuator)
     return driven and all(effect.name in _KNOWN or isinstance(effect, (FreeGain, DriveDamping, LateCommand)) for effect, _ in model.terms)
 

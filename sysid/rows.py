@@ -118,7 +118,7 @@ def tangents(model: Model, motion: Motion, x, stride: int, use: np.ndarray, midd
             except NotFinite:  # at the end of a formula's domain the slope is that of the other side
                 step = -step
                 here, there = asked(step)
-            own = [i for i, c in enumerate(model.coefficients) if (c.effect, c.joint) == (effect.name, value.joint)]
+            own = [i for i, c in enumerate(model.coefficients) if (c.term, c.joint) == (value.term, value.joint)]
             out[value.joint, :, k] = (there - here) @ np.asarray(x)[10 * model.bodies :][own] / step
             continue
         if middle is None:
@@ -188,7 +188,7 @@ def secants(model: Model, motion: Motion, known: list[Bent], effect, tried: list
     apart = apart or [effect.several([(one.load, one.inertia, one.seen, shapes) for shapes in tried]) for one in known]
     for piece, rows, one, own in zip(motion.pieces, starts(motion, stride), known, apart):
         far = np.stack(own)
-        read = [model.sensed(np.einsum("on,ton->tn", one.slopes[:, j], far), piece.step, j) for j in range(model.robot.dof)]
+        read = [model.sensed(np.einsum("on,ton->tn", one.slopes[:, j], far), piece, j) for j in range(model.robot.dof)]
         out.append(np.stack([piece.settled(entry, rows, j) for j, entry in enumerate(read)], axis=1))
     return np.concatenate(out, axis=-1) * use.T
 
@@ -211,7 +211,7 @@ def signatures(model: Model, motion: Motion, pieces: list, effect, joint: int, t
         values = [effect.columns(part, model.robot if joint < 0 else joint, **shapes) for shapes in tried]
         stacked = np.concatenate([v if v.ndim == 3 else v[None] for v in values], axis=1)
         joints = range(model.robot.dof) if joint < 0 else [joint]
-        read = [model.sensed(entry, piece.step, j) for entry, j in zip(stacked, joints)]
+        read = [model.sensed(entry, piece, j) for entry, j in zip(stacked, joints)]
         out.append(np.stack([piece.settled(entry, rows, j) for j, entry in zip(joints, read)]))
     joined = np.moveaxis(np.concatenate(out, axis=-1), 1, 2)
     joined = joined * (use[:, [joint]] if joint >= 0 else use.T[:, :, None])

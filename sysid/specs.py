@@ -158,6 +158,16 @@ class RobotSpec(_Spec):
     transmission: dict[str, Annotated[dict[str, NonZero], Field(min_length=1)]] = {}
 
 
+def _label(value: Any) -> Any:
+    value = str(value) if isinstance(value, int) and not isinstance(value, bool) else value
+    if not isinstance(value, str) or not re.fullmatch(r"[\w+-]+", value):
+        raise ValueError("a name of a group or of a level must be of letters, digits, _, + and -; quote a date")
+    return value
+
+
+Label = Annotated[str, BeforeValidator(_label)]
+
+
 def _episodes(value: Any) -> Any:
     listed = value if isinstance(value, list) else [value]
     if value is None or (listed and all(isinstance(k, int) and not isinstance(k, bool) and k >= 0 for k in listed)):
@@ -219,6 +229,7 @@ def _log(value: Any) -> Any:
 
 
 Logs = Annotated[list[Annotated[LogSpec, BeforeValidator(_log)]], Field(min_length=1)]
+Levels = Annotated[dict[Label, Logs], Field(min_length=1)]
 
 
 class ColumnsSpec(_Spec):
@@ -322,6 +333,7 @@ class DataSpec(_Spec):
 
     train: Logs = Field(default_factory=lambda: [LogSpec(file="train.csv")])
     test: Logs = Field(default_factory=lambda: [LogSpec(file="test.csv")])
+    groups: dict[Label, Levels] = {}
     columns: ColumnsSpec = ColumnsSpec()
     signals: dict[str, Annotated[Any, BeforeValidator(_column)]] = {}
     units: UnitsSpec = UnitsSpec()
@@ -358,11 +370,18 @@ def is_own(name: str) -> bool:
 
 
 class EffectSpec(_Spec):
-    """An effect of the vocabulary, the joints that have it (None: every joint), and its own options by name."""
+    """An effect of the vocabulary, the joints that have it (None: every joint), and its own options by name. `per` names the group
+    of logs at each level of which it has parameters of its own, but for the levels of `except` (here `spared`), which lack it."""
 
     name: str
     joints: Annotated[list[str], Field(min_length=1)] | None = None
+    per: Label | None = None
+    spared: Annotated[list[Label], Field(min_length=1)] | None = Field(default=None, alias="except")
     options: dict[str, Any] = {}
+
+
+ENTRY = tuple(field.alias or name for name, field in EffectSpec.model_fields.items() if name not in ("name", "options"))
+"""The keys that every effect's entry may have beside the effect's own."""
 
 
 class ModelSpec(_Spec):

@@ -8,6 +8,7 @@ from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
 
+from .differences import give_or_take
 from .estimate import Fit, given_shapes, said_of_shapes
 from .export import exported
 from .init.text import flow
@@ -62,6 +63,7 @@ def show_fit(fit: Fit, document: dict) -> None:
             _percent(document["relative_error"]["test"][joint]), _four(document["r2"]["test"][joint]),
         )  # fmt: skip
     console.print(table)
+    _show_groups(document.get("groups", {}))
     certificate = document["certificate"]
     for own in document["drives"]:
         deviation = "" if own["std"] is None else f" +- {own['std']:.2g}"
@@ -87,6 +89,22 @@ def show_fit(fit: Fit, document: dict) -> None:
     print(document["prior"]["says"])
     _show_notices(document)
     print(f"run folder: {document['run']}")
+
+
+def _show_groups(groups: dict) -> None:
+    """Each level's value of what is per group of logs, and how far it is from the first level's."""
+    for group, found in groups.items():
+        print(f"per {group}, +- one standard deviation:")
+        for p in found["parameters"]:
+            apart = {d["to"]: d for d in p["differences"]}
+            first, width = next(iter(p["levels"])), max(map(len, p["levels"]))
+            print(f"  {p['parameter']} [{p['unit']}]")
+            for level, at in p["levels"].items():
+                other, line = apart.get(level), f"    {level:{width}}  {give_or_take(at)}"
+                if other is not None:
+                    times = f", {abs(other['value']) / other['std']:.1f} deviations" if other["std"] else ""
+                    line = f"{line:{width + 28}}  {give_or_take(other, '+')} from {first}{times}"
+                print(line)
 
 
 def _show_filter(chosen: dict) -> None:

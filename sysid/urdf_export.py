@@ -109,19 +109,18 @@ def harmless(said: str) -> str:
 def _unsaid(fit: Fit) -> str:
     """What a URDF cannot say of a fit, in lines."""
     model, robot = fit.model, fit.model.robot
-    values = {c.name: (float(at), c.unit) for c, at in zip(model.coefficients, fit.coefficients)}
-    values |= {v.name: (float(at), v.unit) for v, at in zip(model.shape_values, model.shapes)}
+    values = [*zip(model.coefficients, fit.coefficients), *zip(model.shape_values, model.shapes)]
     left = []
-    for effect, joints in model.terms:
+    for term, (effect, joints) in enumerate(model.terms):
         known = effect.simulators and set(effect.simulators) <= SAYS
         if known or isinstance(effect, DRIVE_EFFECTS):
             continue
         for joint in joints:
             name = f"{effect.name}.{'*' if joint < 0 else robot.joints[joint]}"
             own = ", ".join(
-                f"{key.rpartition('.')[2]} = {at:.6g} {unit}"
-                for key, (at, unit) in values.items()
-                if key.startswith(f"{name}.")
+                f"{one.name.rpartition('.')[2]} = {at:.6g} {one.unit}"
+                for one, at in values
+                if (one.term, one.joint) == (term, joint)
             )
             left.append(f"  {name}: {own}")
     for body, pi in zip(robot.bodies[robot.dof :], fit.pi[robot.dof :]):

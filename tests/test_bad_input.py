@@ -197,7 +197,7 @@ def test_unknown_key(experiment, cli, key):
         ({"data.train": [{"file": "train.csv", "start": 0, "stopp": 1}]}, "unknown key 'stopp' in data.train[0]", "stop"),
         ({"data.train": ["train.csv", {"fil": "train.csv"}]}, "unknown key 'fil' in data.train[1]", "file"),
         ({"model.effects": ["coulomb", {"viscous": {"jonts": ["elbow"]}}]}, "unknown key 'jonts' in model.effects[1]", "joints"),
-        ({"model.effects": [{"viscous": {"speed": 1}}]}, "unknown key 'speed' in model.effects[0]", "joints"),
+        ({"model.effects": [{"viscous": {"limit": 1}}]}, "unknown key 'limit' in model.effects[0]", "joints"),
     ],
 )
 def test_unknown_key_within_a_list(experiment, cli, change, said, closest):

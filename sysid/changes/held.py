@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -12,10 +13,14 @@ from ..model import Model
 from ..specs import Experiment
 
 
-def held(folder: Path, experiment: Experiment) -> tuple[Model, np.ndarray]:
-    """The model and the parameters x (size,) of a run folder of `sysid fit`.
+def held(
+    folder: Path, experiment: Experiment, levels: Mapping[str, str]
+) -> tuple[Model, np.ndarray]:  # fmt: skip
+    """The model and the parameters x (size,) of a run folder of `sysid fit`, at a level of each
+    group of logs.
 
     Raises:
+        SysidError: a level that is not there, or is not said.
         ConfigError: the folder holds no fit, or one of another robot than the experiment's.
     """
     found = run.read_run(folder)
@@ -27,4 +32,4 @@ def held(folder: Path, experiment: Experiment) -> tuple[Model, np.ndarray]:
             allowed=", ".join(own.robot.joints),
             do="give the experiment that was fitted",
         )
-    return found.model, found.x
+    return found.model.at(levels, found.x)

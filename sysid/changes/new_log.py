@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -33,16 +34,20 @@ class Changed:
     notes: tuple[str, ...]
 
 
-def changed(experiment: Experiment, run: Path, logs: list[str]) -> Changed:
+def changed(
+    experiment: Experiment, run: Path, logs: list[str], levels: Mapping[str, str] | None = None
+) -> Changed:  # fmt: skip
     """What is different on logs, with a run's model held.
 
     Args:
         logs: file names relative to the working directory, or names of public logs.
 
+        levels: {group: level} of the logs, of every group that effects of the run are per.
+
     Raises:
-        SysidError: no such run or log, or a log too short to be split in halves.
+        SysidError: no such run, log or level, or a log too short to be split in halves.
     """
-    structure, x = held(run, experiment)
+    structure, x = held(run, experiment, levels or {})
     robot = structure.robot
     specs = [LogSpec(file=_located(log)) for log in logs]
     with pipeline.noticed():

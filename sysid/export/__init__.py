@@ -8,6 +8,7 @@ installed, and its inverse dynamics compared.
 from __future__ import annotations
 
 import warnings
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from importlib import import_module
 from pathlib import Path
@@ -19,6 +20,7 @@ from ..callable_module import callable_module
 from ..errors import SysidError, SysidWarning
 from ..estimate import Fit
 from ..filters import settled
+from ..groups import levels_of
 from ..inertia.consistency import is_consistent
 from ..motion import Motion
 from ..preprocess import prepare
@@ -80,16 +82,20 @@ def told(check: Check) -> str:
     return f"inverse dynamics of {check.by} within {worst:.1e} of ours on {check.samples} samples"
 
 
-def export(run: Run | Fit | str | Path, to: str, out: str | Path) -> Export:
+def export(
+    run: Run | Fit | str | Path, to: str, out: str | Path, *, levels: Mapping[str, str] | None = None
+) -> Export:  # fmt: skip
     """Write an identified model for a simulator, and ask the simulator.
 
     Args:
         run: a run folder of `sysid fit`, or what `sysid.read_run` read or `sysid.fit` found.
         to: mjcf, sdf, drake or isaaclab.
         out: the folder to write into.
+        levels: {group: level} of every group of logs that effects are per: a simulator's robot is
+            one of them.
 
     Raises:
-        SysidError: no such format or run, or a folder that cannot be written.
+        SysidError: no such format, run or level, or a folder that cannot be written.
     """
     if to not in FORMATS:
         raise SysidError(
@@ -98,12 +104,13 @@ def export(run: Run | Fit | str | Path, to: str, out: str | Path) -> Export:
             do="give one of them with --to",
         )
     found = read_run(run) if isinstance(run, (str, Path)) else run
+    model, x = found.model.at(levels or {}, found.x)
     where = folder(out)
     form = import_module(f".{to}", __name__)
-    model, x = joint_side(found.model, found.x)
-    drives = motors(found.experiment, found.model, found.x)
+    drives = motors(found.experiment, model, x)
+    model, x = joint_side(model, x)
     said = replace(stated(model, x, form.KNOWS, form.SHOWS), motors=drives)
-    motion, why = _test_motion(found)
+    motion, why = _test_motion(found, levels or {})
     left, together = costs(model, x, said, motion)
     notes = (
         [] if why is None else [f"no test log is at hand ({why}): what is left out has no price"]
@@ -120,14 +127,19 @@ def export(run: Run | Fit | str | Path, to: str, out: str | Path) -> Export:
     return Export(to, tuple(written.values()), check, left, together, tuple(notes))
 
 
-def _test_motion(run: Run | Fit) -> tuple[Motion | None, str | None]:
-    """The test logs of a run, or why there are none."""
+def _test_motion(run: Run | Fit, levels: Mapping) -> tuple[Motion | None, str | None]:
+    """The test logs of a run at levels, or why there are none."""
     robot, spec = run.model.robot, run.experiment
     filters = settled(spec.preprocess, run.filters) if isinstance(run, Fit) else spec.preprocess
+    of = lambda log: levels_of(spec.data.groups, log).items()  # noqa: E731
+    tests = [log for log in spec.data.test if levels.items() <= of(log)]
+    if not tests:
+        said = " and ".join(f"{group} {level}" for group, level in levels.items())
+        return None, f"none is at {said}"
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", SysidWarning)
-            logs = pipeline.read(spec, robot, spec.data.test)
+            logs = pipeline.read(spec, robot, tests)
             return prepare(logs, filters, robot.joints), None
     except SysidError as error:
         return None, str(error)

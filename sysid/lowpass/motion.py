@@ -50,7 +50,7 @@ def lowpassed(logs: Sequence[Log], joints: tuple[str, ...], cutoff: float) -> Mo
             clean = (
                 replace(segment, tau=mended(segment, log.events, joints)) if log.events else segment
             )
-            if (piece := _piece(number, log.name, clean, cutoff)) is not None:
+            if (piece := _piece(number, log, clean, cutoff)) is not None:
                 seen = _sight(piece, segment.step)
                 sights.append(math.ceil(seen / piece.step))
                 pieces.append(
@@ -147,7 +147,7 @@ def _as_seen(tau: np.ndarray) -> np.ndarray:
     return seen
 
 
-def _piece(number: int, source: str, segment, cutoff: float) -> Piece | None:
+def _piece(number: int, log: Log, segment, cutoff: float) -> Piece | None:
     rate = 1.0 / segment.step
     every = max(1, int(rate / (_SAMPLES_PER_CYCLE * cutoff)))
     both = Gaussian(min(cutoff, HIGHEST * rate), segment.step)
@@ -179,5 +179,6 @@ def _piece(number: int, source: str, segment, cutoff: float) -> Piece | None:
         noise=noise_of(
             segment.q[edge:-edge], smooth[edge:-edge], angles.taken_of_noise, segment.step
         ),
-        source=source,
+        source=log.name,
+        levels=log.levels,
     )

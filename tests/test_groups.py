@@ -1,0 +1,283 @@
+"""Groups of logs: three payloads and an empty arm in one fit, friction per robot. The fit is held
+against a dense problem over all logs at once, whose columns are put together here."""
+
+import json
+
+import numpy as np
+import pytest
+
+import sysid
+from sysid import config, pipeline, regressor
+from sysid.effect import find
+from sysid.errors import SysidError
+from sysid.inertia import DIVERGENCES
+from tests.grouped import JOINTS, MASS, NOISE, ROUGH, experiment, tree, waved
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return experiment(tmp_path_factory.mktemp("groups"))
+
+
+@pytest.fixture(scope="module")
+def fitted(folder):
+    return sysid.fit(sysid.load(folder))
+
+
+@pytest.fixture(scope="module")
+def run(folder, fitted):
+    return folder / "run", sysid.write(fitted, folder / "run")
+
+
+def value(found, name: str) -> tuple[float, float]:
+    at = found.model.names.index(name)
+    return float(found.x[at]), float(found.uncertainty.std[at])
+
+
+# ---- what is found
+
+
+def test_three_payloads_and_an_empty_arm(fitted):
+    for level in ("one", "two", "three"):
+        mass, std = value(fitted, f"payload.*.m[{level}]")
+        assert abs(mass / MASS[level] - 1.0) < 0.02 and abs(mass - MASS[level]) < 4.0 * std
+    assert "payload.*.m[none]" not in fitted.model.names
+    for joint in JOINTS:
+        for level, true in (("r1", 0.4), ("r2", 0.4 * ROUGH)):
+            found, std = value(fitted, f"viscous.{joint}.Fv[{level}]")
+            assert abs(found - true) < 4.0 * std
+        more, std = fitted.difference(f"viscous.{joint}.Fv", "r1", "r2")
+        assert abs(more - 0.4 * (ROUGH - 1.0)) < 4.0 * std and more > 10.0 * std
+        np.testing.assert_allclose(
+            fitted.difference(f"viscous.{joint}.Fv", "r2", "r1"), (-more, std), rtol=1e-9
+        )
+    assert max(fitted.rms("test").values()) < 1.1 * NOISE and fitted.certificate.globally_optimal
+
+
+def dense(fitted):
+    """Columns (rows, size) and torque of all training logs, a block a log: those of one robot,
+    placed where its levels have theirs."""
+    model, groups = fitted.model, fitted.experiment.data.groups
+    machine, first = model.robot, 10 * model.bodies
+    plain = {
+        name: find(name).bound(machine, -1 if name == "payload" else 0)
+        for name in ("viscous", "coulomb", "payload")
+    }
+    motion = pipeline.prepare(
+        pipeline.read(fitted.experiment, machine, fitted.experiment.data.train),
+        fitted.experiment.preprocess,
+        machine.joints,
+    )
+    blocks, torque = [], []
+    for piece, log in zip(motion.pieces, fitted.experiment.data.train):
+        at = {
+            group: level
+            for group, levels in groups.items()
+            for level, logs in levels.items()
+            if log in logs
+        }
+        n = len(piece.t)
+        out = np.zeros((machine.dof, n, model.size))
+        out[:, :, :first] = np.moveaxis(
+            regressor.regressor(machine, piece.q, piece.qd, piece.qdd), 1, 0
+        )
+        for j, joint in enumerate(JOINTS):
+            out[j, :, model.names.index(f"viscous.{joint}.Fv[{at['robot']}]")] = plain[
+                "viscous"
+            ].columns(piece, j)[0]
+            out[j, :, model.names.index(f"coulomb.{joint}.Fc")] = plain["coulomb"].columns(
+                piece, j
+            )[0]
+        if at["payload"] != "none":
+            own = [
+                k
+                for k, name in enumerate(model.names)
+                if name.startswith("payload.") and name.endswith(f"[{at['payload']}]")
+            ]
+            out[:, :, own] = np.moveaxis(plain["payload"].columns(piece, machine), 1, 2)
+        blocks.append(out.reshape(-1, model.size))
+        torque.append(piece.tau.T.ravel())
+    return np.concatenate(blocks), np.concatenate(torque)
+
+
+def test_it_is_the_joint_dense_solution(folder):
+    """With a Euclidean prior and free bodies the whole is least squares, which NumPy solves on all
+    rows at once."""
+    given = tree(prior={"divergence": "euclidean", "weight": 0.5})
+    given["model"]["inertia"] = "linear"
+    found = sysid.fit(config.experiment(given, folder / "config.yaml"))
+    columns, torque = dense(found)
+    bodies, size = found.prior.size, found.model.size
+    weight = np.sqrt(0.5 * 0.5) * np.eye(bodies, size)
+    system = np.concatenate([columns, weight])
+    scale = np.linalg.norm(system, axis=0)
+    x = (
+        np.linalg.lstsq(
+            system / scale,
+            np.concatenate([torque, weight[:, :bodies] @ found.prior.ravel()]),
+            rcond=None,
+        )[0]
+        / scale
+    )
+    assert np.max(np.abs(found.x - x)) <= 1e-9 * np.max(np.abs(x))
+
+
+def test_the_barrier_s_optimum_is_the_dense_one(fitted):
+    """With the log-det prior Newton's method on the dense objective stays where the fit is: in what
+    the logs see, and in parameters that the prior alone holds as far as an objective in double
+    precision tells where its minimum is."""
+    columns, torque = dense(fitted)
+    spec, x = fitted.experiment.prior, np.array(fitted.x)
+    gram, right = 2.0 * columns.T @ columns, 2.0 * columns.T @ torque
+    divergence, count = DIVERGENCES[spec.divergence](fitted.prior), fitted.prior.size
+    for _ in range(20):
+        slope, bend = gram @ x - right, np.array(gram)
+        slope[:count] += (
+            spec.weight * np.asarray(divergence.gradient(x[:count].reshape(-1, 10))).ravel()
+        )
+        for b, own in enumerate(
+            spec.weight * np.asarray(divergence.hessian(x[:count].reshape(-1, 10)))
+        ):
+            bend[10 * b : 10 * b + 10, 10 * b : 10 * b + 10] += own
+        scale = np.sqrt(np.diagonal(bend))
+        x -= np.linalg.solve(bend / np.outer(scale, scale), slope / scale) / scale
+    assert np.max(np.abs(columns @ (fitted.x - x))) <= 1e-9 * np.max(np.abs(torque))
+    assert np.max(np.abs(fitted.x - x)) <= 1e-7 * np.max(np.abs(x))
+
+
+def test_bodies_that_are_shared_are_known_better_than_from_any_log_alone(folder, fitted):
+    """Every parameter that a log tells by itself. Of the last link, which the payloads hide in all
+    logs but the empty arm's, the others say little: there it is so on the whole."""
+    count = 20
+    for level in MASS:
+        given = tree(
+            ["viscous", "coulomb"],
+            data={"train": [f"{level}_train.csv"], "test": [f"{level}_test.csv"]},
+        )
+        alone = sysid.fit(config.experiment(given, folder / "config.yaml")).uncertainty
+        share = fitted.uncertainty.std[:30] / alone.std[:30]
+        told = alone.from_data[:30] > 0.5
+        assert told[:count].any() and np.all(share[:count][told[:count]] < 0.9), level
+        if level == "none":
+            assert told[count:].sum() >= 4 and np.mean(np.log(share[count:][told[count:]])) < 0.0
+
+
+# ---- what is said of it
+
+
+def test_the_document_says_each_level_and_the_differences(run, fitted):
+    _, document = run
+    json.dumps(document, allow_nan=False)
+    assert list(document["groups"]) == ["payload", "robot"]
+    robot = document["groups"]["robot"]
+    assert robot["levels"]["r1"] == [
+        "none_train.csv",
+        "two_train.csv",
+        "none_test.csv",
+        "two_test.csv",
+    ]
+    own = {p["parameter"]: p for p in robot["parameters"]}
+    assert list(own) == [f"viscous.{joint}.Fv" for joint in JOINTS]
+    for name, p in own.items():
+        entry = {q["name"]: q for q in document["parameters"]}
+        for level in ("r1", "r2"):
+            assert (
+                p["levels"][level]["value"] == entry[f"{name}[{level}]"]["value"]
+                and p["levels"][level]["std"] == entry[f"{name}[{level}]"]["std"]
+            )
+        (d,) = p["differences"]
+        assert (d["from"], d["to"]) == ("r1", "r2") and (d["value"], d["std"]) == fitted.difference(
+            name, "r1", "r2"
+        )
+        assert abs(p["between"] - abs(d["value"]) / np.sqrt(2.0)) < p["within"]
+    assert [d["to"] for d in document["groups"]["payload"]["parameters"][0]["differences"]] == [
+        "two",
+        "three",
+    ]
+
+
+def test_the_run_folder_gives_the_same_fit_and_torque_again(run, fitted):
+    out, _ = run
+    again = sysid.fit(sysid.load(out / "experiment.yaml"))
+    np.testing.assert_allclose(again.x, fitted.x, rtol=1e-12)
+    found = sysid.read_run(out)
+    assert found.omitted == () and "RMS" in repr(found)
+    _, q, qd, qdd = waved(99, 0.2)
+    pi, fv = (
+        np.array(fitted.pi),
+        np.array([value(fitted, f"viscous.{j}.Fv[r2]")[0] for j in JOINTS]),
+    )
+    at = fitted.model.names.index("payload.*.m[three]")
+    pi[-1] += fitted.x[at : at + 10]
+    fc = np.array([value(fitted, f"coulomb.{j}.Fc")[0] for j in JOINTS])
+    expected = regressor.torque(fitted.model.robot, pi, q, qd, qdd) + fv * qd + fc * np.sign(qd)
+    levels = {"robot": "r2", "payload": "three"}
+    np.testing.assert_allclose(
+        found.torque(q, qd, qdd, levels=levels), expected, rtol=1e-9, atol=1e-9
+    )
+    np.testing.assert_allclose(
+        found.torque(q[3], qd[3], qdd[3], levels=levels), expected[3], rtol=1e-9, atol=1e-9
+    )
+    for wrong, said in (
+        (None, "viscous is per robot, and no level"),
+        ({"robot": "r1"}, "payload is per payload"),
+        ({**levels, "robot": "r3"}, "no level 'r3'"),
+        ({**levels, "day": "1"}, "per 'day'"),
+    ):
+        with pytest.raises(SysidError, match=said) as caught:
+            found.torque(q, qd, qdd, **({} if wrong is None else {"levels": wrong}))
+        assert "\n" not in str(caught.value)
+    text = (out / "identified.yaml").read_text()
+    assert text.startswith(
+        "# payload.*.m [kg] per payload, in brackets the difference from one: one 0.6"
+    )
+    assert (
+        "\n# viscous.shoulder.Fv [N m s/rad] per robot, in brackets the difference from r1: r1 0."
+        in text
+    )
+    urdf = (out / "identified.urdf").read_text()
+    assert (
+        "viscous.elbow: Fv[r2] = " in urdf
+        and "payload.*: m[one] = " in urdf
+        and 'damping="0.0"' in urdf
+    )
+
+
+def test_another_log_is_predicted_at_the_levels_that_are_given(folder, fitted):
+    one = sysid.predict(fitted, "three_test.csv")
+    stem = folder / "elsewhere.csv"
+    stem.write_text((folder / "three_test.csv").read_text())
+    with pytest.raises(SysidError, match="per robot, and no level"):
+        sysid.predict(fitted, str(stem))
+    other = sysid.predict(fitted, str(stem), levels={"robot": "r2", "payload": "three"})
+    np.testing.assert_array_equal(one.predicted, other.predicted)
+    stem.unlink()
+
+
+def test_commands(folder, cli, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    said = cli("fit", folder, "--out", tmp_path / "run")
+    assert said.status == 0
+    assert (
+        "per robot, +- one standard deviation:" in said.out
+        and " from r1, " in said.out
+        and "payload.*.m [kg]" in said.out
+    )
+    level = ("--level", "robot=r1", "--level", "payload=two")
+    assert cli("export", tmp_path / "run", "--to", "mjcf").status == 2
+    done = cli("export", tmp_path / "run", "--to", "mjcf", *level, "--json")
+    assert (
+        done.status == 0
+        and json.loads(done.out)["checked"]["agrees"]
+        and not json.loads(done.out)["left_out"][1:]
+    )
+    held_model = ("diagnose", folder, "--model", tmp_path / "run", "--log", folder / "two_test.csv")
+    for wrong, words in (
+        ((), "per robot"),
+        (("--level", "robot"), "GROUP=LEVEL"),
+        (("--level", "robot=r1", "--level", "payload=four"), "no level 'four'"),
+    ):
+        failed = cli(*held_model, *wrong)
+        assert failed.status == 2 and words in failed.err and failed.err.count("\n") == 1
+    done = cli(*held_model, *level, "--json")
+    assert done.status == 0 and json.loads(done.out)["findings"] == []
