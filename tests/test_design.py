@@ -8,7 +8,7 @@ import pytest
 
 from sysid import config, pipeline, robot
 from sysid import model as models
-from sysid.design import collision, design, document, limits, solve
+from sysid.design import basis, collision, design, document, limits, solve
 from sysid.design.columns import Slopes, columns, of_the_instant
 from sysid.design.fourier import Fourier
 from sysid.design.information import Known, gram, log_det, log_det_with_slope, own_size
@@ -137,14 +137,8 @@ def designed(poor):
 def test_a_design_keeps_to_every_limit_as_an_independent_check_sees_it(poor, designed):
     """Positions, speeds, torque by Pinocchio and friction by hand, at a kilohertz."""
     machine = poor[1]
-    family = designed.family
     t = np.arange(0.0, 8.0, 1e-3)
-    w = 2.0 * np.pi * family.rounds / family.duration * np.arange(1, family.harmonics + 1)
-    c, a, b = np.split(designed.coefficients, [1, 1 + family.harmonics], axis=1)
-    angle = w * t[:, None]
-    q = (c.T + np.sin(angle) @ a.T + np.cos(angle) @ b.T)
-    qd = np.cos(angle) @ (w * a).T - np.sin(angle) @ (w * b).T
-    qdd = -np.sin(angle) @ (w**2 * a).T - np.cos(angle) @ (w**2 * b).T
+    q, qd, qdd = _motion(designed, t)
     own = [machine.source.joints[j] for j in machine.joints]
     assert (np.abs(q) <= [0.95 * j.limits[1] + 1e-9 for j in own]).all()
     assert (np.abs(qd) <= [0.95 * j.velocity + 1e-9 for j in own]).all()
@@ -232,6 +226,36 @@ def test_what_cannot_be_designed_is_said_in_one_line(poor, name):
     with pytest.raises(config.ConfigError) as error:
         design(pipeline.load(poor[0]), **options)
     assert said in str(error.value) and "\n" not in str(error.value)
+
+
+def test_a_joint_whose_torque_is_unused_tells_nothing(poor):
+    """Neither is its noise taken for none, nor do its rows count in what is promised."""
+    folder, machine = poor
+    text = (folder / "config.yaml").read_text().replace("data:", "data:\n  unused: [elbow]", 1)
+    experiment = config.loads(text, folder / "config.yaml")
+    suspects = [("stribeck", "elbow"), ("spring", "elbow")]
+    found = design(experiment, duration=4.0, separate=suspects)
+    known = basis.basis(experiment, [], lambda *_: None).known
+    assert np.isinf(known.noise[1]) and known.noise[0] < 1.0
+    # the information of the shoulder's rows alone, by hand
+    t = (np.arange(500) + 0.5) * 4.0 / 500
+    moved = columns(known.model, *(np.asarray(x) for x in _motion(found, t)))[0]
+    whole = known.before + 1000.0 / 500 / known.noise[0] ** 2 * moved @ moved.T
+    np.testing.assert_allclose(gram(known, *_motion(found, t), 1000.0), whole - known.before, rtol=1e-9, atol=1e-9 * np.abs(whole).max())
+    assert found.log_det > found.random_best
+    assert found.pairs[0].probability == 0.0 and "viscous.elbow.Fv" not in found.deviations
+    assert any(s["after"] < 0.9 * s["now"] for s in found.deviations.values())
+    assert np.isfinite(found.margins["torque"])
+
+
+def _motion(found, t):
+    """q, qd, qdd of a design at times, from its coefficients."""
+    w = 2.0 * np.pi * found.family.rounds / found.family.duration * np.arange(1, found.family.harmonics + 1)
+    c, a, b = np.split(found.coefficients, [1, 1 + found.family.harmonics], axis=1)
+    angle = w * t[:, None]
+    q = c.T + np.sin(angle) @ a.T + np.cos(angle) @ b.T
+    qd = np.cos(angle) @ (w * a).T - np.sin(angle) @ (w * b).T
+    return q, qd, -np.sin(angle) @ (w**2 * a).T - np.cos(angle) @ (w**2 * b).T
 
 
 def test_without_any_log_the_urdf_is_what_is_known(poor, tmp_path):

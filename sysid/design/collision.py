@@ -18,7 +18,7 @@ import pinocchio as pin
 
 from ..errors import SysidWarning
 from ..inertia import pseudo
-from ..robot import Robot
+from ..robot import Robot, reduced
 from ..urdf import example_root, package_folders
 
 _THINNEST = 0.02  # m: of a capsule
@@ -138,12 +138,9 @@ def _corners(shape) -> np.ndarray:
 def geometry(robot: Robot, floor: float | None = None) -> Geometry:
     """What a robot's links look like. Warns where the URDF does not say, or its meshes are not to
     be found."""
-    model = _model(robot)
-    shapes, source = (
-        _stated(robot, model),
-        "the URDF's collision geometry, meshes as their convex hulls",
-    )
-    if shapes is None or not shapes.ngeoms:
+    model, shapes = _stated(robot)
+    source = "the URDF's collision geometry, meshes as their convex hulls"
+    if not shapes.ngeoms:
         shapes, source = _capsules(robot, model), "capsules as thick as the links' inertia says"
         warnings.warn(
             SysidWarning(f"no collision geometry can be read from the URDF: links are {source}"),
@@ -179,16 +176,8 @@ def _tree(robot: Robot) -> ElementTree.Element:
     return root
 
 
-def _model(robot: Robot) -> pin.Model:
-    whole = pin.buildModelFromXML(ElementTree.tostring(_tree(robot), encoding="unicode"))
-    reference = pin.neutral(whole)
-    for name, angle in robot.locked.items():
-        reference[whole.joints[whole.getJointId(name)].idx_q] = angle
-    locked = [whole.getJointId(name) for name in robot.locked]
-    return pin.buildReducedModel(whole, locked, reference) if locked else whole
-
-
-def _stated(robot: Robot, model: pin.Model) -> pin.GeometryModel | None:
+def _stated(robot: Robot) -> tuple[pin.Model, pin.GeometryModel]:
+    """The model of the moving joints, and the URDF's shapes on it: none where they cannot be read."""
     text = ElementTree.tostring(_tree(robot), encoding="unicode")
     whole = pin.buildModelFromXML(text)
     folders = [str(p) for p in (*package_folders(), example_root().parents[1], *robot.path.parents)]
@@ -199,17 +188,11 @@ def _stated(robot: Robot, model: pin.Model) -> pin.GeometryModel | None:
                 whole, text, pin.GeometryType.COLLISION, package_dirs=folders
             )
     except (ValueError, RuntimeError):
-        return None
+        shapes = pin.GeometryModel()
     for shape in shapes.geometryObjects:
         if isinstance(shape.geometry, coal.BVHModelBase):
             shape.geometry = _hull(shape.geometry)
-    if not robot.locked:
-        return shapes
-    reference = pin.neutral(whole)
-    for name, angle in robot.locked.items():
-        reference[whole.joints[whole.getJointId(name)].idx_q] = angle
-    locked = [whole.getJointId(name) for name in robot.locked]
-    return pin.buildReducedModel(whole, shapes, locked, reference)[1]
+    return reduced(whole, robot.locked, shapes)
 
 
 def _hull(mesh: coal.BVHModelBase) -> coal.Convex:

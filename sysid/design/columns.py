@@ -7,6 +7,7 @@ pass over stacked copies of the motion.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +17,7 @@ from ..model import Model
 from ..motion import Piece
 
 _STEP = 1e-6  # rad, rad/s, rad/s^2 or metres: forward differences of smooth columns
+_RUN = 4096  # samples
 
 
 def of_the_instant(model: Model) -> Model:
@@ -46,6 +48,13 @@ def columns(model: Model, q, qd, qdd) -> np.ndarray:
     for joint, own in enumerate(found):
         out[joint, model.support(joint)] = own
     return out
+
+
+def in_runs(model: Model, q, qd, qdd) -> Iterator[tuple[slice, np.ndarray]]:
+    """Rows and `columns` of them, so few at once that memory does not grow with the motion."""
+    for start in range(0, len(q), _RUN):
+        rows = slice(start, start + _RUN)
+        yield rows, columns(model, q[rows], qd[rows], qdd[rows])
 
 
 @dataclass(frozen=True)

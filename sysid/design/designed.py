@@ -22,8 +22,9 @@ from ..specs import Experiment
 from . import promise, solve
 from .basis import Basis, basis
 from .collision import geometry
-from .columns import columns, of_the_instant
+from .columns import in_runs, of_the_instant
 from .fourier import Fourier
+from .information import noise_of
 from .limits import Limits, LimitsSpec, limits
 from .promise import played
 from .result import Design
@@ -74,7 +75,8 @@ def _fastest(motion) -> np.ndarray:
 
 def _greatest(fit: Fit) -> np.ndarray:
     parts = [p.measured for p in fit.predictions.values()]
-    return np.max([np.abs(m).max(axis=0) for m in parts], axis=0)
+    most = np.max([np.abs(m).max(axis=0) for m in parts], axis=0)
+    return np.where(np.isfinite(noise_of(fit)), most, np.inf)  # of an unused joint no log says any
 
 
 def _searched(problem: Problem, base: Basis, seed: int, tell) -> tuple[Found, float]:
@@ -154,9 +156,7 @@ def _more(fit: Fit, q, qd, qdd) -> np.ndarray:
     instant = of_the_instant(fit.model)
     places = [fit.model.names.index(name) for name in instant.names]
     out = np.zeros((len(fit.joints), fit.model.size, fit.model.size))
-    for start in range(0, len(q), 4096):
-        part = slice(start, start + 4096)
-        found = columns(instant, q[part], qd[part], qdd[part])
+    for _, found in in_runs(instant, q, qd, qdd):
         for j, own in enumerate(found):
             out[j][np.ix_(places, places)] += own @ own.T
     return out

@@ -19,7 +19,7 @@ from scipy.optimize import linprog
 
 from .. import regressor
 from .collision import Geometry
-from .columns import Slopes, columns
+from .columns import Slopes, in_runs
 from .fourier import Fourier
 from .information import Known, gram, log_det, log_det_with_slope
 from .limits import Limits
@@ -98,9 +98,8 @@ def torque(problem: Problem, q, qd, qdd) -> np.ndarray:
     if model.size == count:
         return regressor.torque(model.robot, x[:count].reshape(-1, 10), q, qd, qdd)
     out = np.empty_like(q)
-    for start in range(0, len(q), 4096):
-        part = slice(start, start + 4096)
-        out[part] = np.einsum("jpn,p->nj", columns(model, q[part], qd[part], qdd[part]), x)
+    for rows, found in in_runs(model, q, qd, qdd):
+        out[rows] = np.einsum("jpn,p->nj", found, x)
     return out
 
 
