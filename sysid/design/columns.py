@@ -75,8 +75,10 @@ class Slopes:
                 stacked[rate, 1 + rate * dof + joint, :, joint] += _STEP
         whole = columns(model, *stacked.reshape(3, -1, dof))
         whole = whole.reshape(*whole.shape[:2], 1 + 3 * dof, n)
-        here = whole[:, :, 0]
-        return cls(here, (whole[:, :, 1:] - here[:, :, None]) / _STEP)
+        here, change = whole[:, :, 0].copy(), whole[:, :, 1:]
+        change -= here[:, :, None]
+        change /= _STEP
+        return cls(here, change)
 
 
 def is_of_the_torque(effect) -> bool:
