@@ -95,11 +95,7 @@ def load(spec: RobotSpec, folder: Path = Path()) -> Robot:
     moving = [name for name in model.names[1:]]
     joints = tuple(_chosen(spec, source, moving))
     locked = {name: float(spec.lock.get(name, 0.0)) for name in moving if name not in joints}
-    if locked:
-        reference = pin.neutral(model)
-        for name, angle in locked.items():
-            reference[model.joints[model.getJointId(name)].idx_q] = angle
-        model = pin.buildReducedModel(model, [model.getJointId(name) for name in locked], reference)
+    model, _ = reduced(model, locked)
     model.gravity.linear = np.array(spec.gravity)
     links = [Body(source.joints[name].child, "link", name, model.getJointId(name) - 1) for name in joints]
     priors = _link_priors(source, model, links)
@@ -125,6 +121,17 @@ def load(spec: RobotSpec, folder: Path = Path()) -> Robot:
         damping=_frozen([joint.damping for joint in stated]), friction=_frozen([joint.friction for joint in stated]),
         limits=_frozen([joint.limits for joint in stated]), model=model, source=source, locked=locked,
     )  # fmt: skip
+
+
+def reduced(model: pin.Model, locked: dict[str, float], shapes: pin.GeometryModel | None = None) -> tuple[pin.Model, pin.GeometryModel]:
+    """A Pinocchio model, and shapes on it, with joints locked at angles [rad or m]."""
+    shapes = pin.GeometryModel() if shapes is None else shapes
+    if not locked:
+        return model, shapes
+    reference = pin.neutral(model)
+    for name, angle in locked.items():
+        reference[model.joints[model.getJointId(name)].idx_q] = angle
+    return pin.buildReducedModel(model, shapes, [model.getJointId(name) for name in locked], reference)
 
 
 def _frozen(values) -> np.ndarray:

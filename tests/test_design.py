@@ -8,7 +8,8 @@ import pytest
 
 from sysid import config, pipeline, robot
 from sysid import model as models
-from sysid.design import collision, design, document, limits, solve
+from sysid.design import basis, design, document, limits, links, problem, search
+from sysid.design.collision import corners
 from sysid.design.columns import Slopes, columns, of_the_instant
 from sysid.design.fourier import Fourier
 from sysid.design.information import Known, gram, log_det, log_det_with_slope, own_size
@@ -82,17 +83,19 @@ def test_hulls_are_as_near_as_a_quadratic_program_says():
     import cvxpy
 
     machine = robot.load(RobotSpec(urdf=UR5))
-    shapes = collision.geometry(machine)
+    shapes = links.geometry(machine)
     rng = np.random.default_rng(3)
     checked = 0
+    data, found = shapes.model.createData(), shapes.shapes.createData()
     for pose in rng.uniform(-2.5, 2.5, (40, 6)):
-        distances, _, found = shapes._at(pose)
+        distances = shapes.at(pose[None])[0]
+        pin.updateGeometryPlacements(shapes.model, data, shapes.shapes, found, pose)
         k = int(np.argmin(distances))
         pair = shapes.shapes.collisionPairs[k]
         ends = []
         for which in (pair.first, pair.second):
             shape, placed = shapes.shapes.geometryObjects[which].geometry, found.oMg[which]
-            ends.append(collision._corners(shape) @ placed.rotation.T + placed.translation)
+            ends.append(corners(shape) @ placed.rotation.T + placed.translation)
         a, b = (cvxpy.Variable(len(end), nonneg=True) for end in ends)
         gap = cvxpy.norm(ends[0].T @ a - ends[1].T @ b)
         truth = cvxpy.Problem(cvxpy.Minimize(gap), [cvxpy.sum(a) == 1, cvxpy.sum(b) == 1]).solve(solver="CLARABEL")
@@ -103,14 +106,15 @@ def test_hulls_are_as_near_as_a_quadratic_program_says():
 
 def test_distances_and_their_slopes():
     machine = robot.load(RobotSpec(urdf=UR5))
-    shapes = collision.geometry(machine).about(np.array([0.0, -1.5, 1.5, -1.5, -1.5, 0.0]))
+    shapes = links.geometry(machine).about(np.array([0.0, -1.5, 1.5, -1.5, -1.5, 0.0]))
     rng = np.random.default_rng(4)
     off = []
     for pose in rng.uniform(-2.5, 2.5, (30, 6)):
-        for _, distance, slope in shapes.near(pose[None], 0.05):
+        near = shapes.near(pose[None], 0.05)
+        for distance, slope in zip(near.distance, near.slope):
             way = rng.normal(size=6)
-            ends = [shapes.near((pose + s * 1e-4 * way)[None], 0.2) for s in (1.0, -1.0)]
-            pairs = [min((one[1] for one in end), key=lambda d: abs(d - distance)) for end in ends]
+            ends = [shapes.near((pose + s * 1e-4 * way)[None], 0.2).distance for s in (1.0, -1.0)]
+            pairs = [min(end, key=lambda d: abs(d - distance)) for end in ends]
             off.append(abs((pairs[0] - pairs[1]) / 2e-4 - slope @ way) / max(np.linalg.norm(slope), 1e-3))
     assert len(off) > 10 and np.median(off) < 1e-3
 
@@ -131,20 +135,14 @@ def poor(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def designed(poor):
-    return design(pipeline.load(poor[0]), duration=8.0, separate=[("stribeck", "shoulder"), ("spring", "shoulder")])
+    return design(pipeline.load(poor[0]), duration=8.0, separate=[("stribeck", "shoulder"), ("spring", "shoulder")], processes=1)
 
 
 def test_a_design_keeps_to_every_limit_as_an_independent_check_sees_it(poor, designed):
     """Positions, speeds, torque by Pinocchio and friction by hand, at a kilohertz."""
     machine = poor[1]
-    family = designed.family
     t = np.arange(0.0, 8.0, 1e-3)
-    w = 2.0 * np.pi * family.rounds / family.duration * np.arange(1, family.harmonics + 1)
-    c, a, b = np.split(designed.coefficients, [1, 1 + family.harmonics], axis=1)
-    angle = w * t[:, None]
-    q = (c.T + np.sin(angle) @ a.T + np.cos(angle) @ b.T)
-    qd = np.cos(angle) @ (w * a).T - np.sin(angle) @ (w * b).T
-    qdd = -np.sin(angle) @ (w**2 * a).T - np.cos(angle) @ (w**2 * b).T
+    q, qd, qdd = _motion(designed, t)
     own = [machine.source.joints[j] for j in machine.joints]
     assert (np.abs(q) <= [0.95 * j.limits[1] + 1e-9 for j in own]).all()
     assert (np.abs(qd) <= [0.95 * j.velocity + 1e-9 for j in own]).all()
@@ -185,15 +183,52 @@ def test_its_files(poor, designed, tmp_path):
     assert ros["points"][-1]["time_from_start"] == {"sec": 8, "nanosec": 0}
 
 
-def test_the_same_seed_is_the_same_motion(poor, designed):
-    again = design(pipeline.load(poor[0]), duration=8.0, separate=[("stribeck", "shoulder"), ("spring", "shoulder")])
+def test_the_same_seed_is_the_same_motion_in_any_number_of_processes(poor, designed, monkeypatch):
+    monkeypatch.setattr(search, "_WORTH", 0.0)
+    again = design(pipeline.load(poor[0]), duration=8.0, separate=[("stribeck", "shoulder"), ("spring", "shoulder")], processes=2)
     np.testing.assert_array_equal(again.coefficients, designed.coefficients)
+
+
+def test_what_is_stopped_keeps_the_best_motion_so_far(poor, monkeypatch):
+    whole, slices = search.solve.climbed, []
+
+    def interrupted(*asked):
+        slices.append(asked)
+        if len(slices) > 4:  # every start has had a slice
+            raise KeyboardInterrupt
+        return whole(*asked)
+
+    monkeypatch.setattr(search.solve, "climbed", interrupted)
+    found = design(pipeline.load(poor[0]), duration=8.0, processes=1)
+    assert any("stopped before" in text for text in found.said)
+    assert found.log_det > found.random_best and min(found.margins.values()) > 0.0
+
+
+def test_what_shrinks_keeps_to_its_limits_and_touches_one(arm):
+    machine = arm.model.robot
+    bounds = limits.limits(machine, LimitsSpec(torque={"shoulder": 4.0, "elbow": 2.0}), None)
+    posed = problem.Problem(arm, bounds, links.geometry(machine).about(np.zeros(2)), Fourier(8.0, 5, 4, 2), 250.0)
+    rng = np.random.default_rng(7)
+    touched = counted = 0
+    for _ in range(20):
+        z = problem.drawn(posed, np.zeros(2), rng)
+        z[:, 1:] *= 3.0
+        kept = problem.shrunk(posed, z)
+        if kept is None:  # gravity alone is too much
+            continue
+        motion = posed.basis @ kept.T
+        most = problem.shares(posed, motion, problem.torque(posed, *motion[:3])).max()
+        assert most <= 1.0
+        share = np.linalg.norm(kept[:, 1:]) / np.linalg.norm(z[:, 1:])
+        touched += bool(most > 0.99 or share == pytest.approx(1.0))
+        counted += 1
+    assert counted > 8 and touched >= 0.9 * counted
 
 
 def test_pairs_are_told_apart_or_said_not_to_be(poor, designed):
     (pair,) = designed.pairs
     assert {pair.a, pair.b} == {"stribeck:shoulder", "spring:shoulder"} and pair.probability > 0.9
-    twins = design(pipeline.load(poor[0]), duration=4.0, separate=[("torque_bias", "elbow"), ("asymmetric_coulomb", "elbow")])
+    twins = design(pipeline.load(poor[0]), duration=4.0, separate=[("torque_bias", "elbow"), ("asymmetric_coulomb", "elbow")], processes=1)
     assert twins.pairs[0].probability < 0.1  # beside Coulomb friction they are one column
 
 
@@ -234,9 +269,39 @@ def test_what_cannot_be_designed_is_said_in_one_line(poor, name):
     assert said in str(error.value) and "\n" not in str(error.value)
 
 
+def test_a_joint_whose_torque_is_unused_tells_nothing(poor):
+    """Neither is its noise taken for none, nor do its rows count in what is promised."""
+    folder, machine = poor
+    text = (folder / "config.yaml").read_text().replace("data:", "data:\n  unused: [elbow]", 1)
+    experiment = config.loads(text, folder / "config.yaml")
+    suspects = [("stribeck", "elbow"), ("spring", "elbow")]
+    found = design(experiment, duration=4.0, separate=suspects, processes=1)
+    known = basis.basis(experiment, [], lambda *_: None).known
+    assert np.isinf(known.noise[1]) and known.noise[0] < 1.0
+    # the information of the shoulder's rows alone, by hand
+    t = (np.arange(500) + 0.5) * 4.0 / 500
+    moved = columns(known.model, *(np.asarray(x) for x in _motion(found, t)))[0]
+    whole = known.before + 1000.0 / 500 / known.noise[0] ** 2 * moved @ moved.T
+    np.testing.assert_allclose(gram(known, *_motion(found, t), 1000.0), whole - known.before, rtol=1e-9, atol=1e-9 * np.abs(whole).max())
+    assert found.log_det > found.random_best
+    assert found.pairs[0].probability == 0.0 and "viscous.elbow.Fv" not in found.deviations
+    assert any(s["after"] < 0.9 * s["now"] for s in found.deviations.values())
+    assert np.isfinite(found.margins["torque"])
+
+
+def _motion(found, t):
+    """q, qd, qdd of a design at times, from its coefficients."""
+    w = 2.0 * np.pi * found.family.rounds / found.family.duration * np.arange(1, found.family.harmonics + 1)
+    c, a, b = np.split(found.coefficients, [1, 1 + found.family.harmonics], axis=1)
+    angle = w * t[:, None]
+    q = c.T + np.sin(angle) @ a.T + np.cos(angle) @ b.T
+    qd = np.cos(angle) @ (w * a).T - np.sin(angle) @ (w * b).T
+    return q, qd, -np.sin(angle) @ (w**2 * a).T - np.cos(angle) @ (w**2 * b).T
+
+
 def test_without_any_log_the_urdf_is_what_is_known(poor, tmp_path):
     (tmp_path / "robot.urdf").write_text(URDF)
-    found = design(config.loads("robot: {urdf: robot.urdf}\n", tmp_path / "config.yaml"), duration=4.0)
+    found = design(config.loads("robot: {urdf: robot.urdf}\n", tmp_path / "config.yaml"), duration=4.0, processes=1)
     assert found.log_det > found.random_best and found.deviations == {} and any("no log yet" in text for text in found.said)
 
 
@@ -251,10 +316,32 @@ def test_a_limits_file(tmp_path):
 
 def test_a_floor_is_kept_above(arm):
     machine = arm.model.robot
-    shapes = collision.geometry(machine, floor=0.25)
+    shapes = links.geometry(machine, floor=0.25)
     low = shapes.least(np.array([[0.0, 0.0], [1.5, 0.0]]))
     assert low[0] < low[1]  # hanging down from a metre, the arm ends at a quarter of one or so
-    assert solve.Found(Fourier(4.0, 5, 1, 2), np.zeros((2, 9)), 0.0).value == 0.0
+
+
+@pytest.mark.parametrize("floor", [None, 0.1])
+def test_pairs_that_are_not_asked_again_are_not_near(floor):
+    """Along a motion the least distance, looked at where links may be near alone, is that of all pairs."""
+    shapes = links.geometry(robot.load(RobotSpec(urdf=UR5)), floor=floor)
+    rng = np.random.default_rng(5)
+    family = Fourier(10.0, 5, 2, 6)
+    q = family.motion(0.7 * rng.normal(size=(6, family.size)), np.linspace(0.0, 10.0, 300))[0]
+    data, found = shapes.model.createData(), shapes.shapes.createData()
+    truth = []
+    for pose in q:
+        pin.computeDistances(shapes.model, data, shapes.shapes, found, pose)
+        truth.append(min(result.min_distance for result in found.distanceResults))
+        if floor is not None:
+            for shape, placed in zip(shapes.shapes.geometryObjects, found.oMg):
+                height = (corners(shape.geometry) @ placed.rotation.T + placed.translation)[:, 2].min() - floor
+                truth[-1] = min(truth[-1], height if shape.parentJoint else np.inf)
+    for most in (0.05, 0.5):
+        np.testing.assert_allclose(shapes.least(q, most), np.minimum(truth, most), atol=1e-9)
+    assert shapes.nearest(q) == pytest.approx(min(truth), abs=1e-9)
+    near = shapes.near(q, 0.05)
+    assert set(near.pose) == set(np.flatnonzero(np.array(truth) < 0.05)) and len(near.pose) > 10
 
 
 def test_a_design_shows_itself(poor, designed, tmp_path):

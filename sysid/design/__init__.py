@@ -2,10 +2,13 @@
 
 fourier.py      motions: sums of harmonics, at rest at both ends
 limits.py       positions, speeds, accelerations, jerks, torques, clearance, floor
-collision.py    how close links come to each other
+links.py        what links look like
+collision.py    how close they come to each other along a motion
 columns.py      what parameters do to an instant's torque, and how that changes with the motion
 information.py  log det M of a motion, and its slope
-solve.py        linear programs within a trust region, several starts
+problem.py      a motion against its limits, and how far it must shrink
+solve.py        linear programs within a trust region
+search.py       several starts in several processes
 promise.py      deviations now and after, and which suspects will be told apart
 basis.py        what a design starts from
 designed.py     all of it on one page

@@ -18,7 +18,7 @@ from ..preprocess import prepare
 from ..robot import Robot
 from ..specs import Experiment
 from .columns import is_of_the_torque, of_the_instant
-from .information import Known, own_size
+from .information import Known, noise_of, own_size, size_of
 
 _WINDOW = 0.1  # s, where none is known
 _GUESSED = 0.02  # of a joint's torque: its noise, where no log says
@@ -49,7 +49,7 @@ def basis(experiment: Experiment, separate, tell) -> Basis:
         spec = settled(fit.experiment.preprocess, fit.filters)
         motion = prepare(read.train, spec, machine.joints)
         structure, x = fit.model, fit.x
-        noise = np.maximum(np.array(list(fit.rms("test").values())), 1e-9)
+        noise = noise_of(fit)
         pose = np.concatenate([p.q for p in motion.pieces]).mean(axis=0)
         rate = 1.0 / motion.pieces[0].step
         window = float(fit.filters.get("window", _WINDOW))
@@ -109,10 +109,8 @@ def _known(model: Model, fit: Fit | None, x, noise, prior, suspects) -> Known:
     instant = of_the_instant(model)
     values = dict(zip(model.names, x))
     own = np.array([values[name] for name in instant.names])
-    typical = np.maximum(20.0 * noise, 1e-6)
-    if fit is not None:
-        typical = np.sqrt(np.mean(fit.predictions["train"].measured ** 2, axis=0))
-    before = own_size(instant, prior, own, np.maximum(typical, 1e-9))
+    typical = np.maximum(20.0 * noise, 1e-6) if fit is None else size_of(fit)
+    before = own_size(instant, prior, own, typical)
     if fit is not None:
         places = [model.names.index(name) for name in instant.names]
         for factor in fit.compressed.by_joint:
@@ -128,7 +126,7 @@ def _known(model: Model, fit: Fit | None, x, noise, prior, suspects) -> Known:
     if grown.size > instant.size:
         more = grown.size - instant.size
         x_grown = np.append(own, np.zeros(more))
-        whole = own_size(grown, prior, x_grown, np.maximum(typical, 1e-9))
+        whole = own_size(grown, prior, x_grown, typical)
         whole[: instant.size, : instant.size] = before
         return Known(grown, x_grown, noise, whole)
     return Known(instant, own, noise, before)

@@ -1,33 +1,45 @@
-"""How close a robot's links come to each other, and to the floor.
+"""How close a robot's links come to each other, and to the floor, along a motion.
 
-The URDF's collision geometry, each mesh as its convex hull: never nearer to another link than the
-mesh itself is said to be. Where a URDF has none, a capsule for each link, as long as to its next
-joints and as thick as a rod of its inertia. Pairs that move together, or that overlap in the pose
-that a motion is about, are not looked at; nor what hangs on neighbouring joints.
+Every pair's distance is asked of coal at some poses, its keys. Between them a distance changes by no
+more than the points of its shapes move, so that most pairs need not be asked again:
+
+    d(q) >= d(q_key) - sum_j r_j |q_j - q_key_j|,
+
+with j the joints between the two links, and r_j the farthest that a point of the outer shape can be
+from joint j's axis (one for a joint that slides). The floor is the base's: shapes above it are pairs
+of their own.
+
+Source: the bound is that of conservative advancement, Mirtich 1996, ch. 2.
 """
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass
-from xml.etree import ElementTree
+from functools import cached_property
 
 import coal
 import numpy as np
 import pinocchio as pin
 
-from ..errors import SysidWarning
-from ..inertia import pseudo
-from ..robot import Robot
-from ..urdf import example_root, package_folders
+_EVERY = 8  # poses from one at which all pairs are asked to the next
+_SLIDES = 10.0  # m that a joint without limits is taken to slide at most
 
-_THINNEST = 0.02  # m: of a capsule
+
+@dataclass(frozen=True)
+class Near:
+    """Pairs that are near at poses: each one's pose (m,), distance (m,) [m] and the slope of that
+    (m, dof)."""
+
+    pose: np.ndarray
+    distance: np.ndarray
+    slope: np.ndarray
 
 
 @dataclass(frozen=True)
 class Geometry:
     """A robot's shapes on the Pinocchio model of its moving joints. order (dof,): where each of the
-    robot's joints stands in the model's configuration. pairs: how many are looked at."""
+    robot's joints stands in the model's configuration. floor [m] or None. pairs: how many are looked
+    at."""
 
     model: pin.Model
     shapes: pin.GeometryModel
@@ -49,205 +61,162 @@ class Geometry:
         """The same without pairs that are nearer than a clearance [m] at a pose (dof,)."""
         shapes = self.shapes.copy()
         shapes.removeAllCollisionPairs()
-        for pair, distance in zip(self.shapes.collisionPairs, self._at(pose)[0]):
+        distances = self.at(np.asarray(pose)[None])[0]
+        for pair, distance in zip(self.shapes.collisionPairs, distances):
             if distance > clearance:
                 shapes.addCollisionPair(pair)
         return Geometry(self.model, shapes, self.order, self.floor, self.source)
 
-    def _q(self, pose) -> np.ndarray:
-        q = np.empty(self.model.nq)
-        q[self.order] = pose
-        return q
-
-    def _at(self, pose):
+    def at(self, q) -> np.ndarray:
+        """Distances [m] of every pair, then above the floor of every shape that moves, (n, pairs +
+        shapes), at poses q (n, dof)."""
+        out = np.empty((len(q), len(self._reach)))
         data, found = self.model.createData(), self.shapes.createData()
-        pin.computeDistances(self.model, data, self.shapes, found, self._q(pose))
-        return np.array([r.min_distance for r in found.distanceResults]), data, found
-
-    def least(self, q) -> np.ndarray:
-        """(n,) least distance [m] of any pair, or above the floor, at poses q (n, dof)."""
-        if not self.looks:
-            return np.full(len(q), np.inf)
-        data, found = self.model.createData(), self.shapes.createData()
-        out = np.empty(len(q))
-        for k, pose in enumerate(q):
-            pin.computeDistances(self.model, data, self.shapes, found, self._q(pose))
-            pairs = min((r.min_distance for r in found.distanceResults), default=np.inf)
-            out[k] = min(pairs, self._lowest(found)[0] if self.floor is not None else np.inf)
+        for own, pose in zip(out, self._whole(q)):
+            pin.computeDistances(self.model, data, self.shapes, found, pose)
+            own[: self.pairs] = [result.min_distance for result in found.distanceResults]
+            own[self.pairs :] = [self._lowest(found, k)[0] for k in self._above]
         return out
 
-    def _lowest(self, found) -> tuple[float, int, np.ndarray]:
-        """Height [m] above the floor of the lowest point of what moves, its joint and the point."""
-        best = (np.inf, 0, np.zeros(3))
-        for shape, placed in zip(self.shapes.geometryObjects, found.oMg):
-            if shape.parentJoint == 0:
-                continue
-            corners = _corners(shape.geometry) @ placed.rotation.T + placed.translation
-            at = int(np.argmin(corners[:, 2]))
-            if (height := float(corners[at, 2] - self.floor)) < best[0]:
-                best = (height, shape.parentJoint, corners[at])
-        return best
+    def least(self, q, most: float = np.inf) -> np.ndarray:
+        """(n,) least distance [m] of any pair or above the floor at poses q (n, dof), in the order of
+        a motion; `most` [m] where it is more."""
+        out = np.full(len(q), most)
+        if self.looks:
+            for k, _, distance, *_ in self._nearer(np.asarray(q), most):
+                out[k] = min(out[k], distance)
+        return out
 
-    def near(self, q, within: float) -> list[tuple[int, float, np.ndarray]]:
-        """Every pair nearer than `within` [m] at poses q (n, dof): the pose's number, the distance
-        [m], and its slope (dof,). The floor is the base's: a pair of its own."""
-        out = []
+    def nearest(self, q) -> float:
+        """The least distance [m] of a whole motion (n, dof)."""
         if not self.looks:
-            return out
+            return np.inf
+        keys = float(self.at(np.asarray(q)[::_EVERY]).min())
+        return float(self.least(q, keys).min())
+
+    def near(self, q, within: float) -> Near:
+        """Every pair nearer than `within` [m] at poses q (n, dof), in the order of a motion."""
+        found = list(self._nearer(np.asarray(q), within)) if self.looks else []
+        if not found:
+            return Near(np.zeros(0, dtype=int), np.zeros(0), np.zeros((0, len(self.order))))
+        pose, pair, distance, way, one, two, jacobian = (list(own) for own in zip(*found))
+        way, jacobian = np.array(way), np.array(jacobian)
+        slope = np.zeros((len(pose), self.model.nv))
+        # the pull of a link's point p in the direction n: n . (v + w x p) = n . v + w . (p x n)
+        for point, end, sign in ((one, 0, 1.0), (two, 1, -1.0)):
+            turned = np.cross(np.array(point), way)
+            own = np.einsum("mi,mij->mj", way, jacobian[:, :3])
+            own += np.einsum("mi,mij->mj", turned, jacobian[:, 3:])
+            slope += sign * own * self._carried[self._ends[pair][:, end]]
+        return Near(np.array(pose), np.array(distance), slope[:, self.order])
+
+    def _nearer(self, q, within: float):
+        """(pose, pair, distance, direction from the second to the first, points of both, joint
+        Jacobians at the base's origin) of every pair nearer than `within`."""
+        asked = q[_EVERY // 2 :: _EVERY] if len(q) > _EVERY // 2 else q[:1]
+        keys = self.at(asked)
+        own = np.minimum(np.arange(len(q)) // _EVERY, len(asked) - 1)
+        # pairs that may be near, by pose
+        may = keys[own] - np.abs(q - asked[own]) @ self._reach.T < within
         data, found = self.model.createData(), self.shapes.createData()
-        for k, pose in enumerate(q):
-            pin.computeDistances(self.model, data, self.shapes, found, self._q(pose))
-            low = self._lowest(found) if self.floor is not None else (np.inf, 0, None)
-            if min((r.min_distance for r in found.distanceResults), default=np.inf) >= within and (
-                low[0] >= within
-            ):
-                continue
-            pin.computeJointJacobians(self.model, data, self._q(pose))
-            for pair, result in zip(self.shapes.collisionPairs, found.distanceResults):
-                if result.min_distance >= within:
+        whole, up = self._whole(q), np.array([0.0, 0.0, 1.0])
+        for k in np.flatnonzero(may.any(axis=1)):
+            pin.updateGeometryPlacements(self.model, data, self.shapes, found, whole[k])
+            jacobian = None
+            for pair in np.flatnonzero(may[k]).tolist():
+                if pair < self.pairs:
+                    result = pin.computeDistance(self.shapes, found, pair)
+                    distance = result.min_distance
+                else:
+                    distance, point = self._lowest(found, self._above[pair - self.pairs])
+                if distance >= within:
                     continue
-                first, second = (self.shapes.geometryObjects[i] for i in (pair.first, pair.second))
-                way = -np.asarray(result.normal)  # from the second to the first
-                pull = self._point(data, first.parentJoint, result.getNearestPoint1())
-                pull -= self._point(data, second.parentJoint, result.getNearestPoint2())
-                out.append((k, float(result.min_distance), (way @ pull)[self.order]))
-            if low[0] < within:
-                out.append((k, low[0], self._point(data, low[1], low[2])[2][self.order]))
+                if jacobian is None:
+                    jacobian = pin.computeJointJacobians(self.model, data, whole[k]).copy()
+                if pair < self.pairs:
+                    way = -np.array(result.normal)
+                    ends = np.array(result.getNearestPoint1()), np.array(result.getNearestPoint2())
+                else:
+                    way, ends = up, (point, point)
+                yield int(k), pair, distance, way, *ends, jacobian
+
+    def _whole(self, q) -> np.ndarray:
+        """(n, nq) configurations of the Pinocchio model."""
+        out = np.empty((len(q), self.model.nq))
+        out[:, self.order] = q
         return out
 
-    def _point(self, data, joint: int, place) -> np.ndarray:
-        """Velocity Jacobian (3, nv) of a point [m, base frame] that moves with a joint."""
-        if joint == 0:
-            return np.zeros((3, self.model.nv))
-        jacobian = pin.getJointJacobian(
-            self.model, data, joint, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-        )
-        arm = place - data.oMi[joint].translation
-        return jacobian[:3] + np.cross(jacobian[3:], arm, axisa=0).T
+    def _lowest(self, found, shape: int) -> tuple[float, np.ndarray]:
+        """Height [m] above the floor of the lowest point of a shape, and the point."""
+        placed = found.oMg[shape]
+        corners = self._corners[shape] @ placed.rotation.T + placed.translation
+        point = corners[np.argmin(corners[:, 2])]
+        return float(point[2] - self.floor), point
+
+    @cached_property
+    def _above(self) -> list[int]:
+        """Numbers of the shapes that are kept above the floor."""
+        shapes = enumerate(self.shapes.geometryObjects)
+        return [k for k, shape in shapes if shape.parentJoint] if self.floor is not None else []
+
+    @cached_property
+    def _corners(self) -> list[np.ndarray]:
+        return [corners(shape.geometry) for shape in self.shapes.geometryObjects]
+
+    @cached_property
+    def _ends(self) -> np.ndarray:
+        """(pairs, 2) joints that carry the shapes of each pair; the floor's is 0, the base."""
+        joint = [shape.parentJoint for shape in self.shapes.geometryObjects]
+        pairs = [(joint[pair.first], joint[pair.second]) for pair in self.shapes.collisionPairs]
+        return np.array([*pairs, *((joint[k], 0) for k in self._above)], dtype=int).reshape(-1, 2)
+
+    @cached_property
+    def _carried(self) -> np.ndarray:
+        """(njoints, nv) bool: whether a joint is carried by another, or is it."""
+        out = np.zeros((self.model.njoints, self.model.nv), dtype=bool)
+        for joint in range(1, self.model.njoints):
+            out[joint] = out[self.model.parents[joint]]
+            out[joint, self.model.joints[joint].idx_v] = True
+        return out
+
+    @cached_property
+    def _reach(self) -> np.ndarray:
+        """(pairs, dof) by how much a pair's distance can change [m] for each rad or m of a joint."""
+        numbers = [(pair.first, pair.second) for pair in self.shapes.collisionPairs]
+        numbers += [(k, None) for k in self._above]
+        out = np.zeros((len(numbers), self.model.nv))
+        for row, shapes, joints in zip(out, numbers, self._ends):
+            between = self._carried[joints[0]] != self._carried[joints[1]]
+            for shape in shapes:
+                if shape is not None:
+                    far = self._far(shape)
+                    row[between & (far > 0.0)] = far[between & (far > 0.0)]
+        return out[:, self.order]
+
+    def _far(self, shape: int) -> np.ndarray:
+        """(nv,) how far a shape's points move at most for each rad or m of a joint that carries it;
+        zero of others."""
+        model, out = self.model, np.zeros(self.model.nv)
+        joint = self.shapes.geometryObjects[shape].parentJoint
+        placed = self.shapes.geometryObjects[shape].placement
+        points = self._corners[shape] @ placed.rotation.T + placed.translation
+        reach = float(np.linalg.norm(points, axis=1).max())
+        while joint:
+            own = model.joints[joint]
+            slides = not own.createData().S.ravel()[3:].any()
+            out[own.idx_v] = 1.0 if slides else max(reach, 1e-9)
+            if slides:
+                ends = model.lowerPositionLimit[own.idx_q], model.upperPositionLimit[own.idx_q]
+                reach += min(float(np.abs(ends).max()), _SLIDES)
+            reach += float(np.linalg.norm(model.jointPlacements[joint].translation))
+            joint = model.parents[joint]
+        return out
 
 
-def _corners(shape) -> np.ndarray:
+def corners(shape) -> np.ndarray:
     """Points (n, 3) that a shape lies within: a hull's own, else its box's."""
     if isinstance(shape, coal.ConvexBase):
         return np.array(shape.points())
     shape.computeLocalAABB()
     box = shape.aabb_local
     return np.stack(np.meshgrid(*zip(box.min_, box.max_), indexing="ij"), axis=-1).reshape(-1, 3)
-
-
-def geometry(robot: Robot, floor: float | None = None) -> Geometry:
-    """What a robot's links look like. Warns where the URDF does not say, or its meshes are not to
-    be found."""
-    model = _model(robot)
-    shapes, source = (
-        _stated(robot, model),
-        "the URDF's collision geometry, meshes as their convex hulls",
-    )
-    if shapes is None or not shapes.ngeoms:
-        shapes, source = _capsules(robot, model), "capsules as thick as the links' inertia says"
-        warnings.warn(
-            SysidWarning(f"no collision geometry can be read from the URDF: links are {source}"),
-            stacklevel=2,
-        )
-    near = {(j, int(model.parents[j])) for j in range(1, model.njoints)}
-    for a, one in enumerate(shapes.geometryObjects):
-        for b, two in enumerate(shapes.geometryObjects[:a]):
-            i, j = one.parentJoint, two.parentJoint
-            if i != j and (i, j) not in near and (j, i) not in near:
-                shapes.addCollisionPair(pin.CollisionPair(b, a))
-    order = np.array([model.joints[model.getJointId(name)].idx_q for name in robot.joints])
-    return Geometry(model, shapes, order, floor, source)
-
-
-def _tree(robot: Robot) -> ElementTree.Element:
-    """The URDF without what only pictures need, every moving joint with one coordinate."""
-    root = ElementTree.fromstring(robot.source.text.encode())
-    for link in root.findall("link"):
-        for child in list(link):
-            if child.tag != "collision":
-                link.remove(child)
-    for child in list(root):
-        if child.tag not in ("link", "joint"):
-            root.remove(child)
-        elif child.tag == "joint" and child.get("type") == "continuous":
-            child.set("type", "revolute")
-            for limit in child.findall("limit"):
-                child.remove(limit)
-            ElementTree.SubElement(
-                child, "limit", lower="-1e9", upper="1e9", effort="1e9", velocity="1e9"
-            )
-    return root
-
-
-def _model(robot: Robot) -> pin.Model:
-    whole = pin.buildModelFromXML(ElementTree.tostring(_tree(robot), encoding="unicode"))
-    reference = pin.neutral(whole)
-    for name, angle in robot.locked.items():
-        reference[whole.joints[whole.getJointId(name)].idx_q] = angle
-    locked = [whole.getJointId(name) for name in robot.locked]
-    return pin.buildReducedModel(whole, locked, reference) if locked else whole
-
-
-def _stated(robot: Robot, model: pin.Model) -> pin.GeometryModel | None:
-    text = ElementTree.tostring(_tree(robot), encoding="unicode")
-    whole = pin.buildModelFromXML(text)
-    folders = [str(p) for p in (*package_folders(), example_root().parents[1], *robot.path.parents)]
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            shapes = pin.buildGeomFromUrdfString(
-                whole, text, pin.GeometryType.COLLISION, package_dirs=folders
-            )
-    except (ValueError, RuntimeError):
-        return None
-    for shape in shapes.geometryObjects:
-        if isinstance(shape.geometry, coal.BVHModelBase):
-            shape.geometry = _hull(shape.geometry)
-    if not robot.locked:
-        return shapes
-    reference = pin.neutral(whole)
-    for name, angle in robot.locked.items():
-        reference[whole.joints[whole.getJointId(name)].idx_q] = angle
-    locked = [whole.getJointId(name) for name in robot.locked]
-    return pin.buildReducedModel(whole, shapes, locked, reference)[1]
-
-
-def _hull(mesh: coal.BVHModelBase) -> coal.Convex:
-    """The convex hull of a mesh. Its own `buildConvexRepresentation` gives hulls whose distances are
-    wrong by centimetres (coal 3.0); this one's are those of a quadratic program over its points."""
-    points = coal.StdVec_Vec3s()
-    for point in np.array(mesh.vertices()):
-        points.append(point)
-    return coal.ConvexBase.convexHull(points, True, "Qt")
-
-
-def _capsules(robot: Robot, model: pin.Model) -> pin.GeometryModel:
-    """A capsule along every line from a joint to the next, the last one to its centre of mass."""
-    shapes = pin.GeometryModel()
-    for body, pi in zip(robot.bodies, robot.prior):
-        if body.kind != "link":
-            continue
-        joint = model.getJointId(body.joint)
-        mass, com, central = pseudo.to_central(pi)
-        # a rod's moment about its own axis is m r^2 / 2
-        radius = max(float(np.sqrt(2.0 * np.linalg.eigvalsh(central)[0] / mass)), _THINNEST)
-        ends = [
-            model.jointPlacements[k].translation
-            for k in range(1, model.njoints)
-            if model.parents[k] == joint
-        ]
-        for end in ends or [2.0 * com]:
-            length = float(np.linalg.norm(end))
-            turn = (
-                pin.Quaternion.FromTwoVectors(
-                    np.array([0.0, 0.0, 1.0]), np.asarray(end, dtype=float)
-                )
-                if length > 0
-                else pin.Quaternion.Identity()
-            )
-            placed = pin.SE3(turn.matrix(), 0.5 * np.asarray(end, dtype=float))
-            shape = coal.Capsule(radius, max(length - 2.0 * radius, 0.0))
-            shapes.addGeometryObject(
-                pin.GeometryObject(f"{body.name}_{shapes.ngeoms}", joint, placed, shape)
-            )
-    return shapes

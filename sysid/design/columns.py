@@ -7,6 +7,7 @@ pass over stacked copies of the motion.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +17,7 @@ from ..model import Model
 from ..motion import Piece
 
 _STEP = 1e-6  # rad, rad/s, rad/s^2 or metres: forward differences of smooth columns
+_RUN = 4096  # samples
 
 
 def of_the_instant(model: Model) -> Model:
@@ -48,6 +50,13 @@ def columns(model: Model, q, qd, qdd) -> np.ndarray:
     return out
 
 
+def in_runs(model: Model, q, qd, qdd) -> Iterator[tuple[slice, np.ndarray]]:
+    """Rows and `columns` of them, so few at once that memory does not grow with the motion."""
+    for start in range(0, len(q), _RUN):
+        rows = slice(start, start + _RUN)
+        yield rows, columns(model, q[rows], qd[rows], qdd[rows])
+
+
 @dataclass(frozen=True)
 class Slopes:
     """Columns (dof, size, n) of a motion and how they change: `change` (dof, size, 3 dof, n) per
@@ -66,8 +75,10 @@ class Slopes:
                 stacked[rate, 1 + rate * dof + joint, :, joint] += _STEP
         whole = columns(model, *stacked.reshape(3, -1, dof))
         whole = whole.reshape(*whole.shape[:2], 1 + 3 * dof, n)
-        here = whole[:, :, 0]
-        return cls(here, (whole[:, :, 1:] - here[:, :, None]) / _STEP)
+        here, change = whole[:, :, 0].copy(), whole[:, :, 1:]
+        change -= here[:, :, None]
+        change /= _STEP
+        return cls(here, change)
 
 
 def is_of_the_torque(effect) -> bool:

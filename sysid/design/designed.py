@@ -19,26 +19,26 @@ from .. import pipeline
 from ..errors import ConfigError, SysidWarning
 from ..estimate import Fit
 from ..specs import Experiment
-from . import promise, solve
+from . import promise
 from .basis import Basis, basis
-from .collision import geometry
-from .columns import columns, of_the_instant
+from .columns import in_runs, of_the_instant
 from .fourier import Fourier
+from .information import noise_of
 from .limits import Limits, LimitsSpec, limits
+from .links import geometry
+from .problem import Problem, shares, torque
 from .promise import played
 from .result import Design
-from .solve import Found, Problem
+from .search import searched
+from .solve import Found
 
 HARMONICS = 5
-_ROUNDS = (1, 2, 4, 8)  # of the slowest harmonic
 _FASTEST = 0.25  # of a period of the filter's window: what it still lets through of the fastest
-_DRAWN = 4  # random motions for each number of rounds; the best is where the search begins
-_IMPROVED = 2  # numbers of rounds from which it begins: those whose best random motion tells most
 
 
 def design(
     experiment: Experiment, *, duration: float = 20.0, separate: Sequence[tuple[str, str]] = (),
-    limits_spec: LimitsSpec | None = None, seed: int = 0,
+    limits_spec: LimitsSpec | None = None, seed: int = 0, processes: int | None = None,
     progress: Callable[[str, float], None] | None = None,
 ) -> Design:  # fmt: skip
     """The next motion to log.
@@ -46,6 +46,8 @@ def design(
     Args:
         duration [s]. separate: suspects, (effect, joint) each, `*` for the robot.
         limits_spec: limits beside the URDF's. seed: of the starts.
+        processes: that share the starts, as many as there are cores where it is None; the motion is
+            the same whatever their number.
 
     Raises:
         SysidError: bad input, or no motion keeps to the limits.
@@ -61,10 +63,17 @@ def design(
         family = Fourier(duration, HARMONICS, 1, base.robot.dof)
         shapes = geometry(base.robot, bounds.floor).about(base.pose, bounds.clearance)
         problem = Problem(base.known, bounds.inner(), shapes, family, base.rate)
-        found, random_best = _searched(problem, base, seed, tell)
+        found, random_best = searched(
+            problem, base.pose, _FASTEST / base.window, seed, processes=processes, tell=tell
+        )
+        if found is None:
+            raise ConfigError(
+                f"no motion keeps to the limits: {_why(problem, base.pose)}", where="design",
+                do="give wider limits, a smaller clearance, or logs about another pose",
+            )  # fmt: skip
         for text in bounds.said:
             warnings.warn(SysidWarning(text), stacklevel=2)
-    return _told(base, replace(problem, family=found.family), bounds, found, random_best, notices)
+    return _told(base, problem.with_rounds(found.rounds), bounds, found, random_best, notices)
 
 
 def _fastest(motion) -> np.ndarray:
@@ -74,39 +83,8 @@ def _fastest(motion) -> np.ndarray:
 
 def _greatest(fit: Fit) -> np.ndarray:
     parts = [p.measured for p in fit.predictions.values()]
-    return np.max([np.abs(m).max(axis=0) for m in parts], axis=0)
-
-
-def _searched(problem: Problem, base: Basis, seed: int, tell) -> tuple[Found, float]:
-    """The best motion of all starts, and log det M of the best random one."""
-    fastest = _FASTEST / base.window
-    duration = problem.family.duration
-    rounds = [r for r in _ROUNDS if r * HARMONICS / duration <= fastest] or [1]
-    rng, best, starts = np.random.default_rng(seed), None, []
-    for own in rounds:
-        posed = replace(problem, family=replace(problem.family, rounds=own))
-        drawn = [solve.shrunk(posed, solve.drawn(posed, base.pose, rng)) for _ in range(_DRAWN)]
-        told = [(solve.value(posed, z), z) for z in drawn if z is not None]
-        if told:
-            starts.append((*max(told, key=lambda one: one[0]), posed))
-    random_best = max((one[0] for one in starts), default=-np.inf)
-    starts = sorted(starts, key=lambda one: -one[0])[:_IMPROVED]
-    for number, (_, z, posed) in enumerate(starts):
-        report = lambda share, number=number: tell("design", (number + share) / len(starts))  # noqa: E731
-        try:
-            found = solve.improved(posed, z, report)
-        except KeyboardInterrupt:
-            if best is None:
-                raise
-            break  # the best so far keeps to the limits
-        if np.isfinite(found.value) and (best is None or found.value > best.value):
-            best = found
-    if best is None:
-        raise ConfigError(
-            f"no motion keeps to the limits: {_why(problem, base.pose)}", where="design",
-            do="give wider limits, a smaller clearance, or logs about another pose",
-        )  # fmt: skip
-    return best, random_best
+    most = np.max([np.abs(m).max(axis=0) for m in parts], axis=0)
+    return np.where(np.isfinite(noise_of(fit)), most, np.inf)  # of an unused joint no log says any
 
 
 def _why(problem: Problem, pose) -> str:
@@ -117,7 +95,7 @@ def _why(problem: Problem, pose) -> str:
     if outside.any():
         j = int(np.argmax(outside))
         return f"{joints[j]} at {pose[j]:.3g} is outside {own.position[j, 0]:.3g} to {own.position[j, 1]:.3g}"
-    held = np.abs(solve.torque(problem, pose[None], 0.0 * pose[None], 0.0 * pose[None])[0])
+    held = np.abs(torque(problem, pose[None], 0.0 * pose[None], 0.0 * pose[None])[0])
     if (held > own.torque).any():
         j = int(np.argmax(held / own.torque))
         return f"holding {joints[j]} against gravity needs {held[j]:.3g} of {own.torque[j]:.3g}"
@@ -130,10 +108,10 @@ def _why(problem: Problem, pose) -> str:
 def _told(
     base: Basis, problem: Problem, bounds: Limits, found: Found, random_best, notices
 ) -> Design:
-    family = found.family
+    family = problem.family
     t = np.arange(int(round(family.duration * base.rate)) + 1) / base.rate
     q, qd, qdd, _ = family.motion(found.z, t)
-    needed = solve.torque(problem, q, qd, qdd)
+    needed = torque(problem, q, qd, qdd)
     spread, pairs = {}, []
     if base.fit is not None:
         spread = promise.deviations(base.fit, _more(base.fit, q, qd, qdd))
@@ -154,9 +132,7 @@ def _more(fit: Fit, q, qd, qdd) -> np.ndarray:
     instant = of_the_instant(fit.model)
     places = [fit.model.names.index(name) for name in instant.names]
     out = np.zeros((len(fit.joints), fit.model.size, fit.model.size))
-    for start in range(0, len(q), 4096):
-        part = slice(start, start + 4096)
-        found = columns(instant, q[part], qd[part], qdd[part])
+    for _, found in in_runs(instant, q, qd, qdd):
         for j, own in enumerate(found):
             out[j][np.ix_(places, places)] += own @ own.T
     return out
@@ -165,9 +141,9 @@ def _more(fit: Fit, q, qd, qdd) -> np.ndarray:
 def _margins(problem: Problem, bounds: Limits, found: Found) -> dict[str, float]:
     """Shares of the allowed range that are left at the worst instant, and metres."""
     whole = replace(problem, limits=bounds)
-    motion = found.family.motion(found.z, solve.checked(whole))
-    most = solve.shares(whole, motion, solve.torque(whole, *motion[:3])).max(axis=(1, 2))
+    motion = whole.basis @ found.z.T
+    most = shares(whole, motion, torque(whole, *motion[:3])).max(axis=(1, 2))
     names = ("position", "velocity", "acceleration", "jerk", "torque")
     out = {name: float(1.0 - share) for name, share in zip(names, most)}
-    near = float(problem.geometry.least(motion[0][::10]).min())
+    near = problem.geometry.nearest(motion[0][::10])
     return out | ({"collision": near} if np.isfinite(near) else {})

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..estimate import Fit
 from ..inertia import DIVERGENCES
 from ..model import Model
 from .columns import Slopes, columns
@@ -26,7 +27,7 @@ class Known:
     """What is known before a design.
 
     model: of the instant, at its shape values; x (size,): parameters; noise (dof,): standard
-    deviation of a row's torque [N m]; before (size, size): information of the logs that exist and
+    deviation of a row's torque [N m], infinite where no row counts; before (size, size): information of the logs that exist and
     the prior. scale (size,): in units of which parameters are well-conditioned.
     """
 
@@ -39,6 +40,27 @@ class Known:
     def dof(self) -> int:
         """Joints."""
         return self.model.robot.dof
+
+
+_QUIETEST = 1e-9  # N m: of logs without any noise
+
+
+def noise_of(fit: Fit) -> np.ndarray:
+    """(dof,) deviation [N m or N] of a row of each joint's torque: the error on the test logs, or on
+    the training logs where no test row counts. Infinite where none does: what such a joint's
+    torque would tell, no log will."""
+    told = [fit.predictions[part].told() for part in ("test", "train")]
+    rms = [test if test is not None else train for test, train in zip(*told)]
+    return np.array([np.inf if own is None else max(own, _QUIETEST) for own in rms])
+
+
+def size_of(fit: Fit) -> np.ndarray:
+    """(dof,) RMS [N m or N] of each joint's torque on the training logs; the largest joint's where no
+    row counts."""
+    train = fit.predictions["train"]
+    kept = train.measured if train.use is None else np.where(train.use, train.measured, 0.0)
+    rms = np.sqrt((kept**2).sum(axis=0) / np.maximum(train.counts, 1))
+    return np.maximum(np.where(rms > 0.0, rms, rms.max()), _QUIETEST)
 
 
 def own_size(model: Model, prior, x, torque) -> np.ndarray:

@@ -27,7 +27,7 @@ from ..motion import Motion
 from ..rows import stack
 from ..source import Source
 from .columns import piece
-from .information import own_size
+from .information import noise_of, own_size, size_of
 
 _ODDS = np.log(9.0)  # a set at 90 % holds one of two
 _RATE = 50.0  # Hz of the rows that pairs are asked on
@@ -63,7 +63,7 @@ def pairs(
     Args:
         samples: of the new log.
     """
-    noise = np.array(list(fit.rms("test").values()))
+    noise = noise_of(fit)
     parts = []
     for motion, count in ((old, old.samples), (new, samples)):
         stride = max(1, int(round(1.0 / (_RATE * motion.pieces[0].step))))
@@ -73,8 +73,7 @@ def pairs(
     shapes = [_shapes(parts[0], fit, suspect) for suspect in suspects]
     blocks = [[_columns(part, s, at) for s, at in zip(suspects, shapes)] for part in parts]
     sizes = [_size(fit, parts[0], own, s) for own, s in zip(blocks[0], suspects)]
-    torque = np.sqrt(np.mean(fit.predictions["train"].measured ** 2, axis=0))
-    prior = own_size(fit.model, fit.prior, fit.x, np.maximum(torque, 1e-9))
+    prior = own_size(fit.model, fit.prior, fit.x, size_of(fit))
     out = []
     for i, a in enumerate(suspects):
         for j, b in enumerate(suspects[:i]):
@@ -151,15 +150,18 @@ def deviations(fit: Fit, more: np.ndarray) -> dict[str, dict[str, float | None]]
     """{parameter: {now, after}} of what a fit determines, its deviation now and with a new log.
 
     Args:
-        more: (dof, size, size) of the new log's rows, C'C for each joint, in the fit's parameters.
+        more: (dof, size, size) of the new log's rows, C'C for each joint, in the fit's parameters;
+            a joint none of whose rows counts takes no part.
     """
+    counts = np.isfinite(noise := noise_of(fit))
+    more = more * counts[:, None, None]
     size, weights = fit.model.size, np.ones(len(fit.joints)) if fit.weights is None else fit.weights
     old = np.zeros_like(more)
     for factor in fit.compressed.by_joint:
         pick = np.ix_([factor.joint], factor.columns, factor.columns)
         r = factor.triangle[:, :-1]
         old[pick] += (r.T @ r)[None]
-    variance = np.array(list(fit.rms("test").values())) ** 2 * weights**4
+    variance = np.where(counts, noise, 0.0) ** 2 * weights**4
     beside = np.zeros((size, size))
     if fit.experiment.prior.weight:
         metric = _prior(fit)
