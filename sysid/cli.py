@@ -187,13 +187,14 @@ def simulate(
     jitter: Annotated[float, typer.Option("--jitter", help="Milliseconds (standard deviation) that samples come early or late; a slow logger: --rate 100 --jitter 2.")] = 0.0,
     trajectory: Annotated[Optional[Path], typer.Option("--trajectory", help="A motion for the training log to play, trajectory.csv of `sysid design`; the same seed and --duration make the same robot.")] = None,  # noqa: UP045
     current: Annotated[Optional[str], typer.Option("--current", metavar="STEP", help="Step of the logged torque [N m], or a share of each joint's peak, as in 2%.")] = None,  # noqa: UP045
+    force: Annotated[bool, typer.Option("--force", help="Write over a simulation whose files were changed since.")] = False,
     as_json: Json = False, quiet: Quiet = False,
 ) -> None:  # fmt: skip
     """Simulate an experiment's robot in closed loop, with hidden effects, and write logs to identify."""
     from . import simulate as simulation
 
     hidden = [simulation.hidden(text) for text in hide or []]
-    folder = simulation.prepare(out)
+    folder = simulation.prepare(out, force=force)
     spec, robot, notices = simulation.load(experiment)
     with _progress(quiet or as_json) as progress:
         found = simulation.simulate(
@@ -201,9 +202,9 @@ def simulate(
             motion=motion, logs=logs, knocks=knocks, spikes=spikes, brakes=brakes, jitter=jitter, current=current,
             trajectory=None if trajectory is None else simulation.read_trajectory(trajectory, robot.joints),
         )  # fmt: skip
-    simulation.write(found, spec, folder)
+    truth = simulation.write(found, spec, folder, force=force)
     if as_json:
-        print(json.dumps(found.truth, allow_nan=False))
+        print(json.dumps(truth, allow_nan=False))
     elif not quiet:
         for part, log in found.truth["logs"].items():
             print(f"{part}: {log['samples']} samples; noise " + ", ".join(f"{joint} {rms:.3g}" for joint, rms in log["noise_rms"].items()))
@@ -445,7 +446,8 @@ def fetch(dataset: Annotated[Optional[str], typer.Argument(help="One data set; w
         os.environ["SYSID_DATA_DIR"] = str(out)
     found = []
     for name in [dataset] if dataset else DATASETS:
-        files = DATASETS[name].fetch(progress=not (quiet or as_json))
+        with _progress(quiet or as_json) as progress:
+            files = DATASETS[name].fetch(progress=progress)
         found.append({"dataset": name, "licence": DATASETS[name].licence, "citation": DATASETS[name].citation, "files": [str(f) for f in files]})
         if not (quiet or as_json):
             print(f"{name}: {len(files)} files in {files[0].parent}\n  {DATASETS[name].citation}\n  licence: {DATASETS[name].licence}")
