@@ -25,6 +25,16 @@ Quiet = Annotated[bool, typer.Option("--quiet", help="No progress, no table.")]
 ExperimentPath = Annotated[Path, typer.Argument(metavar="EXPERIMENT", help="A YAML file, or a folder with config.yaml.")]
 
 
+def _trust(given: bool) -> bool:
+    _TRUST["given"] = given
+    return given
+
+
+# whether this command was told --trust; a file that is not trusted is asked for where it would have run
+_TRUST = {"given": False}
+Trust = Annotated[bool, typer.Option("--trust", callback=_trust, help="Let the Python files that the experiment names run; remembered for each as it is now.")]
+
+
 def _version(asked: bool) -> None:
     if asked:
         from importlib.metadata import version
@@ -44,7 +54,7 @@ def _root(
 
 
 @app.command()
-def fit(experiment: ExperimentPath, as_json: Json = False, out: Out = None, quiet: Quiet = False) -> None:
+def fit(experiment: ExperimentPath, trust: Trust = False, as_json: Json = False, out: Out = None, quiet: Quiet = False) -> None:
     """Identify an experiment and write its run folder."""
     from . import pipeline, results
 
@@ -89,7 +99,7 @@ def init(
 
 
 @app.command()
-def check(experiment: ExperimentPath, as_json: Json = False, out: Out = None, quiet: Quiet = False) -> None:
+def check(experiment: ExperimentPath, trust: Trust = False, as_json: Json = False, out: Out = None, quiet: Quiet = False) -> None:
     """What is wrong with an experiment's logs, before any fit. Exit status 1 where a fit of them would be wrong."""
     from . import check as doctor
     from . import pipeline, results
@@ -115,7 +125,7 @@ def design(
     duration: Annotated[float, typer.Option("--duration", help="Seconds of motion.")] = 20.0,
     limits: Annotated[Optional[Path], typer.Option("--limits", help="A YAML file of limits beside the URDF's: position, velocity, acceleration, jerk, torque by joint; margin, clearance, floor.")] = None,  # noqa: UP045
     seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of the starts.")] = 0,
-    as_json: Json = False, quiet: Quiet = False,
+    trust: Trust = False, as_json: Json = False, quiet: Quiet = False,
 ) -> None:  # fmt: skip
     """The next motion to log: the most informative within the limits, or the one that separates suspects."""
     from . import design as designing
@@ -145,7 +155,7 @@ def _suspect(text: str) -> tuple[str, str]:
 @app.command()
 def compare(
     experiments: Annotated[list[Path], typer.Argument(metavar="EXPERIMENT...", help="One or more experiments with the same test logs.")],
-    as_json: Json = False, out: Out = None, quiet: Quiet = False,
+    trust: Trust = False, as_json: Json = False, out: Out = None, quiet: Quiet = False,
 ) -> None:  # fmt: skip
     """Model against measurement on held-out data, and models against each other with standard errors."""
     from . import pipeline, results
@@ -223,7 +233,7 @@ def diagnose(
     experiment: ExperimentPath,
     model: Annotated[Optional[Path], typer.Option("--model", help="A run folder: hold its fitted model, and ask what changed.")] = None,  # noqa: UP045
     log: Annotated[Optional[list[str]], typer.Option("--log", help="With --model: the new log.")] = None,  # noqa: UP045
-    as_json: Json = False, out: Out = None, quiet: Quiet = False,
+    trust: Trust = False, as_json: Json = False, out: Out = None, quiet: Quiet = False,
 ) -> None:  # fmt: skip
     """Where the model fails and which effect is missing; with --model, what changed on a new log."""
     from . import pipeline
@@ -282,7 +292,7 @@ def _changed(spec, model: Path, logs: list[str], as_json: bool, out: Path | None
 
 
 @app.command()
-def report(experiment: ExperimentPath, as_json: Json = False, out: Out = None, quiet: Quiet = False) -> None:
+def report(experiment: ExperimentPath, trust: Trust = False, as_json: Json = False, out: Out = None, quiet: Quiet = False) -> None:
     """Diagnose, and write one self-contained HTML file that opens anywhere."""
     from . import loop, pipeline
     from .report import page
@@ -304,10 +314,13 @@ def studio(
     host: Annotated[str, typer.Option("--host", help="Address to serve on. Any but this machine's own needs the token.")] = "127.0.0.1",
     token: Annotated[Optional[str], typer.Option("--token", help="What whoever opens the page must know (default: made up where --host is not this machine's own).")] = None,  # noqa: UP045
     no_browser: Annotated[bool, typer.Option("--no-browser", help="Do not open the browser.")] = False,
-    as_json: Json = False, out: Out = None, quiet: Quiet = False,
+    trust: Trust = False, as_json: Json = False, out: Out = None, quiet: Quiet = False,
 ) -> None:  # fmt: skip
     """The report's page alive in the browser: look, add, refit, undo. The experiment file stays the truth."""
+    from . import config, own_effects
     from .studio.serve import serve
+    from .studio.shelf import beside
+    from .trusted import Untrusted
 
     def ready(address: str) -> None:
         if as_json:
@@ -319,6 +332,17 @@ def studio(
 
             webbrowser.open(address)
 
+    for number, path in enumerate(beside(config.file_of(experiment))):
+        try:
+            spec = config.load(path)
+            if trust:
+                own_effects.allow(spec)
+            elif number == 0:
+                own_effects.demand(spec)
+        except Untrusted:
+            raise
+        except SysidError:
+            pass  # the page says what is wrong with it
     serve(experiment, out=out, host=host, port=port, token=token, ready=ready)
 
 
@@ -329,7 +353,7 @@ def add(
     joint: Annotated[Optional[list[str]], typer.Option("--joint", help="The joint that has it; again for more. Default: every joint.")] = None,  # noqa: UP045
     option: Annotated[Optional[list[str]], typer.Option("--option", metavar="NAME=VALUE", help="An option of the effect, in YAML; again for more.")] = None,  # noqa: UP045
     force: Annotated[bool, typer.Option("--force", help="Add it also where the held-out error rises by more than its standard error.")] = False,
-    as_json: Json = False, out: Out = None, quiet: Quiet = False,
+    trust: Trust = False, as_json: Json = False, out: Out = None, quiet: Quiet = False,
 ) -> None:  # fmt: skip
     """Write an effect into the experiment file (comments kept), refit, and show the error before and after.
 
@@ -357,7 +381,7 @@ def add(
 def discover(
     experiment: ExperimentPath,
     most: Annotated[int, typer.Option("--max-steps", min=0, help="How many effects to add at most.")] = 10,
-    as_json: Json = False, out: Out = None, quiet: Quiet = False,
+    trust: Trust = False, as_json: Json = False, out: Out = None, quiet: Quiet = False,
 ) -> None:  # fmt: skip
     """Diagnose, add, refit, until nothing is missing; a step folder each. The experiment file stays as it is."""
     from . import loop, pipeline, results
@@ -400,7 +424,7 @@ def export(
     run: Annotated[Path, typer.Argument(metavar="RUN", help="A run folder of `sysid fit`.")],
     to: Annotated[str, typer.Option("--to", help="mjcf, sdf, drake or isaaclab.")],
     out: Annotated[Optional[Path], typer.Option("--out", help="The folder to write into (default RUN/<format>).")] = None,  # noqa: UP045
-    as_json: Json = False, quiet: Quiet = False,
+    trust: Trust = False, as_json: Json = False, quiet: Quiet = False,
 ) -> None:  # fmt: skip
     """Write the fitted model for a simulator, load it there again where that is installed, and tell what the format cannot say."""
     from . import export as exporting
@@ -494,7 +518,7 @@ def study_restarts(
     seed: Seed = 0, jobs: Jobs = 1,
     inertia: Annotated[Optional[str], typer.Option(help="Another parameterization than the experiment's.")] = None,  # noqa: UP045
     newton_alone: Annotated[bool, typer.Option("--newton-alone", help="Newton in the parameterization's coordinates to the end, 3000 iterations at most.")] = False,
-    as_json: Json = False, out: Out = None, quiet: Quiet = False,
+    trust: Trust = False, as_json: Json = False, out: Out = None, quiet: Quiet = False,
 ) -> None:  # fmt: skip
     """Section VII: random starts of one experiment, each certified."""
     from . import pipeline, results
@@ -516,7 +540,7 @@ def study_restarts(
 
 
 @study.command("prior")
-def study_prior(experiment: ExperimentPath, jobs: Jobs = 1, as_json: Json = False, out: Out = None, quiet: Quiet = False) -> None:
+def study_prior(experiment: ExperimentPath, jobs: Jobs = 1, trust: Trust = False, as_json: Json = False, out: Out = None, quiet: Quiet = False) -> None:
     """The prior's weight by cross-validation within the training logs."""
     from . import pipeline, results
     from .studies.commands import study_prior as work
@@ -571,8 +595,17 @@ _INTERRUPTED = 130
 
 def main() -> None:
     """The `sysid` command: bad input is one line on standard error and exit status 2."""
+    from .trusted import Untrusted, allow
+
     try:
-        status = app(standalone_mode=False)
+        while True:
+            try:
+                status = app(standalone_mode=False)
+                break
+            except Untrusted as error:
+                if not (_TRUST["given"] or _allowed(error)):
+                    raise
+                allow(error.path, error.content)  # and from the start: no work was done
     except SysidError as error:
         _fail(str(error), 2)
     except typer.Exit as stop:
@@ -594,6 +627,15 @@ def main() -> None:
     if status == _INTERRUPTED:  # typer makes an exit of Ctrl-C and says nothing
         _fail("interrupted; what a study had finished is kept, run it again to go on", _INTERRUPTED)
     sys.exit(status if isinstance(status, int) else 0)
+
+
+def _allowed(untrusted) -> bool:
+    """Ask, where somebody is there to answer."""
+    if not (sys.stdin.isatty() and sys.stderr.isatty()):
+        return False
+    said = f"{untrusted.path}\nThe experiment names this Python file. It runs with all that you may do: read it first.\nLet it run, now and whenever it is as it is now? [y/N] "
+    print(said, end="", file=sys.stderr, flush=True)
+    return sys.stdin.readline().strip().lower() in ("y", "yes")
 
 
 def _fail(message: str, status: int) -> None:

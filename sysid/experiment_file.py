@@ -10,7 +10,7 @@ import os
 from difflib import SequenceMatcher
 from pathlib import Path
 
-from . import results, state
+from . import results
 from .errors import ConfigError, SysidError
 
 _MARK = "\ufeff"
