@@ -29,13 +29,14 @@ if TYPE_CHECKING:
     from .results import write
     from .run import Run, read_run
     from .specs import Experiment
+    from .trusted import trust
 
 _WHERE = {
     "load": ("pipeline", "load"), "fit": ("pipeline", "fit"), "predict": ("pipeline", "predict_log"),
     "write": ("results", "write"), "compare": ("comparison", "compare"), "Difference": ("comparison", "Difference"),
     "Experiment": ("config", "Experiment"), "Fit": ("estimate", "Fit"), "Prediction": ("estimate", "Prediction"),
     "read_run": ("run", "read_run"), "Run": ("run", "Run"),
-    "check": ("check", None), "design": ("design", None), "diagnose": ("diagnose", None), "export": ("export", None), "SysidError": ("errors", "SysidError"), "SysidWarning": ("errors", "SysidWarning"),
+    "trust": ("trusted", "trust"), "check": ("check", None), "design": ("design", None), "diagnose": ("diagnose", None), "export": ("export", None), "SysidError": ("errors", "SysidError"), "SysidWarning": ("errors", "SysidWarning"),
 }  # fmt: skip
 
 
@@ -53,5 +54,5 @@ def __dir__():
 
 __all__ = [
     "Difference", "Experiment", "Fit", "Prediction", "Run", "SysidError", "SysidWarning", "check", "compare", "design", "diagnose", "export",
-    "fit", "load", "predict", "read_run", "write",
+    "fit", "load", "predict", "read_run", "trust", "write",
 ]

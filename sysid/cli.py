@@ -26,6 +26,16 @@ Level = Annotated[Optional[list[str]], typer.Option("--level", metavar="GROUP=LE
 ExperimentPath = Annotated[Path, typer.Argument(metavar="EXPERIMENT", help="A YAML file, or a folder with config.yaml.")]
 
 
+def _trust(given: bool) -> bool:
+    _TRUST["given"] = given
+    return given
+
+
+# whether this command was told --trust; a file that is not trusted is asked for where it would have run
+_TRUST = {"given": False}
+Trust = Annotated[bool, typer.Option("--trust", callback=_trust, help="Let the Python files that the experiment names run; remembered for each as it is now.")]
+
+
 def _version(asked: bool) -> None:
     if asked:
         from importlib.metadata import version
@@ -45,7 +55,7 @@ def _root(
 
 
 @app.command()
-def fit(experiment: ExperimentPath, as_json: Json = False, out: Out = None, quiet: Quiet = False) -> None:
+def fit(experiment: ExperimentPath, trust: Trust = False, as_json: Json = False, out: Out = None, quiet: Quiet = False) -> None:
     """Identify an experiment and write its run folder."""
     from . import pipeline, results
 
@@ -90,7 +100,7 @@ def init(
 
 
 @app.command()
-def check(experiment: ExperimentPath, as_json: Json = False, out: Out = None, quiet: Quiet = False) -> None:
+def check(experiment: ExperimentPath, trust: Trust = False, as_json: Json = False, out: Out = None, quiet: Quiet = False) -> None:
     """What is wrong with an experiment's logs, before any fit. Exit status 1 where a fit of them would be wrong."""
     from . import check as doctor
     from . import pipeline, results
@@ -117,7 +127,7 @@ def design(
     limits: Annotated[Optional[Path], typer.Option("--limits", help="A YAML file of limits beside the URDF's: position, velocity, acceleration, jerk, torque by joint; margin, clearance, floor.")] = None,  # noqa: UP045
     seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of the starts.")] = 0,
     processes: Annotated[Optional[int], typer.Option("--processes", min=1, help="That share the starts; as many as there are cores. The motion is the same.")] = None,  # noqa: UP045
-    as_json: Json = False, quiet: Quiet = False,
+    trust: Trust = False, as_json: Json = False, quiet: Quiet = False,
 ) -> None:  # fmt: skip
     """The next motion to log: the most informative within the limits, or the one that separates suspects."""
     from . import design as designing
@@ -147,7 +157,7 @@ def _suspect(text: str) -> tuple[str, str]:
 @app.command()
 def compare(
     experiments: Annotated[list[Path], typer.Argument(metavar="EXPERIMENT...", help="One or more experiments with the same test logs.")],
-    as_json: Json = False, out: Out = None, quiet: Quiet = False,
+    trust: Trust = False, as_json: Json = False, out: Out = None, quiet: Quiet = False,
 ) -> None:  # fmt: skip
     """Model against measurement on held-out data, and models against each other with standard errors."""
     from . import pipeline, results
@@ -189,13 +199,14 @@ def simulate(
     jitter: Annotated[float, typer.Option("--jitter", help="Milliseconds (standard deviation) that samples come early or late; a slow logger: --rate 100 --jitter 2.")] = 0.0,
     trajectory: Annotated[Optional[Path], typer.Option("--trajectory", help="A motion for the training log to play, trajectory.csv of `sysid design`; the same seed and --duration make the same robot.")] = None,  # noqa: UP045
     current: Annotated[Optional[str], typer.Option("--current", metavar="STEP", help="Step of the logged torque [N m], or a share of each joint's peak, as in 2%.")] = None,  # noqa: UP045
+    force: Annotated[bool, typer.Option("--force", help="Write over a simulation whose files were changed since.")] = False,
     as_json: Json = False, quiet: Quiet = False,
 ) -> None:  # fmt: skip
     """Simulate an experiment's robot in closed loop, with hidden effects, and write logs to identify."""
     from . import simulate as simulation
 
     hidden = [simulation.hidden(text) for text in hide or []]
-    folder = simulation.prepare(out)
+    folder = simulation.prepare(out, force=force)
     spec, robot, notices = simulation.load(experiment)
     with _progress(quiet or as_json) as progress:
         found = simulation.simulate(
@@ -203,9 +214,9 @@ def simulate(
             motion=motion, logs=logs, knocks=knocks, spikes=spikes, brakes=brakes, jitter=jitter, current=current,
             trajectory=None if trajectory is None else simulation.read_trajectory(trajectory, robot.joints),
         )  # fmt: skip
-    simulation.write(found, spec, folder)
+    truth = simulation.write(found, spec, folder, force=force)
     if as_json:
-        print(json.dumps(found.truth, allow_nan=False))
+        print(json.dumps(truth, allow_nan=False))
     elif not quiet:
         for part, log in found.truth["logs"].items():
             print(f"{part}: {log['samples']} samples; noise " + ", ".join(f"{joint} {rms:.3g}" for joint, rms in log["noise_rms"].items()))
@@ -225,7 +236,7 @@ def diagnose(
     model: Annotated[Optional[Path], typer.Option("--model", help="A run folder: hold its fitted model, and ask what changed.")] = None,  # noqa: UP045
     log: Annotated[Optional[list[str]], typer.Option("--log", help="With --model: the new log.")] = None,  # noqa: UP045
     level: Level = None,
-    as_json: Json = False, out: Out = None, quiet: Quiet = False,
+    trust: Trust = False, as_json: Json = False, out: Out = None, quiet: Quiet = False,
 ) -> None:  # fmt: skip
     """Where the model fails and which effect is missing; with --model, what changed on a new log."""
     from . import pipeline
@@ -294,7 +305,7 @@ def _changed(spec, model: Path, logs: list[str], levels: dict[str, str], as_json
 
 
 @app.command()
-def report(experiment: ExperimentPath, as_json: Json = False, out: Out = None, quiet: Quiet = False) -> None:
+def report(experiment: ExperimentPath, trust: Trust = False, as_json: Json = False, out: Out = None, quiet: Quiet = False) -> None:
     """Diagnose, and write one self-contained HTML file that opens anywhere."""
     from . import loop, pipeline
     from .report import page
@@ -316,10 +327,13 @@ def studio(
     host: Annotated[str, typer.Option("--host", help="Address to serve on. Any but this machine's own needs the token.")] = "127.0.0.1",
     token: Annotated[Optional[str], typer.Option("--token", help="What whoever opens the page must know (default: made up where --host is not this machine's own).")] = None,  # noqa: UP045
     no_browser: Annotated[bool, typer.Option("--no-browser", help="Do not open the browser.")] = False,
-    as_json: Json = False, out: Out = None, quiet: Quiet = False,
+    trust: Trust = False, as_json: Json = False, out: Out = None, quiet: Quiet = False,
 ) -> None:  # fmt: skip
     """The report's page alive in the browser: look, add, refit, undo. The experiment file stays the truth."""
+    from . import config, own_effects
     from .studio.serve import serve
+    from .studio.shelf import beside
+    from .trusted import Untrusted
 
     def ready(address: str) -> None:
         if as_json:
@@ -331,6 +345,17 @@ def studio(
 
             webbrowser.open(address)
 
+    for number, path in enumerate(beside(config.file_of(experiment))):
+        try:
+            spec = config.load(path)
+            if trust:
+                own_effects.allow(spec)
+            elif number == 0:
+                own_effects.demand(spec)
+        except Untrusted:
+            raise
+        except SysidError:
+            pass  # the page says what is wrong with it
     serve(experiment, out=out, host=host, port=port, token=token, ready=ready)
 
 
@@ -341,7 +366,7 @@ def add(
     joint: Annotated[Optional[list[str]], typer.Option("--joint", help="The joint that has it; again for more. Default: every joint.")] = None,  # noqa: UP045
     option: Annotated[Optional[list[str]], typer.Option("--option", metavar="NAME=VALUE", help="An option of the effect, in YAML; again for more.")] = None,  # noqa: UP045
     force: Annotated[bool, typer.Option("--force", help="Add it also where the held-out error rises by more than its standard error.")] = False,
-    as_json: Json = False, out: Out = None, quiet: Quiet = False,
+    trust: Trust = False, as_json: Json = False, out: Out = None, quiet: Quiet = False,
 ) -> None:  # fmt: skip
     """Write an effect into the experiment file (comments kept), refit, and show the error before and after.
 
@@ -369,7 +394,7 @@ def add(
 def discover(
     experiment: ExperimentPath,
     most: Annotated[int, typer.Option("--max-steps", min=0, help="How many effects to add at most.")] = 10,
-    as_json: Json = False, out: Out = None, quiet: Quiet = False,
+    trust: Trust = False, as_json: Json = False, out: Out = None, quiet: Quiet = False,
 ) -> None:  # fmt: skip
     """Diagnose, add, refit, until nothing is missing; a step folder each. The experiment file stays as it is."""
     from . import loop, pipeline, results
@@ -413,7 +438,7 @@ def export(
     to: Annotated[str, typer.Option("--to", help="mjcf, sdf, drake or isaaclab.")],
     out: Annotated[Optional[Path], typer.Option("--out", help="The folder to write into (default RUN/<format>).")] = None,  # noqa: UP045
     level: Level = None,
-    as_json: Json = False, quiet: Quiet = False,
+    trust: Trust = False, as_json: Json = False, quiet: Quiet = False,
 ) -> None:  # fmt: skip
     """Write the fitted model for a simulator, load it there again where that is installed, and tell what the format cannot say."""
     from . import export as exporting
@@ -459,7 +484,8 @@ def fetch(dataset: Annotated[Optional[str], typer.Argument(help="One data set; w
         os.environ["SYSID_DATA_DIR"] = str(out)
     found = []
     for name in [dataset] if dataset else DATASETS:
-        files = DATASETS[name].fetch(progress=not (quiet or as_json))
+        with _progress(quiet or as_json) as progress:
+            files = DATASETS[name].fetch(progress=progress)
         found.append({"dataset": name, "licence": DATASETS[name].licence, "citation": DATASETS[name].citation, "files": [str(f) for f in files]})
         if not (quiet or as_json):
             print(f"{name}: {len(files)} files in {files[0].parent}\n  {DATASETS[name].citation}\n  licence: {DATASETS[name].licence}")
@@ -506,7 +532,7 @@ def study_restarts(
     seed: Seed = 0, jobs: Jobs = 1,
     inertia: Annotated[Optional[str], typer.Option(help="Another parameterization than the experiment's.")] = None,  # noqa: UP045
     newton_alone: Annotated[bool, typer.Option("--newton-alone", help="Newton in the parameterization's coordinates to the end, 3000 iterations at most.")] = False,
-    as_json: Json = False, out: Out = None, quiet: Quiet = False,
+    trust: Trust = False, as_json: Json = False, out: Out = None, quiet: Quiet = False,
 ) -> None:  # fmt: skip
     """Section VII: random starts of one experiment, each certified."""
     from . import pipeline, results
@@ -528,7 +554,7 @@ def study_restarts(
 
 
 @study.command("prior")
-def study_prior(experiment: ExperimentPath, jobs: Jobs = 1, as_json: Json = False, out: Out = None, quiet: Quiet = False) -> None:
+def study_prior(experiment: ExperimentPath, jobs: Jobs = 1, trust: Trust = False, as_json: Json = False, out: Out = None, quiet: Quiet = False) -> None:
     """The prior's weight by cross-validation within the training logs."""
     from . import pipeline, results
     from .studies.commands import study_prior as work
@@ -583,8 +609,17 @@ _INTERRUPTED = 130
 
 def main() -> None:
     """The `sysid` command: bad input is one line on standard error and exit status 2."""
+    from .trusted import Untrusted, allow
+
     try:
-        status = app(standalone_mode=False)
+        while True:
+            try:
+                status = app(standalone_mode=False)
+                break
+            except Untrusted as error:
+                if not (_TRUST["given"] or _allowed(error)):
+                    raise
+                allow(error.path, error.content)  # and from the start: no work was done
     except SysidError as error:
         _fail(str(error), 2)
     except typer.Exit as stop:
@@ -606,6 +641,15 @@ def main() -> None:
     if status == _INTERRUPTED:  # typer makes an exit of Ctrl-C and says nothing
         _fail("interrupted; what a study had finished is kept, run it again to go on", _INTERRUPTED)
     sys.exit(status if isinstance(status, int) else 0)
+
+
+def _allowed(untrusted) -> bool:
+    """Ask, where somebody is there to answer."""
+    if not (sys.stdin.isatty() and sys.stderr.isatty()):
+        return False
+    said = f"{untrusted.path}\nThe experiment names this Python file. It runs with all that you may do: read it first.\nLet it run, now and whenever it is as it is now? [y/N] "
+    print(said, end="", file=sys.stderr, flush=True)
+    return sys.stdin.readline().strip().lower() in ("y", "yes")
 
 
 def _fail(message: str, status: int) -> None:

@@ -294,13 +294,15 @@ def known_bodies(experiment: Experiment, model: Model) -> list[int]:
 
 # A coefficient's column that others match to this share of its size is told from them by rounding alone.
 _ALIKE = 1e-6
+# Nothing of a robot is larger in SI units: what would have to be, to make torque of the size that was measured, is no number here.
+_LARGEST = 1e12
 
 
 def undetermined(objective: Objective, model: Model, moving) -> np.ndarray:
     """(coefficients,) bool: those that no data of this kind can tell from what stands before them in the model."""
     count = 10 * model.bodies
     out = np.zeros(len(moving), dtype=bool)
-    columns = objective.triangle[:, :-1]
+    columns, measured = objective.triangle[:, :-1], np.linalg.norm(objective.triangle[:, -1])
     # bodies have a prior; only coefficients can be left without any hold
     basis = np.zeros((len(columns), 0))
     for k in np.flatnonzero(moving):
@@ -309,7 +311,7 @@ def undetermined(objective: Objective, model: Model, moving) -> np.ndarray:
         rest = column - basis @ (basis.T @ column)
         rest -= basis @ (basis.T @ rest)
         left = np.linalg.norm(rest)
-        if left <= _ALIKE * size:
+        if left <= _ALIKE * size or size * _LARGEST <= measured:
             out[k] = True
         else:
             basis = np.column_stack([basis, rest / left])

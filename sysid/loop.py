@@ -13,10 +13,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from . import comparison, config, pipeline, results
+from . import comparison, config, experiment_file, pipeline, results, state
 from .addition import remaining, spelled
 from .diagnose.diagnosis import Diagnosis, diagnose
-from .errors import ConfigError
+from .errors import ConfigError, SysidError
 from .estimate import Fit
 from .specs import Experiment
 
@@ -146,8 +146,10 @@ def add(
     experiment = pipeline.load(path)
     run = results.folder(out or Path("runs") / experiment.name)
     file = experiment.path
+    joints = None if joints == ["*"] else joints  # every joint, or the whole robot
+    read = experiment_file.read(file)
     every = pipeline.build(experiment)[0].joints
-    text = with_effect(file.read_text(encoding="utf-8-sig"), effect, joints, options, str(file), every=every)
+    text = with_effect(experiment_file.text(read, str(file)), effect, joints, options, str(file), every=every)
     after = config.loads(text, file)
     pipeline.build(after)
     before_fit = pipeline.fit(experiment, progress=progress)
@@ -156,15 +158,32 @@ def add(
     rises = comparison.rises(before_fit, compared, joints)
     if rises and not force:
         return Added(after, before_fit, after_fit, differences, rises, refused=True)
-    history = read_history(run)
-    if not history or history[-1]["rms_test"] != before_fit.rms("test"):
-        history = [_record(run, 0, before_fit, None, None)]
-    named = "*" if joints is None else ", ".join(joints)
-    history.append(_record(run, len(history), after_fit, effect, named))
-    results.write(after_fit, run)
-    results.write_atomically(file, lambda p: p.write_text(text, encoding="utf-8"))
-    _write_history(run, history)
+    with state.locked(file):
+        if experiment_file.read(file) != read:
+            raise experiment_file.Changed("the experiment file changed while the effect was fitted, and nothing was written", where=str(file), do="run the command again")
+        with state.locked(run):
+            steps = read_history(run)
+            history = _continued(run, before_fit)
+            named = "*" if joints is None else ", ".join(joints)
+            history.append(_record(run, len(history), after_fit, effect, named))
+            # the file comes last: a history that is a step ahead of it is put right by the next step, one that lacks a step is not
+            _write_history(run, history)
+            try:
+                results.write(after_fit, run)
+                experiment_file.replace(file, read, experiment_file.edited(read, text))
+            except SysidError:
+                _write_history(run, steps)
+                raise
     return Added(after, before_fit, after_fit, differences, rises)
+
+
+def _continued(run: Path, fit: Fit) -> list[dict]:
+    """The steps of a run folder that lead to a fit, its own the last of them; itself as the start where none does."""
+    steps = read_history(run)
+    for k in range(len(steps) - 1, -1, -1):
+        if steps[k].get("rms_test") == fit.rms("test"):
+            return steps[: k + 1]
+    return [_record(run, 0, fit, None, None)]
 
 
 def _record(run: Path, number: int, fit: Fit, effect: str | None, joint: str | None) -> dict:
@@ -180,13 +199,21 @@ def read_history(run: Path) -> list[dict]:
     """The steps of a run folder, oldest first; empty where there are none."""
     try:
         found = json.loads((run / _HISTORY).read_text(encoding="utf-8"))["steps"]
-        return found if isinstance(found, list) else []
+        return found if all(isinstance(step["rms_test"], dict) for step in found) else []
     except (OSError, ValueError, KeyError, TypeError):
         return []
 
 
 def _write_history(run: Path, steps: list[dict], **more) -> None:
     results.write_json(run / _HISTORY, {"steps": steps, **more})
+
+
+def _forget(run: Path, steps: list[dict]) -> None:
+    """Remove the folders of steps that no history names any more."""
+    kept = {step.get("folder") for step in steps}
+    for path in (run / _STEPS).glob("*"):
+        if str(path.relative_to(run)) not in kept:
+            shutil.rmtree(path, ignore_errors=True)
 
 
 # ---- until nothing is missing
@@ -211,16 +238,21 @@ def discover(experiment: Experiment, run: Path, *, most: int = 10, progress=None
     Args:
         most: effects to add at most. each: called with each step as it is made.
     """
-    shutil.rmtree(run / _STEPS, ignore_errors=True)
     tell = each or (lambda step: None)
     found = diagnose(experiment, progress=progress)
-    fits, steps = [found.fit], [_record(run, 0, found.fit, None, None)]
+    with state.locked(run):
+        fits, steps = [found.fit], _continued(run, found.fit)
+        _write_history(run, steps)
     refused = {(r.effect, r.joint): r for r in found.refused}
-    tell(steps[0])
-    while found.claims and len(steps) <= most:
-        for claim in found.claims[: most + 1 - len(steps)]:
+    for step in steps:
+        tell(step)
+    most += len(steps)
+    while found.claims and len(steps) < most:
+        for claim in found.claims[: most - len(steps)]:
             fits.append(claim.after)
-            steps.append(_record(run, len(steps), claim.after, spelled(claim.head.candidate, claim.head.joint)[0], claim.head.joint))
+            with state.locked(run):  # a search that is interrupted keeps the steps that it made
+                steps.append(_record(run, len(steps), claim.after, spelled(claim.head.candidate, claim.head.joint)[0], claim.head.joint))
+                _write_history(run, steps)
             tell(steps[-1])
         found = diagnose(fits[-1].experiment, fit=fits[-1], progress=progress)
         refused |= {(r.effect, r.joint): r for r in found.refused}
@@ -230,7 +262,9 @@ def discover(experiment: Experiment, run: Path, *, most: int = 10, progress=None
     said = document(found, run)
     results.write_json(run / "diagnosis.json", said)
     left = [{"effect": r.effect, "joint": r.joint, "why": r.why} for r in refused.values()]
-    _write_history(run, steps, verdict=said["verdict"], refused=left)
+    with state.locked(run):
+        _write_history(run, steps, verdict=said["verdict"], refused=left)
+        _forget(run, steps)
     return Discovery(steps, fits[-1].experiment, fits, found, said, left)
 
 

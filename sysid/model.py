@@ -503,14 +503,14 @@ def build(robot: Robot, effects, folder: Path = Path(), signals=(), groups: Mapp
         names = ["*"] if effect.scope == "robot" else spec.joints if spec.joints is not None else list(robot.joints)
         joints = []
         for name in names:
-            if name != "*" and name not in robot.joints:
-                raise ConfigError(f"model.effects: {effect.name} names the joint {name!r}", allowed=", ".join(robot.joints), do="correct the joint")
+            if effect.scope != "robot" and name not in robot.joints:
+                raise ConfigError(f"model.effects: {effect.name} names the joint {name!r}", allowed=", ".join(robot.joints), do="correct the joint, or leave `joints` out for all of them")
             if (effect.name, name) in seen:
                 where = "" if name == "*" else f" on joint {name!r}"
                 do = "give each a `name` of its own" if "formula" in spec.options else "leave one out"
                 raise ConfigError(f"model.effects: {effect.name} stands twice{where}", do=do)
             seen.add((effect.name, name))
-            joints.append(ROBOT if name == "*" else robot.joints.index(name))
+            joints.append(ROBOT if effect.scope == "robot" else robot.joints.index(name))
         for joint in joints:
             effect = effect.bound(robot, joint)
             if is_own(spec.name):

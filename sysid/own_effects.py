@@ -1,7 +1,7 @@
 """A user's own effects: classes in a Python file that the experiment file names, `my_effects.py:Name`.
 
-Naming the file runs it, with all that Python may do: name no file that you would not run yourself. The class is one of
-the four kinds of `sysid.effect`; ten lines do:
+The file runs, with all that Python may do: where its content was allowed (`trusted`), and else not. The class is one of the
+four kinds of `sysid.effect`; ten lines do:
 
     from sysid.effect import Linear, TorqueEffect
 
@@ -29,10 +29,11 @@ from pathlib import Path
 
 import numpy as np
 
-from . import regressor
+from . import regressor, trusted
 from .effect import KINDS, Effect, MotionEffect, NotFinite, SensorEffect, WrenchEffect, vocabulary
 from .errors import ConfigError, SysidError
 from .motion import Piece
+from .specs import Experiment, is_own
 
 _STATED = ("equation", "looks_like", "separate_by", "source")
 _LOADED: dict[tuple[str, str], dict] = {}  # what a file holds, by its path and its content
@@ -44,6 +45,7 @@ def load(reference: str, folder: Path) -> Effect:
 
     Raises:
         ConfigError: no such file or class, a file that cannot be run, or a class that is no effect.
+        Untrusted: nobody has allowed the file to run.
     """
     file, _, name = reference.rpartition(":")
     path = (folder / file).resolve()
@@ -69,6 +71,25 @@ def load(reference: str, folder: Path) -> Effect:
         return kind()
     except Exception as error:
         raise _raised(error, path, f"{name} cannot be made") from None
+
+
+def allow(experiment: Experiment) -> None:
+    """Let every Python file that an experiment names run, as it is now."""
+    for path in _named(experiment):
+        trusted.trust(path)
+
+
+def demand(experiment: Experiment) -> None:
+    """Raises Untrusted: an experiment names a Python file that was not allowed to run."""
+    for path in _named(experiment):
+        trusted.check(path, path.read_bytes())
+
+
+def _named(experiment: Experiment) -> list[Path]:
+    entries = [*experiment.model.effects, *experiment.model.candidates]
+    files = dict.fromkeys(e.name.rpartition(":")[0] for e in entries if is_own(e.name))
+    # one that is not there is said where it is read
+    return [path for file in files if (path := (experiment.folder / file).resolve()).is_file()]
 
 
 def check(effect: Effect, robot, joint: int) -> None:
@@ -128,6 +149,7 @@ def _run(path: Path) -> dict:
         said = getattr(error, "strerror", None) or "not a path"
         raise ConfigError(f"the file of own effects cannot be read ({said})", where=str(path), do="correct model.effects; paths are relative to the experiment file") from None
     key = (str(path), hashlib.sha256(content).hexdigest())
+    trusted.check(path, content)
     if key not in _LOADED:
         name = f"sysid_own_{hashlib.sha256(repr(key).encode()).hexdigest()[:16]}"
         spec = importlib.util.spec_from_file_location(name, path)

@@ -14,14 +14,16 @@ import json
 import math
 import os
 import platform
+import stat
 import uuid
 from collections.abc import Callable
+from contextlib import suppress
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 import numpy as np
 
-from . import prior_weight
+from . import prior_weight, state
 from .differences import per_group, told
 from .errors import ConfigError, SysidError
 from .estimate import Fit, at_edge
@@ -144,14 +146,58 @@ def folder(out: str | Path) -> Path:
 
 def write_atomically(path: Path, write: Callable[[Path], object]) -> None:
     """Let `write` fill a temporary file beside `path`, then rename it. Raises SysidError where the disk refuses."""
-    temporary = path.with_name(f".{path.name}.{uuid.uuid4().hex}")
+    write_together({path: write})
+
+
+def write_together(files: dict[Path, Callable[[Path], object]]) -> None:
+    """Write several files or none: each is filled beside its place, and only when all are whole and on the disk they are
+    renamed, in this order. A file keeps the mode of the one in whose place it comes.
+
+    Raises:
+        SysidError: the disk refuses; everything is as it was.
+    """
+    temporary = {path: path.with_name(f".{path.name[:100]}.{uuid.uuid4().hex}") for path in files}
+    path = None
     try:
-        write(temporary)
-        os.replace(temporary, path)
+        for path, write in files.items():
+            write(temporary[path])
+            _settle(temporary[path], path)
+        for path, filled in temporary.items():
+            os.replace(filled, path)
     except OSError as error:
-        raise SysidError(f"cannot be written ({error.strerror})", where=str(path), do="free the disk or give another --out") from None
+        said = error.strerror or str(error).splitlines()[0]
+        raise SysidError(f"cannot be written ({said})", where=str(path), do="free the disk or give another --out") from None
     finally:
-        temporary.unlink(missing_ok=True)
+        for filled in temporary.values():
+            with suppress(OSError):
+                filled.unlink(missing_ok=True)
+
+
+def parquet(table) -> Callable[[Path], None]:
+    """What writes a table of Polars to a file, for `write_atomically`."""
+    import polars as pl
+
+    def write(path: Path) -> None:
+        try:
+            table.write_parquet(path)
+        except pl.exceptions.PolarsError as error:  # a full disk comes as an error of computation
+            raise OSError(str(error)) from None
+
+    return write
+
+
+def _settle(filled: Path, place: Path) -> None:
+    """Bring a file to the disk, with the mode and the owner of the one that it replaces."""
+    with filled.open("rb") as file:
+        os.fsync(file.fileno())
+    try:
+        before = place.stat()
+    except OSError:
+        return
+    filled.chmod(stat.S_IMODE(before.st_mode))
+    if hasattr(os, "chown") and (before.st_uid, before.st_gid) != (os.getuid(), os.getgid()):
+        with suppress(OSError):  # only root may give a file away
+            os.chown(filled, before.st_uid, before.st_gid)
 
 
 def write_json(path: Path, value) -> None:
@@ -173,10 +219,10 @@ def write(fit: Fit, out: str | Path) -> dict:
         "identified.yaml": (_comments(found) + _yaml(_identified(fit, _relocated(resolved, path)))).encode(),
     }  # fmt: skip
     table = _predictions(fit)
-    write_atomically(path / "predictions.parquet", lambda p: table.write_parquet(p))
-    for name, content in texts.items():
-        write_atomically(path / name, lambda p, c=content: p.write_bytes(c))
-    write_json(path / "fit.json", found)
+    texts["fit.json"] = (json.dumps(found, indent=1, allow_nan=False) + "\n").encode()
+    files = {path / "predictions.parquet": parquet(table)}
+    with state.locked(path):
+        write_together(files | {path / name: lambda p, c=content: p.write_bytes(c) for name, content in texts.items()})
     return found
 
 

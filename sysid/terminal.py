@@ -67,7 +67,7 @@ def show_fit(fit: Fit, document: dict) -> None:
     certificate = document["certificate"]
     for own in document["drives"]:
         deviation = "" if own["std"] is None else f" +- {own['std']:.2g}"
-        print(f"drive of {own['joint']}: {own['name']} = {own['value']:.6g}{deviation} {own['unit']}")
+        print(f"drive of {own['joint']}: {own['name']} = {own['value']:.6g}{deviation}{'' if own['unit'] == '1' else ' ' + own['unit']}")
     if document["rollout"]:
         missed = ", ".join(f"{joint} {value:.3g}" for joint, value in document["rollout"].items())
         print(f"rollout of the closed loop over the test logs, RMS of the angles it misses [rad or m]: {missed}")
@@ -241,8 +241,7 @@ def show_changed(document: dict) -> None:
     for f in document["findings"]:
         print(f"{f['effect']} on {f['joint']}: removes {100 * f['misfit_removed']:.0f} % of the squared residual")
         for name, p in f["parameters"].items():
-            std = "" if p["std"] is None else f" +- {p['std']:.2g}"
-            console.print(f"  {escape(name)} = {p['value']:.4g}{std} {escape(p['unit'])}", soft_wrap=True, highlight=False)
+            print(f"  {text.valued(name, p)}")
     _show_notices(document)
     print(f"run folder: {document['run']}")
 
@@ -259,8 +258,7 @@ def show_added(document: dict) -> None:
         table.add_row(escape(joint), _level(document["rms_test_before"][joint]), _level(document["rms_test_after"][joint]), f"{entry['delta_rms']:+.4g}", se)
     console.print(table)
     for parameter in document["parameters"]:
-        std = "" if parameter["std"] is None else f" +- {parameter['std']:.2g}"
-        console.print(f"{escape(parameter['name'])} = {parameter['value']:.4g}{std} {escape(parameter['unit'])}", soft_wrap=True, highlight=False)
+        print(text.valued(parameter["name"], parameter))
     if document["says"]:
         Console().print(escape(document["says"]), soft_wrap=True, highlight=False)
     if not document["refused"]:

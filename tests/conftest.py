@@ -103,6 +103,14 @@ def put(tree: dict, changes: dict) -> dict:
     return tree
 
 
+@pytest.fixture(scope="session", autouse=True)
+def _state(tmp_path_factory):
+    """Locks, and what is trusted, of these tests alone."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_STATE_HOME", str(tmp_path_factory.mktemp("state")))
+        yield
+
+
 @pytest.fixture(scope="session")
 def arm_logs(tmp_path_factory) -> tuple[dict, dict]:
     """Columns of the training log and of the test log."""

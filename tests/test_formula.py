@@ -13,6 +13,7 @@ from sysid.errors import ConfigError
 from sysid.formula import FUNCTIONS, Formula, parse
 from sysid.model import found
 from sysid.specs import EffectSpec
+from sysid.trusted import trust
 from tests.test_effects import moving, small_piece
 
 REFUSED = {
@@ -491,6 +492,7 @@ thing = 5
 def own(experiment, *written, text=OWN, **more):
     folder = experiment(config={"model.effects": list(written), **more})
     (folder / "mine.py").write_text(text)
+    trust(folder / "mine.py")
     return folder
 
 
@@ -529,6 +531,7 @@ def test_a_changed_file_is_read_again(experiment):
     before = found(spec, folder)
     assert found(spec, folder).__class__ is before.__class__
     (folder / "mine.py").write_text(OWN.replace("It squeaks", "It squeals"))
+    trust(folder / "mine.py")
     assert describe(found(spec, folder))["summary"] == "It squeals."
 
 

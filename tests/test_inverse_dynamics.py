@@ -13,6 +13,7 @@ from sysid.model import ROBOT, Model
 from sysid.model import build as build_model
 from sysid.motion import Piece
 from sysid.specs import RobotSpec
+from sysid.trusted import trust
 from tests import robots
 from tests.problems import UR5, fourier_motion
 from tests.test_effects import middle, moving, piece_of
@@ -158,6 +159,7 @@ def test_rotors_and_other_orders_against_pinocchio(tmp_path):
 
 def test_effects_of_one_s_own(tmp_path):
     (tmp_path / "mine.py").write_text(OWN)
+    trust(tmp_path / "mine.py")
     tree = (
         "robot: {urdf: '" + UR5 + "'}\ndata: {train: [a.csv], test: [b.csv]}\nmodel:\n  effects:\n"
         "    - mine.py:Cubic\n    - mine.py:Past\n    - mine.py:Warm\n"

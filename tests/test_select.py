@@ -17,6 +17,7 @@ from sysid.addition import command, grown, spelled
 from sysid.diagnose.diagnosis import diagnose
 from sysid.diagnose.select import LEVEL, WORTH, search
 from sysid.statement.document import document
+from sysid.trusted import trust
 from sysid.view import first_view
 
 BIAS = ("bias", "torque_bias:elbow:b=0.4")
@@ -239,6 +240,7 @@ class Crosstalk(TorqueEffect):
 def test_an_effect_from_a_file_takes_part(simulated):
     folder = simulated("other_angle", by_other_angle, duration=14.0)
     (folder / "my_effects.py").write_text(OWN)
+    trust(folder / "my_effects.py")
     found = diagnose(pipeline.load(edited(folder, "own", model={"candidates": ["my_effects.py:Crosstalk"]})))
     own = verdict(found, "elbow")
     assert own.status == "missing" and own.claims[0].head.effect == "crosstalk"

@@ -19,6 +19,7 @@ from ..recording import Recording
 from ..robot import Robot
 from ..rows import Rows, stack
 from ..specs import EffectSpec, Experiment, LogSpec
+from ..trusted import Untrusted
 from .equations import FEWEST, Equations
 
 _HAS = ("armature", "viscous", "coulomb", "torque_bias")  # what any joint has
@@ -99,6 +100,8 @@ class Look:
             parts = ([replace(log, events=()) for log in part] for part in parts)
         try:
             return pipeline.fit(self.experiment, measured=pipeline.Read(*parts, ()))
+        except Untrusted:
+            raise
         except SysidError:
             return None
 

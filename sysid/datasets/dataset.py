@@ -48,18 +48,45 @@ class Dataset:
         """Files that are not in the data folder."""
         return [file for file in self.files if not (data_folder() / self.name / file).is_file()]
 
-    def fetch(self, *, progress: bool = False) -> list[Path]:
-        """Download what is missing and check every file. Raises LogError where that fails."""
+    def fetch(self, *, progress: Callable[[str, float], None] | None = None) -> list[Path]:
+        """Download what is missing and check every file. Raises LogError where that fails.
+
+        Args:
+            progress: called with the name of a file and the share of it that is here.
+        """
         import pooch
 
         folder, paths = data_folder() / self.name, []
         for file, (remote, sha256) in self.files.items():
+            bar = False if progress is None else _Bar(lambda share, file=file: progress(f"fetch {file}", share))
             try:
-                path = pooch.retrieve(f"{self.source}/{remote}", known_hash=f"sha256:{sha256}", fname=file, path=folder, progressbar=progress)
-            except (OSError, ValueError) as error:
-                raise LogError(f"{self.name}: {file} could not be fetched ({str(error).splitlines()[0]})", where=str(folder), do=f"check the network, or put the file of {self.source} there") from None
+                path = pooch.retrieve(
+                    f"{self.source}/{remote}", known_hash=f"sha256:{sha256}", fname=file, path=folder, downloader=pooch.HTTPDownloader(progressbar=bar)
+                )
+            except ValueError as error:  # what came is not what was published
+                raise LogError(f"{self.name}: {file} could not be fetched ({str(error).splitlines()[0]})", where=str(folder), do=f"run it again, or put the file of {self.source} there") from None
+            except OSError as error:
+                cure = "free the disk, or name another folder with SYSID_DATA_DIR" if error.errno else f"check the network, or put the file of {self.source} there"
+                raise LogError(f"{self.name}: {file} could not be fetched ({str(error).splitlines()[0]})", where=str(folder), do=cure) from None
             paths.append(Path(path))
         return paths
+
+
+class _Bar:
+    """What Pooch takes for a progress bar."""
+
+    def __init__(self, tell: Callable[[float], None]):
+        self.total, self._tell, self._done = 0, tell, 0
+
+    def update(self, size: int) -> None:
+        self._done += size
+        self._tell(min(1.0, self._done / self.total) if self.total else 0.0)
+
+    def reset(self) -> None:
+        self._done = 0
+
+    def close(self) -> None:
+        self._tell(1.0)
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,7 @@ config.yaml is what one would write who knows nothing of what is hidden. Everyth
 renamed when it is whole.
 """
 
+import hashlib
 import io
 import json
 import os
@@ -34,17 +35,25 @@ def load(path: str | Path) -> tuple[Experiment, Robot, tuple[str, ...]]:
     return experiment, machine, tuple(dict.fromkeys(str(w.message) for w in caught if issubclass(w.category, SysidWarning)))
 
 
-def prepare(out: str | Path) -> Path:
+def prepare(out: str | Path, *, force: bool = False) -> Path:
     """Make sure that a simulation can be written to a folder, before any work is done.
 
+    Args:
+        force: also over a simulation whose files were changed since.
+
     Raises:
-        SysidError: it is a file, cannot be written, or holds something that is no simulation.
+        SysidError: it is a file, cannot be written, holds something that is no simulation, or one that was worked in.
     """
     path = Path(out)
     if path.exists() and not path.is_dir():
         raise SysidError("there is a file of that name", where=str(path), allowed="a new folder", do="give another with --out")
     if path.is_dir() and any(path.iterdir()) and not _is_simulation(path):
         raise SysidError("the folder holds something that is no simulation", where=str(path), allowed="a new or empty folder, or one that sysid simulate wrote", do="give another with --out")
+    if not force and path.is_dir() and (changed := _worked_in(path)):
+        raise SysidError(
+            f"{' and '.join(changed)} of this simulation changed since it was written, and would be lost", where=str(path),
+            allowed="a new or empty folder", do="give another with --out, or --force to write over them",
+        )  # fmt: skip
     probe = path.absolute().parent / f".{uuid.uuid4().hex}"
     try:
         probe.parent.mkdir(parents=True, exist_ok=True)
@@ -62,25 +71,43 @@ def _is_simulation(path: Path) -> bool:
         return False
 
 
-def write(simulation: Simulation, experiment: Experiment, out: str | Path) -> None:
-    """Write the folder of a simulation of an experiment's robot.
+def _worked_in(path: Path) -> list[str]:
+    """Names of a simulation's files that are not as they were written; where that is not known, of the one that people edit."""
+    try:
+        wrote = json.loads((path / "truth.json").read_text(encoding="utf-8")).get("files", {"config.yaml": None})
+    except (OSError, ValueError):
+        return []  # no simulation was there
+    there = [name for name in wrote if (path / name).is_file()]
+    return [name for name in there if _sha256((path / name).read_bytes()) != wrote[name]]
+
+
+def _sha256(data: bytes) -> str:
+    return hashlib.sha256(data).hexdigest()
+
+
+def write(simulation: Simulation, experiment: Experiment, out: str | Path, *, force: bool = False) -> dict:
+    """Write the folder of a simulation of an experiment's robot; returns what its truth.json says.
+
+    Args:
+        force: as of `prepare`.
 
     Raises:
         SysidError: see `prepare`; or the disk refuses.
     """
-    path = prepare(out)
+    path = prepare(out, force=force)
     robot = simulation.robot
     logs = {f"{name}.csv": log for name, log in simulation.logs.items()}
     texts = {
         "config.yaml": _config(experiment, robot, list(logs)), "robot.urdf": "<?xml version=\"1.0\"?>\n" + robot.source.text + "\n",
         **{name: _csv(log, robot) for name, log in logs.items()},
-        "truth.json": json.dumps(simulation.truth, indent=1, allow_nan=False) + "\n",
     }  # fmt: skip
+    truth = {**simulation.truth, "files": {name: _sha256(text.encode("utf-8")) for name, text in texts.items()}}
+    texts["truth.json"] = json.dumps(truth, indent=1, allow_nan=False) + "\n"
     temporary = path.absolute().parent / f".{path.name}.{uuid.uuid4().hex}"
     try:
         temporary.mkdir()
         for name, text in texts.items():
-            (temporary / name).write_text(text, encoding="utf-8")
+            (temporary / name).write_bytes(text.encode("utf-8"))
         if path.is_dir() and any(path.iterdir()):
             for name in texts:
                 os.replace(temporary / name, path / name)
@@ -95,6 +122,7 @@ def write(simulation: Simulation, experiment: Experiment, out: str | Path) -> No
         raise SysidError(f"cannot be written ({error.strerror})", where=str(path), do="free the disk or give another --out") from None
     finally:
         shutil.rmtree(temporary, ignore_errors=True)
+    return truth
 
 
 def _csv(log: SimulatedLog, robot: Robot) -> str:

@@ -105,7 +105,8 @@ def _head(f: dict, of: Told, joint: str, width: int, said: dict[str, str]) -> li
     if f["command"] in said:
         return wrapped(f"  {f['effect']}: see {said[f['command']]}", width, "    ")
     said[f["command"]] = joint
-    values = [_value(name, p) for name, p in f["parameters"].items() if p["value"] is not None]
+    told = [(name.rpartition(".")[2], p) for name, p in f["parameters"].items()]
+    values = [valued(name, p) for name, p in told if p["value"] is not None]
     takes = ""
     if len(of.sets) > 1:
         where = "" if f["joint"] == joint else " on all joints"
@@ -153,11 +154,11 @@ def quantity(variable: str) -> str:
     return f"the {word} of {joint}" if word and joint else variable
 
 
-def _value(name: str, p: dict) -> str:
+def valued(name: str, p: dict) -> str:
+    """A parameter {value, std, unit} with its deviation and its unit, where it has these."""
     std = "" if p["std"] is None else f" +- {p['std']:.2g}"
-    return f"{name.rpartition('.')[2]} = {p['value']:.4g}{std}" + (
-        "" if p["unit"] in ("", "1") else f" {p['unit']}"
-    )
+    unit = "" if p["unit"] in ("", "1") else f" {p['unit']}"
+    return f"{name} = {p['value']:.4g}{std}{unit}"
 
 
 def placed(effect: str, joint: str, here: str = "") -> str:

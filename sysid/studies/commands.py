@@ -33,7 +33,7 @@ def study_bodies(out: Path, *, count: int, seed: int, jobs: int, reading: bodies
          **{f"{key}_{name}": r["runs"][name][key] for name in bodies.NONLINEAR for key in ("iterations", "converged", "cost")}}
         for k, r in enumerate(found)
     ]  # fmt: skip
-    results.write_atomically(out / "bodies.parquet", lambda path: pl.DataFrame(rows).write_parquet(path))
+    results.write_atomically(out / "bodies.parquet", results.parquet(pl.DataFrame(rows)))
     figures.bodies(document, out)
     figures.sweep(document["sweep"], out)
     results.write_json(out / "study.json", document)
@@ -59,7 +59,7 @@ def study_restarts(experiment: Experiment, out: Path, *, count: int, seed: int, 
         pl.DataFrame({"start": k, "iteration": range(len(r["objective"])), "objective": r["objective"], "rms_train": r["rms_train"], "rms_test": r["rms_test"]})
         for k, r in enumerate(runs)
     ])  # fmt: skip
-    results.write_atomically(out / "restarts.parquet", lambda path: table.write_parquet(path))
+    results.write_atomically(out / "restarts.parquet", results.parquet(table))
     figures.restarts(runs, out)
     results.write_json(out / "study.json", document)
     return document

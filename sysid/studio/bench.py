@@ -129,7 +129,8 @@ class Bench:
         return self._moved(self.desk.redo(seen))
 
     def _grow(self, seen: str, effect: str, joints: list[str] | None, options: dict) -> dict:
-        make = lambda text: loop.with_effect(text.removeprefix("\ufeff"), effect, joints, options, str(self.desk.path))  # noqa: E731
+        joints = None if joints == ["*"] else joints  # every joint, or the whole robot
+        make = lambda text: loop.with_effect(text, effect, joints, options, str(self.desk.path))  # noqa: E731
         try:
             return self._moved(self.desk.change(seen, make, effect if effect != "formula" else options["formula"], "*" if joints is None else ", ".join(joints)))
         except ConfigError as error:

@@ -14,16 +14,13 @@ import threading
 from collections.abc import Callable
 from pathlib import Path
 
-from .. import config, loop, pipeline, results
+from .. import config, experiment_file, loop, pipeline, results, state
 from ..errors import ConfigError, SysidError
+from ..experiment_file import Changed
 from ..specs import Experiment
 
 _MOST, _LARGEST = 200, 1_000_000  # texts kept; bytes of one
 _EDIT = "edit by hand"
-
-
-class Changed(SysidError):
-    """The experiment file is not the one that the page was looking at."""
 
 
 def hashed(text: str) -> str:
@@ -48,15 +45,11 @@ class Desk:
 
     def text(self) -> str:
         """The experiment file as it is now. Raises ConfigError."""
-        try:
-            data = self.path.read_bytes()
-            if len(data) > _LARGEST:
-                raise ConfigError(f"an experiment file of {len(data)} bytes", where=str(self.path), allowed=f"at most {_LARGEST}")
-            return data.decode("utf-8")
-        except OSError as error:
-            raise ConfigError(f"the experiment file cannot be read ({error.strerror})", where=str(self.path), do="check its name") from None
-        except UnicodeDecodeError:
-            raise ConfigError("not UTF-8 text", where=str(self.path), do="give an experiment in YAML") from None
+        data = experiment_file.read(self.path)
+        if len(data) > _LARGEST:
+            raise ConfigError(f"an experiment file of {len(data)} bytes", where=str(self.path), allowed=f"at most {_LARGEST}")
+        experiment_file.text(data, str(self.path))
+        return data.decode("utf-8")  # as it stands, to the last byte: an undo brings it back
 
     def experiment(self, text: str) -> Experiment:
         """The experiment that a text is. Raises ConfigError."""
@@ -111,9 +104,10 @@ class Desk:
         """
         with self._lock:
             text = self._as_seen(seen)
-        new = make(text)
+        before = text.encode("utf-8")
+        new = experiment_file.edited(before, make(experiment_file.text(before))).decode("utf-8")
         pipeline.build(self.experiment(new))  # takes a while: who asks for the state need not wait
-        with self._lock:
+        with self._lock, state.locked(self.path):
             self._as_seen(seen)
             self._write(text, new)
             self._append(new, added, joint)
@@ -150,7 +144,7 @@ class Desk:
         return self._items[self._at]["text"]
 
     def _move(self, seen: str, by: int) -> str:
-        with self._lock:
+        with self._lock, state.locked(self.path):
             text = self._as_seen(seen)
             if not 0 <= self._at + by < len(self._items):
                 raise SysidError("there is nothing to undo" if by < 0 else "there is nothing to redo")
@@ -162,9 +156,7 @@ class Desk:
             return hashed(new)
 
     def _write(self, old: str, new: str) -> None:
-        if self.text() != old:
-            raise Changed("the experiment file changed", do="reload")
-        results.write_atomically(self.path, lambda p: p.write_bytes(new.encode("utf-8")))
+        experiment_file.replace(self.path, old.encode("utf-8"), new.encode("utf-8"))
 
     def _tell(self) -> None:
         """Write the steps for `sysid history`, where this page made any."""
