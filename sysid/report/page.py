@@ -8,16 +8,17 @@ from __future__ import annotations
 
 import base64
 import hashlib
-import html
-import json
+import re
 from pathlib import Path
+
+from jinja2.utils import htmlsafe_json_dumps
+from markupsafe import Markup
 
 from .. import results
 from ..diagnose.diagnosis import Diagnosis
 from ..estimate import Fit
+from . import rendering
 from . import sections as parts
-from .script import SCRIPT
-from .style import STYLE
 
 _SHORT = {
     "verdict": "Verdict", "torque": "Torque", "steps": "Steps", "failures": "Where", "suspects": "Suspects", "detectable": "Could show", "parameters": "Parameters",
@@ -40,54 +41,22 @@ def page(name: str, made: dict[str, dict]) -> str:
     """The HTML of sections ({name: {"title", "html", "charts"}}) under the name of an experiment."""
     from plotly.offline import get_plotlyjs
 
-    engine = get_plotlyjs()
-    if "</script" in engine.lower():
-        engine = engine.replace("</script", "<\\/script")
+    # what would end the element that holds it
+    engine = re.sub("<(?=/script)", r"<\\", get_plotlyjs(), flags=re.IGNORECASE)
+    script = rendering.script()
     policy = (
-        f"default-src 'none'; script-src '{_hash(SCRIPT)}' '{_hash(engine)}' 'unsafe-eval'; style-src 'unsafe-inline'; img-src data: blob:; "
+        f"default-src 'none'; script-src '{_hash(script)}' '{_hash(engine)}' 'unsafe-eval'; style-src 'unsafe-inline'; img-src data: blob:; "
         "worker-src blob:; base-uri 'none'; form-action 'none'"
     )
-    title = html.escape(name)
-    links = "".join(f'<li><a href="#{key}">{_SHORT.get(key, html.escape(key))}</a></li>' for key in made)
-    body = "".join(f'<section id="{key}" aria-labelledby="{key}-title"><h2 id="{key}-title">{html.escape(section["title"])}</h2>{section["html"]}</section>\n' for key, section in made.items())
-    figures = "\n".join(
-        f'<script type="application/json" id="figure-{chart["id"]}">{embedded({"link": chart["link"], "figure": chart["figure"]})}</script>'
-        for section in made.values() for chart in section["charts"]
+    return rendering.environment("report").get_template("report/page.html").render(
+        name=name, sections=made, short=_SHORT, policy=policy, version=results.versions()["sysid"], embedded=embedded,
+        style=rendering.style(), script=script, engine=Markup(engine),
     )  # fmt: skip
-    return f"""<!DOCTYPE html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta http-equiv="Content-Security-Policy" content="{policy}">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<meta name="referrer" content="no-referrer">
-<title>{title} · sysid report</title>
-<link rel="icon" href="data:,">
-<style>{STYLE}</style>
-<noscript><style>figure.chart, .tools {{ display: none; }}</style></noscript>
-</head>
-<body>
-<a class="skip" href="#verdict">to the verdict</a>
-<header class="top"><h1>{title}</h1><p class="quiet">What the model says, where it fails, what is missing. Written by sysid {html.escape(results.versions()["sysid"])}.</p></header>
-<nav aria-label="sections"><ul>{links}</ul></nav>
-<main>
-<noscript><p class="empty">Charts need JavaScript, which is off here. The words and tables below hold the findings.</p></noscript>
-{body}</main>
-<footer>One file, no network: everything shown is in it. Charts by plotly.js (MIT licence).</footer>
-{figures}
-<script type="text/plain" id="plotly">{engine}</script>
-<script>{SCRIPT}</script>
-</body>
-</html>
-"""
 
 
-def embedded(value) -> str:
+def embedded(value) -> Markup:
     """A value as JSON that cannot end the script element that holds it. NaN is refused."""
-    text = json.dumps(value, allow_nan=False, separators=(",", ":"), ensure_ascii=False)
-    for character in "<>&\u2028\u2029":
-        text = text.replace(character, f"\\u{ord(character):04x}")
-    return text
+    return htmlsafe_json_dumps(value, allow_nan=False, separators=(",", ":"), ensure_ascii=False)
 
 
 def _hash(script: str) -> str:

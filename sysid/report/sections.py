@@ -6,6 +6,8 @@
 
 from __future__ import annotations
 
+from markupsafe import Markup
+
 from ..diagnose.diagnosis import Diagnosis
 from ..estimate import Fit
 from . import detectable, fitted, identified, suspects, verdict
@@ -28,4 +30,4 @@ def sections(fit: Fit, diagnosis: Diagnosis, document: dict, history: list[dict]
         "bodies": identified.bodies(fit, diagnosis),
         "provenance": identified.provenance(fit, document),
     }
-    return {name: {"title": title, "html": text, "charts": drawn} for name, (title, text, drawn) in made.items()}
+    return {name: {"title": title, "html": Markup(text), "charts": drawn} for name, (title, text, drawn) in made.items()}

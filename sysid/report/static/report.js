@@ -1,6 +1,4 @@
-"""What makes the page move: charts drawn when they come into view, one time axis for all joints, light, dark and paper."""
-
-SCRIPT = r"""
+// What makes the page move: charts drawn when they come into view, one time axis for all joints, light, dark and paper.
 (() => {
 "use strict";
 const DARK = {"#000000":"#e4e7ea", "#0072b2":"#56b4e9", "#d55e00":"#f59350", "#009e73":"#35c79d", "#999999":"#6f7882", "#e69f00":"#f0b429", "#cc79a7":"#e39cc4",
@@ -157,4 +155,3 @@ addEventListener("afterprint", () => {
   redraw();
 });
 })();
-"""

@@ -1,6 +1,4 @@
-"""What the live page does beside what the report does. Every text goes into the page as text, never as markup."""
-
-SCRIPT = r"""
+// What the live page does beside what the report does. Every text goes into the page as text, never as markup.
 (() => {
 "use strict";
 const at = id => document.getElementById(id);
@@ -319,4 +317,3 @@ document.addEventListener("visibilitychange", () => { if (!document.hidden) tick
   tick();
 })();
 })();
-"""
