@@ -16,6 +16,7 @@ from .inertia.consistency import is_consistent
 from .inverse_dynamics import WithTorque
 from .model import Model, moving_coefficients
 from .motion import Motion
+from .nearby import from_nearby
 from .multistart import Searched
 from .objective import Objective, posed
 from .prior_weight import PriorWeight, number, with_weight
@@ -254,6 +255,14 @@ class Problem:
             tolerance=settings.tolerance, max_iterations=settings.max_iterations, handover=settings.handover,
             callback=callback,
         )  # fmt: skip
+
+    def from_nearby(self, x, tolerance: float) -> np.ndarray | None:
+        """The optimum (size,) from that of a problem that differs a little; None where it is not near, or the prior is no barrier."""
+        if not self.objective.barrier:
+            return None
+        begun, held = np.array(x), 10 * self.coordinates.bodies + np.flatnonzero(self.coordinates.held)
+        begun[held] = self.coordinates.physical(self.start)[held]
+        return from_nearby(self.objective, self.coordinates.positive, self.coordinates.held, begun, tolerance=tolerance)
 
     def certify(self, x) -> Certificate:
         """The certificate of x (size,)."""

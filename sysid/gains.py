@@ -11,6 +11,8 @@ it makes; the fit goes on from there, with all bodies free.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.interpolate import make_interp_spline
 from scipy.optimize import minimize_scalar
@@ -20,6 +22,7 @@ from . import model, motor_side, rows
 from .lowpass import lowpassed, stride_of, widest
 from .motion import Motion
 from .robot import Robot
+from .segment import Segment
 from .specs import ActuatorSpec, EffectSpec, Experiment, FreeFactor
 
 _HAS = ("armature", "viscous", "coulomb", "torque_bias")  # what any joint has
@@ -42,8 +45,9 @@ def started(experiment: Experiment, machine: Robot) -> Experiment:
     sums = [j for j, entry in torques.items() if _waits(entry[motor_side.leading(entry)])]
     if not (late or open_ or sums):
         return experiment
-    motion_of = lambda drives: _seen(experiment, machine, drives)  # noqa: E731
     plain = {j: spec.model_copy(update={"delay": 0.0}) for j, spec in actuators.items()}
+    read = [logs.read(spec, experiment.data, machine.joints, machine.prismatic, experiment.folder, plain) for spec in experiment.data.train]
+    motion_of = lambda drives: _seen(machine, read, drives)  # noqa: E731
     motion = motion_of(plain)
     if motion is None:
         return experiment
@@ -95,10 +99,18 @@ def _command(spec: ActuatorSpec) -> ActuatorSpec:
     return ActuatorSpec(voltage=column)
 
 
-def _seen(experiment: Experiment, machine: Robot, drives: dict[str, ActuatorSpec]) -> Motion | None:
+def _seen(machine: Robot, read: list[logs.Log], drives: dict[str, ActuatorSpec]) -> Motion | None:
     """The training motion under one low-pass, each drive's torque per unit of its factor."""
-    read = [logs.read(spec, experiment.data, machine.joints, machine.prismatic, experiment.folder, drives) for spec in experiment.data.train]
+    read = [replace(log, segments=tuple(_driven(machine, segment, drives) for segment in log.segments)) for log in read]
     return lowpassed(read, machine.joints, widest(read))
+
+
+def _driven(machine: Robot, segment: Segment, drives: dict[str, ActuatorSpec]) -> Segment:
+    tau = segment.tau.copy()
+    for joint, spec in drives.items():
+        j, command = machine.joints.index(joint), segment.signals[motor_side.command_name(joint)]
+        tau[:, j], _ = motor_side.driven(motor_side.drive(spec), segment.t, command, segment.q[:, j])
+    return replace(segment, tau=tau)
 
 
 def _rows(machine: Robot, motion: Motion) -> rows.Rows:

@@ -13,7 +13,7 @@ between weights on the same stretches, in which what all weights share cancels.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -22,7 +22,6 @@ from .compress import Compressed
 from .estimate import Problem, known_bodies, noise_weights, pose
 from .interior import minimise
 from .model import Model
-from .nearby import from_nearby
 from .prior_weight import USUAL, PriorWeight, is_auto, weakest, with_weight
 from .specs import Experiment
 
@@ -42,6 +41,7 @@ class HeldApart:
     problems: tuple[Problem, ...]
     stretches: tuple[Compressed, ...]
     weights: np.ndarray
+    _solved: dict[float, np.ndarray] = field(default_factory=dict, repr=False, compare=False)
 
     @property
     def rows(self) -> np.ndarray:
@@ -50,10 +50,15 @@ class HeldApart:
 
     def squares(self, weight: float, tolerance: float = _TOLERANCE) -> np.ndarray:
         """(stretches, joints) sum of squared residuals of each, under fits of the others with a
-        prior of `weight`."""
-        out, x = [], None
+        prior of `weight`.
+
+        Each begins where the one before it ended, the first where the nearest weight's first did.
+        """
+        nearest = min(self._solved, key=lambda w: abs(np.log(w / weight)), default=None)
+        out, x = [], self._solved.get(nearest)
         for problem, stretch in zip(self.problems, self.stretches):
             x = solved(problem, weight, tolerance, near=x)
+            self._solved.setdefault(weight, x)
             out.append(stretch.squares(x))
         return np.array(out)
 
@@ -64,15 +69,15 @@ def solved(
     """The parameters (size,) of a problem under another weight of its prior.
 
     Args:
-        near: those of a problem that has most of its rows, where they are at hand.
+        near: those of a problem that differs a little, where they are at hand.
     """
-    coordinates, objective = problem.coordinates, replace(problem.objective, weight=weight)
-    how = objective, coordinates.positive, coordinates.held
-    if near is not None and objective.barrier:
-        found = from_nearby(*how, near, tolerance=tolerance)
-        if found is not None:
-            return found
-    return minimise(*how, coordinates.physical(problem.start), tolerance=tolerance)[0][-1]
+    problem = replace(problem, objective=replace(problem.objective, weight=weight))
+    found = None if near is None else problem.from_nearby(near, tolerance)
+    if found is not None:
+        return found
+    own = problem.coordinates
+    start = own.physical(problem.start)
+    return minimise(problem.objective, own.positive, own.held, start, tolerance=tolerance)[0][-1]
 
 
 def held_apart(
@@ -91,17 +96,21 @@ def held_apart(
     return HeldApart(tuple(problems), tuple(alone), scale)
 
 
-def chosen(experiment: Experiment, model: Model, data: Compressed, moving, prior) -> PriorWeight:
+def chosen(
+    experiment: Experiment, model: Model, data: Compressed, moving, prior, before=None
+) -> PriorWeight:
     """The weight of an experiment's prior: as given, or chosen on its training data.
 
     Args:
-        moving: (coefficients,) bool. prior: (bodies, 10).
+        moving: (coefficients,) bool. prior: (bodies, 10). before: a PriorWeight that was chosen for
+            a model like this one.
     """
     if not is_auto(experiment):
         return PriorWeight(experiment.prior.weight)
     if data.blocks < FEWEST or len(known_bodies(experiment, model)) == model.bodies:
         return PriorWeight(USUAL, auto=True)
-    found = strongest(held_apart(experiment, model, data, moving, prior))
+    begin = None if before is None or before.errors is None else before.value
+    found = strongest(held_apart(experiment, model, data, moving, prior), begin)
     if experiment.solver.weighting != "noise":
         return found
     whole = pose(with_weight(experiment, found.value), model, data, moving, prior)
@@ -109,12 +118,19 @@ def chosen(experiment: Experiment, model: Model, data: Compressed, moving, prior
     return strongest(held_apart(experiment, model, data, moving, prior, weights))
 
 
-def strongest(apart: HeldApart) -> PriorWeight:
+def strongest(apart: HeldApart, begin: float | None = None) -> PriorWeight:
     """The strongest prior within one standard error of the best, and none that is weaker than what
     a URDF says at all: by decades from the middle of what a prior can be, both ways, up to where
-    the error stands clear above the best or changes no more."""
+    the error stands clear above the best or changes no more.
+
+    Args:
+        begin: a weight near which it is, from which the search goes down no further than to an
+            error that rises.
+    """
     top = int(np.ceil(np.log10(_greatest(apart.problems[0]))))
     middle, rows = top - _DECADES // 2, apart.rows
+    if begin is not None:
+        middle = int(np.clip(np.floor(np.log10(begin)), top - _DECADES, top))
     found = {float(f"1e{middle}"): apart.squares(float(f"1e{middle}"))}
     for way in (range(middle + 1, top + 1), range(middle - 1, top - _DECADES - 1, -1)):
         for power in way:
@@ -128,6 +144,8 @@ def strongest(apart: HeldApart) -> PriorWeight:
             if worse.sum() > _CLEAR * standard_error(worse):
                 break
             if way.step < 0 and abs(own.mean() - before.mean()) <= _NOTHING * before.mean():
+                break
+            if way.step < 0 and begin is not None and own.mean() > before.mean():
                 break
     for step in (_below, _above):
         _try(apart, found, step(_least(found, rows)))

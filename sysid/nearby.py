@@ -18,6 +18,7 @@ from scipy.linalg.lapack import dpotrf, dpotrs
 from .objective import Objective, add_blocks
 
 _STEPS, _HALVINGS = 10, 3  # more, and it is not near
+_ROUNDING = 1e-13  # share of the objective that a step cannot be told to promise
 _AT_ZERO = 1e-9  # share of the objective that taking a coefficient to zero may cost
 
 
@@ -59,7 +60,7 @@ def from_nearby(
         if moved is None:
             return None
         x, value, zero = moved, after, zero | below
-        if promise <= tolerance**2 * value and not below.any():
+        if promise <= max(tolerance**2, _ROUNDING) * value and not below.any():
             return x
     return None
 

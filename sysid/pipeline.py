@@ -267,7 +267,7 @@ def _settled(experiment: Experiment, structure: Model, motion: Motion, prior) ->
                 raise
             return best[1], best[2], searched, best[3]  # of a formula, the last step left its domain
         for _ in range(_ROUNDS if number == 0 else 0):  # what was missing before is in the model now
-            before, strength = strength, _strength(experiment, structure, motion, data, prior)
+            before, strength = strength, _strength(experiment, structure, motion, data, prior, strength)
             weighed = with_weight(experiment, strength.value)
             if before is None or before.value == strength.value:
                 break
@@ -294,18 +294,21 @@ def _settled(experiment: Experiment, structure: Model, motion: Motion, prior) ->
     return structure, slopes, searched, strength
 
 
-def _strength(experiment: Experiment, structure: Model, motion: Motion, data: Compressed, prior) -> PriorWeight:
+def _strength(experiment: Experiment, structure: Model, motion: Motion, data: Compressed, prior, before: PriorWeight | None = None) -> PriorWeight:
     """The weight of the prior on training data, which may hold slopes of shape values after the model's own parameters.
 
     Gains are found anew on what is held apart, to first order: what a gain is and what the bodies weigh is one product, and
     gains that a strong prior chose would let no other weight be better.
+
+    Args:
+        before: what was chosen for the model before its shape values were found.
     """
     if not is_auto(experiment):
         return PriorWeight(experiment.prior.weight)
     if data.size > structure.size:
         free = [k for k, value in enumerate(structure.shape_values) if not value.held]
         data = data.only([*range(structure.size), *(structure.size + at for at, k in enumerate(free) if k in structure.gains)])
-    return held_apart.chosen(experiment, structure, data, moving_coefficients(structure, motion), prior)
+    return held_apart.chosen(experiment, structure, data, moving_coefficients(structure, motion), prior, before)
 
 
 def _tell_undetermined(found: Fit, motion: Motion) -> None:

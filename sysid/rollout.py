@@ -59,6 +59,7 @@ def _run(plant: Plant, piece: Piece, commands, factor, late, servo) -> np.ndarra
     h = piece.step / fine
     middle = piece.t[0] + h * (np.arange(fine * (len(piece.t) - 1)) + 0.5)
     acts = np.stack([np.interp(middle - late[j], piece.t, command) for j, command in enumerate(commands)], axis=1)
+    made, stiffness = factor * acts, np.where(servo, factor, 0.0)
     out = np.empty(piece.q.shape)
     plant.v = np.array(piece.qd[0])
     plant.a = np.array(piece.qdd[0])
@@ -69,7 +70,7 @@ def _run(plant: Plant, piece: Piece, commands, factor, late, servo) -> np.ndarra
             break
         for i in range(k * fine, (k + 1) * fine):
             plant.freeze(middle[i], 0.5 * h)
-            plant.advance(factor * np.where(servo, acts[i] - plant.xm, acts[i]), h)
+            plant.advance(made[i] - stiffness * plant.xm, h)
     return out
 
 

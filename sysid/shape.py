@@ -81,11 +81,16 @@ def settle(
     lighter = with_weight(experiment, number(experiment) / stride)
     moving = moving_coefficients(model, motion)
 
+    last: list[np.ndarray] = []  # where the candidate before was least: the next is not far
+
     def solved(candidate: Model) -> Settled:
         rows = row.stack(candidate, motion, stride)
         problem = pose(lighter, candidate, condensed(candidate, rows), moving, prior, weights)
-        solution = problem.solve(lighter)
-        return Settled(candidate, solution.x, problem, rows, stride, solution.objective)
+        x = problem.from_nearby(last[0], lighter.solver.tolerance) if last else None
+        if x is None:
+            x = problem.solve(lighter).x
+        last[:] = [x]
+        return Settled(candidate, x, problem, rows, stride, problem.objective.value(x))
 
     def attempted(candidate: Model) -> Settled | None:
         try:

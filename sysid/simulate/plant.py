@@ -117,7 +117,6 @@ class Plant:
             h = G.T.dot(pin.nonLinearEffects(self.model, self.data, self.tree, G.dot(vm)))
         self.bodies, self.h, self.M = M, h, M + self.extra
         self.W = dposv(self.M, self.eye)[1] if self.symmetric else np.linalg.inv(self.M)
-        self.diagonal = self.W.diagonal().tolist()
         if self.forces:
             self.g = h.copy()
             for part in self.forces:
@@ -195,11 +194,12 @@ class Plant:
         active = [j for j, s in enumerate(before) if s * speeds[motor[j]] <= 0.0]
         if not active:
             return f, before, a, v1, False
+        diagonal = W.diagonal().tolist()
         for _ in range(_SWEEPS):
             moved = 0.0
             for j in active:
                 m = motor[j]
-                compliance = dt * self.diagonal[m]
+                compliance = dt * diagonal[m]
                 new = min(max(f[j] + speeds[m] / compliance, -minus[j]), plus[j])
                 if (change := new - f[j]) != 0.0:
                     v1 = v1 - (dt * change) * W[:, m]
