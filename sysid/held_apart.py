@@ -68,11 +68,14 @@ def solved(
     """
     coordinates, objective = problem.coordinates, replace(problem.objective, weight=weight)
     how = objective, coordinates.positive, coordinates.held
+    start = coordinates.physical(problem.start)
     if near is not None and objective.barrier:
+        own = np.append(np.zeros(10 * objective.bodies, dtype=bool), coordinates.held)
+        near = np.where(own, start, near)  # what these rows do not tell, its rows may have told
         found = from_nearby(*how, near, tolerance=tolerance)
         if found is not None:
             return found
-    return minimise(*how, coordinates.physical(problem.start), tolerance=tolerance)[0][-1]
+    return minimise(*how, start, tolerance=tolerance)[0][-1]
 
 
 def held_apart(
@@ -83,7 +86,7 @@ def held_apart(
     Args:
         moving: (coefficients,) bool. prior: (bodies, 10). weights: (joints,) or None.
     """
-    parts = np.array_split(np.arange(data.blocks), min(_STRETCHES, data.blocks))
+    parts = data.stretches(_STRETCHES)
     data, numbers = data.gathered(parts), range(len(parts))
     problems = [pose(experiment, model, data.without([k]), moving, prior, weights) for k in numbers]
     alone = [data.without(set(numbers) - {k}) for k in numbers]

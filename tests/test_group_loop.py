@@ -1,0 +1,66 @@
+"""What is added to an experiment with groups of logs, and what is asked of it."""
+
+import json
+
+import polars as pl
+import pytest
+
+import sysid
+from scripts.blind_benchmark import PLANAR
+from sysid.statement.document import document as statement
+from tests.conftest import dump
+from tests.grouped import JOINTS, PER_PAYLOAD, experiment, tree
+from tests.test_changed import LOAD, written
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return experiment(tmp_path_factory.mktemp("groups"))
+
+
+def test_an_effect_that_joins_per_group_takes_the_place_of_the_shared_one(folder, cli, tmp_path):
+    file = folder / "shared.yaml"
+    file.write_text("# kept\n" + dump(tree(["viscous", "coulomb", PER_PAYLOAD[2]])))
+    cli("add", file, "viscous", "--per", "day").complains("there is no group 'day'")
+    said = cli("add", file, "viscous", "--per", "robot", "--out", tmp_path / "run", "--json")
+    assert said.status == 0, said.err
+    document = json.loads(said.out)
+    names = [p["name"] for p in document["parameters"]]
+    assert names == [f"viscous.{joint}.Fv[{level}]" for level in ("r1", "r2") for joint in JOINTS]
+    assert all(d["delta_rms"] < -5.0 * d["se"] for d in document["differences"])
+    assert file.read_text().startswith("# kept\n")
+    effects = sysid.load(file).model.effects
+    assert sorted((e.name, e.per) for e in effects) == [
+        ("coulomb", None),
+        ("payload", "payload"),
+        ("viscous", "robot"),
+    ]
+
+
+def test_a_diagnosis_holds_the_model_at_each_log_s_levels(tmp_path, planar):
+    """An arm with a payload in one log and without in the other, and a spring on its elbow in both:
+    the payload is known, the spring is what is missing."""
+    (tmp_path / "robot.urdf").write_text(PLANAR)
+    for k, (name, load) in enumerate({"empty": None, "loaded": LOAD}.items()):
+        for n, part in enumerate(("train", "test")):
+            file = tmp_path / f"{name}_{part}.csv"
+            written(planar, file, 2 * k + n, load=load)
+            log = pl.read_csv(file)
+            spring = pl.col("tau_elbow") + 1.5 * pl.col("q_elbow")
+            log.with_columns(spring.alias("tau_elbow")).write_csv(file)
+    given = {
+        "robot": {"urdf": "robot.urdf"},
+        "data": {
+            "train": ["*_train.csv"],
+            "test": ["*_test.csv"],
+            "groups": {"payload": {"none": ["empty_*"], "held": ["loaded_*"]}},
+        },
+        "model": {"effects": ["viscous", "coulomb", PER_PAYLOAD[2]]},
+    }
+    (tmp_path / "config.yaml").write_text(dump(given))
+    found = sysid.diagnose(sysid.load(tmp_path))
+    verdict = {v["joint"]: v for v in statement(found, "run")["verdict"]}
+    assert verdict["elbow"]["status"] == "missing" and verdict["elbow"]["effect"] == "spring"
+    assert "missing" != verdict["shoulder"]["status"] != "unknown"
+    mass = found.fit.x[found.fit.model.names.index("payload.*.m[held]")]
+    assert abs(mass - LOAD[0]) < 0.1 * LOAD[0]
