@@ -127,7 +127,7 @@ def design(
     limits: Annotated[Optional[Path], typer.Option("--limits", help="A YAML file of limits beside the URDF's: position, velocity, acceleration, jerk, torque by joint; margin, clearance, floor.")] = None,  # noqa: UP045
     seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of the starts.")] = 0,
     processes: Annotated[Optional[int], typer.Option("--processes", min=1, help="That share the starts; as many as there are cores. The motion is the same.")] = None,  # noqa: UP045
-    trust: Trust = False, as_json: Json = False, quiet: Quiet = False,
+    level: Level = None, trust: Trust = False, as_json: Json = False, quiet: Quiet = False,
 ) -> None:  # fmt: skip
     """The next motion to log: the most informative within the limits, or the one that separates suspects."""
     from . import design as designing
@@ -137,7 +137,7 @@ def design(
     suspects = [_suspect(text) for text in separate.split(",")] if separate else []
     bounds = designing.read_limits(limits) if limits else None
     with _progress(quiet or as_json) as progress:
-        found = designing.design(spec, duration=duration, separate=suspects, limits_spec=bounds, seed=seed, processes=processes, progress=progress)
+        found = designing.design(spec, duration=duration, separate=suspects, limits_spec=bounds, seed=seed, processes=processes, levels=_levels(level), progress=progress)
     document = designing.write(found, folder)
     if as_json:
         print(json.dumps(document, allow_nan=False))

@@ -7,6 +7,7 @@ import pytest
 
 import sysid
 from scripts.blind_benchmark import PLANAR
+from sysid.report.identified import parameters
 from sysid.statement.document import document as statement
 from tests.conftest import dump
 from tests.grouped import JOINTS, PER_PAYLOAD, experiment, tree
@@ -64,3 +65,39 @@ def test_a_diagnosis_holds_the_model_at_each_log_s_levels(tmp_path, planar):
     assert "missing" != verdict["shoulder"]["status"] != "unknown"
     mass = found.fit.x[found.fit.model.names.index("payload.*.m[held]")]
     assert abs(mass - LOAD[0]) < 0.1 * LOAD[0]
+
+
+def test_a_known_payload_is_no_fault_of_the_logs(folder, cli):
+    """Check's own equations have what the experiment says differs: without it the heavy payload
+    looks like a torque that was never there."""
+    limited = folder / "limited.urdf"
+    limited.write_text((folder / "robot.urdf").read_text().replace('effort="50"', 'effort="12"'))
+    for per, status in ((True, 0), (False, 1)):
+        effects = PER_PAYLOAD if per else ["viscous", "coulomb"]
+        (folder / "checked.yaml").write_text(dump(tree(effects, robot={"urdf": "limited.urdf"})))
+        said = cli("check", folder / "checked.yaml", "--json")
+        faults = {fault["fault"] for fault in json.loads(said.out)["faults"]}
+        assert (said.status, "commanded_torque" in faults) == (status, not per), faults
+
+
+def test_a_motion_is_designed_for_one_level(folder, cli, tmp_path):
+    """What the level's own parameters gain is more than what others do, which learn of the bodies
+    alone."""
+    cli("design", folder, "--out", tmp_path / "next", "--level", "payload=four").complains("four")
+    how = ("--duration", "2", "--processes", "1", "--level", "payload=three", "--json")
+    document = json.loads(cli("design", folder, "--out", tmp_path / "next", *how).out)
+    (told,) = [notice for notice in document["notices"] if "is designed for" in notice]
+    assert told.startswith("the motion is designed for robot r1; --level robot=LEVEL (r2)")
+    stds = document["expected_std"].items()
+    left = {name: own["after"] / own["now"] for name, own in stds if own["now"]}
+    for joint in JOINTS:
+        assert left[f"viscous.{joint}.Fv[r1]"] < left[f"viscous.{joint}.Fv[r2]"] <= 1.0
+    assert left["payload.*.m[three]"] < left["payload.*.m[one]"] <= 1.0
+
+
+def test_the_report_says_what_differs(folder, tmp_path):
+    """The table of levels, and a chart whose rows are joints and levels."""
+    fit = sysid.fit(sysid.load(folder))
+    _, body, drawn = parameters(fit)
+    assert "<summary>per robot</summary>" in body and "from r1" in body
+    assert "elbow [r2]" in str(drawn[0])
