@@ -7,6 +7,8 @@ import pytest
 
 import sysid
 from scripts.blind_benchmark import PLANAR
+from sysid import config
+from sysid.differences import parameters_per_group
 from sysid.report.identified import parameters
 from sysid.statement.document import document as statement
 from tests.conftest import dump
@@ -101,3 +103,22 @@ def test_the_report_says_what_differs(folder, tmp_path):
     _, body, drawn = parameters(fit)
     assert "<summary>per robot</summary>" in body and "from r1" in body
     assert "elbow [r2]" in str(drawn[0])
+
+
+def test_what_is_no_column_may_differ_too(folder, tmp_path):
+    """An encoder that was mounted 20 mrad off on one of two robots: a value that the torque is not
+    linear in, at each level, and their difference with its deviation."""
+    (tmp_path / "robot.urdf").write_text((folder / "robot.urdf").read_text())
+    (tmp_path / "r1.csv").write_text((folder / "none_train.csv").read_text())
+    moved = pl.read_csv(folder / "none_test.csv").with_columns(pl.col("q_elbow") + 0.02)
+    moved.write_csv(tmp_path / "r2.csv")
+    offset = {"encoder_offset": {"joints": ["elbow"], "per": "robot", "except": ["r1"]}}
+    given = tree(["viscous", "coulomb", offset])
+    groups = {"robot": {"r1": ["r1.csv"], "r2": ["r2.csv"]}}
+    given["data"] = {"train": ["r1.csv", "r2.csv"], "test": ["r1.csv"], "groups": groups}
+    found = sysid.fit(config.experiment(given, tmp_path / "config.yaml"))
+    (name,) = (value.name for value in found.model.shape_values)
+    assert name.startswith("encoder_offset.elbow.") and name.endswith("[r2]")
+    assert abs(abs(found.model.shapes[0]) - 0.02) < 4.0 * found.shape_std[0] < 0.004
+    (own,) = parameters_per_group(found)
+    assert own.levels == ("r2",) and own.std[0] == found.shape_std[0]
