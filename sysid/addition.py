@@ -40,7 +40,9 @@ def _apart(old: EffectSpec, new: EffectSpec, every: Sequence[str]) -> EffectSpec
 
 def remaining(there: Sequence[str], had: dict, joints: Sequence[str] | None, options: dict) -> list[str] | None:
     """The joints that keep an effect as it is where it comes again with other options; None where it does not take
-    its place: it has no options, the same ones, or other joints."""
+    its place: it has no options, the same ones, or other joints. What is per group on every joint takes every joint's place."""
+    if joints is None and "per" in options and options != had:
+        return []
     if not options or options == had or joints is None or not set(joints) & set(there):
         return None
     return [joint for joint in there if joint not in joints]

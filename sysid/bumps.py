@@ -16,6 +16,7 @@ from .events import Event
 from .log import Log
 from .lowpass import lowpassed, stride_of, widest
 from .model import build
+from .motion import Motion
 from .outliers import BURST, CHANCE, bursts, ratio, surprise
 from .projection import inverted
 from .robot import Robot
@@ -42,7 +43,7 @@ def bumps(robot: Robot, logs: Sequence[Log]) -> list[Event]:
     stride = stride_of(motion, cutoff)
     rows = stack(model, motion, stride)
     step = stride * motion.pieces[0].step
-    size = np.abs(_left(rows))
+    size = np.abs(_left(rows, _kinds(motion)[rows.piece]))
     own = np.stack([_surprise(a, u, rows.piece, step) for a, u in zip(size.T, rows.use.T)], axis=1)
     span = len(own) * step
     level = np.log(span / BURST * robot.dof / CHANCE)
@@ -59,14 +60,23 @@ def bumps(robot: Robot, logs: Sequence[Log]) -> list[Event]:
     return found if len(found) * _OFTEN <= span else []
 
 
-def _left(rows: Rows) -> np.ndarray:
-    """What least squares leave (n, dof), every joint in units of its median."""
-    weights = np.ones(rows.tau.shape[1])
+def _kinds(motion: Motion) -> np.ndarray:
+    """(pieces,) number of the levels at which each piece's log is: where these differ, robots may,
+    and each has an equation of its own."""
+    each = [tuple(sorted(piece.levels.items())) for piece in motion.pieces]
+    return np.array([[*dict.fromkeys(each)].index(own) for own in each])
+
+
+def _left(rows: Rows, kind: np.ndarray) -> np.ndarray:
+    """What least squares leave (n, dof), every joint in units of its median; of rows of each kind
+    (n,) by itself."""
+    weights, left = np.ones(rows.tau.shape[1]), np.zeros(rows.tau.shape)
     for _ in range(_PASSES):
-        columns = rows.columns * weights[:, None, None]
-        system = np.einsum("jnk,jnl->kl", columns, columns, optimize=True)
-        x = inverted(system) @ np.einsum("jnk,nj->k", columns, rows.tau * weights)
-        left = rows.residual(x)
+        for own in (kind == number for number in np.unique(kind)):
+            columns = rows.columns[:, own] * weights[:, None, None]
+            system = np.einsum("jnk,jnl->kl", columns, columns, optimize=True)
+            x = inverted(system) @ np.einsum("jnk,nj->k", columns, rows.tau[own] * weights)
+            left[own] = rows.tau[own] - np.einsum("jnk,k->nj", rows.columns[:, own], x)
         usual = [np.median(np.abs(e[u])) if u.any() else 0.0 for e, u in zip(left.T, rows.use.T)]
         weights = ratio(np.ones(len(usual)), np.array(usual))
     return left * weights

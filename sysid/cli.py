@@ -127,7 +127,7 @@ def design(
     limits: Annotated[Optional[Path], typer.Option("--limits", help="A YAML file of limits beside the URDF's: position, velocity, acceleration, jerk, torque by joint; margin, clearance, floor.")] = None,  # noqa: UP045
     seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of the starts.")] = 0,
     processes: Annotated[Optional[int], typer.Option("--processes", min=1, help="That share the starts; as many as there are cores. The motion is the same.")] = None,  # noqa: UP045
-    trust: Trust = False, as_json: Json = False, quiet: Quiet = False,
+    level: Level = None, trust: Trust = False, as_json: Json = False, quiet: Quiet = False,
 ) -> None:  # fmt: skip
     """The next motion to log: the most informative within the limits, or the one that separates suspects."""
     from . import design as designing
@@ -137,7 +137,7 @@ def design(
     suspects = [_suspect(text) for text in separate.split(",")] if separate else []
     bounds = designing.read_limits(limits) if limits else None
     with _progress(quiet or as_json) as progress:
-        found = designing.design(spec, duration=duration, separate=suspects, limits_spec=bounds, seed=seed, processes=processes, progress=progress)
+        found = designing.design(spec, duration=duration, separate=suspects, limits_spec=bounds, seed=seed, processes=processes, levels=_levels(level), progress=progress)
     document = designing.write(found, folder)
     if as_json:
         print(json.dumps(document, allow_nan=False))
@@ -365,6 +365,8 @@ def add(
     effect: Annotated[str, typer.Argument(help="A word of `sysid effects`, a class my_effects.py:Name, or formula.")],
     joint: Annotated[Optional[list[str]], typer.Option("--joint", help="The joint that has it; again for more. Default: every joint.")] = None,  # noqa: UP045
     option: Annotated[Optional[list[str]], typer.Option("--option", metavar="NAME=VALUE", help="An option of the effect, in YAML; again for more.")] = None,  # noqa: UP045
+    per: Annotated[Optional[str], typer.Option("--per", metavar="GROUP", help="A group of logs (data.groups), at each level of which it has values of its own; takes the place of the same effect in all logs.")] = None,  # noqa: UP045
+    spared: Annotated[Optional[list[str]], typer.Option("--except", metavar="LEVEL", help="With --per: a level that lacks it; again for more.")] = None,  # noqa: UP045
     force: Annotated[bool, typer.Option("--force", help="Add it also where the held-out error rises by more than its standard error.")] = False,
     trust: Trust = False, as_json: Json = False, out: Out = None, quiet: Quiet = False,
 ) -> None:  # fmt: skip
@@ -376,7 +378,8 @@ def add(
     from . import loop
 
     with _progress(quiet or as_json) as progress:
-        found = loop.add(experiment, effect, list(joint) if joint else None, loop.options(option or []), force=force, progress=progress, out=out)
+        own = {**loop.options(option or []), **({"per": per} if per else {}), **({"except": list(spared)} if spared else {})}
+        found = loop.add(experiment, effect, list(joint) if joint else None, own, force=force, progress=progress, out=out)
     said = loop.document(found)
     if as_json:
         print(json.dumps(said, allow_nan=False))

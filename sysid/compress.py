@@ -12,10 +12,10 @@ from functools import cached_property
 
 import numpy as np
 
-from .blocks import divided
+from .blocks import FEWEST, divided
 from .effect import NotFinite
 from .model import Model
-from .motion import Motion
+from .motion import Motion, Piece
 from .rows import difference_step
 
 # samples: with fewer rows than columns a triangle would be no smaller than they are
@@ -56,9 +56,13 @@ class Linearised:
         """Linear parameters and free shape values."""
         return self.model.size + len(self.free)
 
-    def support(self, joint: int) -> np.ndarray:
-        """The model's, and every slope."""
-        return np.append(self.model.support(joint), np.arange(self.model.size, self.size))
+    def support(self, joint: int, piece: Piece | None = None) -> np.ndarray:
+        """The model's, and every slope of values that are there."""
+        slopes = [self.model.size + n for n, k in enumerate(self.free) if piece is None or self._there(k, piece)]
+        return np.append(self.model.support(joint, piece), slopes).astype(int)
+
+    def _there(self, k: int, piece: Piece) -> bool:
+        return self.model.terms[self.model.shape_values[k].term][0].present(piece)
 
     @cached_property
     def _beside(self) -> list[tuple[Model, float]]:
@@ -67,19 +71,22 @@ class Linearised:
     def _stepped(self, k: int, step: float) -> tuple[Model, float]:
         return self.model.with_shapes([s + step * (i == k) for i, s in enumerate(self.model.shapes)]), step
 
-    def remembered(self, piece) -> list[dict]:
-        """What the model remembers of a piece, at its shape values and a step beside each."""
-        return [model.remembered(piece) for model in (self.model, *(beside for beside, _ in self._beside))]
+    def remembered(self, piece: Piece) -> list[dict]:
+        """What the model remembers of a piece, at its shape values and a step beside each that is there."""
+        beside = [model for k, (model, _) in zip(self.free, self._beside) if self._there(k, piece)]
+        return [model.remembered(piece) for model in (self.model, *beside)]
 
     def columns(self, piece, rows: slice, remembered: list[dict]) -> list[np.ndarray]:
         """As `Model.columns`, with the slopes after the others."""
         out = self.model.columns(piece, rows, remembered[0])
         slopes: list[list[np.ndarray]] = [[] for _ in out]
-        for k, (beside, step), known in zip(self.free, self._beside, remembered[1:]):
+        supports = [self.model.support(joint, piece) for joint in range(len(out))]
+        there = [(k, beside) for k, beside in zip(self.free, self._beside) if self._there(k, piece)]
+        for (k, (beside, step)), known in zip(there, remembered[1:]):
             if (slope := self.model.gain_slope(k, step)) is not None:  # all else stays
                 own = self.model.shape_values[k].joint
                 for joint, values in enumerate(out):
-                    gained = slope * (self.x[self.model.support(joint)] @ values) if joint == own else np.zeros(values.shape[1])
+                    gained = slope * (self.x[supports[joint]] @ values) if joint == own else np.zeros(values.shape[1])
                     slopes[joint].append(gained)
                 continue
             try:
@@ -88,7 +95,7 @@ class Linearised:
                 beside, step = self._stepped(k, -step)
                 moved = beside.columns(piece, rows)
             for joint, values in enumerate(moved):
-                slopes[joint].append(self.x[self.model.support(joint)] @ (values - out[joint]) / step)
+                slopes[joint].append(self.x[supports[joint]] @ (values - out[joint]) / step)
         return [np.concatenate([values, *(s[None] for s in own)]) for values, own in zip(out, slopes)]
 
 
@@ -148,6 +155,27 @@ class Compressed:
         out[: len(merged)] = merged
         return out
 
+    @cached_property
+    def told(self) -> np.ndarray:
+        """(size,) how many blocks have a parameter at all."""
+        found = {(factor.block, k) for factor in self.factors for k in factor.columns.tolist()}
+        return np.bincount([k for _, k in found], minlength=self.size)
+
+    def stretches(self, count: int) -> list[np.ndarray]:
+        """The blocks in at most so many parts of neighbours, in each of which every parameter has its share: blocks of logs that
+        have parameters of their own are parted by themselves."""
+        kinds: dict[int, set[int]] = {}
+        for factor in self.factors:
+            kinds.setdefault(factor.block, set()).update(factor.columns.tolist())
+        alike: dict[frozenset, list[int]] = {}
+        for block in range(self.blocks):
+            alike.setdefault(frozenset(kinds.get(block, ())), []).append(block)
+        parts: list[list[int]] = [[] for _ in range(min(count, self.blocks))]
+        for number, own in enumerate(alike.values()):
+            for k, part in enumerate(np.array_split(own, len(parts))):
+                parts[(k + number) % len(parts)] += part.tolist()
+        return [np.array(part, dtype=int) for part in parts if part]
+
     def squares(self, x) -> np.ndarray:
         """(joints,) sum of squared residuals [N^2 m^2]."""
         return np.array([np.sum(factor.misfit(x) ** 2) for factor in self.by_joint])
@@ -193,8 +221,19 @@ class Compressed:
 
 def _merged(factors: Sequence[Factor], joint: int) -> Factor:
     own = [factor for factor in factors if factor.joint == joint]
-    merged = triangle(np.concatenate([factor.triangle for factor in own]))
-    return Factor(joint, 0, own[0].columns, merged, sum(factor.rows for factor in own))
+    alike: dict[bytes, list[Factor]] = {}
+    for factor in own:
+        alike.setdefault(factor.columns.tobytes(), []).append(factor)
+    parts = [(heap[0].columns, triangle(np.concatenate([factor.triangle for factor in heap]))) for heap in alike.values()]
+    if len(parts) == 1:
+        ((columns, merged),) = parts
+    else:  # each is reduced to its own small triangle before they meet: the whole is an arrow
+        columns = np.unique(np.concatenate([own_columns for own_columns, _ in parts]))
+        rows = [np.zeros((len(part), len(columns) + 1)) for _, part in parts]
+        for (own_columns, part), wide in zip(parts, rows):
+            wide[:, np.append(np.searchsorted(columns, own_columns), len(columns))] = part
+        merged = triangle(np.concatenate(rows))
+    return Factor(joint, 0, columns, merged, sum(factor.rows for factor in own))
 
 
 def merge(parts: Sequence[Compressed]) -> Compressed:
@@ -206,10 +245,17 @@ def merge(parts: Sequence[Compressed]) -> Compressed:
     return Compressed(parts[0].size, parts[0].joints, tuple(factors), sum(part.samples for part in parts))
 
 
-def _edges(motion: Motion) -> list[np.ndarray]:
-    """Of each piece, the rows at which its blocks begin, and its end."""
-    pieces = motion.pieces
-    counts = divided([p.samples for p in pieces], shortest=_SHORTEST_BLOCK, fewest=1)
+def _edges(motion: Motion, kinds: Sequence[bytes]) -> list[np.ndarray]:
+    """Of each piece, the rows at which its blocks begin, and its end.
+
+    Args:
+        kinds: of each piece, which parameters it tells: pieces of one kind are divided together, as what only they tell is known
+            by their blocks alone.
+    """
+    pieces, counts, several = motion.pieces, np.zeros(len(motion.pieces), dtype=int), len(set(kinds)) > 1
+    for kind in dict.fromkeys(kinds):
+        own = [k for k, other in enumerate(kinds) if other == kind]
+        counts[own] = divided([pieces[k].samples for k in own], shortest=_SHORTEST_BLOCK, fewest=FEWEST if several else 1)
     return [p.core.start + np.arange(n + 1) * p.samples // n for p, n in zip(pieces, counts)]
 
 
@@ -227,9 +273,10 @@ def compress(model: Model | Linearised, motion: Motion, *, thin: int = 1, progre
         progress: called with the share done, from 0 to 1.
     """
     size = model.size
-    supports = [model.support(joint) for joint in range(model.robot.dof)]
+    supported = [[model.support(joint, piece) for joint in range(model.robot.dof)] for piece in motion.pieces]
     factors, block, done = [], 0, 0
-    for piece, edges in zip(motion.pieces, _edges(motion)):
+    kinds = [b"|".join(support.tobytes() for support in supports) for supports in supported]
+    for piece, supports, edges in zip(motion.pieces, supported, _edges(motion, kinds)):
         # a filter needs margins on each stretch, so a filtered stretch holds many blocks
         filtered, length = piece.smoother is not None, max(1, piece.samples // (len(edges) - 1))
         many = max(1, _FILTERED_STRETCH // length) if filtered else 1

@@ -166,7 +166,7 @@ def _held_out(experiment: Experiment, spec: PreprocessSpec, model: Model, logs, 
     data = compress(model, motion, thin=thin)
     target = data if spec.torque == "raw" and spec.standstill == "keep" and not motion.events else compress(model, raw, thin=thin)
     moving = moving_coefficients(model, motion)
-    folds = np.array_split(np.arange(data.blocks), min(_FOLDS, data.blocks))
+    folds = data.stretches(_FOLDS)
     squares, rows, errors = np.zeros(model.robot.dof), np.zeros(model.robot.dof), []
     if len(folds) < 2:
         raise SysidError("the log is too short to hold a part of it out", where="preprocess")

@@ -88,7 +88,7 @@ def held_apart(
     Args:
         moving: (coefficients,) bool. prior: (bodies, 10). weights: (joints,) or None.
     """
-    parts = np.array_split(np.arange(data.blocks), min(_STRETCHES, data.blocks))
+    parts = data.stretches(_STRETCHES)
     data, numbers = data.gathered(parts), range(len(parts))
     problems = [pose(experiment, model, data.without([k]), moving, prior, weights) for k in numbers]
     alone = [data.without(set(numbers) - {k}) for k in numbers]

@@ -63,16 +63,18 @@ def read(log: LogSpec, data: DataSpec, joints: tuple[str, ...], prismatic, folde
     Raises:
         LogError: the file, a column, a unit or a value is not what a log can hold.
     """
-    found = assembled(measured(log, data, joints, prismatic, folder, actuators), tuple(data.unused))
-    return replace(found, levels=levels_of(data.groups, log))
+    return assembled(measured(log, data, joints, prismatic, folder, actuators), log, data)
 
 
-def assembled(samples: Recording, unused: tuple[str, ...] = ()) -> Log:
-    """The log of what was `measured`: resampled where its clock is irregular, split at gaps and where a recording ends."""
+def assembled(samples: Recording, log: LogSpec, data: DataSpec) -> Log:
+    """The log of what was `measured` of an entry of an experiment: resampled where its clock is irregular, split at gaps and where a recording ends."""
     hashes = {name: _sha256(path) for name, path in samples.files.items()}
     each = list(hashes.values())
     whole = each[0] if len(each) == 1 else hashlib.sha256("".join(each).encode()).hexdigest()
-    return Log(samples.name, next(iter(samples.files.values())), whole, tuple(_segments(samples.t, samples.signals, samples.where, samples.breaks)), hashes=hashes, unused=unused)
+    segments = tuple(_segments(samples.t, samples.signals, samples.where, samples.breaks))
+    return Log(
+        samples.name, next(iter(samples.files.values())), whole, segments, hashes=hashes, unused=tuple(data.unused), levels=levels_of(data.groups, log),
+    )  # fmt: skip
 
 
 def measured(log: LogSpec, data: DataSpec, joints: tuple[str, ...], prismatic, folder: Path = Path(), actuators=NO_ACTUATORS) -> Recording:

@@ -16,7 +16,7 @@ from .effect import Asked, Deflection, Effect, LinkEffect, MotionEffect, SensorE
 from .errors import ConfigError, SysidError, SysidWarning
 from .formula import Formula
 from .inertia import PARAMETERS, UNITS
-from .motion import Motion, Piece
+from .motion import Motion, Piece, never_move
 from .per_level import at_level
 from .robot import Robot
 from .specs import is_own
@@ -28,7 +28,7 @@ ROBOT = -1  # the "joint" of an effect of the whole robot, called `*`
 @dataclass(frozen=True)
 class Coefficient:
     """One linear coefficient of an effect on a joint (-1: on the robot). given: its value, where the user says it; term: the
-    model's, -1 where it is no model's."""
+    model's, -1 where it is no model's; at: the (group, level) of logs that have it, None where all do."""
 
     effect: str
     joint: int
@@ -37,6 +37,7 @@ class Coefficient:
     positive: bool
     given: float | None = None
     term: int = -1
+    at: tuple[str, str] | None = None
 
 
 @dataclass(frozen=True)
@@ -133,7 +134,7 @@ class Model:
         return tuple(
             Coefficient(
                 effect.name, joint, self._name(effect, joint, linear.name), self._unit(linear.unit, joint), linear.lower == 0,
-                effect.given_coefficients.get(linear.name), term,
+                effect.given_coefficients.get(linear.name), term, None if effect.group is None else (effect.group, effect.level),
             )
             for term, (effect, joints) in enumerate(self.terms)
             for joint in joints
@@ -271,8 +272,8 @@ class Model:
         """Whether a link stands apart from its motor."""
         return any(isinstance(effect, Deflection) for effect, _ in self.terms)
 
-    def support(self, joint: int) -> np.ndarray:
-        """Indices of the parameters that can enter the torque of a joint, ascending."""
+    def support(self, joint: int, piece: Piece | None = None) -> np.ndarray:
+        """Indices of the parameters that can enter the torque of a joint, in a piece's log or in any, ascending."""
         robot = self.robot
         depends = np.abs(robot.transmission) > 0
         for row, parent in enumerate(robot.parents):  # parents first: a body moves with what carries it
@@ -280,7 +281,9 @@ class Model:
                 depends[row] |= depends[parent]
         bodies = [10 * b + k for b, body in enumerate(robot.bodies) if depends[body.row, joint] for k in range(10)]
         first = 10 * self.bodies
-        return np.array(bodies + [first + k for k, c in enumerate(self.coefficients) if c.joint in (joint, ROBOT)], dtype=int)
+        there = {term for term, (effect, _) in enumerate(self.terms) if piece is None or effect.present(piece)}
+        own = [first + k for k, c in enumerate(self.coefficients) if c.joint in (joint, ROBOT) and c.term in there]
+        return np.array(bodies + own, dtype=int)
 
     def shapes_of(self, term: int, joint: int) -> dict[str, float]:
         """{name: value} of the shape values of an effect on a joint."""
@@ -288,9 +291,9 @@ class Model:
 
     @property
     def gains(self) -> list[int]:
-        """Which shape values multiply their joint's torque by one number, and are free."""
+        """Which shape values multiply their joint's torque by one number in all logs, and are free."""
         effects = [self.terms[value.term][0] for value in self.shape_values]
-        return [k for k, (effect, value) in enumerate(zip(effects, self.shape_values)) if isinstance(effect, SensorEffect) and effect.constant_gain and not value.held]
+        return [k for k, (effect, value) in enumerate(zip(effects, self.shape_values)) if isinstance(effect, SensorEffect) and effect.constant_gain and effect.level is None and not value.held]
 
     def gain_slope(self, k: int, step: float) -> float | None:
         """Of a shape value that multiplies its joint's torque by one number, the slope of that number's logarithm, by a difference;
@@ -355,7 +358,7 @@ class Model:
         return part
 
     def columns(self, piece: Piece, rows: slice, remembered: dict | None = None, *, keep: bool = False) -> list[np.ndarray]:
-        """For each joint the columns (support, n) of the rows `rows` of a piece, filtered where its torque is.
+        """For each joint the columns (support in this piece, n) of the rows `rows` of a piece, filtered where its torque is.
 
         Args:
             remembered: `remembered(piece)`, where it is at hand.
@@ -368,7 +371,7 @@ class Model:
         rigid = self._bodies_of(piece, rows, part, wide, inner, keep)
         by_joint: list[list[np.ndarray]] = [[] for _ in self.robot.joints]
         for term, (effect, joints) in enumerate(self.terms):
-            for joint in joints:
+            for joint in joints if effect.present(piece) else ():
                 if isinstance(effect, TorqueEffect) and effect.memory:
                     by_joint[joint].append(remembered[term, joint][:, wide])
                 elif isinstance(effect, TorqueEffect):
@@ -415,6 +418,9 @@ class Model:
             k = 0
             for term, (effect, joints) in enumerate(self.terms):
                 size = len(effect.coefficients())
+                if not effect.present(piece):
+                    k += size * len(joints)
+                    continue
                 for joint in joints:
                     own = np.asarray(c)[k : k + size]
                     if isinstance(effect, TorqueEffect) and effect.memory:
@@ -607,4 +613,10 @@ def moving_coefficients(model: Model, motion: Motion) -> np.ndarray:
     """(coefficients,) bool: False for those of a joint that never moves or whose torque is not used, which no data can tell, and for
     those that are given."""
     silent = (*motion.still, *motion.unused)
-    return np.array([c.given is None and (c.joint == ROBOT or model.robot.joints[c.joint] not in silent) for c in model.coefficients], dtype=bool)
+    told = lambda c: c.given is None and (c.joint == ROBOT or model.robot.joints[c.joint] not in silent)  # noqa: E731
+    out = np.array([told(c) for c in model.coefficients], dtype=bool)
+    for at in {c.at for c in model.coefficients} - {None}:  # a joint may stand in all logs of a level
+        here = [piece for piece in motion.pieces if piece.levels.get(at[0]) == at[1]]
+        stays = never_move(here) if here else np.ones(model.robot.dof, dtype=bool)
+        out &= np.array([c.at != at or c.joint == ROBOT or not stays[c.joint] for c in model.coefficients], dtype=bool)
+    return out

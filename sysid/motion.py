@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -11,6 +11,8 @@ from .events import Event
 from .smoother import Smoother
 
 _NO_WEIGHT = 1e-9
+# A joint never moves where its filtered angle travels less than its own noise would make it, or than this [rad or m].
+_NEVER_MOVES, NOISE_TRAVEL = 1e-6, 6.0
 
 
 @dataclass(frozen=True)
@@ -111,3 +113,9 @@ class Motion:
     def duration(self) -> float:
         """Seconds of motion over all pieces."""
         return sum(piece.samples * piece.step for piece in self.pieces)
+
+
+def never_move(pieces: Sequence[Piece]) -> np.ndarray:
+    """(dof,) bool: the joints that none of the pieces shows in motion."""
+    travel = np.ptp(np.concatenate([[p.q[p.core].min(0), p.q[p.core].max(0)] for p in pieces]), axis=0)
+    return travel < np.maximum(_NEVER_MOVES, NOISE_TRAVEL * np.max([piece.noise for piece in pieces], axis=0))

@@ -314,7 +314,8 @@ def _strength(experiment: Experiment, structure: Model, motion: Motion, data: Co
 def _tell_undetermined(found: Fit, motion: Motion) -> None:
     structure = found.model
     moving = moving_coefficients(structure, motion)
-    names = [c.name for c, held, moves in zip(structure.coefficients, found.held, moving) if held and moves]
+    of_level = [c.at is not None and structure.robot.joints[c.joint] not in motion.still for c in structure.coefficients]
+    names = [c.name for c, held, moves, own in zip(structure.coefficients, found.held, moving, of_level) if held and (moves or own)]
     names += [v.name for v, std in zip(structure.shape_values, found.shape_std) if not (v.held or np.isfinite(std))]
     if names:
         warnings.warn(SysidWarning(f"this log cannot tell {', '.join(names)} from the rest of the model: held at the prior"), stacklevel=2)

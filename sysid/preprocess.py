@@ -18,7 +18,7 @@ from .events import Event, mended, usable
 from .gaussian import HIGHEST, Gaussian
 from .jumps import jumps
 from .log import Log
-from .motion import Motion, Piece
+from .motion import NOISE_TRAVEL, Motion, Piece, never_move
 from .segment import Segment
 from .smoother import Smoother
 from .specs import PreprocessSpec
@@ -26,8 +26,6 @@ from .specs import PreprocessSpec
 # `standstill: mask` leaves a joint's rows out below this share of its own rms speed, at most 0.03 rad/s or m/s:
 # there friction is whatever balances the rest.
 _STANDSTILL_SHARE, _STANDSTILL_MOST = 0.05, 0.03
-# A joint never moves where its filtered angle travels less than its own noise would make it, or than this [rad or m].
-_NEVER_MOVES, _NOISE_TRAVEL = 1e-6, 6.0
 _MOST = 0.5  # of the weight that a low-pass has
 _KEPT_A_CYCLE = 8.0  # rows a cycle of a low-pass: what it lets through at half as many is 0.4 %
 _ROUNDING = 1e-9  # share of a joint's top speed that is none
@@ -79,9 +77,7 @@ def assembled(joints: tuple[str, ...], pieces: Sequence[Piece], stuck=False, unu
         counts = np.array([joint not in unused for joint in joints])
         pieces = [replace(p, use=counts & (np.ones(p.q.shape, dtype=bool) if p.use is None else p.use)) for p in pieces]
     rest = _ROUNDING * np.max([np.abs(piece.qd).max(axis=0) for piece in pieces], axis=0)
-    travel = np.ptp(np.concatenate([[p.q[p.core].min(0), p.q[p.core].max(0)] for p in pieces]), axis=0)
-    noise = np.max([piece.noise for piece in pieces], axis=0)
-    never = (travel < np.maximum(_NEVER_MOVES, _NOISE_TRAVEL * noise)) | stuck
+    never = never_move(pieces) | stuck
     still = tuple(joint for joint, stays in zip(joints, never) if stays)
     if any(piece.use is not None for piece in pieces):
         pieces = [replace(p, use=np.ones(p.q.shape, dtype=bool)) if p.use is None else p for p in pieces]
@@ -192,7 +188,7 @@ def clear_of_reversals(pieces, spec: PreprocessSpec) -> list[Piece]:
         smoother = Smoother(spec, piece.step)
         reach, stop = smoother.smear(piece.smoother is not None)
         seen = (2 * smoother.reach + 1) * piece.step
-        threshold = np.maximum(stop * _largest_about(piece.qdd, smoother.reach), _NOISE_TRAVEL * piece.noise / seen)
+        threshold = np.maximum(stop * _largest_about(piece.qdd, smoother.reach), NOISE_TRAVEL * piece.noise / seen)
         bent = turns(piece.qd) | jumps(piece.measured, smoother.reach)
         out.append(without_standstill(piece, np.where(bent, np.inf, threshold), reach))
     return out

@@ -61,13 +61,12 @@ def starts(motion: Motion, stride: int) -> list[slice]:
 
 def stack(model: Model, motion: Motion, stride: int) -> Rows:
     """The rows of a motion under a model."""
-    supports = [model.support(joint) for joint in range(model.robot.dof)]
     kept = [np.arange(rows.start, rows.stop, stride) for rows in starts(motion, stride)]
     n, dof = sum(map(len, kept)), model.robot.dof
     columns = np.zeros((dof, n, model.size))
     at = 0
     for piece in motion.pieces:
-        remembered = model.remembered(piece)
+        remembered, supports = model.remembered(piece), [model.support(joint, piece) for joint in range(dof)]
         # a stretch holds a whole number of strides, so that the kept rows go on where the last stretch ended
         for rows in chunks(piece, stride * max(1, _STRETCH // stride)):
             parts = model.columns(piece, slice(rows.start, rows.stop, stride), remembered, keep=True)

@@ -49,7 +49,7 @@ def estimate(objective: Objective, compressed: Compressed, x: np.ndarray, fixed:
     claim = max(1.0, objective.weight / least) if least > 0.0 else 1.0
     inverse, undetermined = _inverse(data[pick] + prior[pick])
     covariance = np.full((size, size), np.nan)
-    covariance[pick] = _noise(compressed, x, weights, data + prior, free) + 2.0 * variance * claim * inverse @ prior[pick] @ inverse
+    covariance[pick] = _noise(compressed, x, weights, data + prior, free) * _widened(compressed, free) + 2.0 * variance * claim * inverse @ prior[pick] @ inverse
     total = np.diagonal(inverse)
     from_noise = np.einsum("ij,jk,ki->i", inverse, data[pick], inverse)
     share = np.zeros(size)
@@ -57,6 +57,15 @@ def estimate(objective: Objective, compressed: Compressed, x: np.ndarray, fixed:
     std = np.full(size, np.nan)
     std[free] = np.where(undetermined, np.nan, np.sqrt(np.clip(np.diagonal(covariance)[free], 0.0, None)))
     return Uncertainty(covariance, std, share)
+
+
+def _widened(compressed: Compressed, free) -> np.ndarray:
+    """(free, free) by which parameters that some blocks alone tell are less certain than those that all do: by Student's law of
+    so many blocks."""
+    told = np.maximum(compressed.told[free], 1)
+    known = {int(count): blocks.widening(int(count)) for count in {*told, compressed.blocks}}
+    share = np.array([known[int(count)] for count in told]) / known[compressed.blocks]
+    return np.outer(share, share)
 
 
 _FLAT = 1e-12  # eigenvalues that are none, as a share of the largest

@@ -5,6 +5,7 @@ import copy
 from dataclasses import replace
 
 import numpy as np
+import polars as pl
 import pytest
 
 from sysid import config, pipeline
@@ -105,6 +106,23 @@ def test_pieces_of_one_file_and_several_files_are_told_apart(folder):
     assert [(log.name, log.stop) for log in found["b"]] == [("one_train.csv", 8.0)]
 
 
+def test_friction_of_a_joint_that_stands_at_one_level_is_held_there_and_told(folder, tmp_path):
+    for name in ("two_train", "none_train"):
+        log = pl.read_csv(folder / f"{name}.csv")
+        log.with_columns(pl.lit(0.3).alias("q_elbow")).write_csv(tmp_path / f"{name}.csv")
+    for name in ("one_train", "three_train", "one_test"):
+        (tmp_path / f"{name}.csv").write_text((folder / f"{name}.csv").read_text())
+    (tmp_path / "robot.urdf").write_text((folder / "robot.urdf").read_text())
+    given = tree([{"viscous": {"per": "robot"}}])
+    train = ["none_train.csv", "two_train.csv", "one_train.csv", "three_train.csv"]
+    groups = {"robot": {"r1": train[:2], "r2": [*train[2:], "one_test.csv"]}}
+    given["data"] = {"train": train, "test": ["one_test.csv"], "groups": groups}
+    found = pipeline.fit(config.experiment(given, tmp_path / "config.yaml"))
+    held = [c.name for c, own in zip(found.model.coefficients, found.held) if own]
+    assert held == ["viscous.elbow.Fv[r1]"]
+    assert any("cannot tell viscous.elbow.Fv[r1] from the rest" in n for n in found.notices)
+
+
 @pytest.mark.parametrize(
     ("entry", "log", "same"),
     [
@@ -156,7 +174,7 @@ def test_every_effect_is_itself_at_its_level_and_nothing_elsewhere(name):
             own = replace(piece, levels={"robot": level})
             out[key, level] = model.torque(own, machine.prior, c)
             parts = enumerate(model.columns(own, slice(0, len(piece.t))))
-            made = np.stack([x[model.support(j)] @ columns for j, columns in parts], axis=1)
+            made = np.stack([x[model.support(j, own)] @ columns for j, columns in parts], axis=1)
             np.testing.assert_allclose(made, out[key, level], rtol=1e-9, atol=1e-9)
     without = base.torque(replace(piece, levels={}), machine.prior, np.zeros(0))
     np.testing.assert_allclose(out["there", "r2"], out["plain", "r2"], rtol=1e-12, atol=1e-12)

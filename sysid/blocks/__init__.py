@@ -20,7 +20,7 @@ from .deviations import (
     z_score,
 )
 from .numbering import FEWEST, MOST, SHORTEST, divided, folds, memory, numbered, summed
-from .parameters import covariance
+from .parameters import covariance, widening
 from .rivals import SAME, chances, confidence_set, within_one_error
 
 __all__ = [
@@ -43,6 +43,7 @@ __all__ = [
     "slope_chance",
     "standard_error",
     "summed",
+    "widening",
     "within_one_error",
     "z_score",
 ]

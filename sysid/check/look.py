@@ -13,7 +13,7 @@ from .. import pipeline, robot
 from ..errors import SysidError
 from ..estimate import Fit
 from ..lowpass import lowpassed, stride_of, widest
-from ..model import Model, build
+from ..model import Model, build, found
 from ..motion import Motion
 from ..recording import Recording
 from ..robot import Robot
@@ -81,16 +81,28 @@ class Look:
     def seen(self) -> Seen | None:
         """The training motion under a low-pass, with the columns of rigid bodies and of what any
         joint has; None where the logs are too short."""
-        found = [log.log for log in self.part("train")]
-        cutoff = widest(found)
-        motion = lowpassed(found, self.robot.joints, cutoff)
+        train = [log.log for log in self.part("train")]
+        cutoff = widest(train)
+        motion = lowpassed(train, self.robot.joints, cutoff)
         if motion is None or motion.samples < FEWEST:
             return None
-        model, stride = (
-            build(self.robot, [EffectSpec(name=n) for n in _HAS]),
-            stride_of(motion, cutoff),
-        )
+        model, stride = self._plain, stride_of(motion, cutoff)
         return Seen(motion, stride, model, stack(model, motion, stride))
+
+    @property
+    def _plain(self) -> Model:
+        """Rigid bodies with what any joint has, and with columns that the experiment says differ
+        between logs."""
+        spec, joints = self.experiment, self.robot.joints
+        args = spec.folder, spec.data.logged
+        effects = [(one, found(one, *args)) for one in spec.model.effects if one.per is not None]
+        differ = [one for one, effect in effects if effect.coefficients() and not effect.shapes()]
+        for name in _HAS:
+            own = [one.joints or joints for one in differ if one.name == name]
+            if left := [joint for joint in joints if not any(joint in them for them in own)]:
+                differ.append(EffectSpec(name=name, joints=left))
+        with pipeline.noticed():
+            return build(self.robot, differ, *args, spec.data.groups)
 
     @cached_property
     def fit(self) -> Fit | None:
@@ -120,12 +132,13 @@ def looked(experiment: Experiment) -> Look:
     args = (
         experiment.data, machine.joints, machine.prismatic, experiment.folder, experiment.actuator,
     )  # fmt: skip
-    out, unused = [], tuple(experiment.data.unused)
+    out, data = [], experiment.data
     for part in ("train", "test"):
         specs = getattr(experiment.data, part)
         told = [logs.measured(spec, *args) for spec in specs]
-        found = pipeline.with_events(machine, [logs.assembled(one, unused) for one in told])
-        for spec, one, log in zip(specs, told, found):
+        whole = [logs.assembled(one, spec, data) for one, spec in zip(told, specs)]
+        whole = pipeline.with_events(machine, whole)
+        for spec, one, log in zip(specs, told, whole):
             out += [_logged(part, spec, one.rows(*rows), log) for rows in one.parts]
     return Look(experiment, machine, tuple(out))
 

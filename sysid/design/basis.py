@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 
@@ -15,9 +17,10 @@ from ..filters import settled
 from ..model import ROBOT, Model
 from ..motion import Motion
 from ..preprocess import prepare
+from ..projection import inverted
 from ..robot import Robot
 from ..specs import Experiment
-from .columns import is_of_the_torque, of_the_instant
+from .columns import instant_of, is_of_the_torque
 from .information import Known, noise_of, own_size, size_of
 
 _WINDOW = 0.1  # s, where none is known
@@ -37,11 +40,15 @@ class Basis:
     rate: float
     window: float
     suspects: list[Candidate]
+    levels: Mapping[str, str]
 
 
-def basis(experiment: Experiment, separate, tell) -> Basis:
-    """What an experiment knows of its robot. Raises SysidError."""
+def basis(
+    experiment: Experiment, separate, tell, levels: Mapping[str, str] = MappingProxyType({})
+) -> Basis:  # fmt: skip
+    """What an experiment knows of its robot at {group: level}. Raises SysidError."""
     machine, structure, prior = pipeline.build(experiment)
+    levels = _levels(structure, levels)
     fit = motion = None
     if _has_logs(experiment):
         read = pipeline.read_all(experiment)
@@ -68,8 +75,21 @@ def basis(experiment: Experiment, separate, tell) -> Basis:
         pose = np.clip(np.zeros(machine.dof), 0.9 * low + 0.1 * high, 0.1 * low + 0.9 * high)
         rate, window = experiment.data.rate or _RATE, _WINDOW
     suspects = _suspects(experiment, structure, separate)
-    known = _known(structure, fit, x, noise, prior, suspects)
-    return Basis(machine, fit, motion, known, pose, rate, window, suspects)
+    known = _known(structure, levels, fit, x, noise, prior, suspects)
+    return Basis(machine, fit, motion, known, pose, rate, window, suspects, levels)
+
+
+def _levels(model: Model, levels: Mapping[str, str]) -> dict[str, str]:
+    """The level of each group that a motion is designed for: as given, else the first, which is
+    told."""
+    first = {group: own[0] for group, own in model.groups.items() if group not in levels}
+    for group, level in first.items():
+        others = ", ".join(model.groups[group][1:])
+        said = f"the motion is designed for {group} {level}; --level {group}=LEVEL ({others})"
+        warnings.warn(SysidWarning(f"{said} designs for another"), stacklevel=2)
+    chosen = {**levels, **first}
+    model.at(chosen, np.zeros(model.size))  # a level that is not there is told before any work
+    return chosen
 
 
 def _has_logs(experiment: Experiment) -> bool:
@@ -104,20 +124,14 @@ def _suspects(experiment: Experiment, model: Model, separate) -> list[Candidate]
     return out
 
 
-def _known(model: Model, fit: Fit | None, x, noise, prior, suspects) -> Known:
+def _known(model: Model, levels, fit: Fit | None, x, noise, prior, suspects) -> Known:
     """What a design asks of: the model's instant, with the suspects that are columns of it."""
-    instant = of_the_instant(model)
-    values = dict(zip(model.names, x))
-    own = np.array([values[name] for name in instant.names])
+    instant, places = instant_of(model, levels)
+    own = np.asarray(x)[places]
     typical = np.maximum(20.0 * noise, 1e-6) if fit is None else size_of(fit)
     before = own_size(instant, prior, own, typical)
     if fit is not None:
-        places = [model.names.index(name) for name in instant.names]
-        for factor in fit.compressed.by_joint:
-            whole = np.zeros((len(factor.triangle), model.size))
-            whole[:, factor.columns] = factor.triangle[:, :-1]
-            rows = whole[:, places] / noise[factor.joint]
-            before = before + rows.T @ rows
+        before = before + _told(fit, levels, places, noise)
     grown = instant
     for suspect in suspects:
         effect = suspect.effect
@@ -130,3 +144,18 @@ def _known(model: Model, fit: Fit | None, x, noise, prior, suspects) -> Known:
         whole[: instant.size, : instant.size] = before
         return Known(grown, x_grown, noise, whole)
     return Known(instant, own, noise, before)
+
+
+def _told(fit: Fit, levels: Mapping[str, str], places, noise) -> np.ndarray:
+    """What the logs tell of parameters, whatever those of other levels are; those of effects that
+    look back in time taken as known."""
+    whole = np.zeros((fit.model.size, fit.model.size))
+    for factor in fit.compressed.by_joint:
+        rows = factor.triangle[:, :-1] / noise[factor.joint]
+        whole[np.ix_(factor.columns, factor.columns)] += rows.T @ rows
+    _, here = fit.model.at(levels, np.arange(fit.model.size))
+    others = np.setdiff1d(np.arange(fit.model.size), here)
+    told, cross = whole[np.ix_(places, places)], whole[np.ix_(places, others)]
+    if not others.size:
+        return told
+    return told - cross @ inverted(whole[np.ix_(others, others)]) @ cross.T

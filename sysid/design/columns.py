@@ -7,7 +7,7 @@ pass over stacked copies of the motion.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,6 +27,14 @@ def of_the_instant(model: Model) -> Model:
             for joint in joints:
                 model = model.without(effect.name, joint)
     return model
+
+
+def instant_of(model: Model, levels: Mapping[str, str]) -> tuple[Model, np.ndarray]:
+    """The model `of_the_instant` of logs at {group: level}, and which parameters of the model its
+    own are (size,). Raises SysidError: as `Model.at`."""
+    here, kept = model.at(levels, np.arange(model.size))
+    instant, place = of_the_instant(here), dict(zip(here.names, kept.tolist()))
+    return instant, np.array([place[name] for name in instant.names], dtype=int)
 
 
 def piece(q, qd, qdd, step: float = 1.0) -> Piece:

@@ -10,7 +10,7 @@ fit + motion -> deviations now and after, and which suspects will be told apart
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -21,7 +21,7 @@ from ..estimate import Fit
 from ..specs import Experiment
 from . import promise
 from .basis import Basis, basis
-from .columns import in_runs, of_the_instant
+from .columns import in_runs, instant_of
 from .fourier import Fourier
 from .information import noise_of
 from .limits import Limits, LimitsSpec, limits
@@ -39,7 +39,7 @@ _FASTEST = 0.25  # of a period of the filter's window: what it still lets throug
 def design(
     experiment: Experiment, *, duration: float = 20.0, separate: Sequence[tuple[str, str]] = (),
     limits_spec: LimitsSpec | None = None, seed: int = 0, processes: int | None = None,
-    progress: Callable[[str, float], None] | None = None,
+    levels: Mapping[str, str] | None = None, progress: Callable[[str, float], None] | None = None,
 ) -> Design:  # fmt: skip
     """The next motion to log.
 
@@ -48,6 +48,8 @@ def design(
         limits_spec: limits beside the URDF's. seed: of the starts.
         processes: that share the starts, as many as there are cores where it is None; the motion is
             the same whatever their number.
+        levels: {group: level} of logs that the motion is for, where effects are per group; the
+            first by default.
 
     Raises:
         SysidError: bad input, or no motion keeps to the limits.
@@ -56,7 +58,7 @@ def design(
     if not 2.0 <= duration <= 600.0:
         raise ConfigError(f"--duration {duration:g}", allowed="2 to 600 s")
     with pipeline.noticed() as notices:
-        base = basis(experiment, separate, tell)
+        base = basis(experiment, separate, tell, levels or {})
         seen = None if base.fit is None else _greatest(base.fit)
         fastest = None if base.motion is None else _fastest(base.motion)
         bounds = limits(base.robot, limits_spec, seen, fastest)
@@ -114,9 +116,9 @@ def _told(
     needed = torque(problem, q, qd, qdd)
     spread, pairs = {}, []
     if base.fit is not None:
-        spread = promise.deviations(base.fit, _more(base.fit, q, qd, qdd))
+        spread = promise.deviations(base.fit, _more(base.fit, base.levels, q, qd, qdd))
         if len(base.suspects) > 1:
-            new = played(q, qd, qdd, 1.0 / base.rate, base.motion)
+            new = played(q, qd, qdd, 1.0 / base.rate, base.motion, base.levels)
             pairs = promise.pairs(base.fit, base.suspects, base.motion, new, len(t))
     return Design(
         joints=base.robot.joints, family=family, coefficients=family.coefficients(found.z),
@@ -126,11 +128,10 @@ def _told(
     )  # fmt: skip
 
 
-def _more(fit: Fit, q, qd, qdd) -> np.ndarray:
+def _more(fit: Fit, levels: Mapping[str, str], q, qd, qdd) -> np.ndarray:
     """C'C (dof, size, size) of a motion's rows in the fit's parameters; zero for effects that look
     back in time."""
-    instant = of_the_instant(fit.model)
-    places = [fit.model.names.index(name) for name in instant.names]
+    instant, places = instant_of(fit.model, levels)
     out = np.zeros((len(fit.joints), fit.model.size, fit.model.size))
     for _, found in in_runs(instant, q, qd, qdd):
         for j, own in enumerate(found):

@@ -14,7 +14,8 @@ Source: Atkinson & Fedorov 1975 (T-optimality); Wald 1943.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import ndtr
@@ -48,9 +49,9 @@ def spelled(candidate: Candidate, joints) -> str:
     return f"{candidate.name}:{'*' if candidate.joint == ROBOT else joints[candidate.joint]}"
 
 
-def played(q, qd, qdd, step: float, template: Motion) -> Motion:
-    """A designed motion (n, dof) as the motion of a log."""
-    own = piece(q, qd, qdd, step)
+def played(q, qd, qdd, step: float, template: Motion, levels: Mapping[str, str]) -> Motion:
+    """A designed motion (n, dof) as the motion of a log at {group: level}."""
+    own = replace(piece(q, qd, qdd, step), levels=levels)
     rest = np.zeros(q.shape[1])
     return Motion(template.joints, (own,), (), rest, rest.astype(int))
 

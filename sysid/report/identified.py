@@ -17,7 +17,8 @@ from .words import SPACE, breaking, drawing, empty, number, plus_minus, table, t
 
 def parameters(fit: Fit) -> tuple[str, str, list]:
     """Parameters with uncertainty, the prior, and how much the data say."""
-    known = results.document(fit)["parameters"]
+    document = results.document(fit)
+    known = document["parameters"]
     count, robot = 10 * fit.model.bodies, fit.model.robot
     drawn, parts = [], []
     spans = (("mass", 0, 1), ("first moment", 1, 4), ("second moment", 4, 10))
@@ -41,10 +42,12 @@ def parameters(fit: Fit) -> tuple[str, str, list]:
     others = known[count:]
     if others:
         by_effect: dict[tuple[str, str], list[tuple[str, dict]]] = {}
-        places = [c.joint for c in fit.model.coefficients] + [v.joint for v in fit.model.shape_values]
-        for entry, place in zip(others, places):
-            what = f"{entry['name'].partition('.')[0]}: {entry['name'].rpartition('.')[2]}"
-            by_effect.setdefault((what, entry["unit"]), []).append(("whole robot" if place == ROBOT else fit.joints[place], entry))
+        places = [(v.joint, fit.model.terms[v.term][0].level) for v in (*fit.model.coefficients, *fit.model.shape_values)]
+        for entry, (joint, level) in zip(others, places):
+            own = "" if level is None else f"[{level}]"
+            what = f"{entry['name'].partition('.')[0]}: {entry['name'].rpartition('.')[2].removesuffix(own)}"
+            place = "whole robot" if joint == ROBOT else fit.joints[joint]
+            by_effect.setdefault((what, entry["unit"]), []).append((f"{place} {own}".strip(), entry))
         groups = []
         for (what, unit), own in by_effect.items():
             names = [joint for joint, _ in own]
@@ -64,7 +67,24 @@ def parameters(fit: Fit) -> tuple[str, str, list]:
         "pale dots are said by the prior. Most single inertial parameters of a robot cannot be seen in any log, only combinations of them: a low number there is no fault of the log. Moments are about the joint’s frame. "
         f"{text(fit.strength.says[0].upper() + fit.strength.says[1:])}.</p>"
     )
-    return "Parameters", about + "".join(parts), drawn
+    return "Parameters", about + _per_group(document.get("groups", {})) + "".join(parts), drawn
+
+
+def _per_group(groups: dict) -> str:
+    """What differs from level to level of groups of logs."""
+    out = []
+    for group, found in groups.items():
+        rows = []
+        for p in found["parameters"]:
+            apart, first = {d["to"]: d for d in p["differences"]}, next(iter(p["levels"]))
+            for level, at in p["levels"].items():
+                other = apart.get(level)
+                far = f"{plus_minus(other['value'], other['std'])} from {text(first)}" if other else "–"
+                times = number(abs(other["value"]) / other["std"], 2) if other and other["std"] else "–"
+                rows.append([breaking(p["parameter"]), text(level), plus_minus(at["value"], at["std"]), unit_of(p["unit"]) or "–", far, times])
+        heads = ["parameter", text(group), "value", "unit", "difference", "in deviations"]
+        out.append(f"<details open><summary>per {text(group)}</summary>{table(heads, rows, 'parameters', f'per {group}')}</details>")
+    return "".join(out)
 
 
 def _parameter_table(rows: list[list[str]], label: str) -> str:
