@@ -106,6 +106,24 @@ def test_page_needs_nothing_else(text):
     assert len(text.encode()) < 8e6
 
 
+def parse_errors(source: str) -> list:
+    """What the standard's parser finds wrong in a page, scripts' texts left out."""
+    import tinyhtml5.parser
+
+    parser = tinyhtml5.parser.HTMLParser()
+    parser.parse(re.sub(r"(<script[^>]*>).*?(?=</script>)", r"\1", source, flags=re.S))
+    return parser.errors
+
+
+def test_page_parses_without_error(text, missing, clean):
+    assert not parse_errors(text) and parse_errors(text.replace("</table>", "</p>", 1))
+    for found, said in (missing, clean, tied(missing)):
+        made = sections(found.fit, found, said, [])
+        assert not parse_errors(page.page("x", made))
+        names = [a["id"] for _, a in Elements(page.page("x", made)).found if "id" in a]
+        assert len(names) == len(set(names))
+
+
 def test_policy_allows_the_two_scripts_as_they_stand(text):
     policy = re.search(r'Content-Security-Policy" content="([^"]*)"', text)[1]
     engine = re.search(r'<script type="text/plain" id="plotly">(.*?)</script>', text, re.S)[1]
@@ -198,7 +216,7 @@ def tied(missing):
 def test_ties_stand_in_one_bracket(missing):
     twice, told = tied(missing)
     made = sections(twice.fit, twice, told, [])
-    (bracket,) = re.findall(r'<tbody class="tied">(.*?)</tbody>', made["suspects"]["html"])
+    (bracket,) = re.findall(r'<tbody class="tied">(.*?)</tbody>', made["suspects"]["html"], re.S)
     assert "cannot tell them apart" in bracket and "backlash" in bracket and bracket.count("<svg") == 2
     assert "Not fitted here: gravity_tilt of the whole robot" in bracket
     card = "".join(Elements(made["verdict"]["html"]).texts)
@@ -223,7 +241,7 @@ LEFT = {"depends_on": [{"variable": f"qd_{EVIL}", "share": 0.3}, {"variable": "t
 def test_every_status_has_its_card(clean, more, words):
     found, said = clean
     made = sections(found.fit, found, judged(said, **more), [])
-    cards = re.findall(r'<article class="card (\w+)">(.*?)</article>', made["verdict"]["html"])
+    cards = re.findall(r'<article class="card (\w+)">(.*?)</article>', made["verdict"]["html"], re.S)
     assert cards[0][0] == more["status"] and words in "".join(Elements(cards[0][1]).texts)
     assert ("What the residual of" in made["detectable"]["html"]) == ("depends_on" in more)
 

@@ -87,7 +87,7 @@ def torque(name: str, joint: str, unit: str, line: dict, series: dict, joints: i
             data.append({
                 "type": "scatter", "mode": "lines", "x": rounded(t, 6), "y": rounded(y, 4), "name": what, "legendgroup": what, "showlegend": number == 0,
                 "line": {"color": colour, "width": width}, "yaxis": place, "xaxis": "x", "connectgaps": False,
-                "hovertemplate": f"{part}, {what}: %{{y:.4g}} {unit}<extra></extra>",
+                "hovertemplate": f"{part}, {what}: %{{y:.4g}} {unit}",
             })  # fmt: skip
     shapes, notes = [], []
     for part, own in line.items():
@@ -96,7 +96,7 @@ def torque(name: str, joint: str, unit: str, line: dict, series: dict, joints: i
                 shapes.append({"type": "rect", "xref": "x", "yref": "paper", "x0": begin, "x1": end, "y0": 0, "y1": 1, "fillcolor": SKY, "opacity": 0.13, "line": {"width": 0}, "layer": "below"})
         if own["spans"]:
             word = "train" if part == "train" else "test (held out)"
-            notes.append({"text": f"<b>{word}</b>", "xref": "x", "yref": "paper", "x": own["spans"][0][0], "y": 0.995, "xanchor": "left", "yanchor": "top", "showarrow": False, "font": {"size": 11}})
+            notes.append({"text": word, "xref": "x", "yref": "paper", "x": own["spans"][0][0], "y": 0.995, "xanchor": "left", "yanchor": "top", "showarrow": False, "font": {"size": 11, "weight": "bold"}})
     end = max((span[1] for own in line.values() for span in own["spans"]), default=1.0)
     shapes += [
         {
@@ -141,13 +141,13 @@ def staircase(name: str, joint: str, unit: str, names: list[str], made: list, ex
         ends = [-0.5, len(names) - 0.5]
         if doubt:
             data.append({"type": "scatter", "mode": "lines", "x": ends + ends[::-1], "y": rounded([level + 2 * doubt] * 2 + [max(level - 2 * doubt, 0.0)] * 2), "fill": "toself", "fillcolor": GREEN, "opacity": 0.2, "line": {"width": 0, "color": GREEN}, "hoverinfo": "skip", "showlegend": False})
-        data.append({"type": "scatter", "mode": "lines", "x": ends, "y": rounded([level] * 2), "name": "noise floor", "line": {"color": GREEN, "width": 2, "dash": "dot"}, "hovertemplate": f"noise floor %{{y:.4g}} {unit}<extra></extra>"})
+        data.append({"type": "scatter", "mode": "lines", "x": ends, "y": rounded([level] * 2), "name": "noise floor", "line": {"color": GREEN, "width": 2, "dash": "dot"}, "hovertemplate": f"noise floor %{{y:.4g}} {unit}"})
     for values, word, dash, symbol in ((made, "held-out error", "solid", "circle"), (expected, "expected by the diagnosis", "dash", "circle-open")):
         if any(v is not None for v in values):
             shown = [v if v is not None and math.isfinite(v) else None for v in values]
             data.append({
                 "type": "scatter", "mode": "lines+markers", "x": at, "y": shown, "name": word, "line": {"color": BLUE, "width": 2, "shape": "hvh", "dash": dash},
-                "marker": {"size": 8, "symbol": symbol}, "text": [plain(n) for n in names], "hovertemplate": f"%{{text}}, {word}: %{{y:.4g}} {unit}<extra></extra>",
+                "marker": {"size": 8, "symbol": symbol}, "text": [plain(n) for n in names], "hovertemplate": f"%{{text}}, {word}: %{{y:.4g}} {unit}",
             })  # fmt: skip
     layout = {
         "title": {"text": plain(joint), "x": 0.01, "y": 0.99, "yanchor": "top", "font": {"size": 14}},
@@ -172,7 +172,7 @@ def residual_map(name: str, joint: str, unit: str, base: str, found: dict) -> di
         "type": "heatmap", "x": middle(found["q"]), "y": middle(found["qd"]), "z": [rounded(row, 3) for row in mean.T], "zmin": -most or -1.0, "zmax": most or 1.0,
         "customdata": [[int(v) for v in row] for row in rows.T.tolist()], "colorscale": [[0, BLUE], [0.5, MIDDLE], [1, VERMILLION]], "hoverongaps": False, "xgap": 1, "ygap": 1,
         "colorbar": {"title": {"text": f"mean residual [{unit}]", "side": "right", "font": {"size": 12}}, "thickness": 10, "len": 1.0, "outlinewidth": 0},
-        "hovertemplate": f"{quantity} %{{x:.3g}} {base}<br>speed %{{y:.3g}} {base}/s<br>mean residual %{{z:.3g}} {unit}<br>%{{customdata}} rows<extra></extra>",
+        "hovertemplate": f"{quantity} %{{x:.3g}} {base}\nspeed %{{y:.3g}} {base}/s\nmean residual %{{z:.3g}} {unit}\n%{{customdata}} rows",
     }]  # fmt: skip
     layout = {
         "xaxis": axis(f"{quantity} q [{base}]", showgrid=False), "yaxis": axis(f"speed qd [{base}/s]", showgrid=False), "plot_bgcolor": EMPTY,
@@ -192,7 +192,7 @@ def residual_time(name: str, joint: str, unit: str, found: dict) -> dict:
             own.append((own[-1][0] + float(np.median(np.diff([t for t, _ in own]))), own[-1][1]))
         data.append({
             "type": "scatter", "mode": "lines", "x": rounded([t for t, _ in own]), "y": rounded([np.nan if v is None else v for _, v in own], 4), "name": f"test log {int(number) + 1}",
-            "line": {"shape": "hv", "width": 1.6, "color": (VERMILLION, BLUE, GREEN, ORANGE, PURPLE)[k % 5]}, "hovertemplate": f"%{{x:.3g}} s: %{{y:.3g}} {unit}<extra></extra>",
+            "line": {"shape": "hv", "width": 1.6, "color": (VERMILLION, BLUE, GREEN, ORANGE, PURPLE)[k % 5]}, "hovertemplate": f"%{{x:.3g}} s: %{{y:.3g}} {unit}",
         })  # fmt: skip
     layout = {
         "xaxis": axis("time in the test log [s]"), "yaxis": axis(f"residual RMS [{unit}]", rangemode="tozero"), "showlegend": len(numbers) > 1, "legend": LEGEND,
@@ -205,7 +205,7 @@ def residual_bands(name: str, joint: str, found: dict) -> dict:
     """The share of the squared residual in each band of frequency."""
     edges = found["edges"]
     names = [f"{a:g}–{b:g}" for a, b in zip(edges, edges[1:])]
-    data = [{"type": "bar", "x": names, "y": rounded([100.0 * (v or 0.0) for v in found["share"]], 4), "marker": {"color": VERMILLION}, "hovertemplate": "%{x} Hz: %{y:.3g} %<extra></extra>"}]
+    data = [{"type": "bar", "x": names, "y": rounded([100.0 * (v or 0.0) for v in found["share"]], 4), "marker": {"color": VERMILLION}, "hovertemplate": "%{x} Hz: %{y:.3g} %"}]
     layout = {
         "xaxis": axis("frequency [Hz]", type="category", tickangle=-45, showgrid=False), "yaxis": axis("squared residual [%]", rangemode="tozero"),
         "title": {"text": "over frequency", "x": 0.01, "y": 0.99, "yanchor": "top", "font": {"size": 13}}, "margin": {"l": 60, "r": 10, "t": 34, "b": 46},
@@ -235,12 +235,12 @@ def whiskers(name: str, label: str, groups: list[dict]) -> dict:
             "type": "scatter", "mode": "markers", "x": rounded(group["values"]), "y": names, "name": "identified, ± 2 std", "showlegend": False,
             "error_x": {"type": "data", "array": rounded(stds), "thickness": 1.4, "width": 3, "color": BLUE},
             "marker": {"color": BLUE, "size": 8, "opacity": [round(0.25 + 0.75 * float(s or 0.0), 2) for s in group["shares"]]}, "xaxis": f"x{number}", "yaxis": f"y{number}",
-            "customdata": rounded([100 * (s or 0.0) for s in group["shares"]], 3), "hovertemplate": f"%{{x:.4g}} {group['unit']}, %{{customdata:.0f}} % from data<extra></extra>",
+            "customdata": rounded([100 * (s or 0.0) for s in group["shares"]], 3), "hovertemplate": f"%{{x:.4g}} {group['unit']}, %{{customdata:.0f}} % from data",
         })  # fmt: skip
         if any(p is not None for p in group["priors"]):
             data.append({
                 "type": "scatter", "mode": "markers", "x": rounded([np.nan if p is None else p for p in group["priors"]]), "y": names, "name": "prior", "legendgroup": "prior", "showlegend": k == 0,
-                "marker": {"color": ORANGE, "size": 9, "symbol": "diamond-open", "line": {"width": 1.6}}, "xaxis": f"x{number}", "yaxis": f"y{number}", "hovertemplate": f"prior %{{x:.4g}} {group['unit']}<extra></extra>",
+                "marker": {"color": ORANGE, "size": 9, "symbol": "diamond-open", "line": {"width": 1.6}}, "xaxis": f"x{number}", "yaxis": f"y{number}", "hovertemplate": f"prior %{{x:.4g}} {group['unit']}",
             })  # fmt: skip
         unit = "" if group["unit"] in ("", "1") else f" [{group['unit']}]"
         layout[f"xaxis{number}"] = axis(f"{group.get('quantity', 'value')}{unit}", anchor=f"y{number}", zeroline=True, nticks=6)
@@ -271,13 +271,13 @@ def bodies(name: str, found: list[dict], lines: list) -> dict:
             data.append({
                 "type": "mesh3d", **{key: rounded(points[:, k], 4) for k, key in enumerate("xyz")}, **{key: faces[:, k].tolist() for k, key in enumerate("ijk")},
                 "color": colour, "opacity": 0.55, "flatshading": False, "name": f"{entry['kind']}, identified", "legendgroup": entry["kind"], "showlegend": first,
-                "hovertemplate": f"{plain(entry['name'])}: {plain(entry['words'])}<extra></extra>",
+                "hovertemplate": f"{plain(entry['name'])}: {plain(entry['words'])}",
             })  # fmt: skip
         if entry["prior"] is not None:
             ring = entry["prior"].rings()
             data.append({
                 "type": "scatter3d", "mode": "lines", **{key: rounded(ring[:, k], 4) for k, key in enumerate("xyz")}, "line": {"color": ORANGE, "width": 3}, "name": "prior", "legendgroup": "prior",
-                "showlegend": "prior" not in shown, "hovertemplate": f"{plain(entry['name'])}: prior<extra></extra>",
+                "showlegend": "prior" not in shown, "hovertemplate": f"{plain(entry['name'])}: prior",
             })  # fmt: skip
             shown.add("prior")
     skeleton = np.concatenate([np.array([a, b, [np.nan] * 3], dtype=float) for a, b in lines]) if lines else np.zeros((0, 3))

@@ -12,6 +12,8 @@ from importlib import resources
 from jinja2 import Environment, PackageLoader, PrefixLoader, StrictUndefined
 from markupsafe import Markup
 
+from .words import pieces
+
 _SCRIPTS = ("report.js",)
 _STYLES = ("report.css",)
 
@@ -20,14 +22,15 @@ _STYLES = ("report.css",)
 def environment(*packages: str) -> Environment:
     """The templates of packages of the project, each under its name: `report/page.html`."""
     places = {name: PackageLoader(f"sysid.{name}") for name in packages}
-    return Environment(
+    made = Environment(
         loader=PrefixLoader(places),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
-        keep_trailing_newline=True,
     )
+    made.filters["pieces"] = pieces
+    return made
 
 
 def static(package: str, names: tuple[str, ...]) -> Markup:

@@ -1,8 +1,7 @@
-"""Numbers as words, and the few elements that every section of a page is made of. Whatever is no number is escaped."""
+"""Numbers, units and names as the words of a page. All are plain texts: the templates escape them."""
 
 from __future__ import annotations
 
-import html
 import math
 import re
 
@@ -11,14 +10,15 @@ from ..estimate import Fit
 SPACE = "\u00a0"  # between a number and what belongs to it: no line ends there
 
 
-def text(value) -> str:
-    """Any value as text of a page."""
-    return html.escape(str(value), quote=True)
+def pieces(name) -> list[str]:
+    """A name in pieces that may stand on lines of their own, after an underscore, a dot or a slash."""
+    return re.split(r"(?<=\w[._/])", str(name))
 
 
-def breaking(name) -> str:
-    """A name as text that may go on in the next line after an underscore, a dot or a slash."""
-    return re.sub(r"(?<=\w)([_./])", r"\1<wbr>", text(name))
+def placed(effect: str, joint: str, here: str = "") -> str:
+    """An effect with its joint, where that is not `here`."""
+    where = "" if joint == here else " of the whole robot" if joint == "*" else f" on {joint}"
+    return effect + where
 
 
 def number(value, digits: int = 4) -> str:
@@ -49,8 +49,13 @@ def plus_minus(value, std, digits: int = 4) -> str:
 
 
 def unit_of(word: str) -> str:
-    """A unit as text behind a number, escaped; nothing where there is none."""
-    return "" if word in ("", "1") else SPACE + text(raised(word))
+    """A unit as text behind a number; nothing where there is none."""
+    return "" if word in ("", "1") else SPACE + raised(word)
+
+
+def known(name: str, value, std, unit: str) -> str:
+    """A parameter of an effect with its value, its standard deviation and its unit."""
+    return f"{name.split('.')[-1]}{SPACE}={SPACE}{plus_minus(value, std)}{unit_of(unit)}"
 
 
 def raised(unit: str) -> str:
@@ -73,28 +78,6 @@ def units(fit: Fit) -> dict[str, tuple[str, str]]:
     return {joint: ("N", "m") if slides else ("N m", "rad") for joint, slides in zip(fit.joints, fit.model.robot.prismatic)}
 
 
-def drawing(chart: dict, caption: str = "", kind: str = "") -> str:
-    """The place of a chart, with what a screen reader says of it."""
-    below = f"<figcaption>{caption}</figcaption>" if caption else ""
-    keys = ' tabindex="0" aria-keyshortcuts="ArrowLeft ArrowRight + - 0"' if chart["link"] else ""
-    return (
-        f'<figure class="chart {kind}" data-chart="{chart["id"]}" aria-label="{text(chart["label"])}"{keys} style="--height:{chart["height"]}px">'
-        f'<div class="plot"><p class="waiting">drawing…</p></div>{below}</figure>'
-    )
-
-
-def table(heads: list[str], rows: list[list[str]], kind: str = "", label: str = "") -> str:
-    """A table that scrolls inside its box; heads and cells are HTML already."""
-    head = "".join(f'<th scope="col">{h}</th>' for h in heads)
-    body = "".join("<tr>" + "".join(f'<th scope="row">{c}</th>' if k == 0 else f"<td>{c}</td>" for k, c in enumerate(row)) + "</tr>" for row in rows)
-    return f'<div class="scroll" tabindex="0" role="region" aria-label="{text(label)}"><table class="{kind}"><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>'
-
-
-def empty(words: str) -> str:
-    """What stands where there is nothing to show."""
-    return f'<p class="empty">{words}</p>'
-
-
 def percentage(share, se=None) -> str:
     """A share, with its standard error, in per cent."""
     if share is None or not math.isfinite(share):
@@ -106,4 +89,4 @@ def percentage(share, se=None) -> str:
 
 def chance(probability: float) -> str:
     """A probability, in per cent: as many draws tell it, it is never nothing."""
-    return f"&lt;{SPACE}1{SPACE}%" if probability < 0.005 else f"{round(100 * probability)}{SPACE}%"
+    return f"<{SPACE}1{SPACE}%" if probability < 0.005 else f"{round(100 * probability)}{SPACE}%"

@@ -24,6 +24,8 @@ function dressed(chart) {
   layout.font = {...layout.font, color: ink, family: css.fontFamily || "sans-serif"};
   layout.hoverlabel = {bgcolor: printing ? "#ffffff" : get("--raised"), bordercolor: line, font: {color: ink}};
   layout.modebar = {bgcolor: "rgba(0,0,0,0)", color: get("--quiet"), activecolor: get("--accent")};
+  // lines of a hover text; nothing stands in a second box beside it
+  for (const trace of figure.data) if (trace.hovertemplate) trace.hovertemplate = trace.hovertemplate.replaceAll("\n", "<br>") + "<extra></extra>";
   const axes = Object.keys(layout).filter(k => /^[xy]axis\d*$/.test(k)).map(k => layout[k]);
   for (const axis of axes) Object.assign(axis, {gridcolor: grid, linecolor: line, zerolinecolor: line, color: ink});
   if (layout.scene) for (const k of ["xaxis", "yaxis", "zaxis"]) Object.assign(layout.scene[k], {gridcolor: line, zerolinecolor: line, color: ink, showbackground: false});
