@@ -67,7 +67,7 @@ def test_the_diagnosis_can_be_read():
     assert not long and not wide and total < 1500, (long, wide, total)
 
 
-BESIDE = ["blocks", "changes", "check", "failures", "flexible", "init", "lowpass", "noise", "statement"]
+BESIDE = ["blocks", "changes", "check", "failures", "flexible", "init", "lowpass", "noise", "report", "statement"]
 
 
 @pytest.mark.parametrize("room", BESIDE)
@@ -75,6 +75,14 @@ def test_what_stands_beside_the_diagnosis_can_be_read(room):
     """No module of it over 200 lines or 100 columns."""
     texts = {p.name: p.read_text().splitlines() for p in (ROOT / "sysid" / room).glob("*.py")}
     wide = {name for name, lines in texts.items() if max(map(len, lines), default=0) > 100}
+    assert texts and not wide and max(map(len, texts.values())) <= 200
+
+
+@pytest.mark.parametrize("folder", ["report/static", "report/templates", "studio/templates"])
+def test_pages_files_can_be_read(folder):
+    """No template, style or script over 200 lines or 100 columns."""
+    texts = {path.name: path.read_text().splitlines() for path in (ROOT / "sysid" / folder).iterdir()}
+    wide = {name for name, lines in texts.items() if max(map(len, lines)) > 100}
     assert texts and not wide and max(map(len, texts.values())) <= 200
 
 

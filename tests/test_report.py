@@ -18,7 +18,7 @@ from hypothesis.extra.numpy import arrays
 
 from sysid import pipeline, regressor, robot, specs
 from sysid.diagnose.diagnosis import diagnose
-from sysid.report import charts, page, solids
+from sysid.report import charts, page, residual_charts, solids, torque_chart
 from sysid.report.decimate import broken, kept
 from sysid.report.failures import failures
 from sysid.report.sections import sections
@@ -375,7 +375,7 @@ def test_forty_joints_still_fit():
     t = np.arange(100_000) / 1000.0
     line = charts.timeline({"train": (np.zeros(len(t)), t, ["a"]), "test": (np.zeros(len(t)), t, ["b"])})
     noise = rng.normal(size=len(t))
-    one = charts.torque("torque0", "x", "N m", line, {"train": (noise,) * 3, "test": (noise,) * 3}, 40)
+    one = torque_chart.torque("torque0", "x", "N m", line, {"train": (noise,) * 3, "test": (noise,) * 3}, 40)
     assert 40 * len(page.embedded(one["figure"])) < 2.6e6
 
 
@@ -400,9 +400,9 @@ def test_ellipsoid_has_the_body_s_inertia(missing):
 
 def test_sliding_joints_have_newtons_and_metres(missing):
     found, said = missing
-    slides = charts.residual_map("m", "x", "N", "m", said["fails_where"][0]["map"])["figure"]["layout"]
+    slides = residual_charts.residual_map("m", "x", "N", "m", said["fails_where"][0]["map"])["figure"]["layout"]
     assert slides["xaxis"]["title"]["text"] == "position q [m]" and slides["yaxis"]["title"]["text"] == "speed qd [m/s]"
-    assert charts.torque("t", "x", "N", {}, {}, 1)["figure"]["layout"]["yaxis"]["title"]["text"] == "force [N]"
+    assert torque_chart.torque("t", "x", "N", {}, {}, 1)["figure"]["layout"]["yaxis"]["title"]["text"] == "force [N]"
 
 
 def test_figures_on_paper(missing, tmp_path):

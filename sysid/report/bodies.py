@@ -6,7 +6,7 @@ import numpy as np
 
 from ..diagnose.diagnosis import Diagnosis
 from ..estimate import Fit
-from . import charts, solids
+from . import ellipsoids, solids
 from .section import Section
 from .words import number
 
@@ -33,7 +33,7 @@ def bodies(fit: Fit, diagnosis: Diagnosis) -> Section:
         rows.append(
             [body.name, body.kind, mass, prior, centre, semi, _axes(other) if other else "–"]
         )
-    chart = charts.bodies("solids", found, solids.skeleton(robot, placed))
+    chart = ellipsoids.bodies("solids", found, solids.skeleton(robot, placed))
     angles = [
         f"{joint} {number(value, 3)} {'m' if slides else 'rad'}"
         for joint, value, slides in zip(fit.joints, middle, robot.prismatic)

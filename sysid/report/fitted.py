@@ -8,7 +8,7 @@ import numpy as np
 
 from ..estimate import Fit
 from ..events import WORDS
-from . import charts
+from . import charts, residual_charts, torque_chart
 from .section import Section
 from .words import SPACE, level, number, percentage, raised, units
 
@@ -35,7 +35,9 @@ def torque(fit: Fit, document: dict) -> Section:
             series[part] = (measured, predicted, residual)
         own = [span for e in events if joint in e["joints"] for span in _placed(e, line)]
         force = unit[joint][0]
-        drawn.append(charts.torque(f"torque{j}", joint, force, line, series, len(fit.joints), own))
+        drawn.append(
+            torque_chart.torque(f"torque{j}", joint, force, line, series, len(fit.joints), own)
+        )
     errors = {part: p.errors() for part, p in parts.items()}
     rows = [
         [
@@ -107,15 +109,15 @@ def _counted(found: list[dict]) -> str:
 
 
 def failures(fit: Fit, document: dict) -> Section:
-    """The residual of each joint over angle and speed, over time, over frequency, with the words."""
+    """Each joint's residual over angle and speed, over time, over frequency, with the words."""
     drawn, joints, unit = [], [], units(fit)
     for j, entry in enumerate(document["fails_where"]):
         joint = entry["joint"]
         force, base = unit[joint]
         own = [
-            charts.residual_map(f"map{j}", joint, force, base, entry["map"]),
-            charts.residual_time(f"time{j}", joint, force, entry["time"]),
-            charts.residual_bands(f"bands{j}", joint, entry["frequency"]),
+            residual_charts.residual_map(f"map{j}", joint, force, base, entry["map"]),
+            residual_charts.residual_time(f"time{j}", joint, force, entry["time"]),
+            residual_charts.residual_bands(f"bands{j}", joint, entry["frequency"]),
         ]
         drawn += own
         where = "angle" if base == "rad" else "position"

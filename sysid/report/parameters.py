@@ -8,6 +8,7 @@ from ..inertia import PARAMETERS, UNITS
 from ..model import ROBOT
 from . import charts
 from .section import Section
+from .whiskers import whiskers
 from .words import number, plus_minus, unit_of
 
 _SPANS = (("mass", 0, 1), ("first moment", 1, 4), ("second moment", 4, 10))
@@ -42,7 +43,7 @@ def _body(b: int, body, own: list[dict], prior: list[float]) -> dict:
         "label": f"parameters of {body.name}",
         "open": b == 0,
         "rows": [_row(PARAMETERS[k], entry, prior[k]) for k, entry in enumerate(own)],
-        "chart": charts.whiskers(f"body{b}", label, panels),
+        "chart": whiskers(f"body{b}", label, panels),
     }
 
 
@@ -68,7 +69,7 @@ def _others(fit: Fit, others: list[dict]) -> dict:
         "label": "friction and other effects",
         "open": True,
         "rows": [_row(entry["name"], entry, None, entry["name"] in zero) for entry in others],
-        "chart": charts.whiskers("effects", "Coefficients of friction and other effects", panels),
+        "chart": whiskers("effects", "Coefficients of friction and other effects", panels),
     }
 
 

@@ -1,7 +1,8 @@
 """Templates, styles and scripts of the pages: files beside the modules, put together here.
 
-Templates are Jinja2's with autoescape: whatever a page shows is escaped unless a template made it. A variable that is not
-there is an error. Static files are joined in the order given; nothing is built beforehand.
+Templates are Jinja2's with autoescape: whatever a page shows is escaped unless a template made it.
+A variable that is not there is an error. Static files are joined in the order given; nothing is
+built beforehand.
 """
 
 from __future__ import annotations
@@ -14,8 +15,8 @@ from markupsafe import Markup
 
 from .words import pieces
 
-_SCRIPTS = ("report.js",)
-_STYLES = ("report.css",)
+_SCRIPTS = ("theme.js", "time.js", "charts.js", "paper.js")
+_STYLES = ("theme.css", "page.css", "sections.css", "narrow.css", "paper.css")
 
 
 @cache

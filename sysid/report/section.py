@@ -15,7 +15,8 @@ class Section:
 
     Attributes:
         title: its heading. template: name of its file in `templates/`, without the ending.
-        values: of the template's variables. charts: as `charts.chart` makes them, in the order of their places.
+        values: of the template's variables.
+        charts: as `charts.chart` makes them, in the order of their places.
     """
 
     title: str

@@ -1,7 +1,8 @@
-"""The sections of a page on one experiment, each its words and tables as HTML and its charts as Plotly figures.
+"""The sections of a page on one experiment: words and tables as HTML, charts as Plotly figures.
 
-`sysid report` puts them into one file. Words come first, charts after; the place of a chart says its name
-(`data-chart`). Every text that comes from a file or an experiment is escaped, by the templates.
+`sysid report` puts them into one file. Words come first, charts after; the place of a chart says
+its name (`data-chart`). Every text that comes from a file or an experiment is escaped, by the
+templates.
 """
 
 from __future__ import annotations

@@ -6,8 +6,8 @@ import math
 
 from ..diagnose.diagnosis import Diagnosis
 from ..estimate import Fit
-from . import charts
 from .section import Section
+from .staircase import staircase
 from .words import level, plus_minus, raised, units
 
 
@@ -30,7 +30,7 @@ def steps(fit: Fit, diagnosis: Diagnosis, document: dict, history: list[dict]) -
         )
         floor = document["joints"][joint]
         drawn.append(
-            charts.staircase(
+            staircase(
                 f"steps{j}",
                 joint,
                 unit[joint][0],
@@ -48,7 +48,7 @@ def steps(fit: Fit, diagnosis: Diagnosis, document: dict, history: list[dict]) -
     ]
     rows.append(["noise floor", *(_floor(document["joints"][j]) for j in fit.joints)])
     values = {
-        # none: no step yet; changed: the experiment is not the last step's; begun: it is the first's
+        # changed: the experiment is not the last step's; begun: it is the first one's
         "state": "changed" if not same else "none" if len(done) == 1 else "made",
         "begun": begun,
         "ahead": bool(ahead),
@@ -90,5 +90,8 @@ def _expected(diagnosis: Diagnosis) -> list[tuple[str, dict[str, float]]]:
     Returns:
         [(what is added, {joint: held-out RMS})].
     """
-    where = lambda head: head.effect + ("" if head.joint == "*" else f" on {head.joint}")  # noqa: E731
-    return [(where(claim.head), claim.after.rms("test")) for claim in diagnosis.claims]
+    out = []
+    for claim in diagnosis.claims:
+        where = "" if claim.head.joint == "*" else f" on {claim.head.joint}"
+        out.append((claim.head.effect + where, claim.after.rms("test")))
+    return out

@@ -1,4 +1,4 @@
-"""Numbers, units and names as the words of a page. All are plain texts: the templates escape them."""
+"""Numbers, units and names as the words of a page, all plain texts: the templates escape them."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ SPACE = "\u00a0"  # between a number and what belongs to it: no line ends there
 
 
 def pieces(name) -> list[str]:
-    """A name in pieces that may stand on lines of their own, after an underscore, a dot or a slash."""
+    """A name in pieces that may stand on lines of their own, cut after `_`, `.` and `/`."""
     return re.split(r"(?<=\w[._/])", str(name))
 
 
@@ -44,7 +44,9 @@ def plus_minus(value, std, digits: int = 4) -> str:
     places = 1 - int(math.floor(math.log10(std)))
     if -2 <= places <= 6 and abs(value) < 1e6:
         places = max(places, 0)
-        return f"{round(value, places) + 0.0:.{places}f}{SPACE}±{SPACE}{std:.{places}f}".replace("-", "−")  # + 0.0: no minus before a zero
+        return f"{round(value, places) + 0.0:.{places}f}{SPACE}±{SPACE}{std:.{places}f}".replace(
+            "-", "−"
+        )  # + 0.0: no minus before a zero
     return f"{number(value, digits)}{SPACE}±{SPACE}{number(std, 2)}"
 
 
@@ -66,7 +68,12 @@ def raised(unit: str) -> str:
 def quantity(variable: str, fit: Fit) -> str:
     """A variable of the diagnosis (`qd_hip`) in words; itself where it is none of the motion's."""
     for joint, slides in zip(fit.joints, fit.model.robot.prismatic):
-        known = {"q": "position" if slides else "angle", "qd": "speed", "qdd": "acceleration", "load": "load"}
+        known = {
+            "q": "position" if slides else "angle",
+            "qd": "speed",
+            "qdd": "acceleration",
+            "load": "load",
+        }
         for symbol, word in known.items():
             if variable == f"{symbol}_{joint}":
                 return f"{word} of {joint}"
@@ -75,7 +82,10 @@ def quantity(variable: str, fit: Fit) -> str:
 
 def units(fit: Fit) -> dict[str, tuple[str, str]]:
     """Of each joint the unit of what it exerts and of where it is."""
-    return {joint: ("N", "m") if slides else ("N m", "rad") for joint, slides in zip(fit.joints, fit.model.robot.prismatic)}
+    return {
+        joint: ("N", "m") if slides else ("N m", "rad")
+        for joint, slides in zip(fit.joints, fit.model.robot.prismatic)
+    }
 
 
 def percentage(share, se=None) -> str:
@@ -83,8 +93,13 @@ def percentage(share, se=None) -> str:
     if share is None or not math.isfinite(share):
         return "–"
     places = 0 if abs(share) >= 0.0995 else 1
-    said = lambda value: f"{round(100 * value, places) + 0.0:.{places}f}"  # noqa: E731 - no minus before a zero
-    return f"{said(share)}{'' if se is None or not math.isfinite(se) else f'{SPACE}±{SPACE}{said(se)}'}{SPACE}%".replace("-", "−")
+    # + 0.0: no minus before a zero
+    said = [f"{round(100 * v, places) + 0.0:.{places}f}" for v in (share, se) if _finite(v)]
+    return f"{f'{SPACE}±{SPACE}'.join(said)}{SPACE}%".replace("-", "−")
+
+
+def _finite(value) -> bool:
+    return value is not None and math.isfinite(value)
 
 
 def chance(probability: float) -> str:
