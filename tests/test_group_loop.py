@@ -9,7 +9,7 @@ import sysid
 from scripts.blind_benchmark import PLANAR
 from sysid import config
 from sysid.differences import parameters_per_group
-from sysid.report.identified import parameters
+from sysid.report.parameters import parameters
 from sysid.statement.document import document as statement
 from tests.conftest import dump
 from tests.grouped import JOINTS, PER_PAYLOAD, experiment, tree
@@ -100,9 +100,10 @@ def test_a_motion_is_designed_for_one_level(folder, cli, tmp_path):
 def test_the_report_says_what_differs(folder, tmp_path):
     """The table of levels, and a chart whose rows are joints and levels."""
     fit = sysid.fit(sysid.load(folder))
-    _, body, drawn = parameters(fit)
+    made = parameters(fit)
+    body = made.html()
     assert "<summary>per robot</summary>" in body and "from r1" in body
-    assert "elbow [r2]" in str(drawn[0])
+    assert "elbow [r2]" in str(made.charts[0])
 
 
 def test_what_is_no_column_may_differ_too(folder, tmp_path):

@@ -2,6 +2,7 @@
 
 import ast
 import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -66,7 +67,7 @@ def test_the_diagnosis_can_be_read():
     assert not long and not wide and total < 1500, (long, wide, total)
 
 
-BESIDE = ["blocks", "changes", "check", "failures", "flexible", "init", "lowpass", "noise", "statement"]
+BESIDE = ["blocks", "changes", "check", "failures", "flexible", "init", "lowpass", "noise", "report", "statement"]
 
 
 @pytest.mark.parametrize("room", BESIDE)
@@ -77,12 +78,97 @@ def test_what_stands_beside_the_diagnosis_can_be_read(room):
     assert texts and not wide and max(map(len, texts.values())) <= 200
 
 
+@pytest.mark.parametrize("folder", ["report/static", "report/templates", "studio/templates"])
+def test_pages_files_can_be_read(folder):
+    """No template, style or script over 200 lines or 100 columns."""
+    texts = {path.name: path.read_text().splitlines() for path in (ROOT / "sysid" / folder).iterdir()}
+    wide = {name for name, lines in texts.items() if max(map(len, lines)) > 100}
+    assert texts and not wide and max(map(len, texts.values())) <= 200
+
+
 def test_only_the_command_line_prints():
     for parts, tree in modules():
         if parts[0] in ("cli", "terminal"):
             continue
         calls = [n for n in ast.walk(tree) if isinstance(n, ast.Call) and getattr(n.func, "id", "") in ("print", "eval", "exec")]
         assert not calls, parts
+
+
+# what a page is made of, where it stands in a text: elements and entities, declarations of a style, statements of a script
+_ELEMENTS = "a|article|b|body|br|button|code|details|div|em|figure|footer|form|h[1-6]|head|header|html|i|iframe|img|input|label|li|link|main|meta|nav|noscript|ol|option|p|path|pre|rect|script|section|select|small|span|strong|style|summary|svg|table|tbody|td|th|thead|title|tr|ul|wbr"
+PAGE = {
+    "HTML": re.compile(rf"</[a-z]|<!doctype|<(?:{_ELEMENTS})[\s>/]|&(?:[a-z]+|#\d+);", re.IGNORECASE),
+    "CSS": re.compile(r"\{\s*[a-z-]+\s*:[^{}]*;|(?<![.\w-])(?:color|margin|padding|display|font|background|width|height|border)\s*:[^;{}]+[;}]"),
+    "JavaScript": re.compile(r"\bfunction\s*\w*\([\w, ]*\)\s*\{|=>|\b(?:document|window)\.\w|\b(?:const|let|var) \w+ ?=|addEventListener"),
+}  # fmt: skip
+XML = ("export", "urdf", "urdf_export")  # write and read the XML of robots
+
+
+def texts(tree):
+    """The literals of a module that are no docstrings."""
+    owners = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
+    docs = {id(node.body[0].value) for node in ast.walk(tree) if isinstance(node, owners) and node.body and isinstance(node.body[0], ast.Expr)}
+    return [node for node in ast.walk(tree) if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in docs]
+
+
+def test_pages_are_files_not_strings():
+    """HTML, CSS and JavaScript stand in templates/ and static/."""
+    found = [f"{'.'.join(parts)} line {node.lineno}: {kind}" for parts, tree in modules() if parts[0] not in XML for node in texts(tree) for kind, pattern in PAGE.items() if pattern.search(node.value)]
+    assert not found, found
+
+
+@pytest.mark.parametrize(("kind", "text"), [
+    ("HTML", "<p class='x'>"), ("HTML", "a</script"), ("HTML", "<!DOCTYPE html>"), ("HTML", "&lt;"), ("HTML", "<br>"),
+    ("CSS", "p { margin-top: 1em; }"), ("CSS", "a { color: red }"), ("CSS", "width:3px;"),
+    ("JavaScript", "function f(a, b) { return a }"), ("JavaScript", "x => x + 1"), ("JavaScript", "document.title"), ("JavaScript", "const a = 1"),
+])  # fmt: skip
+def test_what_a_page_is_made_of_is_recognized(kind, text):
+    assert PAGE[kind].search(text)
+
+
+def test_pages_files_are_installed():
+    """Every template and static file is package data, and every one is used."""
+    import tomllib
+
+    patterns = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"]["package-data"]["sysid"]
+    installed = {path for pattern in patterns for path in (ROOT / "sysid").glob(pattern)}
+    every = {path for path in (ROOT / "sysid").rglob("*") if path.suffix in (".html", ".js", ".css")}
+    assert every and every <= installed
+    texts = {path: path.read_text() for path in [*(ROOT / "sysid").rglob("*.py"), *every]}
+    sections = set(re.findall(r'Section\(\s*"[^"]*",\s*"(\w+)"', "".join(text for path, text in texts.items() if path.suffix == ".py")))
+    for path in every:
+        used = path.stem in sections or any(f'"{path.name}"' in text or f'/{path.name}"' in text for other, text in texts.items() if other != path)
+        assert used, f"{path.name} is used nowhere"
+
+
+@pytest.mark.parametrize("path", sorted((ROOT / "sysid").rglob("static/*.js")), ids=lambda path: path.name)
+def test_scripts_parse(path):
+    node = shutil.which("node")
+    if node is None:
+        pytest.skip("Node is not installed")
+    done = subprocess.run([node, "--check", path], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize("path", sorted((ROOT / "sysid").rglob("static/*.css")), ids=lambda path: path.name)
+def test_styles_parse(path):
+    """No error in the sheet, in its media or in any declaration; every variable that is used is given a value."""
+    import tinycss2
+
+    def check(rules):
+        for rule in rules:
+            if rule.type == "qualified-rule" or (rule.type == "at-rule" and rule.lower_at_keyword == "page"):
+                for entry in tinycss2.parse_blocks_contents(rule.content, skip_comments=True, skip_whitespace=True):
+                    assert entry.type == "declaration" and entry.value, f"{path.name} line {entry.source_line}: {getattr(entry, 'message', entry)}"
+            elif rule.type == "at-rule" and rule.content is not None:
+                check(tinycss2.parse_rule_list(rule.content, skip_comments=True, skip_whitespace=True))
+            else:
+                assert rule.type == "at-rule", f"{path.name} line {rule.source_line}: {rule}"
+
+    check(tinycss2.parse_stylesheet(path.read_text(), skip_comments=True, skip_whitespace=True))
+    every = "".join(p.read_text() for p in (ROOT / "sysid").rglob("*") if p.suffix in (".css", ".html", ".js"))
+    for name in set(re.findall(r"var\((--[\w-]+)", path.read_text())):
+        assert re.search(rf"{name}:", every), f"{path.name}: {name} has no value"
 
 
 def test_public_things_have_docstrings():

@@ -18,7 +18,7 @@ from hypothesis.extra.numpy import arrays
 
 from sysid import pipeline, regressor, robot, specs
 from sysid.diagnose.diagnosis import diagnose
-from sysid.report import charts, page, solids
+from sysid.report import charts, page, residual_charts, solids, torque_chart
 from sysid.report.decimate import broken, kept
 from sysid.report.failures import failures
 from sysid.report.sections import sections
@@ -104,6 +104,24 @@ def test_page_needs_nothing_else(text):
     assert "default-src 'none'" in policy and "http" not in policy and "connect-src" not in policy
     assert "url(" not in text[text.index("<style>") : text.index("</style>")]
     assert len(text.encode()) < 8e6
+
+
+def parse_errors(source: str) -> list:
+    """What the standard's parser finds wrong in a page, scripts' texts left out."""
+    import tinyhtml5.parser
+
+    parser = tinyhtml5.parser.HTMLParser()
+    parser.parse(re.sub(r"(<script[^>]*>).*?(?=</script>)", r"\1", source, flags=re.S))
+    return parser.errors
+
+
+def test_page_parses_without_error(text, missing, clean):
+    assert not parse_errors(text) and parse_errors(text.replace("</table>", "</p>", 1))
+    for found, said in (missing, clean, tied(missing)):
+        made = sections(found.fit, found, said, [])
+        assert not parse_errors(page.page("x", made))
+        names = [a["id"] for _, a in Elements(page.page("x", made)).found if "id" in a]
+        assert len(names) == len(set(names))
 
 
 def test_policy_allows_the_two_scripts_as_they_stand(text):
@@ -198,7 +216,7 @@ def tied(missing):
 def test_ties_stand_in_one_bracket(missing):
     twice, told = tied(missing)
     made = sections(twice.fit, twice, told, [])
-    (bracket,) = re.findall(r'<tbody class="tied">(.*?)</tbody>', made["suspects"]["html"])
+    (bracket,) = re.findall(r'<tbody class="tied">(.*?)</tbody>', made["suspects"]["html"], re.S)
     assert "cannot tell them apart" in bracket and "backlash" in bracket and bracket.count("<svg") == 2
     assert "Not fitted here: gravity_tilt of the whole robot" in bracket
     card = "".join(Elements(made["verdict"]["html"]).texts)
@@ -223,7 +241,7 @@ LEFT = {"depends_on": [{"variable": f"qd_{EVIL}", "share": 0.3}, {"variable": "t
 def test_every_status_has_its_card(clean, more, words):
     found, said = clean
     made = sections(found.fit, found, judged(said, **more), [])
-    cards = re.findall(r'<article class="card (\w+)">(.*?)</article>', made["verdict"]["html"])
+    cards = re.findall(r'<article class="card (\w+)">(.*?)</article>', made["verdict"]["html"], re.S)
     assert cards[0][0] == more["status"] and words in "".join(Elements(cards[0][1]).texts)
     assert ("What the residual of" in made["detectable"]["html"]) == ("depends_on" in more)
 
@@ -357,7 +375,7 @@ def test_forty_joints_still_fit():
     t = np.arange(100_000) / 1000.0
     line = charts.timeline({"train": (np.zeros(len(t)), t, ["a"]), "test": (np.zeros(len(t)), t, ["b"])})
     noise = rng.normal(size=len(t))
-    one = charts.torque("torque0", "x", "N m", line, {"train": (noise,) * 3, "test": (noise,) * 3}, 40)
+    one = torque_chart.torque("torque0", "x", "N m", line, {"train": (noise,) * 3, "test": (noise,) * 3}, 40)
     assert 40 * len(page.embedded(one["figure"])) < 2.6e6
 
 
@@ -382,9 +400,9 @@ def test_ellipsoid_has_the_body_s_inertia(missing):
 
 def test_sliding_joints_have_newtons_and_metres(missing):
     found, said = missing
-    slides = charts.residual_map("m", "x", "N", "m", said["fails_where"][0]["map"])["figure"]["layout"]
+    slides = residual_charts.residual_map("m", "x", "N", "m", said["fails_where"][0]["map"])["figure"]["layout"]
     assert slides["xaxis"]["title"]["text"] == "position q [m]" and slides["yaxis"]["title"]["text"] == "speed qd [m/s]"
-    assert charts.torque("t", "x", "N", {}, {}, 1)["figure"]["layout"]["yaxis"]["title"]["text"] == "force [N]"
+    assert torque_chart.torque("t", "x", "N", {}, {}, 1)["figure"]["layout"]["yaxis"]["title"]["text"] == "force [N]"
 
 
 def test_figures_on_paper(missing, tmp_path):

@@ -30,7 +30,7 @@ from sysid.studio.serve import serve
 from sysid.studio.shelf import Shelf, beside
 from sysid.studio.view import View
 from sysid.studio.work import Cancelled, Job, Worker
-from tests.test_report import EVIL, Elements, written
+from tests.test_report import EVIL, Elements, parse_errors, written
 
 PORT, CSRF = 8765, "of-this-start"
 HOME = f"http://127.0.0.1:{PORT}"
@@ -588,6 +588,10 @@ def test_every_answer_carries_the_policy(opened):
 
 
 # ---- names are text
+
+
+def test_the_empty_page_parses_without_error():
+    assert not parse_errors(page.shell("a <u>name</u>", "x\"y", ["a", EVIL], 1)) and not parse_errors(page.shell("a", "b"))
 
 
 def test_names_show_as_text(opened, arm):

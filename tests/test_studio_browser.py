@@ -204,6 +204,31 @@ def test_names_that_look_like_markup_show_as_text(opened):
     assert page.locator("script").count() == 2  # the page's own and plotly.js
 
 
+def declarations(rules):
+    """Names and values of every declaration of a style sheet but of its paper's size."""
+    import tinycss2
+
+    for rule in rules:
+        if rule.type == "qualified-rule":
+            own = tinycss2.parse_blocks_contents(rule.content, skip_comments=True, skip_whitespace=True)
+            yield from ((d.name, tinycss2.serialize(d.value).strip()) for d in own)
+        elif rule.type == "at-rule" and rule.content is not None and rule.lower_at_keyword != "page":
+            yield from declarations(tinycss2.parse_rule_list(rule.content, skip_comments=True, skip_whitespace=True))
+
+
+def test_the_browser_knows_every_declaration(browser):
+    """A property or a value that it does not know is dropped without a word."""
+    import tinycss2
+
+    from sysid.studio.page import style
+
+    every = [d for d in declarations(tinycss2.parse_stylesheet(style(), skip_comments=True, skip_whitespace=True)) if not d[0].startswith("-webkit-")]
+    page = browser.new_page()
+    unknown = page.evaluate("all => all.filter(([name, value]) => !CSS.supports(name, value))", [list(d) for d in every])
+    page.close()
+    assert len(every) > 300 and not unknown
+
+
 def test_a_phone_shows_it_without_sideways_scrolling(browser, opened):
     page = opened()
     page.wait_for_function(DONE, timeout=WAIT)

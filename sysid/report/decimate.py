@@ -1,4 +1,4 @@
-"""Fewer points of a long signal, for display, so that every peak survives: the least and the greatest of each bucket."""
+"""Fewer points of a long signal, for display: the least and the greatest of each bucket survive."""
 
 from __future__ import annotations
 
@@ -8,8 +8,9 @@ import numpy as np
 def kept(y, most: int = 2000) -> np.ndarray:
     """Indices, rising, of at most `most` samples that draw the same picture as all of them.
 
-    The signal is cut into buckets of equal numbers of samples; each keeps its least and its greatest, and the signal its
-    first and its last. NaN never stands for a bucket that has a number.
+    The signal is cut into buckets of equal numbers of samples; each keeps its least and its
+    greatest, and the signal its first and its last. NaN never stands for a bucket that has a
+    number.
 
     Args:
         y: (n,). most: at least 4.
@@ -23,7 +24,9 @@ def kept(y, most: int = 2000) -> np.ndarray:
     padded = np.append(y, np.full(-n % size, np.nan)).reshape(-1, size)
     nothing = np.isnan(padded)
     start = np.arange(len(padded)) * size
-    lows, highs = (start + np.argmin(np.where(nothing, np.inf, sign * padded), axis=1) for sign in (1.0, -1.0))
+    lows, highs = (
+        start + np.argmin(np.where(nothing, np.inf, sign * padded), axis=1) for sign in (1.0, -1.0)
+    )
     return np.unique(np.concatenate([[0], lows, highs, [n - 1]]))
 
 

@@ -1,10 +1,18 @@
-"""The figures of the studies, as PNG and SVG. Colours hold in print and for colour-blind eyes (Okabe & Ito 2008)."""
+"""The figures of the studies, as PNG and SVG.
+
+Colours hold in print and for colour-blind eyes (Okabe & Ito 2008).
+"""
 
 from pathlib import Path
 
 import numpy as np
 
-COLOURS = {"eigenvalue": "#E69F00", "exponential": "#009E73", "log-cholesky": "#0072B2", "linear": "#999999"}
+COLOURS = {
+    "eigenvalue": "#E69F00",
+    "exponential": "#009E73",
+    "log-cholesky": "#0072B2",
+    "linear": "#999999",
+}
 _FADED, _STRONG = "#0072B2", "#D55E00"
 
 
@@ -15,8 +23,9 @@ def _pyplot():
     from matplotlib import pyplot
 
     pyplot.rcParams.update({
-        "font.size": 9, "axes.spines.top": False, "axes.spines.right": False, "axes.grid": True, "grid.alpha": 0.25,
-        "svg.hashsalt": "sysid", "savefig.dpi": 160, "figure.constrained_layout.use": True,
+        "font.size": 9, "axes.spines.top": False, "axes.spines.right": False, "axes.grid": True,
+        "grid.alpha": 0.25, "svg.hashsalt": "sysid", "savefig.dpi": 160,
+        "figure.constrained_layout.use": True,
     })  # fmt: skip
     return pyplot
 
@@ -28,7 +37,12 @@ def _save(figure, out: Path, name: str, kinds: tuple[str, ...] = ("png", "svg"))
     for kind in kinds:
         path = out / f"{name}.{kind}"
         # the date would make every run another file
-        write_atomically(path, lambda p, k=kind: figure.savefig(p, format=k, metadata={"Date": None} if k == "svg" else None))
+        write_atomically(
+            path,
+            lambda p, k=kind: figure.savefig(
+                p, format=k, metadata={"Date": None} if k == "svg" else None
+            ),
+        )
         paths.append(path)
     _pyplot().close(figure)
     return paths
@@ -44,7 +58,11 @@ def bodies(document: dict, out: Path) -> list[Path]:
         entry = document["parameterizations"][name]
         axis.hist(entry["iterations"], bins=np.arange(0.5, most + 1.5), color=COLOURS[name])
         axis.axvline(entry["median_iterations"], color="black", linewidth=1, linestyle="--")
-        axis.set_title(f"{name}: median {entry['median_iterations']:g}, {entry['failures']} of {document['bodies']} not converged", fontsize=9)
+        axis.set_title(
+            f"{name}: median {entry['median_iterations']:g}, "
+            f"{entry['failures']} of {document['bodies']} not converged",
+            fontsize=9,
+        )
         axis.set_ylabel("bodies")
     axes[-1].set_xlabel("iterations until convergence")
     return _save(figure, out, "figure1_iterations")
@@ -56,10 +74,23 @@ def sweep(entries: list[dict], out: Path) -> list[Path]:
     figure, (left, right) = plt.subplots(1, 2, figsize=(7.2, 2.9))
     entries = [entry for entry in entries if entry["gap"] > 0]
     gaps = [entry["gap"] for entry in entries]
-    for (name, colour), marker in zip(((n, COLOURS[n]) for n in ("eigenvalue", "exponential", "log-cholesky")), "os^"):
-        known = [(g, e["condition"][name]) for g, e in zip(gaps, entries) if e["condition"][name] is not None]
+    for (name, colour), marker in zip(
+        ((n, COLOURS[n]) for n in ("eigenvalue", "exponential", "log-cholesky")), "os^"
+    ):
+        known = [
+            (g, e["condition"][name])
+            for g, e in zip(gaps, entries)
+            if e["condition"][name] is not None
+        ]
         left.plot(*zip(*known), marker=marker, markersize=4, color=colour, label=name)
-        right.plot(gaps, [entry["median_iterations"][name] for entry in entries], marker=marker, markersize=4, color=colour, label=name)
+        right.plot(
+            gaps,
+            [entry["median_iterations"][name] for entry in entries],
+            marker=marker,
+            markersize=4,
+            color=colour,
+            label=name,
+        )
     for axis in (left, right):
         axis.set_xscale("log")
         axis.invert_xaxis()
@@ -73,13 +104,19 @@ def sweep(entries: list[dict], out: Path) -> list[Path]:
 
 
 def restarts(runs: list[dict], out: Path) -> list[Path]:
-    """Figure 3 of the paper: objective, training and test RMS against iteration, every start a line."""
+    """Figure 3 of the paper: objective and RMS errors against iteration, every start a line."""
     plt = _pyplot()
     figure, axes = plt.subplots(1, 3, figsize=(9.0, 2.9))
-    for axis, key, label in zip(axes, ("objective", "rms_train", "rms_test"), ("objective [N² m²]", "RMS on training logs [N m]", "RMS on test logs [N m]")):
+    for axis, key, label in zip(
+        axes,
+        ("objective", "rms_train", "rms_test"),
+        ("objective [N² m²]", "RMS on training logs [N m]", "RMS on test logs [N m]"),
+    ):
         for run in runs:
             axis.plot(run[key], color=_FADED, linewidth=0.9, alpha=0.5)
-            axis.plot(len(run[key]) - 1, run[key][-1], marker="o", markersize=3, color=_STRONG, zorder=3)
+            axis.plot(
+                len(run[key]) - 1, run[key][-1], marker="o", markersize=3, color=_STRONG, zorder=3
+            )
         axis.set_yscale("log")
         axis.set_xlabel("iteration")
         axis.set_ylabel(label)
@@ -94,8 +131,16 @@ def prior(document: dict, out: Path) -> list[Path]:
     plt = _pyplot()
     figure, axis = plt.subplots(figsize=(4.8, 3.2))
     axis.plot(document["weights"], document["rms_held_out"], marker="o", markersize=4, color=_FADED)
-    axis.axvline(document["chosen"], color=_STRONG, linewidth=1, label=f"least error: {document['chosen']:g}")
-    axis.axvline(document["experiment_weight"], color="black", linewidth=1, linestyle="--", label=f"experiment: {document['experiment_weight']:g}")
+    axis.axvline(
+        document["chosen"], color=_STRONG, linewidth=1, label=f"least error: {document['chosen']:g}"
+    )
+    axis.axvline(
+        document["experiment_weight"],
+        color="black",
+        linewidth=1,
+        linestyle="--",
+        label=f"experiment: {document['experiment_weight']:g}",
+    )
     axis.set_xscale("log")
     axis.set_xlabel("prior weight γ [N² m²]")
     axis.set_ylabel("held-out RMS [N m]")

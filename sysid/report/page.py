@@ -1,7 +1,8 @@
-"""One self-contained HTML file of a diagnosed experiment: words and tables first, charts drawn when they come into view.
+"""One self-contained HTML file of a diagnosed experiment: words first, charts when they come near.
 
-Nothing is loaded from anywhere. The page carries a content security policy that allows its own two scripts, by their
-hashes, and no connection: a text of a log that looks like markup is escaped, and would not run were it not.
+Nothing is loaded from anywhere. The page carries a content security policy that allows its own two
+scripts, by their hashes, and no connection: a text of a log that looks like markup is escaped, and
+would not run were it not.
 """
 
 from __future__ import annotations
@@ -21,7 +22,8 @@ from . import rendering
 from . import sections as parts
 
 _SHORT = {
-    "verdict": "Verdict", "torque": "Torque", "steps": "Steps", "failures": "Where", "suspects": "Suspects", "detectable": "Could show", "parameters": "Parameters",
+    "verdict": "Verdict", "torque": "Torque", "steps": "Steps", "failures": "Where",
+    "suspects": "Suspects", "detectable": "Could show", "parameters": "Parameters",
     "bodies": "Bodies", "provenance": "Provenance",
 }  # fmt: skip
 
@@ -38,19 +40,21 @@ def write(fit: Fit, diagnosis: Diagnosis, document: dict, history: list[dict], p
 
 
 def page(name: str, made: dict[str, dict]) -> str:
-    """The HTML of sections ({name: {"title", "html", "charts"}}) under the name of an experiment."""
+    """The HTML of sections, {name: {"title", "html", "charts"}}, under an experiment's name."""
     from plotly.offline import get_plotlyjs
 
     # what would end the element that holds it
     engine = re.sub("<(?=/script)", r"<\\", get_plotlyjs(), flags=re.IGNORECASE)
     script = rendering.script()
     policy = (
-        f"default-src 'none'; script-src '{_hash(script)}' '{_hash(engine)}' 'unsafe-eval'; style-src 'unsafe-inline'; img-src data: blob:; "
-        "worker-src blob:; base-uri 'none'; form-action 'none'"
+        f"default-src 'none'; script-src '{_hash(script)}' '{_hash(engine)}' 'unsafe-eval'; "
+        "style-src 'unsafe-inline'; img-src data: blob:; worker-src blob:; base-uri 'none'; "
+        "form-action 'none'"
     )
     return rendering.environment("report").get_template("report/page.html").render(
-        name=name, sections=made, short=_SHORT, policy=policy, version=results.versions()["sysid"], embedded=embedded,
-        style=rendering.style(), script=script, engine=Markup(engine),
+        name=name, sections=made, short=_SHORT, policy=policy, embedded=embedded,
+        version=results.versions()["sysid"], style=rendering.style(), script=script,
+        engine=Markup(engine),
     )  # fmt: skip
 
 

@@ -1,7 +1,8 @@
 """Templates, styles and scripts of the pages: files beside the modules, put together here.
 
-Templates are Jinja2's with autoescape: whatever a page shows is escaped unless a template made it. A variable that is not
-there is an error. Static files are joined in the order given; nothing is built beforehand.
+Templates are Jinja2's with autoescape: whatever a page shows is escaped unless a template made it.
+A variable that is not there is an error. Static files are joined in the order given; nothing is
+built beforehand.
 """
 
 from __future__ import annotations
@@ -12,22 +13,25 @@ from importlib import resources
 from jinja2 import Environment, PackageLoader, PrefixLoader, StrictUndefined
 from markupsafe import Markup
 
-_SCRIPTS = ("report.js",)
-_STYLES = ("report.css",)
+from .words import pieces
+
+_SCRIPTS = ("theme.js", "time.js", "charts.js", "paper.js")
+_STYLES = ("theme.css", "page.css", "sections.css", "narrow.css", "paper.css")
 
 
 @cache
 def environment(*packages: str) -> Environment:
     """The templates of packages of the project, each under its name: `report/page.html`."""
     places = {name: PackageLoader(f"sysid.{name}") for name in packages}
-    return Environment(
+    made = Environment(
         loader=PrefixLoader(places),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
-        keep_trailing_newline=True,
     )
+    made.filters["pieces"] = pieces
+    return made
 
 
 def static(package: str, names: tuple[str, ...]) -> Markup:

@@ -1,33 +1,46 @@
-"""The sections of a page on one experiment, each its words and tables as HTML and its charts as Plotly figures.
+"""The sections of a page on one experiment: words and tables as HTML, charts as Plotly figures.
 
-`sysid report` puts them into one file. Words come first, charts after; a chart's place in the HTML is
-`<figure class="chart" data-chart="ID">`. Every text that comes from a file or an experiment is escaped.
+`sysid report` puts them into one file. Words come first, charts after; the place of a chart says
+its name (`data-chart`). Every text that comes from a file or an experiment is escaped, by the
+templates.
 """
 
 from __future__ import annotations
 
-from markupsafe import Markup
-
 from ..diagnose.diagnosis import Diagnosis
 from ..estimate import Fit
-from . import detectable, fitted, identified, suspects, verdict
+from .bodies import bodies
+from .detectable import detectable
+from .fitted import failures, torque
+from .parameters import parameters
+from .provenance import provenance
+from .section import Section
+from .steps import steps
+from .suspects import suspects
+from .verdict import verdict
 
 
-def sections(fit: Fit, diagnosis: Diagnosis, document: dict, history: list[dict]) -> dict[str, dict]:
+def sections(
+    fit: Fit, diagnosis: Diagnosis, document: dict, history: list[dict]
+) -> dict[str, dict]:
     """The sections in the order of the page: {name: {"title", "html", "charts"}}.
 
     Args:
-        document: of the diagnosis (`statement.document`). history: the steps made so far, oldest first; may be empty.
+        document: of the diagnosis (`statement.document`). history: the steps made so far, oldest
+            first; may be empty.
     """
-    made = {
-        "verdict": verdict.verdict(fit, diagnosis, document),
-        "torque": fitted.torque(fit, document),
-        "steps": fitted.steps(fit, diagnosis, document, history),
-        "failures": fitted.failures(fit, document),
-        "suspects": suspects.suspects(diagnosis, document),
-        "detectable": detectable.detectable(fit, document),
-        "parameters": identified.parameters(fit),
-        "bodies": identified.bodies(fit, diagnosis),
-        "provenance": identified.provenance(fit, document),
+    made: dict[str, Section] = {
+        "verdict": verdict(fit, diagnosis, document),
+        "torque": torque(fit, document),
+        "steps": steps(fit, diagnosis, document, history),
+        "failures": failures(fit, document),
+        "suspects": suspects(diagnosis, document),
+        "detectable": detectable(fit, document),
+        "parameters": parameters(fit),
+        "bodies": bodies(fit, diagnosis),
+        "provenance": provenance(fit, document),
     }
-    return {name: {"title": title, "html": Markup(text), "charts": drawn} for name, (title, text, drawn) in made.items()}
+    return {
+        name: {"title": section.title, "html": section.html(), "charts": section.charts}
+        for name, section in made.items()
+    }

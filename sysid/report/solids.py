@@ -1,8 +1,10 @@
-"""Bodies as the solids that a page can draw: the uniform ellipsoid with a body's mass, centre and inertia, on the robot.
+"""Bodies as the solids that a page can draw: the uniform ellipsoid with mass, centre and inertia.
 
-A uniform ellipsoid of mass m with semi-axes a_i has second moments m a_i^2 / 5 about its centre. So the ellipsoid with a
-body's inertia has semi-axes sqrt(5 s_i / m), s_i the eigenvalues of Sigma about the centre of mass, along their
-eigenvectors. Source: Wensing, Kim & Slotine 2018, section III.
+A uniform ellipsoid of mass m with semi-axes a_i has second moments m a_i^2 / 5 about its centre.
+So the ellipsoid with a body's inertia has semi-axes sqrt(5 s_i / m), s_i the eigenvalues of Sigma
+about the centre of mass, along their eigenvectors.
+
+Source: Wensing, Kim & Slotine 2018, section III.
 """
 
 from __future__ import annotations
@@ -18,7 +20,8 @@ from ..robot import Robot
 
 @dataclass(frozen=True)
 class Solid:
-    """An ellipsoid in the base frame: centre (3,) [m], semi-axes (3,) [m], directions (3, 3) in columns."""
+    """An ellipsoid in the base frame: centre (3,) [m], semi-axes (3,) [m], directions (3, 3) in
+    columns."""
 
     centre: np.ndarray
     axes: np.ndarray
@@ -27,12 +30,25 @@ class Solid:
     def surface(self, across: int = 14) -> tuple[np.ndarray, np.ndarray]:
         """Points (k, 3) [m] and triangles (f, 3) of its surface."""
         around = 2 * across
-        polar, turn = np.linspace(0.0, np.pi, across + 1), np.linspace(0.0, 2.0 * np.pi, around, endpoint=False)
+        polar, turn = (
+            np.linspace(0.0, np.pi, across + 1),
+            np.linspace(0.0, 2.0 * np.pi, around, endpoint=False),
+        )
         p, a = (grid.ravel() for grid in np.meshgrid(polar, turn, indexing="ij"))
-        points = self._placed(np.stack([np.sin(p) * np.cos(a), np.sin(p) * np.sin(a), np.cos(p)], 1))
-        row, column = (grid.ravel() for grid in np.meshgrid(np.arange(across), np.arange(around), indexing="ij"))
+        points = self._placed(
+            np.stack([np.sin(p) * np.cos(a), np.sin(p) * np.sin(a), np.cos(p)], 1)
+        )
+        row, column = (
+            grid.ravel()
+            for grid in np.meshgrid(np.arange(across), np.arange(around), indexing="ij")
+        )
         here, beside = row * around + column, row * around + (column + 1) % around
-        return points, np.concatenate([np.stack([here, beside, here + around], 1), np.stack([beside, beside + around, here + around], 1)])
+        return points, np.concatenate(
+            [
+                np.stack([here, beside, here + around], 1),
+                np.stack([beside, beside + around, here + around], 1),
+            ]
+        )
 
     def rings(self, count: int = 40) -> np.ndarray:
         """Its three principal ellipses as one line (k, 3) [m], NaN between them."""
@@ -56,7 +72,8 @@ def frames(robot: Robot, q) -> list[pin.SE3]:
 
 
 def solids(robot: Robot, pi, placed: list[pin.SE3]) -> list[Solid | None]:
-    """The ellipsoid of each body with parameters pi (bodies, 10); None for a body that none has (not physically possible)."""
+    """The ellipsoid of each body with parameters pi (bodies, 10); None for a body that is not
+    physically possible."""
     out: list[Solid | None] = []
     for body, own in zip(robot.bodies, np.asarray(pi, dtype=float)):
         mass = own[0]
@@ -75,10 +92,10 @@ def solids(robot: Robot, pi, placed: list[pin.SE3]) -> list[Solid | None]:
 
 
 def skeleton(robot: Robot, placed: list[pin.SE3]) -> list[tuple[np.ndarray, np.ndarray]]:
-    """The links as lines, each from one joint's origin to the next's (3,) [m]; the first from the base.
+    """The links as lines, each from one joint's origin to the next's (3,) [m], from the base on.
 
-    A link that carries no further joint ends at its centre of mass in the robot's description: without it, that joint's
-    motion could not be seen.
+    A link that carries no further joint ends at its centre of mass in the robot's description:
+    without it, that joint's motion could not be seen.
     """
     rows = {body.row for body in robot.bodies if body.kind == "link"}
     origin = lambda row: placed[row].translation if row >= 0 else np.zeros(3)  # noqa: E731

@@ -1,8 +1,7 @@
-"""Numbers as words, and the few elements that every section of a page is made of. Whatever is no number is escaped."""
+"""Numbers, units and names as the words of a page, all plain texts: the templates escape them."""
 
 from __future__ import annotations
 
-import html
 import math
 import re
 
@@ -11,14 +10,15 @@ from ..estimate import Fit
 SPACE = "\u00a0"  # between a number and what belongs to it: no line ends there
 
 
-def text(value) -> str:
-    """Any value as text of a page."""
-    return html.escape(str(value), quote=True)
+def pieces(name) -> list[str]:
+    """A name in pieces that may stand on lines of their own, cut after `_`, `.` and `/`."""
+    return re.split(r"(?<=\w[._/])", str(name))
 
 
-def breaking(name) -> str:
-    """A name as text that may go on in the next line after an underscore, a dot or a slash."""
-    return re.sub(r"(?<=\w)([_./])", r"\1<wbr>", text(name))
+def placed(effect: str, joint: str, here: str = "") -> str:
+    """An effect with its joint, where that is not `here`."""
+    where = "" if joint == here else " of the whole robot" if joint == "*" else f" on {joint}"
+    return effect + where
 
 
 def number(value, digits: int = 4) -> str:
@@ -44,13 +44,20 @@ def plus_minus(value, std, digits: int = 4) -> str:
     places = 1 - int(math.floor(math.log10(std)))
     if -2 <= places <= 6 and abs(value) < 1e6:
         places = max(places, 0)
-        return f"{round(value, places) + 0.0:.{places}f}{SPACE}±{SPACE}{std:.{places}f}".replace("-", "−")  # + 0.0: no minus before a zero
+        return f"{round(value, places) + 0.0:.{places}f}{SPACE}±{SPACE}{std:.{places}f}".replace(
+            "-", "−"
+        )  # + 0.0: no minus before a zero
     return f"{number(value, digits)}{SPACE}±{SPACE}{number(std, 2)}"
 
 
 def unit_of(word: str) -> str:
-    """A unit as text behind a number, escaped; nothing where there is none."""
-    return "" if word in ("", "1") else SPACE + text(raised(word))
+    """A unit as text behind a number; nothing where there is none."""
+    return "" if word in ("", "1") else SPACE + raised(word)
+
+
+def known(name: str, value, std, unit: str) -> str:
+    """A parameter of an effect with its value, its standard deviation and its unit."""
+    return f"{name.split('.')[-1]}{SPACE}={SPACE}{plus_minus(value, std)}{unit_of(unit)}"
 
 
 def raised(unit: str) -> str:
@@ -61,7 +68,12 @@ def raised(unit: str) -> str:
 def quantity(variable: str, fit: Fit) -> str:
     """A variable of the diagnosis (`qd_hip`) in words; itself where it is none of the motion's."""
     for joint, slides in zip(fit.joints, fit.model.robot.prismatic):
-        known = {"q": "position" if slides else "angle", "qd": "speed", "qdd": "acceleration", "load": "load"}
+        known = {
+            "q": "position" if slides else "angle",
+            "qd": "speed",
+            "qdd": "acceleration",
+            "load": "load",
+        }
         for symbol, word in known.items():
             if variable == f"{symbol}_{joint}":
                 return f"{word} of {joint}"
@@ -70,29 +82,10 @@ def quantity(variable: str, fit: Fit) -> str:
 
 def units(fit: Fit) -> dict[str, tuple[str, str]]:
     """Of each joint the unit of what it exerts and of where it is."""
-    return {joint: ("N", "m") if slides else ("N m", "rad") for joint, slides in zip(fit.joints, fit.model.robot.prismatic)}
-
-
-def drawing(chart: dict, caption: str = "", kind: str = "") -> str:
-    """The place of a chart, with what a screen reader says of it."""
-    below = f"<figcaption>{caption}</figcaption>" if caption else ""
-    keys = ' tabindex="0" aria-keyshortcuts="ArrowLeft ArrowRight + - 0"' if chart["link"] else ""
-    return (
-        f'<figure class="chart {kind}" data-chart="{chart["id"]}" aria-label="{text(chart["label"])}"{keys} style="--height:{chart["height"]}px">'
-        f'<div class="plot"><p class="waiting">drawing…</p></div>{below}</figure>'
-    )
-
-
-def table(heads: list[str], rows: list[list[str]], kind: str = "", label: str = "") -> str:
-    """A table that scrolls inside its box; heads and cells are HTML already."""
-    head = "".join(f'<th scope="col">{h}</th>' for h in heads)
-    body = "".join("<tr>" + "".join(f'<th scope="row">{c}</th>' if k == 0 else f"<td>{c}</td>" for k, c in enumerate(row)) + "</tr>" for row in rows)
-    return f'<div class="scroll" tabindex="0" role="region" aria-label="{text(label)}"><table class="{kind}"><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>'
-
-
-def empty(words: str) -> str:
-    """What stands where there is nothing to show."""
-    return f'<p class="empty">{words}</p>'
+    return {
+        joint: ("N", "m") if slides else ("N m", "rad")
+        for joint, slides in zip(fit.joints, fit.model.robot.prismatic)
+    }
 
 
 def percentage(share, se=None) -> str:
@@ -100,10 +93,15 @@ def percentage(share, se=None) -> str:
     if share is None or not math.isfinite(share):
         return "–"
     places = 0 if abs(share) >= 0.0995 else 1
-    said = lambda value: f"{round(100 * value, places) + 0.0:.{places}f}"  # noqa: E731 - no minus before a zero
-    return f"{said(share)}{'' if se is None or not math.isfinite(se) else f'{SPACE}±{SPACE}{said(se)}'}{SPACE}%".replace("-", "−")
+    # + 0.0: no minus before a zero
+    said = [f"{round(100 * v, places) + 0.0:.{places}f}" for v in (share, se) if _finite(v)]
+    return f"{f'{SPACE}±{SPACE}'.join(said)}{SPACE}%".replace("-", "−")
+
+
+def _finite(value) -> bool:
+    return value is not None and math.isfinite(value)
 
 
 def chance(probability: float) -> str:
     """A probability, in per cent: as many draws tell it, it is never nothing."""
-    return f"&lt;{SPACE}1{SPACE}%" if probability < 0.005 else f"{round(100 * probability)}{SPACE}%"
+    return f"<{SPACE}1{SPACE}%" if probability < 0.005 else f"{round(100 * probability)}{SPACE}%"

@@ -88,7 +88,7 @@ class Looks:
             t, y = broken(self.line["t"], np.where(use, own, np.nan), self.line["breaks"], _MOST)
             data.append({
                 "type": "scatter", "mode": "lines", "x": charts.rounded(t, 6), "y": charts.rounded(y, 4), "name": charts.plain(word), "line": {"color": colour, "width": width},
-                "connectgaps": False, "hovertemplate": f"{charts.plain(word)}: %{{y:.4g}} {unit}<extra></extra>",
+                "connectgaps": False, "hovertemplate": f"{charts.plain(word)}: %{{y:.4g}} {unit}",
             })  # fmt: skip
         end = max((span[1] for span in self.line["spans"]), default=1.0)
         layout = {

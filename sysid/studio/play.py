@@ -42,7 +42,7 @@ def play(looks: Looks) -> dict:
     data = [
         {"type": "scatter3d", "mode": "lines", **spread(links[0]), "line": {"color": charts.INK, "width": 7}, "hoverinfo": "skip", "showlegend": False},
         {
-            "type": "scatter3d", "mode": "markers", **spread(joints[0]), "text": [charts.plain(j) for j in fit.joints], "hovertemplate": "%{text}: %{marker.color:.2f} times its own<extra></extra>", "showlegend": False,
+            "type": "scatter3d", "mode": "markers", **spread(joints[0]), "text": [charts.plain(j) for j in fit.joints], "hovertemplate": "%{text}: %{marker.color:.2f} times its own", "showlegend": False,
             "marker": {
                 "size": 8, "color": charts.rounded(np.nan_to_num(levels[0]), 3), "cmin": 0, "cmax": _SPEED, "colorscale": _SCALE, "line": {"width": 1, "color": charts.INK},
                 "colorbar": {"title": {"text": "residual, times its RMS", "side": "top"}, "orientation": "h", "y": 0, "yanchor": "top", "thickness": 10, "len": 0.6, "outlinewidth": 0},

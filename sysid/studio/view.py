@@ -10,8 +10,8 @@ import numpy as np
 from ..diagnose.diagnosis import Diagnosis
 from ..effect import describe, find, vocabulary
 from ..estimate import Fit
-from ..report import fitted
 from ..report.sections import sections
+from ..report.steps import steps
 from ..report.words import units
 from ..statement.document import document
 from .look import Looks
@@ -43,13 +43,13 @@ class View:
 
     def page(self, history: list[dict]) -> dict:
         """What the page needs to show itself, but for the charts."""
-        title, html, drawn = fitted.steps(self.fit, self.diagnosis, self.said, history)
-        self._charts |= {chart["id"]: dumped(chart) for chart in drawn}
+        made = steps(self.fit, self.diagnosis, self.said, history)
+        self._charts |= {chart["id"]: dumped(chart) for chart in made.charts}
         joints, unit = self.fit.joints, units(self.fit)
         heads = {f["joins_as_step"]: k for k, f in reversed(list(enumerate(self.said["findings"]))) if f["joins_as_step"]}
         offered = [{"finding": k, "step": step, "effect": self.said["findings"][k]["effect"], "joint": self.said["findings"][k]["joint"]} for step, k in sorted(heads.items())]
         return {
-            "sha": self.sha, "sections": {**self._html, "steps": {"title": title, "html": html}}, "order": ORDER,
+            "sha": self.sha, "sections": {**self._html, "steps": {"title": made.title, "html": made.html()}}, "order": ORDER,
             "joints": [{"name": j, "unit": unit[j][0]} for j in joints],
             "findings": [{"effect": f["effect"], "joint": f["joint"]} for f in self.said["findings"]],
             "verdict": [{"joint": v["joint"], "status": v["status"]} for v in self.said["verdict"]], "offered": offered,
