@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import sys
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Annotated, Optional
 
@@ -615,6 +615,8 @@ def main() -> None:
         while True:
             try:
                 status = app(standalone_mode=False)
+                if sys.stdout is not None:  # closed
+                    sys.stdout.flush()
                 break
             except Untrusted as error:
                 if not (_TRUST["given"] or _allowed(error)):
@@ -627,8 +629,11 @@ def main() -> None:
     except (KeyboardInterrupt, typer.Abort):
         status = _INTERRUPTED
     except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _drop_output()
         status = 1
+    except OSError as error:  # a full disk under the output, or under a file that nobody minds
+        _drop_output()
+        _fail(f"{error.filename or 'the output'} cannot be written or read ({error.strerror or error})", 1)
     except MemoryError:
         _fail("out of memory", 1)
     except Exception as error:
@@ -652,6 +657,13 @@ def _allowed(untrusted) -> bool:
     return sys.stdin.readline().strip().lower() in ("y", "yes")
 
 
+def _drop_output() -> None:
+    """Let nothing more be written to standard output: Python would try again when it ends."""
+    with suppress(OSError, ValueError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
 def _fail(message: str, status: int) -> None:
-    print("sysid: " + " ".join(str(message).split()), file=sys.stderr)
+    with suppress(OSError):  # nobody can be told
+        print("sysid: " + " ".join(str(message).split()), file=sys.stderr)
     sys.exit(status)

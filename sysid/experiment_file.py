@@ -10,7 +10,7 @@ import os
 from difflib import SequenceMatcher
 from pathlib import Path
 
-from . import results
+from . import bounded, results
 from .errors import ConfigError, SysidError
 
 _MARK = "\ufeff"
@@ -23,7 +23,7 @@ class Changed(SysidError):
 def read(path: Path) -> bytes:
     """The bytes of an experiment file. Raises ConfigError."""
     try:
-        return path.read_bytes()
+        return bounded.read_bytes(path)
     except OSError as error:
         raise ConfigError(f"the experiment file cannot be read ({error.strerror})", where=str(path), do="check its name") from None
 

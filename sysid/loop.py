@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from . import comparison, config, experiment_file, pipeline, results, state
+from . import bounded, comparison, config, experiment_file, pipeline, results, state
 from .addition import remaining, spelled
 from .diagnose.diagnosis import Diagnosis, diagnose
 from .errors import ConfigError, SysidError
@@ -198,7 +198,7 @@ def _record(run: Path, number: int, fit: Fit, effect: str | None, joint: str | N
 def read_history(run: Path) -> list[dict]:
     """The steps of a run folder, oldest first; empty where there are none."""
     try:
-        found = json.loads((run / _HISTORY).read_text(encoding="utf-8"))["steps"]
+        found = json.loads(bounded.read_text(run / _HISTORY))["steps"]
         return found if all(isinstance(step["rms_test"], dict) for step in found) else []
     except (OSError, ValueError, KeyError, TypeError):
         return []

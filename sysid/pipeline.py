@@ -24,7 +24,7 @@ from .bumps import bumps
 from .compress import Compressed, Linearised, compress
 from .drives import rescaled, scale_is_told, with_drives
 from .effect import NotFinite
-from .errors import SysidWarning
+from .errors import LogError, SysidWarning
 from .estimate import Fit, Prediction, identify, predict
 from .inertia.consistency import is_consistent
 from .model import Model, moving_coefficients
@@ -117,6 +117,7 @@ def fit(experiment: Experiment, *, filters: dict | None = None, strength: PriorW
             warnings.warn(SysidWarning(text), stacklevel=2)
         with _timed(seconds, "read"):
             train = measured.train if measured else read(experiment, machine, experiment.data.train)
+        _refuse_no_torque(train)
         provenance = [_provenance("train", log, spec) for log, spec in zip(train, experiment.data.train)]
         with _timed(seconds, "filters"):
             chosen = filtering.compare(experiment, structure, train, prior) if filters is None else filters
@@ -223,6 +224,7 @@ def prepared(experiment: Experiment) -> Prepared:
         experiment = started(experiment)
         machine, structure, prior = build(experiment)
         train = read(experiment, machine, experiment.data.train)
+        _refuse_no_torque(train)
         preprocess = experiment.preprocess
         if _automatic(experiment):
             preprocess = filtering.settled(preprocess, filtering.compare(experiment, structure, train, prior))
@@ -333,6 +335,14 @@ def _prior(experiment: Experiment, structure: Model) -> np.ndarray:
 
 # Of a joint that moves through its reversals, a few per cent of the rows are slow; more means that it was held.
 _MUCH_STANDING = 0.1
+
+
+_NO_TORQUE = 1e-12  # N m: no robot is moved by less
+
+
+def _refuse_no_torque(train: list[logs.Log]) -> None:
+    if max(np.abs(segment.tau).max(initial=0.0) for log in train for segment in log.segments) < _NO_TORQUE:
+        raise LogError("the torque of every joint is 0 in every row: none was logged", where=str(train[0].path), do="name the columns of torque in data.columns.torque, or what drives the joints in actuator")
 
 
 def _tell_still(motion: Motion) -> None:

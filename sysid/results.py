@@ -23,7 +23,7 @@ from pathlib import Path
 
 import numpy as np
 
-from . import prior_weight, state
+from . import bounded, prior_weight, state
 from .differences import per_group, told
 from .errors import ConfigError, SysidError
 from .estimate import Fit, at_edge
@@ -322,7 +322,7 @@ def read_fit(path: Path, asked: str, allowed: str = "a run folder of `sysid fit`
         ConfigError: there is no such run.
     """
     try:
-        found = json.loads(path.read_text(encoding="utf-8"))
+        found = json.loads(bounded.read_text(path))
         values = {entry["name"]: float(entry["value"]) for entry in found["parameters"]}
         return values, (sorted(found["robot"]["joints"]), found["robot"]["locked"])
     except OSError as error:

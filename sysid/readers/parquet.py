@@ -8,6 +8,8 @@ from ..silence import silenced
 from . import lerobot
 from .table import Table
 
+# whole numbers stay whole, as a clock in ns has more digits than a float; NumPy has none of 128 bits
+_WHOLE = (pl.Int8, pl.Int16, pl.Int32, pl.Int64, pl.UInt8, pl.UInt16, pl.UInt32, pl.UInt64)
 # on corrupt pages Polars panics; what it raises then is no Exception, and Rust has written to standard error
 _CORRUPT = (pl.exceptions.PolarsError, pl.exceptions.PanicException, OSError)
 
@@ -83,7 +85,7 @@ class ParquetTable(Table):
                         where=f"{self.path} column {name!r} row {row}", do="leave the row out",
                     )  # fmt: skip
                 values = values.explode() if width else values
-                values = values if values.dtype.is_integer() else values.cast(pl.Float64)
+                values = values if values.dtype in _WHOLE else values.cast(pl.Float64)
         except _CORRUPT as error:
             raise self._unreadable(error, name) from None
         self._check_null(name, values, width or 1)

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from .. import config
+from .. import bounded, config
 from ..errors import SysidError, SysidWarning
 from ..robot import Robot
 from ..robot import load as robot_of
@@ -66,7 +66,7 @@ def prepare(out: str | Path, *, force: bool = False) -> Path:
 
 def _is_simulation(path: Path) -> bool:
     try:
-        return json.loads((path / "truth.json").read_text(encoding="utf-8"))["simulated_by"] == "sysid simulate"
+        return json.loads(bounded.read_text(path / "truth.json"))["simulated_by"] == "sysid simulate"
     except (OSError, ValueError, KeyError, TypeError):
         return False
 
@@ -74,7 +74,7 @@ def _is_simulation(path: Path) -> bool:
 def _worked_in(path: Path) -> list[str]:
     """Names of a simulation's files that are not as they were written; where that is not known, of the one that people edit."""
     try:
-        wrote = json.loads((path / "truth.json").read_text(encoding="utf-8")).get("files", {"config.yaml": None})
+        wrote = json.loads(bounded.read_text(path / "truth.json")).get("files", {"config.yaml": None})
     except (OSError, ValueError):
         return []  # no simulation was there
     there = [name for name in wrote if (path / name).is_file()]
