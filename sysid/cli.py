@@ -136,7 +136,7 @@ def design(
     spec, folder = pipeline.load(experiment), results.folder(out)
     suspects = [_suspect(text) for text in separate.split(",")] if separate else []
     bounds = designing.read_limits(limits) if limits else None
-    with _progress(quiet or as_json) as progress:
+    with _progress(quiet or as_json, asks=True) as progress:
         found = designing.design(spec, duration=duration, separate=suspects, limits_spec=bounds, seed=seed, processes=processes, progress=progress)
     document = designing.write(found, folder)
     if as_json:
@@ -165,7 +165,7 @@ def compare(
 
     specs = [pipeline.load(path) for path in experiments]
     run = results.folder(out or Path("runs") / "-".join(["compare", *(spec.name for spec in specs)]))
-    with _progress(quiet or as_json) as progress:
+    with _progress(quiet or as_json, len(specs)) as progress:
         fits = [pipeline.fit(spec, progress=progress) for spec in specs]
     found = document(fits, _told_apart(specs))
     results.write_json(run / "compare.json", found)
@@ -208,7 +208,7 @@ def simulate(
     hidden = [simulation.hidden(text) for text in hide or []]
     folder = simulation.prepare(out, force=force)
     spec, robot, notices = simulation.load(experiment)
-    with _progress(quiet or as_json) as progress:
+    with _progress(quiet or as_json, logs + 1) as progress:
         found = simulation.simulate(
             robot, hide=hidden, seed=seed, duration=duration, rate=rate, noise=noise, colour=colour, encoder=encoder, speed=speed, progress=progress,
             motion=motion, logs=logs, knocks=knocks, spikes=spikes, brakes=brakes, jitter=jitter, current=current,
@@ -272,7 +272,7 @@ def _diagnosed(spec, out: Path | None, silent: bool) -> tuple:
     from .statement.document import document
 
     run = results.folder(out or Path("runs") / spec.name)
-    with _progress(silent) as progress:
+    with _progress(silent, asks=True) as progress:
         found = work(spec, progress=progress)
     results.write(found.fit, run)
     said = document(found, run)
@@ -375,7 +375,7 @@ def add(
     """
     from . import loop
 
-    with _progress(quiet or as_json) as progress:
+    with _progress(quiet or as_json, 3) as progress:
         found = loop.add(experiment, effect, list(joint) if joint else None, loop.options(option or []), force=force, progress=progress, out=out)
     said = loop.document(found)
     if as_json:
@@ -403,7 +403,7 @@ def discover(
     spec = pipeline.load(experiment)
     run = results.folder(out or Path("runs") / spec.name)
     said_each = None if as_json or quiet else show_step
-    with _progress(quiet or as_json) as progress:
+    with _progress(quiet or as_json, asks=True) as progress:
         found = loop.discover(spec, run, most=most, progress=progress, each=said_each)
     said = {"steps": found.steps, "verdict": found.said["verdict"], "refused": found.refused, "run": str(run)}
     if as_json:
@@ -484,7 +484,7 @@ def fetch(dataset: Annotated[Optional[str], typer.Argument(help="One data set; w
         os.environ["SYSID_DATA_DIR"] = str(out)
     found = []
     for name in [dataset] if dataset else DATASETS:
-        with _progress(quiet or as_json) as progress:
+        with _progress(quiet or as_json, len(DATASETS[name].files)) as progress:
             files = DATASETS[name].fetch(progress=progress)
         found.append({"dataset": name, "licence": DATASETS[name].licence, "citation": DATASETS[name].citation, "files": [str(f) for f in files]})
         if not (quiet or as_json):
@@ -593,14 +593,20 @@ def _finish(found: dict, as_json: bool, quiet: bool, show: str, run: Path) -> No
 
 
 @contextmanager
-def _progress(silent: bool):
-    """A progress bar on standard error; nothing where silent or where nobody watches."""
-    if silent or not sys.stderr.isatty():
+def _progress(silent: bool, fits: int = 1, *, asks: bool = False):
+    """Progress on standard error, a bar where somebody watches, else a line now and then; nothing where silent.
+
+    Args:
+        fits, asks: what the command does, as far as is known; see `progress.Course`.
+    """
+    if silent or sys.stderr is None:
         yield None
         return
-    from .terminal import progress_bar
+    from .progress import Course
+    from .terminal import progress_bar, progress_lines
 
-    with progress_bar() as report:
+    course = Course(fits, asks=asks)
+    with progress_bar(course) if sys.stderr.isatty() else progress_lines(course) as report:
         yield report
 
 

@@ -111,45 +111,45 @@ def fit(experiment: Experiment, *, filters: dict | None = None, strength: PriorW
     seconds: dict[str, float] = {}
     with noticed() as notices:
         experiment = started(experiment)
-        with _timed(seconds, "robot"):
+        with _timed(seconds, "robot", tell):
             machine, structure, prior = build(experiment)
         for text in measured.notices if measured else ():
             warnings.warn(SysidWarning(text), stacklevel=2)
-        with _timed(seconds, "read"):
+        with _timed(seconds, "read", tell):
             train = measured.train if measured else read(experiment, machine, experiment.data.train)
         _refuse_no_torque(train)
         provenance = [_provenance("train", log, spec) for log, spec in zip(train, experiment.data.train)]
-        with _timed(seconds, "filters"):
-            chosen = filtering.compare(experiment, structure, train, prior) if filters is None else filters
+        with _timed(seconds, "filters", tell):
+            chosen = filtering.compare(experiment, structure, train, prior, progress=lambda share: tell("filters", share)) if filters is None else filters
             preprocess = filtering.settled(experiment.preprocess, chosen)
-        with _timed(seconds, "preprocess"):
+        with _timed(seconds, "preprocess", tell):
             motion = prepare(train, preprocess, machine.joints)
             del train  # the filtered motion holds all that is needed from here on
         _tell_still(motion)
         _tell_left_out(motion, preprocess)
         disturbed = _tell_events("train", motion)
-        with _timed(seconds, "shape"):
+        with _timed(seconds, "shape", tell):
             structure, slopes, searched, weight = _settled(experiment, structure, motion, prior)
-        with _timed(seconds, "compress"):  # the regressor is built and reduced chunk by chunk, never whole
+        with _timed(seconds, "compress", tell):  # the regressor is built and reduced chunk by chunk, never whole
             compressed = compress(slopes or structure, motion, progress=lambda share: tell("compress", share))
-        with _timed(seconds, "weight"):
+        with _timed(seconds, "weight", tell):
             weight = weight or _strength(experiment, structure, motion, compressed, prior)
-        with _timed(seconds, "solve"):
+        with _timed(seconds, "solve", tell):
             found = identify(with_weight(experiment, weight.value), structure, motion, compressed, prior)
             found = replace(found, strength=strength or weight)
         if not found.physically_consistent:
             names = [body.name for body, possible in zip(machine.bodies, is_consistent(found.pi)) if not possible]
             warnings.warn(SysidWarning(f"impossible bodies: {', '.join(names)}; identified.urdf will not serve a simulator. model.inertia: log-cholesky keeps them possible"), stacklevel=2)
         _tell_undetermined(found, motion)
-        with _timed(seconds, "masses"):  # what other fits are compared with has been asked what it lacks
+        with _timed(seconds, "masses", tell):  # what other fits are compared with has been asked what it lacks
             heavy = masses.implausible(found, motion if filters is None else None)
         if heavy is not None:
             warnings.warn(SysidWarning(heavy.says), stacklevel=2)
-        with _timed(seconds, "predict"):
+        with _timed(seconds, "predict", tell):
             predictions = {"train": predict(structure, found.x, motion)}
             samples, left_out = {"train": motion.samples}, {"train": _left_out(motion)}
             del motion
-        with _timed(seconds, "test"):
+        with _timed(seconds, "test", tell):
             held_out = measured.test if measured else read(experiment, machine, experiment.data.test)
             provenance += [_provenance("test", log, spec) for log, spec in zip(held_out, experiment.data.test)]
             _tell_overlap(experiment, provenance)
@@ -406,8 +406,9 @@ def noticed():
 
 
 @contextmanager
-def _timed(seconds: dict[str, float], stage: str):
+def _timed(seconds: dict[str, float], stage: str, tell: Progress):
     start = time.perf_counter()
+    tell(stage, 0.0)
     yield
     seconds[stage] = time.perf_counter() - start
 

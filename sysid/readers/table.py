@@ -10,6 +10,14 @@ import numpy as np
 
 from ..errors import LogError
 
+# Numbers with noise never shrink so far; a file that was made to fill a disk or a memory does.
+_MOST, _ANY = 300, 2**28  # times its size; bytes that any may have
+
+
+def most_bytes(path: Path) -> int:
+    """How many bytes a file may unpack to, or an array in it may have."""
+    return max(_ANY, _MOST * path.stat().st_size)
+
 
 class Table(ABC):
     """Named columns of a file. Matrices (n, k) go by their name, and column by column as `name[0]` …
