@@ -9,11 +9,13 @@
 Each file is written under a temporary name and renamed, so that a run folder never holds half a file.
 """
 
+import hashlib
 import io
 import json
 import math
 import os
 import platform
+import shutil
 import stat
 import uuid
 from collections.abc import Callable
@@ -156,7 +158,7 @@ def write_together(files: dict[Path, Callable[[Path], object]]) -> None:
     Raises:
         SysidError: the disk refuses; everything is as it was.
     """
-    temporary = {path: path.with_name(f".{path.name[:100]}.{uuid.uuid4().hex}") for path in files}
+    temporary = {path: beside(path) for path in files}
     path = None
     try:
         for path, write in files.items():
@@ -171,6 +173,30 @@ def write_together(files: dict[Path, Callable[[Path], object]]) -> None:
         for filled in temporary.values():
             with suppress(OSError):
                 filled.unlink(missing_ok=True)
+
+
+def beside(path: Path) -> Path:
+    """A name beside a path to fill before it is renamed. What processes of this machine that were killed left of that kind is removed."""
+    kind, here = f".{path.name[:100]}.", hashlib.sha256(platform.node().encode()).hexdigest()[:8]
+    with suppress(OSError):
+        for old in path.parent.iterdir():
+            host, _, process = old.name.removeprefix(kind).partition("-")
+            number = process.partition("-")[0]
+            if old.name.startswith(kind) and host == here and number.isdigit() and not _alive(int(number)):
+                shutil.rmtree(old) if old.is_dir() else old.unlink()
+    return path.with_name(f"{kind}{here}-{os.getpid()}-{uuid.uuid4().hex[:8]}")
+
+
+def _alive(process: int) -> bool:
+    if os.name != "posix":
+        return True  # asking would end it
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except (OSError, OverflowError):
+        return True
+    return True
 
 
 def parquet(table) -> Callable[[Path], None]:

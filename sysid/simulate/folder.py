@@ -18,6 +18,7 @@ import numpy as np
 
 from .. import bounded, config
 from ..errors import SysidError, SysidWarning
+from ..results import beside
 from ..robot import Robot
 from ..robot import load as robot_of
 from ..specs import AUTO, Experiment, PreprocessSpec
@@ -103,7 +104,7 @@ def write(simulation: Simulation, experiment: Experiment, out: str | Path, *, fo
     }  # fmt: skip
     truth = {**simulation.truth, "files": {name: _sha256(text.encode("utf-8")) for name, text in texts.items()}}
     texts["truth.json"] = json.dumps(truth, indent=1, allow_nan=False) + "\n"
-    temporary = path.absolute().parent / f".{path.name}.{uuid.uuid4().hex}"
+    temporary = beside(path.absolute())
     try:
         temporary.mkdir()
         for name, text in texts.items():
