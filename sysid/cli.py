@@ -650,7 +650,7 @@ def main() -> None:
             raise
         _fail(f"internal error, {type(error).__name__}: {error}; SYSID_DEBUG=1 shows where", 1)
     if status == _INTERRUPTED:  # typer makes an exit of Ctrl-C and says nothing
-        _fail("interrupted; what a study had finished is kept, run it again to go on", _INTERRUPTED)
+        _fail(f"interrupted; {_kept(sys.argv[1:])}", _INTERRUPTED)
     sys.exit(status if isinstance(status, int) else 0)
 
 
@@ -661,6 +661,15 @@ def _allowed(untrusted) -> bool:
     said = f"{untrusted.path}\nThe experiment names this Python file. It runs with all that you may do: read it first.\nLet it run, now and whenever it is as it is now? [y/N] "
     print(said, end="", file=sys.stderr, flush=True)
     return sys.stdin.readline().strip().lower() in ("y", "yes")
+
+
+def _kept(words: list[str]) -> str:
+    """What of a command is there after Ctrl-C."""
+    command = next((word for word in words if not word.startswith("-")), "")
+    return {
+        "study": "what was finished is kept, run it again to go on", "discover": "the steps that were shown are kept",
+        "fetch": "the files that came whole are kept",
+    }.get(command, "nothing was written")  # fmt: skip
 
 
 def _drop_output() -> None:

@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import io
 import json
+import re
 import shutil
 from collections.abc import Callable, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,6 +21,7 @@ from .diagnose.diagnosis import Diagnosis, diagnose
 from .errors import ConfigError, SysidError
 from .estimate import Fit
 from .specs import Experiment
+from .trusted import Untrusted
 
 _HISTORY, _STEPS = "history.json", "steps"
 
@@ -126,6 +129,19 @@ def _flow(own: dict):
     return out
 
 
+@contextmanager
+def asked(file: Path):
+    """Errors in what was typed or clicked without the line of a text that was never written. Raises SysidError."""
+    try:
+        yield
+    except Untrusted:
+        raise
+    except ConfigError as error:
+        said = re.sub(rf"^{re.escape(str(file))}( line \d+)?: ", "", str(error))
+        said = re.sub(r"^(unknown) key (.*) in model\.effects\[\d+\]", r"\1 option \2", said)
+        raise SysidError(re.sub(r"^model\.effects(\[\d+\])?[:.] ?", "", said)) from None
+
+
 # ---- one step
 
 
@@ -149,9 +165,10 @@ def add(
     joints = None if joints == ["*"] else joints  # every joint, or the whole robot
     read = experiment_file.read(file)
     every = pipeline.build(experiment)[0].joints
-    text = with_effect(experiment_file.text(read, str(file)), effect, joints, options, str(file), every=every)
-    after = config.loads(text, file)
-    pipeline.build(after)
+    with asked(file):
+        text = with_effect(experiment_file.text(read, str(file)), effect, joints, options, str(file), every=every)
+        after = config.loads(text, file)
+        pipeline.build(after)
     before_fit = pipeline.fit(experiment, progress=progress)
     after_fit, compared = pipeline.refit(after, before_fit, progress=progress)
     differences = tuple(comparison.compare(before_fit, after_fit, ("before", "after")))

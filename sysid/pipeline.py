@@ -348,7 +348,7 @@ def _refuse_no_torque(train: list[logs.Log]) -> None:
 def _tell_still(motion: Motion) -> None:
     for joint, share in zip(motion.joints, motion.standing):
         if share > _MUCH_STANDING and joint not in motion.still:
-            warnings.warn(SysidWarning(f"joint {joint!r} stands still in {100 * share:.0f} % of its rows, where friction is whatever balances the rest; preprocess.standstill: auto leaves them out"), stacklevel=2)
+            warnings.warn(SysidWarning(f"joint {joint!r} stands still in {100 * share:.0f} % of its rows, where its friction may have any value up to its greatest; preprocess.standstill: auto leaves them out"), stacklevel=2)
     for joint in motion.still:
         warnings.warn(SysidWarning(f"joint {joint!r} never moves in the training logs, or never clear of a standstill; its friction is held at its prior, and its bodies are where the other joints' torque leaves them"), stacklevel=2)
 

@@ -24,7 +24,7 @@ from .smoother import Smoother
 from .specs import PreprocessSpec
 
 # `standstill: mask` leaves a joint's rows out below this share of its own rms speed, at most 0.03 rad/s or m/s:
-# there friction is whatever balances the rest.
+# there friction may have any value up to its greatest.
 _STANDSTILL_SHARE, _STANDSTILL_MOST = 0.05, 0.03
 # A joint never moves where its filtered angle travels less than its own noise would make it, or than this [rad or m].
 _NEVER_MOVES, _NOISE_TRAVEL = 1e-6, 6.0

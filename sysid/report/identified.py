@@ -61,7 +61,7 @@ def parameters(fit: Fit) -> tuple[str, str, list]:
         parts.insert(0, f'<details open><summary>friction and other effects <span class="quiet">{len(others)} coefficients</span></summary><div class="split">{_parameter_table(rows, "friction and other effects")}{drawing(chart)}</div></details>')
     about = (
         '<p class="quiet">± 1 standard deviation in the tables, 2 in the charts. “From data” is 1 where the measurement determines a parameter and 0 where only the prior speaks; '
-        "pale dots are said by the prior. Most single inertial parameters of a robot cannot be seen in any log, only combinations of them: a low number there is no fault of the log. Moments are about the joint’s frame. "
+        "pale dots are values that come from the prior. Most single inertial parameters of a robot cannot be seen in any log, only combinations of them: a low number there is no fault of the log. Moments are about the joint’s frame. "
         f"{text(fit.strength.says[0].upper() + fit.strength.says[1:])}.</p>"
     )
     return "Parameters", about + "".join(parts), drawn
