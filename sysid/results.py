@@ -214,7 +214,7 @@ def parquet(table) -> Callable[[Path], None]:
 
 def _settle(filled: Path, place: Path) -> None:
     """Bring a file to the disk, with the mode and the owner of the one that it replaces."""
-    with filled.open("rb") as file:
+    with filled.open("r+b") as file:
         os.fsync(file.fileno())
     try:
         before = place.stat()

@@ -114,6 +114,58 @@ def test_without_a_home_locks_are_kept_elsewhere(tmp_path, monkeypatch, home):
         pass
 
 
+def test_where_no_lock_can_be_had_work_goes_on(tmp_path, monkeypatch):
+    import filelock
+
+    def refuse(*given, **how):
+        raise OSError(37, "No locks available")
+
+    monkeypatch.setattr(filelock.FileLock, "acquire", refuse)
+    with state.locked(tmp_path / "x"):
+        pass
+
+
+# ---- the studio
+
+
+def test_the_studio_keeps_what_is_not_its_change(experiment, tmp_path):
+    from sysid.studio.desk import Desk, hashed
+
+    folder = experiment(config=TEXT)
+    real = tmp_path / "real.yaml"
+    before = b"\xef\xbb\xbf" + TEXT.replace("\n", "\r\n").encode()
+    real.write_bytes(before)
+    real.chmod(0o640)
+    (folder / "config.yaml").unlink()
+    (folder / "config.yaml").symlink_to(real)
+    desk = Desk(folder, tmp_path / "run")
+    seen = desk.sync()
+    now = desk.change(seen, lambda text: loop.with_effect(text, "cogging", ["elbow"], {}), "cogging", "elbow")
+    assert (folder / "config.yaml").is_symlink() and stat.S_IMODE(real.stat().st_mode) == 0o640
+    lines = real.read_bytes().splitlines(keepends=True)
+    assert lines[0].startswith(b"\xef\xbb\xbf") and all(line.endswith(b"\r\n") for line in lines) and len(lines) >= 4
+    assert now == hashed(desk.text())
+    desk.undo(now)
+    assert real.read_bytes() == before
+    # what another wrote meanwhile stays
+    real.write_bytes(before + b"# theirs\r\n")
+    with pytest.raises(experiment_file.Changed):
+        desk.change(seen, lambda text: text + "# ours\n", "x", None)
+    assert real.read_bytes().endswith(b"# theirs\r\n")
+
+
+@pytest.mark.parametrize("effect", ["cogging", "gravity_tilt"])
+def test_a_star_in_the_studio_is_every_joint_or_the_whole_robot(experiment, tmp_path, monkeypatch, effect):
+    from sysid.studio.bench import Bench
+
+    folder = experiment(config=TEXT)
+    monkeypatch.setattr(Bench, "_ensure", lambda self, sha: None)
+    bench = Bench(folder, tmp_path / "run")
+    bench.add_effect(bench.desk.sync(), effect, "*")
+    _, model, _ = pipeline.build(pipeline.load(folder))
+    assert model.terms[-1][0].name == effect and (folder / "config.yaml").read_text() == TEXT.replace("coulomb]", f"coulomb, {effect}]")
+
+
 # ---- a run folder
 
 
