@@ -169,11 +169,12 @@ def test_a_full_disk(experiment, tmp_path):
     sound(folder, tmp_path / "run")
 
 
-@pytest.mark.skipif(hasattr(os, "getuid") and os.getuid() == 0, reason="root may write anywhere")
 def test_a_folder_that_may_only_be_read(experiment, cli, tmp_path):
     folder = experiment(config=TEXT)
     folder.chmod(0o555)
     try:
+        if os.access(folder, os.W_OK):
+            pytest.skip("this user may write anywhere")
         assert cli("fit", folder, "--quiet").status == 0  # the run folder is elsewhere
         said = cli("add", folder, "torque_bias", "--force")
         assert said.status == 2 and "cannot be written" in said.err
