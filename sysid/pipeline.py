@@ -162,6 +162,7 @@ def fit(experiment: Experiment, *, filters: dict | None = None, strength: PriorW
             let_go = rollout.rms(experiment, structure, found.x, motion)
         if not scale_is_told(experiment, machine.joints):
             warnings.warn(SysidWarning("no joint's torque is known in N m: these logs tell masses, friction and gains up to one common factor, which the prior's masses choose; one known gain, or a payload of known mass, settles it"), stacklevel=2)
+        tell("left", 0.0)
         for text in implausible(replace(found, predictions=predictions)):
             warnings.warn(SysidWarning(text), stacklevel=2)
     return replace(

@@ -11,6 +11,7 @@ FIT = {
     "robot": ("reading the robot", 1), "read": ("reading the logs", 5), "filters": ("comparing filters", 30), "preprocess": ("filtering", 2),
     "shape": ("searching shape values", 15), "compress": ("fitting", 20), "weight": ("choosing the prior's weight", 10), "solve": ("solving", 5),
     "masses": ("looking at the masses", 5), "predict": ("predicting", 2), "test": ("reading the test logs", 5),
+    "left": ("looking at what is left", 1),
 }  # fmt: skip
 _WORDS = {"starting": "reading the logs", "ask": "asking what is missing", "drawing": "drawing"}
 _ASKED, _FIRST = 0.2, 0.5  # shares of a diagnosis: its fit, and the first round of questions
