@@ -38,6 +38,8 @@ class Course:
         """A stage and the share of it that is done: in words, and the share of the whole, which never falls."""
         word, comma, rest = stage.partition(",")
         words = FIT[word][0] if word in FIT else _WORDS.get(word, word)
+        if word in FIT and self._rounds:
+            words = f"trying a suspect, {words}"
         self.share = max(self.share, min(self._at(word, stage, share), _MOST))
         return words + comma + rest, self.share
 

@@ -98,6 +98,9 @@ def test_a_course_never_falls_and_is_never_over_before_it_is():
         assert shares[len(shares) // 2] < 0.95  # half of the run is no standing still at the end
     assert Course(3).tell("train", 1.0) == ("train", pytest.approx(1 / 3))
     assert Course().tell("filters", 0.5)[0] == "comparing filters"
+    asking = Course(asks=True)
+    asking.tell("ask", 0.5)
+    assert asking.tell("compress", 0.5)[0] == "trying a suspect, fitting"
 
 
 def test_times_are_spoken():
