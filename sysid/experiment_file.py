@@ -54,6 +54,34 @@ def edited(before: bytes, after: str) -> bytes:
     return (mark + "".join(out)).encode("utf-8")
 
 
+def grafted(text: str, rewritten: str, changed: str) -> str:
+    """A change made in a text itself, that was made in how a writer of YAML would write it: lines that stay keep their
+    indentation and their spaces. Where the writer did more than move words, `changed`.
+
+    Args:
+        rewritten: the text as the writer writes it. changed: the same with the change.
+    """
+    old, bare, new = text.splitlines(), rewritten.splitlines(), changed.splitlines()
+    if [line.split() for line in old] != [line.split() for line in bare]:
+        return changed
+    out = []
+    for what, i, j, k, m in SequenceMatcher(None, bare, new, autojunk=False).get_opcodes():
+        if what == "equal":
+            out += old[i:j]
+            continue
+        before = [n for n in range(min(j, len(bare)) - 1, -1, -1) if bare[n].strip()[:1] not in ("", "#")]
+        for line in new[k:m]:
+            # a new line stands as far in as the last before it that stood beside it
+            beside = [n for n in before if _indent(bare[n]) == _indent(line)] or before
+            further = _indent(old[beside[0]]) - _indent(bare[beside[0]]) if beside else 0
+            out.append(" " * max(_indent(line) + further, 0) + line.lstrip(" ") if line.strip() else line)
+    return "\n".join(out) + "\n"
+
+
+def _indent(line: str) -> int:
+    return len(line) - len(line.lstrip(" "))
+
+
 def replace(path: Path, before: bytes, after: bytes) -> None:
     """Write `after` into a file that holds `before`; the caller holds `state.locked(path)`.
 

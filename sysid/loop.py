@@ -107,9 +107,21 @@ def with_effect(
         listed.append(_flow(own) if formula is not None else effect if not own else CommentedMap({effect: _flow(own)}))
         if listed and isinstance(listed[-1], CommentedMap):
             listed[-1].fa.set_flow_style()
+    changed = _dumped(writer, tree)
+    if only_comments:
+        return (text.rstrip("\n") + "\n" if text.strip() else "") + changed
+    kept = experiment_file.grafted(text, _dumped(writer, writer.load(text)), changed)
+    try:
+        same = config.plain(config.parse_yaml(kept, where=where)) == config.plain(config.parse_yaml(changed, where=where))
+    except ConfigError:
+        same = False
+    return kept if same else changed
+
+
+def _dumped(writer, tree) -> str:
     stream = io.StringIO()
     writer.dump(tree, stream)
-    return (text.rstrip("\n") + "\n" if only_comments and text.strip() else "") + stream.getvalue()
+    return stream.getvalue()
 
 
 def _word(entry) -> str:

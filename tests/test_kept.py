@@ -1,8 +1,10 @@
 """What a user wrote is never lost: two at once, edits meanwhile, links, modes, line ends; steps and simulations."""
 
+import gc
 import json
 import os
 import stat
+import warnings
 
 import pytest
 
@@ -282,6 +284,9 @@ def published(tmp_path, monkeypatch):
     yield served
     server.shutdown()
     server.server_close()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ResourceWarning)  # of an answer that requests left unread
+        gc.collect()
 
 
 def test_fetch_shows_its_progress_without_another_package(published, cli, tmp_path, monkeypatch):
@@ -304,3 +309,31 @@ def test_fetch_says_what_is_wrong(published, cli, tmp_path):
     (published / "log.csv").unlink()
     said = cli("fetch", "mine", out=tmp_path / "data")
     assert said.status == 2 and "network" in said.err
+
+
+# ---- the lines of a file that the change does not touch
+
+
+STYLES = {
+    "deep lists": "robot:\n    urdf: robot.urdf\ndata:\n    train:\n        - train.csv      # the long one\n    test:\n        -   test.csv\nmodel:\n    effects:\n        - viscous\n\n        # after March\n        - coulomb\nprior: {weight:   1.0e-2}\n",
+    "flat lists": "model:\n  effects:\n  - viscous\n  - coulomb\nrobot:   {urdf: 'robot.urdf'}\n",
+    "flow": "robot:   {urdf: robot.urdf}   # mine\nmodel: {effects: [viscous,   coulomb]}\n",
+    "nested": "model:\n   effects:\n      - viscous\n      - stribeck:\n            joints: [elbow]\n   inertia: log-cholesky\n",
+    "last": "robot:\n    urdf: robot.urdf\nmodel:\n    effects:\n        - viscous",
+}
+
+
+@pytest.mark.parametrize("style", STYLES)
+@pytest.mark.parametrize(("effect", "joints"), [("torque_bias", None), ("cogging", ["elbow"]), ("stribeck", ["shoulder"])])
+def test_lines_that_do_not_change_stay_as_they_were(style, effect, joints):
+    from sysid import config
+
+    text = STYLES[style]
+    changed = loop.with_effect(text, effect, joints, {})
+    before, after = (config.plain(config.parse_yaml(t, where="")) for t in (text, changed))
+    assert {k: v for k, v in after.items() if k != "model"} == {k: v for k, v in before.items() if k != "model"}
+    entries = [e if isinstance(e, str) else next(iter(e)) for e in after["model"]["effects"]]
+    assert effect in entries and "viscous" in entries
+    lines = changed.splitlines()
+    touched = [line for line in text.splitlines() if line not in lines]
+    assert len(touched) <= 1 and all("effects" in line or "joints" in line for line in touched), changed
