@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import sys
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Annotated, Optional
 
@@ -136,7 +136,7 @@ def design(
     spec, folder = pipeline.load(experiment), results.folder(out)
     suspects = [_suspect(text) for text in separate.split(",")] if separate else []
     bounds = designing.read_limits(limits) if limits else None
-    with _progress(quiet or as_json) as progress:
+    with _progress(quiet or as_json, asks=True) as progress:
         found = designing.design(spec, duration=duration, separate=suspects, limits_spec=bounds, seed=seed, processes=processes, levels=_levels(level), progress=progress)
     document = designing.write(found, folder)
     if as_json:
@@ -165,7 +165,7 @@ def compare(
 
     specs = [pipeline.load(path) for path in experiments]
     run = results.folder(out or Path("runs") / "-".join(["compare", *(spec.name for spec in specs)]))
-    with _progress(quiet or as_json) as progress:
+    with _progress(quiet or as_json, len(specs)) as progress:
         fits = [pipeline.fit(spec, progress=progress) for spec in specs]
     found = document(fits, _told_apart(specs))
     results.write_json(run / "compare.json", found)
@@ -208,7 +208,7 @@ def simulate(
     hidden = [simulation.hidden(text) for text in hide or []]
     folder = simulation.prepare(out, force=force)
     spec, robot, notices = simulation.load(experiment)
-    with _progress(quiet or as_json) as progress:
+    with _progress(quiet or as_json, logs + 1) as progress:
         found = simulation.simulate(
             robot, hide=hidden, seed=seed, duration=duration, rate=rate, noise=noise, colour=colour, encoder=encoder, speed=speed, progress=progress,
             motion=motion, logs=logs, knocks=knocks, spikes=spikes, brakes=brakes, jitter=jitter, current=current,
@@ -272,7 +272,7 @@ def _diagnosed(spec, out: Path | None, silent: bool) -> tuple:
     from .statement.document import document
 
     run = results.folder(out or Path("runs") / spec.name)
-    with _progress(silent) as progress:
+    with _progress(silent, asks=True) as progress:
         found = work(spec, progress=progress)
     results.write(found.fit, run)
     said = document(found, run)
@@ -377,7 +377,7 @@ def add(
     """
     from . import loop
 
-    with _progress(quiet or as_json) as progress:
+    with _progress(quiet or as_json, 3) as progress:
         own = {**loop.options(option or []), **({"per": per} if per else {}), **({"except": list(spared)} if spared else {})}
         found = loop.add(experiment, effect, list(joint) if joint else None, own, force=force, progress=progress, out=out)
     said = loop.document(found)
@@ -406,7 +406,7 @@ def discover(
     spec = pipeline.load(experiment)
     run = results.folder(out or Path("runs") / spec.name)
     said_each = None if as_json or quiet else show_step
-    with _progress(quiet or as_json) as progress:
+    with _progress(quiet or as_json, asks=True) as progress:
         found = loop.discover(spec, run, most=most, progress=progress, each=said_each)
     said = {"steps": found.steps, "verdict": found.said["verdict"], "refused": found.refused, "run": str(run)}
     if as_json:
@@ -487,7 +487,7 @@ def fetch(dataset: Annotated[Optional[str], typer.Argument(help="One data set; w
         os.environ["SYSID_DATA_DIR"] = str(out)
     found = []
     for name in [dataset] if dataset else DATASETS:
-        with _progress(quiet or as_json) as progress:
+        with _progress(quiet or as_json, len(DATASETS[name].files)) as progress:
             files = DATASETS[name].fetch(progress=progress)
         found.append({"dataset": name, "licence": DATASETS[name].licence, "citation": DATASETS[name].citation, "files": [str(f) for f in files]})
         if not (quiet or as_json):
@@ -596,14 +596,20 @@ def _finish(found: dict, as_json: bool, quiet: bool, show: str, run: Path) -> No
 
 
 @contextmanager
-def _progress(silent: bool):
-    """A progress bar on standard error; nothing where silent or where nobody watches."""
-    if silent or not sys.stderr.isatty():
+def _progress(silent: bool, fits: int = 1, *, asks: bool = False):
+    """Progress on standard error, a bar where somebody watches, else a line now and then; nothing where silent.
+
+    Args:
+        fits, asks: what the command does, as far as is known; see `progress.Course`.
+    """
+    if silent or sys.stderr is None:
         yield None
         return
-    from .terminal import progress_bar
+    from .progress import Course
+    from .terminal import progress_bar, progress_lines
 
-    with progress_bar() as report:
+    course = Course(fits, asks=asks)
+    with progress_bar(course) if sys.stderr.isatty() else progress_lines(course) as report:
         yield report
 
 
@@ -618,6 +624,8 @@ def main() -> None:
         while True:
             try:
                 status = app(standalone_mode=False)
+                if sys.stdout is not None:  # closed
+                    sys.stdout.flush()
                 break
             except Untrusted as error:
                 if not (_TRUST["given"] or _allowed(error)):
@@ -630,8 +638,11 @@ def main() -> None:
     except (KeyboardInterrupt, typer.Abort):
         status = _INTERRUPTED
     except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _drop_output()
         status = 1
+    except OSError as error:  # a full disk under the output, or under a file that nobody minds
+        _drop_output()
+        _fail(f"{error.filename or 'the output'} cannot be written or read ({error.strerror or error})", 1)
     except MemoryError:
         _fail("out of memory", 1)
     except Exception as error:
@@ -642,7 +653,7 @@ def main() -> None:
             raise
         _fail(f"internal error, {type(error).__name__}: {error}; SYSID_DEBUG=1 shows where", 1)
     if status == _INTERRUPTED:  # typer makes an exit of Ctrl-C and says nothing
-        _fail("interrupted; what a study had finished is kept, run it again to go on", _INTERRUPTED)
+        _fail(f"interrupted; {_kept(sys.argv[1:])}", _INTERRUPTED)
     sys.exit(status if isinstance(status, int) else 0)
 
 
@@ -655,6 +666,22 @@ def _allowed(untrusted) -> bool:
     return sys.stdin.readline().strip().lower() in ("y", "yes")
 
 
+def _kept(words: list[str]) -> str:
+    """What of a command is there after Ctrl-C."""
+    command = next((word for word in words if not word.startswith("-")), "")
+    return {
+        "study": "what was finished is kept, run it again to go on", "discover": "the steps that were shown are kept",
+        "fetch": "the files that came whole are kept",
+    }.get(command, "nothing was written")  # fmt: skip
+
+
+def _drop_output() -> None:
+    """Let nothing more be written to standard output: Python would try again when it ends."""
+    with suppress(OSError, ValueError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
 def _fail(message: str, status: int) -> None:
-    print("sysid: " + " ".join(str(message).split()), file=sys.stderr)
+    with suppress(OSError):  # nobody can be told
+        print("sysid: " + " ".join(str(message).split()), file=sys.stderr)
     sys.exit(status)

@@ -12,7 +12,7 @@ from typing import Any, get_args
 
 from pydantic import BaseModel, ValidationError
 
-from . import datasets, groups
+from . import bounded, datasets, groups
 from .effect import find, vocabulary
 from .errors import ConfigError
 from .formula import parse
@@ -50,7 +50,7 @@ def load(path: str | Path) -> Experiment:
             do="`sysid init URDF LOG...` writes one from a robot and its logs",
         )  # fmt: skip
     try:
-        data = path.read_bytes()
+        data = bounded.read_bytes(path)
     except OSError as error:
         raise ConfigError(f"the experiment file cannot be read ({error.strerror})", where=str(path), do="check its name") from None
     if len(data) > _LARGEST_FILE:

@@ -10,7 +10,7 @@ import os
 from difflib import SequenceMatcher
 from pathlib import Path
 
-from . import results
+from . import bounded, results
 from .errors import ConfigError, SysidError
 
 _MARK = "\ufeff"
@@ -23,7 +23,7 @@ class Changed(SysidError):
 def read(path: Path) -> bytes:
     """The bytes of an experiment file. Raises ConfigError."""
     try:
-        return path.read_bytes()
+        return bounded.read_bytes(path)
     except OSError as error:
         raise ConfigError(f"the experiment file cannot be read ({error.strerror})", where=str(path), do="check its name") from None
 
@@ -52,6 +52,34 @@ def edited(before: bytes, after: str) -> bytes:
         else:
             out += [line[:-1] + usual if line.endswith("\n") else line for line in new[k:m]]
     return (mark + "".join(out)).encode("utf-8")
+
+
+def grafted(text: str, rewritten: str, changed: str) -> str:
+    """A change made in a text itself, that was made in how a writer of YAML would write it: lines that stay keep their
+    indentation and their spaces. Where the writer did more than move words, `changed`.
+
+    Args:
+        rewritten: the text as the writer writes it. changed: the same with the change.
+    """
+    old, bare, new = text.splitlines(), rewritten.splitlines(), changed.splitlines()
+    if [line.split() for line in old] != [line.split() for line in bare]:
+        return changed
+    out = []
+    for what, i, j, k, m in SequenceMatcher(None, bare, new, autojunk=False).get_opcodes():
+        if what == "equal":
+            out += old[i:j]
+            continue
+        before = [n for n in range(min(j, len(bare)) - 1, -1, -1) if bare[n].strip()[:1] not in ("", "#")]
+        for line in new[k:m]:
+            # a new line stands as far in as the last before it that stood beside it
+            beside = [n for n in before if _indent(bare[n]) == _indent(line)] or before
+            further = _indent(old[beside[0]]) - _indent(bare[beside[0]]) if beside else 0
+            out.append(" " * max(_indent(line) + further, 0) + line.lstrip(" ") if line.strip() else line)
+    return "\n".join(out) + "\n"
+
+
+def _indent(line: str) -> int:
+    return len(line) - len(line.lstrip(" "))
 
 
 def replace(path: Path, before: bytes, after: bytes) -> None:

@@ -6,7 +6,7 @@ fit states what the chosen filter gives and what its neighbours would have given
 """
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -36,8 +36,13 @@ _ANGLES, _POSES = 12.0, 50
 _MOST_SAMPLES, _ROWS = 30_000, 5_000
 
 
-def compare(experiment: Experiment, model: Model, logs: Sequence[Log], prior) -> dict:
+def compare(
+    experiment: Experiment, model: Model, logs: Sequence[Log], prior, *, progress: Callable[[float], None] | None = None
+) -> dict:  # fmt: skip
     """The chosen filter and its neighbours with their held-out errors.
+
+    Args:
+        progress: called with the share of them that is done.
 
     Returns:
         {"filter", "order", "window" or "cutoff", "torque", "chosen": "given" or "held-out error", "held_out": [
@@ -56,7 +61,9 @@ def compare(experiment: Experiment, model: Model, logs: Sequence[Log], prior) ->
     candidates = (_WINDOWS if key == "window" else _CUTOFFS) if automatic else (value / 2, value, value * 2)
     shortened = [_middle(log) for log in logs]
     edge, tried = _widest_edge(spec, key, candidates, shortened), []
-    for candidate in candidates:
+    for number, candidate in enumerate(candidates):
+        if progress:
+            progress(number / len(candidates))
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", SysidWarning)

@@ -8,17 +8,20 @@ from __future__ import annotations
 
 import io
 import json
+import re
 import shutil
 from collections.abc import Callable, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from . import comparison, config, experiment_file, pipeline, results, state
+from . import bounded, comparison, config, experiment_file, pipeline, results, state
 from .addition import remaining, spelled
 from .diagnose.diagnosis import Diagnosis, diagnose
 from .errors import ConfigError, SysidError
 from .estimate import Fit
 from .specs import Experiment
+from .trusted import Untrusted
 
 _HISTORY, _STEPS = "history.json", "steps"
 
@@ -104,9 +107,21 @@ def with_effect(
         listed.append(_flow(own) if formula is not None else effect if not own else CommentedMap({effect: _flow(own)}))
         if listed and isinstance(listed[-1], CommentedMap):
             listed[-1].fa.set_flow_style()
+    changed = _dumped(writer, tree)
+    if only_comments:
+        return (text.rstrip("\n") + "\n" if text.strip() else "") + changed
+    kept = experiment_file.grafted(text, _dumped(writer, writer.load(text)), changed)
+    try:
+        same = config.plain(config.parse_yaml(kept, where=where)) == config.plain(config.parse_yaml(changed, where=where))
+    except ConfigError:
+        same = False
+    return kept if same else changed
+
+
+def _dumped(writer, tree) -> str:
     stream = io.StringIO()
     writer.dump(tree, stream)
-    return (text.rstrip("\n") + "\n" if only_comments and text.strip() else "") + stream.getvalue()
+    return stream.getvalue()
 
 
 def _word(entry) -> str:
@@ -124,6 +139,19 @@ def _flow(own: dict):
         out[key] = value
     out.fa.set_flow_style()
     return out
+
+
+@contextmanager
+def asked(file: Path):
+    """Errors in what was typed or clicked without the line of a text that was never written. Raises SysidError."""
+    try:
+        yield
+    except Untrusted:
+        raise
+    except ConfigError as error:
+        said = re.sub(rf"^{re.escape(str(file))}( line \d+)?: ", "", str(error))
+        said = re.sub(r"^(unknown) key (.*) in model\.effects\[\d+\]", r"\1 option \2", said)
+        raise SysidError(re.sub(r"^model\.effects(\[\d+\])?[:.] ?", "", said)) from None
 
 
 # ---- one step
@@ -149,9 +177,10 @@ def add(
     joints = None if joints == ["*"] else joints  # every joint, or the whole robot
     read = experiment_file.read(file)
     every = pipeline.build(experiment)[0].joints
-    text = with_effect(experiment_file.text(read, str(file)), effect, joints, options, str(file), every=every)
-    after = config.loads(text, file)
-    pipeline.build(after)
+    with asked(file):
+        text = with_effect(experiment_file.text(read, str(file)), effect, joints, options, str(file), every=every)
+        after = config.loads(text, file)
+        pipeline.build(after)
     before_fit = pipeline.fit(experiment, progress=progress)
     after_fit, compared = pipeline.refit(after, before_fit, progress=progress)
     differences = tuple(comparison.compare(before_fit, after_fit, ("before", "after")))
@@ -198,7 +227,7 @@ def _record(run: Path, number: int, fit: Fit, effect: str | None, joint: str | N
 def read_history(run: Path) -> list[dict]:
     """The steps of a run folder, oldest first; empty where there are none."""
     try:
-        found = json.loads((run / _HISTORY).read_text(encoding="utf-8"))["steps"]
+        found = json.loads(bounded.read_text(run / _HISTORY))["steps"]
         return found if all(isinstance(step["rms_test"], dict) for step in found) else []
     except (OSError, ValueError, KeyError, TypeError):
         return []

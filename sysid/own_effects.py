@@ -29,7 +29,7 @@ from pathlib import Path
 
 import numpy as np
 
-from . import regressor, trusted
+from . import bounded, regressor, trusted
 from .effect import KINDS, Effect, MotionEffect, NotFinite, SensorEffect, WrenchEffect, vocabulary
 from .errors import ConfigError, SysidError
 from .motion import Piece
@@ -82,7 +82,7 @@ def allow(experiment: Experiment) -> None:
 def demand(experiment: Experiment) -> None:
     """Raises Untrusted: an experiment names a Python file that was not allowed to run."""
     for path in _named(experiment):
-        trusted.check(path, path.read_bytes())
+        trusted.check(path, bounded.read_bytes(path))
 
 
 def _named(experiment: Experiment) -> list[Path]:
@@ -144,7 +144,7 @@ def _is_effect(value) -> bool:
 def _run(path: Path) -> dict:
     """What a Python file defines; run once for each content."""
     try:
-        content = path.read_bytes()
+        content = bounded.read_bytes(path)
     except (OSError, ValueError) as error:
         said = getattr(error, "strerror", None) or "not a path"
         raise ConfigError(f"the file of own effects cannot be read ({said})", where=str(path), do="correct model.effects; paths are relative to the experiment file") from None

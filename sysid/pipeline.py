@@ -24,7 +24,7 @@ from .bumps import bumps
 from .compress import Compressed, Linearised, compress
 from .drives import rescaled, scale_is_told, with_drives
 from .effect import NotFinite
-from .errors import SysidWarning
+from .errors import LogError, SysidWarning
 from .estimate import Fit, Prediction, identify, predict
 from .inertia.consistency import is_consistent
 from .model import Model, moving_coefficients
@@ -111,44 +111,45 @@ def fit(experiment: Experiment, *, filters: dict | None = None, strength: PriorW
     seconds: dict[str, float] = {}
     with noticed() as notices:
         experiment = started(experiment)
-        with _timed(seconds, "robot"):
+        with _timed(seconds, "robot", tell):
             machine, structure, prior = build(experiment)
         for text in measured.notices if measured else ():
             warnings.warn(SysidWarning(text), stacklevel=2)
-        with _timed(seconds, "read"):
+        with _timed(seconds, "read", tell):
             train = measured.train if measured else read(experiment, machine, experiment.data.train)
+        _refuse_no_torque(train)
         provenance = [_provenance("train", log, spec) for log, spec in zip(train, experiment.data.train)]
-        with _timed(seconds, "filters"):
-            chosen = filtering.compare(experiment, structure, train, prior) if filters is None else filters
+        with _timed(seconds, "filters", tell):
+            chosen = filtering.compare(experiment, structure, train, prior, progress=lambda share: tell("filters", share)) if filters is None else filters
             preprocess = filtering.settled(experiment.preprocess, chosen)
-        with _timed(seconds, "preprocess"):
+        with _timed(seconds, "preprocess", tell):
             motion = prepare(train, preprocess, machine.joints)
             del train  # the filtered motion holds all that is needed from here on
         _tell_still(motion)
         _tell_left_out(motion, preprocess)
         disturbed = _tell_events("train", motion)
-        with _timed(seconds, "shape"):
+        with _timed(seconds, "shape", tell):
             structure, slopes, searched, weight = _settled(experiment, structure, motion, prior)
-        with _timed(seconds, "compress"):  # the regressor is built and reduced chunk by chunk, never whole
+        with _timed(seconds, "compress", tell):  # the regressor is built and reduced chunk by chunk, never whole
             compressed = compress(slopes or structure, motion, progress=lambda share: tell("compress", share))
-        with _timed(seconds, "weight"):
+        with _timed(seconds, "weight", tell):
             weight = weight or _strength(experiment, structure, motion, compressed, prior)
-        with _timed(seconds, "solve"):
+        with _timed(seconds, "solve", tell):
             found = identify(with_weight(experiment, weight.value), structure, motion, compressed, prior)
             found = replace(found, strength=strength or weight)
         if not found.physically_consistent:
             names = [body.name for body, possible in zip(machine.bodies, is_consistent(found.pi)) if not possible]
             warnings.warn(SysidWarning(f"impossible bodies: {', '.join(names)}; identified.urdf will not serve a simulator. model.inertia: log-cholesky keeps them possible"), stacklevel=2)
         _tell_undetermined(found, motion)
-        with _timed(seconds, "masses"):  # what other fits are compared with has been asked what it lacks
+        with _timed(seconds, "masses", tell):  # what other fits are compared with has been asked what it lacks
             heavy = masses.implausible(found, motion if filters is None else None)
         if heavy is not None:
             warnings.warn(SysidWarning(heavy.says), stacklevel=2)
-        with _timed(seconds, "predict"):
+        with _timed(seconds, "predict", tell):
             predictions = {"train": predict(structure, found.x, motion)}
             samples, left_out = {"train": motion.samples}, {"train": _left_out(motion)}
             del motion
-        with _timed(seconds, "test"):
+        with _timed(seconds, "test", tell):
             held_out = measured.test if measured else read(experiment, machine, experiment.data.test)
             provenance += [_provenance("test", log, spec) for log, spec in zip(held_out, experiment.data.test)]
             _tell_overlap(experiment, provenance)
@@ -161,6 +162,7 @@ def fit(experiment: Experiment, *, filters: dict | None = None, strength: PriorW
             let_go = rollout.rms(experiment, structure, found.x, motion)
         if not scale_is_told(experiment, machine.joints):
             warnings.warn(SysidWarning("no joint's torque is known in N m: these logs tell masses, friction and gains up to one common factor, which the prior's masses choose; one known gain, or a payload of known mass, settles it"), stacklevel=2)
+        tell("left", 0.0)
         for text in implausible(replace(found, predictions=predictions)):
             warnings.warn(SysidWarning(text), stacklevel=2)
     return replace(
@@ -223,6 +225,7 @@ def prepared(experiment: Experiment) -> Prepared:
         experiment = started(experiment)
         machine, structure, prior = build(experiment)
         train = read(experiment, machine, experiment.data.train)
+        _refuse_no_torque(train)
         preprocess = experiment.preprocess
         if _automatic(experiment):
             preprocess = filtering.settled(preprocess, filtering.compare(experiment, structure, train, prior))
@@ -339,10 +342,18 @@ def _prior(experiment: Experiment, structure: Model) -> np.ndarray:
 _MUCH_STANDING = 0.1
 
 
+_NO_TORQUE = 1e-12  # N m: no robot is moved by less
+
+
+def _refuse_no_torque(train: list[logs.Log]) -> None:
+    if max(np.abs(segment.tau).max(initial=0.0) for log in train for segment in log.segments) < _NO_TORQUE:
+        raise LogError("the torque of every joint is 0 in every row: none was logged", where=str(train[0].path), do="name the columns of torque in data.columns.torque, or what drives the joints in actuator")
+
+
 def _tell_still(motion: Motion) -> None:
     for joint, share in zip(motion.joints, motion.standing):
         if share > _MUCH_STANDING and joint not in motion.still:
-            warnings.warn(SysidWarning(f"joint {joint!r} stands still in {100 * share:.0f} % of its rows, where friction is whatever balances the rest; preprocess.standstill: auto leaves them out"), stacklevel=2)
+            warnings.warn(SysidWarning(f"joint {joint!r} stands still in {100 * share:.0f} % of its rows, where its friction may have any value up to its greatest; preprocess.standstill: auto leaves them out"), stacklevel=2)
     for joint in motion.still:
         warnings.warn(SysidWarning(f"joint {joint!r} never moves in the training logs, or never clear of a standstill; its friction is held at its prior, and its bodies are where the other joints' torque leaves them"), stacklevel=2)
 
@@ -400,8 +411,9 @@ def noticed():
 
 
 @contextmanager
-def _timed(seconds: dict[str, float], stage: str):
+def _timed(seconds: dict[str, float], stage: str, tell: Progress):
     start = time.perf_counter()
+    tell(stage, 0.0)
     yield
     seconds[stage] = time.perf_counter() - start
 

@@ -24,7 +24,7 @@ from .smoother import Smoother
 from .specs import PreprocessSpec
 
 # `standstill: mask` leaves a joint's rows out below this share of its own rms speed, at most 0.03 rad/s or m/s:
-# there friction is whatever balances the rest.
+# there friction may have any value up to its greatest.
 _STANDSTILL_SHARE, _STANDSTILL_MOST = 0.05, 0.03
 _MOST = 0.5  # of the weight that a low-pass has
 _KEPT_A_CYCLE = 8.0  # rows a cycle of a low-pass: what it lets through at half as many is 0.4 %

@@ -16,6 +16,8 @@ from .inertia.consistency import is_consistent
 
 # A second moment below this share of the body's mean one is no thickness that a link has (a 1 : 30 sheet).
 _THINNEST = 1e-3
+# kg, and of a radius of gyration m^2 (a micrometre): no body of a robot has less, and squares of much less are zero
+LIGHTEST = _SMALLEST = 1e-12
 _DEFAULT_MASS = 1.0  # kg, where no other body of the robot states one
 
 
@@ -29,6 +31,8 @@ def usable(name: str, stated: np.ndarray | None, geometry: np.ndarray | None, re
         reach: (3,) [m], from its joint's frame to the farthest next joint; zero for a last link.
         typical_mass: median mass [kg] of the robot's usable bodies, or None.
     """
+    if stated is not None and not stated[0] == 0.0 and abs(stated[0]) < LIGHTEST:
+        stated = None
     if stated is not None and is_consistent(stated) and _well_conditioned(stated):
         return stated
     mass = float(stated[0]) if stated is not None and stated[0] > 0.0 else None
@@ -53,17 +57,27 @@ def usable(name: str, stated: np.ndarray | None, geometry: np.ndarray | None, re
     return pseudo.sphere(mass, 0.5 * np.asarray(reach), radius)
 
 
-def _well_conditioned(pi) -> bool:
+def measurable(pi) -> bool:
+    """Whether a possible body (10,) has a mass and a size that double precision can square."""
+    return bool(pi[0] >= LIGHTEST and _moments(pi).max() > _SMALLEST * pi[0])
+
+
+def _moments(pi) -> np.ndarray:
+    """(3,) principal second moments [kg m^2] about the centre of mass."""
     _, _, central = pseudo.to_central(pi)
-    moments = 0.5 * np.trace(central) - np.linalg.eigvalsh(central)
-    return bool(moments.min() > 1e-9 * moments.max())
+    return 0.5 * np.trace(central) - np.linalg.eigvalsh(central)
+
+
+def _well_conditioned(pi) -> bool:
+    moments = _moments(pi)
+    return bool(moments.min() > 1e-9 * moments.max()) and measurable(pi)
 
 
 def _raised(pi) -> np.ndarray | None:
     mass, com, central = pseudo.to_central(pi)
     values, axes = np.linalg.eigh(0.5 * np.trace(central) * np.eye(3) - central)
     mean = np.clip(values, 0.0, None).mean()
-    if not mean > 0.0:
+    if not mean > _SMALLEST * mass:
         return None
     values = np.maximum(values, _THINNEST * mean)
     sigma = (axes * values) @ axes.T

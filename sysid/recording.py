@@ -129,7 +129,7 @@ def _load(table: Table, data: DataSpec, joints, episodes, drives):
             wanted[name] = there
     wanted |= _signals(table, data, joints, drives)
     time = None if data.rate else _time(table, _meant(table, spec, "time"))
-    counted = _EPISODE if _EPISODE in table.names else None
+    counted = _EPISODE if table.has(_EPISODE) else None
     if episodes is not None and counted is None:
         raise LogError(
             f"an episode is asked for, and there is no column {_EPISODE!r}", where=str(table.path),
@@ -156,6 +156,7 @@ def _load(table: Table, data: DataSpec, joints, episodes, drives):
     unit = (
         table.clock if time and time == table.usual.get("time") and table.clock else data.units.time
     )
+    _check_headers(table, data, wanted, time)
     signals = {}
     for name, names in wanted.items():
         if len(names) == 1 and names[0]:
@@ -170,6 +171,36 @@ def _load(table: Table, data: DataSpec, joints, episodes, drives):
                     signals[name][:, k] = columns[c][rows]
     _sum(signals, data, joints)
     return (columns[time][rows] if time else None), unit, signals, breaks
+
+
+_QUANTITIES = {"q": "position", "qd": "position", "qdd": "position", "tau": "torque"}
+
+
+def _check_headers(table: Table, data: DataSpec, wanted: dict, time: str | None) -> None:
+    """Refuse a unit that the header states and that nobody spoke of; where the experiment names
+    another, it stands, and is told.
+
+    Raises:
+        LogError: a column is in other units than it would be read in.
+    """
+    asked = [("time", time)] if time and not (table.clock and time == table.usual.get("time")) else []
+    asked += [
+        (quantity, name)
+        for key, quantity in _QUANTITIES.items()
+        for name in wanted.get(key, ())
+        if name
+    ]
+    for quantity, name in asked:
+        stated, taken = units.in_header(name, quantity), getattr(data.units, quantity)
+        if not stated or units.agree(stated, taken):
+            continue
+        said = f"the header {name!r} says {stated}, and data.units.{quantity} is {taken}"
+        if quantity not in data.units.model_fields_set:
+            raise LogError(
+                said, where=str(table.path),
+                do=f"write data.units.{quantity}: {stated}, or {taken} where the header is wrong",
+            )  # fmt: skip
+        warnings.warn(SysidWarning(f"{table.path}: {said}; read in {taken}"), stacklevel=5)
 
 
 def _signals(table: Table, data: DataSpec, joints, drives) -> dict[str, list[str]]:
@@ -208,7 +239,7 @@ def _meant(table: Table, spec: ColumnsSpec, key: str):
 
 
 def _time(table: Table, column) -> str:
-    if column not in table.names and not isinstance(column, int):
+    if not isinstance(column, int) and not table.has(column):
         raise LogError(
             f"there is no column {column!r} for time",
             where=str(table.path),
@@ -251,7 +282,7 @@ def _names(table: Table, pattern, joints, signal: str, needed: list[bool]) -> li
     if isinstance(pattern, str):
         pattern = [pattern.replace("{joint}", joint) for joint in joints]
         for joint, name, looked_at in zip(joints, pattern, needed):
-            if looked_at and name not in table.names:
+            if looked_at and not table.has(name):
                 raise LogError(
                     f"joint {joint!r} has no column: {name!r} is not there",
                     where=str(table.path),

@@ -9,11 +9,13 @@
 Each file is written under a temporary name and renamed, so that a run folder never holds half a file.
 """
 
+import hashlib
 import io
 import json
 import math
 import os
 import platform
+import shutil
 import stat
 import uuid
 from collections.abc import Callable
@@ -23,7 +25,7 @@ from pathlib import Path
 
 import numpy as np
 
-from . import prior_weight, state
+from . import bounded, prior_weight, state
 from .differences import per_group, told
 from .errors import ConfigError, SysidError
 from .estimate import Fit, at_edge
@@ -156,7 +158,7 @@ def write_together(files: dict[Path, Callable[[Path], object]]) -> None:
     Raises:
         SysidError: the disk refuses; everything is as it was.
     """
-    temporary = {path: path.with_name(f".{path.name[:100]}.{uuid.uuid4().hex}") for path in files}
+    temporary = {path: beside(path) for path in files}
     path = None
     try:
         for path, write in files.items():
@@ -171,6 +173,30 @@ def write_together(files: dict[Path, Callable[[Path], object]]) -> None:
         for filled in temporary.values():
             with suppress(OSError):
                 filled.unlink(missing_ok=True)
+
+
+def beside(path: Path) -> Path:
+    """A name beside a path to fill before it is renamed. What processes of this machine that were killed left of that kind is removed."""
+    kind, here = f".{path.name[:100]}.", hashlib.sha256(platform.node().encode()).hexdigest()[:8]
+    with suppress(OSError):
+        for old in path.parent.iterdir():
+            host, _, process = old.name.removeprefix(kind).partition("-")
+            number = process.partition("-")[0]
+            if old.name.startswith(kind) and host == here and number.isdigit() and not _alive(int(number)):
+                shutil.rmtree(old) if old.is_dir() else old.unlink()
+    return path.with_name(f"{kind}{here}-{os.getpid()}-{uuid.uuid4().hex[:8]}")
+
+
+def _alive(process: int) -> bool:
+    if os.name != "posix":
+        return True  # asking would end it
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except (OSError, OverflowError):
+        return True
+    return True
 
 
 def parquet(table) -> Callable[[Path], None]:
@@ -188,7 +214,7 @@ def parquet(table) -> Callable[[Path], None]:
 
 def _settle(filled: Path, place: Path) -> None:
     """Bring a file to the disk, with the mode and the owner of the one that it replaces."""
-    with filled.open("rb") as file:
+    with filled.open("r+b") as file:
         os.fsync(file.fileno())
     try:
         before = place.stat()
@@ -322,7 +348,7 @@ def read_fit(path: Path, asked: str, allowed: str = "a run folder of `sysid fit`
         ConfigError: there is no such run.
     """
     try:
-        found = json.loads(path.read_text(encoding="utf-8"))
+        found = json.loads(bounded.read_text(path))
         values = {entry["name"]: float(entry["value"]) for entry in found["parameters"]}
         return values, (sorted(found["robot"]["joints"]), found["robot"]["locked"])
     except OSError as error:

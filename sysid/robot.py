@@ -258,8 +258,8 @@ def _rotors(spec: RobotSpec, source: urdf.Urdf, model: pin.Model, joints: tuple[
         if rotor.on not in source.links:
             raise RobotError(f"on: {rotor.on!r} is no link of the URDF", where=where, allowed=", ".join(source.links), do="name the link that carries the motor")
         inertia = body_from(rotor.inertia)
-        if not is_consistent(inertia):
-            raise RobotError("its prior inertia is impossible", where=where, allowed="mass > 0 and edges > 0")
+        if not (is_consistent(inertia) and prior.measurable(inertia)):
+            raise RobotError("its prior inertia is impossible", where=where, allowed=f"mass > {prior.LIGHTEST:g} kg and edges > 0")
         if model.existJointName(f"{rotor.joint}_rotor"):
             raise RobotError(f"the URDF has a joint {rotor.joint}_rotor of its own", where=where, do="rename it, or leave the rotor out")
         row = np.zeros(len(joints))

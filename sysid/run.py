@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from . import config, pipeline
+from . import bounded, config, pipeline
 from .errors import ConfigError, SysidWarning
 from .estimate import Prediction, units
 from .inertia import PARAMETERS
@@ -118,7 +118,7 @@ def read_run(folder: str | Path) -> Run:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SysidWarning)  # what is odd in the URDF was told by the fit
         _, model, _ = pipeline.build(experiment)
-    document = json.loads((folder / "fit.json").read_text(encoding="utf-8"))
+    document = json.loads(bounded.read_text(folder / "fit.json"))
     wanted = (*model.names, *(value.name for value in model.shape_values))
     if missing := [name for name in wanted if name not in values]:
         raise ConfigError(

@@ -13,7 +13,7 @@ import hashlib
 import os
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from .errors import SysidError
@@ -36,17 +36,21 @@ def folder(name: str) -> Path | None:
     return path if os.access(path, os.W_OK) else None
 
 
-def _locks() -> Path:
+def _places() -> Iterator[Path]:
+    """Folders for locks: the user's own; where there is none, or its file system has no locks, one in the temporary folder."""
     if (own := folder("locks")) is not None:
-        return own
+        yield own
     path = Path(tempfile.gettempdir()) / f"sysid-locks-{os.getuid() if hasattr(os, 'getuid') else 'user'}"
-    path.mkdir(mode=0o700, exist_ok=True)
-    return path
+    with suppress(OSError):
+        path.mkdir(mode=0o700, exist_ok=True)
+        yield path
 
 
 @contextmanager
 def locked(path: Path) -> Iterator[None]:
     """Keep every other process of this user that asks for the same file out, until the block ends or the process dies.
+
+    Where no lock can be had at all, the block goes on without: what it writes is compared with what it read in any case.
 
     Raises:
         SysidError: another holds it for a minute.
@@ -54,17 +58,19 @@ def locked(path: Path) -> Iterator[None]:
     from filelock import FileLock, Timeout
 
     name = hashlib.sha256(os.fsencode(os.path.realpath(path))).hexdigest()[:32]
-    try:
-        # one object for each file: a thread that holds it already goes on
-        lock = FileLock(_locks() / f"{name}.lock", is_singleton=True)
-        lock.acquire(timeout=_WAIT)
-    except Timeout:
-        raise SysidError("another sysid is writing it", where=str(path), do="wait until it is done") from None
-    except OSError as error:
-        raise SysidError(
-            f"cannot be locked ({error.strerror})", where=str(path), do="set XDG_STATE_HOME or TMPDIR to a folder that can be written"
-        ) from None
+    held = None
+    for place in _places():
+        try:
+            # one object for each file: a thread that holds it already goes on
+            held = FileLock(place / f"{name}.lock", is_singleton=True)
+            held.acquire(timeout=_WAIT)
+            break
+        except Timeout:
+            raise SysidError("another sysid is writing it", where=str(path), do="wait until it is done") from None
+        except (OSError, NotImplementedError):
+            held = None
     try:
         yield
     finally:
-        lock.release()
+        if held is not None:
+            held.release()

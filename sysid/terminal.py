@@ -1,13 +1,17 @@
 """What the commands print for a person: tables, notices, a progress bar. Computes nothing."""
 
+import shlex
 import shutil
-from contextlib import contextmanager
+import sys
+import threading
+import time
+from contextlib import contextmanager, suppress
 
 from rich.console import Console
 from rich.markup import escape
-from rich.table import Table
 from rich.text import Text
 
+from . import progress
 from .differences import give_or_take
 from .estimate import Fit, given_shapes, said_of_shapes
 from .export import exported
@@ -18,51 +22,82 @@ _LOW = 0.1  # below this share the prior, not the data, gave a parameter
 
 
 @contextmanager
-def progress_bar():
-    """A bar for each stage; yields the function that pipelines call with (stage, share done)."""
-    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+def progress_bar(course):
+    """A bar with the stage and the time left; yields the function that pipelines call with (stage, share done)."""
+    from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn
 
-    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
+    columns = (SpinnerColumn(), BarColumn(bar_width=20), TextColumn("{task.fields[left]}"), TextColumn("{task.description}"))
+    begun = time.monotonic()
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        tasks: dict[str, object] = {}
+        task = bar.add_task("", total=1.0, left="")
 
         def report(stage: str, share: float) -> None:
-            if stage not in tasks:
-                tasks[stage] = bar.add_task(stage, total=1.0)
-            bar.update(tasks[stage], completed=share)
+            words, whole = course.tell(stage, share)
+            rest = progress.left(whole, time.monotonic() - begun)
+            told = "" if rest is None else f"about {progress.spoken(rest)} left"
+            bar.update(task, completed=whole, description=escape(words), left=told)
 
         yield report
 
 
+_QUIET, _EVERY = 5.0, 15.0  # s before the first line of a log, and from line to line
+
+
+@contextmanager
+def progress_lines(course):
+    """The same as lines for a log, the first after some seconds, then now and then, also where a stage tells nothing."""
+    begun, lock, over = time.monotonic(), threading.Lock(), threading.Event()
+    now = {"stage": "", "share": 0.0, "next": _QUIET}
+
+    def say() -> None:
+        elapsed = time.monotonic() - begun
+        if not now["stage"] or elapsed < now["next"]:
+            return
+        now["next"] = elapsed + _EVERY
+        rest = progress.left(now["share"], elapsed)
+        told = f"{progress.spoken(elapsed)} so far" if rest is None else f"about {progress.spoken(rest)} left"
+        with suppress(OSError, ValueError):  # a log that nobody can write is no reason to stop
+            print(f"sysid: {now['stage']}, {100 * now['share']:.0f} %, {told}", file=sys.stderr, flush=True)
+
+    def tick() -> None:
+        while not over.wait(1.0):
+            with lock:
+                say()
+
+    def report(stage: str, share: float) -> None:
+        with lock:
+            now["stage"], now["share"] = course.tell(stage, share)
+            say()
+
+    thread = threading.Thread(target=tick, name="sysid-progress", daemon=True)
+    thread.start()
+    try:
+        yield report
+    finally:
+        over.set()
+        thread.join()
+
+
 def show_init(found, file) -> None:
     """What was guessed of a robot and its logs, and why."""
-    console = Console()
-    table = Table(title="guessed", title_justify="left", show_lines=False)
-    for heading in ("key", "value", "because"):
-        table.add_column(heading, overflow="fold")
+    print("guessed")
     for guess in found.guesses.values():
-        value = flow(guess.value)
-        table.add_row(guess.key, escape(value if len(value) < 80 else value[:76] + " ..."), escape(str(guess)))
-    console.print(table)
+        for words, indent in ((f"  {guess.key}: {flow(guess.value)}", "      "), (f"      because: {guess}", "        ")):
+            print("\n".join(text.wrapped(words, _width(), indent)))
     for note in found.notes:
         print(f"look {note}")
-    place = file.parent
+    place = shlex.quote(str(file.parent))
     print(f"wrote {file}; next: sysid check {place}, sysid fit {place}")
 
 
 def show_fit(fit: Fit, document: dict) -> None:
     """The errors of each joint, what the solver proved, and what was decided on the way."""
-    console = Console()
-    robot = fit.model.robot
-    table = Table(title=f"{escape(fit.experiment.name)}: residual by joint", title_justify="left")
-    for heading in ("joint", "", "RMS train", "RMS test", "relative test", "R2 test"):
-        table.add_column(heading, justify="left" if heading == "joint" else "right", overflow="fold")
-    for joint, prismatic in zip(fit.joints, robot.prismatic):
-        table.add_row(
-            escape(joint), "N" if prismatic else "N m", _level(document["rms"]["train"][joint]), _level(document["rms"]["test"][joint]),
-            _percent(document["relative_error"]["test"][joint]), _four(document["r2"]["test"][joint]),
-        )  # fmt: skip
-    console.print(table)
+    robot, rms, relative = fit.model.robot, document["rms"], document["relative_error"]["test"]
+    rows = [
+        [joint, "N" if slides else "N m", _level(rms["train"][joint]), _level(rms["test"][joint]), _percent(relative[joint]), _four(document["r2"]["test"][joint])]
+        for joint, slides in zip(fit.joints, robot.prismatic)
+    ]  # fmt: skip
+    _table(f"{fit.experiment.name}: residual by joint", ["joint", "", "RMS train", "RMS test", "relative test", "R2 test"], rows)
     _show_groups(document.get("groups", {}))
     certificate = document["certificate"]
     for own in document["drives"]:
@@ -169,21 +204,21 @@ def show_design(document: dict) -> None:
 
 def show_comparison(document: dict) -> None:
     """RMS of every experiment and the differences with their standard errors."""
-    console = Console()
     joints = list(dict.fromkeys(joint for entry in document["experiments"] for joint in entry["rms_test"]))
-    table = Table(title="held-out RMS [N m, or N on a prismatic joint]", title_justify="left")
-    table.add_column("experiment", overflow="fold")
-    for joint in joints:
-        table.add_column(escape(joint), justify="right", overflow="fold")
-    table.add_column("relative", justify="right", overflow="fold")
-    for entry in document["experiments"]:
-        cells = [_level(entry["rms_test"][joint]) if joint in entry["rms_test"] else "" for joint in joints]
-        table.add_row(escape(entry["name"]), *cells, _percent(entry["relative_error"]["*"]))
-    console.print(table)
+    rows = [
+        [entry["name"], *(_level(entry["rms_test"][j]) if j in entry["rms_test"] else "" for j in joints), _percent(entry["relative_error"]["*"])]
+        for entry in document["experiments"]
+    ]  # fmt: skip
+    _table("held-out RMS [N m, or N on a prismatic joint]", ["experiment", *joints, "relative"], rows)
     for entry in document["differences"]:
         se = "unknown: too few blocks" if entry["se"] is None else f"{entry['se']:.2g}"
         print(f"{entry['joint']}: {entry['from']} -> {entry['to']} {entry['delta_rms']:+.4g} (standard error {se})")
     _show_notices(document)
+
+
+def _table(title: str, heads: list[str], rows: list[list[str]]) -> None:
+    """A table in the width of the terminal, the names on its left whole."""
+    print("\n".join([title, *tables.fitted(heads, rows, 1, _width())]))
 
 
 def _percent(share: float | None) -> str:
@@ -202,7 +237,7 @@ def show_diagnosis(found, document: dict) -> None:
     """The verdict in words, then what it rests on."""
     of, width = text.told(found, document), _width()
     _show_verdict(of, width)
-    parts = [tables.errors(of, width), tables.suspects(document), tables.events(document, width), tables.fails(document, width)]
+    parts = [tables.errors(of, width), tables.suspects(document, width), tables.events(document, width), tables.fails(document, width)]
     for lines in [*parts, tables.shown(document, found.fit.joints, width)]:
         if lines:
             print("\n" + "\n".join(lines))
@@ -229,17 +264,12 @@ def _show_verdict(of, width: int) -> None:
 
 def show_changed(document: dict) -> None:
     """What is different on a log while a fitted model is held."""
-    console = Console()
-    table = Table(title="the held model on the new log, low-passed at 15 Hz [N m or N]", title_justify="left")
-    for heading in ("joint", "RMS held", "RMS with the changes"):
-        table.add_column(heading, justify="left" if heading == "joint" else "right", overflow="fold")
-    for joint, entry in document["joints"].items():
-        table.add_row(escape(joint), f"{entry['rms']['held']:.4g}", f"{entry['rms']['after']:.4g}")
-    console.print(table)
+    rows = [[joint, _level(entry["rms"]["held"]), _level(entry["rms"]["after"])] for joint, entry in document["joints"].items()]
+    _table("the held model on the new log, low-passed at 15 Hz [N m or N]", ["joint", "RMS held", "RMS with the changes"], rows)
     if not document["findings"]:
         print("nothing has changed that one half of the log would tell of the other")
     for f in document["findings"]:
-        print(f"{f['effect']} on {f['joint']}: removes {100 * f['misfit_removed']:.0f} % of the squared residual")
+        print(f"{f['effect']} on {f['joint']}: removes {text.percent(max(f['misfit_removed'], 0.0))} of the squared residual")
         for name, p in f["parameters"].items():
             print(f"  {text.valued(name, p)}")
     _show_notices(document)
@@ -248,15 +278,12 @@ def show_changed(document: dict) -> None:
 
 def show_added(document: dict) -> None:
     """The held-out error before and after an effect."""
-    console = Console()
-    table = Table(title=f"held-out RMS without and with {escape(document['added'])}", title_justify="left")
-    for heading in ("joint", "before", "after", "change", "standard error"):
-        table.add_column(heading, justify="left" if heading == "joint" else "right", overflow="fold")
-    for entry in document["differences"]:
-        se = "-" if entry["se"] is None else f"{entry['se']:.2g}"
-        joint = entry["joint"]
-        table.add_row(escape(joint), _level(document["rms_test_before"][joint]), _level(document["rms_test_after"][joint]), f"{entry['delta_rms']:+.4g}", se)
-    console.print(table)
+    before, after = document["rms_test_before"], document["rms_test_after"]
+    rows = [
+        [d["joint"], _level(before[d["joint"]]), _level(after[d["joint"]]), f"{d['delta_rms']:+.4g}", "-" if d["se"] is None else f"{d['se']:.2g}"]
+        for d in document["differences"]
+    ]  # fmt: skip
+    _table(f"held-out RMS without and with {document['added']}", ["joint", "before", "after", "change", "standard error"], rows)
     for parameter in document["parameters"]:
         print(text.valued(parameter["name"], parameter))
     if document["says"]:
@@ -281,19 +308,23 @@ def show_discovery(said: dict, found, document: dict) -> None:
     print(f"steps and experiment files: {said['run']}/steps")
 
 
+_LONGEST_BAR = 20  # twice the error of the start, or more
+
+
 def show_history(steps: list[dict]) -> None:
     """The steps, one a line, and the error of each joint as a falling row of bars."""
-    joints = list(steps[0]["rms_test"])
-    table = Table(title="held-out RMS [N m, or N on a prismatic joint]", title_justify="left")
-    table.add_column("step", overflow="fold")
-    for joint in joints:
-        table.add_column(escape(joint), justify="right", overflow="fold")
-    first = steps[0]["rms_test"]
-    for number, step in enumerate(steps):
-        what = "start" if step["added"] is None else f"+ {step['added']} on {step['joint']}"
-        cells = [f"{_level(step['rms_test'][j])} {'#' * max(1, round(10 * (step['rms_test'][j] or 0.0) / first[j])) if first.get(j) else ''}" if j in step["rms_test"] else "" for j in joints]
-        table.add_row(f"{number} {escape(what)}", *cells)
-    Console().print(table)
+    joints, first = list(steps[0]["rms_test"]), steps[0]["rms_test"]
+
+    def cell(rms: dict, joint: str) -> str:
+        now, before = rms.get(joint), first.get(joint)
+        bar = "#" * min(max(1, round(10 * now / before)), _LONGEST_BAR) if now and before else ""
+        return f"{_level(now)} {bar.ljust(10)}" if joint in rms else ""
+
+    rows = [
+        [f"{number} start" if step["added"] is None else f"{number} + {step['added']} on {step['joint']}", *(cell(step["rms_test"], j) for j in joints)]
+        for number, step in enumerate(steps)
+    ]  # fmt: skip
+    _table("held-out RMS [N m, or N on a prismatic joint]", ["step", *joints], rows)
 
 
 def show_export(found) -> None:
@@ -339,13 +370,12 @@ def show_bodies(document: dict, run) -> None:
         f"linear least squares: {linear['nonphysical_count']} not physical ({100 * linear['nonphysical']:.1f} %), {linear['negative_mass']} of negative mass, "
         f"{linear['inertia_not_positive']} with inertia not positive, {linear['triangle_violated']} violate a triangle inequality (about the centre of mass)"
     )
-    table = Table(title="iterations until convergence", title_justify="left")
-    for heading in ("parameterization", "median", "5 % to 95 %", "not converged", "s per iteration", "own solver: median"):
-        table.add_column(heading, justify="left" if heading == "parameterization" else "right", overflow="fold")
+    rows = []
     for name, entry in document["parameterizations"].items():
         low, high = entry["range_90"]
-        table.add_row(name, f"{entry['median_iterations']:g}", f"{low:g} to {high:g}", str(entry["failures"]), f"{entry['seconds_per_iteration']:.1e}", f"{entry['newton']['median_iterations']:g}")
-    Console().print(table)
+        rows.append([name, f"{entry['median_iterations']:g}", f"{low:g} to {high:g}", str(entry["failures"]), f"{entry['seconds_per_iteration']:.1e}", f"{entry['newton']['median_iterations']:g}"])
+    heads = ["parameterization", "median", "5 % to 95 %", "not converged", "s per iteration", "own solver: median"]
+    _table("iterations until convergence", heads, rows)
     print(f"figures and tables: {run}")
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import hashlib
 from pathlib import Path
 
-from . import state
+from . import bounded, state
 from .errors import ConfigError
 
 _ALLOWED: set[str] = set()  # in this process, also where nothing can be remembered
@@ -53,6 +53,6 @@ def trust(file: str | Path) -> None:
     """Let a Python file of own effects run, as it is now. Raises ConfigError: it cannot be read."""
     path = Path(file)
     try:
-        allow(path.resolve(), path.read_bytes())
+        allow(path.resolve(), bounded.read_bytes(path))
     except OSError as error:
         raise ConfigError(f"the file cannot be read ({error.strerror})", where=str(path), do="check its name") from None

@@ -13,11 +13,17 @@ from xml.parsers import expat
 
 import numpy as np
 
+from . import bounded
 from .errors import RobotError
 from .inertia import pseudo
 
 MOVING = ("revolute", "continuous", "prismatic")
 TYPES = MOVING + ("fixed", "floating", "planar")
+# nothing of a robot is larger in SI units, and its square is still a number; a limit beyond it is none
+_LARGEST = 1e12
+_UNLIMITED = ("limit", "safety_controller")
+_DEEPEST = 50  # elements in elements; a URDF has six
+_ELSEWHERE = ("xacro", "xinclude")  # in the name spaces of elements that stand for others
 _EXAMPLES, _PACKAGE = "example-robot-data://", "package://"
 
 
@@ -124,7 +130,7 @@ def read(path: Path) -> Urdf:
         RobotError: not there, not XML, entities, a loop, a missing link, numbers that are no numbers.
     """
     try:
-        data = path.read_bytes()
+        data = bounded.read_bytes(path)
     except OSError as error:
         raise RobotError(f"no URDF can be read there ({error.strerror})", where=str(path), do="check robot.urdf") from None
     return parse(data, path)
@@ -135,6 +141,7 @@ def parse(data: bytes, path: Path) -> Urdf:
     root = root_of(data, path)
     if root.tag != "robot":
         raise RobotError(f"the root element is <{root.tag}>", where=str(path), allowed="<robot>", do="give a URDF, not a xacro or SDF")
+    _check_whole(root, path)
     links: dict[str, Link] = {}
     for element in root.findall("link"):
         link = _link(element, path)
@@ -148,6 +155,7 @@ def parse(data: bytes, path: Path) -> Urdf:
             raise RobotError(f"joint {joint.name!r} appears twice", where=str(path), do="rename one")
         joints[joint.name] = joint
     _check_rest(root, path)
+    _check_mimics(root, joints, path)
     _check_tree(links, joints, path)
     root.set("name", root.get("name") or "robot")
     return Urdf(path=path, text=ElementTree.tostring(root, encoding="unicode"), links=links, joints=joints)
@@ -163,7 +171,18 @@ def root_of(data: bytes, path: Path) -> ElementTree.Element:
     def refuse(*_):
         raise RobotError("the XML declares a document type or entities", where=str(path), allowed="plain elements", do="remove <!DOCTYPE …>")
 
+    depth = [0]
+
+    def deeper(*_):
+        depth[0] += 1
+        if depth[0] > _DEEPEST:
+            raise RobotError(f"elements more than {_DEEPEST} deep", where=str(path), do="give a URDF file")
+
+    def back(*_):
+        depth[0] -= 1
+
     checker = expat.ParserCreate()
+    checker.StartElementHandler, checker.EndElementHandler = deeper, back
     checker.StartDoctypeDeclHandler = refuse
     checker.EntityDeclHandler = refuse
     try:
@@ -179,12 +198,14 @@ def _numbers(element, attribute: str, count: int, default: str, path: Path, owne
         values = np.array([float(word) for word in text.split()])
     except ValueError:
         values = np.array([])
-    if values.shape != (count,) or not np.isfinite(values).all():
+    most = math.inf if (element is not None and element.tag in _UNLIMITED) else _LARGEST
+    if values.shape != (count,) or not (np.abs(values) <= most).all():
         tag = element.tag if element is not None else attribute
+        what = "a finite number" if count == 1 else f"{count} finite numbers"
         raise RobotError(
-            f"{owner}: <{tag} {attribute}={text!r}>",
+            f"{owner}: <{tag} {attribute}={text[:60]!r}>",
             where=str(path),
-            allowed="a finite number" if count == 1 else f"{count} finite numbers",
+            allowed=what + ("" if most == math.inf else f", at most {_LARGEST:g} in size"),
             do="correct it",
         )
     return values
@@ -271,6 +292,7 @@ def _joint(element, path: Path) -> Joint:
             raise RobotError(f"joint {name!r} has the axis 0 0 0", where=str(path), allowed="a direction")
     # zero is what exporters write where nobody knows
     most = [(_numbers(limit, key, 1, "0", path, f"joint {name!r}")[0] if limit is not None else 0.0) or math.inf for key in ("velocity", "effort")]
+    lower, upper, *most = (math.copysign(math.inf, value) if abs(value) > _LARGEST else value for value in (lower, upper, *most))
     bounds = (lower, upper) if kind != "continuous" else (-math.inf, math.inf)
     return Joint(name, kind, ends[0], ends[1], damping, friction, bounds, *most)
 
@@ -281,6 +303,25 @@ _REPEATED = {
     "calibration": {"rising": 1, "falling": 1}, "safety_controller": {"soft_lower_limit": 1, "soft_upper_limit": 1, "k_position": 1, "k_velocity": 1},
 }  # fmt: skip
 _REFERS = {"mesh": "filename", "texture": "filename", "mimic": "joint"}
+
+
+def _check_whole(root, path: Path) -> None:
+    """Refuse what stands for something else: the robot is not all there."""
+    for element in root.iter():
+        space, _, tag = str(element.tag).rpartition("}")
+        if any(word in space.lower() for word in _ELSEWHERE):
+            raise RobotError(f"the element <{space.rpartition('/')[2]}:{tag}> stands for others, which are not in the file", where=str(path), do="expand it first: xacro FILE > robot.urdf")
+    for element in [*root.findall("link"), *root.findall("joint")]:
+        for one in (element, *element.findall("parent"), *element.findall("child")):
+            if word := next((value for value in one.attrib.values() if "${" in value or "$(" in value), None):
+                raise RobotError(f"{word[:60]!r} in <{one.tag}> is an expression of xacro", where=str(path), do="expand it first: xacro FILE > robot.urdf")
+
+
+def _check_mimics(root, joints, path: Path) -> None:
+    for element in root.findall("joint"):
+        mimic = element.find("mimic")
+        if mimic is not None and mimic.get("joint") not in joints:
+            raise RobotError(f"joint {element.get('name')!r} mimics {mimic.get('joint')!r}, which is missing", where=str(path), allowed=_some(joints), do="correct or remove <mimic>")
 
 
 def _check_rest(root, path: Path) -> None:

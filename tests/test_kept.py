@@ -1,8 +1,10 @@
 """What a user wrote is never lost: two at once, edits meanwhile, links, modes, line ends; steps and simulations."""
 
+import gc
 import json
 import os
 import stat
+import warnings
 
 import pytest
 
@@ -112,6 +114,58 @@ def test_without_a_home_locks_are_kept_elsewhere(tmp_path, monkeypatch, home):
     assert state.folder("locks") is None
     with state.locked(tmp_path / "x"):
         pass
+
+
+def test_where_no_lock_can_be_had_work_goes_on(tmp_path, monkeypatch):
+    import filelock
+
+    def refuse(*given, **how):
+        raise OSError(37, "No locks available")
+
+    monkeypatch.setattr(filelock.FileLock, "acquire", refuse)
+    with state.locked(tmp_path / "x"):
+        pass
+
+
+# ---- the studio
+
+
+def test_the_studio_keeps_what_is_not_its_change(experiment, tmp_path):
+    from sysid.studio.desk import Desk, hashed
+
+    folder = experiment(config=TEXT)
+    real = tmp_path / "real.yaml"
+    before = b"\xef\xbb\xbf" + TEXT.replace("\n", "\r\n").encode()
+    real.write_bytes(before)
+    real.chmod(0o640)
+    (folder / "config.yaml").unlink()
+    (folder / "config.yaml").symlink_to(real)
+    desk = Desk(folder, tmp_path / "run")
+    seen = desk.sync()
+    now = desk.change(seen, lambda text: loop.with_effect(text, "cogging", ["elbow"], {}), "cogging", "elbow")
+    assert (folder / "config.yaml").is_symlink() and stat.S_IMODE(real.stat().st_mode) == 0o640
+    lines = real.read_bytes().splitlines(keepends=True)
+    assert lines[0].startswith(b"\xef\xbb\xbf") and all(line.endswith(b"\r\n") for line in lines) and len(lines) >= 4
+    assert now == hashed(desk.text())
+    desk.undo(now)
+    assert real.read_bytes() == before
+    # what another wrote meanwhile stays
+    real.write_bytes(before + b"# theirs\r\n")
+    with pytest.raises(experiment_file.Changed):
+        desk.change(seen, lambda text: text + "# ours\n", "x", None)
+    assert real.read_bytes().endswith(b"# theirs\r\n")
+
+
+@pytest.mark.parametrize("effect", ["cogging", "gravity_tilt"])
+def test_a_star_in_the_studio_is_every_joint_or_the_whole_robot(experiment, tmp_path, monkeypatch, effect):
+    from sysid.studio.bench import Bench
+
+    folder = experiment(config=TEXT)
+    monkeypatch.setattr(Bench, "_ensure", lambda self, sha: None)
+    bench = Bench(folder, tmp_path / "run")
+    bench.add_effect(bench.desk.sync(), effect, "*")
+    _, model, _ = pipeline.build(pipeline.load(folder))
+    assert model.terms[-1][0].name == effect and (folder / "config.yaml").read_text() == TEXT.replace("coulomb]", f"coulomb, {effect}]")
 
 
 # ---- a run folder
@@ -230,6 +284,9 @@ def published(tmp_path, monkeypatch):
     yield served
     server.shutdown()
     server.server_close()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ResourceWarning)  # of an answer that requests left unread
+        gc.collect()
 
 
 def test_fetch_shows_its_progress_without_another_package(published, cli, tmp_path, monkeypatch):
@@ -252,3 +309,31 @@ def test_fetch_says_what_is_wrong(published, cli, tmp_path):
     (published / "log.csv").unlink()
     said = cli("fetch", "mine", out=tmp_path / "data")
     assert said.status == 2 and "network" in said.err
+
+
+# ---- the lines of a file that the change does not touch
+
+
+STYLES = {
+    "deep lists": "robot:\n    urdf: robot.urdf\ndata:\n    train:\n        - train.csv      # the long one\n    test:\n        -   test.csv\nmodel:\n    effects:\n        - viscous\n\n        # after March\n        - coulomb\nprior: {weight:   1.0e-2}\n",
+    "flat lists": "model:\n  effects:\n  - viscous\n  - coulomb\nrobot:   {urdf: 'robot.urdf'}\n",
+    "flow": "robot:   {urdf: robot.urdf}   # mine\nmodel: {effects: [viscous,   coulomb]}\n",
+    "nested": "model:\n   effects:\n      - viscous\n      - stribeck:\n            joints: [elbow]\n   inertia: log-cholesky\n",
+    "last": "robot:\n    urdf: robot.urdf\nmodel:\n    effects:\n        - viscous",
+}
+
+
+@pytest.mark.parametrize("style", STYLES)
+@pytest.mark.parametrize(("effect", "joints"), [("torque_bias", None), ("cogging", ["elbow"]), ("stribeck", ["shoulder"])])
+def test_lines_that_do_not_change_stay_as_they_were(style, effect, joints):
+    from sysid import config
+
+    text = STYLES[style]
+    changed = loop.with_effect(text, effect, joints, {})
+    before, after = (config.plain(config.parse_yaml(t, where="")) for t in (text, changed))
+    assert {k: v for k, v in after.items() if k != "model"} == {k: v for k, v in before.items() if k != "model"}
+    entries = [e if isinstance(e, str) else next(iter(e)) for e in after["model"]["effects"]]
+    assert effect in entries and "viscous" in entries
+    lines = changed.splitlines()
+    touched = [line for line in text.splitlines() if line not in lines]
+    assert len(touched) <= 1 and all("effects" in line or "joints" in line for line in touched), changed

@@ -79,7 +79,6 @@ def test_the_other_lines_keep_their_quotes():
     assert '- "train.csv"' in text and "['test.csv']" in text
 
 
-@pytest.mark.xfail(strict=True, reason="ruamel.yaml writes every list with its own indentation")
 def test_the_other_lines_keep_their_indentation():
     text = with_effect(BLOCK, "armature", None, {})
     assert "    - viscous\n" in text

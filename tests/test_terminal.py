@@ -163,7 +163,7 @@ def test_no_name_is_cut_and_commands_are_whole(monkeypatch, capsys, columns):
     wide = {
         COMMAND,
         *tables.errors(of(said), columns),
-        *tables.suspects(said),
+        *tables.suspects(said, columns),
         *tables.shown(said, JOINTS, columns),
     }
     wide |= {line for line in out.splitlines() if line.startswith("sysid design ")}
@@ -223,7 +223,7 @@ def test_each_joint_is_said_in_a_paragraph():
 
 def test_tables_say_what_is_not_known():
     said = document()
-    errors = tables.errors(of(said), 80)
+    errors = tables.errors(of(said), 200)
     (rail,) = [line.split() for line in errors if line.startswith("  rail ")]
     assert rail == ["rail", "N", "0.3", "0.4", "0.11", "not", "known"]
     assert "  noise floor of rail: not determined: 2 s are too short" in errors
@@ -248,7 +248,7 @@ def test_tables_say_what_is_not_known():
         tables.events(many, 200)[-1] == "  and 40 more: see diagnosis.json"
         and tables.events(document(events=[]), 80) == []
     )
-    assert tables.suspects(document(findings=[])) == []
+    assert tables.suspects(document(findings=[]), 80) == []
 
 
 @pytest.mark.parametrize(

@@ -9,6 +9,7 @@ from typing import Annotated
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from .. import bounded
 from ..config import parse_yaml, plain
 from ..errors import ConfigError
 from ..robot import Robot
@@ -82,7 +83,7 @@ class Limits:
 def read(path: Path) -> LimitsSpec:
     """A limits file (YAML). Raises ConfigError."""
     try:
-        data = path.read_bytes()
+        data = bounded.read_bytes(path)
     except OSError as error:
         raise ConfigError(
             f"the limits cannot be read ({error.strerror})", where=str(path), do="check --limits"

@@ -7,7 +7,7 @@ from ..errors import ConfigError
 
 
 class JointCoupling(TorqueEffect):
-    """A wrist's motor, or the bevel gear it drives, turns with a neighbouring joint too: inertia and friction of one
+    """A joint's motor, or the bevel gear it drives, turns with a neighbouring joint too, as in many wrists: inertia and friction of one
     joint follow the motion of the other.
     """
 

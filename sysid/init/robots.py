@@ -8,7 +8,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from .. import urdf
+from .. import bounded, urdf
 from ..errors import RobotError
 from ..silence import silenced
 from .guess import Guess
@@ -51,7 +51,7 @@ def read(reference: str) -> Machine:
         )
     if path.suffix.lower() == ".xacro":
         return _of_xacro(path)
-    if urdf.root_of(path.read_bytes(), path).tag == "mujoco":
+    if urdf.root_of(bounded.read_bytes(path), path).tag == "mujoco":
         return _of_mjcf(path)
     return Machine(urdf.read(path), None)
 

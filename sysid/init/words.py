@@ -8,6 +8,8 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
+from ..units import WORDS as UNITS
+
 #: {signal: the words for it that logs of robots use}
 SIGNALS = {
     "position": {"q", "pos", "position", "positions", "angle", "angles", "theta", "qpos", "jpos"},
@@ -40,15 +42,6 @@ _BESIDE_TIME = {
     "start",
 }
 COUNTS = {"enc", "encoder", "count", "counts", "tick", "ticks"}
-#: {word: unit}
-UNITS = {
-    "time": {"s": "s", "sec": "s", "secs": "s", "seconds": "s", "second": "s", "ms": "ms"}
-    | {"msec": "ms", "millis": "ms", "milliseconds": "ms", "us": "us", "usec": "us", "micros": "us"}
-    | {"microseconds": "us", "ns": "ns", "nsec": "ns", "nanos": "ns", "nanoseconds": "ns"},
-    "position": {"deg": "deg", "degree": "deg", "degrees": "deg", "rad": "rad", "rads": "rad"}
-    | {"radian": "rad", "radians": "rad", "mm": "mm", "m": "m"},
-    "torque": {"nm": "N m"},
-}
 _WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+")
 
 

@@ -4,8 +4,8 @@ out.
 Whatever filter a fit uses, structure that only the filter made must not be taken for physics, and
 single samples of noise must not hide it. So angles are lightly smoothed and differentiated, and
 then torque and every predicted column go through one and the same zero-phase Gaussian low-pass,
-whose memory is short and finite; rows where a joint stands still, where friction is whatever
-balances the rest, are left out for that joint, widened by what the filters see of them.
+whose memory is short and finite; rows where a joint stands still, where friction may have any
+value up to its greatest, are left out for that joint, widened by what the filters see of them.
 
     motion.py    logs under it, and the band that a motion asks for
     angles.py    the noise of the angles: how large it is, and drawn once more

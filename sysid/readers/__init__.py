@@ -26,6 +26,7 @@ def open_table(path: Path, topic: str | None = None) -> Table:
         return _open_folder(path, topic)
     if not path.is_file():
         what = "no file matches" if has_magic(path.name) else "there is no such file"
+        what = "a pipe or a device, no plain file" if path.exists() else what
         raise LogError(what, where=where, do="check data.train and data.test")
     if path.suffix.lower() in listing.PACKED and kind:
         from .packed import PackedTable

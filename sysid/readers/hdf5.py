@@ -8,9 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import LogError
-from .table import ArrayTable
+from .table import ArrayTable, most_bytes
 
-_MOST_VALUES = 10**9  # of one dataset: HDF5 may promise more than any memory holds, in a few bytes
 _DEEPEST = 50
 
 _STATE, _STAMP = "observation/robot_state/", "observation/timestamp/"
@@ -52,7 +51,7 @@ class Hdf5Table(ArrayTable):
         try:
             self._file = h5py.File(path, "r")
             for name, dataset in contained(self._file, str(path)):
-                if np.issubdtype(dataset.dtype, np.number) and 0 < dataset.size <= _MOST_VALUES:
+                if np.issubdtype(dataset.dtype, np.number) and 0 < dataset.size and dataset.nbytes <= most_bytes(path):
                     self._datasets[name] = dataset
             self.rate = _rate(dict(self._file.attrs))
         except LogError:

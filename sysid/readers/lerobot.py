@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from .. import bounded
 from ..errors import LogError
 from .table import Table
 
@@ -56,7 +57,7 @@ def element_names(path: Path) -> dict[str, list[str]]:
     try:
         if info.stat().st_size > _LARGEST_INFO:
             raise ValueError(f"{info.stat().st_size} bytes")
-        features = json.loads(info.read_text(encoding="utf-8"))["features"]
+        features = json.loads(bounded.read_text(info))["features"]
         said = {name: _listed(feature.get("names")) for name, feature in features.items()}
     except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise LogError(

@@ -12,7 +12,7 @@ import zlib
 import numpy as np
 
 from ..errors import LogError
-from .table import ArrayTable, stacked
+from .table import ArrayTable, most_bytes, stacked
 
 _NUMBERS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
 _MATRIX, _COMPRESSED = 14, 15
@@ -27,7 +27,7 @@ class Mat5Table(ArrayTable):
     def __init__(self, path):
         self._arrays = {}
         try:
-            for name, value in _variables(path.read_bytes()):
+            for name, value in _variables(path.read_bytes(), most_bytes(path)):
                 self._collect(name, value)
         except (ValueError, KeyError, IndexError, struct.error, zlib.error, RecursionError, OSError, MemoryError) as error:
             raise LogError(
@@ -51,7 +51,7 @@ class Mat5Table(ArrayTable):
         return self._arrays[name]
 
 
-def _variables(data: bytes):
+def _variables(data: bytes, most: int):
     """Name and value of every variable: an array, a list of cells, a list of structs (dicts), None for what else there is."""
     if len(data) < 128 or data[126:128] not in (b"IM", b"MI"):
         raise ValueError("it has no header of MAT v5")
@@ -60,7 +60,13 @@ def _variables(data: bytes):
     while at < len(view):
         kind, content, at = _element(view, at, order)
         if kind == _COMPRESSED:
-            kind, content, _ = _element(memoryview(zlib.decompress(content)), 0, order)
+            unpacker = zlib.decompressobj()
+            unpacked = unpacker.decompress(content, most)
+            if unpacker.unconsumed_tail:
+                raise ValueError(f"a variable unpacks to more than {most} bytes")
+            if not unpacker.eof:
+                raise ValueError("a variable is cut off")
+            kind, content, _ = _element(memoryview(unpacked), 0, order)
         if kind != _MATRIX:
             raise ValueError(f"an element of type {kind} where a variable should be")
         name, value = _matrix(content, order)

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..errors import LogError
 from .hdf5 import own_item
-from .table import ArrayTable
+from .table import ArrayTable, most_bytes
 
 
 class Mat73Table(ArrayTable):
@@ -47,12 +47,14 @@ class Mat73Table(ArrayTable):
     def _shape(self, dataset):
         if not self._reference(dataset.dtype):
             return dataset.shape[::-1] if np.issubdtype(dataset.dtype, np.number) else None
-        first = self._file[dataset[()].ravel()[0]] if dataset.size else None
+        first = self._file[dataset[()].ravel()[0]] if 0 < dataset.nbytes <= most_bytes(self.path) else None
         # cells of structs or of text have no place in a log; that is no reason to refuse what else is there
         return (dataset.size, first.size) if hasattr(first, "size") else None
 
     def fetch(self, name):
         dataset = self._datasets[name]
+        if dataset.nbytes > most_bytes(self.path):  # HDF5 may promise more than any memory holds, in a few bytes
+            raise self._unreadable(f"variable {name!r}", ValueError(f"{dataset.nbytes} bytes in a file of {self.path.stat().st_size}"))
         try:
             values = self._cells(dataset) if self._reference(dataset.dtype) else dataset[()].T
         except Exception as error:  # as above

@@ -5,7 +5,7 @@ import zipfile
 import numpy as np
 
 from ..errors import LogError
-from .table import ArrayTable
+from .table import ArrayTable, most_bytes
 
 
 class NpzTable(ArrayTable):
@@ -17,7 +17,11 @@ class NpzTable(ArrayTable):
         try:
             # given an open file, NumPy leaves the closing to us also where it fails
             with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
-                self._arrays = {name: archive[name] for name in archive.files}
+                if sum(entry.file_size for entry in archive.zip.infolist()) > most_bytes(path):
+                    raise ValueError(f"it unpacks to more than {most_bytes(path)} bytes")
+                held = {name: archive[name] for name in archive.files}
+            # what is no array stands in it as its bytes
+            self._arrays = {name: array for name, array in held.items() if isinstance(array, np.ndarray)}
         except Exception as error:  # zipfile, zlib and NumPy's header parser raise what they like on corrupt bytes
             said = (str(error).splitlines() or [type(error).__name__])[0]
             raise LogError(

@@ -13,11 +13,9 @@ import zlib
 from pathlib import Path
 
 from ..errors import LogError
-from .table import Table
+from .table import Table, most_bytes
 
 OPENERS = {".gz": gzip.open, ".bz2": bz2.open, ".xz": lzma.open}
-# Numbers with noise never shrink so far; a file that was made to fill a disk does.
-_MOST, _ANY = 300, 2**30  # times its size; bytes that any may have
 _CHUNK = 2**20
 
 
@@ -35,7 +33,7 @@ class PackedTable(Table):
         self.rate = self._table.rate
 
     def _unpack(self) -> None:
-        most = max(_ANY, _MOST * self.path.stat().st_size)
+        most = most_bytes(self.path)
         try:
             with (
                 OPENERS[self.path.suffix.lower()](self.path) as packed,

@@ -6,8 +6,10 @@ import polars as pl
 from ..errors import LogError
 from ..silence import silenced
 from . import lerobot
-from .table import Table
+from .table import Table, most_bytes
 
+# whole numbers stay whole, as a clock in ns has more digits than a float; NumPy has none of 128 bits
+_WHOLE = (pl.Int8, pl.Int16, pl.Int32, pl.Int64, pl.UInt8, pl.UInt16, pl.UInt32, pl.UInt64)
 # on corrupt pages Polars panics; what it raises then is no Exception, and Rust has written to standard error
 _CORRUPT = (pl.exceptions.PolarsError, pl.exceptions.PanicException, OSError)
 
@@ -20,6 +22,9 @@ class ParquetTable(Table):
         try:
             with silenced():
                 self._schema = pl.read_parquet_schema(path)
+                rows = pl.scan_parquet(path).select(pl.len()).collect().item() if self._schema else 0
+                if 8 * rows > most_bytes(path):
+                    raise OSError(f"{rows} rows in a file of {path.stat().st_size} bytes")
                 self._widths = {name: width for name, kind in self._schema.items() if (width := self._width(name, kind))}
         except _CORRUPT as error:
             raise self._unreadable(error) from None
@@ -83,7 +88,7 @@ class ParquetTable(Table):
                         where=f"{self.path} column {name!r} row {row}", do="leave the row out",
                     )  # fmt: skip
                 values = values.explode() if width else values
-                values = values if values.dtype.is_integer() else values.cast(pl.Float64)
+                values = values if values.dtype in _WHOLE else values.cast(pl.Float64)
         except _CORRUPT as error:
             raise self._unreadable(error, name) from None
         self._check_null(name, values, width or 1)

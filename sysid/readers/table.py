@@ -2,12 +2,21 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
+from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
 
 from ..errors import LogError
+
+# Numbers with noise never shrink so far; a file that was made to fill a disk or a memory does.
+_MOST, _ANY = 300, 2**28  # times its size; bytes that any may have
+
+
+def most_bytes(path: Path) -> int:
+    """How many bytes a file may unpack to, or an array in it may have."""
+    return max(_ANY, _MOST * path.stat().st_size)
 
 
 class Table(ABC):
@@ -37,6 +46,18 @@ class Table(ABC):
         """How many columns stand behind a name: more than one for a matrix."""
         return 1
 
+    def has(self, name) -> bool:
+        """Whether there is a column of that name."""
+        return name in self._named
+
+    @cached_property
+    def _named(self) -> frozenset:
+        return frozenset(self.names)
+
+    @cached_property
+    def _single(self) -> list[str]:
+        return [name for name in self.names if self.width(name) == 1]
+
     def resolve(self, column: str | int) -> str:
         """The name of a column given by its name, or by its number from 0 (the columns of a matrix count one by one).
 
@@ -44,11 +65,11 @@ class Table(ABC):
             LogError: no such column.
         """
         if isinstance(column, int):
-            single = [name for name in self.names if self.width(name) == 1]
+            single = self._single
             if not 0 <= column < len(single):
                 raise LogError(f"there is no column {column}", where=str(self.path), allowed=f"0 to {len(single) - 1}", do="correct data.columns")
             return single[column]
-        if column not in self.names:
+        if not self.has(column):
             raise LogError(f"there is no column {column!r}", where=str(self.path), allowed=self.some_names(), do="correct data.columns")
         return column
 

@@ -16,8 +16,9 @@ from pathlib import Path
 
 import numpy as np
 
-from .. import config
+from .. import bounded, config
 from ..errors import SysidError, SysidWarning
+from ..results import beside
 from ..robot import Robot
 from ..robot import load as robot_of
 from ..specs import AUTO, Experiment, PreprocessSpec
@@ -66,7 +67,7 @@ def prepare(out: str | Path, *, force: bool = False) -> Path:
 
 def _is_simulation(path: Path) -> bool:
     try:
-        return json.loads((path / "truth.json").read_text(encoding="utf-8"))["simulated_by"] == "sysid simulate"
+        return json.loads(bounded.read_text(path / "truth.json"))["simulated_by"] == "sysid simulate"
     except (OSError, ValueError, KeyError, TypeError):
         return False
 
@@ -74,7 +75,7 @@ def _is_simulation(path: Path) -> bool:
 def _worked_in(path: Path) -> list[str]:
     """Names of a simulation's files that are not as they were written; where that is not known, of the one that people edit."""
     try:
-        wrote = json.loads((path / "truth.json").read_text(encoding="utf-8")).get("files", {"config.yaml": None})
+        wrote = json.loads(bounded.read_text(path / "truth.json")).get("files", {"config.yaml": None})
     except (OSError, ValueError):
         return []  # no simulation was there
     there = [name for name in wrote if (path / name).is_file()]
@@ -103,7 +104,7 @@ def write(simulation: Simulation, experiment: Experiment, out: str | Path, *, fo
     }  # fmt: skip
     truth = {**simulation.truth, "files": {name: _sha256(text.encode("utf-8")) for name, text in texts.items()}}
     texts["truth.json"] = json.dumps(truth, indent=1, allow_nan=False) + "\n"
-    temporary = path.absolute().parent / f".{path.name}.{uuid.uuid4().hex}"
+    temporary = beside(path.absolute())
     try:
         temporary.mkdir()
         for name, text in texts.items():

@@ -42,13 +42,13 @@ def errors(of: Told, width: int) -> list[str]:
             ]
         )
         how.setdefault(entry["floor_detail"], []).append(joint)
-    out = ["RMS error against the noise floor", *columns(heads, rows, 2)]
+    out = ["RMS error against the noise floor", *fitted(heads, rows, 2, width)]
     for detail, joints in how.items():
         out += wrapped(f"  noise floor of {listed(joints, 'and')}: {detail}", width, "    ")
     return out
 
 
-def suspects(document: dict) -> list[str]:
+def suspects(document: dict, width: int) -> list[str]:
     """What is named, step by step, each with what could stand in its place."""
     rows, step = [], 0
     for f in document["findings"]:
@@ -69,7 +69,7 @@ def suspects(document: dict) -> list[str]:
     heads = ["step", "suspect", "joint", "probability", "test before", "after"]
     return [
         "suspects, step by step: * joins the model, and the next step is asked with it in",
-        *columns(heads, rows, 3),
+        *fitted(heads, rows, 3, width),
     ]
 
 
@@ -175,3 +175,20 @@ def columns(heads: Sequence[str], rows: Sequence[Sequence[str]], left: int) -> l
 
     lines = ("  ".join(cell(k, word) for k, word in enumerate(row)) for row in [heads, *rows])
     return [f"  {line}".rstrip() for line in lines]
+
+
+def fitted(heads: Sequence[str], rows: Sequence[Sequence[str]], left: int, width: int) -> list[str]:
+    """The same in a width: of a table that is wider, as many columns at a time as there is room
+    for, each time beside its first `left`. No cell is cut: one alone may be wider."""
+    wide = [max(len(row[k]) for row in [heads, *rows]) + 2 for k in range(len(heads))]
+    parts: list[list[int]] = [[]]
+    for k in range(left, len(heads)):
+        if parts[-1] and sum(wide[:left]) + sum(wide[i] for i in [*parts[-1], k]) > width:
+            parts.append([])
+        parts[-1].append(k)
+    pick = lambda row, part: [row[k] for k in [*range(left), *part]]  # noqa: E731
+    return [
+        line
+        for part in parts
+        for line in columns(pick(heads, part), [pick(row, part) for row in rows], left)
+    ]

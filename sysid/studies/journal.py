@@ -7,6 +7,7 @@ anew; half a line, which is what a kill leaves, is dropped. Results come back fr
 
 import json
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from pathlib import Path
 
 from ..errors import SysidError
@@ -41,12 +42,16 @@ class Journal:
     def add(self, key: str, result: dict) -> None:
         """Record a finished run, on disk before this returns."""
         self.done[key] = result
-        self._file.write(json.dumps({"key": key, "result": result}) + "\n")
-        self._file.flush()
+        try:
+            self._file.write(json.dumps({"key": key, "result": result}) + "\n")
+            self._file.flush()
+        except OSError as error:
+            raise SysidError(f"cannot be written ({error.strerror})", where=str(self.path), do="free the disk and run it again: it goes on from here") from None
 
     def close(self) -> None:
         """Close the file; the journal stays readable."""
-        self._file.close()
+        with suppress(OSError):  # what a full disk refused is refused once more
+            self._file.close()
 
 
 def run(

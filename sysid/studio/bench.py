@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import threading
 from collections.abc import Callable
 from pathlib import Path
@@ -11,7 +10,7 @@ from .. import comparison, loop, pipeline, results
 from ..addition import spelled
 from ..diagnose.diagnosis import diagnose
 from ..effect import find, vocabulary
-from ..errors import ConfigError, SysidError
+from ..errors import SysidError
 from ..report import page as report
 from ..report.sections import sections
 from .desk import Changed, Desk, hashed
@@ -131,11 +130,8 @@ class Bench:
     def _grow(self, seen: str, effect: str, joints: list[str] | None, options: dict) -> dict:
         joints = None if joints == ["*"] else joints  # every joint, or the whole robot
         make = lambda text: loop.with_effect(text, effect, joints, options, str(self.desk.path))  # noqa: E731
-        try:
+        with loop.asked(self.desk.path):
             return self._moved(self.desk.change(seen, make, effect if effect != "formula" else options["formula"], "*" if joints is None else ", ".join(joints)))
-        except ConfigError as error:
-            # the line of a text that was never written says nothing to who clicked
-            raise SysidError(re.sub(rf"^{re.escape(str(self.desk.path))}( line \d+)?: (model\.effects(\[\d+\])?: )?", "", str(error))) from None
 
     def _moved(self, sha: str) -> dict:
         self._ensure(sha)

@@ -14,7 +14,7 @@ import threading
 from collections.abc import Callable
 from pathlib import Path
 
-from .. import config, experiment_file, loop, pipeline, results, state
+from .. import bounded, config, experiment_file, loop, pipeline, results, state
 from ..errors import ConfigError, SysidError
 from ..experiment_file import Changed
 from ..specs import Experiment
@@ -184,7 +184,7 @@ class Desk:
     def _remembered(self) -> tuple[list[dict], int, dict, list]:
         self._stamp = self._stamped()
         try:
-            found = json.loads(self._store.read_text(encoding="utf-8"))
+            found = json.loads(bounded.read_text(self._store))
             if found.get("file", str(self.path.resolve())) != str(self.path.resolve()):
                 return [], 0, {}, []  # of another experiment of the same name: its texts are not this one's
             items = [{"text": str(i["text"]), "added": i["added"], "joint": i["joint"]} for i in found["items"]]

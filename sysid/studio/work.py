@@ -8,11 +8,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from ..errors import SysidError
+from ..progress import Course
 
-_WORDS = {"starting": "reading the logs", "compress": "fitting", "ask": "asking what is missing"}
-_FIT, _FIRST = 0.2, 0.5  # shares of a job that the fit takes, and the first round of questions
 _WAIT = 0.1  # s between looks whether a job that waits was cancelled
-_SHARES = {"starting": (0.0, 0.0), "compress": (0.0, _FIT), "drawing": (0.97, 1.0)}
 
 
 class Cancelled(Exception):
@@ -30,24 +28,13 @@ class Job:
     share: float = 0.0
     error: str | None = None
     stop: threading.Event = field(default_factory=threading.Event)
-    _rounds: list[str] = field(default_factory=list)
+    _course: Course = field(default_factory=lambda: Course(asks=True))
 
     def tell(self, stage: str, share: float) -> None:
         """Progress, as `pipeline.fit` and `diagnose` report it. Raises Cancelled."""
         if self.stop.is_set():
             raise Cancelled
-        word = stage.partition(",")[0]
-        self.stage = _WORDS.get(word, word) + stage[len(word) :]
-        if word in _SHARES:
-            low, high = _SHARES[word]
-            now = low + (high - low) * share
-        else:
-            if stage not in self._rounds:
-                self._rounds.append(stage)
-            before = len(self._rounds) - 1
-            now = _FIT + _FIRST * share if not before else 1.0 - (1.0 - _FIT - _FIRST) * 0.5 ** (before - 1) * (1.0 - 0.5 * share)
-            now = min(now, 0.97)
-        self.share = max(self.share, min(now, 0.99))
+        self.stage, self.share = self._course.tell(stage, share)
 
     def document(self) -> dict:
         """What the page polls."""

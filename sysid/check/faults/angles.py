@@ -147,7 +147,7 @@ def _of_training(look: Look, j: int, joint: str, slides: bool) -> Iterator[Fault
             WARNING,
             (
                 f"{joint} stands in {100 * np.mean(still):.0f} % of the training "
-                "samples, where friction is whatever balances the rest"
+                "samples, where its friction may have any value up to its greatest"
             ),
             "log more motion; preprocess.standstill: auto leaves these rows out",
             joint,

@@ -25,11 +25,13 @@ def find(look: Look) -> Iterator[Fault]:
 def _of_log(look: Look, log: Logged, j: int, joint: str) -> Iterator[Fault]:
     tau, name = log.tau[:, j], log.log.name
     if not np.ptp(tau) > 0.0:
-        if np.ptp(log.q[:, j]) > _TRAVELS:
+        moves = np.ptp(log.q[:, j]) > _TRAVELS
+        if moves or not log.tau.any():
+            why = "the joint moves" if moves else "so is that of every other joint"
             yield Fault(
                 "effort_missing",
                 ERROR,
-                (f"the torque of {joint} is {tau[0]:.4g} throughout {name}, and the joint moves"),
+                f"the torque of {joint} is {tau[0]:.4g} throughout {name}, and {why}",
                 "log its torque or current, or name the joint in data.unused",
                 joint,
                 name,
