@@ -26,7 +26,8 @@ def time(joint: str, unit: str, t, lines: dict, *, own, breaks, window, shaded) 
             kind) of events.
     """
     x = np.insert(np.asarray(t, dtype=float), breaks, np.nan)
-    seen = np.insert(np.array([[*row, ""] for row in own], dtype=object), breaks, None, axis=0)
+    named = [[charts.plain(log), clock, ""] for log, clock in own]
+    seen = np.insert(np.array(named, dtype=object), breaks, None, axis=0)
     residual = lines["residual"]
     seen[:, 2] = [_words(v) for v in np.insert(residual, breaks, np.nan)]
     clock = "%{customdata[0]} at %{customdata[1]} s"

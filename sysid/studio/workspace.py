@@ -8,6 +8,9 @@ few, and with the greatest and the least of each stretch where there are many.
 
 from __future__ import annotations
 
+import csv
+import io
+
 import numpy as np
 
 from ..errors import SysidError
@@ -76,11 +79,7 @@ class Workspace:
         """
         name, line, found = self.joint(joint), self.line(part), self.prediction(part)
         t, left = line["t"], self.residual(part, joint)
-        if not len(t):
-            raise SysidError("these logs have no rows")
-        low, high = (t[0] if low is None else low), (t[-1] if high is None else high)
-        if not (np.isfinite(low) and np.isfinite(high) and low < high):
-            raise SysidError("a window of time needs two numbers, the first the less")
+        low, high = self._bounds(t, low, high)
         # one row beyond either edge, so that lines reach it
         first, last = np.searchsorted(t, low) - 1, np.searchsorted(t, high, side="right") + 1
         rows = slice(max(int(first), 0), min(int(last), len(t)))
@@ -95,15 +94,51 @@ class Workspace:
         chart = panels.time(
             name, units(self.fit)[name][0], t[rows][keep], {w: v[keep] for w, v in lines.items()},
             own=_own_clock(line, rows.start + keep, found), breaks=_breaks(line, rows.start + keep),
-            window=(float(low), float(high)), shaded=self._disturbed(part, name, low, high),
+            window=(low, high), shaded=self._disturbed(part, name, low, high),
         )  # fmt: skip
         inside = (t >= low) & (t <= high)
         return {
-            "chart": chart, "from": float(low), "to": float(high), "samples": int(inside.sum()),
+            "chart": chart, "from": low, "to": high, "samples": int(inside.sum()),
             "drawn": int(len(keep)), "whole": [float(t[0]), float(t[-1])], "joint": name,
             "unit": units(self.fit)[name][0], "rms": _rms(left), "here": _rms(left[inside]),
             "before": None if beside is None else _rms(beside[1]),
         }  # fmt: skip
+
+    def csv(self, part: str, joint: int, low=None, high=None) -> str:
+        """Every row of a window of time as text of a CSV file: the log, its own clock, torques."""
+        name, line, found = self.joint(joint), self.line(part), self.prediction(part)
+        low, high = self._bounds(line["t"], low, high)
+        rows = np.flatnonzero((line["t"] >= low) & (line["t"] <= high))
+        unit = units(self.fit)[name][0]
+        heads = [
+            "log",
+            "t [s]",
+            *(f"{word} [{unit}]" for word in ("measured", "predicted", "residual")),
+        ]
+        out = io.StringIO()
+        sheet = csv.writer(out, lineterminator="\n")
+        sheet.writerow(heads)
+        left = self.residual(part, joint)
+        for k, (log, own) in zip(rows, _own_clock(line, rows, found)):
+            torques = found.measured[k, joint], found.predicted[k, joint], left[k]
+            sheet.writerow(
+                [
+                    log,
+                    repr(float(found.t[k])),
+                    *(repr(float(v)) if np.isfinite(v) else "" for v in torques),
+                ]
+            )
+        return out.getvalue()
+
+    @staticmethod
+    def _bounds(t, low, high) -> tuple[float, float]:
+        """The window that is meant. Raises SysidError."""
+        if not len(t):
+            raise SysidError("these logs have no rows")
+        low, high = (t[0] if low is None else low), (t[-1] if high is None else high)
+        if not (np.isfinite(low) and np.isfinite(high) and low < high):
+            raise SysidError("a window of time needs two numbers, the first the less")
+        return float(low), float(high)
 
     def same_rows(self, other: Workspace, part: str, joint: int):
         """Predicted torque and residual (n,) of this model on another's rows; None where its own
@@ -183,6 +218,13 @@ class Workspace:
         }  # fmt: skip
 
 
+def workspace_page(workspace: Workspace, steps: dict) -> dict:
+    """What the page needs of a fit that is yet to be diagnosed: its joints, and its steps."""
+    unit = units(workspace.fit)
+    joints = [{"name": j, "unit": unit[j][0]} for j in workspace.fit.joints]
+    return {"joints": joints, "converged": bool(workspace.fit.solution.converged), **steps}
+
+
 def _listed(frames) -> list:
     return [[charts.rounded(axis, 4) for axis in frame] for frame in frames]
 
@@ -197,7 +239,7 @@ def _own_clock(line: dict, rows, found: Prediction) -> list[list]:
     names = [name.rpartition("/")[2] for _, _, name in line["spans"]]
     ends = np.array([end for _, end, _ in line["spans"]])
     which = np.minimum(np.searchsorted(ends, line["t"][rows] - 1e-9), len(names) - 1)
-    return [[charts.plain(names[k]), float(f"{t:.6g}")] for k, t in zip(which, found.t[rows])]
+    return [[names[k], float(f"{t:.6g}")] for k, t in zip(which, found.t[rows])]
 
 
 def _breaks(line: dict, rows) -> np.ndarray:
