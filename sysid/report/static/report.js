@@ -21,7 +21,7 @@ function dressed(chart) {
   const figure = dark ? turned(chart.figure) : structuredClone(chart.figure), layout = figure.layout;
   layout.paper_bgcolor = "rgba(0,0,0,0)";
   if (!layout.plot_bgcolor) layout.plot_bgcolor = "rgba(0,0,0,0)";
-  layout.font = {...layout.font, color: ink, family: css.fontFamily || "sans-serif"};
+  layout.font = {...layout.font, color: ink, family: getComputedStyle(document.body).fontFamily || "sans-serif"};
   layout.hoverlabel = {bgcolor: printing ? "#ffffff" : get("--raised"), bordercolor: line, font: {color: ink}};
   layout.modebar = {bgcolor: "rgba(0,0,0,0)", color: get("--quiet"), activecolor: get("--accent")};
   const axes = Object.keys(layout).filter(k => /^[xy]axis\d*$/.test(k)).map(k => layout[k]);

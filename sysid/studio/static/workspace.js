@@ -7,6 +7,7 @@ const at = id => document.getElementById(id);
 let tools = null; // what the page lends: {get, engine, make, button, number, level, stretch}
 let sha = null, page = null, asked = 0;
 let view = {joint: 0, part: "test", from: null, to: null, before: null}; // what a link keeps
+let touched = false; // the user chose what to look at: nothing else chooses for him
 let brush = null, cursor = null, frames = null, cloud = null, whole = null, said = "", mode = "zoom";
 const place = name => at("workspace-" + name), plot = name => place(name).querySelector(".plot");
 
@@ -18,9 +19,10 @@ function remembered() {
   if (["test", "train"].includes(words.get("logs"))) view.part = words.get("logs");
   view.from = value("from"); view.to = value("to");
   if (words.has("before")) view.before = value("before");
-  return named >= 0;
+  touched = touched || named >= 0;
 }
 function kept() {
+  if (!touched) return;
   const words = new URLSearchParams(location.search);
   const put = (key, value) => value === null || value === undefined ? words.delete(key) : words.set(key, value);
   put("joint", page.joints[view.joint].name); put("logs", view.part === "test" ? null : view.part);
@@ -37,9 +39,9 @@ function build(section, lent) {
     make("div", {class: "plot"}, make("p", {class: "waiting"}, "drawing…")),
     make("figcaption", {class: "take"}, ...["PNG", "SVG", "CSV"].map(kind => button(kind, () => take(name, kind), {"aria-label": "save " + label + " as " + kind, "data-take": name + "-" + kind}))));
   const parts = make("select", {id: "workspace-part", "aria-label": "which logs"}, make("option", {value: "test"}, "test logs (held out)"), make("option", {value: "train"}, "training logs"));
-  parts.addEventListener("change", () => { view.part = parts.value; view.from = view.to = brush = cursor = null; all(); });
+  parts.addEventListener("change", () => { touched = true; view.part = parts.value; view.from = view.to = brush = cursor = null; all(); });
   const before = make("select", {id: "workspace-before", "aria-label": "compared with"});
-  before.addEventListener("change", () => { view.before = before.value === "" ? null : Number(before.value); time(); });
+  before.addEventListener("change", () => { touched = true; view.before = before.value === "" ? null : Number(before.value); time(); });
   const way = (word, what, label) => button(word, () => shift(what), label ? {"aria-label": label} : {});
   section.replaceChildren(make("h2", {id: "workspace-title", tabindex: "-1"}, "One joint from all sides"),
     make("div", {class: "acts", id: "workspace-joints", role: "group", "aria-label": "joint"}),
@@ -59,17 +61,17 @@ function show(found, seen) {
   const first = page === null, grew = page && found.steps.length > page.steps.length;
   page = found; sha = seen; frames = null;
   view.joint = Math.min(view.joint, page.joints.length - 1);
-  const linked = first && remembered();
+  if (first) remembered();
   if (grew) { view.before = page.steps.length - 2; view.from = view.to = null; }
-  if (view.before !== null && view.before >= page.steps.length - 1 && !linked) view.before = null;
+  if (view.before !== null && view.before >= page.steps.length - 1) view.before = null;
   const {make, button} = tools;
   at("workspace-joints").replaceChildren(...page.joints.map((j, k) => button(j.name, () => to(k), {"aria-pressed": String(k === view.joint), "data-key": "joint" + k})));
   at("workspace-before").replaceChildren(make("option", {value: ""}, "nothing"), ...page.steps.slice(0, -1).map((s, k) => make("option", {value: k, disabled: !page.kept.includes(k)}, "step " + k + ": " + s + (page.kept.includes(k) ? "" : " (not in memory)"))));
   if (view.before !== null && !page.kept.includes(view.before)) view.before = null;
   at("workspace-part").value = view.part;
-  return linked;
 }
-function to(k) { view.joint = k; brush = null; all(); }
+function suggest(k) { if (!touched) view.joint = k; }
+function to(k) { touched = true; view.joint = k; brush = null; return all(); }
 async function all() { await Promise.all([time(), sides(), robot()]); }
 
 // ---- asked of the server, drawn
@@ -149,6 +151,7 @@ function listen() {
   plot("time").on("plotly_selected", event => { if (event && event.range && event.range.x) stretchOf(...event.range.x); });
 }
 function sight(range) {
+  touched = true;
   if (range && whole && range[0] <= whole[0] && range[1] >= whole[1]) range = null;
   [view.from, view.to] = range || [null, null];
   return time();
@@ -261,5 +264,5 @@ function rowsOf(own) {
   if (first.type === "scatter3d") return [["x", "y", "z"], ...first.x.map((x, k) => [x ?? "", first.y[k] ?? "", first.z[k] ?? ""])];
   return [["t [s]", title("xaxis"), title("yaxis")], ...first.x.map((x, k) => [first.customdata[k], x, first.y[k]])];
 }
-window.sysid.workspace = {build, show, all, to, view, cursorAt: moved, brush: () => brush, cursor: () => cursor};
+window.sysid.workspace = {build, show, all, to, suggest, view, cursorAt: moved, brush: () => brush, cursor: () => cursor};
 })();
