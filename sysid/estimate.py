@@ -26,11 +26,21 @@ from .specs import Experiment
 
 
 @dataclass(frozen=True)
+class States:
+    """Where the joints were in some rows of a prediction, spread evenly over it: index (m,) of the row; q, qd (m, dof)."""
+
+    index: np.ndarray
+    q: np.ndarray
+    qd: np.ndarray
+
+
+@dataclass(frozen=True)
 class Prediction:
     """Measured and predicted torque over the pieces of one set of logs.
 
     log (n,) number of the log; t (n,) [s]; measured (n, dof) as logged, filtered where the fit filtered torque;
-    predicted (n, dof); use (n, dof) bool, None where every row counts; joints: names, units: N m or N, of each.
+    predicted (n, dof); use (n, dof) bool, None where every row counts; joints: names, units: N m or N, of each;
+    states: of at most `_STATES` rows, None where nobody kept them.
     """
 
     log: np.ndarray
@@ -40,6 +50,7 @@ class Prediction:
     use: np.ndarray | None
     joints: tuple[str, ...] = ()
     units: tuple[str, ...] = ()
+    states: States | None = None
 
     def __repr__(self) -> str:
         errors = ", ".join(f"{joint} {rms:.4g}" for joint, rms in zip(self.joints, self.told()) if rms is not None)
@@ -413,5 +424,18 @@ def predict(model: Model, x, motion: Motion) -> Prediction:
         measured=joined([piece.tau[piece.core] for piece in pieces]),
         predicted=joined([model.torque(piece, pi, c) for piece in pieces]),
         use=None if pieces[0].use is None else joined([piece.use[piece.core] for piece in pieces]),
-        joints=model.robot.joints, units=units(model.robot),
+        joints=model.robot.joints, units=units(model.robot), states=_states(motion),
     )
+
+
+_STATES = 20_000  # rows: more than a screen has points
+
+
+def _states(motion: Motion) -> States:
+    stride, first, parts = max(1, -(-motion.samples // _STATES)), 0, []
+    for piece in motion.pieces:
+        own = np.arange(-first % stride, piece.samples, stride)
+        rows = piece.core.start + own
+        parts.append((first + own, piece.q[rows], piece.qd[rows]))
+        first += piece.samples
+    return States(*(np.concatenate(part) for part in zip(*parts)))

@@ -299,3 +299,122 @@ def test_one_of_several_experiments_is_picked(browser, leg, tmp_path):
     finally:
         served.stop()
     assert (tmp_path / "run" / "leg" / "fit.json").is_file()
+
+
+SETTLED = "() => { const p = document.querySelector('#workspace-time .plot'); return p && p.data && p._fullLayout; }"
+
+
+def traces(page, name):
+    """A chart of the workspace: its traces as what is drawn, and the range of its first axis."""
+    return page.evaluate(
+        "name => { const p = document.querySelector(`#workspace-${name} .plot`);"
+        " return {n: p.data.map(d => d.x ? d.x.length : 0), names: p.data.map(d => d.name), x: p._fullLayout.xaxis && p._fullLayout.xaxis.range,"
+        " y: p._fullLayout.yaxis && p._fullLayout.yaxis.range, at: p.data[1] && p.data[1].x, chosen: p.data[0].selectedpoints || null,"
+        " shapes: (p._fullLayout.shapes || []).length}; }",
+        name,
+    )
+
+
+def dragged(page, name, across, down=(0.5, 0.5)):
+    """Drag over a chart of the workspace, by shares of its plot."""
+    place = page.locator(f"#workspace-{name}")
+    place.evaluate("e => e.scrollIntoView({block: 'center', behavior: 'instant'})")
+    page.wait_for_timeout(300)
+    box = page.locator(f"#workspace-{name} .nsewdrag").first.bounding_box()
+    x, y = (lambda s: box["x"] + s * box["width"]), (lambda s: box["y"] + s * box["height"])
+    page.mouse.move(x(across[0]), y(down[0]))
+    page.mouse.down()
+    page.mouse.move(x(across[1]), y(down[1]), steps=8)
+    page.mouse.up()
+
+
+def test_one_joint_from_all_sides(opened):
+    """The charts stand before the diagnosis; zoom brings every sample; one cursor and one brush; a link keeps it all."""
+    from playwright.sync_api import expect
+
+    page = opened()
+    page.wait_for_function(SETTLED, timeout=WAIT)
+    early = page.locator("#verdict .card").count() == 0
+    page.wait_for_function(DONE, timeout=WAIT)
+    assert early  # nobody waited for a diagnosis
+    expect(page.locator("#workspace-joints [aria-pressed=true]")).to_have_text("hip")  # where physics is missing
+    page.locator("#workspace-joints button", has_text="knee").click()
+    expect(page.locator("#workspace-said")).to_contain_text("knee: residual RMS")
+    expect(page.locator("#workspace-said")).to_contain_text("thinned: every peak is kept")
+    whole = traces(page, "time")
+    dragged(page, "time", (0.4, 0.45))
+    expect(page.locator("#workspace-said")).to_contain_text("Every one of")
+    near = traces(page, "time")
+    assert near["x"][1] - near["x"][0] < 0.1 * (whole["x"][1] - whole["x"][0])
+    assert near["y"][1] - near["y"][0] < 0.7 * (whole["y"][1] - whole["y"][0])  # y follows
+    samples = int(page.locator("#workspace-said").inner_text().partition("Every one of ")[2].split(" ")[0].replace(",", ""))
+    assert samples <= near["n"][0] <= samples + 2
+    # a link keeps joint and window
+    link = page.url
+    assert "joint=knee" in link and "from=" in link
+    other = page.context.new_page()
+    other.goto(link)
+    other.wait_for_function(DONE, timeout=WAIT)
+    expect(other.locator("#workspace-joints [aria-pressed=true]")).to_have_text("knee")
+    expect(other.locator("#workspace-said")).to_contain_text(f"Every one of {samples:,}")
+    other.close()
+    # the cursor, by mouse and by keyboard
+    page.get_by_role("button", name="whole").first.click()
+    expect(page.locator("#workspace-said")).to_contain_text("thinned")
+    box = page.locator("#workspace-time .nsewdrag").first.bounding_box()
+    page.mouse.move(box["x"] + 0.3 * box["width"], box["y"] + 0.5 * box["height"], steps=5)
+    expect(page.locator("#workspace-clock")).to_contain_text("rad/s")
+    first, moment = traces(page, "position")["at"], page.evaluate("window.sysid.workspace.cursor()")
+    assert first[0] is not None and page.locator("#workspace-cursor").is_visible()
+    page.locator("#workspace-time").focus()
+    for _ in range(5):
+        page.keyboard.press("ArrowRight")
+    page.wait_for_timeout(300)
+    assert page.evaluate("window.sysid.workspace.cursor()") > moment
+    assert traces(page, "position")["at"] != first and traces(page, "speed")["at"][0] is not None
+    page.keyboard.press("]")
+    expect(page.locator("#workspace-joints [aria-pressed=true]")).to_have_text("abad")
+    page.keyboard.press("[")
+    expect(page.locator("#workspace-joints [aria-pressed=true]")).to_have_text("knee")
+    page.wait_for_timeout(500)
+    # the brush: over time, then over positions
+    page.get_by_role("button", name="drag brushes").click()
+    dragged(page, "time", (0.2, 0.5))
+    page.wait_for_function("() => window.sysid.workspace.brush()")
+    chosen = page.evaluate("window.sysid.workspace.brush()")
+    assert traces(page, "position")["chosen"] == chosen == traces(page, "speed")["chosen"]
+    expect(page.locator("#workspace-brush")).to_contain_text("rows brushed, in 1 stretch of time")
+    page.get_by_role("button", name="no brush").click()
+    assert page.evaluate("window.sysid.workspace.brush()") is None
+    before = traces(page, "time")["shapes"]
+    dragged(page, "position", (0.3, 0.6), (0.05, 0.95))
+    page.wait_for_function("() => window.sysid.workspace.brush()")
+    assert traces(page, "time")["shapes"] > before  # the times when the joint was there
+    assert 0 < len(page.evaluate("window.sysid.workspace.brush()")) < traces(page, "position")["n"][0]
+    # taken along
+    for kind, name in (("CSV", "time"), ("CSV", "map"), ("SVG", "position"), ("PNG", "time")):
+        with page.expect_download() as taken:
+            page.locator(f'[data-take="{name}-{kind}"]').click()
+        content = Path(taken.value.path()).read_bytes()
+        assert taken.value.suggested_filename.endswith(f".{kind.lower()}")
+        assert content.startswith({"CSV": {"time": b"log,t [s],measured", "map": b"q,qd,mean residual"}.get(name), "SVG": b"<svg", "PNG": b"\x89PNG"}[kind])
+    assert content  # the last of them
+
+
+def test_what_was_added_is_seen_beside_what_was_before(opened):
+    """After an addition the falling error is the first thing seen, and both models stand in the same chart."""
+    from playwright.sync_api import expect
+
+    page = opened()
+    page.wait_for_function(DONE, timeout=WAIT)
+    page.get_by_role("button", name="add stribeck to hip").first.click()
+    expect(page.locator("#workspace-fall")).to_contain_text("hip:", timeout=WAIT)
+    expect(page.locator("#workspace-fall")).to_contain_text("% against step 0 (start)")
+    assert "−" in page.locator("#workspace-fall").inner_text()
+    assert page.locator("main").get_attribute("aria-busy") == "true"  # the diagnosis is still at work
+    assert {"predicted before", "residual before"} <= set(traces(page, "time")["names"])
+    page.wait_for_function(DONE, timeout=WAIT)
+    expect(page.locator("#workspace-fall")).to_contain_text("against step 0")
+    page.locator("#workspace-before").select_option("")
+    expect(page.locator("#workspace-fall")).to_be_empty()
+    assert "predicted before" not in traces(page, "time")["names"]

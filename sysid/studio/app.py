@@ -71,7 +71,11 @@ def application(shelf: Shelf | Bench, *, host: str = "127.0.0.1", port: int = 87
     own("/api/figure", _figure)
     own("/api/residual", lambda bench, r: _json(bench.view(_word(r, "sha")).looks.residual(_whole(r, "joint"), _whole(r, "finding") if "finding" in r.query_params else None)))
     own("/api/stretch", lambda bench, r: _json(bench.view(_word(r, "sha")).looks.stretch(_number(r, "from"), _number(r, "to"))))
-    own("/api/play", lambda bench, r: Response(bench.view(_word(r, "sha")).film, media_type="application/json", headers={"cache-control": "no-store"}))
+    own("/api/fitted", lambda bench, r: _json(bench.fitted(_word(r, "sha"))))
+    own("/api/window", _window)
+    own("/api/cloud", lambda bench, r: _json(bench.workspace(_word(r, "sha")).cloud(_word(r, "part"), _whole(r, "joint"))))
+    own("/api/film", lambda bench, r: _json(bench.workspace(_word(r, "sha")).film(_word(r, "part"))))
+    own("/export/window.csv", _window_csv)
     own("/api/compare", lambda bench, r: _json(bench.compare(_whole(r, "from"), _whole(r, "to"))))
     own("/export/report.html", lambda bench, r: _file(bench.report(_word(r, "sha")), "text/html", f"{bench.desk.name}.html"))
     own("/export/experiment.yaml", lambda bench, r: _file(bench.desk.text(), "application/yaml", f"{bench.desk.name}.yaml"))
@@ -101,6 +105,24 @@ def _figure(bench: Bench, request: Request) -> Response:
     if found is None:
         return _json({"error": "there is no such chart"}, 404)
     return Response(found, media_type="application/json", headers={"cache-control": "no-store"})
+
+
+def _window(bench: Bench, request: Request) -> Response:
+    sha = _word(request, "sha")
+    before = bench.before(sha, _whole(request, "before")) if "before" in request.query_params else None
+    return _json(bench.workspace(sha).window(*_what(request), before))
+
+
+def _window_csv(bench: Bench, request: Request) -> Response:
+    part, joint, low, high = _what(request)
+    found = bench.workspace(_word(request, "sha"))
+    return _file(found.csv(part, joint, low, high), "text/csv", f"{bench.desk.name}-{found.joint(joint)}.csv")
+
+
+def _what(request: Request) -> tuple:
+    """Which logs, joint and window of time are asked for."""
+    bounds = [_number(request, name) if name in request.query_params else None for name in ("from", "to")]
+    return _word(request, "part"), _whole(request, "joint"), *bounds
 
 
 def _said(act) -> Response:

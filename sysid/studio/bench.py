@@ -15,9 +15,10 @@ from ..report import page as report
 from ..report.sections import sections
 from .desk import Changed, Desk, hashed
 from .look import compared
-from .view import View
+from .view import View, step_name
 from .views import Views, key
 from .work import Job, Worker
+from .workspace import Workspace, workspace_page
 
 
 class Bench:
@@ -31,6 +32,7 @@ class Bench:
         self.desk, self.worker = Desk(path, out), Worker(turn)
         self._views = views or Views()
         self._last: dict | None = None
+        self._early: tuple[str, Workspace] | None = None  # of a fit that is yet to be diagnosed
         self._looks, self._looking = 0, False
 
     # ---- what stands
@@ -44,7 +46,7 @@ class Bench:
         except SysidError as problem:
             sha, error = None, str(problem)
         undo, redo = self.desk.labels()
-        found = {"name": self.desk.name, "sha": sha, "error": error, "job": None if job is None else job.document(), "ready": sha is not None and self._find(sha) is not None, "undo": undo, "redo": redo}
+        found = {"name": self.desk.name, "sha": sha, "error": error, "job": None if job is None else job.document(), "ready": sha is not None and self._find(sha) is not None, "fitted": self._early is not None and self._early[0] == sha, "undo": undo, "redo": redo}
         if look == self._looks:  # none that began later, after a change perhaps
             self._last = found
         return found
@@ -64,7 +66,7 @@ class Bench:
         if not self._looking:
             self._looking = True
             beside(self._look)
-        return {**last, "job": now}
+        return {**last, "job": now, "fitted": self._early is not None and self._early[0] == last["sha"]}
 
     def _look(self) -> None:
         try:
@@ -81,7 +83,36 @@ class Bench:
 
     def page(self, sha: str) -> dict:
         """A view as the page shows it, with the steps that led to it."""
-        return self.view(sha).page(self.desk.history())
+        return self.view(sha).page(self.desk.history()) | self._steps(sha)
+
+    def fitted(self, sha: str) -> dict:
+        """What the page shows of a fit before it is diagnosed."""
+        return workspace_page(self.workspace(sha), self._steps(sha))
+
+    def workspace(self, sha: str) -> Workspace:
+        """The fit under the text with a hash, ready to be looked at, diagnosed or not. Raises SysidError: there is none."""
+        early, found = self._early, self._find(sha)
+        if found is not None:
+            return found.workspace
+        if early is not None and early[0] == sha:
+            return early[1]
+        raise SysidError("nothing was found under this text yet", do="reload")
+
+    def before(self, sha: str, step: int) -> Workspace | None:
+        """The fit of an earlier step, None where it is not in memory. Raises SysidError: there is no such step."""
+        steps = self.desk.history()
+        if not 0 <= step < len(steps):
+            raise SysidError("there is no such step", do="reload")
+        found = self._find(steps[step].get("sha", ""))
+        return None if found is None else found.workspace
+
+    def _steps(self, sha: str) -> dict:
+        """The steps that led to a text, itself the last, and which of them are in memory."""
+        steps = self.desk.history()
+        names = [step_name(s) for s in steps]
+        if not steps or steps[-1].get("sha") != sha:
+            names.append(self.desk.named(sha) if names else "start")
+        return {"steps": names, "kept": [k for k, s in enumerate(steps) if self._find(s.get("sha", "")) is not None]}
 
     # ---- work
 
@@ -151,14 +182,15 @@ class Bench:
         experiment = self.desk.experiment(text)
         state = key(hashed(text), experiment)
         fit = pipeline.fit(experiment, progress=job.tell)
+        self._early = hashed(text), Workspace(fit)  # seen while the diagnosis is at work
         found = diagnose(experiment, fit=fit, progress=job.tell)
         job.tell("drawing", 0.0)
         view = View(hashed(text), fit, found, self.desk.run)
         view.looks.warm(lambda share: job.tell("drawing", share))
-        view.film  # noqa: B018 - made once, here
         results.write(fit, self.desk.run)
         results.write_json(self.desk.run / "diagnosis.json", view.said)
         self.keep(state, text, view)
+        self._early = None
 
     def keep(self, state: str, text: str, view: View) -> None:
         """Remember a view, and the errors under its text."""

@@ -89,6 +89,12 @@ class Desk:
                 out[0] = {**out[0], "added": None, "joint": None}
             return out
 
+    def named(self, sha: str) -> str:
+        """The step that led to the text with a hash, in words, its error not known yet."""
+        with self._lock:
+            item = next((item for item in reversed(self._items) if hashed(item["text"]) == sha), None)
+            return "now" if item is None or item["added"] is None else _said(item)
+
     # ---- changing
 
     def change(self, seen: str, make: Callable[[str], str], added: str, joint: str | None) -> str:

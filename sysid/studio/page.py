@@ -8,7 +8,7 @@ from markupsafe import Markup
 
 from ..report import rendering
 
-_SCRIPTS = ("studio.js",)
+_SCRIPTS = ("workspace.js", "studio.js")
 _STYLES = ("studio.css",)
 
 

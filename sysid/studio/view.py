@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from functools import cache, cached_property
+from functools import cache
 
 import numpy as np
 
@@ -15,9 +15,9 @@ from ..report.steps import steps
 from ..report.words import units
 from ..statement.document import document
 from .look import Looks
-from .play import play
+from .workspace import Workspace
 
-ORDER = ("verdict", "steps", "suspects", "look", "torque", "failures", "detectable", "parameters", "bodies", "provenance")
+ORDER = ("verdict", "workspace", "steps", "suspects", "look", "torque", "failures", "detectable", "parameters", "bodies", "provenance")
 
 
 class View:
@@ -26,15 +26,10 @@ class View:
     def __init__(self, sha: str, fit: Fit, diagnosis: Diagnosis, run=""):
         self.sha, self.fit, self.diagnosis = sha, fit, diagnosis
         self.said = document(diagnosis, run)
-        self.looks = Looks(diagnosis)
+        self.looks, self.workspace = Looks(diagnosis), Workspace(fit)
         made = sections(fit, diagnosis, self.said, [])
         self._html = {name: {"title": section["title"], "html": section["html"]} for name, section in made.items() if name != "steps"}
         self._charts = {chart["id"]: dumped(chart) for section in made.values() for chart in section["charts"]}
-
-    @cached_property
-    def film(self) -> bytes:
-        """The test logs played on the robot."""
-        return dumped(play(self.looks))
 
     @property
     def samples(self) -> int:

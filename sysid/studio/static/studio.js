@@ -3,7 +3,7 @@
 "use strict";
 const at = id => document.getElementById(id);
 const CSRF = document.querySelector('meta[name="sysid-csrf"]').content;
-const SHORT = {verdict: "Verdict", steps: "Steps", suspects: "Suspects", look: "Residual", torque: "Torque", failures: "Where", detectable: "Could show", parameters: "Parameters", bodies: "Bodies", provenance: "Provenance"};
+const SHORT = {verdict: "Verdict", workspace: "Joint", steps: "Steps", suspects: "Suspects", look: "Residual", torque: "Torque", failures: "Where", detectable: "Could show", parameters: "Parameters", bodies: "Bodies", provenance: "Provenance"};
 // looking: hash of the experiment file that this page is about; shown: that of the results in it; page: these
 let looking = null, shown = null, page = null, last = null, busy = false, said = "", told = null;
 let joint = 0, finding = null, asked = 0;
@@ -95,6 +95,7 @@ async function follow(state) {
   else notice("");
   if (shown !== null && shown === looking && runs && job.sha === looking) shown = "";  // computed again
   if (!stranger && state.ready && shown !== looking) await show(looking);
+  else if (!stranger && state.fitted && !state.ready && shown !== looking && early !== looking) await showFit(looking);
   const words = runs ? (job.state === "cancelling" ? "stopping" : job.stage) : stranger || told === "changed" ? "the experiment file changed" : state.error ? "the experiment file cannot be read"
     : job && job.sha === looking && job.state === "failed" ? "failed" : state.ready ? "saved in the experiment file" : job && job.state === "cancelled" ? "stopped" : "waiting";
   if (at("status").textContent !== words) at("status").textContent = words;
@@ -106,7 +107,7 @@ async function follow(state) {
   const stale = shown !== null && (shown !== looking || stranger);
   at("main").classList.toggle("stale", stale);
   at("main").setAttribute("aria-busy", String(Boolean(runs)));
-  at("waiting").hidden = shown !== null || stranger || Boolean(state.error) || Boolean(job && !runs && !state.ready);
+  at("waiting").hidden = shown !== null || early !== null || stranger || Boolean(state.error) || Boolean(job && !runs && !state.ready);
   at("report").hidden = !(shown && shown === looking);
   if (at("report").hidden === false) at("report").href = "export/report.html?sha=" + encodeURIComponent(shown);
   enable();
@@ -127,26 +128,51 @@ async function tick() {
 }
 
 // ---- the page
+const LENT = {get, engine, make, button, number, level, stretch: (from, to) => { if (at("stretch-answer")) { at("stretch-from").value = from.toFixed(3); at("stretch-to").value = to.toFixed(3); stretch(from, to); } }};
+function placed(name) {
+  let section = at(name);
+  if (!section) {
+    section = make("section", {id: name, "aria-labelledby": name + "-title"});
+    at("sections").append(section);
+    at("links").append(make("li", {}, make("a", {href: "#" + name}, SHORT[name] || name)));
+  }
+  return section;
+}
+let early = null; // hash of the text whose fit is shown while it is being diagnosed
+async function showFit(sha) {
+  const found = await get("api/fitted", {sha});
+  if (shown === sha || looking !== sha) return;
+  early = sha;
+  if (!at("verdict")) placed("verdict").replaceChildren(make("h2", {id: "verdict-title", tabindex: "-1"}, "Verdict"), make("p", {class: "lead"}, "The fit stands; it is being diagnosed. Its charts are below."));
+  if (!at("workspace")) window.sysid.workspace.build(placed("workspace"), LENT);
+  at("workspace").classList.add("fresh");
+  window.sysid.workspace.show(found, sha);
+  await window.sysid.workspace.all();
+}
 async function show(sha) {
   const found = await get("api/view", {sha});
   const focus = document.activeElement && document.activeElement.dataset ? document.activeElement.dataset.key : null, lost = at("sections").contains(document.activeElement);
   shown = sha; page = found; finding = null;
   joint = Math.min(joint, page.joints.length - 1);
-  const worst = page.verdict.findIndex(v => v.status === "missing");
-  if (!at("look") && worst >= 0) joint = worst;
+  const worst = page.verdict.findIndex(v => v.status === "missing"), first = !at("look");
+  if (first && worst >= 0) joint = worst;
   for (const name of page.order) {
-    let section = at(name);
-    if (!section) {
-      section = make("section", {id: name, "aria-labelledby": name + "-title"});
-      at("sections").append(section);
-      at("links").append(make("li", {}, make("a", {href: "#" + name}, SHORT[name] || name)));
-    }
+    const section = placed(name);
     if (name === "look") { look(section); continue; }
+    if (name === "workspace") {
+      const workspace = window.sysid.workspace;
+      if (!section.childElementCount) workspace.build(section, LENT);
+      section.classList.remove("fresh");
+      workspace.show(page, sha);
+      if (first && worst >= 0) workspace.suggest(worst);
+      workspace.all();
+      continue;
+    }
     const part = page.sections[name];
     section.innerHTML = part.html;  // made and escaped by the server, as in the report
     section.prepend(make("h2", {id: name + "-title", tabindex: "-1"}, part.title));
   }
-  offers(); suspects(); steps(); film();
+  offers(); suspects(); steps();
   window.sysid.begin();
   residual();
   if (lost) { const again = focus && [...document.querySelectorAll("[data-key]")].find(e => e.dataset.key === focus); (again || at("verdict-title")).focus({preventScroll: Boolean(again)}); }
@@ -212,43 +238,6 @@ function steps() {
   one.addEventListener("change", ask); other.addEventListener("change", ask);
   at("steps").append(make("h3", {}, "Compare steps"), make("form", {class: "own", onsubmit: e => e.preventDefault()}, make("label", {}, "first", one), make("label", {}, "second", other)), answer);
   ask();
-}
-
-// ---- the log, played on the robot
-const nearby = new IntersectionObserver(entries => { for (const e of entries) if (e.isIntersecting) { nearby.unobserve(e.target); e.target.dispatchEvent(new Event("near")); } }, {rootMargin: "200px"});
-function film() {
-  const own = shown, slider = make("input", {type: "range", min: 0, max: 0, value: 0, "aria-label": "moment of the test logs", class: "moment"}), clock = make("span", {class: "quiet"}, "");
-  const place = make("figure", {class: "look", style: "--height:440px"}, make("div", {class: "plot"}, make("p", {class: "waiting"}, "drawing…")));
-  let found = null, timer = null;
-  const plot = place.querySelector(".plot");
-  const at_ = k => {
-    const [x, y, z] = found.links[k], [u, v, w] = found.joints[k];
-    Plotly.restyle(plot, {x: [x, u], y: [y, v], z: [z, w], "marker.color": [undefined, found.levels[k].map(v => v ?? 0)]}, [0, 1]);
-    clock.textContent = found.time[k].toFixed(2) + " s: " + found.names.map((n, j) => n + " " + (found.levels[k][j] === null ? "–" : number(found.levels[k][j], 2) + " ×")).join(", ");
-  };
-  const stop = () => { clearTimeout(timer); timer = null; start.textContent = "play"; };
-  const step = () => {
-    if (!place.isConnected) return stop();
-    const k = Number(slider.value), next = k >= found.time.length - 1 ? 0 : k + 1;
-    slider.value = String(next); at_(next);
-    timer = setTimeout(step, Math.min(200, Math.max(60, 1000 * Math.abs(found.time[next] - found.time[k]))));
-  };
-  const start = button("play", () => { if (!found) return; if (timer) stop(); else { start.textContent = "pause"; timer = setTimeout(step, 0); } }, {disabled: true});
-  slider.addEventListener("input", () => { if (found) at_(Number(slider.value)); });
-  place.addEventListener("near", async () => {
-    try {
-      const [answer] = await Promise.all([get("api/play", {sha: own}), engine()]);
-      if (!place.isConnected) return;
-      found = answer;
-      place.setAttribute("aria-label", found.chart.label);
-      slider.max = String(found.time.length - 1);
-      window.sysid.show(place, found.chart);
-      start.disabled = false; at_(0);
-    } catch (error) { place.querySelector(".plot").textContent = error.message; }
-  });
-  at("bodies").append(make("h3", {}, "The test logs, played"), make("p", {class: "quiet"}, "Joints coloured by the RMS of their low-passed residual around the moment, in units of that of the whole log."),
-    make("div", {class: "acts"}, start, slider, clock), place);
-  nearby.observe(place);
 }
 
 // ---- the residual over time: previews, and questions about a stretch of it

@@ -1,0 +1,262 @@
+"""One joint from all sides: its torque over time, its residual against where it is and how fast,
+and the robot at the moment under the cursor.
+
+Everything is of the same rows as the fit's own errors, in the same band: the test logs, or the
+training logs, at the rate of the log. A window of time is drawn with every sample where there are
+few, and with the greatest and the least of each stretch where there are many.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+
+import numpy as np
+
+from ..errors import SysidError
+from ..estimate import Fit, Prediction
+from ..report import charts, solids
+from ..report.decimate import kept
+from ..report.words import units
+from . import panels
+
+MOST = 3000  # samples of a line before it is thinned
+_DOTS = 3000  # of a cloud
+_FRAMES = 600  # of the robot
+_CELLS = (28, 20)  # of a map, over position and speed
+PARTS = ("test", "train")
+
+
+class Workspace:
+    """A fit, ready to be looked at. Safe to use from several threads."""
+
+    def __init__(self, fit: Fit):
+        self.fit = fit
+        self._lines: dict[str, dict] = {}
+
+    def prediction(self, part: str) -> Prediction:
+        """The prediction of a part of the logs. Raises SysidError: there is none."""
+        if part not in PARTS or part not in self.fit.predictions:
+            raise SysidError(f"there is no part {part!r}", allowed=", ".join(PARTS), do="reload")
+        return self.fit.predictions[part]
+
+    def joint(self, number: int) -> str:
+        """The name of a joint. Raises SysidError: there is none of that number."""
+        if not 0 <= number < len(self.fit.joints):
+            raise SysidError("there is no such joint", do="reload")
+        return self.fit.joints[number]
+
+    def line(self, part: str) -> dict:
+        """The logs of a part end to end, the first from 0 s: as `charts.timeline` has them."""
+        if part not in self._lines:
+            found = self.prediction(part)
+            own = [e for e in self.fit.logs if e.get("part") == part]
+            names = [str(e.get("log", f"log {k + 1}")) for k, e in enumerate(own)]
+            self._lines[part] = charts.timeline({part: (found.log, found.t, names)})[part]
+        return self._lines[part]
+
+    def residual(self, part: str, joint: int) -> np.ndarray:
+        """(n,) measured minus predicted torque, NaN where a row does not count."""
+        found = self.prediction(part)
+        left = found.measured[:, joint] - found.predicted[:, joint]
+        return left if found.use is None else np.where(found.use[:, joint], left, np.nan)
+
+    # ---- a window of time
+
+    def window(
+        self, part: str, joint: int, low=None, high=None, before: Workspace | None = None
+    ) -> dict:
+        """Torque measured and predicted, and the residual, between two times.
+
+        Args:
+            low, high: on the axis of the logs end to end [s]; None for all of it.
+            before: the same logs under another model, drawn beside.
+
+        Returns:
+            {"chart", "from", "to", "samples", "drawn", "whole": [first, last], "joint", "unit",
+            "rms", "here", "before"}: RMS of all rows, of those of the window, and of all under the
+            other model (None where there is none, or its rows are others).
+        """
+        name, line, found = self.joint(joint), self.line(part), self.prediction(part)
+        t, left = line["t"], self.residual(part, joint)
+        low, high = self._bounds(t, low, high)
+        # one row beyond either edge, so that lines reach it
+        first, last = np.searchsorted(t, low) - 1, np.searchsorted(t, high, side="right") + 1
+        rows = slice(max(int(first), 0), min(int(last), len(t)))
+        lines = {"measured": found.measured[:, joint], "predicted": found.predicted[:, joint]}
+        lines["residual"] = left
+        beside = None if before is None else before.same_rows(self, part, joint)
+        if beside is not None:
+            lines |= {"predicted before": beside[0], "residual before": beside[1]}
+        lines = {word: values[rows] for word, values in lines.items()}
+        keep = np.unique(np.concatenate([kept(v, MOST) for v in lines.values()]))
+        keep = keep if rows.stop - rows.start > MOST else np.arange(rows.stop - rows.start)
+        chart = panels.time(
+            name, units(self.fit)[name][0], t[rows][keep], {w: v[keep] for w, v in lines.items()},
+            own=_own_clock(line, rows.start + keep, found), breaks=_breaks(line, rows.start + keep),
+            window=(low, high), shaded=self._disturbed(part, name, low, high),
+        )  # fmt: skip
+        inside = (t >= low) & (t <= high)
+        return {
+            "chart": chart, "from": low, "to": high, "samples": int(inside.sum()),
+            "drawn": int(len(keep)), "whole": [float(t[0]), float(t[-1])], "joint": name,
+            "unit": units(self.fit)[name][0], "rms": _rms(left), "here": _rms(left[inside]),
+            "before": None if beside is None else _rms(beside[1]),
+        }  # fmt: skip
+
+    def csv(self, part: str, joint: int, low=None, high=None) -> str:
+        """Every row of a window of time as text of a CSV file: the log, its own clock, torques."""
+        name, line, found = self.joint(joint), self.line(part), self.prediction(part)
+        low, high = self._bounds(line["t"], low, high)
+        rows = np.flatnonzero((line["t"] >= low) & (line["t"] <= high))
+        unit = units(self.fit)[name][0]
+        heads = [
+            "log",
+            "t [s]",
+            *(f"{word} [{unit}]" for word in ("measured", "predicted", "residual")),
+        ]
+        out = io.StringIO()
+        sheet = csv.writer(out, lineterminator="\n")
+        sheet.writerow(heads)
+        left = self.residual(part, joint)
+        for k, (log, own) in zip(rows, _own_clock(line, rows, found)):
+            torques = found.measured[k, joint], found.predicted[k, joint], left[k]
+            sheet.writerow(
+                [
+                    log,
+                    repr(float(found.t[k])),
+                    *(repr(float(v)) if np.isfinite(v) else "" for v in torques),
+                ]
+            )
+        return out.getvalue()
+
+    @staticmethod
+    def _bounds(t, low, high) -> tuple[float, float]:
+        """The window that is meant. Raises SysidError."""
+        if not len(t):
+            raise SysidError("these logs have no rows")
+        low, high = (t[0] if low is None else low), (t[-1] if high is None else high)
+        if not (np.isfinite(low) and np.isfinite(high) and low < high):
+            raise SysidError("a window of time needs two numbers, the first the less")
+        return float(low), float(high)
+
+    def same_rows(self, other: Workspace, part: str, joint: int):
+        """Predicted torque and residual (n,) of this model on another's rows; None where its own
+        are others: the logs, or the filter that was chosen for them, changed."""
+        mine, theirs = self.prediction(part), other.prediction(part)
+        if mine.t.shape != theirs.t.shape or not np.array_equal(mine.t, theirs.t):
+            return None
+        return mine.predicted[:, joint], self.residual(part, joint)
+
+    def _disturbed(self, part: str, joint: str, low, high) -> list[tuple[float, float, str]]:
+        """What disturbed a joint's log in a window: from, to, kind."""
+        line, out = self.line(part), []
+        for event in self.fit.events:
+            if event["part"] != part or joint not in event["joints"]:
+                continue
+            for (begin, end, name), first in zip(line["spans"], line["starts"]):
+                a, b = (begin + event[key] - first for key in ("start", "stop"))
+                if name == event["log"] and b >= max(begin, low) and a <= min(end, high):
+                    out.append((max(a, begin), min(b, end), event["kind"]))
+        return out
+
+    # ---- the residual against position and speed
+
+    def cloud(self, part: str, joint: int) -> dict:
+        """The residual against position and against speed, each dot coloured by the direction of
+        motion, and its mean over both.
+
+        Returns:
+            {"position", "speed", "map": charts, "t": (m,) [s] of the dots, "joint", "unit"}.
+        """
+        name, states = self.joint(joint), self.prediction(part).states
+        if states is None:
+            raise SysidError("where the joints were was not kept", do="reload")
+        left = self.residual(part, joint)[states.index]
+        q, qd = states.q[:, joint], states.qd[:, joint]
+        seen = np.flatnonzero(np.isfinite(left))
+        dots = seen[:: max(1, -(-len(seen) // _DOTS))]
+        force, base = units(self.fit)[name]
+        rest = 1e-3 * float(np.abs(qd).max(initial=0.0))
+        direction = np.where(np.abs(qd) > rest, np.sign(qd), 0.0)
+        t = self.line(part)["t"][states.index]
+        drawn = {
+            word: panels.dots(
+                word, name, values[dots], left[dots], direction[dots], t[dots], force, unit
+            )
+            for word, values, unit in (("position", q, base), ("speed", qd, f"{base}/s"))
+        }
+        drawn["map"] = panels.mean_map(name, *_binned(q[seen], qd[seen], left[seen]), force, base)
+        return {**drawn, "t": charts.rounded(t[dots], 6), "joint": name, "unit": force}
+
+    # ---- the robot
+
+    def film(self, part: str) -> dict:
+        """Where the robot's joints and links are over a part of the logs.
+
+        Returns:
+            {"chart": of the first moment, "t": (f,) [s], "links": (f, 3, k), None between links,
+            "joints": (f, 3, dof), "names"}.
+        """
+        states, robot = self.prediction(part).states, self.fit.model.robot
+        if states is None or not len(states.index):
+            raise SysidError("where the joints were was not kept", do="reload")
+        frames = np.unique(np.linspace(0, len(states.index) - 1, _FRAMES).astype(int))
+        rows = {body.joint: body.row for body in robot.bodies if body.kind == "link"}
+        own = [rows[joint] for joint in self.fit.joints]
+        links, joints = [], []
+        for k in frames:
+            placed = solids.frames(robot, states.q[k])
+            ends = solids.skeleton(robot, placed)
+            links.append(np.concatenate([np.array([a, b, [np.nan] * 3]) for a, b in ends]).T)
+            joints.append(np.array([placed[row].translation for row in own]).T)
+        chart = panels.robot(np.array(links), joints[0], list(self.fit.joints))
+        t = self.line(part)["t"][states.index[frames]]
+        return {
+            "chart": chart, "t": charts.rounded(t, 6), "links": _listed(links),
+            "joints": _listed(joints), "names": list(self.fit.joints),
+        }  # fmt: skip
+
+
+def workspace_page(workspace: Workspace, steps: dict) -> dict:
+    """What the page needs of a fit that is yet to be diagnosed: its joints, and its steps."""
+    unit = units(workspace.fit)
+    joints = [{"name": j, "unit": unit[j][0]} for j in workspace.fit.joints]
+    return {"joints": joints, "converged": bool(workspace.fit.solution.converged), **steps}
+
+
+def _listed(frames) -> list:
+    return [[charts.rounded(axis, 4) for axis in frame] for frame in frames]
+
+
+def _rms(values) -> float | None:
+    known = values[np.isfinite(values)]
+    return float(np.sqrt(np.mean(known**2))) if len(known) else None
+
+
+def _own_clock(line: dict, rows, found: Prediction) -> list[list]:
+    """Of each row its log's name and the time by the log's own clock [s]."""
+    names = [name.rpartition("/")[2] for _, _, name in line["spans"]]
+    ends = np.array([end for _, end, _ in line["spans"]])
+    which = np.minimum(np.searchsorted(ends, line["t"][rows] - 1e-9), len(names) - 1)
+    return [[names[k], float(f"{t:.6g}")] for k, t in zip(which, found.t[rows])]
+
+
+def _breaks(line: dict, rows) -> np.ndarray:
+    """Places in a choice of rows before which the log was interrupted."""
+    at = np.searchsorted(rows, line["breaks"])
+    return np.unique(at[(at > 0) & (at < len(rows))])
+
+
+def _binned(q, qd, left) -> tuple:
+    """Edges over position and speed, and the mean residual and the number of rows in each cell."""
+    edges = [_edges(values, cells) for values, cells in zip((q, qd), _CELLS)]
+    count = np.histogram2d(q, qd, bins=edges)[0]
+    total = np.histogram2d(q, qd, bins=edges, weights=left)[0]
+    mean = np.where(count > 0, total / np.maximum(count, 1), np.nan)
+    return *edges, mean, count.astype(int)
+
+
+def _edges(values, cells: int) -> np.ndarray:
+    low, high = (float(values.min()), float(values.max())) if len(values) else (0.0, 0.0)
+    return np.linspace(low, high if high > low else low + 1.0, cells + 1)
