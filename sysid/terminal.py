@@ -22,10 +22,11 @@ _LOW = 0.1  # below this share the prior, not the data, gave a parameter
 
 
 @contextmanager
-def progress_bar(course):
+def progress_bar(course=None):
     """A bar with the stage and the time left; yields the function that pipelines call with (stage, share done)."""
     from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn
 
+    course = progress.Course() if course is None else course
     columns = (SpinnerColumn(), BarColumn(bar_width=20), TextColumn("{task.fields[left]}"), TextColumn("{task.description}"))
     begun = time.monotonic()
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:

@@ -113,7 +113,8 @@ def test_dots_say_where_the_joint_was(arm):
 def test_the_robot_moves_as_the_log_says(arm):
     film = Workspace(arm).film("train")
     assert len(film["t"]) == len(film["links"]) == len(film["joints"]) <= 600
-    assert film["names"] == list(arm.joints)
+    assert film["names"] == list(arm.joints) and film["t"] == sorted(film["t"])
+    assert EVIL not in film["chart"]["figure"]["data"][1]["text"]  # as markup
     assert film["links"][0] != film["links"][len(film["links"]) // 2]
 
 

@@ -75,7 +75,7 @@ def application(shelf: Shelf | Bench, *, host: str = "127.0.0.1", port: int = 87
     own("/api/window", _window)
     own("/api/cloud", lambda bench, r: _json(bench.workspace(_word(r, "sha")).cloud(_word(r, "part"), _whole(r, "joint"))))
     own("/api/film", lambda bench, r: _json(bench.workspace(_word(r, "sha")).film(_word(r, "part"))))
-    own("/export/window.csv", _window_csv)
+    own("/export/rows.csv", _window_csv)
     own("/api/compare", lambda bench, r: _json(bench.compare(_whole(r, "from"), _whole(r, "to"))))
     own("/export/report.html", lambda bench, r: _file(bench.report(_word(r, "sha")), "text/html", f"{bench.desk.name}.html"))
     own("/export/experiment.yaml", lambda bench, r: _file(bench.desk.text(), "application/yaml", f"{bench.desk.name}.yaml"))

@@ -49,7 +49,7 @@ function build(section, lent) {
     make("div", {class: "acts"}, parts, make("label", {class: "quiet"}, "beside ", before)),
     make("div", {class: "acts", role: "group", "aria-label": "time"}, way("zoom in", "in"), way("zoom out", "out"), way("←", "back", "earlier"), way("→", "on", "later"), way("whole", "all"),
       button("drag zooms", () => drags("zoom"), {id: "drag-zoom", "aria-pressed": "true"}), button("drag brushes", () => drags("select"), {id: "drag-brush", "aria-pressed": "false"}),
-      button("no brush", () => brushed(null), {id: "brush-none"})),
+      button("no brush", () => brushed(null), {id: "brush-none"}), button("play", play, {id: "workspace-play", "aria-pressed": "false"})),
     make("p", {id: "workspace-said", class: "answer", "aria-live": "polite"}),
     make("div", {class: "timeplace"}, figure("time", 400, "torque and residual over time"), make("div", {id: "workspace-cursor", hidden: true})),
     make("p", {id: "workspace-brush", class: "quiet", "aria-live": "polite"}),
@@ -217,6 +217,21 @@ function pointed() {
   at("workspace-clock").textContent = cursor.toFixed(3) + " s: residual " + words(p.y[k]) + " " + cloud.unit + " at " + words(p.x[k]) + (slides ? " m, " : " rad, ") + words(s.x[k]) + (slides ? " m/s" : " rad/s");
 }
 
+let film = null;
+function play() { // the log in its own time, and again from the start of what is in sight
+  const stop = () => { clearInterval(film); film = null; at("workspace-play").setAttribute("aria-pressed", "false"); at("workspace-play").textContent = "play"; };
+  if (film !== null) return stop();
+  if (!whole) return;
+  at("workspace-play").setAttribute("aria-pressed", "true"); at("workspace-play").textContent = "pause";
+  let last = performance.now();
+  film = setInterval(() => {
+    if (!at("workspace-play").isConnected) return stop();
+    const now = performance.now(), [a, b] = view.from === null ? whole : [view.from, view.to], next = (cursor === null ? a : cursor) + (now - last) / 1000;
+    last = now;
+    moved(next > b || next < a ? a : next);
+  }, 60);
+}
+
 // ---- the brush: a set of dots, whichever chart it was drawn in
 function stretchOf(a, b) {
   if (!cloud) return;
@@ -253,7 +268,7 @@ async function take(name, kind) {
   if (kind !== "CSV") { await Plotly.downloadImage(own, {format: kind.toLowerCase(), filename: file, width: own.offsetWidth, height: own.offsetHeight, scale: kind === "PNG" ? 2 : 1}); return; }
   if (name === "time") { // every sample in sight, not the drawn ones
     const words = new URLSearchParams({sha, joint: view.joint, part: view.part, ...(view.from === null ? {} : {from: view.from, to: view.to})});
-    tools.make("a", {href: "export/window.csv?" + words, download: file + ".csv"}).click();
+    tools.make("a", {href: "export/rows.csv?" + words, download: file + ".csv"}).click();
     return;
   }
   saved(file + ".csv", rowsOf(own).map(row => row.join(",")).join("\n") + "\n", "text/csv");
