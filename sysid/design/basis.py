@@ -16,13 +16,17 @@ from ..model import ROBOT, Model
 from ..motion import Motion
 from ..preprocess import prepare
 from ..robot import Robot
+from ..simulate.motion import draw
 from ..specs import Experiment
-from .columns import is_of_the_torque, of_the_instant
-from .information import Known, noise_of, own_size, size_of
+from .columns import of_the_instant
+from .information import Known, own_size
+from .noise import noise_of, size_of
+from .suspects import Seen, along, played, suspected, unseen
 
 _WINDOW = 0.1  # s, where none is known
 _GUESSED = 0.02  # of a joint's torque: its noise, where no log says
 _RATE = 500.0  # Hz, where no log says
+_USUAL = 10.0  # s of a motion that says how a robot usually moves, where no log does
 
 
 @dataclass(frozen=True)
@@ -36,7 +40,6 @@ class Basis:
     pose: np.ndarray
     rate: float
     window: float
-    suspects: list[Candidate]
 
 
 def basis(experiment: Experiment, separate, tell) -> Basis:
@@ -67,9 +70,9 @@ def basis(experiment: Experiment, separate, tell) -> Basis:
         low, high = np.where(np.isfinite(machine.limits.T), machine.limits.T, [[-1.0], [1.0]])
         pose = np.clip(np.zeros(machine.dof), 0.9 * low + 0.1 * high, 0.1 * low + 0.9 * high)
         rate, window = experiment.data.rate or _RATE, _WINDOW
-    suspects = _suspects(experiment, structure, separate)
-    known = _known(structure, fit, x, noise, prior, suspects)
-    return Basis(machine, fit, motion, known, pose, rate, window, suspects)
+    asked = _suspects(experiment, structure, separate)
+    known = _known(structure, fit, x, noise, prior, asked, motion)
+    return Basis(machine, fit, motion, known, pose, rate, window)
 
 
 def _has_logs(experiment: Experiment) -> bool:
@@ -104,29 +107,62 @@ def _suspects(experiment: Experiment, model: Model, separate) -> list[Candidate]
     return out
 
 
-def _known(model: Model, fit: Fit | None, x, noise, prior, suspects) -> Known:
-    """What a design asks of: the model's instant, with the suspects that are columns of it."""
+def _known(model: Model, fit: Fit | None, x, noise, prior, asked, motion: Motion | None) -> Known:
+    """What a design asks of: the model's instant, and the suspects."""
     instant = of_the_instant(model)
     values = dict(zip(model.names, x))
     own = np.array([values[name] for name in instant.names])
     typical = np.maximum(20.0 * noise, 1e-6) if fit is None else size_of(fit)
     before = own_size(instant, prior, own, typical)
-    if fit is not None:
+    if not asked:
+        if fit is not None:
+            before = before + _told(fit, instant, noise)
+        return Known(instant, own, noise, before)
+    count = 10 * instant.bodies
+    if instant.reference is None:
+        instant = instant.with_reference(own[:count].reshape(-1, 10))
+    if fit is None:
+        q, qd, qdd = usual = _usual(model.robot)
+        instant = instant.scaled_by(played(q, qd, qdd, 1.0 / _RATE, model.robot.joints))
+        torque = float(np.sqrt(np.mean(typical**2)))
+        suspects = tuple(unseen(instant, own, *usual, one, torque) for one in asked)
+        columns = along(suspects, instant, own, *usual)
+        each, more = np.sqrt(np.mean(columns**2, axis=(0, 2))), None
+    else:
+        instant = instant.scaled_by(motion)
+        seen = Seen.of(fit, motion, motion.samples)
+        suspects = tuple(suspected(seen, fit, one) for one in asked)
+        columns = np.concatenate([seen.columns(one) for one in suspects], axis=2)
+        each, more = np.sqrt(np.mean(columns**2, axis=(0, 1))), seen
+    size = np.zeros(instant.size + len(each))
+    whole = np.diag(size)
+    whole[: instant.size, : instant.size] = before
+    # a suspect is about as large as would make a joint's torque
+    large = (each / np.max(typical)) ** 2
+    k = np.arange(instant.size, len(size))
+    whole[k, k] = np.where(large > 0.0, large, 1.0)
+    if more is not None:
         places = [model.names.index(name) for name in instant.names]
-        for factor in fit.compressed.by_joint:
-            whole = np.zeros((len(factor.triangle), model.size))
-            whole[:, factor.columns] = factor.triangle[:, :-1]
-            rows = whole[:, places] / noise[factor.joint]
-            before = before + rows.T @ rows
-    grown = instant
-    for suspect in suspects:
-        effect = suspect.effect
-        if is_of_the_torque(effect) and effect.instantaneous and not effect.uses_load:
-            grown = grown.with_effect(effect, (suspect.joint,))
-    if grown.size > instant.size:
-        more = grown.size - instant.size
-        x_grown = np.append(own, np.zeros(more))
-        whole = own_size(grown, prior, x_grown, typical)
-        whole[: instant.size, : instant.size] = before
-        return Known(grown, x_grown, noise, whole)
-    return Known(instant, own, noise, before)
+        both = np.concatenate([more.rows.columns[:, :, places], columns], axis=2)
+        flat = (both * more.weights[:, None, None]).reshape(-1, len(size))
+        whole += flat.T @ flat
+    return Known(instant, own, noise, whole, suspects)
+
+
+def _told(fit: Fit, instant: Model, noise) -> np.ndarray:
+    """Information (size, size) of the logs that exist about the model's instant."""
+    places = [fit.model.names.index(name) for name in instant.names]
+    out = np.zeros((instant.size, instant.size))
+    for factor in fit.compressed.by_joint:
+        whole = np.zeros((len(factor.triangle), fit.model.size))
+        whole[:, factor.columns] = factor.triangle[:, :-1]
+        rows = whole[:, places] / noise[factor.joint]
+        out += rows.T @ rows
+    return out
+
+
+def _usual(robot: Robot) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Positions, speeds and accelerations (n, dof) that a robot of this size usually moves with."""
+    t = np.arange(0.0, _USUAL, 1.0 / _RATE)
+    found = draw(robot, t, np.random.default_rng(0))
+    return found.q, found.qd, found.qdd

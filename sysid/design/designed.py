@@ -23,14 +23,14 @@ from . import promise
 from .basis import Basis, basis
 from .columns import in_runs, of_the_instant
 from .fourier import Fourier
-from .information import noise_of
 from .limits import Limits, LimitsSpec, limits
 from .links import geometry
+from .noise import noise_of
 from .problem import Problem, shares, torque
-from .promise import played
 from .result import Design
 from .search import searched
 from .solve import Found
+from .suspects import played
 
 HARMONICS = 5
 _FASTEST = 0.25  # of a period of the filter's window: what it still lets through of the fastest
@@ -115,12 +115,12 @@ def _told(
     spread, pairs = {}, []
     if base.fit is not None:
         spread = promise.deviations(base.fit, _more(base.fit, q, qd, qdd))
-        if len(base.suspects) > 1:
-            new = played(q, qd, qdd, 1.0 / base.rate, base.motion)
-            pairs = promise.pairs(base.fit, base.suspects, base.motion, new, len(t))
+        if len(base.known.suspects) > 1:
+            new = played(q, qd, qdd, 1.0 / base.rate, base.robot.joints)
+            pairs = promise.pairs(base.fit, base.known.suspects, base.motion, new, len(t))
     return Design(
         joints=base.robot.joints, family=family, coefficients=family.coefficients(found.z),
-        t=t, q=q, qd=qd, qdd=qdd, torque=needed, log_det=found.value, random_best=random_best,
+        t=t, q=q, qd=qd, qdd=qdd, torque=needed, log_det=found.log_det, random_best=random_best,
         deviations=spread, pairs=tuple(pairs), margins=_margins(problem, bounds, found),
         limits=bounds, said=tuple(notices),
     )  # fmt: skip

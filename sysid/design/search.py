@@ -19,7 +19,7 @@ from joblib import Parallel, cpu_count, delayed
 from ..errors import SysidWarning
 from ..threads import single_threaded
 from . import solve
-from .problem import Problem, drawn, shrunk, value
+from .problem import Problem, drawn
 from .solve import Climb, Found
 
 _ROUNDS = (1, 2, 4, 8)  # of the slowest harmonic
@@ -45,7 +45,7 @@ def searched(
     work = _shared(1)
     asked = [(problem, pose, (seed, r, k)) for r in rounds for k in range(_DRAWN)]
     starts = [found for found in work(_start, asked) if np.isfinite(found.value)]
-    random_best = max((found.value for found in starts), default=-np.inf)
+    random_best = max((found.log_det for found in starts), default=-np.inf)
     starts = sorted(starts, key=lambda found: -found.value)[:_IMPROVED]
     climbs = [Climb(found.rounds, found.z) for found in starts]
     try:
@@ -70,9 +70,7 @@ def searched(
 def _start(problem: Problem, pose, seed: tuple[int, int, int]) -> Found:
     """A random motion of seed[1] rounds that keeps to the limits, as large as they let it."""
     posed = problem.with_rounds(seed[1])
-    z = drawn(posed, pose, np.random.default_rng(seed))
-    kept = shrunk(posed, z)
-    return Found(seed[1], z, -np.inf) if kept is None else Found(seed[1], kept, value(posed, kept))
+    return Found.of(posed, drawn(posed, pose, np.random.default_rng(seed)))
 
 
 def _shared(processes: int) -> Callable[[Callable, list[tuple]], list]:

@@ -1,7 +1,7 @@
 """The motion that tells most within its limits.
 
-Maximised is log det M by steps of linear programs: its slope, and every limit that a step could
-reach, linearised at the nodes (positions, speeds, accelerations and jerks are linear in the
+Maximised is what a motion is worth by steps of linear programs: its slope, and every limit that a
+step could reach, linearised at the nodes (positions, speeds, accelerations and jerks are linear in the
 coordinates as they are), within a trust region that grows where a step keeps its promise and
 shrinks where it does not. Where a limit is passed between the nodes, that instant becomes one.
 
@@ -15,28 +15,37 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.optimize import linprog
 
-from .collision import Near
-from .columns import Slopes
-from .information import log_det_with_slope
-from .problem import Problem, passed, shares, shrunk, value
+from ..model import ROBOT
+from .columns import with_changes
+from .information import information, worth
+from .problem import Problem, looking_back, passed, shares, shrunk, told, torque, value
 
 STEPS = (40, 15, 10, 10)  # linear programs, again each time that more times are looked at
 _FIRST, _WIDEST, _NARROWEST = 0.1, 0.5, 1e-3  # rad or m: radius of the trust region
 _GOOD, _BAD = 0.7, 0.25  # of what a step promised: from there it is wider, up to there narrower
-_SETTLED = 1e-2  # of log det M: a step that gains less is the last
-_PRICE = 1e4  # of log det M for going beyond a limit by as much as the limit
+_NUDGE = 1e-5  # rad or m of a coordinate: along whose motion a suspect looks back
+_SETTLED = 1e-2  # of its worth: a step that gains less is the last
+_PRICE = 1e4  # of its worth for going beyond a limit by as much as the limit
 _LOOKED = 25.0  # Hz at which distances are while the motion is sought
+_STRONG = 0.5  # of a limit: torques that a step minds; others are looked at afterwards
 _SIGHT = 0.03  # m beyond the clearance: pairs that a step minds; others are looked at afterwards
 
 
 @dataclass(frozen=True)
 class Found:
-    """A motion z (dof, size) of a number of rounds and its log det M; -inf where none keeps to the
-    limits."""
+    """A motion z (dof, size) of a number of rounds, what it is worth, and log det M alone; -inf where
+    none keeps to the limits."""
 
     rounds: int
     z: np.ndarray
     value: float
+    log_det: float = -np.inf
+
+    @classmethod
+    def of(cls, problem: Problem, z: np.ndarray) -> Found:
+        """The largest share of a motion that keeps to every limit."""
+        kept, rounds = shrunk(problem, z), problem.family.rounds
+        return cls(rounds, z, -np.inf) if kept is None else cls(rounds, kept, *value(problem, kept))
 
 
 @dataclass(frozen=True)
@@ -85,66 +94,77 @@ def climbed(problem: Problem, climb: Climb, steps: int) -> Climb:
 
 def ended(problem: Problem, climb: Climb) -> Found:
     """The motion of a search, shrunk to what keeps to every limit."""
-    problem = problem.with_rounds(climb.rounds)
-    kept = shrunk(problem, climb.z)
-    told = -np.inf if kept is None else value(problem, kept)
-    return Found(climb.rounds, climb.z if kept is None else kept, told)
+    return Found.of(problem.with_rounds(climb.rounds), climb.z)
 
 
 @dataclass(frozen=True)
 class _Grid:
     """Times at which a motion is looked at: nodes, and `extra` times [s] that limits alone look at.
-    basis: of all of them; weights (n,): how many samples each stands for; poses (m, size): the basis
-    of q at the times at which distances are looked at."""
+    basis: of all of them; nodes: how many are nodes; poses (m, size): the basis of q at the times at
+    which distances are looked at."""
 
     basis: np.ndarray
-    weights: np.ndarray
+    nodes: int
     poses: np.ndarray
 
 
 def _grid(problem: Problem, extra) -> _Grid:
     nodes = problem.nodes
-    weights = np.concatenate([np.full(len(nodes), problem.samples / len(nodes)), 0.0 * extra])
     count = int(np.ceil(_LOOKED * problem.family.duration)) if problem.geometry.looks else 0
     often = np.union1d((np.arange(count) + 0.5) / _LOOKED, extra)
     poses = problem.family.basis(often)[0]
-    return _Grid(problem.family.basis(np.concatenate([nodes, extra])), weights, poses)
+    return _Grid(problem.family.basis(np.concatenate([nodes, extra])), len(nodes), poses)
 
 
 @dataclass(frozen=True)
 class _Look:
-    """A motion at the nodes: log det M and its slope (dof, size), (4, n, dof) motion, torque (n, dof)
-    and its slope (n, dof, dof, size), pairs that are near, and what goes beyond limits, in all."""
+    """A motion: what it is worth, the slope (all, all) of that in M, the columns (dof, all, nodes), the
+    motion (4, n, dof), torque (n, dof), and what goes beyond limits, in all."""
 
     z: np.ndarray
-    told: float
+    worth: float
     slope: np.ndarray
+    columns: np.ndarray
     motion: np.ndarray
     torque: np.ndarray
-    pull: np.ndarray
-    near: Near
     beyond: float
 
     @property
     def merit(self) -> float:
         """What a step must raise."""
-        return self.told - _PRICE * self.beyond
+        return self.worth - _PRICE * self.beyond
 
 
 def _look(problem: Problem, z, grid: _Grid) -> _Look:
-    x, dof, basis = problem.known.x, problem.family.dof, grid.basis
-    motion = basis @ z.T
-    slopes = Slopes.of(problem.known.model, *motion[:3])
-    told, by_node = log_det_with_slope(problem.known, slopes, grid.weights)
-    slope = np.einsum("rin,rnz->iz", by_node.reshape(3, dof, -1), basis[:3])
-    own = np.einsum("jpn,p->nj", slopes.here, x)
-    change = np.tensordot(slopes.change, x, (1, 0)).reshape(dof, 3, dof, -1)
-    pull = np.einsum("jrin,rnz->njiz", change, basis[:3])
+    found, weights = told(problem, z), np.full(grid.nodes, problem.samples / grid.nodes)
+    value, slope = worth(problem.known, information(problem.known, found, weights))
+    motion = grid.basis @ z.T
+    needed = torque(problem, *motion[:3])
     clearance = problem.limits.clearance
-    near = problem.geometry.near(grid.poses @ z.T, clearance + _SIGHT)
-    lacks = float(np.max(clearance - near.distance, initial=0.0)) / max(clearance, 1e-3)
-    over = float(np.maximum(shares(problem, motion, own) - 1.0, 0.0).max())
-    return _Look(z, told, slope, motion, own, pull, near, max(over, 0.1 * lacks, 0.0))
+    least = problem.geometry.least(grid.poses @ z.T, clearance)
+    lacks = float(np.max(clearance - least, initial=0.0)) / max(clearance, 1e-3)
+    over = float(np.max(shares(problem, motion, needed) - 1.0, initial=0.0))
+    return _Look(z, value, slope, found, motion, needed, max(over, 0.1 * lacks))
+
+
+def climbs(problem: Problem, at: _Look, grid: _Grid) -> np.ndarray:
+    """The slope (dof, size) of what a motion is worth in its coordinates."""
+    known, dof, weight = problem.known, problem.family.dof, problem.samples / grid.nodes
+    pull = 2.0 * weight * np.matmul(at.slope, at.columns)
+    _, change = with_changes(known.all_columns, *at.motion[:3, : grid.nodes])
+    by_node = np.einsum("jpn,jpvn->vn", pull, change).reshape(3, dof, -1)
+    out = np.einsum("rin,rnz->iz", by_node, grid.basis[:3, : grid.nodes])
+    for place, one in zip(known.places, known.suspects):
+        joint = one.candidate.joint
+        if not one.looks_back or joint == ROBOT:
+            continue
+        # of its own joint's motion, by differences: what others do to it enters with the next look
+        for k in range(at.z.shape[1]):
+            moved = at.z.copy()
+            moved[joint, k] += _NUDGE
+            more = looking_back(problem, one, moved) - at.columns[:, place]
+            out[joint, k] += float(np.sum(pull[:, place] * more)) / _NUDGE
+    return out
 
 
 def _stepped(problem: Problem, at: _Look, grid: _Grid, radius: float) -> tuple[_Look, float, bool]:
@@ -172,6 +192,7 @@ def _step(
     to raise the merit; None where there is none."""
     limits, dof, size = problem.limits, problem.family.dof, problem.family.size
     rows, most, basis = [], [], grid.basis
+    slope = climbs(problem, at, grid)
 
     def bound(values, slopes, limit):
         """|values + slopes d| <= limit, of those rows that a step can bring there."""
@@ -188,11 +209,16 @@ def _step(
             slopes[:, j] = reach
             value = own[:, j] - (centre[j] if np.ndim(centre) else centre)
             bound(value / limit[j], slopes.reshape(len(reach), -1) / limit[j], 1.0)
-    for j in range(dof):
-        if np.isfinite(limits.torque[j]):
-            slopes = at.pull[:, j].reshape(len(at.pull), -1) / limits.torque[j]
-            bound(at.torque[:, j] / limits.torque[j], slopes, 1.0)
-    scale, near = max(limits.clearance, 1e-2), at.near
+    strong = np.flatnonzero((np.abs(at.torque) > _STRONG * limits.torque).any(axis=1))
+    if len(strong):
+        motion, reach = at.motion[:3, strong], basis[:3, strong]
+        _, change = with_changes(lambda *asked: torque(problem, *asked).T, *motion)
+        for j in np.flatnonzero(np.isfinite(limits.torque)):
+            own = change[j].reshape(3, dof, -1) / limits.torque[j]
+            slopes = np.einsum("rin,rnz->niz", own, reach).reshape(-1, dof * size)
+            bound(at.torque[strong, j] / limits.torque[j], slopes, 1.0)
+    near = problem.geometry.near(grid.poses @ at.z.T, limits.clearance + _SIGHT)
+    scale = max(limits.clearance, 1e-2)
     slopes = np.einsum("mi,mz->miz", near.slope, grid.poses[near.pose]).reshape(-1, dof * size)
     room = near.distance - limits.clearance
     can = radius * np.abs(slopes).sum(axis=1) > room
@@ -201,7 +227,7 @@ def _step(
     rows, most = np.concatenate(rows), np.concatenate(most)
     # one slack for all, so that there is a step from where a limit is passed, too
     matrix = np.column_stack([rows, -np.ones(len(rows))])
-    gain = np.append(-at.slope.ravel(), _PRICE)
+    gain = np.append(-slope.ravel(), _PRICE)
     free = [(-radius, radius)] * (dof * size) + [(0.0, None)]
     found = linprog(gain, A_ub=matrix, b_ub=most, bounds=free, method="highs")
     if found.status != 0:
