@@ -24,6 +24,7 @@ from .noise import noise_of, size_of
 from .suspects import Seen, along, played, suspected, unseen
 
 _WINDOW = 0.1  # s, where none is known
+_FASTEST = 0.25  # of a period of the filter's window: what it still lets through of the fastest
 _GUESSED = 0.02  # of a joint's torque: its noise, where no log says
 _RATE = 500.0  # Hz, where no log says
 _USUAL = 10.0  # s of a motion that says how a robot usually moves, where no log does
@@ -40,6 +41,11 @@ class Basis:
     pose: np.ndarray
     rate: float
     window: float
+
+    @property
+    def fastest(self) -> float:
+        """Harmonics [Hz] that the logs' filter still lets through."""
+        return _FASTEST / self.window
 
 
 def basis(experiment: Experiment, separate, tell) -> Basis:

@@ -33,7 +33,6 @@ from .solve import Found
 from .suspects import played
 
 HARMONICS = 5
-_FASTEST = 0.25  # of a period of the filter's window: what it still lets through of the fastest
 
 
 def design(
@@ -57,14 +56,9 @@ def design(
         raise ConfigError(f"--duration {duration:g}", allowed="2 to 600 s")
     with pipeline.noticed() as notices:
         base = basis(experiment, separate, tell)
-        seen = None if base.fit is None else _greatest(base.fit)
-        fastest = None if base.motion is None else _fastest(base.motion)
-        bounds = limits(base.robot, limits_spec, seen, fastest)
-        family = Fourier(duration, HARMONICS, 1, base.robot.dof)
-        shapes = geometry(base.robot, bounds.floor).about(base.pose, bounds.clearance)
-        problem = Problem(base.known, bounds.inner(), shapes, family, base.rate)
+        problem, bounds = posed(base, duration, limits_spec)
         found, random_best = searched(
-            problem, base.pose, _FASTEST / base.window, seed, processes=processes, tell=tell
+            problem, base.pose, base.fastest, seed, processes=processes, tell=tell
         )
         if found is None:
             raise ConfigError(
@@ -74,6 +68,22 @@ def design(
         for text in bounds.said:
             warnings.warn(SysidWarning(text), stacklevel=2)
     return _told(base, problem.with_rounds(found.rounds), bounds, found, random_best, notices)
+
+
+def posed(
+    base: Basis, duration: float, limits_spec: LimitsSpec | None = None
+) -> tuple[Problem, Limits]:
+    """The problem of a design of a duration [s], within limits less their margin, and the limits.
+
+    Raises:
+        SysidError: see `limits`.
+    """
+    seen = None if base.fit is None else _greatest(base.fit)
+    fastest = None if base.motion is None else _fastest(base.motion)
+    bounds = limits(base.robot, limits_spec, seen, fastest)
+    family = Fourier(duration, HARMONICS, 1, base.robot.dof)
+    shapes = geometry(base.robot, bounds.floor).about(base.pose, bounds.clearance)
+    return Problem(base.known, bounds.inner(), shapes, family, base.rate), bounds
 
 
 def _fastest(motion) -> np.ndarray:
