@@ -16,6 +16,7 @@ import numpy as np
 from scipy.optimize import linprog
 
 from ..model import ROBOT
+from .collision import Near
 from .columns import with_changes
 from .information import information, worth
 from .problem import Problem, looking_back, passed, shares, shrunk, told, torque, value
@@ -24,6 +25,7 @@ STEPS = (40, 15, 10, 10)  # linear programs, again each time that more times are
 _FIRST, _WIDEST, _NARROWEST = 0.1, 0.5, 1e-3  # rad or m: radius of the trust region
 _GOOD, _BAD = 0.7, 0.25  # of what a step promised: from there it is wider, up to there narrower
 _NUDGE = 1e-5  # rad or m of a coordinate: along whose motion a suspect looks back
+_STANDS = 0.1  # rad or m of a coordinate: so far the slope of what looks back stands
 _SETTLED = 1e-2  # of its worth: a step that gains less is the last
 _PRICE = 1e4  # of its worth for going beyond a limit by as much as the limit
 _LOOKED = 25.0  # Hz at which distances are while the motion is sought
@@ -79,9 +81,12 @@ def climbed(problem: Problem, climb: Climb, steps: int) -> Climb:
     while steps > 0 and not climb.over:
         grid = _grid(problem, climb.extra)
         at, radius, done, settled = _look(problem, climb.z, grid), climb.radius, climb.steps, False
+        near = _nearby(problem, at, grid)
         while steps > 0 and done < STEPS[climb.stage] and not settled:
-            at, radius, settled = _stepped(problem, at, grid, radius)
+            new, radius, settled = _stepped(problem, at, near, grid, radius)
             done, steps = done + 1, steps - 1
+            if new is not at:
+                at, near = new, _nearby(problem, new, grid, near.back)
         climb = replace(climb, z=at.z, radius=radius, steps=done)
         if settled or done >= STEPS[climb.stage]:
             times = passed(problem, climb.z)
@@ -147,29 +152,73 @@ def _look(problem: Problem, z, grid: _Grid) -> _Look:
     return _Look(z, value, slope, found, motion, needed, max(over, 0.1 * lacks))
 
 
-def climbs(problem: Problem, at: _Look, grid: _Grid) -> np.ndarray:
-    """The slope (dof, size) of what a motion is worth in its coordinates."""
+@dataclass(frozen=True)
+class _Nearby:
+    """What a motion's neighbours are like, to first order: the slope (dof, size) of its worth; the rows
+    at which torque is strong, and torque's slopes (rows, dof size) there by joint, as shares of its
+    limit; pairs of links that are near; and what `climbs` keeps."""
+
+    slope: np.ndarray
+    strong: np.ndarray
+    torque: dict[int, np.ndarray]
+    links: Near
+    back: dict[int, tuple[np.ndarray, np.ndarray]]
+
+
+def _nearby(problem: Problem, at: _Look, grid: _Grid, back: dict | None = None) -> _Nearby:
+    limits, dof, torques = problem.limits, problem.family.dof, {}
+    back = {} if back is None else back
+    strong = np.flatnonzero((np.abs(at.torque) > _STRONG * limits.torque).any(axis=1))
+    if len(strong):
+        _, change = with_changes(lambda *asked: torque(problem, *asked).T, *at.motion[:3, strong])
+        for j in np.flatnonzero(np.isfinite(limits.torque)):
+            own = change[j].reshape(3, dof, -1) / limits.torque[j]
+            slopes = np.einsum("rin,rnz->niz", own, grid.basis[:3, strong])
+            torques[int(j)] = slopes.reshape(len(strong), -1)
+    links = problem.geometry.near(grid.poses @ at.z.T, limits.clearance + _SIGHT)
+    return _Nearby(climbs(problem, at, grid, back), strong, torques, links, back)
+
+
+def climbs(problem: Problem, at: _Look, grid: _Grid, back: dict | None = None) -> np.ndarray:
+    """The slope (dof, size) of what a motion is worth in its coordinates.
+
+    Args:
+        back: slopes of what looks back along the motion, by suspect, with the coordinates that they
+            are of: they stand for others nearby, and new ones are put there.
+    """
     known, dof, weight = problem.known, problem.family.dof, problem.samples / grid.nodes
     pull = 2.0 * weight * np.matmul(at.slope, at.columns)
     _, change = with_changes(known.all_columns, *at.motion[:3, : grid.nodes])
     by_node = np.einsum("jpn,jpvn->vn", pull, change).reshape(3, dof, -1)
     out = np.einsum("rin,rnz->iz", by_node, grid.basis[:3, : grid.nodes])
-    for place, one in zip(known.places, known.suspects):
+    back = {} if back is None else back
+    for i, (place, one) in enumerate(zip(known.places, known.suspects)):
         joint = one.candidate.joint
         if not one.looks_back or joint == ROBOT:
             continue
-        # of its own joint's motion, by differences: what others do to it enters with the next look
-        for k in range(at.z.shape[1]):
-            moved = at.z.copy()
-            moved[joint, k] += _NUDGE
-            more = looking_back(problem, one, moved) - at.columns[:, place]
-            out[joint, k] += float(np.sum(pull[:, place] * more)) / _NUDGE
+        if i not in back or np.abs(at.z - back[i][0]).max() > _STANDS:
+            here = at.columns[:, place]
+            back[i] = at.z, _back(problem, one, at.z, joint, here)
+        out[joint] += np.einsum("jpn,zjpn->z", pull[:, place], back[i][1])
     return out
 
 
-def _stepped(problem: Problem, at: _Look, grid: _Grid, radius: float) -> tuple[_Look, float, bool]:
+def _back(problem: Problem, suspect, z, joint: int, here) -> np.ndarray:
+    """(size, dof, k, nodes) slopes of a suspect's columns in the coordinates of a joint's motion, by
+    differences: what others do to it enters with the next look."""
+    out = np.empty((z.shape[1], *here.shape))
+    for k, own in enumerate(out):
+        moved = z.copy()
+        moved[joint, k] += _NUDGE
+        own[:] = (looking_back(problem, suspect, moved) - here) / _NUDGE
+    return out
+
+
+def _stepped(
+    problem: Problem, at: _Look, near: _Nearby, grid: _Grid, radius: float
+) -> tuple[_Look, float, bool]:
     """A motion after one linear program, the radius of the next, and whether it is settled."""
-    found = _step(problem, at, grid, radius)
+    found = _step(problem, at, near, grid, radius)
     if found is None:
         return at, radius, True
     change, promised = found
@@ -186,13 +235,12 @@ def _stepped(problem: Problem, at: _Look, grid: _Grid, radius: float) -> tuple[_
 
 
 def _step(
-    problem: Problem, at: _Look, grid: _Grid, radius: float
+    problem: Problem, at: _Look, near: _Nearby, grid: _Grid, radius: float
 ) -> tuple[np.ndarray, float] | None:
     """The change (dof, size) of the best linear program within a radius, and by how much it promises
     to raise the merit; None where there is none."""
     limits, dof, size = problem.limits, problem.family.dof, problem.family.size
-    rows, most, basis = [], [], grid.basis
-    slope = climbs(problem, at, grid)
+    rows, most = [], []
 
     def bound(values, slopes, limit):
         """|values + slopes d| <= limit, of those rows that a step can bring there."""
@@ -203,31 +251,24 @@ def _step(
 
     bounds = (limits.half, limits.velocity, limits.acceleration, limits.jerk)
     middle = (limits.middle, 0.0, 0.0, 0.0)
-    for own, reach, limit, centre in zip(at.motion, basis, bounds, middle):
+    for own, reach, limit, centre in zip(at.motion, grid.basis, bounds, middle):
         for j in range(dof):
             slopes = np.zeros((len(reach), dof, size))
             slopes[:, j] = reach
             value = own[:, j] - (centre[j] if np.ndim(centre) else centre)
             bound(value / limit[j], slopes.reshape(len(reach), -1) / limit[j], 1.0)
-    strong = np.flatnonzero((np.abs(at.torque) > _STRONG * limits.torque).any(axis=1))
-    if len(strong):
-        motion, reach = at.motion[:3, strong], basis[:3, strong]
-        _, change = with_changes(lambda *asked: torque(problem, *asked).T, *motion)
-        for j in np.flatnonzero(np.isfinite(limits.torque)):
-            own = change[j].reshape(3, dof, -1) / limits.torque[j]
-            slopes = np.einsum("rin,rnz->niz", own, reach).reshape(-1, dof * size)
-            bound(at.torque[strong, j] / limits.torque[j], slopes, 1.0)
-    near = problem.geometry.near(grid.poses @ at.z.T, limits.clearance + _SIGHT)
-    scale = max(limits.clearance, 1e-2)
-    slopes = np.einsum("mi,mz->miz", near.slope, grid.poses[near.pose]).reshape(-1, dof * size)
-    room = near.distance - limits.clearance
+    for j, slopes in near.torque.items():
+        bound(at.torque[near.strong, j] / limits.torque[j], slopes, 1.0)
+    links, scale = near.links, max(limits.clearance, 1e-2)
+    slopes = np.einsum("mi,mz->miz", links.slope, grid.poses[links.pose]).reshape(-1, dof * size)
+    room = links.distance - limits.clearance
     can = radius * np.abs(slopes).sum(axis=1) > room
     rows.append(-slopes[can] / scale)
     most.append(room[can] / scale)
     rows, most = np.concatenate(rows), np.concatenate(most)
     # one slack for all, so that there is a step from where a limit is passed, too
     matrix = np.column_stack([rows, -np.ones(len(rows))])
-    gain = np.append(-slope.ravel(), _PRICE)
+    gain = np.append(-near.slope.ravel(), _PRICE)
     free = [(-radius, radius)] * (dof * size) + [(0.0, None)]
     found = linprog(gain, A_ub=matrix, b_ub=most, bounds=free, method="highs")
     if found.status != 0:
