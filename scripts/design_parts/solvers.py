@@ -30,7 +30,7 @@ def case(seed: int, number: int, robots=ROBOTS) -> dict:
 
 
 def trial(case: dict) -> dict:
-    """What each solver makes of a start: what the motion is worth once it keeps to every limit at a
+    """What each solver makes of a start: what its motion is worth once it keeps to every limit at a
     kilohertz, and the CPU seconds. Without distances, which have corners that others cannot take."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
@@ -43,16 +43,16 @@ def trial(case: dict) -> dict:
         told = {**case, "start": start.value, "solvers": {}}
         for name, solver in SOLVERS.items():
             begun = time.process_time()
-            z, looks = solver(problem, start.z)
+            ends, looks = solver(problem, start.z)
             spent = time.process_time() - begun
-            found = solve.Found.of(problem, z)
-            told["solvers"][name] = {"worth": found.value, "cpu": spent, "looks": looks}
+            best = max(solve.Found.of(problem, z).value for z in ends)
+            told["solvers"][name] = {"worth": best, "cpu": spent, "looks": looks}
     return told
 
 
 def _programs(problem, z):
     climb = solve.climbed(problem, solve.Climb(_ROUNDS, z), sum(solve.STEPS))
-    return climb.z, None
+    return [climb.z], None
 
 
 class _Others:
@@ -75,6 +75,10 @@ class _Others:
             if self.at.beyond < 1e-3 and self.at.worth > self.best[0]:
                 self.best = self.at.worth, self.at.z
         return self.at
+
+    def ends(self, flat) -> list[np.ndarray]:
+        """Where a solver ended, and the best point on its way that passed no limit."""
+        return [np.asarray(flat).reshape(self.shape), self.best[1]]
 
     def cost(self, flat) -> float:
         return -self.look(flat).worth
@@ -129,11 +133,9 @@ def _scipy(method: str):
                 posed.cost, z.ravel(), jac=posed.slope, method=method, constraints=limits,
                 bounds=Bounds(-10.0, 10.0), options=options,
             )  # fmt: skip
-            if posed.best[0] == -np.inf:
-                return found.x.reshape(z.shape), posed.looks
+            return posed.ends(found.x), posed.looks
         except _Late:
-            pass
-        return posed.best[1], posed.looks
+            return posed.ends(posed.last), posed.looks
 
     return solver
 
@@ -223,12 +225,11 @@ def _ipopt(problem, z):
     solver = casadi.nlpsol("s", "ipopt", {"x": x, "f": cost(x), "g": casadi.vertcat(*parts)}, asked)
     try:
         found = solver(x0=z.ravel(), lbg=np.concatenate(lower), ubg=np.concatenate(upper))
-        if posed.best[0] == -np.inf:
-            return np.array(found["x"]).reshape(z.shape), posed.looks
+        return posed.ends(np.array(found["x"])), posed.looks
     except RuntimeError:
         if not failed:
             raise
-    return posed.best[1], posed.looks
+    return posed.ends(posed.last), posed.looks
 
 
 SOLVERS = {
