@@ -8,12 +8,13 @@ import pytest
 
 from sysid import config, pipeline, robot
 from sysid import model as models
-from sysid.design import basis, design, document, limits, links, problem, search
+from sysid.design import basis, design, document, limits, links, problem, search, solve
 from sysid.design.collision import corners
-from sysid.design.columns import Slopes, columns, of_the_instant
+from sysid.design.columns import columns, of_the_instant
 from sysid.design.fourier import Fourier
-from sysid.design.information import Known, gram, log_det, log_det_with_slope, own_size
+from sysid.design.information import Known, evidence, information, log_det, own_size
 from sysid.design.limits import LimitsSpec
+from sysid.errors import SysidWarning
 from sysid.simulate import load, read_trajectory, simulate
 from sysid.specs import EffectSpec, RobotSpec
 from tests.conftest import URDF
@@ -47,22 +48,57 @@ def arm(tmp_path_factory):
     return Known(model, x, np.array([0.05, 0.02]), own_size(model, machine.prior, x, torque))
 
 
-def test_log_det_and_its_slope(arm):
+def _posed(known, machine):
+    bounds = limits.limits(machine, None, None)
+    return problem.Problem(known, bounds, links.geometry(machine).about(np.zeros(2)), Fourier(8.0, 4, 2, 2), 250.0)
+
+
+SUSPECTS = {
+    "none": [], "instant": [("stribeck", "shoulder"), ("spring", "shoulder")], "load": [("load_friction", "elbow"), ("torque_bias", "elbow")],
+    "motion": [("encoder_offset", "elbow"), ("gravity_tilt", "*")], "one": [("torque_gain", "elbow")],
+    "history": [("presliding", "elbow"), ("coulomb", "elbow")], "late": [("delay", "elbow"), ("current_lag", "elbow")],
+    "soft": [("elasticity", "elbow"), ("warmup", "elbow")],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", SUSPECTS)
+def test_what_a_motion_is_worth_and_its_slope(arm, tmp_path, name):
     """Against differences of the criterion itself, in coordinates of a motion."""
-    family = Fourier(8.0, 4, 2, 2)
-    t = (np.arange(64) + 0.5) * 8.0 / 64
+    (tmp_path / "robot.urdf").write_text(URDF)
+    with pytest.warns(SysidWarning, match="no log yet"):
+        known = basis.basis(config.loads("robot: {urdf: robot.urdf}\nmodel: {effects: [viscous]}\n", tmp_path / "c.yaml"), SUSPECTS[name], None).known
+    posed = _posed(known, arm.model.robot)
     rng = np.random.default_rng(1)
-    z = 0.4 * rng.normal(size=(2, family.size))
-    basis = family.basis(t)
-    slopes = Slopes.of(arm.model, *(basis @ z.T)[:3])
-    told, by_node = log_det_with_slope(arm, slopes, np.full(64, 100.0))
-    slope = np.einsum("rin,rnz->iz", by_node.reshape(3, 2, -1), basis[:3])
-    value = lambda z: log_det(arm.before + gram(arm, *family.motion(z, t)[:3], 6400.0))  # noqa: E731
-    assert told == pytest.approx(value(z), rel=1e-12)
+    z = 0.4 * rng.normal(size=(2, posed.family.size))
+    grid = solve._grid(posed, np.zeros(0))
+    at = solve._look(posed, z, grid)
+    assert (at.worth, log_det(information(known, at.columns, np.full(grid.nodes, 2000.0 / grid.nodes)))) == pytest.approx(problem.value(posed, z))
+    slope = solve.climbs(posed, at, grid)
     for _ in range(3):
         way = rng.normal(size=z.shape)
-        numeric = (value(z + 1e-5 * way) - value(z - 1e-5 * way)) / 2e-5
-        assert float(np.sum(slope * way)) == pytest.approx(numeric, rel=1e-4, abs=1e-3)
+        if any(one.looks_back for one in known.suspects):
+            way[0] = 0.0  # of what looks back, the slope is that of its own joint's motion
+        h = 1e-6 if name == "history" else 1e-5  # presliding has corners
+        numeric = (problem.value(posed, z + h * way)[0] - problem.value(posed, z - h * way)[0]) / (2.0 * h)
+        assert float(np.sum(slope * way)) == pytest.approx(numeric, rel=2e-3 if name in ("none", "instant", "load") else 3e-2, abs=0.05)
+
+
+def test_evidence_is_what_a_rival_and_the_model_leave_of_a_suspect(arm, tmp_path):
+    """Against least squares on the rows themselves."""
+    (tmp_path / "robot.urdf").write_text(URDF)
+    with pytest.warns(SysidWarning, match="no log yet"):
+        known = basis.basis(config.loads("robot: {urdf: robot.urdf}\nmodel: {effects: [viscous]}\n", tmp_path / "c.yaml"), SUSPECTS["history"], None).known
+    posed = _posed(known, arm.model.robot)
+    z = 0.4 * np.random.default_rng(2).normal(size=(2, posed.family.size))
+    found, weight = problem.told(posed, z), 2000.0 / len(posed.nodes)
+    rows = np.sqrt(weight) * np.moveaxis(found, 1, 2).reshape(-1, found.shape[1])
+    stacked = np.concatenate([rows, np.linalg.cholesky(known.before).T])  # the prior as rows
+    a, b = known.places
+    for (one, _), own, rival, size in zip(evidence(known, information(known, found, weight)), (a, b), (b, a), (s.size for s in known.suspects)):
+        rest = stacked[:, np.concatenate([np.arange(known.model.size), rival])]
+        target = stacked[:, own] @ size
+        left = target - rest @ np.linalg.lstsq(rest, target, rcond=1e-12)[0]
+        assert one == pytest.approx(float(left @ left), rel=1e-4)
 
 
 def test_columns_of_a_design_are_the_fit_s(arm):
@@ -280,9 +316,10 @@ def test_a_joint_whose_torque_is_unused_tells_nothing(poor):
     assert np.isinf(known.noise[1]) and known.noise[0] < 1.0
     # the information of the shoulder's rows alone, by hand
     t = (np.arange(500) + 0.5) * 4.0 / 500
-    moved = columns(known.model, *(np.asarray(x) for x in _motion(found, t)))[0]
-    whole = known.before + 1000.0 / 500 / known.noise[0] ** 2 * moved @ moved.T
-    np.testing.assert_allclose(gram(known, *_motion(found, t), 1000.0), whole - known.before, rtol=1e-9, atol=1e-9 * np.abs(whole).max())
+    moved = columns(known.model, *_motion(found, t))[0]
+    whole = known.before + 2.0 / known.noise[0] ** 2 * moved @ moved.T
+    told = information(known, known.all_columns(*_motion(found, t)), np.full(500, 2.0))
+    np.testing.assert_allclose(told, whole, rtol=1e-9, atol=1e-9 * np.abs(whole).max())
     assert found.log_det > found.random_best
     assert found.pairs[0].probability == 0.0 and "viscous.elbow.Fv" not in found.deviations
     assert any(s["after"] < 0.9 * s["now"] for s in found.deviations.values())

@@ -5,7 +5,9 @@ limits.py       positions, speeds, accelerations, jerks, torques, clearance, flo
 links.py        what links look like
 collision.py    how close they come to each other along a motion
 columns.py      what parameters do to an instant's torque, and how that changes with the motion
-information.py  log det M of a motion, and its slope
+suspects.py     what effects that a model may lack would add along a motion
+noise.py        how quiet and how large torques are
+information.py  what a motion is worth: log det M, evidence between suspects, and its slope
 problem.py      a motion against its limits, and how far it must shrink
 solve.py        linear programs within a trust region
 search.py       several starts in several processes

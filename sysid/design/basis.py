@@ -19,13 +19,18 @@ from ..motion import Motion
 from ..preprocess import prepare
 from ..projection import inverted
 from ..robot import Robot
+from ..simulate.motion import draw
 from ..specs import Experiment
-from .columns import instant_of, is_of_the_torque
-from .information import Known, noise_of, own_size, size_of
+from .columns import instant_of
+from .information import Known, own_size
+from .noise import noise_of, size_of
+from .suspects import Seen, along, played, suspected, unseen
 
 _WINDOW = 0.1  # s, where none is known
+_FASTEST = 0.25  # of a period of the filter's window: what it still lets through of the fastest
 _GUESSED = 0.02  # of a joint's torque: its noise, where no log says
 _RATE = 500.0  # Hz, where no log says
+_USUAL = 10.0  # s of a motion that says how a robot usually moves, where no log does
 
 
 @dataclass(frozen=True)
@@ -39,13 +44,17 @@ class Basis:
     pose: np.ndarray
     rate: float
     window: float
-    suspects: list[Candidate]
     levels: Mapping[str, str]
+
+    @property
+    def fastest(self) -> float:
+        """Harmonics [Hz] that the logs' filter still lets through."""
+        return _FASTEST / self.window
 
 
 def basis(
     experiment: Experiment, separate, tell, levels: Mapping[str, str] = MappingProxyType({})
-) -> Basis:  # fmt: skip
+) -> Basis:
     """What an experiment knows of its robot at {group: level}. Raises SysidError."""
     machine, structure, prior = pipeline.build(experiment)
     levels = _levels(structure, levels)
@@ -74,9 +83,9 @@ def basis(
         low, high = np.where(np.isfinite(machine.limits.T), machine.limits.T, [[-1.0], [1.0]])
         pose = np.clip(np.zeros(machine.dof), 0.9 * low + 0.1 * high, 0.1 * low + 0.9 * high)
         rate, window = experiment.data.rate or _RATE, _WINDOW
-    suspects = _suspects(experiment, structure, separate)
-    known = _known(structure, levels, fit, x, noise, prior, suspects)
-    return Basis(machine, fit, motion, known, pose, rate, window, suspects, levels)
+    asked = _suspects(experiment, structure, separate)
+    known = _known(structure, levels, fit, x, noise, prior, asked, motion)
+    return Basis(machine, fit, motion, known, pose, rate, window, levels)
 
 
 def _levels(model: Model, levels: Mapping[str, str]) -> dict[str, str]:
@@ -124,26 +133,46 @@ def _suspects(experiment: Experiment, model: Model, separate) -> list[Candidate]
     return out
 
 
-def _known(model: Model, levels, fit: Fit | None, x, noise, prior, suspects) -> Known:
-    """What a design asks of: the model's instant, with the suspects that are columns of it."""
+def _known(
+    model: Model, levels, fit: Fit | None, x, noise, prior, asked, motion: Motion | None
+) -> Known:
+    """What a design asks of: the model's instant, and the suspects."""
     instant, places = instant_of(model, levels)
     own = np.asarray(x)[places]
     typical = np.maximum(20.0 * noise, 1e-6) if fit is None else size_of(fit)
     before = own_size(instant, prior, own, typical)
-    if fit is not None:
-        before = before + _told(fit, levels, places, noise)
-    grown = instant
-    for suspect in suspects:
-        effect = suspect.effect
-        if is_of_the_torque(effect) and effect.instantaneous and not effect.uses_load:
-            grown = grown.with_effect(effect, (suspect.joint,))
-    if grown.size > instant.size:
-        more = grown.size - instant.size
-        x_grown = np.append(own, np.zeros(more))
-        whole = own_size(grown, prior, x_grown, typical)
-        whole[: instant.size, : instant.size] = before
-        return Known(grown, x_grown, noise, whole)
-    return Known(instant, own, noise, before)
+    if not asked:
+        if fit is not None:
+            before = before + _told(fit, levels, places, noise)
+        return Known(instant, own, noise, before)
+    count = 10 * instant.bodies
+    if instant.reference is None:
+        instant = instant.with_reference(own[:count].reshape(-1, 10))
+    if fit is None:
+        q, qd, qdd = usual = _usual(model.robot)
+        instant = instant.scaled_by(played(q, qd, qdd, 1.0 / _RATE, model.robot.joints))
+        torque = float(np.sqrt(np.mean(typical**2)))
+        suspects = tuple(unseen(instant, own, *usual, one, torque) for one in asked)
+        columns = along(suspects, instant, own, *usual)
+        each, more = np.sqrt(np.mean(columns**2, axis=(0, 2))), None
+    else:
+        instant = instant.scaled_by(motion)
+        seen = Seen.of(fit, motion, motion.samples)
+        suspects = tuple(suspected(seen, fit, one) for one in asked)
+        columns = np.concatenate([seen.columns(one) for one in suspects], axis=2)
+        each, more = np.sqrt(np.mean(columns**2, axis=(0, 1))), seen
+    size = np.zeros(instant.size + len(each))
+    whole = np.diag(size)
+    whole[: instant.size, : instant.size] = before
+    # a suspect is about as large as would make a joint's torque
+    large = (each / np.max(typical)) ** 2
+    k = np.arange(instant.size, len(size))
+    whole[k, k] = np.where(large > 0.0, large, 1.0)
+    if more is not None:
+        both = np.concatenate([more.rows.columns[:, :, places], columns], axis=2)
+        flat = (both * more.weights[:, None, None]).reshape(-1, len(size))
+        whole += flat.T @ flat
+    return Known(instant, own, noise, whole, suspects)
 
 
 def _told(fit: Fit, levels: Mapping[str, str], places, noise) -> np.ndarray:
@@ -159,3 +188,10 @@ def _told(fit: Fit, levels: Mapping[str, str], places, noise) -> np.ndarray:
     if not others.size:
         return told
     return told - cross @ inverted(whole[np.ix_(others, others)]) @ cross.T
+
+
+def _usual(robot: Robot) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Positions, speeds and accelerations (n, dof) that a robot of this size usually moves with."""
+    t = np.arange(0.0, _USUAL, 1.0 / _RATE)
+    found = draw(robot, t, np.random.default_rng(0))
+    return found.q, found.qd, found.qdd

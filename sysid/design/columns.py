@@ -7,16 +7,14 @@ pass over stacked copies of the motion.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping
 
 import numpy as np
 
-from ..effect import MotionEffect, SensorEffect
 from ..model import Model
 from ..motion import Piece
 
-_STEP = 1e-6  # rad, rad/s, rad/s^2 or metres: forward differences of smooth columns
+_STEP = 1e-5  # rad, rad/s, rad/s^2 or metres: forward; columns may be differences themselves
 _RUN = 4096  # samples
 
 
@@ -65,30 +63,21 @@ def in_runs(model: Model, q, qd, qdd) -> Iterator[tuple[slice, np.ndarray]]:
         yield rows, columns(model, q[rows], qd[rows], qdd[rows])
 
 
-@dataclass(frozen=True)
-class Slopes:
-    """Columns (dof, size, n) of a motion and how they change: `change` (dof, size, 3 dof, n) per
-    unit of q, then qd, then qdd of each joint."""
+def with_changes(of: Callable, q, qd, qdd) -> tuple[np.ndarray, np.ndarray]:
+    """What a function makes of samples (n, dof), (..., n), and how that changes (..., 3 dof, n) per unit
+    of q, then qd, then qdd of each joint.
 
-    here: np.ndarray
-    change: np.ndarray
-
-    @classmethod
-    def of(cls, model: Model, q, qd, qdd) -> Slopes:
-        """At samples (n, dof)."""
-        n, dof = q.shape
-        stacked = np.repeat(np.stack([q, qd, qdd])[:, None], 1 + 3 * dof, axis=1)
-        for rate in range(3):
-            for joint in range(dof):
-                stacked[rate, 1 + rate * dof + joint, :, joint] += _STEP
-        whole = columns(model, *stacked.reshape(3, -1, dof))
-        whole = whole.reshape(*whole.shape[:2], 1 + 3 * dof, n)
-        here, change = whole[:, :, 0].copy(), whole[:, :, 1:]
-        change -= here[:, :, None]
-        change /= _STEP
-        return cls(here, change)
-
-
-def is_of_the_torque(effect) -> bool:
-    """Whether an effect is a column, not a change of the motion or of the sensor."""
-    return not isinstance(effect, (MotionEffect, SensorEffect))
+    Args:
+        of: (q, qd, qdd) of any number of samples -> (..., samples).
+    """
+    n, dof = q.shape
+    stacked = np.repeat(np.stack([q, qd, qdd])[:, None], 1 + 3 * dof, axis=1)
+    for rate in range(3):
+        for joint in range(dof):
+            stacked[rate, 1 + rate * dof + joint, :, joint] += _STEP
+    whole = of(*stacked.reshape(3, -1, dof))
+    whole = whole.reshape(*whole.shape[:-1], 1 + 3 * dof, n)
+    here, change = whole[..., 0, :].copy(), whole[..., 1:, :]
+    change -= here[..., None, :]
+    change /= _STEP
+    return here, change

@@ -10,7 +10,7 @@ fit + motion -> deviations now and after, and which suspects will be told apart
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -23,17 +23,16 @@ from . import promise
 from .basis import Basis, basis
 from .columns import in_runs, instant_of
 from .fourier import Fourier
-from .information import noise_of
 from .limits import Limits, LimitsSpec, limits
 from .links import geometry
+from .noise import noise_of
 from .problem import Problem, shares, torque
-from .promise import played
 from .result import Design
 from .search import searched
 from .solve import Found
+from .suspects import played
 
 HARMONICS = 5
-_FASTEST = 0.25  # of a period of the filter's window: what it still lets through of the fastest
 
 
 def design(
@@ -49,7 +48,7 @@ def design(
         processes: that share the starts, as many as there are cores where it is None; the motion is
             the same whatever their number.
         levels: {group: level} of logs that the motion is for, where effects are per group; the
-            first by default.
+            first level by default, which is told.
 
     Raises:
         SysidError: bad input, or no motion keeps to the limits.
@@ -59,14 +58,9 @@ def design(
         raise ConfigError(f"--duration {duration:g}", allowed="2 to 600 s")
     with pipeline.noticed() as notices:
         base = basis(experiment, separate, tell, levels or {})
-        seen = None if base.fit is None else _greatest(base.fit)
-        fastest = None if base.motion is None else _fastest(base.motion)
-        bounds = limits(base.robot, limits_spec, seen, fastest)
-        family = Fourier(duration, HARMONICS, 1, base.robot.dof)
-        shapes = geometry(base.robot, bounds.floor).about(base.pose, bounds.clearance)
-        problem = Problem(base.known, bounds.inner(), shapes, family, base.rate)
+        problem, bounds = posed(base, duration, limits_spec)
         found, random_best = searched(
-            problem, base.pose, _FASTEST / base.window, seed, processes=processes, tell=tell
+            problem, base.pose, base.fastest, seed, processes=processes, tell=tell
         )
         if found is None:
             raise ConfigError(
@@ -76,6 +70,22 @@ def design(
         for text in bounds.said:
             warnings.warn(SysidWarning(text), stacklevel=2)
     return _told(base, problem.with_rounds(found.rounds), bounds, found, random_best, notices)
+
+
+def posed(
+    base: Basis, duration: float, limits_spec: LimitsSpec | None = None
+) -> tuple[Problem, Limits]:
+    """The problem of a design of a duration [s], within limits less their margin, and the limits.
+
+    Raises:
+        SysidError: see `limits`.
+    """
+    seen = None if base.fit is None else _greatest(base.fit)
+    fastest = None if base.motion is None else _fastest(base.motion)
+    bounds = limits(base.robot, limits_spec, seen, fastest)
+    family = Fourier(duration, HARMONICS, 1, base.robot.dof)
+    shapes = geometry(base.robot, bounds.floor).about(base.pose, bounds.clearance)
+    return Problem(base.known, bounds.inner(), shapes, family, base.rate), bounds
 
 
 def _fastest(motion) -> np.ndarray:
@@ -117,12 +127,13 @@ def _told(
     spread, pairs = {}, []
     if base.fit is not None:
         spread = promise.deviations(base.fit, _more(base.fit, base.levels, q, qd, qdd))
-        if len(base.suspects) > 1:
-            new = played(q, qd, qdd, 1.0 / base.rate, base.motion, base.levels)
-            pairs = promise.pairs(base.fit, base.suspects, base.motion, new, len(t))
+        if len(base.known.suspects) > 1:
+            joints = base.robot.joints
+            new = played(q, qd, qdd, 1.0 / base.rate, joints, levels=base.levels)
+            pairs = promise.pairs(base.fit, base.known.suspects, base.motion, new, len(t))
     return Design(
         joints=base.robot.joints, family=family, coefficients=family.coefficients(found.z),
-        t=t, q=q, qd=qd, qdd=qdd, torque=needed, log_det=found.value, random_best=random_best,
+        t=t, q=q, qd=qd, qdd=qdd, torque=needed, log_det=found.log_det, random_best=random_best,
         deviations=spread, pairs=tuple(pairs), margins=_margins(problem, bounds, found),
         limits=bounds, said=tuple(notices),
     )  # fmt: skip

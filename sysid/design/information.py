@@ -7,19 +7,24 @@ P the prior as wide as the bodies themselves: of a body nobody knows more than i
 that no motion can show hold P in all designs alike, so log det M counts the others: what the prior
 leaves open.
 
-Source: Fedorov 1972 (D-optimality); Rucker & Wensing 2022 for the metric of P.
+A suspect a of coefficients s_a is told from its rival b by lambda_ab = min_x |c_a s_a - (c, c_b) x|^2,
+over the noise and on the old logs and the new one together: the Schur complement of M.
+
+Source: Fedorov 1972 (D-optimality); Atkinson & Fedorov 1975 (lambda); Rucker & Wensing 2022 for the
+metric of P.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from ..estimate import Fit
 from ..inertia import DIVERGENCES
 from ..model import Model
-from .columns import Slopes, columns
+from .columns import columns
+from .suspects import Suspect, along
 
 
 @dataclass(frozen=True)
@@ -27,40 +32,41 @@ class Known:
     """What is known before a design.
 
     model: of the instant, at its shape values; x (size,): parameters; noise (dof,): standard
-    deviation of a row's torque [N m], infinite where no row counts; before (size, size): information of the logs that exist and
-    the prior. scale (size,): in units of which parameters are well-conditioned.
+    deviation of a row's torque [N m], infinite where no row counts; suspects: what it may lack,
+    whose coefficients stand after its parameters; before (all, all): information of the logs that
+    exist and the prior.
     """
 
     model: Model
     x: np.ndarray
     noise: np.ndarray
     before: np.ndarray
+    suspects: tuple[Suspect, ...] = ()
 
     @property
     def dof(self) -> int:
         """Joints."""
         return self.model.robot.dof
 
+    @cached_property
+    def places(self) -> list[np.ndarray]:
+        """Where each suspect's coefficients stand among all."""
+        ends = np.cumsum([self.model.size, *(len(one.size) for one in self.suspects)])
+        return [np.arange(a, b) for a, b in zip(ends[:-1], ends[1:])]
 
-_QUIETEST = 1e-9  # N m: of logs without any noise
+    def all_columns(self, q, qd, qdd) -> np.ndarray:
+        """(dof, all, n) of samples (n, dof), each over its joint's noise. Zero of suspects that look
+        back in time."""
+        own = [columns(self.model, q, qd, qdd)]
+        for one in self.suspects:
+            if one.looks_back:
+                own.append(np.zeros((self.dof, len(one.size), len(q))))
+            else:
+                own.append(along([one], self.model, self.x, q, qd, qdd))
+        return np.concatenate(own, axis=1) / self.noise[:, None, None]
 
 
-def noise_of(fit: Fit) -> np.ndarray:
-    """(dof,) deviation [N m or N] of a row of each joint's torque: the error on the test logs, or on
-    the training logs where no test row counts. Infinite where none does: what such a joint's
-    torque would tell, no log will."""
-    told = [fit.predictions[part].told() for part in ("test", "train")]
-    rms = [test if test is not None else train for test, train in zip(*told)]
-    return np.array([np.inf if own is None else max(own, _QUIETEST) for own in rms])
-
-
-def size_of(fit: Fit) -> np.ndarray:
-    """(dof,) RMS [N m or N] of each joint's torque on the training logs; the largest joint's where no
-    row counts."""
-    train = fit.predictions["train"]
-    kept = train.measured if train.use is None else np.where(train.use, train.measured, 0.0)
-    rms = np.sqrt((kept**2).sum(axis=0) / np.maximum(train.counts, 1))
-    return np.maximum(np.where(rms > 0.0, rms, rms.max()), _QUIETEST)
+_ENOUGH = 100.0  # of lambda: ten standard deviations
 
 
 def own_size(model: Model, prior, x, torque) -> np.ndarray:
@@ -81,11 +87,11 @@ def own_size(model: Model, prior, x, torque) -> np.ndarray:
     return out
 
 
-def gram(known: Known, q, qd, qdd, samples: float) -> np.ndarray:
-    """Information (size, size) of nodes (n, dof) that stand for so many samples."""
-    found = columns(known.model, q, qd, qdd) / known.noise[:, None, None]
-    flat = np.moveaxis(found, 1, 2).reshape(-1, found.shape[1])
-    return samples / len(q) * flat.T @ flat
+def information(known: Known, columns, weights) -> np.ndarray:
+    """M (all, all) of columns (dof, all, n) over their noise, each sample of which stands for so many
+    (n,)."""
+    flat = np.moveaxis(columns * np.sqrt(weights), 1, 2).reshape(-1, columns.shape[1])
+    return known.before + flat.T @ flat
 
 
 def log_det(information: np.ndarray) -> float:
@@ -95,20 +101,38 @@ def log_det(information: np.ndarray) -> float:
     return float(value + 2.0 * np.log(scale).sum()) if sign > 0 else -np.inf
 
 
-def log_det_with_slope(known: Known, slopes: Slopes, weights) -> tuple[float, np.ndarray]:
-    """log det M of a motion, and its slope (3 dof, n) in q, qd and qdd of every joint at every
-    node.
+def worth(known: Known, information: np.ndarray) -> tuple[float, np.ndarray]:
+    """What a motion is worth, and the slope (all, all) of that in M: log det M, and
 
-    Args:
-        weights: (n,) how many samples each node stands for.
+        p sum_ab log((lambda_ab + 1) / (lambda_ab + enough))
+
+    over every suspect a and its rivals b, p the number of parameters: evidence that is not enough yet
+    counts as much as all precision together, and none that is enough, nor where there is none to have.
     """
-    root = np.sqrt(weights)
-    here = slopes.here / known.noise[:, None, None] * root
-    n = here.shape[2]
-    flat = np.moveaxis(here, 1, 2).reshape(-1, here.shape[1])
-    information = known.before + flat.T @ flat
     scale = 1.0 / np.sqrt(np.diagonal(information))
     inverse = np.linalg.inv(information * np.outer(scale, scale)) * np.outer(scale, scale)
-    pulled = np.moveaxis((flat @ inverse).reshape(len(here), n, -1), 1, 2)
-    pulled = 2.0 * root * pulled / known.noise[:, None, None]
-    return log_det(information), np.einsum("jpn,jpvn->vn", pulled, slopes.change)
+    total, slope, weight = log_det(information), inverse, float(known.model.size)
+    for told, way in evidence(known, information):
+        total += weight * np.log((told + 1.0) / (told + _ENOUGH))
+        share = weight * (1.0 / (told + 1.0) - 1.0 / (told + _ENOUGH))
+        slope = slope + share * np.outer(way, way)
+    return total, slope
+
+
+def evidence(known: Known, information: np.ndarray) -> list[tuple[float, np.ndarray]]:
+    """lambda of each suspect against each rival (against nothing where there is one alone), and the
+    way (all,) with lambda = way' M way: what is left of the suspect once the model's parameters and
+    the rival have taken theirs."""
+    out, base = [], np.arange(known.model.size)
+    for i, (own, one) in enumerate(zip(known.places, known.suspects)):
+        rivals = [other for j, other in enumerate(known.places) if j != i] or [own[:0]]
+        for rival in rivals:
+            rest = np.concatenate([base, rival])
+            scale = 1.0 / np.sqrt(np.diagonal(information)[rest])
+            inner = information[np.ix_(rest, rest)] * np.outer(scale, scale)
+            pull = information[np.ix_(rest, own)] @ one.size
+            way = np.zeros(len(information))
+            way[own] = one.size
+            way[rest] = -scale * np.linalg.solve(inner, scale * pull)
+            out.append((max(float(way @ information @ way), 0.0), way))
+    return out

@@ -15,10 +15,12 @@ import numpy as np
 from .collision import Geometry
 from .columns import piece
 from .fourier import Fourier
-from .information import Known, gram, log_det
+from .information import Known, information, log_det, worth
 from .limits import Limits
+from .suspects import Suspect, along
 
 _NODES = 12.0  # for each period of the fastest harmonic: inertia goes with its square and products
+_FINE = 0.01  # s: the steps of a motion that a suspect looks back along
 _CHECKED = 1000.0  # Hz at which limits are kept
 _CLOSE = 10  # every so many of them distances are: between two a link's point moves a few mm
 _BISECTIONS = 10
@@ -62,10 +64,34 @@ class Problem:
         return replace(self, family=replace(self.family, rounds=rounds))
 
 
-def value(problem: Problem, z) -> float:
-    """log det M of a motion."""
-    q, qd, qdd, _ = problem.family.motion(z, problem.nodes)
-    return log_det(problem.known.before + gram(problem.known, q, qd, qdd, problem.samples))
+def told(problem: Problem, z) -> np.ndarray:
+    """(dof, all, nodes) columns of a motion over their noise."""
+    known = problem.known
+    out = known.all_columns(*problem.family.motion(z, problem.nodes)[:3])
+    for place, one in zip(known.places, known.suspects):
+        if one.looks_back:
+            out[:, place] = looking_back(problem, one, z)
+    return out
+
+
+def looking_back(problem: Problem, suspect: Suspect, z) -> np.ndarray:
+    """(dof, k, nodes) columns over their noise of a suspect that looks back along the motion."""
+    known, family, count = problem.known, problem.family, len(problem.nodes)
+    half = int(np.ceil(0.5 * (family.duration / count / _FINE - 1.0)))
+    between = 2 * max(half, 0) + 1  # odd: nodes are samples of the finer motion, too
+    step = family.duration / count / between
+    motion = family.motion(z, step * (np.arange(count * between) + 0.5))
+    rows = slice(between // 2, None, between)
+    found = along([suspect], known.model, known.x, *motion[:3], step, rows)
+    return found / known.noise[:, None, None]
+
+
+def value(problem: Problem, z) -> tuple[float, float]:
+    """What a motion is worth, and log det M alone."""
+    count = len(problem.nodes)
+    weights = np.full(count, problem.samples / count)
+    found = information(problem.known, told(problem, z), weights)
+    return worth(problem.known, found)[0], log_det(found)
 
 
 def torque(problem: Problem, q, qd, qdd) -> np.ndarray:

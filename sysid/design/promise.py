@@ -14,25 +14,20 @@ Source: Atkinson & Fedorov 1975 (T-optimality); Wald 1943.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.special import ndtr
 
-from ..candidates import Candidate, columns_of, tried
 from ..estimate import Fit
 from ..inertia import DIVERGENCES
-from ..model import ROBOT
 from ..motion import Motion
-from ..rows import stack
-from ..source import Source
-from .columns import piece
-from .information import noise_of, own_size, size_of
+from .information import own_size
+from .noise import noise_of, size_of
+from .suspects import Seen, Suspect
 
 _ODDS = np.log(9.0)  # a set at 90 % holds one of two
-_RATE = 50.0  # Hz of the rows that pairs are asked on
-_TYPICAL = 0.03  # of the joint's torque: the size of an effect of which no log says any
 
 
 @dataclass(frozen=True)
@@ -44,89 +39,30 @@ class Pair:
     probability: float
 
 
-def spelled(candidate: Candidate, joints) -> str:
-    """`effect:joint`, as `--separate` has it."""
-    return f"{candidate.name}:{'*' if candidate.joint == ROBOT else joints[candidate.joint]}"
-
-
-def played(q, qd, qdd, step: float, template: Motion, levels: Mapping[str, str]) -> Motion:
-    """A designed motion (n, dof) as the motion of a log at {group: level}."""
-    own = replace(piece(q, qd, qdd, step), levels=levels)
-    rest = np.zeros(q.shape[1])
-    return Motion(template.joints, (own,), (), rest, rest.astype(int))
-
-
 def pairs(
-    fit: Fit, suspects: list[Candidate], old: Motion, new: Motion, samples: float
+    fit: Fit, suspects: Sequence[Suspect], old: Motion, new: Motion, samples: float
 ) -> list[Pair]:
     """How likely it is that each two suspects will be told apart by the old logs with the new one.
 
     Args:
         samples: of the new log.
     """
-    noise = noise_of(fit)
-    parts = []
-    for motion, count in ((old, old.samples), (new, samples)):
-        stride = max(1, int(round(1.0 / (_RATE * motion.pieces[0].step))))
-        rows = stack(fit.model, motion, stride)
-        source = Source(fit.model.scaled_by(motion), fit.x, motion, stride, rows.use)
-        parts.append((rows, source, np.sqrt(count / max(len(rows.t), 1)) / noise))
-    shapes = [_shapes(parts[0], fit, suspect) for suspect in suspects]
-    blocks = [[_columns(part, s, at) for s, at in zip(suspects, shapes)] for part in parts]
-    sizes = [_size(fit, parts[0], own, s) for own, s in zip(blocks[0], suspects)]
+    seen = Seen.of(fit, old, old.samples), Seen.of(fit, new, samples)
+    parts = [(one.rows, one.weights) for one in seen]
+    blocks = [[one.columns(suspect) for suspect in suspects] for one in seen]
     prior = own_size(fit.model, fit.prior, fit.x, size_of(fit))
     out = []
     for i, a in enumerate(suspects):
         for j, b in enumerate(suspects[:i]):
             probability = min(
                 _apart(
-                    parts, prior, [own[k] for own in blocks], sizes[k], [own[m] for own in blocks]
+                    parts, prior, [own[k] for own in blocks], suspects[k].size,
+                    [own[m] for own in blocks],
                 )
                 for k, m in ((i, j), (j, i))
-            )
-            out.append(Pair(spelled(b, fit.joints), spelled(a, fit.joints), probability))
+            )  # fmt: skip
+            out.append(Pair(b.named(fit.joints), a.named(fit.joints), probability))
     return out
-
-
-def _shapes(part, fit: Fit, suspect: Candidate) -> dict[str, float]:
-    """The shape values of a suspect that take most of what the first logs leave."""
-    rows, source, _ = part
-    left = rows.residual(fit.x)
-    asked = tried(source, suspect)  # which looks at the model's scales alone
-    return max(asked, key=lambda at: _taken(_columns(part, suspect, at), left, part[2]))
-
-
-def _columns(part, suspect: Candidate, at: dict[str, float]) -> np.ndarray:
-    """(dof, n, k) of a suspect on every joint."""
-    rows, source, _ = part
-    found = columns_of(source, suspect, [at])[0]
-    if len(found) == rows.tau.shape[1]:
-        return found
-    out = np.zeros((rows.tau.shape[1], *found.shape[1:]))
-    out[suspect.joint] = found[0]
-    return out
-
-
-def _taken(columns, left, weights) -> float:
-    flat = (columns * weights[:, None, None]).reshape(-1, columns.shape[2])
-    target = (left * weights).T.ravel()
-    size = np.linalg.norm(flat, axis=0)
-    if not np.all(np.isfinite(flat)) or not size.any():
-        return -1.0
-    kept = flat[:, size > 0] / size[size > 0]
-    return float(np.linalg.norm(kept @ np.linalg.lstsq(kept, target, rcond=1e-8)[0]))
-
-
-def _size(fit: Fit, part, columns, suspect: Candidate) -> np.ndarray:
-    """(k,) likely coefficients of a suspect: those that the first logs suggest, at least a few per
-    cent of the joint's torque."""
-    rows, _, weights = part
-    flat = (columns * weights[:, None, None]).reshape(-1, columns.shape[2])
-    target = (rows.residual(fit.x) * weights).T.ravel()
-    found = np.linalg.lstsq(flat, target, rcond=1e-8)[0]
-    made = np.sqrt(np.mean((columns @ found) ** 2))
-    least = _TYPICAL * np.sqrt(np.mean(rows.tau**2))
-    return found * max(1.0, least / made) if made > 0.0 else np.ones(columns.shape[2])
 
 
 def _apart(parts, prior, own, size, rival) -> float:
@@ -134,7 +70,7 @@ def _apart(parts, prior, own, size, rival) -> float:
     square, cross, k = 0.0, 0.0, rival[0].shape[2]
     gram = np.zeros((len(prior) + k, len(prior) + k))
     gram[: len(prior), : len(prior)] = prior
-    for (rows, _, weights), mine, other in zip(parts, own, rival):
+    for (rows, weights), mine, other in zip(parts, own, rival):
         beside = np.concatenate([rows.columns, other], axis=2) * weights[:, None, None]
         signature = (mine @ size) * weights[:, None]
         flat = beside.reshape(-1, beside.shape[2])

@@ -19,12 +19,13 @@ from joblib import Parallel, cpu_count, delayed
 from ..errors import SysidWarning
 from ..threads import single_threaded
 from . import solve
-from .problem import Problem, drawn, shrunk, value
+from .fourier import Fourier
+from .problem import Problem, drawn
 from .solve import Climb, Found
 
 _ROUNDS = (1, 2, 4, 8)  # of the slowest harmonic
-_DRAWN = 4  # random motions for each number of rounds
-_IMPROVED = 4  # starts of a search: the best of them
+DRAWN = 4  # random motions for each number of rounds
+IMPROVED = 4  # starts of a search: the best of them
 _WORTH = 8.0  # s of work from which others help: a process takes two to begin
 _SLICE = 12  # linear programs, less than a second or two
 
@@ -40,13 +41,13 @@ def searched(
         pose: (dof,) about which motions begin. fastest [Hz]: harmonics stay below. processes: as
             many as there are cores, where it is None.
     """
-    family = problem.family
-    rounds = [r for r in _ROUNDS if r * family.harmonics / family.duration <= fastest] or [1]
     work = _shared(1)
-    asked = [(problem, pose, (seed, r, k)) for r in rounds for k in range(_DRAWN)]
-    starts = [found for found in work(_start, asked) if np.isfinite(found.value)]
-    random_best = max((found.value for found in starts), default=-np.inf)
-    starts = sorted(starts, key=lambda found: -found.value)[:_IMPROVED]
+    asked = [
+        (problem, pose, (seed, r, k)) for r in rounds(problem.family, fastest) for k in range(DRAWN)
+    ]
+    starts = [found for found in work(start, asked) if np.isfinite(found.value)]
+    random_best = max((found.log_det for found in starts), default=-np.inf)
+    starts = sorted(starts, key=lambda found: -found.value)[:IMPROVED]
     climbs = [Climb(found.rounds, found.z) for found in starts]
     try:
         if climbs:
@@ -67,12 +68,15 @@ def searched(
     return max(starts, key=lambda found: found.value, default=None), random_best
 
 
-def _start(problem: Problem, pose, seed: tuple[int, int, int]) -> Found:
+def rounds(family: Fourier, fastest: float) -> list[int]:
+    """Numbers of rounds with which no harmonic is above a frequency [Hz]; one at least."""
+    return [r for r in _ROUNDS if r * family.harmonics / family.duration <= fastest] or [1]
+
+
+def start(problem: Problem, pose, seed: tuple[int, int, int]) -> Found:
     """A random motion of seed[1] rounds that keeps to the limits, as large as they let it."""
     posed = problem.with_rounds(seed[1])
-    z = drawn(posed, pose, np.random.default_rng(seed))
-    kept = shrunk(posed, z)
-    return Found(seed[1], z, -np.inf) if kept is None else Found(seed[1], kept, value(posed, kept))
+    return Found.of(posed, drawn(posed, pose, np.random.default_rng(seed)))
 
 
 def _shared(processes: int) -> Callable[[Callable, list[tuple]], list]:

@@ -1,7 +1,7 @@
 """The motion that tells most within its limits.
 
-Maximised is log det M by steps of linear programs: its slope, and every limit that a step could
-reach, linearised at the nodes (positions, speeds, accelerations and jerks are linear in the
+Maximised is what a motion is worth by steps of linear programs: its slope, and every limit that a
+step could reach, linearised at the nodes (positions, speeds, accelerations and jerks are linear in the
 coordinates as they are), within a trust region that grows where a step keeps its promise and
 shrinks where it does not. Where a limit is passed between the nodes, that instant becomes one.
 
@@ -15,28 +15,39 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.optimize import linprog
 
+from ..model import ROBOT
 from .collision import Near
-from .columns import Slopes
-from .information import log_det_with_slope
-from .problem import Problem, passed, shares, shrunk, value
+from .columns import with_changes
+from .information import information, worth
+from .problem import Problem, looking_back, passed, shares, shrunk, told, torque, value
 
 STEPS = (40, 15, 10, 10)  # linear programs, again each time that more times are looked at
 _FIRST, _WIDEST, _NARROWEST = 0.1, 0.5, 1e-3  # rad or m: radius of the trust region
 _GOOD, _BAD = 0.7, 0.25  # of what a step promised: from there it is wider, up to there narrower
-_SETTLED = 1e-2  # of log det M: a step that gains less is the last
-_PRICE = 1e4  # of log det M for going beyond a limit by as much as the limit
+_NUDGE = 1e-5  # rad or m of a coordinate: along whose motion a suspect looks back
+_STANDS = 0.1  # rad or m of a coordinate: so far the slope of what looks back stands
+_SETTLED = 1e-2  # of its worth: a step that gains less is the last
+_PRICE = 1e4  # of its worth for going beyond a limit by as much as the limit
 _LOOKED = 25.0  # Hz at which distances are while the motion is sought
+_STRONG = 0.5  # of a limit: torques that a step minds; others are looked at afterwards
 _SIGHT = 0.03  # m beyond the clearance: pairs that a step minds; others are looked at afterwards
 
 
 @dataclass(frozen=True)
 class Found:
-    """A motion z (dof, size) of a number of rounds and its log det M; -inf where none keeps to the
-    limits."""
+    """A motion z (dof, size) of a number of rounds, what it is worth, and log det M alone; -inf where
+    none keeps to the limits."""
 
     rounds: int
     z: np.ndarray
     value: float
+    log_det: float = -np.inf
+
+    @classmethod
+    def of(cls, problem: Problem, z: np.ndarray) -> Found:
+        """The largest share of a motion that keeps to every limit."""
+        kept, rounds = shrunk(problem, z), problem.family.rounds
+        return cls(rounds, z, -np.inf) if kept is None else cls(rounds, kept, *value(problem, kept))
 
 
 @dataclass(frozen=True)
@@ -70,9 +81,12 @@ def climbed(problem: Problem, climb: Climb, steps: int) -> Climb:
     while steps > 0 and not climb.over:
         grid = _grid(problem, climb.extra)
         at, radius, done, settled = _look(problem, climb.z, grid), climb.radius, climb.steps, False
+        near = _nearby(problem, at, grid)
         while steps > 0 and done < STEPS[climb.stage] and not settled:
-            at, radius, settled = _stepped(problem, at, grid, radius)
+            new, radius, settled = _stepped(problem, at, near, grid, radius)
             done, steps = done + 1, steps - 1
+            if new is not at:
+                at, near = new, _nearby(problem, new, grid, near.back)
         climb = replace(climb, z=at.z, radius=radius, steps=done)
         if settled or done >= STEPS[climb.stage]:
             times = passed(problem, climb.z)
@@ -85,71 +99,126 @@ def climbed(problem: Problem, climb: Climb, steps: int) -> Climb:
 
 def ended(problem: Problem, climb: Climb) -> Found:
     """The motion of a search, shrunk to what keeps to every limit."""
-    problem = problem.with_rounds(climb.rounds)
-    kept = shrunk(problem, climb.z)
-    told = -np.inf if kept is None else value(problem, kept)
-    return Found(climb.rounds, climb.z if kept is None else kept, told)
+    return Found.of(problem.with_rounds(climb.rounds), climb.z)
 
 
 @dataclass(frozen=True)
 class _Grid:
     """Times at which a motion is looked at: nodes, and `extra` times [s] that limits alone look at.
-    basis: of all of them; weights (n,): how many samples each stands for; poses (m, size): the basis
-    of q at the times at which distances are looked at."""
+    basis: of all of them; nodes: how many are nodes; poses (m, size): the basis of q at the times at
+    which distances are looked at."""
 
     basis: np.ndarray
-    weights: np.ndarray
+    nodes: int
     poses: np.ndarray
 
 
 def _grid(problem: Problem, extra) -> _Grid:
     nodes = problem.nodes
-    weights = np.concatenate([np.full(len(nodes), problem.samples / len(nodes)), 0.0 * extra])
     count = int(np.ceil(_LOOKED * problem.family.duration)) if problem.geometry.looks else 0
     often = np.union1d((np.arange(count) + 0.5) / _LOOKED, extra)
     poses = problem.family.basis(often)[0]
-    return _Grid(problem.family.basis(np.concatenate([nodes, extra])), weights, poses)
+    return _Grid(problem.family.basis(np.concatenate([nodes, extra])), len(nodes), poses)
 
 
 @dataclass(frozen=True)
 class _Look:
-    """A motion at the nodes: log det M and its slope (dof, size), (4, n, dof) motion, torque (n, dof)
-    and its slope (n, dof, dof, size), pairs that are near, and what goes beyond limits, in all."""
+    """A motion: what it is worth, the slope (all, all) of that in M, the columns (dof, all, nodes), the
+    motion (4, n, dof), torque (n, dof), and what goes beyond limits, in all."""
 
     z: np.ndarray
-    told: float
+    worth: float
     slope: np.ndarray
+    columns: np.ndarray
     motion: np.ndarray
     torque: np.ndarray
-    pull: np.ndarray
-    near: Near
     beyond: float
 
     @property
     def merit(self) -> float:
         """What a step must raise."""
-        return self.told - _PRICE * self.beyond
+        return self.worth - _PRICE * self.beyond
 
 
 def _look(problem: Problem, z, grid: _Grid) -> _Look:
-    x, dof, basis = problem.known.x, problem.family.dof, grid.basis
-    motion = basis @ z.T
-    slopes = Slopes.of(problem.known.model, *motion[:3])
-    told, by_node = log_det_with_slope(problem.known, slopes, grid.weights)
-    slope = np.einsum("rin,rnz->iz", by_node.reshape(3, dof, -1), basis[:3])
-    own = np.einsum("jpn,p->nj", slopes.here, x)
-    change = np.tensordot(slopes.change, x, (1, 0)).reshape(dof, 3, dof, -1)
-    pull = np.einsum("jrin,rnz->njiz", change, basis[:3])
+    found, weights = told(problem, z), np.full(grid.nodes, problem.samples / grid.nodes)
+    value, slope = worth(problem.known, information(problem.known, found, weights))
+    motion = grid.basis @ z.T
+    needed = torque(problem, *motion[:3])
     clearance = problem.limits.clearance
-    near = problem.geometry.near(grid.poses @ z.T, clearance + _SIGHT)
-    lacks = float(np.max(clearance - near.distance, initial=0.0)) / max(clearance, 1e-3)
-    over = float(np.maximum(shares(problem, motion, own) - 1.0, 0.0).max())
-    return _Look(z, told, slope, motion, own, pull, near, max(over, 0.1 * lacks, 0.0))
+    least = problem.geometry.least(grid.poses @ z.T, clearance)
+    lacks = float(np.max(clearance - least, initial=0.0)) / max(clearance, 1e-3)
+    over = float(np.max(shares(problem, motion, needed) - 1.0, initial=0.0))
+    return _Look(z, value, slope, found, motion, needed, max(over, 0.1 * lacks))
 
 
-def _stepped(problem: Problem, at: _Look, grid: _Grid, radius: float) -> tuple[_Look, float, bool]:
+@dataclass(frozen=True)
+class _Nearby:
+    """What a motion's neighbours are like, to first order: the slope (dof, size) of its worth; the rows
+    at which torque is strong, and torque's slopes (rows, dof size) there by joint, as shares of its
+    limit; pairs of links that are near; and what `climbs` keeps."""
+
+    slope: np.ndarray
+    strong: np.ndarray
+    torque: dict[int, np.ndarray]
+    links: Near
+    back: dict[int, tuple[np.ndarray, np.ndarray]]
+
+
+def _nearby(problem: Problem, at: _Look, grid: _Grid, back: dict | None = None) -> _Nearby:
+    limits, dof, torques = problem.limits, problem.family.dof, {}
+    back = {} if back is None else back
+    strong = np.flatnonzero((np.abs(at.torque) > _STRONG * limits.torque).any(axis=1))
+    if len(strong):
+        _, change = with_changes(lambda *asked: torque(problem, *asked).T, *at.motion[:3, strong])
+        for j in np.flatnonzero(np.isfinite(limits.torque)):
+            own = change[j].reshape(3, dof, -1) / limits.torque[j]
+            slopes = np.einsum("rin,rnz->niz", own, grid.basis[:3, strong])
+            torques[int(j)] = slopes.reshape(len(strong), -1)
+    links = problem.geometry.near(grid.poses @ at.z.T, limits.clearance + _SIGHT)
+    return _Nearby(climbs(problem, at, grid, back), strong, torques, links, back)
+
+
+def climbs(problem: Problem, at: _Look, grid: _Grid, back: dict | None = None) -> np.ndarray:
+    """The slope (dof, size) of what a motion is worth in its coordinates.
+
+    Args:
+        back: slopes of what looks back along the motion, by suspect, with the coordinates that they
+            are of: they stand for others nearby, and new ones are put there.
+    """
+    known, dof, weight = problem.known, problem.family.dof, problem.samples / grid.nodes
+    pull = 2.0 * weight * np.matmul(at.slope, at.columns)
+    _, change = with_changes(known.all_columns, *at.motion[:3, : grid.nodes])
+    by_node = np.einsum("jpn,jpvn->vn", pull, change).reshape(3, dof, -1)
+    out = np.einsum("rin,rnz->iz", by_node, grid.basis[:3, : grid.nodes])
+    back = {} if back is None else back
+    for i, (place, one) in enumerate(zip(known.places, known.suspects)):
+        joint = one.candidate.joint
+        if not one.looks_back or joint == ROBOT:
+            continue
+        if i not in back or np.abs(at.z - back[i][0]).max() > _STANDS:
+            here = at.columns[:, place]
+            back[i] = at.z, _back(problem, one, at.z, joint, here)
+        out[joint] += np.einsum("jpn,zjpn->z", pull[:, place], back[i][1])
+    return out
+
+
+def _back(problem: Problem, suspect, z, joint: int, here) -> np.ndarray:
+    """(size, dof, k, nodes) slopes of a suspect's columns in the coordinates of a joint's motion, by
+    differences: what others do to it enters with the next look."""
+    out = np.empty((z.shape[1], *here.shape))
+    for k, own in enumerate(out):
+        moved = z.copy()
+        moved[joint, k] += _NUDGE
+        own[:] = (looking_back(problem, suspect, moved) - here) / _NUDGE
+    return out
+
+
+def _stepped(
+    problem: Problem, at: _Look, near: _Nearby, grid: _Grid, radius: float
+) -> tuple[_Look, float, bool]:
     """A motion after one linear program, the radius of the next, and whether it is settled."""
-    found = _step(problem, at, grid, radius)
+    found = _step(problem, at, near, grid, radius)
     if found is None:
         return at, radius, True
     change, promised = found
@@ -166,12 +235,12 @@ def _stepped(problem: Problem, at: _Look, grid: _Grid, radius: float) -> tuple[_
 
 
 def _step(
-    problem: Problem, at: _Look, grid: _Grid, radius: float
+    problem: Problem, at: _Look, near: _Nearby, grid: _Grid, radius: float
 ) -> tuple[np.ndarray, float] | None:
     """The change (dof, size) of the best linear program within a radius, and by how much it promises
     to raise the merit; None where there is none."""
     limits, dof, size = problem.limits, problem.family.dof, problem.family.size
-    rows, most, basis = [], [], grid.basis
+    rows, most = [], []
 
     def bound(values, slopes, limit):
         """|values + slopes d| <= limit, of those rows that a step can bring there."""
@@ -182,26 +251,24 @@ def _step(
 
     bounds = (limits.half, limits.velocity, limits.acceleration, limits.jerk)
     middle = (limits.middle, 0.0, 0.0, 0.0)
-    for own, reach, limit, centre in zip(at.motion, basis, bounds, middle):
+    for own, reach, limit, centre in zip(at.motion, grid.basis, bounds, middle):
         for j in range(dof):
             slopes = np.zeros((len(reach), dof, size))
             slopes[:, j] = reach
             value = own[:, j] - (centre[j] if np.ndim(centre) else centre)
             bound(value / limit[j], slopes.reshape(len(reach), -1) / limit[j], 1.0)
-    for j in range(dof):
-        if np.isfinite(limits.torque[j]):
-            slopes = at.pull[:, j].reshape(len(at.pull), -1) / limits.torque[j]
-            bound(at.torque[:, j] / limits.torque[j], slopes, 1.0)
-    scale, near = max(limits.clearance, 1e-2), at.near
-    slopes = np.einsum("mi,mz->miz", near.slope, grid.poses[near.pose]).reshape(-1, dof * size)
-    room = near.distance - limits.clearance
+    for j, slopes in near.torque.items():
+        bound(at.torque[near.strong, j] / limits.torque[j], slopes, 1.0)
+    links, scale = near.links, max(limits.clearance, 1e-2)
+    slopes = np.einsum("mi,mz->miz", links.slope, grid.poses[links.pose]).reshape(-1, dof * size)
+    room = links.distance - limits.clearance
     can = radius * np.abs(slopes).sum(axis=1) > room
     rows.append(-slopes[can] / scale)
     most.append(room[can] / scale)
     rows, most = np.concatenate(rows), np.concatenate(most)
     # one slack for all, so that there is a step from where a limit is passed, too
     matrix = np.column_stack([rows, -np.ones(len(rows))])
-    gain = np.append(-at.slope.ravel(), _PRICE)
+    gain = np.append(-near.slope.ravel(), _PRICE)
     free = [(-radius, radius)] * (dof * size) + [(0.0, None)]
     found = linprog(gain, A_ub=matrix, b_ub=most, bounds=free, method="highs")
     if found.status != 0:

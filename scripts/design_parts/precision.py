@@ -1,0 +1,172 @@
+"""Precision: information against random motions and a design for the condition number, and whether
+the promised standard deviations come true."""
+
+from __future__ import annotations
+
+import json
+import tempfile
+import time
+import warnings
+from pathlib import Path
+
+import numpy as np
+
+from scripts.design_parts.robots import RATE, experiment_with, unlogged
+from sysid.design import search, solve
+from sysid.design.problem import told, value
+
+ROBOTS = ("leg", "ur5", "panda", "ur10e")
+RANDOM = 1000  # motions that keep to the limits
+DRAWS = 20  # of the noise
+_SPREAD = 1e-9  # of the largest eigenvalue: below, no motion shows a direction
+
+
+def case(seed: int, number: int, robots=ROBOTS) -> dict:
+    """Robot and seed."""
+    return {"robot": robots[number % len(robots)], "seed": seed + number // len(robots)}
+
+
+def trial(case: dict) -> dict:
+    """log det of three designs, from the URDF; then the promise, where a first log can be
+    simulated."""
+    out = {**case, "cpu": {}}
+    with warnings.catch_warnings(), tempfile.TemporaryDirectory() as place:
+        warnings.simplefilter("ignore")
+        problem, pose, rounds = unlogged(case["robot"])
+        fastest = max(rounds) * problem.family.harmonics / problem.family.duration
+        begun = time.process_time()
+        found, _ = search.searched(problem, pose, fastest, case["seed"], processes=1)
+        out["cpu"]["designed"] = time.process_time() - begun
+        out["designed"] = found.log_det
+        begun = time.process_time()
+        best, count, k = -np.inf, 0, 0
+        while count < RANDOM and k < 20 * RANDOM:
+            own = search.start(problem, pose, (case["seed"], rounds[k % len(rounds)], 10_000 + k))
+            best, count, k = max(best, own.log_det), count + bool(np.isfinite(own.value)), k + 1
+        out["cpu"]["random"] = time.process_time() - begun
+        out["random"], out["drawn"] = best, count
+        begun = time.process_time()
+        out["condition"], out["kappa"], out["kappa_designed"] = _condition(
+            problem, pose, rounds, case["seed"], found
+        )
+        out["cpu"]["condition"] = time.process_time() - begun
+        if case["robot"] in RATE:
+            out["promise"] = _promise(case, Path(place))
+    return out
+
+
+def _condition(problem, pose, rounds, seed: int, designed) -> tuple[float, float, float]:
+    """log det of the motion with the least condition number that the same search finds, that number,
+    and the designed motion's own. Of base parameters, each in units of what a random motion tells of
+    it: the usual design, Gautier & Khalil 1992."""
+    known = problem.known
+    grams = []
+    for k in range(8):
+        start = search.start(problem, pose, (seed, rounds[k % len(rounds)], 5000 + k))
+        grams.append(_gram(told(problem.with_rounds(start.rounds), start.z)))
+    typical = np.sum(grams, axis=0)
+    scale = 1.0 / np.sqrt(np.maximum(np.diagonal(typical), 1e-300))
+    values, vectors = np.linalg.eigh(typical * np.outer(scale, scale))
+    shown = values > _SPREAD * values[-1]
+    base = scale[:, None] * vectors[:, shown] / np.sqrt(values[shown])
+
+    def worth(known, information):
+        own = base.T @ (information - known.before) @ base
+        values, vectors = np.linalg.eigh(own)
+        low, high = base @ vectors[:, 0], base @ vectors[:, -1]
+        slope = np.outer(low, low) / values[0] - np.outer(high, high) / values[-1]
+        return float(np.log(values[0] / values[-1])), slope
+
+    # of the order of hundreds, as log det is, so that prices and thresholds mean the same
+    weight = float(known.model.size)
+    kept = solve.worth
+    solve.worth = lambda *asked: tuple(weight * part for part in worth(*asked))
+    try:
+        starts = [
+            search.start(problem, pose, (seed, r, k)) for r in rounds for k in range(search.DRAWN)
+        ]
+        starts = [one for one in starts if np.isfinite(one.value)]
+
+        def kappa(found) -> float:
+            own = problem.with_rounds(found.rounds)
+            weights = own.samples / len(own.nodes)
+            return -worth(known, known.before + weights * _gram(told(own, found.z)))[0]
+
+        starts = sorted(starts, key=kappa)[: search.IMPROVED]
+        ended = []
+        for one in starts:
+            climb = solve.Climb(one.rounds, one.z)
+            while not climb.over:
+                climb = solve.climbed(problem, climb, 100)
+            ended.append(solve.Found.of(problem.with_rounds(climb.rounds), climb.z))
+    finally:
+        solve.worth = kept
+    best = min((one for one in ended if np.isfinite(one.value)), key=kappa)
+    log_det = value(problem.with_rounds(best.rounds), best.z)[1]
+    return log_det, float(np.exp(kappa(best))), float(np.exp(kappa(designed)))
+
+
+def _gram(columns) -> np.ndarray:
+    flat = np.moveaxis(columns, 1, 2).reshape(-1, columns.shape[1])
+    return flat.T @ flat
+
+
+def _promise(case: dict, folder: Path) -> dict:
+    """Promised over achieved standard deviation of what two logs determine, over draws of the torque's
+    noise on both."""
+    import polars
+
+    from sysid import design, pipeline
+    from sysid.config import loads
+
+    first = experiment_with(case["robot"], folder / "first", case["seed"])
+    begun = time.process_time()
+    found = design(first, processes=1)
+    spent = time.process_time() - begun
+    both = experiment_with(
+        case["robot"], folder / "both", case["seed"], motions=[(found.t, found.q)]
+    )
+    fit = pipeline.fit(both)
+    # the prior's weight as it was chosen: another one would be another estimator
+    text = (both.folder / "config.yaml").read_text()
+    text = text.replace("weight: auto", f"weight: {fit.strength.value:.6g}")
+    logs = {name: polars.read_csv(both.folder / name) for name in ("train.csv", "next_0.csv")}
+    noise = json.loads((both.folder / "truth.json").read_text())["torque_noise_std"]
+    rng = np.random.default_rng(case["seed"])
+    drawn = []
+    for _ in range(DRAWS):
+        for name, log in logs.items():
+            more = {
+                f"tau_{j}": log[f"tau_{j}"].to_numpy() + rng.normal(0.0, noise[j], len(log))
+                for j in fit.joints
+            }
+            log.with_columns(**{k: polars.Series(v) for k, v in more.items()}).write_csv(
+                both.folder / name
+            )
+        drawn.append(pipeline.fit(loads(text, both.folder / "config.yaml")).x)
+    achieved = np.std(drawn, axis=0, ddof=1)
+    names, own = fit.model.names, fit.uncertainty
+    ratio = [
+        float(found.deviations[name]["after"] / achieved[k])
+        for k, name in enumerate(names)
+        if name in found.deviations and own.from_data[k] > 0.9 and achieved[k] > 0.0
+    ]
+    return {"ratio": ratio, "cpu": spent}
+
+
+def table(results: list[dict]) -> list[str]:
+    """log det beside the others', and the share of promises within a quarter."""
+    out = ["robot     designed   best random     condition number (kappa; of the designed motion)"]
+    for r in results:
+        out.append(
+            f"{r['robot']:8s} {r['designed']:9.1f}  {r['random']:9.1f} of {r['drawn']}  "
+            f"{r['condition']:9.1f}  ({r['kappa']:.0f}; {r['kappa_designed']:.0f})"
+        )
+    for r in results:
+        if len(ratio := np.array(r.get("promise", {}).get("ratio", []))):
+            within = np.mean(np.abs(np.log(ratio)) < np.log(1.25))
+            out.append(
+                f"{r['robot']:8s} promised / achieved deviation of {len(ratio)} parameters: median "
+                f"{np.median(ratio):.2f}, within a quarter {within:.0%}"
+            )
+    return out

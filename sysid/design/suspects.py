@@ -1,0 +1,160 @@
+"""Suspects: effects that a model may lack, and the columns that they would add along a motion.
+
+A suspect's shape values and its size are those that the first logs suggest. An effect of the instant
+has columns at any sample; one that looks back in time (presliding, elasticity, a delay) has them
+along a whole motion alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from types import MappingProxyType, SimpleNamespace
+
+import numpy as np
+
+from ..candidates import Candidate, columns_of, tried
+from ..estimate import Fit
+from ..model import ROBOT, Model
+from ..motion import Motion
+from ..rows import Rows, stack
+from ..source import Source
+from .columns import piece
+from .noise import noise_of
+
+_RATE = 50.0  # Hz of the rows of a log that suspects are asked on
+_TYPICAL = 0.03  # of the joint's torque: the size of an effect of which no log says any
+
+
+@dataclass(frozen=True)
+class Suspect:
+    """A candidate with its shape values and its likely coefficients size (k,)."""
+
+    candidate: Candidate
+    shapes: dict[str, float]
+    size: np.ndarray
+
+    @property
+    def looks_back(self) -> bool:
+        """Whether its columns are of a whole motion, not of an instant."""
+        effect = self.candidate.effect
+        return bool(effect.memory or effect.reach or not effect.instantaneous)
+
+    def named(self, joints: Sequence[str]) -> str:
+        """`effect:joint`, as `--separate` has it."""
+        own = self.candidate
+        return f"{own.name}:{'*' if own.joint == ROBOT else joints[own.joint]}"
+
+
+def along(
+    suspects: Sequence[Suspect],
+    model: Model,
+    x,
+    q,
+    qd,
+    qdd,
+    step: float = 1.0,
+    rows: slice = slice(None),
+) -> np.ndarray:
+    """Columns (dof, k of all, n) of suspects at the rows of a motion (samples, dof).
+
+    Args:
+        model: what lacks them, sized by a motion; x: its parameters.
+    """
+    first, _, stride = rows.indices(len(q))
+    motion = played(q, qd, qdd, step, model.robot.joints, first)
+    use = np.ones((-(-(len(q) - first) // stride), q.shape[1]), dtype=bool)
+    source = Source(model, np.asarray(x), motion, stride, use)
+    found = [on_every_joint(source, one.candidate, one.shapes) for one in suspects]
+    return np.moveaxis(np.concatenate(found, axis=2), 1, 2)
+
+
+def played(
+    q,
+    qd,
+    qdd,
+    step: float,
+    joints: tuple[str, ...],
+    first: int = 0,
+    levels: Mapping[str, str] = MappingProxyType({}),
+) -> Motion:
+    """Samples (n, dof) of a designed motion as the motion of a log at {group: level}, whose rows
+    count from one on."""
+    own = replace(piece(q, qd, qdd, step), core=slice(first, len(q)), levels=levels)
+    rest = np.zeros(q.shape[1])
+    return Motion(joints, (own,), (), rest, rest.astype(int))
+
+
+def on_every_joint(source: Source, candidate: Candidate, at: dict[str, float]) -> np.ndarray:
+    """Columns (dof, n, k) of a candidate on the rows of a source."""
+    found = columns_of(source, candidate, [at])[0]
+    dof = source.use.shape[1]
+    if len(found) == dof:
+        return found
+    out = np.zeros((dof, *found.shape[1:]))
+    out[candidate.joint] = found[0]
+    return out
+
+
+@dataclass(frozen=True)
+class Seen:
+    """Rows of a log under a fit: what suspects are asked on. weights (dof,): the root of how many
+    samples a row stands for, over the noise."""
+
+    rows: Rows
+    source: Source
+    weights: np.ndarray
+
+    @classmethod
+    def of(cls, fit: Fit, motion: Motion, samples: float) -> Seen:
+        """A motion that stands for so many samples."""
+        stride = max(1, int(round(1.0 / (_RATE * motion.pieces[0].step))))
+        rows = stack(fit.model, motion, stride)
+        source = Source(fit.model.scaled_by(motion), fit.x, motion, stride, rows.use)
+        return cls(rows, source, np.sqrt(samples / max(len(rows.t), 1)) / noise_of(fit))
+
+    def columns(self, suspect: Suspect) -> np.ndarray:
+        """(dof, n, k)."""
+        return on_every_joint(self.source, suspect.candidate, suspect.shapes)
+
+
+def suspected(seen: Seen, fit: Fit, candidate: Candidate) -> Suspect:
+    """A candidate with the shape values that take most of what the first logs leave, as large as
+    these suggest, at least a few per cent of the joint's torque."""
+    left = seen.rows.residual(fit.x)
+    asked = tried(seen.source, candidate)  # which looks at the model's scales alone
+    target = (left * seen.weights).T.ravel()
+    found = [on_every_joint(seen.source, candidate, at) for at in asked]
+    best = max(range(len(asked)), key=lambda k: _taken(found[k], target, seen.weights))
+    columns = found[best]
+    flat = (columns * seen.weights[:, None, None]).reshape(-1, columns.shape[2])
+    size = np.linalg.lstsq(flat, target, rcond=1e-8)[0]
+    return Suspect(candidate, asked[best], grown(columns, size, np.sqrt(np.mean(seen.rows.tau**2))))
+
+
+def grown(columns, size, torque: float) -> np.ndarray:
+    """Coefficients (k,) that make a few per cent of a torque [N m] at least."""
+    if not np.any(columns @ size):
+        each = np.sqrt(np.mean(columns**2, axis=(0, 1)))
+        size = np.divide(1.0, each, out=np.zeros_like(each), where=each > 0.0)
+    made = np.sqrt(np.mean((columns @ size) ** 2))
+    return size * max(1.0, _TYPICAL * torque / made) if made > 0.0 else np.ones(len(size))
+
+
+def unseen(model: Model, x, q, qd, qdd, candidate: Candidate, torque: float) -> Suspect:
+    """A candidate without any log: midway between the shape values that it may have, a few per cent
+    of the torque of a usual motion (n, dof)."""
+    asked = tried(SimpleNamespace(model=model), candidate)
+    at = asked[len(asked) // 2]
+    blank = Suspect(candidate, at, np.zeros(0))
+    columns = np.moveaxis(along([blank], model, x, q, qd, qdd), 1, 2)
+    return Suspect(candidate, at, grown(columns, np.zeros(columns.shape[2]), torque))
+
+
+def _taken(columns, target, weights) -> float:
+    flat = (columns * weights[:, None, None]).reshape(-1, columns.shape[2])
+    size = np.linalg.norm(flat, axis=0)
+    if not np.all(np.isfinite(flat)) or not size.any():
+        return -1.0
+    kept = flat[:, size > 0] / size[size > 0]
+    return float(np.linalg.norm(kept @ np.linalg.lstsq(kept, target, rcond=1e-8)[0]))

@@ -1,0 +1,45 @@
+"""What the study of designs counts: a motion beyond its limits is seen, and ties are what holds 90 %."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import pytest
+
+from scripts.design_parts import limits, precision, robots, solvers, ties
+from sysid import design
+
+
+@pytest.fixture(scope="module")
+def planar(tmp_path_factory):
+    experiment = robots.unlogged_experiment("planar", tmp_path_factory.mktemp("planar"))
+    return experiment, design(experiment, duration=5.0, processes=1)
+
+
+def test_a_motion_beyond_its_limits_is_seen(planar):
+    experiment, found = planar
+    case = {"margin": 0.05, "clearance": 0.01, "robot": "planar"}
+    kept = limits.checked(experiment, found, case)
+    assert max(kept["shares"][k] for k in ("position", "velocity", "torque")) <= 1.0 and kept["shares"]["rest"] < 1e-9
+    wide = found.coefficients.copy()
+    wide[:, 1:] *= 1.5 / max(kept["shares"].values())  # the largest share: three halves
+    beyond = limits.checked(experiment, replace(found, coefficients=wide), case)
+    assert max(beyond["shares"].values()) > 1.0
+    results = [{"robot": "planar", **one} for one in (kept, beyond)]
+    assert limits.table(results)[-1].endswith("beyond any limit: 1")
+
+
+def test_a_tie_is_what_holds_90_per_cent():
+    members = [("a", "j", 0.85), ("c", "j", 0.04), ("b", "j", 0.11)]
+    found = SimpleNamespace(claims=[SimpleNamespace(set=members), SimpleNamespace(set=[("a", "j", 0.95), ("b", "j", 0.05)])])
+    assert [[e for e, *_ in own] for own in ties._sets(found)] == [["a", "b"], ["a"]]
+
+
+def test_tables():
+    one = {"robot": "leg", "tie": [["a", "j", 0.6], ["b", "j", 0.4]], "arms": {arm: {"alone": arm == "designed", "promised": 0.99 if arm == "designed" else None} for arm in ties.ARMS}}
+    said = "\n".join(ties.table([one, {"robot": "leg", "tie": None, "arms": {}}]))
+    assert "2 robots, 1 with a tie" in said and "alone 1/1 = 100%" in said and "alone 0/1" in said
+    row = {"robot": "leg", "designed": 10.0, "random": 8.0, "drawn": 1000, "condition": 7.0, "kappa": 30.0, "kappa_designed": 90.0, "promise": {"ratio": [1.0, 1.1, 2.0]}}
+    assert "within a quarter 67%" in "\n".join(precision.table([row]))
+    assert "+1.5 in 2.0 s" in "\n".join(solvers.table([{"robot": "leg", "start": 1.0, "solvers": {"linear programs": {"worth": 2.5, "cpu": 2.0}}}]))
+    for part in (limits, precision, solvers, ties):
+        assert part.case(3, 5) == part.case(3, 5) and part.case(3, 5)["robot"] in part.ROBOTS
