@@ -305,7 +305,11 @@ def _changed(spec, model: Path, logs: list[str], levels: dict[str, str], as_json
 
 
 @app.command()
-def report(experiment: ExperimentPath, trust: Trust = False, as_json: Json = False, out: Out = None, quiet: Quiet = False) -> None:
+def report(
+    experiment: ExperimentPath,
+    opened: Annotated[bool, typer.Option("--open", help="Open the file in the browser.")] = False,
+    trust: Trust = False, as_json: Json = False, out: Out = None, quiet: Quiet = False,
+) -> None:  # fmt: skip
     """Diagnose, and write one self-contained HTML file that opens anywhere."""
     from . import loop, pipeline
     from .report import page
@@ -316,6 +320,10 @@ def report(experiment: ExperimentPath, trust: Trust = False, as_json: Json = Fal
         print(json.dumps({"report": str(path), "bytes": path.stat().st_size, "verdict": said["verdict"], "run": str(run)}, allow_nan=False))
     elif not quiet:
         print(path)
+    if opened:
+        import webbrowser
+
+        webbrowser.open(path.resolve().as_uri())
     if not found.fit.solution.converged:
         raise typer.Exit(1)
 

@@ -248,8 +248,20 @@ def write(fit: Fit, out: str | Path) -> dict:
     texts["fit.json"] = (json.dumps(found, indent=1, allow_nan=False) + "\n").encode()
     files = {path / "predictions.parquet": parquet(table)}
     with state.locked(path):
+        other = _another(path, found)
         write_together(files | {path / name: lambda p, c=content: p.write_bytes(c) for name, content in texts.items()})
+        if other:  # what it says is of a model that stands here no more
+            (path / "diagnosis.json").unlink(missing_ok=True)
     return found
+
+
+def _another(path: Path, found: dict) -> bool:
+    """Whether a run folder holds another fit than the one that is about to be written, or none."""
+    try:
+        old = json.loads((path / "fit.json").read_bytes())
+        return any(old[key] != json.loads(json.dumps(found[key])) for key in ("parameters", "logs"))
+    except (OSError, ValueError, KeyError, TypeError):
+        return True
 
 
 def _predictions(fit: Fit):

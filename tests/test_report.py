@@ -16,7 +16,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from sysid import pipeline, regressor, robot, specs
+from sysid import pipeline, regressor, results, robot, specs
 from sysid.diagnose.diagnosis import diagnose
 from sysid.report import charts, page, residual_charts, solids, torque_chart
 from sysid.report.decimate import broken, kept
@@ -424,10 +424,23 @@ def test_command_writes_the_page(clean, tmp_path, monkeypatch, capsys):
 
     found, _ = clean
     monkeypatch.setattr(diagnosis, "diagnose", lambda spec, progress=None: found)
-    monkeypatch.setattr(sys, "argv", ["sysid", "report", str(found.fit.experiment.folder), "--out", str(tmp_path / "run"), "--json"])
+    opened: list[str] = []
+    monkeypatch.setattr("webbrowser.open", opened.append)
+    monkeypatch.setattr(sys, "argv", ["sysid", "report", str(found.fit.experiment.folder), "--out", str(tmp_path / "run"), "--json", "--open"])
     with pytest.raises(SystemExit) as stop:
         cli.main()
     said = json.loads(capsys.readouterr().out)
     path = tmp_path / "run" / "report.html"
+    assert opened == [path.as_uri()]
     assert stop.value.code in (0, None) and said["report"] == str(path) and said["bytes"] == path.stat().st_size
     assert (tmp_path / "run" / "diagnosis.json").is_file() and (tmp_path / "run" / "fit.json").is_file()
+
+
+def test_a_diagnosis_of_another_fit_does_not_stay(clean, tmp_path):
+    fit, run = clean[0].fit, tmp_path / "run"
+    results.write(fit, run)
+    (run / "diagnosis.json").write_text("{}")
+    results.write(fit, run)  # the same fit again
+    assert (run / "diagnosis.json").is_file()
+    results.write(replace(fit, x=fit.x * 1.01), run)
+    assert not (run / "diagnosis.json").exists()

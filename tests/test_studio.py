@@ -153,6 +153,54 @@ def test_add_for_real_error_falls_and_undo_is_at_hand(arm, tmp_path):
     assert (own.run / "fit.json").is_file() and (own.run / "diagnosis.json").is_file()
 
 
+def test_all_steps_that_are_named_are_one_change(arm, tmp_path):
+    folder = shutil.copytree(arm[0], tmp_path / "arm")
+    before = (folder / "config.yaml").read_bytes()
+    own = studio(folder, tmp_path / "run")
+    state = own.wait()
+    view = own.bench.view(state["sha"])
+    named = [view.diagnosis.findings[k].effect for _, k in view.offered()]
+    added = own.post("/api/add", sha=state["sha"], steps=True).json()
+    model = own.bench.desk.experiment(own.file.read_text()).model
+    assert named and set(named) <= {e.name for e in model.effects} and added["undo"] == ", ".join(named)
+    state = own.post("/api/undo", sha=added["sha"]).json()
+    assert own.file.read_bytes() == before and own.wait()
+    # of what is complete nothing is named
+    view.offered = list
+    assert "no step to add" in own.post("/api/add", sha=state["sha"], steps=True).json()["error"]
+
+
+def test_charts_are_answered_before_the_diagnosis(arm, tmp_path, monkeypatch):
+    """A fit can be looked at from all sides while its diagnosis is at work."""
+    begun, go_on = threading.Event(), threading.Event()
+    from sysid.studio import bench
+
+    def waiting(*args, **more):
+        begun.set()
+        assert go_on.wait(60.0)
+        return diagnose(*args, **more)
+
+    monkeypatch.setattr(bench, "diagnose", waiting)
+    folder = shutil.copytree(arm[0], tmp_path / "arm")
+    client_of = Bench(folder, tmp_path / "run")
+    client = TestClient(application(client_of, port=PORT, csrf=CSRF), base_url=HOME)
+    client_of.run()
+    assert begun.wait(60.0)
+    client_of.state()
+    state = client.get("/api/state").json()
+    assert state["fitted"] and not state["ready"] and state["job"]["state"] == "running"
+    page = client.get("/api/fitted", params={"sha": state["sha"]}).json()
+    assert [j["name"] for j in page["joints"]] == [EVIL, "elbow"] and page["steps"] == ["start"]
+    asked = {"sha": state["sha"], "joint": 0, "part": "test"}
+    assert client.get("/api/window", params=asked).json()["joint"] == EVIL
+    assert client.get("/api/cloud", params=asked).json()["t"]
+    assert client.get("/api/film", params=asked).json()["names"] == [EVIL, "elbow"]
+    assert client.get("/export/rows.csv", params=asked).text.startswith("log,t [s],measured")
+    assert client.get("/api/window", params={**asked, "part": "both"}).status_code == 422
+    assert client.get("/api/window", params={**asked, "before": 5}).status_code == 422
+    go_on.set()
+
+
 def test_undo_and_redo_are_found_again_after_a_restart(opened, tmp_path):
     before = opened.file.read_text()
     sha = opened.post("/api/add", sha=opened.sha, effect="stribeck", joint="elbow").json()["sha"]

@@ -94,6 +94,8 @@ def _add(bench: Bench, body: dict) -> dict:
         if isinstance(number, bool) or not isinstance(number, int):
             raise SysidError("finding must be a number")
         return bench.add_finding(sha, number)
+    if body.get("steps") is True:
+        return bench.add_steps(sha)
     joint = _given(body, "joint", optional=True)
     if "formula" in body:
         return bench.add_formula(sha, _given(body, "formula"), joint)

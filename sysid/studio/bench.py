@@ -138,6 +138,22 @@ class Bench:
         name, joints, options = spelled(finding.candidate, finding.joint)
         return self._grow(seen, name, joints, options)
 
+    def add_steps(self, seen: str) -> dict:
+        """Add the steps that the diagnosis names, all of them in one change."""
+        found = self.view(seen)
+        named = [found.diagnosis.findings[k] for _, k in found.offered()]
+        if not named:
+            raise SysidError("the diagnosis names no step to add", do="reload")
+        parts = [spelled(own.candidate, own.joint) for own in named]
+
+        def make(text: str) -> str:
+            for name, joints, options in parts:
+                text = loop.with_effect(text, name, None if joints == ["*"] else joints, options, str(self.desk.path))
+            return text
+
+        with loop.asked(self.desk.path):
+            return self._moved(self.desk.change(seen, make, ", ".join(name for name, *_ in parts), "*"))
+
     def add_effect(self, seen: str, effect: str, joint: str | None) -> dict:
         """Add an effect of the vocabulary."""
         if effect not in vocabulary():

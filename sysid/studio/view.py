@@ -36,13 +36,17 @@ class View:
         """Samples that it keeps in memory."""
         return sum(self.fit.samples.values())
 
+    def offered(self) -> list[tuple[int, int]]:
+        """(step, number of its finding) of the steps that the diagnosis names, in order."""
+        heads = {f["joins_as_step"]: k for k, f in reversed(list(enumerate(self.said["findings"]))) if f["joins_as_step"]}
+        return sorted(heads.items())
+
     def page(self, history: list[dict]) -> dict:
         """What the page needs to show itself, but for the charts."""
         made = steps(self.fit, self.diagnosis, self.said, history)
         self._charts |= {chart["id"]: dumped(chart) for chart in made.charts}
         joints, unit = self.fit.joints, units(self.fit)
-        heads = {f["joins_as_step"]: k for k, f in reversed(list(enumerate(self.said["findings"]))) if f["joins_as_step"]}
-        offered = [{"finding": k, "step": step, "effect": self.said["findings"][k]["effect"], "joint": self.said["findings"][k]["joint"]} for step, k in sorted(heads.items())]
+        offered = [{"finding": k, "step": step, "effect": self.said["findings"][k]["effect"], "joint": self.said["findings"][k]["joint"]} for step, k in self.offered()]
         return {
             "sha": self.sha, "sections": {**self._html, "steps": {"title": made.title, "html": made.html()}}, "order": ORDER,
             "joints": [{"name": j, "unit": unit[j][0]} for j in joints],

@@ -182,6 +182,7 @@ function offers() {
   if (!lead || !page.offered.length) return;
   const acts = make("div", {class: "acts"});
   page.offered.slice(0, 4).forEach((offer, k) => acts.append(button("add " + on(offer.effect, offer.joint), () => act("api/add", {finding: offer.finding}), {"data-acts": true, class: k ? "" : "first", "data-key": "offer" + k})));
+  if (page.offered.length > 1) acts.append(button("add all " + page.offered.length + " steps", () => act("api/add", {steps: true}), {"data-acts": true, "data-key": "offer-all"}));
   lead.after(acts);
 }
 function suspects() {
