@@ -66,6 +66,7 @@ def test_the_error_of_a_window_is_that_of_its_rows(arm):
     left = (found.measured - found.predicted)[inside, 1]
     use = slice(None) if found.use is None else found.use[inside, 1]
     assert part["here"] == pytest.approx(np.sqrt(np.mean(left[use] ** 2)), rel=1e-12)
+    assert part["left_out"] == (0 if found.use is None else (~found.use[inside, 1]).sum())
     assert "residual" in trace(part["chart"], "predicted")["hovertemplate"]
 
 

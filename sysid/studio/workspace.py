@@ -74,7 +74,8 @@ class Workspace:
 
         Returns:
             {"chart", "from", "to", "samples", "drawn", "whole": [first, last], "joint", "unit",
-            "rms", "here", "before"}: RMS of all rows, of those of the window, and of all under the
+            "left_out", "rms", "here", "before"}: rows in sight that do
+            not count, and RMS of all rows, of those of the window, and of all under the
             other model (None where there is none, or its rows are others).
         """
         name, line, found = self.joint(joint), self.line(part), self.prediction(part)
@@ -100,7 +101,8 @@ class Workspace:
         return {
             "chart": chart, "from": low, "to": high, "samples": int(inside.sum()),
             "drawn": int(len(keep)), "whole": [float(t[0]), float(t[-1])], "joint": name,
-            "unit": units(self.fit)[name][0], "rms": _rms(left), "here": _rms(left[inside]),
+            "unit": units(self.fit)[name][0], "left_out": int(np.isnan(left[inside]).sum()),
+            "rms": _rms(left), "here": _rms(left[inside]),
             "before": None if beside is None else _rms(beside[1]),
         }  # fmt: skip
 

@@ -96,7 +96,8 @@ async function time() {
     paint();
     const {level} = tools, unit = " " + found.unit, rows = view.part === "test" ? "test logs" : "training logs";
     at("workspace-said").textContent = found.joint + ": residual RMS " + level(found.rms) + unit + " over the " + rows + (view.from === null ? "" : "; " + level(found.here) + unit + " in sight, " + found.from.toFixed(2) + " to " + found.to.toFixed(2) + " s")
-      + (found.drawn < found.samples ? ". " + found.samples.toLocaleString("en") + " samples in sight, thinned: every peak is kept" : ". Every one of " + found.samples.toLocaleString("en") + " samples in sight is drawn") + ".";
+      + (found.drawn < found.samples ? ". " + found.samples.toLocaleString("en") + " samples in sight, thinned: every peak is kept" : ". Every one of " + found.samples.toLocaleString("en") + " samples in sight is drawn") + "."
+      + (found.left_out ? " " + found.left_out.toLocaleString("en") + " of them, where the residual has gaps, are left out of the fit and of its error." : "");
     fell(found);
     if (cursor !== null) lineAt(cursor);
   } catch (error) { if (own === asked) at("workspace-said").textContent = error.message; }
