@@ -370,10 +370,11 @@ def inverse(rms: np.ndarray) -> np.ndarray:
     return np.where(there, weights / np.exp(np.mean(np.log(weights[there]))), 1.0) if there.any() else np.ones(len(rms))
 
 
-def identify(experiment: Experiment, model: Model, motion: Motion, data: Compressed, prior: np.ndarray, callback=None) -> Fit:
+def identify(experiment: Experiment, model: Model, motion: Motion, data: Compressed, prior: np.ndarray, callback=None, near=None) -> Fit:
     """Solve, certify and say how sure; the predictions are added by the pipeline.
 
     Args:
+        near: (size,) where the optimum is not far from, where that is known; the search begins at the prior otherwise.
         data: the training logs; where it holds slopes of shape values after the model's own parameters, these count in
             the uncertainty.
     """
@@ -381,7 +382,8 @@ def identify(experiment: Experiment, model: Model, motion: Motion, data: Compres
     compressed = data if data.size == model.size else data.first(model.size)
     moving = moving_coefficients(model, motion)
     problem = pose(experiment, model, compressed, moving, prior)
-    solution = problem.solve(experiment, callback=callback)
+    begun = None if near is None else problem.from_nearby(near, experiment.solver.tolerance)
+    solution = problem.solve(experiment, None if begun is None else problem.coordinates.theta(begun), callback=callback)
     if experiment.solver.weighting == "noise":
         problem = pose(experiment, model, compressed, moving, prior, noise_weights(compressed, solution.x))
         solution = problem.solve(experiment, callback=callback)

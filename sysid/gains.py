@@ -12,6 +12,7 @@ it makes; the fit goes on from there, with all bodies free.
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 from scipy.interpolate import make_interp_spline
@@ -141,6 +142,7 @@ def delays(left: list) -> list[float]:
     Args:
         left: of each joint, what its columns leave at a delay; None where there is too little to tell.
     """
+    left = [one if one is None else cache(one) for one in left]
     told = [one for one in left if one is not None]
     if not told:
         return [0.0] * len(left)

@@ -278,7 +278,7 @@ def _settled(experiment: Experiment, structure: Model, motion: Motion, prior) ->
             searched = tuple(one.checked_again(other) for one, other in zip(searched, again.searched))
             structure, slopes = again.model, Linearised(again.model, again.x)
             data = compress(slopes, motion)
-        fit = identify(weighed, structure, motion, data, prior)
+        fit = identify(weighed, structure, motion, data, prior, near=slopes.x)
         # blows make valleys narrower than a step, and slopes say little at a corner: the last step is taken back
         if best is not None and (structure.deflects or not structure.uses_load) and fit.objective > best[0]:
             return best[1], best[2], searched, best[3]

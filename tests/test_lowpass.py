@@ -300,3 +300,16 @@ def test_rounding_is_drawn_again_as_rounding(grain):
             for k in range(8)
         ]
         assert np.sqrt(np.mean(np.square(drawn))) == pytest.approx(band(made, low, high), rel=0.4)
+
+
+def test_windows_that_overlap_are_summed_as_each_alone():
+    """Every window by hand, whatever its size, stride and the number of values."""
+    from sysid.gaussian import _weighed
+
+    rng = np.random.default_rng(0)
+    for _ in range(200):
+        size, stride = 2 * int(rng.integers(1, 60)) + 1, int(rng.integers(1, 12))
+        values, weights = rng.normal(size=(3, size + int(rng.integers(0, 300)))), rng.random(size)
+        starts = range(0, values.shape[1] - size + 1, stride)
+        wanted = np.array([values[:, k : k + size] @ weights for k in starts]).T
+        np.testing.assert_allclose(_weighed(values, weights, stride), wanted, atol=1e-12)
