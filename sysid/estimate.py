@@ -16,8 +16,8 @@ from .inertia.consistency import is_consistent
 from .inverse_dynamics import WithTorque
 from .model import Model, moving_coefficients
 from .motion import Motion
-from .nearby import from_nearby
 from .multistart import Searched
+from .nearby import from_nearby
 from .objective import Objective, posed
 from .prior_weight import PriorWeight, number, with_weight
 from .robot import Robot

@@ -10,14 +10,19 @@ fit + motion -> deviations now and after, and which suspects will be told apart
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
 from .. import pipeline
 from ..errors import ConfigError, SysidWarning
 from ..estimate import Fit
+from ..filters import settled
+from ..log import Log
+from ..preprocess import prepare
+from ..segment import Segment
 from ..specs import Experiment
 from . import promise
 from .basis import Basis, basis
@@ -126,7 +131,7 @@ def _told(
     needed = torque(problem, q, qd, qdd)
     spread, pairs = {}, []
     if base.fit is not None:
-        spread = promise.deviations(base.fit, _more(base.fit, base.levels, q, qd, qdd))
+        spread = promise.deviations(base.fit, _more(base.fit, base.levels, t, q, needed))
         if len(base.known.suspects) > 1:
             joints = base.robot.joints
             new = played(q, qd, qdd, 1.0 / base.rate, joints, levels=base.levels)
@@ -139,14 +144,29 @@ def _told(
     )  # fmt: skip
 
 
-def _more(fit: Fit, levels: Mapping[str, str], q, qd, qdd) -> np.ndarray:
+def _more(fit: Fit, levels: Mapping[str, str], t, q, needed) -> np.ndarray:
     """C'C (dof, size, size) of a motion's rows in the fit's parameters; zero for effects that look
-    back in time."""
+    back in time.
+
+    The motion is filtered as its log will be: what is left out around a reversal tells nothing.
+
+    Args:
+        t (n,) [s]; q (n, dof); needed (n, dof), the torque of the motion.
+    """
+    spec, joints = settled(fit.experiment.preprocess, fit.filters), fit.joints
+    segment = Segment(t, float(t[1] - t[0]), q, needed, None, None, {})
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SysidWarning)
+        seen = prepare([Log("designed", Path("designed"), "", (segment,))], spec, joints)
     instant, places = instant_of(fit.model, levels)
-    out = np.zeros((len(fit.joints), fit.model.size, fit.model.size))
-    for _, found in in_runs(instant, q, qd, qdd):
-        for j, own in enumerate(found):
-            out[j][np.ix_(places, places)] += own @ own.T
+    out = np.zeros((len(joints), fit.model.size, fit.model.size))
+    for piece in seen.pieces:
+        core = piece.core
+        use = np.ones((piece.samples, len(joints)), bool) if piece.use is None else piece.use[core]
+        for rows, found in in_runs(instant, piece.q[core], piece.qd[core], piece.qdd[core]):
+            for j, own in enumerate(found):
+                kept = own[:, use[rows, j]]
+                out[j][np.ix_(places, places)] += kept @ kept.T
     return out
 
 
