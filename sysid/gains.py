@@ -3,7 +3,7 @@
 Both are told by a joint's own equation in the low-passed training logs. Of the columns of its bodies, motor and friction,
 without any sign or prior, a command that acts d late leaves
 
-    || (1 - P) (command(t - d) - q) ||,
+    || (1 - P) (command(t - d) - q) || / || command(t - d) - q ||,
 
 and the delay is where that is least, over all joints together (see `delays`): P is the same for all d. The factor starts where the URDF's bodies need the torque that
 it makes; the fit goes on from there, with all bodies free.
@@ -163,7 +163,7 @@ def delays(left: list) -> list[float]:
 
 
 def _left(found: rows.Rows, motion: Motion, commands: Motion, j: int, own: motor_side.Drive):
-    """What a joint's own columns leave of its torque where its command acts a delay [s] late; None where rows are too few."""
+    """The share of its torque that a joint's own columns leave where its command acts a delay [s] late; None where rows are too few."""
     use = found.use[:, j]
     columns = found.columns[j]
     columns = columns[:, columns.any(axis=0)]
@@ -185,6 +185,7 @@ def _left(found: rows.Rows, motion: Motion, commands: Motion, j: int, own: motor
         for spline, part in zip(splines, parts):
             acts[part] = spline(found.t[part] - delay)
         torque = (acts - angles)[use]
-        return float(np.linalg.norm(torque - basis @ (basis.T @ torque)))
+        # as a share: a servo that lags has little torque left where its command is as late as its joint is
+        return float(np.linalg.norm(torque - basis @ (basis.T @ torque)) / max(np.linalg.norm(torque), 1e-300))
 
     return left
