@@ -72,6 +72,11 @@ class Prediction:
         residual = self.measured - self.predicted
         return residual if self.use is None else np.where(self.use, residual, 0.0)
 
+    def counted_residual(self, joint: int) -> np.ndarray:
+        """(n,) measured minus predicted torque of a joint, NaN where a row does not count."""
+        left = self.measured[:, joint] - self.predicted[:, joint]
+        return left if self.use is None else np.where(self.use[:, joint], left, np.nan)
+
     @property
     def counts(self) -> np.ndarray:
         """(dof,) rows that count."""

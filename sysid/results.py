@@ -248,18 +248,19 @@ def write(fit: Fit, out: str | Path) -> dict:
     texts["fit.json"] = (json.dumps(found, indent=1, allow_nan=False) + "\n").encode()
     files = {path / "predictions.parquet": parquet(table)}
     with state.locked(path):
-        other = _another(path, found)
+        other = _another(path, texts["fit.json"])
         write_together(files | {path / name: lambda p, c=content: p.write_bytes(c) for name, content in texts.items()})
         if other:  # what it says is of a model that stands here no more
             (path / "diagnosis.json").unlink(missing_ok=True)
     return found
 
 
-def _another(path: Path, found: dict) -> bool:
-    """Whether a run folder holds another fit than the one that is about to be written, or none."""
+def _another(path: Path, text: bytes) -> bool:
+    """Whether a run folder holds another fit than the one whose fit.json is about to be written, or none."""
     try:
         old = json.loads((path / "fit.json").read_bytes())
-        return any(old[key] != json.loads(json.dumps(found[key])) for key in ("parameters", "logs"))
+        new = json.loads(text)
+        return any(old[key] != new[key] for key in ("parameters", "logs"))
     except (OSError, ValueError, KeyError, TypeError):
         return True
 

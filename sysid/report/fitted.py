@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from ..estimate import Fit
 from ..events import WORDS
 from . import charts, residual_charts, torque_chart
@@ -22,18 +20,16 @@ def torque(fit: Fit, document: dict) -> Section:
         document: of the diagnosis.
     """
     parts = {part: fit.predictions[part] for part in ("train", "test") if part in fit.predictions}
-    names = {part: _log_names(fit, part) for part in parts}
+    names = {part: log_names(fit, part) for part in parts}
     line = charts.timeline({part: (p.log, p.t, names[part]) for part, p in parts.items()})
     drawn, unit, events = [], units(fit), document["events"]
     for j, joint in enumerate(fit.joints):
         series = {}
         for part, prediction in parts.items():
             measured, predicted = prediction.measured[:, j], prediction.predicted[:, j]
-            residual = measured - predicted
-            if prediction.use is not None:
-                residual = np.where(prediction.use[:, j], residual, np.nan)
-            series[part] = (measured, predicted, residual)
-        own = [span for e in events if joint in e["joints"] for span in _placed(e, line)]
+            series[part] = (measured, predicted, prediction.counted_residual(j))
+        mine = [e for e in events if joint in e["joints"]]
+        own = [span for e in mine for part in line.values() for span in placed(e, part)]
         force = unit[joint][0]
         drawn.append(
             torque_chart.torque(f"torque{j}", joint, force, line, series, len(fit.joints), own)
@@ -76,19 +72,23 @@ def _percent(value) -> str:
     return f"{number(100 * value, 3)}{SPACE}%"
 
 
-def _log_names(fit: Fit, part: str) -> list[str]:
+def log_names(fit: Fit, part: str) -> list[str]:
+    """The names of a part's logs, in the order of their numbers."""
     own = [entry for entry in fit.logs if entry.get("part") == part]
     return [str(entry.get("log", f"log {k + 1}")) for k, entry in enumerate(own)]
 
 
-def _placed(event: dict, line: dict) -> list[tuple[float, float]]:
-    """Where an event stands on the axis of all logs end to end; none where its log has no row."""
+def placed(event: dict, own: dict) -> list[tuple[float, float]]:
+    """Where an event stands on the axis of a part's logs end to end; none where its log has no row.
+
+    Args:
+        own: of the part, as `charts.timeline` has it.
+    """
     out = []
-    for own in line.values():
-        for (begin, end, name), first in zip(own["spans"], own["starts"]):
-            low, high = (begin + event[key] - first for key in ("start", "stop"))
-            if name == event["log"] and high >= begin and low <= end:
-                out.append((max(low, begin), min(high, end)))
+    for (begin, end, name), first in zip(own["spans"], own["starts"]):
+        low, high = (begin + event[key] - first for key in ("start", "stop"))
+        if name == event["log"] and high >= begin and low <= end:
+            out.append((max(low, begin), min(high, end)))
     return out
 
 

@@ -19,6 +19,13 @@ from .charts import (
 )
 
 
+def _titled(text: str, top: int = 34) -> dict:
+    """A small title in the corner, and the margins that leave it `top` pixels."""
+    font = {"size": 13}
+    title = {"text": text, "x": 0.01, "y": 0.99, "yanchor": "top", "font": font}
+    return {"title": title, "margin": {"l": 60, "r": 10, "t": top, "b": 46}}
+
+
 def residual_map(name: str, joint: str, unit: str, base: str, found: dict) -> dict:
     """The mean residual over angle (or position) and speed."""
     quantity = "angle" if base == "rad" else "position"
@@ -58,14 +65,7 @@ def residual_map(name: str, joint: str, unit: str, base: str, found: dict) -> di
         "xaxis": axis(f"{quantity} q [{base}]", showgrid=False),
         "yaxis": axis(f"speed qd [{base}/s]", showgrid=False),
         "plot_bgcolor": EMPTY,
-        "title": {
-            "text": f"over {quantity} and speed",
-            "x": 0.01,
-            "y": 0.99,
-            "yanchor": "top",
-            "font": {"size": 13},
-        },
-        "margin": {"l": 60, "r": 10, "t": 34, "b": 46},
+        **_titled(f"over {quantity} and speed"),
     }
     return chart(
         name, f"Mean residual of {joint} over {quantity} and speed", data, layout, height=300
@@ -102,14 +102,7 @@ def residual_time(name: str, joint: str, unit: str, found: dict) -> dict:
         "yaxis": axis(f"residual RMS [{unit}]", rangemode="tozero"),
         "showlegend": len(numbers) > 1,
         "legend": LEGEND,
-        "title": {
-            "text": "over time",
-            "x": 0.01,
-            "y": 0.99,
-            "yanchor": "top",
-            "font": {"size": 13},
-        },
-        "margin": {"l": 60, "r": 10, "t": 34 if len(numbers) < 2 else 58, "b": 46},
+        **_titled("over time", 34 if len(numbers) < 2 else 58),
     }
     return chart(name, f"RMS residual of {joint} over time", data, layout, height=300)
 
@@ -130,14 +123,7 @@ def residual_bands(name: str, joint: str, found: dict) -> dict:
     layout = {
         "xaxis": axis("frequency [Hz]", type="category", tickangle=-45, showgrid=False),
         "yaxis": axis("squared residual [%]", rangemode="tozero"),
-        "title": {
-            "text": "over frequency",
-            "x": 0.01,
-            "y": 0.99,
-            "yanchor": "top",
-            "font": {"size": 13},
-        },
-        "margin": {"l": 60, "r": 10, "t": 34, "b": 46},
+        **_titled("over frequency"),
     }
     return chart(
         name,

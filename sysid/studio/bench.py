@@ -46,7 +46,7 @@ class Bench:
         except SysidError as problem:
             sha, error = None, str(problem)
         undo, redo = self.desk.labels()
-        found = {"name": self.desk.name, "sha": sha, "error": error, "job": None if job is None else job.document(), "ready": sha is not None and self._find(sha) is not None, "fitted": self._early is not None and self._early[0] == sha, "undo": undo, "redo": redo}
+        found = {"name": self.desk.name, "sha": sha, "error": error, "job": None if job is None else job.document(), "ready": sha is not None and self._find(sha) is not None, "fitted": self._fitted(sha), "undo": undo, "redo": redo}
         if look == self._looks:  # none that began later, after a change perhaps
             self._last = found
         return found
@@ -66,7 +66,11 @@ class Bench:
         if not self._looking:
             self._looking = True
             beside(self._look)
-        return {**last, "job": now, "fitted": self._early is not None and self._early[0] == last["sha"]}
+        return {**last, "job": now, "fitted": self._fitted(last["sha"])}
+
+    def _fitted(self, sha: str | None) -> bool:
+        """Whether the fit under a text can be looked at while it is diagnosed."""
+        return self._early is not None and self._early[0] == sha
 
     def _look(self) -> None:
         try:
@@ -135,8 +139,7 @@ class Bench:
         if not 0 <= number < len(found.diagnosis.findings):
             raise SysidError("there is no such suspect", do="reload")
         finding = found.diagnosis.findings[number]
-        name, joints, options = spelled(finding.candidate, finding.joint)
-        return self._grow(seen, name, joints, options)
+        return self._grow(seen, [spelled(finding.candidate, finding.joint)])
 
     def add_steps(self, seen: str) -> dict:
         """Add the steps that the diagnosis names, all of them in one change."""
@@ -144,27 +147,19 @@ class Bench:
         named = [found.diagnosis.findings[k] for _, k in found.offered()]
         if not named:
             raise SysidError("the diagnosis names no step to add", do="reload")
-        parts = [spelled(own.candidate, own.joint) for own in named]
-
-        def make(text: str) -> str:
-            for name, joints, options in parts:
-                text = loop.with_effect(text, name, None if joints == ["*"] else joints, options, str(self.desk.path))
-            return text
-
-        with loop.asked(self.desk.path):
-            return self._moved(self.desk.change(seen, make, ", ".join(name for name, *_ in parts), "*"))
+        return self._grow(seen, [spelled(own.candidate, own.joint) for own in named], "*")
 
     def add_effect(self, seen: str, effect: str, joint: str | None) -> dict:
         """Add an effect of the vocabulary."""
         if effect not in vocabulary():
             raise SysidError("there is no such effect", allowed=", ".join(vocabulary()))
-        return self._grow(seen, effect, None if joint is None or find(effect).scope == "robot" else [joint], {})
+        return self._grow(seen, [(effect, None if joint is None or find(effect).scope == "robot" else [joint], {})])
 
     def add_formula(self, seen: str, formula: str, joint: str | None) -> dict:
         """Add a formula of the user's own."""
         if not formula.strip():
             raise SysidError("there is no formula", do="write one, such as a*sin(3*q)")
-        return self._grow(seen, "formula", None if joint is None else [joint], {"formula": formula.strip()})
+        return self._grow(seen, [("formula", None if joint is None else [joint], {"formula": formula.strip()})])
 
     def undo(self, seen: str) -> dict:
         """Restore the text before."""
@@ -174,11 +169,24 @@ class Bench:
         """Take an undo back."""
         return self._moved(self.desk.redo(seen))
 
-    def _grow(self, seen: str, effect: str, joints: list[str] | None, options: dict) -> dict:
-        joints = None if joints == ["*"] else joints  # every joint, or the whole robot
-        make = lambda text: loop.with_effect(text, effect, joints, options, str(self.desk.path))  # noqa: E731
+    def _grow(self, seen: str, parts: list[tuple[str, list[str] | None, dict]], where: str | None = None) -> dict:
+        """Add effects, (word, joints, options) each, in one change of the text.
+
+        Args:
+            where: the joints as the step is called; by default those of the first.
+        """
+        # every joint, or the whole robot
+        parts = [(effect, None if joints == ["*"] else joints, options) for effect, joints, options in parts]
+
+        def make(text: str) -> str:
+            for effect, joints, options in parts:
+                text = loop.with_effect(text, effect, joints, options, str(self.desk.path))
+            return text
+
+        words = ", ".join(effect if effect != "formula" else options["formula"] for effect, _, options in parts)
+        where = where or ("*" if parts[0][1] is None else ", ".join(parts[0][1]))
         with loop.asked(self.desk.path):
-            return self._moved(self.desk.change(seen, make, effect if effect != "formula" else options["formula"], "*" if joints is None else ", ".join(joints)))
+            return self._moved(self.desk.change(seen, make, words, where))
 
     def _moved(self, sha: str) -> dict:
         self._ensure(sha)

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from ..report import charts
-from ..report.charts import BLUE, EMPTY, GREY, INK, MIDDLE, ORANGE, PURPLE, VERMILLION
+from ..report.charts import BLUE, GREY, INK, ORANGE, PURPLE, VERMILLION
+from ..report.residual_charts import residual_map
 
 _LINES = {
     "measured": (GREY, 1.6, "y", "solid"),
@@ -105,30 +106,13 @@ def dots(word: str, joint: str, at, left, direction, t, force: str, unit: str) -
     return charts.chart(f"workspace-{word}", label, data, layout, height=300)
 
 
-def mean_map(joint: str, q, qd, mean, count, force: str, base: str) -> dict:
-    """The mean residual over position and speed."""
-    known = np.sort(np.abs(mean[np.isfinite(mean) & (count >= 3)]))
-    most = float(known[int(0.95 * (len(known) - 1))]) if len(known) and known[-1] > 0 else 1.0
-    middle = lambda edges: charts.rounded((edges[1:] + edges[:-1]) / 2)  # noqa: E731
-    hover = f"q %{{x:.3g}} {base}\nqd %{{y:.3g}} {base}/s\nmean residual %{{z:.3g}} {force}"
-    data = [{
-        "type": "heatmap", "x": middle(q), "y": middle(qd), "zmin": -most, "zmax": most,
-        "z": [charts.rounded(row, 3) for row in mean.T], "customdata": count.T.tolist(),
-        "hoverongaps": False, "xgap": 1, "ygap": 1,
-        "colorscale": [[0, BLUE], [0.5, MIDDLE], [1, VERMILLION]],
-        "colorbar": {
-            "title": {"text": f"mean residual [{force}]", "side": "right", "font": {"size": 11}},
-            "thickness": 10, "outlinewidth": 0,
-        },
-        "hovertemplate": f"{hover}\n%{{customdata}} rows",
-    }, {"type": "scatter", **_CURSOR}]  # fmt: skip
-    where = "angle" if base == "rad" else "position"
-    layout = {
-        "xaxis": charts.axis(f"{where} q [{base}]", showgrid=False), "plot_bgcolor": EMPTY,
-        "yaxis": charts.axis(f"speed qd [{base}/s]", showgrid=False), **_PANEL,
-    }  # fmt: skip
-    label = f"Mean residual of {joint} over its position and speed"
-    return charts.chart("workspace-map", label, data, layout, height=300)
+def mean_map(joint: str, found: dict, force: str, base: str) -> dict:
+    """The mean residual over position and speed, as `residual_charts.residual_map` has it, with a
+    place for the cursor."""
+    made = residual_map("workspace-map", joint, force, base, found)
+    made["figure"]["data"].append({"type": "scatter", **_CURSOR})
+    del made["figure"]["layout"]["title"]
+    return made
 
 
 def robot(links, joints, names: list[str]) -> dict:

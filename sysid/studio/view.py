@@ -5,8 +5,6 @@ from __future__ import annotations
 import json
 from functools import cache
 
-import numpy as np
-
 from ..diagnose.diagnosis import Diagnosis
 from ..effect import describe, find, vocabulary
 from ..estimate import Fit
@@ -52,7 +50,6 @@ class View:
             "joints": [{"name": j, "unit": unit[j][0]} for j in joints],
             "findings": [{"effect": f["effect"], "joint": f["joint"]} for f in self.said["findings"]],
             "verdict": [{"joint": v["joint"], "status": v["status"]} for v in self.said["verdict"]], "offered": offered,
-            "steps": [step_name(s) for s in history] or ["start"], "seconds": [0.0, float(np.round(max((s[1] for s in self.looks.line["spans"]), default=0.0), 3))],
             "vocabulary": spoken(), "converged": bool(self.fit.solution.converged),
         }  # fmt: skip
 

@@ -17,6 +17,7 @@ from ..errors import SysidError
 from ..estimate import Fit, Prediction
 from ..report import charts, solids
 from ..report.decimate import kept
+from ..report.fitted import log_names, placed
 from ..report.words import units
 from . import panels
 
@@ -50,16 +51,9 @@ class Workspace:
         """The logs of a part end to end, the first from 0 s: as `charts.timeline` has them."""
         if part not in self._lines:
             found = self.prediction(part)
-            own = [e for e in self.fit.logs if e.get("part") == part]
-            names = [str(e.get("log", f"log {k + 1}")) for k, e in enumerate(own)]
-            self._lines[part] = charts.timeline({part: (found.log, found.t, names)})[part]
+            parts = {part: (found.log, found.t, log_names(self.fit, part))}
+            self._lines[part] = charts.timeline(parts)[part]
         return self._lines[part]
-
-    def residual(self, part: str, joint: int) -> np.ndarray:
-        """(n,) measured minus predicted torque, NaN where a row does not count."""
-        found = self.prediction(part)
-        left = found.measured[:, joint] - found.predicted[:, joint]
-        return left if found.use is None else np.where(found.use[:, joint], left, np.nan)
 
     # ---- a window of time
 
@@ -79,7 +73,7 @@ class Workspace:
             other model (None where there is none, or its rows are others).
         """
         name, line, found = self.joint(joint), self.line(part), self.prediction(part)
-        t, left = line["t"], self.residual(part, joint)
+        t, left = line["t"], found.counted_residual(joint)
         low, high = self._bounds(t, low, high)
         # one row beyond either edge, so that lines reach it
         first, last = np.searchsorted(t, low) - 1, np.searchsorted(t, high, side="right") + 1
@@ -120,8 +114,8 @@ class Workspace:
         out = io.StringIO()
         sheet = csv.writer(out, lineterminator="\n")
         sheet.writerow(heads)
-        left = self.residual(part, joint)
-        for k, (log, own) in zip(rows, _own_clock(line, rows, found)):
+        left = found.counted_residual(joint)
+        for k, (log, _) in zip(rows, _own_clock(line, rows, found)):
             torques = found.measured[k, joint], found.predicted[k, joint], left[k]
             sheet.writerow(
                 [
@@ -148,19 +142,14 @@ class Workspace:
         mine, theirs = self.prediction(part), other.prediction(part)
         if mine.t.shape != theirs.t.shape or not np.array_equal(mine.t, theirs.t):
             return None
-        return mine.predicted[:, joint], self.residual(part, joint)
+        return mine.predicted[:, joint], mine.counted_residual(joint)
 
     def _disturbed(self, part: str, joint: str, low, high) -> list[tuple[float, float, str]]:
         """What disturbed a joint's log in a window: from, to, kind."""
-        line, out = self.line(part), []
-        for event in self.fit.events:
-            if event["part"] != part or joint not in event["joints"]:
-                continue
-            for (begin, end, name), first in zip(line["spans"], line["starts"]):
-                a, b = (begin + event[key] - first for key in ("start", "stop"))
-                if name == event["log"] and b >= max(begin, low) and a <= min(end, high):
-                    out.append((max(a, begin), min(b, end), event["kind"]))
-        return out
+        line = self.line(part)
+        mine = [e for e in self.fit.events if e["part"] == part and joint in e["joints"]]
+        spans = [(*span, e["kind"]) for e in mine for span in placed(e, line)]
+        return [span for span in spans if span[1] >= low and span[0] <= high]
 
     # ---- the residual against position and speed
 
@@ -171,10 +160,11 @@ class Workspace:
         Returns:
             {"position", "speed", "map": charts, "t": (m,) [s] of the dots, "joint", "unit"}.
         """
-        name, states = self.joint(joint), self.prediction(part).states
+        name, found = self.joint(joint), self.prediction(part)
+        states = found.states
         if states is None:
             raise SysidError("where the joints were was not kept", do="reload")
-        left = self.residual(part, joint)[states.index]
+        left = found.counted_residual(joint)[states.index]
         q, qd = states.q[:, joint], states.qd[:, joint]
         seen = np.flatnonzero(np.isfinite(left))
         dots = seen[:: max(1, -(-len(seen) // _DOTS))]
@@ -188,7 +178,7 @@ class Workspace:
             )
             for word, values, unit in (("position", q, base), ("speed", qd, f"{base}/s"))
         }
-        drawn["map"] = panels.mean_map(name, *_binned(q[seen], qd[seen], left[seen]), force, base)
+        drawn["map"] = panels.mean_map(name, _binned(q[seen], qd[seen], left[seen]), force, base)
         return {**drawn, "t": charts.rounded(t[dots], 6), "joint": name, "unit": force}
 
     # ---- the robot
@@ -250,13 +240,14 @@ def _breaks(line: dict, rows) -> np.ndarray:
     return np.unique(at[(at > 0) & (at < len(rows))])
 
 
-def _binned(q, qd, left) -> tuple:
-    """Edges over position and speed, and the mean residual and the number of rows in each cell."""
+def _binned(q, qd, left) -> dict:
+    """Edges over position and speed, and the mean residual and the number of rows in each cell, as
+    a failure's map has them."""
     edges = [_edges(values, cells) for values, cells in zip((q, qd), _CELLS)]
     count = np.histogram2d(q, qd, bins=edges)[0]
     total = np.histogram2d(q, qd, bins=edges, weights=left)[0]
     mean = np.where(count > 0, total / np.maximum(count, 1), np.nan)
-    return *edges, mean, count.astype(int)
+    return {"q": edges[0], "qd": edges[1], "mean": mean, "rows": count.astype(int)}
 
 
 def _edges(values, cells: int) -> np.ndarray:
