@@ -123,7 +123,7 @@ def test_summary_holds_the_bars_of_the_issue(blind):
     records = [
         ALONE, HEAD, FAMILY, ALSO, WRONG, ELSEWHERE, UNKNOWN, CRASH, record(("payload", "*"), knee=verdict("knee", "spring")),
         record(("creep", "knee"), kind="outside", knee=verdict("knee", "unknown")), record(("hum", "knee"), kind="outside"),
-        record(("heat", "knee"), kind="outside"),
+        record(("heat", "knee"), kind="outside"), record(("swept_grease", "knee"), kind="outside", knee=verdict("knee", "unknown")),
         control(0), control(1, knee=verdict("knee", "unknown")), control(2, knee=verdict("knee", "spring")),
     ]  # fmt: skip
     found = blind.summary(records)
@@ -131,7 +131,7 @@ def test_summary_holds_the_bars_of_the_issue(blind):
     counted = lambda name: (bars[name]["reached"]["count"], bars[name]["reached"]["of"])  # noqa: E731
     assert counted("named") == (2, 8) and counted("alone") == (1, 8) and counted("after discover") == (2, 2)
     assert counted("controls accused") == (1, 3) and counted("outside, old laws") == (1, 2)
-    assert counted("outside, new laws") == (0, 1)
+    assert counted("outside, new laws") == (0, 1) and counted("outside, third laws") == (1, 1)
     assert not any(bars[name]["met"] for name in ("named", "alone", "controls accused", "outside, old laws", "outside, new laws", "controls", "cases")) and bars["after discover"]["met"]
     assert found["controls"]["unknown"]["count"] == 1
     table = found["confusion"]
@@ -171,7 +171,7 @@ def test_cases_are_as_promised(blind):
     stribeck = [c.hidden[0]["size"] for c in full if c.kind == "one" and c.hidden[0]["effect"] == "stribeck"]
     assert min(stribeck) < 0.95 < max(stribeck)
     small = blind.cases(5, "small")
-    assert set(c.key for c in small) < set(c.key for c in full) and all(c in full for c in small) and 30 <= len(small) <= 60
+    assert set(c.key for c in small) < set(c.key for c in full) and all(c in full for c in small) and 30 <= len(small) <= 65
 
 
 def test_cases_of_old_keys_are_what_they_were(blind):
@@ -181,7 +181,8 @@ def test_cases_of_old_keys_are_what_they_were(blind):
     assert {key: full[key].seed for key in seeds} == seeds
     assert full["leg/hum/1"].hidden == ({"effect": "hum", "joint": "knee", "size": 1.1457, "other": "hip"},)
     drawn = Counter(c.hidden[0]["effect"] for c in full.values() if c.kind == "outside")
-    assert set(drawn) == {*blind.OLD, *blind.NEW} and len(blind.NEW) == len(blind.OLD) == 8 and set(drawn.values()) == {5}
+    sets = (blind.OLD, blind.NEW, blind.THIRD)
+    assert set(drawn) == set().union(*sets) and [len(own) for own in sets] == [8, 8, 8] and len(drawn) == 24 and set(drawn.values()) == {5}
 
 
 @pytest.mark.parametrize("law", ["seal_carried_along", "heat", "ageing_contact", "loose_load", "bumper", "gas_strut"])
@@ -212,6 +213,45 @@ def test_new_laws_in_closed_form(blind, law):
         assert after(0.001, [-0.5, 0], [0.0, 0.0]) == pytest.approx(0.0) and after(0.001, [0.0, (math.pi / 2 - 0.5) / 0.7], [0.0, 0.0]) == pytest.approx(1.0 / 1.5**1.2)
 
 
+@pytest.mark.parametrize("law", ["clutched_spring", "one_way_pawl", "shared_pump", "stroke_cushion", "swept_grease", "current_foldback", "reflex_twitch", "rolling_ballast"])
+def test_third_laws_in_closed_form(blind, law):
+    """At constant speeds, or at rest, each is what its equation says."""
+    scales = {"torque": 5.0, "inertia": 2.0, "speed": 1.5, "coulomb": 0.4, "low": -1.0, "high": 1.0}
+    own, memory, clock = blind.THIRD[law][1](1.0, 0, 1, scales), {}, [0.0]
+
+    def after(seconds, q, qd, load=(0.0, 0.0)):
+        for _ in range(round(1e3 * seconds)):
+            out = own(q, qd, [0.0, 0.0], clock[0], load, memory)
+            clock[0] += 1e-3
+        return out
+
+    if law == "clutched_spring":
+        assert after(0.001, [0.5, 0], [1.0, 0]) == 0.0 and after(0.001, [0.5, 0], [-1.0, 0]) == 0.0
+        assert after(0.001, [0.1, 0], [-1.0, 0]) == pytest.approx(-0.5) == after(0.001, [0.1, 0], [0.0, 0]) and after(0.001, [0.1, 0], [1.0, 0]) == 0.0
+    elif law == "one_way_pawl":
+        assert after(0.001, [math.pi / 32, 0], [1.0, 0]) == pytest.approx(0.75) and after(0.001, [math.pi / 32, 0], [-1.0, 0]) == 0.0
+    elif law == "shared_pump":
+        assert after(0.001, [0, 0], [0, 1.5], [4.0, 0]) == pytest.approx(1.4) and after(0.001, [0, 0], [0, -1.5], [4.0, 0]) == 0.0
+    elif law == "stroke_cushion":
+        assert after(0.001, [0.5, 0], [1.5, 0]) == pytest.approx(5.0) and after(0.001, [0.5, 0], [-1.5, 0]) == after(0.001, [-0.1, 0], [1.5, 0]) == 0.0
+    elif law == "swept_grease":
+        assert after(0.001, [0.3, 0], [1.0, 0]) == pytest.approx(1.0)
+        after(2.0, [0.5, 0], [1.0, 0])
+        assert after(0.001, [0.3, 0], [-1.0, 0]) == pytest.approx(-(1.0 - math.exp(-1.0)), rel=1e-3)
+    elif law == "current_foldback":
+        # a load of twice the rms: warm at 1.5 after 0.8 log(4 / 2.5) s
+        warm = 0.8 * math.log(4.0 / 2.5)
+        assert after(warm - 0.01, [0, 0], [0, 0], [10.0, 0]) == 0.0 and after(0.02, [0, 0], [0, 0], [10.0, 0]) == pytest.approx(1.5)
+        cool = 0.8 * math.log(1.5 / 0.8)
+        assert after(cool - 0.02, [0, 0], [0, 0], [1e-6, 0]) > 0.0 and after(0.06, [0, 0], [0, 0], [1e-6, 0]) == 0.0
+    elif law == "reflex_twitch":
+        assert after(1.0, [0, 0], [0.4, 0]) == 0.0 and after(0.081, [0, 0], [0.5, 0]) == pytest.approx(0.0)
+        assert after(0.12, [0, 0], [0.5, 0]) == pytest.approx(1.5) and after(3.0, [0, 0], [0.5, 0]) == pytest.approx(0.0, abs=1e-6)
+    else:
+        assert after(0.1, [0.2, 0.1], [0, 0]) == 0.0 and after(0.1, [0.2, 0.3], [0, 0]) == 0.0
+        assert after(0.3, [0.2, 0.6], [0, 0]) == pytest.approx(math.cos(0.5)) and after(0.1, [0.2, 0.1], [0, 0]) == pytest.approx(1.0)
+
+
 def test_keys_are_matched_by_their_parts(blind):
     match = lambda wanted: blind.matches("leg/stribeck/2", wanted)  # noqa: E731
     assert all(map(match, ("leg", "stribeck", "leg/stribeck", "leg/stribeck/2", "/stribeck", "leg//2")))
@@ -219,7 +259,7 @@ def test_keys_are_matched_by_their_parts(blind):
 
 
 def test_a_killed_run_ends_in_the_same_journal(blind, tmp_path, monkeypatch):
-    keys = [c.key for c in blind.cases(3)[:4]]
+    keys = [c.key for c in blind.cases(3) if all(h["joint"] != "*" for h in c.hidden)][:4]
     calls = []
 
     def fake(case, keep=None, killed=None):
