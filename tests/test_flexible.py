@@ -1,5 +1,7 @@
 """What a flexible function predicts of a residual: laws that it was never told, and nothing of noise."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.signal import lfilter
@@ -8,7 +10,9 @@ from scipy.stats import binom
 from sysid import blocks
 from sysid.diagnose.select import LEVEL
 from sysid.diagnose.verdict import predictable
-from sysid.flexible import Unknown, unknown
+from sysid.flexible import Agreement, Projection, Unknown, agreement, families, unknown
+from sysid.statement.document import dependences
+from sysid.statement.words import followed, quantity
 
 STEP, N = 0.01, 2500
 RNG = np.random.default_rng(0)
@@ -123,3 +127,63 @@ def test_a_motion_that_stands_has_no_functions():
     law = np.sin(5.0 * KNOWN["q_elbow"])
     found = unknown(still, "elbow", law, np.ones(N, bool), FOLD, np.zeros(N, int), STEP, np.random.default_rng(0))
     assert found.gain.sum() > 0.8 * found.total and np.isfinite(found.told).all()
+
+
+# ---- what blocks of time agree on
+
+
+def projected(values, *, columns=None, length: int = 50) -> Projection:
+    """Nothing, or columns, in the model; a block every `length` rows."""
+    a = np.zeros((N, 1)) if columns is None else columns
+    number = np.arange(N) // length
+    inverse = np.linalg.pinv(a.T @ a)
+    residual = values - a @ (inverse @ (a.T @ values))
+    return Projection(a, inverse, blocks.summed(number, a * residual[:, None]), residual, number)
+
+
+def agreed(values, **model) -> Agreement:
+    asked = families(KNOWN, "elbow", np.zeros(N, int), STEP, np.random.default_rng(0))
+    return agreement(asked, np.ones(N, bool), projected(values, **model), np.random.default_rng(0))
+
+
+def coloured(seed: int, memory: float = 0.04):
+    keep = np.exp(-STEP / memory)
+    return lfilter([np.sqrt(1.0 - keep**2)], [1.0, -keep], np.random.default_rng(seed).normal(size=N))
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_blocks_agree_on_a_law_that_is_smaller_than_the_noise(name):
+    law, variable = LAWS[name]
+    own = law(KNOWN) / np.std(law(KNOWN))
+    own = own - own.mean()
+    found = agreed(own + 2.0 * coloured(3))
+    assert found.chance < 1e-3
+    assert variable is None or variable in found.variables
+    assert found.gain <= 1.3 * np.sum(own**2)  # of the law, not of the noise
+
+
+def test_blocks_agree_on_nothing_in_noise():
+    """As often as the level says, white or coloured, also of noise that neighbouring blocks share."""
+    for memory in (0.001, 0.04, 0.25):
+        chances = [agreed(coloured(seed, memory), length=100).chance for seed in range(20)]
+        assert sum(c < 0.05 for c in chances) <= binom.ppf(1.0 - 1e-3, 20, 0.05), (memory, chances)
+
+
+def test_what_the_model_holds_is_nothing_that_blocks_agree_on():
+    """A column of the model's, whatever its size, is off the residual and off every family."""
+    law = np.column_stack([np.sin(5.0 * KNOWN["q_elbow"]), KNOWN["qd_elbow"]])
+    without = agreed(coloured(5), columns=law)
+    with_it = agreed(coloured(5) + law @ [30.0, 20.0], columns=law)
+    assert with_it.chance == without.chance and with_it.variables == without.variables
+    assert with_it.gain == pytest.approx(without.gain, rel=1e-6)
+
+
+def test_what_blocks_agree_on_is_said_with_its_variables():
+    found = asked(LAWS["a product of two angles"][0])
+    seen = replace(found, chance=0.5, gain=np.zeros(10), shares={}).with_agreement(
+        Agreement(1e-3, "q_elbow and q_shoulder", 0.4 * found.total)
+    )
+    assert predictable(seen, 2) and seen.share == pytest.approx(0.4)
+    (entry,) = dependences(seen)
+    assert entry == {"variable": "q_elbow", "with": "q_shoulder", "share": pytest.approx(0.4)}
+    assert followed(entry, quantity) == "the position of elbow with the position of shoulder"

@@ -220,7 +220,7 @@ def test_dependences_are_sorted_and_say_something():
 
 def test_predictable_is_a_level_and_a_share():
     assert predictable(left(0.3), 2) and not predictable(NOISE, 2) and not predictable(left(0.9 * WORTH), 2)
-    by_chance = replace(left(0.3), chance=0.6 * _UNKNOWN)
+    by_chance = replace(left(0.3), chance=0.3 * _UNKNOWN)  # half of it for each of two questions
     assert predictable(by_chance, 1) and not predictable(by_chance, 2)  # a level for all joints together
     assert predictable(replace(NOISE, tone=2.0 * WORTH), 2) and not predictable(replace(NOISE, tone=0.9 * WORTH), 2)
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from ..estimate import Fit
-from ..flexible import Unknown
+from ..flexible import Agreement, Unknown
 from ..transfer import Transfer
 from .claims import Claim
 from .select import WORTH
@@ -46,6 +46,7 @@ def verdicts(
     refused: Sequence = (),
     carried: Sequence[Transfer] = (),
     weighed: dict[str, float] | None = None,
+    agreed: Callable[[int], Agreement] | None = None,
 ) -> list[Verdict]:
     """The verdict on every joint.
 
@@ -53,9 +54,11 @@ def verdicts(
         fit: of the experiment as it is. left: what functions of the motion predict with all claims
             in the model. floors: noise floor of each joint. carried: whether the model with all
             claims carries over, of each joint. weighed: {joint: RMS that it leaves where each joint
-            counts by its noise}.
+            counts by its noise}. agreed: what blocks of time agree on of a joint, asked where its
+            error is not at its floor and `left` says nothing.
     """
     last = claims[-1].after if claims else fit
+    reaches = [_reached(last, joint, floors[j]) for j, joint in enumerate(fit.joints)]
     out = []
     for j, joint in enumerate(fit.joints):
         takes = [c.head.joint == joint or c.step.shares[j] >= WORTH for c in claims]
@@ -67,12 +70,11 @@ def verdicts(
         first, then, floor = fit.rms("test")[joint], last.rms("test")[joint], floors[j].rms
         misfit = first**2 - (floor if floor is not None else then) ** 2
         explained = (first**2 - then**2) / misfit if misfit > 0 and claims else float("nan")
-        remains = left[j] if predictable(left[j], len(fit.joints)) else None
-        reached = (
-            floor is not None
-            and max(then, last.rms("train")[joint]) <= (1.0 + _FLOOR) * floor + 2.0 * floors[j].std
-        )
-        reached = reached and first > 0.0 and not _above(remains, then, floor)
+        seen, asked = left[j], len(left) if reaches[j] else reaches.count(False)
+        if agreed and not reaches[j] and then > 0.0 and not predictable(seen, asked):
+            seen = seen.with_agreement(agreed(j))
+        remains = seen if predictable(seen, asked) else None
+        reached = reaches[j] and first > 0.0 and not _above(remains, then, floor)
         at_floor = floor is not None and first <= (1.0 + _FLOOR) * floor + 2.0 * floors[j].std
         taken = sum(c.step.shares[j] for c in own)
         # most of what stands above the floor may be how the fit weighs its joints
@@ -95,9 +97,16 @@ def verdicts(
     return [replace(one, carries=said.get(one.joint, "")) for one in out]
 
 
+def _reached(fit: Fit, joint: str, floor) -> bool:
+    """Whether a joint's error, on either logs, is at its noise floor."""
+    error = max(fit.rms("test")[joint], fit.rms("train")[joint])
+    return floor.rms is not None and error <= (1.0 + _FLOOR) * floor.rms + 2.0 * floor.std
+
+
 def predictable(found: Unknown, joints: int) -> bool:
-    """Whether functions of the motion predict a part worth having of what is left."""
-    functions = found.chance < _UNKNOWN / joints and found.gain.sum() > WORTH * found.total
+    """Whether functions of the motion predict a part worth having of what is left. Two questions
+    may be asked of each of `joints`, those above their floors: each has half of the level."""
+    functions = found.chance < 0.5 * _UNKNOWN / joints and found.predicted > WORTH
     return bool(functions or found.tone > WORTH)
 
 

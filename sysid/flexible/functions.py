@@ -49,6 +49,34 @@ def groups(
     return out
 
 
+def families(
+    known: dict[str, np.ndarray], joint: str, piece, step: float, rng
+) -> dict[str, np.ndarray]:
+    """Small families of functions (n, k), by the variables that they are of: splines of each
+    variable with and without the direction of motion, these times speed and acceleration, waves of
+    two variables, and the past.
+
+    Args:
+        known, piece: as of `groups`.
+    """
+    speed, push = known[f"qd_{joint}"], known[f"qdd_{joint}"]
+    direction = np.sign(speed)[:, None]
+    parts = {name: _splines(name, values) for name, values in known.items()}
+    out = {name: np.concatenate([own, direction * own], axis=1) for name, own in parts.items()}
+    for name, own in parts.items():
+        if name.startswith("q_") or name in (f"qdd_{joint}", f"load_{joint}"):
+            out[f"qd_{joint} and {name}"] = speed[:, None] * own
+        if name.startswith("q_"):
+            out[f"qdd_{joint} and {name}"] = push[:, None] * own
+    out[f"qd_{joint} and its past"] = _remembered(speed, direction[:, 0], piece, step)
+    others = [name for name in known if name != "time" and not name.startswith("load")]
+    for own in (f"q_{joint}", f"qd_{joint}"):
+        for name in others:
+            if name != own:
+                out[f"{own} and {name}, waves"] = _cosines(known, own, name, 2 * _WAVES, rng)
+    return out
+
+
 def _splines(name: str, values: np.ndarray) -> np.ndarray:
     """Linear splines (n, knots) of one variable, knots where its values are; of a speed also its
     sign, size and slow ranges."""
@@ -92,12 +120,14 @@ def _waves(known: dict, own: str, rng: np.random.Generator) -> np.ndarray:
     ]
     out = []
     for first, second in pairs:
-        x = np.stack([known[first], known[second]], axis=1)
-        x = (x - x.mean(0)) / np.maximum(x.std(0), 1e-12)
-        w, phase = (
-            rng.normal(size=(2, _WAVES)) * rng.choice([0.7, 1.5, 3.0], _WAVES),
-            rng.uniform(0.0, 2.0 * np.pi, _WAVES),
-        )
-        waves = np.cos(x @ w + phase)
+        waves = _cosines(known, first, second, _WAVES, rng)
         out += [waves, waves[:, ::2] * np.sign(known[f"qd_{own}"])[:, None]]
     return np.concatenate(out, axis=1)
+
+
+def _cosines(known: dict, first: str, second: str, count: int, rng) -> np.ndarray:
+    """Random cosines (n, count) of two variables, from slow to fast over their ranges."""
+    x = np.stack([known[first], known[second]], axis=1)
+    x = (x - x.mean(0)) / np.maximum(x.std(0), 1e-12)
+    w = rng.normal(size=(2, count)) * rng.choice([0.7, 1.5, 3.0], count)
+    return np.cos(x @ w + rng.uniform(0.0, 2.0 * np.pi, count))

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from .. import blocks
+from .agreement import Agreement
 from .functions import groups
 from .ridge import predicted, stretches
 
@@ -19,7 +20,8 @@ class Unknown:
     told (n,) the torque that it predicts of folds that it was not fitted on, weighted; shares
     {variable: share of the squared residual that functions of it alone, and of the direction of
     motion, predict}; total: the squared residual; chance: the probability of predictions as good as
-    these, were nothing there; tone: the share of a steady tone, zero where there is none."""
+    these, were nothing there; tone: the share of a steady tone, zero where there is none; agreed:
+    the share that one family of functions predicts, where blocks were asked what they agree on."""
 
     gain: np.ndarray
     told: np.ndarray
@@ -27,12 +29,24 @@ class Unknown:
     total: float
     chance: float = 1.0
     tone: float = 0.0
+    agreed: float = 0.0
+
+    @property
+    def predicted(self) -> float:
+        """Of the squared residual, what functions of the motion predict."""
+        return max(float(self.gain.sum() / self.total), self.agreed)
 
     @property
     def share(self) -> float:
         """Of the squared residual: what functions of the motion predict, or a tone holds, whichever
         is more."""
-        return max(float(self.gain.sum() / self.total), self.tone)
+        return max(self.predicted, self.tone)
+
+    def with_agreement(self, found: Agreement) -> Unknown:
+        """This and what blocks agree on; the chance is the smaller one of the two."""
+        share = min(found.gain / self.total, 1.0)
+        shares = self.shares | {found.variables: max(share, self.shares.get(found.variables, 0.0))}
+        return replace(self, chance=min(self.chance, found.chance), shares=shares, agreed=share)
 
 
 def unknown(

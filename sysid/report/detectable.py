@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from ..estimate import Fit
 from ..statement.tables import size
+from ..statement.words import followed
 from .section import Section
 from .verdict import left_words
 from .words import SPACE, percentage, quantity, unit_of
@@ -54,7 +55,8 @@ def _followed(fit: Fit, document: dict) -> list[dict]:
             "joint": found["joint"],
             "words": left_words(found, fit),
             "shares": [
-                (quantity(d["variable"], fit), percentage(d["share"])) for d in found["depends_on"]
+                (followed(d, lambda v: quantity(v, fit)), percentage(d["share"]))
+                for d in found["depends_on"]
             ],
         }
         for found in document["verdict"]

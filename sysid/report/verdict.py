@@ -7,7 +7,8 @@ import math
 from ..diagnose.diagnosis import Diagnosis
 from ..effect import describe
 from ..estimate import Fit, given_shapes, said_of_shapes
-from ..statement.text import designs, percent
+from ..statement.text import designs
+from ..statement.words import followed, percent
 from .section import Section
 from .words import (
     SPACE,
@@ -159,7 +160,7 @@ def left_words(found: dict, fit: Fit) -> str:
     if "depends_on" not in found:
         return ""
     alone = [
-        f"{_named(d['variable'], fit)} alone {percentage(d['share'])}"
+        f"{followed(d, lambda v: _named(v, fit))} {percentage(d['share'])}"
         for d in found["depends_on"][:3]
         if d["variable"] != "several variables together"
     ]

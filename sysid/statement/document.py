@@ -182,7 +182,11 @@ def dependences(found: Unknown) -> list[dict]:
     alone = sorted(
         ((share, name) for name, share in found.shares.items() if share > 0.02), reverse=True
     )
-    out = [{"variable": name, "share": float(share)} for share, name in alone[:4]]
+    out = [
+        {"variable": name, **({"with": other} if other else {}), "share": float(share)}
+        for share, words in alone[:4]
+        for name, _, other in [words.partition(" and ")]
+    ]
     return out or [{"variable": "several variables together", "share": found.share}]
 
 

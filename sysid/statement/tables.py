@@ -8,7 +8,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ..events import WORDS
-from .text import Told, listed, percent, wrapped
+from .text import Told
+from .words import listed, percent, wrapped
 
 _EVENTS = 20  # lines; the rest is counted
 

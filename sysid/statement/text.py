@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import re
 import shlex
-import textwrap
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
+
+from .words import followed, listed, percent, placed, quantity, valued, wrapped
 
 if TYPE_CHECKING:
     from ..diagnose.diagnosis import Diagnosis
@@ -140,60 +139,8 @@ def _left(v: dict) -> str:
     """What of the rest of a joint's error the motion predicts."""
     whole = f"the motion predicts {percent(v['share_left'])} of what is left"
     alone = [
-        f"{quantity(d['variable'])} alone {percent(d['share'])}"
+        f"{followed(d, quantity)} {percent(d['share'])}"
         for d in v["depends_on"][:3]
         if d["variable"] != _TOGETHER
     ]
     return whole + (f" ({', '.join(alone)})" if alone else "")
-
-
-def quantity(variable: str) -> str:
-    """A variable of the motion in words."""
-    kind, _, joint = variable.partition("_")
-    word = {"q": "position", "qd": "speed", "qdd": "acceleration", "load": "load"}.get(kind)
-    return f"the {word} of {joint}" if word and joint else variable
-
-
-def valued(name: str, p: dict) -> str:
-    """A parameter {value, std, unit} with its deviation and its unit, where it has these."""
-    std = "" if p["std"] is None else f" +- {p['std']:.2g}"
-    unit = "" if p["unit"] in ("", "1") else f" {p['unit']}"
-    return f"{name} = {p['value']:.4g}{std}{unit}"
-
-
-def placed(effect: str, joint: str, here: str = "") -> str:
-    """An effect with its joint, where that is not `here`."""
-    return (
-        effect
-        if joint == here
-        else f"{effect} of the whole robot"
-        if joint == "*"
-        else f"{effect} on {joint}"
-    )
-
-
-def listed(words: Sequence[str], last: str) -> str:
-    """Words as 'a, b or c'."""
-    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} {last} {words[-1]}"
-
-
-def percent(share: float) -> str:
-    """A share or a probability; little is not said to be nothing, nor nearly all to be all."""
-    return (
-        "less than 1 %"
-        if share < 0.005
-        else f"{100 if share > 0.9999 else min(round(100 * share), 99)} %"
-    )
-
-
-def wrapped(words: str, width: int, indent: str) -> list[str]:
-    """Lines of at most `width`; no word is broken, and no number stands away from its unit."""
-    tied = re.sub(r"(?<=\d) (?=%|N\b|s\b|rad|Hz)|(?<=N) (?=m\b)", "\u00a0", words)
-    lines = textwrap.wrap(
-        tied,
-        max(width, 40),
-        subsequent_indent=indent,
-        break_long_words=False,
-        break_on_hyphens=False,
-    )
-    return [line.replace("\u00a0", " ") for line in lines]
