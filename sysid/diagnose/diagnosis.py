@@ -90,8 +90,8 @@ def diagnose(
         x = after.settled.x + after.design.change[: after.model.size]
         parts = measured.train, measured.test
         found, weighed = floors_of_fit(experiment, last, after.model, x, parts)
-        asked_last = refused, transfers(last), weighed, after.agreement
-        said = verdicts(fit, claims, after.unknown, found, *asked_last)
+        more = refused, transfers(last), weighed, after.agreement
+        said = verdicts(fit, claims, after.unknown, found, *more)
         errors = last.rms("test").values()
         levels = np.array([e if f.rms is None else f.rms for f, e in zip(found, errors)])
         where = failures(first, fit.predictions["test"], levels)

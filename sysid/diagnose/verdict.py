@@ -52,17 +52,18 @@ def verdicts(
 
     Args:
         fit: of the experiment as it is. left: what functions of the motion predict with all claims
-            in the model. floors: noise floor of each joint. carried: whether the model with all
-            claims carries over, of each joint. weighed: {joint: RMS that it leaves where each joint
-            counts by its noise}. agreed: what blocks of time agree on of a joint, asked where its
-            error is not at its floor and `left` says nothing.
+            in the model. floors: of each joint's noise. carried: whether the model with all claims
+            carries over, of each joint. weighed: {joint: RMS where each counts by its noise}.
+            agreed: what blocks of time agree on of a joint, asked where `left` says nothing.
     """
     last = claims[-1].after if claims else fit
-    reaches = [_reached(last, joint, floors[j]) for j, joint in enumerate(fit.joints)]
+    errors = last.rms("train"), last.rms("test")
+    reaches = [_at(f, max(e[j] for e in errors)) for f, j in zip(floors, fit.joints)]
+    evens = [_even(last, joint, floors[j].rms, weighed or {}) for j, joint in enumerate(fit.joints)]
+    asked = [not at and not even for at, even in zip(reaches, evens)]
     out = []
     for j, joint in enumerate(fit.joints):
-        takes = [c.head.joint == joint or c.step.shares[j] >= WORTH for c in claims]
-        taking = [c for c, it in zip(claims, takes) if it]
+        taking = [c for c in claims if c.head.joint == joint or c.step.shares[j] >= WORTH]
         # what does not lower the joint's error on the test logs is no name for it
         falls = last.rms("test")[joint] < fit.rms("test")[joint]
         own = tuple(c for c in taking if c.head.joint in (joint, "*") and falls)
@@ -70,24 +71,20 @@ def verdicts(
         first, then, floor = fit.rms("test")[joint], last.rms("test")[joint], floors[j].rms
         misfit = first**2 - (floor if floor is not None else then) ** 2
         explained = (first**2 - then**2) / misfit if misfit > 0 and claims else float("nan")
-        seen, asked = left[j], len(left) if reaches[j] else reaches.count(False)
-        if agreed and not reaches[j] and then > 0.0 and not predictable(seen, asked):
+        seen, among = left[j], sum(asked) if asked[j] else len(left)
+        if agreed and asked[j] and then > 0.0 and not predictable(seen, among):
             seen = seen.with_agreement(agreed(j))
-        remains = seen if predictable(seen, asked) else None
+        remains = seen if predictable(seen, among) else None
         reached = reaches[j] and first > 0.0 and not _above(remains, then, floor)
-        at_floor = floor is not None and first <= (1.0 + _FLOOR) * floor + 2.0 * floors[j].std
         taken = sum(c.step.shares[j] for c in own)
-        # most of what stands above the floor may be how the fit weighs its joints
-        above = then**2 - floor**2 if floor is not None and fit.weights is None else float("inf")
-        even = then**2 - (weighed or {}).get(joint, then) ** 2 > _MOST * abs(above)
         if own and (remains is None or remains.share * max(1.0 - taken, 0.0) <= _MOST * taken):
             told = ("missing", own, explained, remains)
-        elif own or (remains is not None and not reached and not even):
+        elif own or (remains is not None and not reached and not evens[j]):
             told = ("unknown", own or others, explained, remains)
         elif not reached:
-            why = _why(fit, j, floors[j], then, last, refused, weighed[joint] if even else None)
+            why = _why(fit, j, floors[j], then, last, refused, weighed[joint] if evens[j] else None)
             told = ("unresolved", others, explained, remains, why)
-        elif at_floor or not claims:
+        elif _at(floors[j], first) or not claims:
             told = ("complete",)
         else:
             most = max(claims, key=lambda c, j=j: c.step.shares[j])
@@ -97,10 +94,17 @@ def verdicts(
     return [replace(one, carries=said.get(one.joint, "")) for one in out]
 
 
-def _reached(fit: Fit, joint: str, floor) -> bool:
-    """Whether a joint's error, on either logs, is at its noise floor."""
-    error = max(fit.rms("test")[joint], fit.rms("train")[joint])
+def _at(floor, error: float) -> bool:
+    """Whether an error is at a noise floor."""
     return floor.rms is not None and error <= (1.0 + _FLOOR) * floor.rms + 2.0 * floor.std
+
+
+def _even(fit: Fit, joint: str, floor: float | None, weighed: dict[str, float]) -> bool:
+    """Whether most of what stands above a joint's floor is how the fit weighs its joints."""
+    if floor is None or fit.weights is not None:
+        return False
+    square = fit.rms("test")[joint] ** 2
+    return square - weighed.get(joint, square**0.5) ** 2 > _MOST * abs(square - floor**2)
 
 
 def predictable(found: Unknown, joints: int) -> bool:
@@ -132,7 +136,7 @@ def _why(fit: Fit, j: int, floor, error: float, last: Fit, refused, weighed: flo
             "noise count as much as quiet ones in this fit; with solver.weighting: noise it would "
             f"be {weighed / floor.rms:.2g} times"
         )
-    elif train <= (1.0 + _FLOOR) * floor.rms + 2.0 * floor.std:
+    elif _at(floor, train):
         said = (
             "the training logs are explained and the test logs are not: the model does not carry "
             "over to them"
