@@ -240,4 +240,4 @@ class Bench:
     def report(self, sha: str) -> str:
         """The report as `sysid report` writes it."""
         view = self.view(sha)
-        return report.page(self.desk.name, sections(view.fit, view.diagnosis, view.said, self.desk.history()))
+        return report.page(self.desk.name, sections(view.fit, view.said, self.desk.history()))

@@ -25,7 +25,7 @@ class View:
         self.sha, self.fit, self.diagnosis = sha, fit, diagnosis
         self.said = document(diagnosis, run)
         self.looks, self.workspace = Looks(diagnosis), Workspace(fit)
-        made = sections(fit, diagnosis, self.said, [])
+        made = sections(fit, self.said, [])
         self._html = {name: {"title": section["title"], "html": section["html"]} for name, section in made.items() if name != "steps"}
         self._charts = {chart["id"]: dumped(chart) for section in made.values() for chart in section["charts"]}
 
@@ -41,7 +41,7 @@ class View:
 
     def page(self, history: list[dict]) -> dict:
         """What the page needs to show itself, but for the charts."""
-        made = steps(self.fit, self.diagnosis, self.said, history)
+        made = steps(self.fit, self.said, history)
         self._charts |= {chart["id"]: dumped(chart) for chart in made.charts}
         joints, unit = self.fit.joints, units(self.fit)
         offered = [{"finding": k, "step": step, "effect": self.said["findings"][k]["effect"], "joint": self.said["findings"][k]["joint"]} for step, k in self.offered()]
