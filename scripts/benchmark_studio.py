@@ -26,8 +26,8 @@ import polars as pl
 from sysid import candidates, regressor, robot, specs
 from sysid.diagnose import ask, diagnosis
 from sysid.studio.app import application
-from sysid.studio.bench import Bench
 from sysid.studio.serve import responsive
+from sysid.studio.session import Session
 
 LIMIT, PORT, CSRF = 0.3, 8765, "benchmark"
 URDF = "example-robot-data://ur_description/urdf/ur5_robot.urdf"
@@ -59,8 +59,8 @@ def written(folder: Path, samples: int) -> Path:
 class Clicks:
     """Requests to the application, each timed."""
 
-    def __init__(self, bench: Bench):
-        self.app = application(bench, port=PORT, csrf=CSRF)
+    def __init__(self, session: Session):
+        self.app = application(session, port=PORT, csrf=CSRF)
         self.loop = asyncio.new_event_loop()
         self.client = httpx.AsyncClient(transport=httpx.ASGITransport(self.app), base_url=f"http://127.0.0.1:{PORT}", timeout=None, headers={"x-sysid-csrf": CSRF})
 
@@ -101,12 +101,12 @@ def main() -> int:
         start = time.perf_counter()
         path = written(Path(folder), given.samples)
         print(f"{given.samples} samples of 6 joints written in {time.perf_counter() - start:.1f} s", flush=True)
-        bench = Bench(path, Path(folder) / "run")
-        clicks = Clicks(bench)
+        session = Session(path, Path(folder) / "run")
+        clicks = Clicks(session)
         start = time.perf_counter()
         clicks.ask("/api/run", {})
         during = []
-        while bench.worker.job.state == "running":
+        while session.worker.job.state == "running":
             during.append(clicks.ask("/api/state")[1])
             time.sleep(0.25)
         first = clicks.settle()["sha"]
@@ -114,7 +114,7 @@ def main() -> int:
         start = time.perf_counter()
         second = clicks.ask("/api/add", {"sha": first, "finding": 0})[0].json()["sha"]
         previewed = []
-        while bench.worker.job.state == "running":
+        while session.worker.job.state == "running":
             during.append(clicks.ask("/api/state")[1])
             previewed.append(clicks.ask(f"/api/residual?sha={first}&joint=1&finding=0")[1])
             time.sleep(0.25)

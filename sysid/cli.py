@@ -336,7 +336,7 @@ def studio(
     """The report's page alive in the browser: look, add, refit, undo. The experiment file stays the truth."""
     from . import config, own_effects
     from .studio.serve import serve
-    from .studio.shelf import beside
+    from .studio.experiments import beside
     from .trusted import Untrusted
 
     def ready(address: str) -> None:

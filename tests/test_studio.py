@@ -22,14 +22,14 @@ from sysid.diagnose.diagnosis import diagnose
 from sysid.effect import vocabulary
 from sysid.errors import SysidError
 from sysid.failures import HeldOut
-from sysid.studio import desk, guard, page, views
+from sysid.studio import cache, history, page, security
 from sysid.studio.app import application
-from sysid.studio.bench import Bench
-from sysid.studio.desk import Desk, hashed
+from sysid.studio.diagnosed import Diagnosed
+from sysid.studio.experiments import Experiments, beside
+from sysid.studio.history import History, hashed
+from sysid.studio.jobs import Cancelled, Job, Worker
 from sysid.studio.serve import serve
-from sysid.studio.shelf import Shelf, beside
-from sysid.studio.view import View
-from sysid.studio.work import Cancelled, Job, Worker
+from sysid.studio.session import Session
 from tests.test_report import EVIL, Elements, parse_errors, written
 
 PORT, CSRF = 8765, "of-this-start"
@@ -56,22 +56,22 @@ def arm(tmp_path_factory):
     folder = rippled(tmp_path_factory.mktemp("studio") / "arm")
     experiment = loop.pipeline.load(folder)
     found = diagnose(experiment)
-    return folder, View(hashed((folder / "config.yaml").read_text()), found.fit, found)
+    return folder, Diagnosed(hashed((folder / "config.yaml").read_text()), found.fit, found)
 
 
-def told(bench, job, text, view):
+def told(session, job, text, view):
     """What a job finds, from a diagnosis made before."""
     own = copy.copy(view)
-    own.sha, own._charts, own.fit = hashed(text), dict(view._charts), replace(view.fit, experiment=bench.desk.experiment(text))
+    own.sha, own._charts, own.fit = hashed(text), dict(view._charts), replace(view.fit, experiment=session.history.experiment(text))
     job.tell("compress", 0.5)
-    bench.keep(views.key(hashed(text), bench.desk.experiment(text)), text, own)
+    session.keep(cache.key(hashed(text), session.history.experiment(text)), text, own)
 
 
 @pytest.fixture
 def opened(arm, tmp_path, monkeypatch):
-    """A studio on a copy of the folder whose jobs are done at once: (bench, client, post, file)."""
+    """A studio on a copy of the folder whose jobs are done at once: (session, client, post, file)."""
     folder = shutil.copytree(arm[0], tmp_path / "arm")
-    monkeypatch.setattr(Bench, "_work", lambda self, job, text: told(self, job, text, arm[1]))
+    monkeypatch.setattr(Session, "_work", lambda self, job, text: told(self, job, text, arm[1]))
     return studio(folder, tmp_path / "run")
 
 
@@ -99,9 +99,9 @@ class TestClient:
 class studio:
     def __init__(self, folder, run, **more):
         self.file, self.run = folder / "config.yaml", run
-        self.bench = Bench(folder, run)
-        self.client = TestClient(application(self.bench, port=PORT, csrf=CSRF, **more), base_url=HOME)
-        self.bench.run()
+        self.session = Session(folder, run)
+        self.client = TestClient(application(self.session, port=PORT, csrf=CSRF, **more), base_url=HOME)
+        self.session.run()
         self.wait()
 
     def get(self, path, **words):
@@ -158,10 +158,10 @@ def test_all_steps_that_are_named_are_one_change(arm, tmp_path):
     before = (folder / "config.yaml").read_bytes()
     own = studio(folder, tmp_path / "run")
     state = own.wait()
-    view = own.bench.view(state["sha"])
+    view = own.session.diagnosed(state["sha"])
     named = [view.diagnosis.findings[k].effect for _, k in view.offered()]
     added = own.post("/api/add", sha=state["sha"], steps=True).json()
-    model = own.bench.desk.experiment(own.file.read_text()).model
+    model = own.session.history.experiment(own.file.read_text()).model
     assert named and set(named) <= {e.name for e in model.effects} and added["undo"] == ", ".join(named)
     state = own.post("/api/undo", sha=added["sha"]).json()
     assert own.file.read_bytes() == before and own.wait()
@@ -173,16 +173,16 @@ def test_all_steps_that_are_named_are_one_change(arm, tmp_path):
 def test_charts_are_answered_before_the_diagnosis(arm, tmp_path, monkeypatch):
     """A fit can be looked at from all sides while its diagnosis is at work."""
     begun, go_on = threading.Event(), threading.Event()
-    from sysid.studio import bench
+    from sysid.studio import session
 
     def waiting(*args, **more):
         begun.set()
         assert go_on.wait(60.0)
         return diagnose(*args, **more)
 
-    monkeypatch.setattr(bench, "diagnose", waiting)
+    monkeypatch.setattr(session, "diagnose", waiting)
     folder = shutil.copytree(arm[0], tmp_path / "arm")
-    client_of = Bench(folder, tmp_path / "run")
+    client_of = Session(folder, tmp_path / "run")
     client = TestClient(application(client_of, port=PORT, csrf=CSRF), base_url=HOME)
     client_of.run()
     assert begun.wait(60.0)
@@ -282,7 +282,7 @@ def test_many_tabs_at_once_make_one_change(opened):
         thread.join()
     assert sorted(answers) == [200] + [409] * 5
     assert opened.file.read_text().count("sin(") == 1
-    opened.bench.desk.experiment(opened.file.read_text())
+    opened.session.history.experiment(opened.file.read_text())
 
 
 # ---- what is refused, with the file as it was
@@ -306,7 +306,7 @@ def test_bad_additions_say_so_in_one_line(opened, body, words):
 
 def test_a_formula_goes_into_the_file(opened):
     opened.post("/api/add", sha=opened.sha, formula="a*sin(3*q)", joint="elbow")
-    (entry,) = [e for e in opened.bench.desk.experiment(opened.file.read_text()).model.effects if e.name == "formula"]
+    (entry,) = [e for e in opened.session.history.experiment(opened.file.read_text()).model.effects if e.name == "formula"]
     assert entry.options["formula"] == "a*sin(3*q)" and entry.joints == ["elbow"]
     assert opened.wait()["undo"] == "a*sin(3*q) on elbow"
 
@@ -318,7 +318,7 @@ def test_an_effect_that_is_no_suspect_goes_into_the_file(opened):
     opened.wait()
     opened.post("/api/add", sha=opened.sha, effect="gravity_tilt", joint=None)
     opened.wait()
-    *_, drag, tilt = opened.bench.desk.experiment(opened.file.read_text()).model.effects
+    *_, drag, tilt = opened.session.history.experiment(opened.file.read_text()).model.effects
     assert (drag.name, drag.joints) == ("quadratic_drag", ["elbow"]) and (tilt.name, tilt.joints) == ("gravity_tilt", None)
     said = opened.post("/api/add", sha=opened.sha, effect="quadratic_drag", joint="elbow").json()["error"]
     assert said.startswith("quadratic_drag is in the model already on elbow") and "config.yaml" not in said
@@ -326,7 +326,7 @@ def test_an_effect_that_is_no_suspect_goes_into_the_file(opened):
 
 def test_the_state_is_answered_while_an_addition_is_checked(opened, monkeypatch):
     built, checked = threading.Event(), threading.Event()
-    monkeypatch.setattr(desk.pipeline, "build", lambda experiment: (checked.set(), built.wait(10)))
+    monkeypatch.setattr(history.pipeline, "build", lambda experiment: (checked.set(), built.wait(10)))
     sha = opened.sha
     thread = threading.Thread(target=lambda: opened.post("/api/add", sha=sha, effect="armature", joint="elbow"))
     thread.start()
@@ -340,14 +340,14 @@ def test_the_state_is_answered_while_an_addition_is_checked(opened, monkeypatch)
 
 def test_while_it_works_the_state_needs_no_file_and_yet_hears_of_edits(opened, monkeypatch):
     go = threading.Event()
-    monkeypatch.setattr(Bench, "_work", lambda self, job, text: (job.tell("compress", 0.5), go.wait(20)))
+    monkeypatch.setattr(Session, "_work", lambda self, job, text: (job.tell("compress", 0.5), go.wait(20)))
     sha = opened.post("/api/add", sha=opened.sha, effect="armature", joint="elbow").json()["sha"]
-    reads, read = [], desk.Desk.text
-    monkeypatch.setattr(desk.Desk, "text", lambda self: (reads.append(threading.current_thread()), read(self))[1])
+    reads, read = [], history.History.text
+    monkeypatch.setattr(history.History, "text", lambda self: (reads.append(threading.current_thread()), read(self))[1])
     waiting = []
-    found = opened.bench.glance(waiting.append)
+    found = opened.session.glance(waiting.append)
     assert found["sha"] == sha and found["job"]["state"] == "running" and not reads and len(waiting) == 1
-    assert opened.bench.glance(waiting.append) == found and len(waiting) == 1  # one look at a time
+    assert opened.session.glance(waiting.append) == found and len(waiting) == 1  # one look at a time
     waiting[0]()
     opened.file.write_text(opened.file.read_text() + "# by hand\n")
     end = time.monotonic() + 10
@@ -360,12 +360,12 @@ def test_while_it_works_the_state_needs_no_file_and_yet_hears_of_edits(opened, m
 
 def test_a_job_that_ends_while_it_is_asked_for_is_not_done_with_nothing_ready(opened, monkeypatch):
     go = threading.Event()
-    monkeypatch.setattr(Bench, "_work", lambda self, job, text: (job.tell("compress", 0.5), go.wait(20)))
+    monkeypatch.setattr(Session, "_work", lambda self, job, text: (job.tell("compress", 0.5), go.wait(20)))
     opened.post("/api/add", sha=opened.sha, effect="armature", joint="elbow")
-    assert opened.bench.glance(lambda look: None)["job"]["state"] == "running"
+    assert opened.session.glance(lambda look: None)["job"]["state"] == "running"
     said = Job.document
     monkeypatch.setattr(Job, "document", lambda self: (setattr(self, "state", "done"), said(self))[1])
-    assert opened.bench.glance(lambda look: None) is None
+    assert opened.session.glance(lambda look: None) is None
     go.set()
 
 
@@ -373,35 +373,35 @@ def test_a_job_that_ends_while_it_is_asked_for_is_not_done_with_nothing_ready(op
 
 
 @pytest.fixture
-def shelf(arm, tmp_path, monkeypatch):
+def experiments(arm, tmp_path, monkeypatch):
     """Two folders with the same experiment file and one file beside them, and requests to the studio on all."""
     for name in ("one", "two"):
         shutil.copytree(arm[0], tmp_path / "all" / name)
     (tmp_path / "all" / "lone.yml").write_text((arm[0] / "config.yaml").read_text())
     (tmp_path / "all" / "notes.yaml").write_text("shopping: [milk]\n")
-    monkeypatch.setattr(Bench, "_work", lambda self, job, text: told(self, job, text, arm[1]))
-    own = Shelf(beside(tmp_path / "all" / "config.yaml"), tmp_path / "run")
+    monkeypatch.setattr(Session, "_work", lambda self, job, text: told(self, job, text, arm[1]))
+    own = Experiments(beside(tmp_path / "all" / "config.yaml"), tmp_path / "run")
     own.folder, own.client = tmp_path / "all", TestClient(application(own, port=PORT, csrf=CSRF))
     return own
 
 
-def test_a_folder_offers_its_experiments(shelf):
-    assert shelf.names == ["lone", "one", "two"]
-    for number, name in enumerate(shelf.names):
-        shown = shelf.client.get(f"/{number}/").text
+def test_a_folder_offers_its_experiments(experiments):
+    assert experiments.names == ["lone", "one", "two"]
+    for number, name in enumerate(experiments.names):
+        shown = experiments.client.get(f"/{number}/").text
         assert f"<h1>{name}</h1>" in shown and [a["href"] for tag, a in Elements(shown).found if tag == "a" and a.get("href", "").endswith("/")] == ["/0/", "/1/", "/2/"]
-        assert shelf.client.get(f"/{number}/api/state").json()["name"] == name
-    assert shelf.client.get("/api/state").json()["name"] == "lone" and shelf.client.get("/2").status_code == 200
+        assert experiments.client.get(f"/{number}/api/state").json()["name"] == name
+    assert experiments.client.get("/api/state").json()["name"] == "lone" and experiments.client.get("/2").status_code == 200
     for path in ("/3/", "/-1/", "/99999999999999999999/api/state", "/one/", "/../notes.yaml", "/1/../../notes.yaml"):
-        assert shelf.client.get(path).status_code == 404, path
-    assert beside(shelf.folder / "one" / "config.yaml") == [shelf.folder / "one" / "config.yaml"]
-    assert beside(shelf.folder / "lone.yml") == [shelf.folder / "lone.yml"]
-    assert beside(shelf.folder / "nothing.yaml") == [shelf.folder / "nothing.yaml"]
+        assert experiments.client.get(path).status_code == 404, path
+    assert beside(experiments.folder / "one" / "config.yaml") == [experiments.folder / "one" / "config.yaml"]
+    assert beside(experiments.folder / "lone.yml") == [experiments.folder / "lone.yml"]
+    assert beside(experiments.folder / "nothing.yaml") == [experiments.folder / "nothing.yaml"]
 
 
-def test_experiments_with_the_same_text_are_kept_apart(shelf):
-    post = lambda number, act, **body: shelf.client.post(f"/{number}/api/{act}", json=body, headers={"x-sysid-csrf": CSRF}).json()  # noqa: E731
-    state = lambda number: shelf.client.get(f"/{number}/api/state").json()  # noqa: E731
+def test_experiments_with_the_same_text_are_kept_apart(experiments):
+    post = lambda number, act, **body: experiments.client.post(f"/{number}/api/{act}", json=body, headers={"x-sysid-csrf": CSRF}).json()  # noqa: E731
+    state = lambda number: experiments.client.get(f"/{number}/api/state").json()  # noqa: E731
     sha = state(1)["sha"]
     assert state(2)["sha"] == sha
     post(1, "run")
@@ -409,10 +409,10 @@ def test_experiments_with_the_same_text_are_kept_apart(shelf):
     while not state(1)["ready"] and time.monotonic() < end:
         time.sleep(0.02)
     assert state(1)["ready"] and not state(2)["ready"]
-    before = (shelf.folder / "two" / "config.yaml").read_text()
+    before = (experiments.folder / "two" / "config.yaml").read_text()
     post(1, "add", sha=sha, effect="armature", joint="elbow")
-    assert state(1)["undo"] == "armature on elbow" and state(2)["undo"] is None and (shelf.folder / "two" / "config.yaml").read_text() == before
-    assert shelf.bench(1).desk.run != shelf.bench(2).desk.run != shelf.bench(0).desk.run
+    assert state(1)["undo"] == "armature on elbow" and state(2)["undo"] is None and (experiments.folder / "two" / "config.yaml").read_text() == before
+    assert experiments.session(1).history.run != experiments.session(2).history.run != experiments.session(0).history.run
 
 
 def test_an_experiment_of_the_same_name_elsewhere_does_not_undo_into_this_one(opened, arm, tmp_path):
@@ -461,7 +461,7 @@ def test_unknown_things_are_not_found(opened):
 
 def test_preview_is_what_the_suspect_removes(arm):
     _, view = arm
-    looks = view.looks
+    looks = view.residuals
     claims = view.diagnosis.claims
     assert len(view.diagnosis.findings) == sum(len(claim.findings) for claim in claims) >= 1
     # the first step's head added, the residual is that of the model that it made
@@ -478,7 +478,7 @@ def test_preview_is_what_the_suspect_removes(arm):
 
 
 def test_a_stretch_of_time_names_the_suspect(arm):
-    looks = arm[1].looks
+    looks = arm[1].residuals
     whole = looks.stretch(-1.0, 1e6)
     assert whole["suspects"][0]["effect"] == "cogging" and whole["suspects"][0]["joint"] == EVIL and whole["suspects"][0]["share"] > 0.5
     for entry in whole["joints"]:
@@ -523,8 +523,8 @@ def test_shares_of_a_job_only_rise():
 def test_cancel_keeps_the_page_answering_and_the_file_whole(arm, tmp_path):
     folder = shutil.copytree(arm[0], tmp_path / "arm")
     own = studio.__new__(studio)
-    own.file, own.run, own.bench = folder / "config.yaml", tmp_path / "run", Bench(folder, tmp_path / "run")
-    own.client = TestClient(application(own.bench, port=PORT, csrf=CSRF), base_url=HOME)
+    own.file, own.run, own.session = folder / "config.yaml", tmp_path / "run", Session(folder, tmp_path / "run")
+    own.client = TestClient(application(own.session, port=PORT, csrf=CSRF), base_url=HOME)
     before = own.file.read_bytes()
     assert own.post("/api/run").json()["job"]["state"] == "running"
     own.post("/api/cancel")
@@ -536,7 +536,7 @@ def test_cancel_keeps_the_page_answering_and_the_file_whole(arm, tmp_path):
 
 
 def test_a_mistake_of_ours_ends_the_job_not_the_studio(opened, monkeypatch, capsys):
-    monkeypatch.setattr(Bench, "_work", lambda self, job, text: 1 / 0)
+    monkeypatch.setattr(Session, "_work", lambda self, job, text: 1 / 0)
     opened.post("/api/add", sha=opened.sha, effect="stribeck", joint="elbow")
     state = opened.wait()
     assert state["job"]["state"] == "failed" and "ZeroDivisionError" in state["job"]["error"] and state["undo"]
@@ -585,7 +585,7 @@ def test_changes_need_post_json_and_the_header(opened):
 
 
 def test_a_token_is_asked_of_everyone(opened):
-    app = application(opened.bench, host="192.0.2.7", port=PORT, token="geheim", csrf=CSRF)
+    app = application(opened.session, host="192.0.2.7", port=PORT, token="geheim", csrf=CSRF)
     home = f"http://192.0.2.7:{PORT}"
     for path in ("/", "/?token=wrong", "/api/state", "/studio.js", "/api/state?token=geheim"):
         assert TestClient(app, base_url=home).get(path).status_code == 401, path
@@ -602,14 +602,14 @@ def test_a_token_is_asked_of_everyone(opened):
 @pytest.mark.parametrize("token", [None, "", "with space", "semi;colon", "ümlaut"])
 def test_no_address_is_served_to_others_without_a_token(opened, token):
     with pytest.raises((ValueError, SysidError)):
-        application(opened.bench, host="0.0.0.0", port=PORT, token=token)
+        application(opened.session, host="0.0.0.0", port=PORT, token=token)
     if token is not None:
         with pytest.raises(SysidError, match="token"):
             serve(opened.file, host="127.0.0.1", port=0, token=token, out=opened.run)
 
 
 def test_bound_to_every_address_names_of_others_are_refused(opened):
-    app = application(opened.bench, host="0.0.0.0", port=PORT, token="geheim")
+    app = application(opened.session, host="0.0.0.0", port=PORT, token="geheim")
     auth = {"authorization": "Bearer geheim"}
     for host, status in (("192.0.2.7:8765", 200), ("[2001:db8::1]:8765", 200), (f"{socket.gethostname()}:8765", 200), ("evil.example:8765", 403), ("192.0.2.7:80", 403), ("192.0.2.7", 403)):
         assert TestClient(app).get("/api/state", headers={"host": host, **auth}).status_code == status, host
@@ -621,7 +621,7 @@ def test_every_answer_carries_the_policy(opened):
         policy = answer.headers["content-security-policy"]
         assert "default-src 'none'" in policy and "frame-ancestors 'none'" in policy and "script-src 'self' 'unsafe-eval';" in policy and "http:" not in policy
         assert answer.headers["x-content-type-options"] == "nosniff"
-    assert opened.client.get("/", headers={"host": "evil"}).headers["content-security-policy"] == guard.POLICY
+    assert opened.client.get("/", headers={"host": "evil"}).headers["content-security-policy"] == security.POLICY
 
 
 # ---- names are text
@@ -694,7 +694,7 @@ def test_the_command_serves_until_interrupted(experiment, tmp_path):
     assert process.returncode == 0 and err == "" and out == ""
 
 
-def test_the_desk_refuses_a_run_folder_that_cannot_be(arm, tmp_path):
+def test_the_history_refuses_a_run_folder_that_cannot_be(arm, tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(SysidError):
-        Desk(arm[0], tmp_path / "file" / "run")
+        History(arm[0], tmp_path / "file" / "run")

@@ -28,7 +28,7 @@ def hashed(text: str) -> str:
     return hashlib.sha256(text.encode("utf-8")).hexdigest()
 
 
-class Desk:
+class History:
     """One experiment file with its history. Safe to use from several threads."""
 
     def __init__(self, path: Path, out: Path | None = None):
@@ -77,7 +77,7 @@ class Desk:
             redo = _said(self._items[self._at + 1]) if self._at + 1 < len(self._items) else None
             return undo, redo
 
-    def history(self) -> list[dict]:
+    def steps(self) -> list[dict]:
         """The steps up to the text that stands now, as `sysid history` has them, with those whose error is known."""
         with self._lock:
             out = list(self._before)
@@ -167,7 +167,7 @@ class Desk:
     def _tell(self) -> None:
         """Write the steps for `sysid history`, where this page made any."""
         if any(item["added"] not in (None, _EDIT) for item in self._items):
-            results.write_json(self.run / "history.json", {"steps": [{k: v for k, v in step.items() if k != "sha"} for step in self.history()]})
+            results.write_json(self.run / "history.json", {"steps": [{k: v for k, v in step.items() if k != "sha"} for step in self.steps()]})
 
     def _append(self, text: str, added: str | None, joint: str | None) -> None:
         kept = self._items[: self._at + 1] if self._items else []

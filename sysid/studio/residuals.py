@@ -21,7 +21,7 @@ from ..report.words import units
 _MOST = 3000  # points of a line
 
 
-class Looks:
+class Residuals:
     """A diagnosis, ready to answer."""
 
     def __init__(self, diagnosis: Diagnosis):

@@ -13,24 +13,24 @@ from ..effect import find, vocabulary
 from ..errors import SysidError
 from ..report import page as report
 from ..report.sections import sections
-from .desk import Changed, Desk, hashed
-from .look import compared
-from .view import View, step_name
-from .views import Views, key
-from .work import Job, Worker
+from .cache import Cache, key
+from .diagnosed import Diagnosed, step_name
+from .history import Changed, History, hashed
+from .jobs import Job, Worker
+from .residuals import compared
 from .workspace import Workspace, workspace_page
 
 
-class Bench:
+class Session:
     """What the requests of a page do. Safe to use from several threads.
 
     Args:
-        views, turn: what several experiments share: the memory, and the lock of the one that works.
+        cache, turn: what several experiments share: the memory, and the lock of the one that works.
     """
 
-    def __init__(self, path: Path, out: Path | None = None, *, views: Views | None = None, turn: threading.Lock | None = None):
-        self.desk, self.worker = Desk(path, out), Worker(turn)
-        self._views = views or Views()
+    def __init__(self, path: Path, out: Path | None = None, *, cache: Cache | None = None, turn: threading.Lock | None = None):
+        self.history, self.worker = History(path, out), Worker(turn)
+        self._cache = cache or Cache()
         self._last: dict | None = None
         self._early: tuple[str, Workspace] | None = None  # of a fit that is yet to be diagnosed
         self._looks, self._looking = 0, False
@@ -42,11 +42,11 @@ class Bench:
         self._looks += 1
         look, job = self._looks, self.worker.job
         try:
-            sha, error = self.desk.sync(), None
+            sha, error = self.history.sync(), None
         except SysidError as problem:
             sha, error = None, str(problem)
-        undo, redo = self.desk.labels()
-        found = {"name": self.desk.name, "sha": sha, "error": error, "job": None if job is None else job.document(), "ready": sha is not None and self._find(sha) is not None, "fitted": self._fitted(sha), "undo": undo, "redo": redo}
+        undo, redo = self.history.labels()
+        found = {"name": self.history.name, "sha": sha, "error": error, "job": None if job is None else job.document(), "ready": sha is not None and self._find(sha) is not None, "fitted": self._fitted(sha), "undo": undo, "redo": redo}
         if look == self._looks:  # none that began later, after a change perhaps
             self._last = found
         return found
@@ -78,7 +78,7 @@ class Bench:
         finally:
             self._looking = False
 
-    def view(self, sha: str) -> View:
+    def diagnosed(self, sha: str) -> Diagnosed:
         """What was found under the text with a hash. Raises SysidError where nothing is at hand."""
         found = self._find(sha)
         if found is None:
@@ -86,8 +86,8 @@ class Bench:
         return found
 
     def page(self, sha: str) -> dict:
-        """A view as the page shows it, with the steps that led to it."""
-        return self.view(sha).page(self.desk.history()) | self._steps(sha)
+        """What was found as the page shows it, with the steps that led to it."""
+        return self.diagnosed(sha).page(self.history.steps()) | self._steps(sha)
 
     def fitted(self, sha: str) -> dict:
         """What the page shows of a fit before it is diagnosed."""
@@ -104,7 +104,7 @@ class Bench:
 
     def before(self, sha: str, step: int) -> Workspace | None:
         """The fit of an earlier step, None where it is not in memory. Raises SysidError: there is no such step."""
-        steps = self.desk.history()
+        steps = self.history.steps()
         if not 0 <= step < len(steps):
             raise SysidError("there is no such step", do="reload")
         found = self._find(steps[step].get("sha", ""))
@@ -112,17 +112,17 @@ class Bench:
 
     def _steps(self, sha: str) -> dict:
         """The steps that led to a text, itself the last, and which of them are in memory."""
-        steps = self.desk.history()
+        steps = self.history.steps()
         names = [step_name(s) for s in steps]
         if not steps or steps[-1].get("sha") != sha:
-            names.append(self.desk.named(sha) if names else "start")
+            names.append(self.history.named(sha) if names else "start")
         return {"steps": names, "kept": [k for k, s in enumerate(steps) if self._find(s.get("sha", "")) is not None]}
 
     # ---- work
 
     def run(self, seen: str | None = None) -> dict:
         """Fit and diagnose the file as it is, where that was not done yet."""
-        sha = self.desk.sync()
+        sha = self.history.sync()
         if seen is not None and sha != seen:
             raise Changed("the experiment file changed", do="reload")
         self._ensure(sha)
@@ -135,7 +135,7 @@ class Bench:
 
     def add_finding(self, seen: str, number: int) -> dict:
         """Add a suspect to the model."""
-        found = self.view(seen)
+        found = self.diagnosed(seen)
         if not 0 <= number < len(found.diagnosis.findings):
             raise SysidError("there is no such suspect", do="reload")
         finding = found.diagnosis.findings[number]
@@ -143,7 +143,7 @@ class Bench:
 
     def add_steps(self, seen: str) -> dict:
         """Add the steps that the diagnosis names, all of them in one change."""
-        found = self.view(seen)
+        found = self.diagnosed(seen)
         named = [found.diagnosis.findings[k] for _, k in found.offered()]
         if not named:
             raise SysidError("the diagnosis names no step to add", do="reload")
@@ -163,11 +163,11 @@ class Bench:
 
     def undo(self, seen: str) -> dict:
         """Restore the text before."""
-        return self._moved(self.desk.undo(seen))
+        return self._moved(self.history.undo(seen))
 
     def redo(self, seen: str) -> dict:
         """Take an undo back."""
-        return self._moved(self.desk.redo(seen))
+        return self._moved(self.history.redo(seen))
 
     def _grow(self, seen: str, parts: list[tuple[str, list[str] | None, dict]], where: str | None = None) -> dict:
         """Add effects, (word, joints, options) each, in one change of the text.
@@ -180,13 +180,13 @@ class Bench:
 
         def make(text: str) -> str:
             for effect, joints, options in parts:
-                text = loop.with_effect(text, effect, joints, options, str(self.desk.path))
+                text = loop.with_effect(text, effect, joints, options, str(self.history.path))
             return text
 
         words = ", ".join(effect if effect != "formula" else options["formula"] for effect, _, options in parts)
         where = where or ("*" if parts[0][1] is None else ", ".join(parts[0][1]))
-        with loop.asked(self.desk.path):
-            return self._moved(self.desk.change(seen, make, words, where))
+        with loop.asked(self.history.path):
+            return self._moved(self.history.change(seen, make, words, where))
 
     def _moved(self, sha: str) -> dict:
         self._ensure(sha)
@@ -198,37 +198,37 @@ class Bench:
             if job is not None and job.state == "running" and job.sha != sha:
                 self.worker.cancel()  # of a text that does not stand any more
             return
-        text = self.desk.text()
+        text = self.history.text()
         if hashed(text) == sha:
             self.worker.start(sha, lambda job: self._work(job, text))
 
     def _work(self, job: Job, text: str) -> None:
-        experiment = self.desk.experiment(text)
+        experiment = self.history.experiment(text)
         state = key(hashed(text), experiment)
         fit = pipeline.fit(experiment, progress=job.tell)
         self._early = hashed(text), Workspace(fit)  # seen while the diagnosis is at work
         found = diagnose(experiment, fit=fit, progress=job.tell)
         job.tell("drawing", 0.0)
-        view = View(hashed(text), fit, found, self.desk.run)
-        view.looks.warm(lambda share: job.tell("drawing", share))
-        results.write(fit, self.desk.run)
-        results.write_json(self.desk.run / "diagnosis.json", view.said)
+        view = Diagnosed(hashed(text), fit, found, self.history.run)
+        view.residuals.warm(lambda share: job.tell("drawing", share))
+        results.write(fit, self.history.run)
+        results.write_json(self.history.run / "diagnosis.json", view.said)
         self.keep(state, text, view)
         self._early = None
 
-    def keep(self, state: str, text: str, view: View) -> None:
-        """Remember a view, and the errors under its text."""
-        self._views.keep(self.desk.path, state, view)
-        self.desk.measured(text, view.fit.rms("test"), view.fit.rms("train"))
+    def keep(self, state: str, text: str, view: Diagnosed) -> None:
+        """Remember what was found, and the errors under its text."""
+        self._cache.keep(self.history.path, state, view)
+        self.history.measured(text, view.fit.rms("test"), view.fit.rms("train"))
 
-    def _find(self, sha: str) -> View | None:
-        return self._views.find(self.desk.path, sha)
+    def _find(self, sha: str) -> Diagnosed | None:
+        return self._cache.find(self.history.path, sha)
 
     # ---- answers
 
     def compare(self, one: int, other: int) -> dict:
         """Two steps compared, with standard errors where both fits are in memory."""
-        steps = self.desk.history()
+        steps = self.history.steps()
         found = compared(steps, one, other)
         first, second = (self._find(steps[k].get("sha", "")) for k in (one, other))
         if first is not None and second is not None:
@@ -239,5 +239,5 @@ class Bench:
 
     def report(self, sha: str) -> str:
         """The report as `sysid report` writes it."""
-        view = self.view(sha)
-        return report.page(self.desk.name, sections(view.fit, view.said, self.desk.history()))
+        view = self.diagnosed(sha)
+        return report.page(self.history.name, sections(view.fit, view.said, self.history.steps()))

@@ -12,19 +12,19 @@ from ..report.sections import sections
 from ..report.steps import steps
 from ..report.words import units
 from ..statement.document import document
-from .look import Looks
+from .residuals import Residuals
 from .workspace import Workspace
 
 ORDER = ("verdict", "workspace", "steps", "suspects", "look", "torque", "failures", "detectable", "parameters", "bodies", "provenance")
 
 
-class View:
+class Diagnosed:
     """Everything about one text of the experiment file that the page may ask for, made once."""
 
     def __init__(self, sha: str, fit: Fit, diagnosis: Diagnosis, run=""):
         self.sha, self.fit, self.diagnosis = sha, fit, diagnosis
         self.said = document(diagnosis, run)
-        self.looks, self.workspace = Looks(diagnosis), Workspace(fit)
+        self.residuals, self.workspace = Residuals(diagnosis), Workspace(fit)
         made = sections(fit, self.said, [])
         self._html = {name: {"title": section["title"], "html": section["html"]} for name, section in made.items() if name != "steps"}
         self._charts = {chart["id"]: dumped(chart) for section in made.values() for chart in section["charts"]}
