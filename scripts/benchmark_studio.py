@@ -116,7 +116,7 @@ def main() -> int:
         previewed = []
         while session.worker.job.state == "running":
             during.append(clicks.ask("/api/state")[1])
-            previewed.append(clicks.ask(f"/api/residual?sha={first}&joint=1&finding=0")[1])
+            previewed.append(clicks.ask(f"/api/window?sha={first}&joint=1&part=test")[1])
             time.sleep(0.25)
         clicks.settle()
         print(f"an effect added, refitted and questioned in {time.perf_counter() - start:.1f} s", flush=True)
@@ -124,15 +124,16 @@ def main() -> int:
         count = len(view["findings"])
         rows = {
             "page (frame)": "/", "view (all sections)": f"/api/view?sha={first}", "chart: torque": f"/api/figure?sha={first}&id=torque0", "chart: staircase": f"/api/figure?sha={first}&id=steps0",
-            "chart: bodies": f"/api/figure?sha={first}&id=solids", "residual": f"/api/residual?sha={first}&joint=3", "preview": f"/api/residual?sha={first}&joint=1&finding={{k}}", "brush": f"/api/stretch?sha={first}&from={{k}}&to={{l}}",
-            "compare steps": "/api/compare?from=0&to=1", "play": f"/api/play?sha={first}", "state": "/api/state",
+            "chart: bodies": f"/api/figure?sha={first}&id=solids", "time, whole": f"/api/window?sha={first}&joint=3&part=train", "time, zoomed": f"/api/window?sha={first}&joint=3&part=train&from={{k}}&to={{l}}", "beside": f"/api/window?sha={second}&joint=1&part=train&beside=step:0",
+            "dots": f"/api/cloud?sha={first}&joint=2&part=train", "robot": f"/api/film?sha={first}&part=train", "brush": f"/api/stretch?sha={first}&from={{k}}&to={{l}}",
+            "compare steps": "/api/compare?from=0&to=1", "state": "/api/state",
         }  # fmt: skip
         times = {name: [clicks.ask(path.format(k=k % max(count, 1), l=20 + k))[1] for k in range(given.repeat)] for name, path in rows.items()}
         times["undo (cached)"], times["redo (cached)"] = [], []
         for _ in range(given.repeat):
             times["undo (cached)"].append(clicks.ask("/api/undo", {"sha": second})[1])
             times["redo (cached)"].append(clicks.ask("/api/redo", {"sha": first})[1])
-        times["state, while it works"], times["preview, while it works"] = during, previewed
+        times["state, while it works"], times["time, while it works"] = during, previewed
         slow = 0
         print(f"\n{'click':<26}{'median':>10}{'worst':>10}   (ms; {given.repeat} times, while it works {len(during)} and {len(previewed)})")
         for name, own in times.items():

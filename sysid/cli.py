@@ -335,8 +335,8 @@ def studio(
 ) -> None:  # fmt: skip
     """The report's page alive in the browser: look, add, refit, undo. The experiment file stays the truth."""
     from . import config, own_effects
-    from .studio.serve import serve
     from .studio.experiments import beside
+    from .studio.serve import serve
     from .trusted import Untrusted
 
     def ready(address: str) -> None:

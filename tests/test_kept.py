@@ -163,7 +163,7 @@ def test_a_star_in_the_studio_is_every_joint_or_the_whole_robot(experiment, tmp_
     folder = experiment(config=TEXT)
     monkeypatch.setattr(Session, "_ensure", lambda self, sha: None)
     session = Session(folder, tmp_path / "run")
-    session.add_effect(session.history.sync(), effect, "*")
+    session.add(session.history.sync(), {"effect": effect, "joint": "*"})
     _, model, _ = pipeline.build(pipeline.load(folder))
     assert model.terms[-1][0].name == effect and (folder / "config.yaml").read_text() == TEXT.replace("coulomb]", f"coulomb, {effect}]")
 

@@ -14,14 +14,13 @@ from dataclasses import replace
 
 import anyio
 import httpx
-import numpy as np
 import pytest
 
 from sysid import loop
 from sysid.diagnose.diagnosis import diagnose
 from sysid.effect import vocabulary
 from sysid.errors import SysidError
-from sysid.failures import HeldOut
+from sysid.statement.document import document
 from sysid.studio import cache, history, page, security
 from sysid.studio.app import application
 from sysid.studio.diagnosed import Diagnosed
@@ -30,6 +29,7 @@ from sysid.studio.history import History, hashed
 from sysid.studio.jobs import Cancelled, Job, Worker
 from sysid.studio.serve import serve
 from sysid.studio.session import Session
+from sysid.studio.workspace import Workspace
 from tests.test_report import EVIL, Elements, parse_errors, written
 
 PORT, CSRF = 8765, "of-this-start"
@@ -56,13 +56,14 @@ def arm(tmp_path_factory):
     folder = rippled(tmp_path_factory.mktemp("studio") / "arm")
     experiment = loop.pipeline.load(folder)
     found = diagnose(experiment)
-    return folder, Diagnosed(hashed((folder / "config.yaml").read_text()), found.fit, found)
+    return folder, Diagnosed(hashed((folder / "config.yaml").read_text()), found.fit, json.loads(json.dumps(document(found))))
 
 
 def told(session, job, text, view):
     """What a job finds, from a diagnosis made before."""
     own = copy.copy(view)
     own.sha, own._charts, own.fit = hashed(text), dict(view._charts), replace(view.fit, experiment=session.history.experiment(text))
+    own.workspace = Workspace(own.fit)
     job.tell("compress", 0.5)
     session.keep(cache.key(hashed(text), session.history.experiment(text)), text, own)
 
@@ -159,7 +160,7 @@ def test_all_steps_that_are_named_are_one_change(arm, tmp_path):
     own = studio(folder, tmp_path / "run")
     state = own.wait()
     view = own.session.diagnosed(state["sha"])
-    named = [view.diagnosis.findings[k].effect for _, k in view.offered()]
+    named = [view.said["findings"][k]["effect"] for _, k in view.offered()]
     added = own.post("/api/add", sha=state["sha"], steps=True).json()
     model = own.session.history.experiment(own.file.read_text()).model
     assert named and set(named) <= {e.name for e in model.effects} and added["undo"] == ", ".join(named)
@@ -197,7 +198,7 @@ def test_charts_are_answered_before_the_diagnosis(arm, tmp_path, monkeypatch):
     assert client.get("/api/film", params=asked).json()["names"] == [EVIL, "elbow"]
     assert client.get("/export/rows.csv", params=asked).text.startswith("log,t [s],measured")
     assert client.get("/api/window", params={**asked, "part": "both"}).status_code == 422
-    assert client.get("/api/window", params={**asked, "before": 5}).status_code == 422
+    assert client.get("/api/window", params={**asked, "beside": "step:5"}).status_code == 422
     go_on.set()
 
 
@@ -449,7 +450,7 @@ def test_a_file_that_cannot_be_meant_is_said_on_the_page(opened):
 
 def test_unknown_things_are_not_found(opened):
     sha = opened.sha
-    for path, words in (("view", {"sha": "x"}), ("residual", {"sha": sha, "joint": 9}), ("residual", {"sha": sha, "joint": 0, "finding": 99}), ("residual", {"sha": sha, "joint": "x"}), ("stretch", {"sha": sha, "from": "nan", "to": 1}), ("compare", {"from": 0, "to": 9})):
+    for path, words in (("view", {"sha": "x"}), ("window", {"sha": sha, "joint": 9, "part": "test"}), ("window", {"sha": sha, "joint": "x", "part": "test"}), *(("window", {"sha": sha, "joint": 0, "part": "test", "beside": b}) for b in ("step:9", "step:x", "preview:x", "run:../../etc", "x")), ("cloud", {"sha": sha, "joint": 0, "part": "test", "shown": "preview:x"}), ("cloud", {"sha": sha, "joint": 0, "part": "test", "shown": "run:x"}), ("stretch", {"sha": sha, "from": "nan", "to": 1}), ("compare", {"from": 0, "to": 9})):
         assert opened.get(f"/api/{path}", **words).status_code == 422, path
     assert opened.get("/api/figure", sha=sha, id="../../etc/passwd").status_code == 404
     for path in ("/../pyproject.toml", "/api", "/export/../../x", "/%2e%2e/%2e%2e/etc/passwd", "/studio/undo.json"):
@@ -459,33 +460,144 @@ def test_unknown_things_are_not_found(opened):
 # ---- answers without a refit
 
 
-def test_preview_is_what_the_suspect_removes(arm):
-    _, view = arm
-    looks = view.residuals
-    claims = view.diagnosis.claims
-    assert len(view.diagnosis.findings) == sum(len(claim.findings) for claim in claims) >= 1
-    # the first step's head added, the residual is that of the model that it made
-    grown = HeldOut(view.diagnosis.findings[0].member.view.settled, view.diagnosis.first.test)
-    np.testing.assert_allclose(looks.first.residual - looks.removed(0), grown.residual * looks.first.rows.use, atol=1e-9)
-    for k, finding in enumerate(view.diagnosis.findings):
-        own = looks.own(k)
-        assert own == ([0, 1] if finding.joint == "*" else [view.fit.joints.index(finding.joint)])
-        assert (looks.removed(k)[:, own] ** 2).sum() > 0
-    bare, with_one = looks.residual(0), looks.residual(0, 0)
-    assert len(bare["chart"]["figure"]["data"]) == 1 and len(with_one["chart"]["figure"]["data"]) == 2
-    assert with_one["explained"] < 0.7 * with_one["rms"] == 0.7 * bare["rms"]
-    assert with_one["explained"] == pytest.approx(grown.rms()[0])
+def previewed(own, **body):
+    """The hash of a preview, once it is there."""
+    answer = own.post("/api/preview", sha=own.sha, **body).json()
+    end = time.monotonic() + 60.0
+    while time.monotonic() < end:
+        state = own.get("/api/state").json()
+        if any(one["sha"] == answer["preview"] for one in state["previews"]):
+            return answer["preview"]
+        assert state["aside"]["state"] in ("running", "done"), state["aside"]
+        time.sleep(0.02)
+    raise AssertionError("the preview does not come")
 
 
-def test_a_stretch_of_time_names_the_suspect(arm):
-    looks = arm[1].residuals
-    whole = looks.stretch(-1.0, 1e6)
-    assert whole["suspects"][0]["effect"] == "cogging" and whole["suspects"][0]["joint"] == EVIL and whole["suspects"][0]["share"] > 0.5
+def test_a_preview_is_the_fit_that_the_addition_gives(opened, monkeypatch):
+    before = opened.file.read_bytes()
+    key = previewed(opened, finding=0)
+    assert opened.file.read_bytes() == before and opened.get("/api/state").json()["undo"] is None
+    asked = {"sha": opened.sha, "joint": 0, "part": "test"}
+    shown = opened.get("/api/window", **asked, shown=f"preview:{key}", beside="now").json()
+    found = opened.get("/api/view", sha=opened.sha).json()
+    said = opened.session.diagnosed(opened.sha).said
+    assert shown["beside"] == said["joints"][EVIL]["rms"]["test"] == opened.get("/api/window", **asked).json()["rms"]
+    assert shown["rms"] == pytest.approx(said["claims"][0]["rms_test_after"][EVIL], rel=1e-9) and shown["laid"]
+    names = [trace["name"] for trace in shown["chart"]["figure"]["data"]]
+    assert {"predicted beside", "residual beside", "difference"} <= set(names) and found["offered"]
+    # what is then added is this very fit, and the text this very text
+    fits = []
+    monkeypatch.setattr(Session, "_work", lambda self, job, text: fits.append(self.aside.previews.fit(hashed(text), cache.key(hashed(text), self.history.experiment(text)))))
+    assert opened.post("/api/add", sha=opened.sha, finding=0).json()["sha"] == key
+    opened.wait()
+    assert fits[0] is opened.session.aside.previews.find(key).fit
+
+
+def test_any_effect_and_any_formula_is_previewed_and_what_cannot_be_is_said(opened):
+    first = previewed(opened, effect="cogging", joint=EVIL, options={"lines": "2"})
+    second = previewed(opened, formula="a*sin(3*q)", joint="elbow")
+    words = {one["sha"]: one["words"] for one in opened.get("/api/state").json()["previews"]}
+    assert words == {first: f"cogging on {EVIL}", second: "a*sin(3*q) on elbow"}
+    for body, said in (({"formula": "import os", "joint": "elbow"}, "formula"), ({"effect": "viscous", "joint": "elbow"}, "already"), ({"effect": "cogging", "joint": "elbow", "options": {"lines": "[many"}}, "lines"), ({"effect": "cogging", "joint": "elbow", "options": {"lines": "many"}}, "lines"), ({"effect": "cogging", "options": 3}, "options")):
+        answer = opened.post("/api/preview", sha=opened.sha, **body)
+        assert answer.status_code == 422 and said in answer.json()["error"], answer.json()
+    assert opened.post("/api/preview", sha="another", finding=0).status_code == 422
+    # options go into the file
+    opened.post("/api/add", sha=opened.sha, effect="cogging", joint="elbow", options={"lines": "2", "k": ""})
+    assert "cogging: {joints: [elbow], lines: 2}" in opened.file.read_text()
+
+
+def test_a_stretch_of_time_names_the_preview_that_takes_it(opened):
+    key = previewed(opened, finding=0)
+    ask = lambda low, high: opened.get("/api/stretch", sha=opened.sha, part="test", **{"from": low, "to": high}).json()  # noqa: E731
+    whole = ask(-1.0, 1e6)
+    assert (first := whole["previews"][0])["sha"] == key and first["joint"] == EVIL and first["share"] > 0.5
     for entry in whole["joints"]:
         assert entry["here"] == pytest.approx(entry["whole"])
-    half = looks.stretch(4.0, 2.0)
+    half = ask(4.0, 2.0)
     assert half["from"] == 2.0 and 0 < half["rows"] < whole["rows"]
-    assert looks.stretch(50.0, 60.0)["rows"] == 0 and looks.stretch(50.0, 60.0)["suspects"] == []
+    assert ask(50.0, 60.0)["rows"] == 0 and ask(50.0, 60.0)["previews"] == []
+
+
+def test_a_stretch_is_masked_on_its_logs_own_clock(opened):
+    before = opened.file.read_text()
+    mask = {"part": "test", "from": 2.0, "to": 3.0, "joint": 1}
+    opened.post("/api/add", sha=opened.sha, mask=mask)
+    state = opened.wait()
+    (own,) = opened.session.history.experiment(opened.file.read_text()).preprocess.mask
+    first = opened.session.workspace(opened.sha).prediction("test").t[0]
+    assert own.log == "test.csv" and own.joints == ["elbow"] and own.start == pytest.approx(2.0 + first, abs=0.006)
+    assert state["undo"].startswith("mask 2.0") and state["undo"].endswith("on elbow")
+    opened.post("/api/add", sha=state["sha"], mask={**mask, "joint": None})
+    assert len(opened.session.history.experiment(opened.file.read_text()).preprocess.mask) == 2
+    state = opened.wait()
+    for wrong in (3, {"part": "both", "from": 0, "to": 1}, {**mask, "from": "x"}, {**mask, "joint": 9}, {**mask, "joint": "x"}, {**mask, "from": 90, "to": 91}):
+        assert opened.post("/api/add", sha=state["sha"], mask=wrong).status_code == 422, wrong
+    state = opened.post("/api/undo", sha=state["sha"]).json()
+    opened.post("/api/undo", sha=state["sha"])
+    assert opened.file.read_text() == before
+
+
+def test_a_motion_is_designed_with_its_files_to_take_along(opened, monkeypatch):
+    from sysid.studio import designs
+
+    asked = []
+
+    def design(experiment, *, separate, duration, processes, progress):
+        asked.append((experiment.name, separate, duration))
+        progress("searching", 0.5)
+        return "found"
+
+    def write(found, folder):
+        folder.mkdir(parents=True)
+        said = {"duration": 20.0, "separates": [{"a": "cogging:elbow", "b": "cable:elbow", "probability": 0.97}], "expected_std": {}}
+        (folder / "design.json").write_text(json.dumps(said))
+        (folder / "trajectory.csv").write_text("t,q\n")
+
+    monkeypatch.setattr(designs.designing, "design", design)
+    monkeypatch.setattr(designs.designing, "write", write)
+    answer = opened.post("/api/design", sha=opened.sha, separate=["cogging:elbow", "payload:*"]).json()
+    end = time.monotonic() + 10
+    while not (found := opened.get("/api/state").json()["designs"]) and time.monotonic() < end:
+        time.sleep(0.02)
+    assert asked == [("arm", [("cogging", "elbow"), ("payload", "*")], 20.0)]
+    assert found == [{"name": answer["design"], "says": "20 s of motion; cogging:elbow and cable:elbow will be told apart with probability 0.97"}]
+    assert answer["design"] == "cogging-elbow-against-payload-robot"
+    assert opened.get("/export/design", name=answer["design"], file="trajectory.csv").text == "t,q\n"
+    for name, file in (("../..", "design.json"), (answer["design"], "../../fit.json"), ("x", "trajectory.csv")):
+        assert opened.get("/export/design", name=name, file=file).status_code == 422
+    for body in ({"separate": "a"}, {"separate": [1]}, {"separate": ["a"]}, {"duration": "x"}):
+        assert opened.post("/api/design", sha=opened.sha, **body).status_code == 422
+
+
+def test_another_run_is_laid_over_this_one(opened):
+    fit = opened.session.diagnosed(opened.sha).fit
+    found = fit.predictions["test"]
+    worse = replace(fit, predictions={**fit.predictions, "test": replace(found, predicted=found.predicted + 0.1)})
+    loop.results.write(worse, opened.run.parent / "other")
+    loop.results.write(fit, opened.run / "steps" / "00-start")
+    assert opened.get("/api/view", sha=opened.sha).json()["runs"] == ["steps/00-start", "other"]
+    asked = {"sha": opened.sha, "joint": 1, "part": "test"}
+    told = opened.get("/api/window", **asked, beside="run:other").json()
+    assert told["laid"] and told["beside"] == pytest.approx(worse.rms("test")["elbow"], rel=1e-12)
+    same = opened.get("/api/window", **asked, beside="run:steps/00-start").json()
+    assert same["beside"] == same["rms"]
+
+
+def test_a_diagnosis_that_stands_is_not_made_again(arm, tmp_path, monkeypatch):
+    from sysid.statement import kept
+    from sysid.studio import session
+
+    folder, count = shutil.copytree(arm[0], tmp_path / "arm"), []
+    monkeypatch.setattr(session, "diagnose", lambda *a, **k: (count.append(1), diagnose(*a, **k))[1])
+    first = studio(folder, tmp_path / "run")
+    said = first.session.diagnosed(first.sha).said
+    again = studio(folder, tmp_path / "run")
+    assert len(count) == 1 and again.session.diagnosed(again.sha).said == said
+    assert kept.found(again.session.history.experiment(again.file.read_text()), again.session.diagnosed(again.sha).fit, tmp_path / "run") == said
+    again.file.write_text(again.file.read_text().replace("weight: 0.01", "weight: 0.02"))
+    studio(folder, tmp_path / "run")
+    assert len(count) == 2
 
 
 # ---- jobs
@@ -641,7 +753,7 @@ def test_names_show_as_text(opened, arm):
         assert EVIL not in section["html"], name
         assert not [1 for tag, a in Elements(section["html"]).found if tag in ("script", "iframe", "object") or any(k.startswith("on") for k in a)]
     for joint in range(2):
-        chart = opened.get("/api/residual", sha=opened.sha, joint=joint, finding=0)
+        chart = opened.get("/api/window", sha=opened.sha, joint=joint, part="test")
         assert "<b>" not in chart.text and chart.headers["content-type"] == "application/json"
 
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from ..addition import apart, designs
 from ..estimate import Fit, given_shapes, said_of_shapes
-from ..statement.text import designs, percent
+from ..statement.text import percent
 from .section import Section
 from .words import (
     SPACE,
@@ -148,6 +149,7 @@ def _claim(head: dict, tied: list[dict], joint: str, several: bool) -> dict:
         "others": [f"{placed(e, j, head['joint'])}{SPACE}({chance(p)})" for e, j, p in others],
         "separate_by": head["separate_by"],
         "design": designs(head["command"], effect, others) if others else "",
+        "separate": ",".join(apart(effect, others)) if others else "",
     }
 
 

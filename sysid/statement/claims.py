@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ..addition import spelled
 from ..diagnose.claims import Claim
 from ..diagnose.diagnosis import Diagnosis
 from ..diagnose.findings import Finding
@@ -47,6 +48,8 @@ def finding(f: Finding, claim: Claim, found: Diagnosis) -> dict:
         "effect": f.effect,
         "joint": f.joint,
         "options": dict(f.candidate.options),
+        # as an experiment file spells it
+        "adds": dict(zip(("effect", "joints", "options"), spelled(f.candidate, f.joint))),
         "summary": describe(f.candidate.effect)["summary"],
         "probability": f.probability,
         "q_value": f.p,

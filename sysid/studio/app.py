@@ -13,7 +13,7 @@ from starlette.responses import Response
 from starlette.routing import Route
 
 from ..errors import SysidError
-from . import page
+from . import designs, page
 from .diagnosed import dumped
 from .experiments import Absent, Experiments
 from .history import Changed
@@ -69,13 +69,13 @@ def application(experiments: Experiments | Session, *, host: str = "127.0.0.1", 
     routed("/api/state", state, "GET")
     own("/api/view", lambda session, r: _json(session.page(_word(r, "sha"))))
     own("/api/figure", _figure)
-    own("/api/residual", lambda session, r: _json(session.diagnosed(_word(r, "sha")).residuals.residual(_whole(r, "joint"), _whole(r, "finding") if "finding" in r.query_params else None)))
-    own("/api/stretch", lambda session, r: _json(session.diagnosed(_word(r, "sha")).residuals.stretch(_number(r, "from"), _number(r, "to"))))
+    own("/api/stretch", _stretch)
     own("/api/fitted", lambda session, r: _json(session.fitted(_word(r, "sha"))))
     own("/api/window", _window)
-    own("/api/cloud", lambda session, r: _json(session.workspace(_word(r, "sha")).cloud(_word(r, "part"), _whole(r, "joint"))))
-    own("/api/film", lambda session, r: _json(session.workspace(_word(r, "sha")).film(_word(r, "part"))))
+    own("/api/cloud", lambda session, r: _json(_seen(session, r).cloud(_word(r, "part"), _whole(r, "joint"))))
+    own("/api/film", lambda session, r: _json(_seen(session, r).film(_word(r, "part"))))
     own("/export/rows.csv", _window_csv)
+    own("/export/design", _design)
     own("/api/compare", lambda session, r: _json(session.compare(_whole(r, "from"), _whole(r, "to"))))
     own("/export/report.html", lambda session, r: _file(session.report(_word(r, "sha")), "text/html", f"{session.history.name}.html"))
     own("/export/experiment.yaml", lambda session, r: _file(session.history.text(), "application/yaml", f"{session.history.name}.yaml"))
@@ -83,23 +83,10 @@ def application(experiments: Experiments | Session, *, host: str = "127.0.0.1", 
     changing("/api/cancel", lambda session, b: session.cancel())
     changing("/api/undo", lambda session, b: session.undo(_given(b, "sha")))
     changing("/api/redo", lambda session, b: session.redo(_given(b, "sha")))
-    changing("/api/add", _add)
+    changing("/api/add", lambda session, b: session.add(_given(b, "sha"), b))
+    changing("/api/preview", lambda session, b: session.preview(_given(b, "sha"), b))
+    changing("/api/design", lambda session, b: session.design(_given(b, "sha"), b.get("separate"), b.get("duration", 20.0)))
     return guard
-
-
-def _add(session: Session, body: dict) -> dict:
-    sha = _given(body, "sha")
-    if "finding" in body:
-        number = body["finding"]
-        if isinstance(number, bool) or not isinstance(number, int):
-            raise SysidError("finding must be a number")
-        return session.add_finding(sha, number)
-    if body.get("steps") is True:
-        return session.add_steps(sha)
-    joint = _given(body, "joint", optional=True)
-    if "formula" in body:
-        return session.add_formula(sha, _given(body, "formula"), joint)
-    return session.add_effect(sha, _given(body, "effect"), joint)
 
 
 def _figure(session: Session, request: Request) -> Response:
@@ -109,15 +96,30 @@ def _figure(session: Session, request: Request) -> Response:
     return Response(found, media_type="application/json", headers={"cache-control": "no-store"})
 
 
+def _seen(session: Session, request: Request):
+    return session.workspace(_word(request, "sha"), _word(request, "shown"))
+
+
 def _window(session: Session, request: Request) -> Response:
-    sha = _word(request, "sha")
-    before = session.before(sha, _whole(request, "before")) if "before" in request.query_params else None
-    return _json(session.workspace(sha).window(*_what(request), before))
+    which = _word(request, "beside")
+    beside = session.beside(_word(request, "sha"), which) if which else None
+    return _json(_seen(session, request).window(*_what(request), beside))
+
+
+def _stretch(session: Session, request: Request) -> Response:
+    part = _word(request, "part") or "test"
+    return _json(session.stretch(_word(request, "sha"), part, _number(request, "from"), _number(request, "to")))
+
+
+def _design(session: Session, request: Request) -> Response:
+    name, which = _word(request, "name"), _word(request, "file")
+    text = designs.file(session.history.run, name, which)
+    return _file(text, designs.FILES[which], f"{name}-{which}")
 
 
 def _window_csv(session: Session, request: Request) -> Response:
     part, joint, low, high = _what(request)
-    found = session.workspace(_word(request, "sha"))
+    found = _seen(session, request)
     return _file(found.csv(part, joint, low, high), "text/csv", f"{session.history.name}-{found.joint(joint)}.csv")
 
 

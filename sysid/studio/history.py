@@ -109,12 +109,12 @@ class History:
             Changed: another text stands there. SysidError: the new text cannot be meant.
         """
         with self._lock:
-            text = self._as_seen(seen)
+            text = self.as_seen(seen)
         before = text.encode("utf-8")
         new = experiment_file.edited(before, make(experiment_file.text(before))).decode("utf-8")
         pipeline.build(self.experiment(new))  # takes a while: who asks for the state need not wait
         with self._lock, state.locked(self.path):
-            self._as_seen(seen)
+            self.as_seen(seen)
             self._write(text, new)
             self._append(new, added, joint)
             self._save()
@@ -143,7 +143,8 @@ class History:
 
     # ---- inside
 
-    def _as_seen(self, seen: str) -> str:
+    def as_seen(self, seen: str) -> str:
+        """The text, where it is the one with a hash. Raises Changed."""
         now = self.sync()
         if now != seen:
             raise Changed("the experiment file changed", do="reload")
@@ -151,7 +152,7 @@ class History:
 
     def _move(self, seen: str, by: int) -> str:
         with self._lock, state.locked(self.path):
-            text = self._as_seen(seen)
+            text = self.as_seen(seen)
             if not 0 <= self._at + by < len(self._items):
                 raise SysidError("there is nothing to undo" if by < 0 else "there is nothing to redo")
             new = self._items[self._at + by]["text"]
