@@ -26,8 +26,8 @@ import polars as pl
 from sysid import candidates, regressor, robot, specs
 from sysid.diagnose import ask, diagnosis
 from sysid.studio.app import application
-from sysid.studio.bench import Bench
 from sysid.studio.serve import responsive
+from sysid.studio.session import Session
 
 LIMIT, PORT, CSRF = 0.3, 8765, "benchmark"
 URDF = "example-robot-data://ur_description/urdf/ur5_robot.urdf"
@@ -59,8 +59,8 @@ def written(folder: Path, samples: int) -> Path:
 class Clicks:
     """Requests to the application, each timed."""
 
-    def __init__(self, bench: Bench):
-        self.app = application(bench, port=PORT, csrf=CSRF)
+    def __init__(self, session: Session):
+        self.app = application(session, port=PORT, csrf=CSRF)
         self.loop = asyncio.new_event_loop()
         self.client = httpx.AsyncClient(transport=httpx.ASGITransport(self.app), base_url=f"http://127.0.0.1:{PORT}", timeout=None, headers={"x-sysid-csrf": CSRF})
 
@@ -101,12 +101,12 @@ def main() -> int:
         start = time.perf_counter()
         path = written(Path(folder), given.samples)
         print(f"{given.samples} samples of 6 joints written in {time.perf_counter() - start:.1f} s", flush=True)
-        bench = Bench(path, Path(folder) / "run")
-        clicks = Clicks(bench)
+        session = Session(path, Path(folder) / "run")
+        clicks = Clicks(session)
         start = time.perf_counter()
         clicks.ask("/api/run", {})
         during = []
-        while bench.worker.job.state == "running":
+        while session.worker.job.state == "running":
             during.append(clicks.ask("/api/state")[1])
             time.sleep(0.25)
         first = clicks.settle()["sha"]
@@ -114,9 +114,9 @@ def main() -> int:
         start = time.perf_counter()
         second = clicks.ask("/api/add", {"sha": first, "finding": 0})[0].json()["sha"]
         previewed = []
-        while bench.worker.job.state == "running":
+        while session.worker.job.state == "running":
             during.append(clicks.ask("/api/state")[1])
-            previewed.append(clicks.ask(f"/api/residual?sha={first}&joint=1&finding=0")[1])
+            previewed.append(clicks.ask(f"/api/window?sha={first}&joint=1&part=test")[1])
             time.sleep(0.25)
         clicks.settle()
         print(f"an effect added, refitted and questioned in {time.perf_counter() - start:.1f} s", flush=True)
@@ -124,15 +124,16 @@ def main() -> int:
         count = len(view["findings"])
         rows = {
             "page (frame)": "/", "view (all sections)": f"/api/view?sha={first}", "chart: torque": f"/api/figure?sha={first}&id=torque0", "chart: staircase": f"/api/figure?sha={first}&id=steps0",
-            "chart: bodies": f"/api/figure?sha={first}&id=solids", "residual": f"/api/residual?sha={first}&joint=3", "preview": f"/api/residual?sha={first}&joint=1&finding={{k}}", "brush": f"/api/stretch?sha={first}&from={{k}}&to={{l}}",
-            "compare steps": "/api/compare?from=0&to=1", "play": f"/api/play?sha={first}", "state": "/api/state",
+            "chart: bodies": f"/api/figure?sha={first}&id=solids", "time, whole": f"/api/window?sha={first}&joint=3&part=train", "time, zoomed": f"/api/window?sha={first}&joint=3&part=train&from={{k}}&to={{l}}", "beside": f"/api/window?sha={second}&joint=1&part=train&beside=step:0",
+            "dots": f"/api/cloud?sha={first}&joint=2&part=train", "robot": f"/api/film?sha={first}&part=train", "brush": f"/api/stretch?sha={first}&from={{k}}&to={{l}}",
+            "compare steps": "/api/compare?from=0&to=1", "state": "/api/state",
         }  # fmt: skip
         times = {name: [clicks.ask(path.format(k=k % max(count, 1), l=20 + k))[1] for k in range(given.repeat)] for name, path in rows.items()}
         times["undo (cached)"], times["redo (cached)"] = [], []
         for _ in range(given.repeat):
             times["undo (cached)"].append(clicks.ask("/api/undo", {"sha": second})[1])
             times["redo (cached)"].append(clicks.ask("/api/redo", {"sha": first})[1])
-        times["state, while it works"], times["preview, while it works"] = during, previewed
+        times["state, while it works"], times["time, while it works"] = during, previewed
         slow = 0
         print(f"\n{'click':<26}{'median':>10}{'worst':>10}   (ms; {given.repeat} times, while it works {len(during)} and {len(previewed)})")
         for name, own in times.items():

@@ -57,3 +57,17 @@ def command(path, effect: str, joints: list[str] | None, options: dict) -> str:
     for name, value in options.items():
         words += ["--option", f"{name}={value}"]
     return shlex.join(words)
+
+
+def apart(head: tuple[str, str], others) -> list[str]:
+    """An effect and what it is not told from, as `sysid design --separate` names them."""
+    likely = [(e, j) for e, j, p in others if p >= 0.01] or [others[0][:2]]  # others: "less than"
+    return [f"{e}:{j}" for e, j in (head, *likely)]
+
+
+def designs(added: str, head: tuple[str, str], others) -> str:
+    """What is typed for a motion that separates an effect (effect, joint), which the command
+    `added` adds, from those it is not told from: (effect, joint, probability)."""
+    suspects = ",".join(apart(head, others))
+    target = shlex.split(added)[2]
+    return shlex.join(["sysid", "design", target, "--separate", suspects, "--out", "next"])

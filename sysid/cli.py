@@ -249,7 +249,14 @@ def diagnose(
         return
     if level:
         raise SysidError("--level goes with --model: a diagnosis asks all logs together", do="leave it out")
-    found, said, run = _diagnosed(spec, out, quiet or as_json)
+    from . import results
+    from .diagnose.diagnosis import diagnose as work
+    from .statement import kept
+
+    run = results.folder(out or Path("runs") / spec.name)
+    with _progress(quiet or as_json, asks=True) as progress:
+        found = work(spec, progress=progress)
+    said = kept.written(spec, found, run)
     if as_json:
         print(json.dumps(said, allow_nan=False))
     else:
@@ -263,21 +270,6 @@ def diagnose(
             show_diagnosis(found, said)
     if not found.fit.solution.converged:
         raise typer.Exit(1)
-
-
-def _diagnosed(spec, out: Path | None, silent: bool) -> tuple:
-    """The diagnosis of an experiment, its document and its run folder, where both it and its fit were written."""
-    from . import results
-    from .diagnose.diagnosis import diagnose as work
-    from .statement.document import document
-
-    run = results.folder(out or Path("runs") / spec.name)
-    with _progress(silent, asks=True) as progress:
-        found = work(spec, progress=progress)
-    results.write(found.fit, run)
-    said = document(found, run)
-    results.write_json(run / "diagnosis.json", said)
-    return found, said, run
 
 
 def _levels(texts: list[str] | None) -> dict[str, str]:
@@ -310,21 +302,25 @@ def report(
     opened: Annotated[bool, typer.Option("--open", help="Open the file in the browser.")] = False,
     trust: Trust = False, as_json: Json = False, out: Out = None, quiet: Quiet = False,
 ) -> None:  # fmt: skip
-    """Diagnose, and write one self-contained HTML file that opens anywhere."""
-    from . import loop, pipeline
+    """Write one self-contained HTML file that opens anywhere, of the diagnosis that the run folder holds where nothing changed since, else of a new one."""
+    from . import loop, pipeline, results
     from .report import page
+    from .statement import kept
 
-    found, said, run = _diagnosed(pipeline.load(experiment), out, quiet or as_json)
-    path = page.write(found.fit, found, said, loop.read_history(run), run / "report.html")
+    spec = pipeline.load(experiment)
+    run = results.folder(out or Path("runs") / spec.name)
+    with _progress(quiet or as_json, asks=True) as progress:
+        fit, said = kept.diagnosed(spec, run, progress=progress)
+    path = page.write(fit, said, loop.read_history(run), run / "report.html")
     if as_json:
-        print(json.dumps({"report": str(path), "bytes": path.stat().st_size, "verdict": said["verdict"], "run": str(run)}, allow_nan=False))
+        print(json.dumps({"report": str(path), "bytes": path.stat().st_size, "verdict": said["verdict"], "diagnosed": said["made"], "run": str(run)}, allow_nan=False))
     elif not quiet:
         print(path)
     if opened:
         import webbrowser
 
         webbrowser.open(path.resolve().as_uri())
-    if not found.fit.solution.converged:
+    if not fit.solution.converged:
         raise typer.Exit(1)
 
 
@@ -339,8 +335,8 @@ def studio(
 ) -> None:  # fmt: skip
     """The report's page alive in the browser: look, add, refit, undo. The experiment file stays the truth."""
     from . import config, own_effects
+    from .studio.experiments import beside
     from .studio.serve import serve
-    from .studio.shelf import beside
     from .trusted import Untrusted
 
     def ready(address: str) -> None:

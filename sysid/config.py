@@ -105,6 +105,11 @@ def _listed(experiment: Experiment, lines) -> Experiment:
     if wrong := groups.mistake(data, experiment.model):
         location, said = wrong
         raise _refused(location, said, (), lines, experiment.path)
+    names = [log.name for log in (*data.train, *data.test)]
+    for k, mask in enumerate(experiment.preprocess.mask):
+        if mask.log not in names:
+            near = difflib.get_close_matches(mask.log, names, 3, 0.3) or names[:3]
+            raise _refused(("preprocess", "mask", k, "log"), f"no such log in data.train or data.test; near: {', '.join(near)}", mask.log, lines, experiment.path)
     data = groups.resolved(data)
     return experiment.model_copy(update={"data": data})
 

@@ -7,6 +7,7 @@ spike       a sample or a few of one joint's torque stand alone
 brake       one joint's torque repeats exactly while it rests: not the torque that holds it
 frozen      one joint's torque or angle repeats exactly while it moves: the reading stood still
 saturation  as frozen, at the highest or lowest torque of the log: told, but not left out
+mask        no event: a stretch that the user leaves out (`masks`)
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from .segment import Segment
 
 WORDS = {
     "knock": "knock", "spike": "torque spike", "brake": "closed brake", "frozen": "frozen value",
-    "saturation": "flat top",
+    "saturation": "flat top", "mask": "masked stretch",
 }  # fmt: skip
 KINDS = tuple(WORDS)
 TOLD = ("saturation",)  # not left out
@@ -136,8 +137,11 @@ def told(events: Sequence[Event], left_out: float, part: str) -> list[str]:
     masked, kept = ([e for e in events if (e.kind in TOLD) == stays] for stays in (False, True))
     out = []
     if masked:
-        share = f"{100 * left_out:.1f} % of the {part} rows left out as disturbed"
-        out.append(f"{share}: {_summary(masked)}; preprocess.events: keep keeps them")
+        own = [e.kind == "mask" for e in masked]
+        why = "masked" if all(own) else "disturbed or masked" if any(own) else "disturbed"
+        share = f"{100 * left_out:.1f} % of the {part} rows left out as {why}"
+        keeps = "" if any(own) else "; preprocess.events: keep keeps them"
+        out.append(f"{share}: {_summary(masked)}{keeps}")
     if kept:
         out.append(f"flat tops of the torque on {part} logs, not left out: {_summary(kept)}")
     return out
@@ -152,9 +156,15 @@ def _summary(events: Sequence[Event]) -> str:
         left = len(logs) - _SHOWN
         more = [f"{left} more log{'s' * (left > 1)}"] if left > 0 else []
         if own:
-            words = WORDS[kind] + "s" * (len(own) > 1)
+            words = plural(kind, len(own))
             out.append(f"{len(own)} {words} ({'; '.join(where + more)})")
     return ", ".join(out)
+
+
+def plural(kind: str, count: int) -> str:
+    """The word for so many events of a kind."""
+    word = WORDS.get(kind, kind)
+    return word if count == 1 else word + ("es" if word.endswith("ch") else "s")
 
 
 def _where(log: str, events: Sequence[Event]) -> str:

@@ -6,7 +6,6 @@
 
 from __future__ import annotations
 
-import io
 import json
 import re
 import shutil
@@ -15,7 +14,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from . import bounded, comparison, config, experiment_file, pipeline, results, state
+from . import bounded, comparison, config, experiment_file, pipeline, results, state, yaml_edit
 from .addition import remaining, spelled
 from .diagnose.diagnosis import Diagnosis, diagnose
 from .errors import ConfigError, SysidError
@@ -67,13 +66,13 @@ def with_effect(
     Raises:
         ConfigError: the effect is there already.
     """
-    from ruamel.yaml import YAML
+    return yaml_edit.edited(text, lambda tree: _join(tree, effect, joints, options, where, every), where=where)
+
+
+def _join(tree, effect: str, joints: list[str] | None, options: dict, where: str, every: Sequence[str]) -> None:
+    """Put an effect into the tree of an experiment file."""
     from ruamel.yaml.comments import CommentedMap, CommentedSeq
 
-    writer = YAML()
-    writer.preserve_quotes, writer.width = True, 4096
-    # checked as every experiment file is, then read once more as it is written
-    tree = CommentedMap() if (only_comments := config.parse_yaml(text, where=where) is None) else writer.load(text)
     model = tree.setdefault("model", CommentedMap())
     if model.get("effects") is None:
         model["effects"] = CommentedSeq(["viscous", "coulomb"])
@@ -91,7 +90,7 @@ def with_effect(
         if left is not None:
             at = listed.index(entry)
             if left:
-                listed[at] = CommentedMap({effect: _flow({"joints": left, **had})})
+                listed[at] = CommentedMap({effect: yaml_edit.flow({"joints": left, **had})})
                 listed[at].fa.set_flow_style()
             else:
                 del listed[at]
@@ -104,41 +103,13 @@ def with_effect(
             there["joints"].extend(joints)
             break
     else:
-        listed.append(_flow(own) if formula is not None else effect if not own else CommentedMap({effect: _flow(own)}))
+        listed.append(yaml_edit.flow(own) if formula is not None else effect if not own else CommentedMap({effect: yaml_edit.flow(own)}))
         if listed and isinstance(listed[-1], CommentedMap):
             listed[-1].fa.set_flow_style()
-    changed = _dumped(writer, tree)
-    if only_comments:
-        return (text.rstrip("\n") + "\n" if text.strip() else "") + changed
-    kept = experiment_file.grafted(text, _dumped(writer, writer.load(text)), changed)
-    try:
-        same = config.plain(config.parse_yaml(kept, where=where)) == config.plain(config.parse_yaml(changed, where=where))
-    except ConfigError:
-        same = False
-    return kept if same else changed
-
-
-def _dumped(writer, tree) -> str:
-    stream = io.StringIO()
-    writer.dump(tree, stream)
-    return stream.getvalue()
 
 
 def _word(entry) -> str:
     return str(next(iter(entry))) if isinstance(entry, dict) else str(entry)
-
-
-def _flow(own: dict):
-    from ruamel.yaml.comments import CommentedMap, CommentedSeq
-
-    out = CommentedMap()
-    for key, value in own.items():
-        if isinstance(value, list):
-            value = CommentedSeq(value)
-            value.fa.set_flow_style()
-        out[key] = value
-    out.fa.set_flow_style()
-    return out
 
 
 @contextmanager

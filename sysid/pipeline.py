@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from . import config, drives, events, gains, groups, held_apart, masses, model, robot, rollout, shape
+from . import config, drives, events, gains, groups, held_apart, masks, masses, model, robot, rollout, shape
 from . import filters as filtering
 from . import log as logs
 from .bumps import bumps
@@ -60,9 +60,11 @@ def build(experiment: Experiment) -> tuple[Robot, Model, np.ndarray]:
 
 
 def read(experiment: Experiment, machine: Robot, specs: list[LogSpec]) -> list[logs.Log]:
-    """The logs of an experiment's `data.train` or `data.test`, with their events where these are left out. Raises LogError."""
+    """The logs of an experiment's `data.train` or `data.test`, with their events where these are left out, and what the experiment
+    masks. Raises LogError, ConfigError."""
     read = [logs.read(spec, experiment.data, machine.joints, machine.prismatic, experiment.folder, experiment.actuator) for spec in specs]
-    return read if experiment.preprocess.events == "keep" else with_events(machine, read)
+    found = read if experiment.preprocess.events == "keep" else with_events(machine, read)
+    return masks.masked(found, experiment.preprocess.mask, machine.joints)
 
 
 def with_events(machine: Robot, read: list[logs.Log]) -> list[logs.Log]:

@@ -293,6 +293,9 @@ def _relocated(experiment: Experiment, run: Path) -> dict:
         return Path(os.path.relpath((experiment.folder / path).resolve(), run.resolve())).as_posix()
 
     tree["robot"]["urdf"] = moved(tree["robot"]["urdf"])
+    named = {log.name: " + ".join(moved(name) for name in log.names) for log in (*experiment.data.train, *experiment.data.test)}
+    for mask in tree["preprocess"]["mask"]:
+        mask["log"] = named[mask["log"]]
     levels = [level for group in tree["data"]["groups"].values() for level in group.values()]
     for listed in (tree["data"]["train"], tree["data"]["test"], *levels):
         for log in listed:

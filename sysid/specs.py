@@ -348,6 +348,19 @@ class DataSpec(_Spec):
         return tuple({**self.columns.signals, **self.signals})
 
 
+class MaskSpec(_Spec):
+    """A stretch of a log that counts in no fit and no error: start <= t <= stop [s] on the log's own clock; of some joints, or all."""
+
+    log: Text
+    start: Number
+    stop: Number
+    joints: Annotated[list[str], Field(min_length=1)] | None = None
+
+    def model_post_init(self, _context: Any) -> None:
+        if not self.start < self.stop:
+            raise ValueError(f"start {self.start:g} must be before stop {self.stop:g}")
+
+
 class PreprocessSpec(_Spec):
     """The filter from logged angles to position, velocity and acceleration."""
 
@@ -358,6 +371,7 @@ class PreprocessSpec(_Spec):
     torque: Literal["raw", "same", "low-pass"] = "raw"
     standstill: Annotated[Any, BeforeValidator(_standstill)] = "auto"
     events: Literal["mask", "keep"] = "mask"
+    mask: list[MaskSpec] = []
 
     def model_post_init(self, _context: Any) -> None:
         if self.filter == "savitzky-golay" and self.order < 2:

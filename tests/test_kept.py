@@ -131,7 +131,7 @@ def test_where_no_lock_can_be_had_work_goes_on(tmp_path, monkeypatch):
 
 
 def test_the_studio_keeps_what_is_not_its_change(experiment, tmp_path):
-    from sysid.studio.desk import Desk, hashed
+    from sysid.studio.history import History, hashed
 
     folder = experiment(config=TEXT)
     real = tmp_path / "real.yaml"
@@ -140,30 +140,30 @@ def test_the_studio_keeps_what_is_not_its_change(experiment, tmp_path):
     real.chmod(0o640)
     (folder / "config.yaml").unlink()
     (folder / "config.yaml").symlink_to(real)
-    desk = Desk(folder, tmp_path / "run")
-    seen = desk.sync()
-    now = desk.change(seen, lambda text: loop.with_effect(text, "cogging", ["elbow"], {}), "cogging", "elbow")
+    history = History(folder, tmp_path / "run")
+    seen = history.sync()
+    now = history.change(seen, lambda text: loop.with_effect(text, "cogging", ["elbow"], {}), "cogging", "elbow")
     assert (folder / "config.yaml").is_symlink() and stat.S_IMODE(real.stat().st_mode) == 0o640
     lines = real.read_bytes().splitlines(keepends=True)
     assert lines[0].startswith(b"\xef\xbb\xbf") and all(line.endswith(b"\r\n") for line in lines) and len(lines) >= 4
-    assert now == hashed(desk.text())
-    desk.undo(now)
+    assert now == hashed(history.text())
+    history.undo(now)
     assert real.read_bytes() == before
     # what another wrote meanwhile stays
     real.write_bytes(before + b"# theirs\r\n")
     with pytest.raises(experiment_file.Changed):
-        desk.change(seen, lambda text: text + "# ours\n", "x", None)
+        history.change(seen, lambda text: text + "# ours\n", "x", None)
     assert real.read_bytes().endswith(b"# theirs\r\n")
 
 
 @pytest.mark.parametrize("effect", ["cogging", "gravity_tilt"])
 def test_a_star_in_the_studio_is_every_joint_or_the_whole_robot(experiment, tmp_path, monkeypatch, effect):
-    from sysid.studio.bench import Bench
+    from sysid.studio.session import Session
 
     folder = experiment(config=TEXT)
-    monkeypatch.setattr(Bench, "_ensure", lambda self, sha: None)
-    bench = Bench(folder, tmp_path / "run")
-    bench.add_effect(bench.desk.sync(), effect, "*")
+    monkeypatch.setattr(Session, "_ensure", lambda self, sha: None)
+    session = Session(folder, tmp_path / "run")
+    session.add(session.history.sync(), {"effect": effect, "joint": "*"})
     _, model, _ = pipeline.build(pipeline.load(folder))
     assert model.terms[-1][0].name == effect and (folder / "config.yaml").read_text() == TEXT.replace("coulomb]", f"coulomb, {effect}]")
 

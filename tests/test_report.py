@@ -69,7 +69,7 @@ def clean(tmp_path_factory):
 @pytest.fixture(scope="module")
 def text(missing):
     found, said = missing
-    return page.page("an <u>experiment</u>", sections(found.fit, found, said, []))
+    return page.page("an <u>experiment</u>", sections(found.fit, said, []))
 
 
 class Elements(HTMLParser):
@@ -118,7 +118,7 @@ def parse_errors(source: str) -> list:
 def test_page_parses_without_error(text, missing, clean):
     assert not parse_errors(text) and parse_errors(text.replace("</table>", "</p>", 1))
     for found, said in (missing, clean, tied(missing)):
-        made = sections(found.fit, found, said, [])
+        made = sections(found.fit, said, [])
         assert not parse_errors(page.page("x", made))
         names = [a["id"] for _, a in Elements(page.page("x", made)).found if "id" in a]
         assert len(names) == len(set(names))
@@ -165,7 +165,7 @@ def test_variables_are_said_in_words(variable, words):
 
 def test_every_chart_has_its_place_and_every_axis_its_quantity(missing):
     found, said = missing
-    made = sections(found.fit, found, said, [])
+    made = sections(found.fit, said, [])
     assert list(made) == ORDER
     names = []
     for section in made.values():
@@ -208,14 +208,15 @@ def tied(missing):
         claim, findings=(claim.head, claim.head),
         set=((claim.head.effect, EVIL, 0.6), ("backlash", EVIL, 0.3), ("gravity_tilt", "*", 0.1)),
     )  # fmt: skip
+    every = [{"effect": e, "joint": j, "probability": p} for e, j, p in pair.set]
     first = {**said["findings"][0], "tied_with": ["backlash", "gravity_tilt on *"], "probability": 0.6}
     other = {**first, "effect": "backlash", "joins_as_step": None, "probability": 0.3, "command": "sysid add x backlash"}
-    return replace(found, claims=(pair,)), {**said, "findings": [first, other]}
+    return replace(found, claims=(pair,)), {**said, "findings": [first, other], "claims": [{**said["claims"][0], "findings": [0, 1], "set": every}]}
 
 
 def test_ties_stand_in_one_bracket(missing):
     twice, told = tied(missing)
-    made = sections(twice.fit, twice, told, [])
+    made = sections(twice.fit, told, [])
     (bracket,) = re.findall(r'<tbody class="tied">(.*?)</tbody>', made["suspects"]["html"], re.S)
     assert "cannot tell them apart" in bracket and "backlash" in bracket and bracket.count("<svg") == 2
     assert "Not fitted here: gravity_tilt of the whole robot" in bracket
@@ -240,7 +241,7 @@ LEFT = {"depends_on": [{"variable": f"qd_{EVIL}", "share": 0.3}, {"variable": "t
 ])  # fmt: skip
 def test_every_status_has_its_card(clean, more, words):
     found, said = clean
-    made = sections(found.fit, found, judged(said, **more), [])
+    made = sections(found.fit, judged(said, **more), [])
     cards = re.findall(r'<article class="card (\w+)">(.*?)</article>', made["verdict"]["html"], re.S)
     assert cards[0][0] == more["status"] and words in "".join(Elements(cards[0][1]).texts)
     assert ("What the residual of" in made["detectable"]["html"]) == ("depends_on" in more)
@@ -251,7 +252,7 @@ def test_a_floor_that_is_not_known_is_said_so(missing):
     said = copy.deepcopy(said)
     for entry in said["joints"].values():
         entry.update(noise_floor=None, noise_floor_se=None, floor_detail="not determined: it is <i>too</i> short")
-    made = sections(found.fit, found, said, [])
+    made = sections(found.fit, said, [])
     card, steps = ("".join(Elements(made[name]["html"]).texts) for name in ("verdict", "steps"))
     assert "noise floor not known" in card and "of the misfit is explained" not in card  # a share of what nobody knows
     assert "not known" in steps and "it is <i>too</i> short" in steps
@@ -265,7 +266,7 @@ def test_events_are_listed_and_shaded_where_their_log_stands(missing):
         {"kind": "spike", "log": "test.csv", "start": 3.0, "stop": 3.0, "joints": ["elbow"]},
         {"kind": "spike", "log": "another.csv", "start": 3.0, "stop": 3.0, "joints": ["elbow"]},
     ]  # fmt: skip
-    made = sections(found.fit, found, {**said, "events": events}, [])["torque"]
+    made = sections(found.fit, {**said, "events": events}, [])["torque"]
     assert "1 knock, 2 torque spikes in these logs" in made["html"]
     shaded = [[(s["x0"], s["x1"]) for s in c["figure"]["layout"]["shapes"] if s["fillcolor"] == charts.ORANGE] for c in made["charts"]]
     line = charts.timeline({part: (p.log, p.t, [part]) for part, p in found.fit.predictions.items()})
@@ -294,7 +295,7 @@ def test_staircase_is_the_history(missing):
         {"added": "stribeck", "joint": EVIL, "rms_test": {EVIL: 0.06, "elbow": 0.05}, "rms_train": now, "folder": "steps/01"},
         {"added": "spring", "joint": "*", "rms_test": {EVIL: 0.055, "elbow": None}, "rms_train": now, "folder": "steps/02"},
     ]  # fmt: skip
-    section = sections(found.fit, found, said, history)["steps"]
+    section = sections(found.fit, said, history)["steps"]
     made = levels(section, "held-out error")
     assert made[charts.plain(EVIL)] == [now[EVIL], 0.06, 0.055] and made["elbow"] == [now["elbow"], 0.05, None]
     assert levels(section, "expected by the diagnosis")["elbow"] is None
@@ -304,7 +305,7 @@ def test_staircase_is_the_history(missing):
 
 def test_staircase_without_history_is_what_the_diagnosis_expects(missing):
     found, said = missing
-    section = sections(found.fit, found, said, [])["steps"]
+    section = sections(found.fit, said, [])["steps"]
     assert "No step was made yet" in section["html"]
     expected = levels(section, "expected by the diagnosis")[charts.plain(EVIL)]
     heads = [f for f in said["findings"] if f["joins_as_step"]]
@@ -314,7 +315,7 @@ def test_staircase_without_history_is_what_the_diagnosis_expects(missing):
 def test_nothing_missing_is_said_plainly(clean):
     found, said = clean
     assert all(v["status"] == "complete" for v in said["verdict"])
-    made = sections(found.fit, found, said, [])
+    made = sections(found.fit, said, [])
     assert "on all 2 joints" in made["verdict"]["html"] and "there is nothing to add" in made["suspects"]["html"]
     assert "names no effect to add" in made["steps"]["html"]
 
@@ -336,7 +337,7 @@ def test_numbers_that_are_not_there(clean):
     measured[:100] = np.nan
     object.__setattr__(prediction, "measured", measured)
     object.__setattr__(fit, "predictions", {**fit.predictions, "test": prediction})
-    made = sections(fit, found, said, [{"added": None, "joint": None, "rms_test": {EVIL: float("nan")}}])
+    made = sections(fit, said, [{"added": None, "joint": None, "rms_test": {EVIL: float("nan")}}])
     source = page.page("x", made)
     assert not re.search(r"\bnan\b|\bNone\b|Infinity", "".join(Elements(source).texts))
     for section in made.values():
@@ -416,14 +417,11 @@ def test_figures_on_paper(missing, tmp_path):
 
 def test_command_writes_the_page(clean, tmp_path, monkeypatch, capsys):
     """The command, with the diagnosis at hand."""
-    from sysid import (
-        cli,
-        loop,  # noqa: F401 - which keeps the true one, imported before it is replaced
-    )
-    from sysid.diagnose import diagnosis
+    from sysid import cli
+    from sysid.statement import kept
 
     found, _ = clean
-    monkeypatch.setattr(diagnosis, "diagnose", lambda spec, progress=None: found)
+    monkeypatch.setattr(kept, "diagnose", lambda spec, progress=None: found)
     opened: list[str] = []
     monkeypatch.setattr("webbrowser.open", opened.append)
     monkeypatch.setattr(sys, "argv", ["sysid", "report", str(found.fit.experiment.folder), "--out", str(tmp_path / "run"), "--json", "--open"])

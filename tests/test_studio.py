@@ -14,22 +14,22 @@ from dataclasses import replace
 
 import anyio
 import httpx
-import numpy as np
 import pytest
 
 from sysid import loop
 from sysid.diagnose.diagnosis import diagnose
 from sysid.effect import vocabulary
 from sysid.errors import SysidError
-from sysid.failures import HeldOut
-from sysid.studio import desk, guard, page, views
+from sysid.statement.document import document
+from sysid.studio import cache, history, page, security
 from sysid.studio.app import application
-from sysid.studio.bench import Bench
-from sysid.studio.desk import Desk, hashed
+from sysid.studio.diagnosed import Diagnosed
+from sysid.studio.experiments import Experiments, beside
+from sysid.studio.history import History, hashed
+from sysid.studio.jobs import Cancelled, Job, Worker
 from sysid.studio.serve import serve
-from sysid.studio.shelf import Shelf, beside
-from sysid.studio.view import View
-from sysid.studio.work import Cancelled, Job, Worker
+from sysid.studio.session import Session
+from sysid.studio.workspace import Workspace
 from tests.test_report import EVIL, Elements, parse_errors, written
 
 PORT, CSRF = 8765, "of-this-start"
@@ -56,22 +56,23 @@ def arm(tmp_path_factory):
     folder = rippled(tmp_path_factory.mktemp("studio") / "arm")
     experiment = loop.pipeline.load(folder)
     found = diagnose(experiment)
-    return folder, View(hashed((folder / "config.yaml").read_text()), found.fit, found)
+    return folder, Diagnosed(hashed((folder / "config.yaml").read_text()), found.fit, json.loads(json.dumps(document(found))))
 
 
-def told(bench, job, text, view):
+def told(session, job, text, view):
     """What a job finds, from a diagnosis made before."""
     own = copy.copy(view)
-    own.sha, own._charts, own.fit = hashed(text), dict(view._charts), replace(view.fit, experiment=bench.desk.experiment(text))
+    own.sha, own._charts, own.fit = hashed(text), dict(view._charts), replace(view.fit, experiment=session.history.experiment(text))
+    own.workspace = Workspace(own.fit)
     job.tell("compress", 0.5)
-    bench.keep(views.key(hashed(text), bench.desk.experiment(text)), text, own)
+    session.keep(cache.key(hashed(text), session.history.experiment(text)), text, own)
 
 
 @pytest.fixture
 def opened(arm, tmp_path, monkeypatch):
-    """A studio on a copy of the folder whose jobs are done at once: (bench, client, post, file)."""
+    """A studio on a copy of the folder whose jobs are done at once: (session, client, post, file)."""
     folder = shutil.copytree(arm[0], tmp_path / "arm")
-    monkeypatch.setattr(Bench, "_work", lambda self, job, text: told(self, job, text, arm[1]))
+    monkeypatch.setattr(Session, "_work", lambda self, job, text: told(self, job, text, arm[1]))
     return studio(folder, tmp_path / "run")
 
 
@@ -99,9 +100,9 @@ class TestClient:
 class studio:
     def __init__(self, folder, run, **more):
         self.file, self.run = folder / "config.yaml", run
-        self.bench = Bench(folder, run)
-        self.client = TestClient(application(self.bench, port=PORT, csrf=CSRF, **more), base_url=HOME)
-        self.bench.run()
+        self.session = Session(folder, run)
+        self.client = TestClient(application(self.session, port=PORT, csrf=CSRF, **more), base_url=HOME)
+        self.session.run()
         self.wait()
 
     def get(self, path, **words):
@@ -158,10 +159,10 @@ def test_all_steps_that_are_named_are_one_change(arm, tmp_path):
     before = (folder / "config.yaml").read_bytes()
     own = studio(folder, tmp_path / "run")
     state = own.wait()
-    view = own.bench.view(state["sha"])
-    named = [view.diagnosis.findings[k].effect for _, k in view.offered()]
+    view = own.session.diagnosed(state["sha"])
+    named = [view.said["findings"][k]["effect"] for _, k in view.offered()]
     added = own.post("/api/add", sha=state["sha"], steps=True).json()
-    model = own.bench.desk.experiment(own.file.read_text()).model
+    model = own.session.history.experiment(own.file.read_text()).model
     assert named and set(named) <= {e.name for e in model.effects} and added["undo"] == ", ".join(named)
     state = own.post("/api/undo", sha=added["sha"]).json()
     assert own.file.read_bytes() == before and own.wait()
@@ -173,16 +174,16 @@ def test_all_steps_that_are_named_are_one_change(arm, tmp_path):
 def test_charts_are_answered_before_the_diagnosis(arm, tmp_path, monkeypatch):
     """A fit can be looked at from all sides while its diagnosis is at work."""
     begun, go_on = threading.Event(), threading.Event()
-    from sysid.studio import bench
+    from sysid.studio import session
 
     def waiting(*args, **more):
         begun.set()
         assert go_on.wait(60.0)
         return diagnose(*args, **more)
 
-    monkeypatch.setattr(bench, "diagnose", waiting)
+    monkeypatch.setattr(session, "diagnose", waiting)
     folder = shutil.copytree(arm[0], tmp_path / "arm")
-    client_of = Bench(folder, tmp_path / "run")
+    client_of = Session(folder, tmp_path / "run")
     client = TestClient(application(client_of, port=PORT, csrf=CSRF), base_url=HOME)
     client_of.run()
     assert begun.wait(60.0)
@@ -197,7 +198,7 @@ def test_charts_are_answered_before_the_diagnosis(arm, tmp_path, monkeypatch):
     assert client.get("/api/film", params=asked).json()["names"] == [EVIL, "elbow"]
     assert client.get("/export/rows.csv", params=asked).text.startswith("log,t [s],measured")
     assert client.get("/api/window", params={**asked, "part": "both"}).status_code == 422
-    assert client.get("/api/window", params={**asked, "before": 5}).status_code == 422
+    assert client.get("/api/window", params={**asked, "beside": "step:5"}).status_code == 422
     go_on.set()
 
 
@@ -282,7 +283,7 @@ def test_many_tabs_at_once_make_one_change(opened):
         thread.join()
     assert sorted(answers) == [200] + [409] * 5
     assert opened.file.read_text().count("sin(") == 1
-    opened.bench.desk.experiment(opened.file.read_text())
+    opened.session.history.experiment(opened.file.read_text())
 
 
 # ---- what is refused, with the file as it was
@@ -306,7 +307,7 @@ def test_bad_additions_say_so_in_one_line(opened, body, words):
 
 def test_a_formula_goes_into_the_file(opened):
     opened.post("/api/add", sha=opened.sha, formula="a*sin(3*q)", joint="elbow")
-    (entry,) = [e for e in opened.bench.desk.experiment(opened.file.read_text()).model.effects if e.name == "formula"]
+    (entry,) = [e for e in opened.session.history.experiment(opened.file.read_text()).model.effects if e.name == "formula"]
     assert entry.options["formula"] == "a*sin(3*q)" and entry.joints == ["elbow"]
     assert opened.wait()["undo"] == "a*sin(3*q) on elbow"
 
@@ -318,7 +319,7 @@ def test_an_effect_that_is_no_suspect_goes_into_the_file(opened):
     opened.wait()
     opened.post("/api/add", sha=opened.sha, effect="gravity_tilt", joint=None)
     opened.wait()
-    *_, drag, tilt = opened.bench.desk.experiment(opened.file.read_text()).model.effects
+    *_, drag, tilt = opened.session.history.experiment(opened.file.read_text()).model.effects
     assert (drag.name, drag.joints) == ("quadratic_drag", ["elbow"]) and (tilt.name, tilt.joints) == ("gravity_tilt", None)
     said = opened.post("/api/add", sha=opened.sha, effect="quadratic_drag", joint="elbow").json()["error"]
     assert said.startswith("quadratic_drag is in the model already on elbow") and "config.yaml" not in said
@@ -326,7 +327,7 @@ def test_an_effect_that_is_no_suspect_goes_into_the_file(opened):
 
 def test_the_state_is_answered_while_an_addition_is_checked(opened, monkeypatch):
     built, checked = threading.Event(), threading.Event()
-    monkeypatch.setattr(desk.pipeline, "build", lambda experiment: (checked.set(), built.wait(10)))
+    monkeypatch.setattr(history.pipeline, "build", lambda experiment: (checked.set(), built.wait(10)))
     sha = opened.sha
     thread = threading.Thread(target=lambda: opened.post("/api/add", sha=sha, effect="armature", joint="elbow"))
     thread.start()
@@ -340,14 +341,14 @@ def test_the_state_is_answered_while_an_addition_is_checked(opened, monkeypatch)
 
 def test_while_it_works_the_state_needs_no_file_and_yet_hears_of_edits(opened, monkeypatch):
     go = threading.Event()
-    monkeypatch.setattr(Bench, "_work", lambda self, job, text: (job.tell("compress", 0.5), go.wait(20)))
+    monkeypatch.setattr(Session, "_work", lambda self, job, text: (job.tell("compress", 0.5), go.wait(20)))
     sha = opened.post("/api/add", sha=opened.sha, effect="armature", joint="elbow").json()["sha"]
-    reads, read = [], desk.Desk.text
-    monkeypatch.setattr(desk.Desk, "text", lambda self: (reads.append(threading.current_thread()), read(self))[1])
+    reads, read = [], history.History.text
+    monkeypatch.setattr(history.History, "text", lambda self: (reads.append(threading.current_thread()), read(self))[1])
     waiting = []
-    found = opened.bench.glance(waiting.append)
+    found = opened.session.glance(waiting.append)
     assert found["sha"] == sha and found["job"]["state"] == "running" and not reads and len(waiting) == 1
-    assert opened.bench.glance(waiting.append) == found and len(waiting) == 1  # one look at a time
+    assert opened.session.glance(waiting.append) == found and len(waiting) == 1  # one look at a time
     waiting[0]()
     opened.file.write_text(opened.file.read_text() + "# by hand\n")
     end = time.monotonic() + 10
@@ -360,12 +361,12 @@ def test_while_it_works_the_state_needs_no_file_and_yet_hears_of_edits(opened, m
 
 def test_a_job_that_ends_while_it_is_asked_for_is_not_done_with_nothing_ready(opened, monkeypatch):
     go = threading.Event()
-    monkeypatch.setattr(Bench, "_work", lambda self, job, text: (job.tell("compress", 0.5), go.wait(20)))
+    monkeypatch.setattr(Session, "_work", lambda self, job, text: (job.tell("compress", 0.5), go.wait(20)))
     opened.post("/api/add", sha=opened.sha, effect="armature", joint="elbow")
-    assert opened.bench.glance(lambda look: None)["job"]["state"] == "running"
+    assert opened.session.glance(lambda look: None)["job"]["state"] == "running"
     said = Job.document
     monkeypatch.setattr(Job, "document", lambda self: (setattr(self, "state", "done"), said(self))[1])
-    assert opened.bench.glance(lambda look: None) is None
+    assert opened.session.glance(lambda look: None) is None
     go.set()
 
 
@@ -373,35 +374,35 @@ def test_a_job_that_ends_while_it_is_asked_for_is_not_done_with_nothing_ready(op
 
 
 @pytest.fixture
-def shelf(arm, tmp_path, monkeypatch):
+def experiments(arm, tmp_path, monkeypatch):
     """Two folders with the same experiment file and one file beside them, and requests to the studio on all."""
     for name in ("one", "two"):
         shutil.copytree(arm[0], tmp_path / "all" / name)
     (tmp_path / "all" / "lone.yml").write_text((arm[0] / "config.yaml").read_text())
     (tmp_path / "all" / "notes.yaml").write_text("shopping: [milk]\n")
-    monkeypatch.setattr(Bench, "_work", lambda self, job, text: told(self, job, text, arm[1]))
-    own = Shelf(beside(tmp_path / "all" / "config.yaml"), tmp_path / "run")
+    monkeypatch.setattr(Session, "_work", lambda self, job, text: told(self, job, text, arm[1]))
+    own = Experiments(beside(tmp_path / "all" / "config.yaml"), tmp_path / "run")
     own.folder, own.client = tmp_path / "all", TestClient(application(own, port=PORT, csrf=CSRF))
     return own
 
 
-def test_a_folder_offers_its_experiments(shelf):
-    assert shelf.names == ["lone", "one", "two"]
-    for number, name in enumerate(shelf.names):
-        shown = shelf.client.get(f"/{number}/").text
+def test_a_folder_offers_its_experiments(experiments):
+    assert experiments.names == ["lone", "one", "two"]
+    for number, name in enumerate(experiments.names):
+        shown = experiments.client.get(f"/{number}/").text
         assert f"<h1>{name}</h1>" in shown and [a["href"] for tag, a in Elements(shown).found if tag == "a" and a.get("href", "").endswith("/")] == ["/0/", "/1/", "/2/"]
-        assert shelf.client.get(f"/{number}/api/state").json()["name"] == name
-    assert shelf.client.get("/api/state").json()["name"] == "lone" and shelf.client.get("/2").status_code == 200
+        assert experiments.client.get(f"/{number}/api/state").json()["name"] == name
+    assert experiments.client.get("/api/state").json()["name"] == "lone" and experiments.client.get("/2").status_code == 200
     for path in ("/3/", "/-1/", "/99999999999999999999/api/state", "/one/", "/../notes.yaml", "/1/../../notes.yaml"):
-        assert shelf.client.get(path).status_code == 404, path
-    assert beside(shelf.folder / "one" / "config.yaml") == [shelf.folder / "one" / "config.yaml"]
-    assert beside(shelf.folder / "lone.yml") == [shelf.folder / "lone.yml"]
-    assert beside(shelf.folder / "nothing.yaml") == [shelf.folder / "nothing.yaml"]
+        assert experiments.client.get(path).status_code == 404, path
+    assert beside(experiments.folder / "one" / "config.yaml") == [experiments.folder / "one" / "config.yaml"]
+    assert beside(experiments.folder / "lone.yml") == [experiments.folder / "lone.yml"]
+    assert beside(experiments.folder / "nothing.yaml") == [experiments.folder / "nothing.yaml"]
 
 
-def test_experiments_with_the_same_text_are_kept_apart(shelf):
-    post = lambda number, act, **body: shelf.client.post(f"/{number}/api/{act}", json=body, headers={"x-sysid-csrf": CSRF}).json()  # noqa: E731
-    state = lambda number: shelf.client.get(f"/{number}/api/state").json()  # noqa: E731
+def test_experiments_with_the_same_text_are_kept_apart(experiments):
+    post = lambda number, act, **body: experiments.client.post(f"/{number}/api/{act}", json=body, headers={"x-sysid-csrf": CSRF}).json()  # noqa: E731
+    state = lambda number: experiments.client.get(f"/{number}/api/state").json()  # noqa: E731
     sha = state(1)["sha"]
     assert state(2)["sha"] == sha
     post(1, "run")
@@ -409,10 +410,10 @@ def test_experiments_with_the_same_text_are_kept_apart(shelf):
     while not state(1)["ready"] and time.monotonic() < end:
         time.sleep(0.02)
     assert state(1)["ready"] and not state(2)["ready"]
-    before = (shelf.folder / "two" / "config.yaml").read_text()
+    before = (experiments.folder / "two" / "config.yaml").read_text()
     post(1, "add", sha=sha, effect="armature", joint="elbow")
-    assert state(1)["undo"] == "armature on elbow" and state(2)["undo"] is None and (shelf.folder / "two" / "config.yaml").read_text() == before
-    assert shelf.bench(1).desk.run != shelf.bench(2).desk.run != shelf.bench(0).desk.run
+    assert state(1)["undo"] == "armature on elbow" and state(2)["undo"] is None and (experiments.folder / "two" / "config.yaml").read_text() == before
+    assert experiments.session(1).history.run != experiments.session(2).history.run != experiments.session(0).history.run
 
 
 def test_an_experiment_of_the_same_name_elsewhere_does_not_undo_into_this_one(opened, arm, tmp_path):
@@ -449,7 +450,7 @@ def test_a_file_that_cannot_be_meant_is_said_on_the_page(opened):
 
 def test_unknown_things_are_not_found(opened):
     sha = opened.sha
-    for path, words in (("view", {"sha": "x"}), ("residual", {"sha": sha, "joint": 9}), ("residual", {"sha": sha, "joint": 0, "finding": 99}), ("residual", {"sha": sha, "joint": "x"}), ("stretch", {"sha": sha, "from": "nan", "to": 1}), ("compare", {"from": 0, "to": 9})):
+    for path, words in (("view", {"sha": "x"}), ("window", {"sha": sha, "joint": 9, "part": "test"}), ("window", {"sha": sha, "joint": "x", "part": "test"}), *(("window", {"sha": sha, "joint": 0, "part": "test", "beside": b}) for b in ("step:9", "step:x", "preview:x", "run:../../etc", "x")), ("cloud", {"sha": sha, "joint": 0, "part": "test", "shown": "preview:x"}), ("cloud", {"sha": sha, "joint": 0, "part": "test", "shown": "run:x"}), ("stretch", {"sha": sha, "from": "nan", "to": 1}), ("compare", {"from": 0, "to": 9})):
         assert opened.get(f"/api/{path}", **words).status_code == 422, path
     assert opened.get("/api/figure", sha=sha, id="../../etc/passwd").status_code == 404
     for path in ("/../pyproject.toml", "/api", "/export/../../x", "/%2e%2e/%2e%2e/etc/passwd", "/studio/undo.json"):
@@ -459,33 +460,144 @@ def test_unknown_things_are_not_found(opened):
 # ---- answers without a refit
 
 
-def test_preview_is_what_the_suspect_removes(arm):
-    _, view = arm
-    looks = view.looks
-    claims = view.diagnosis.claims
-    assert len(view.diagnosis.findings) == sum(len(claim.findings) for claim in claims) >= 1
-    # the first step's head added, the residual is that of the model that it made
-    grown = HeldOut(view.diagnosis.findings[0].member.view.settled, view.diagnosis.first.test)
-    np.testing.assert_allclose(looks.first.residual - looks.removed(0), grown.residual * looks.first.rows.use, atol=1e-9)
-    for k, finding in enumerate(view.diagnosis.findings):
-        own = looks.own(k)
-        assert own == ([0, 1] if finding.joint == "*" else [view.fit.joints.index(finding.joint)])
-        assert (looks.removed(k)[:, own] ** 2).sum() > 0
-    bare, with_one = looks.residual(0), looks.residual(0, 0)
-    assert len(bare["chart"]["figure"]["data"]) == 1 and len(with_one["chart"]["figure"]["data"]) == 2
-    assert with_one["explained"] < 0.7 * with_one["rms"] == 0.7 * bare["rms"]
-    assert with_one["explained"] == pytest.approx(grown.rms()[0])
+def previewed(own, **body):
+    """The hash of a preview, once it is there."""
+    answer = own.post("/api/preview", sha=own.sha, **body).json()
+    end = time.monotonic() + 60.0
+    while time.monotonic() < end:
+        state = own.get("/api/state").json()
+        if any(one["sha"] == answer["preview"] for one in state["previews"]):
+            return answer["preview"]
+        assert state["aside"]["state"] in ("running", "done"), state["aside"]
+        time.sleep(0.02)
+    raise AssertionError("the preview does not come")
 
 
-def test_a_stretch_of_time_names_the_suspect(arm):
-    looks = arm[1].looks
-    whole = looks.stretch(-1.0, 1e6)
-    assert whole["suspects"][0]["effect"] == "cogging" and whole["suspects"][0]["joint"] == EVIL and whole["suspects"][0]["share"] > 0.5
+def test_a_preview_is_the_fit_that_the_addition_gives(opened, monkeypatch):
+    before = opened.file.read_bytes()
+    key = previewed(opened, finding=0)
+    assert opened.file.read_bytes() == before and opened.get("/api/state").json()["undo"] is None
+    asked = {"sha": opened.sha, "joint": 0, "part": "test"}
+    shown = opened.get("/api/window", **asked, shown=f"preview:{key}", beside="now").json()
+    found = opened.get("/api/view", sha=opened.sha).json()
+    said = opened.session.diagnosed(opened.sha).said
+    assert shown["beside"] == said["joints"][EVIL]["rms"]["test"] == opened.get("/api/window", **asked).json()["rms"]
+    assert shown["rms"] == pytest.approx(said["claims"][0]["rms_test_after"][EVIL], rel=1e-9) and shown["laid"]
+    names = [trace["name"] for trace in shown["chart"]["figure"]["data"]]
+    assert {"predicted beside", "residual beside", "difference"} <= set(names) and found["offered"]
+    # what is then added is this very fit, and the text this very text
+    fits = []
+    monkeypatch.setattr(Session, "_work", lambda self, job, text: fits.append(self.aside.previews.fit(hashed(text), cache.key(hashed(text), self.history.experiment(text)))))
+    assert opened.post("/api/add", sha=opened.sha, finding=0).json()["sha"] == key
+    opened.wait()
+    assert fits[0] is opened.session.aside.previews.find(key).fit
+
+
+def test_any_effect_and_any_formula_is_previewed_and_what_cannot_be_is_said(opened):
+    first = previewed(opened, effect="cogging", joint=EVIL, options={"lines": "2"})
+    second = previewed(opened, formula="a*sin(3*q)", joint="elbow")
+    words = {one["sha"]: one["words"] for one in opened.get("/api/state").json()["previews"]}
+    assert words == {first: f"cogging on {EVIL}", second: "a*sin(3*q) on elbow"}
+    for body, said in (({"formula": "import os", "joint": "elbow"}, "formula"), ({"effect": "viscous", "joint": "elbow"}, "already"), ({"effect": "cogging", "joint": "elbow", "options": {"lines": "[many"}}, "lines"), ({"effect": "cogging", "joint": "elbow", "options": {"lines": "many"}}, "lines"), ({"effect": "cogging", "options": 3}, "options")):
+        answer = opened.post("/api/preview", sha=opened.sha, **body)
+        assert answer.status_code == 422 and said in answer.json()["error"], answer.json()
+    assert opened.post("/api/preview", sha="another", finding=0).status_code == 422
+    # options go into the file
+    opened.post("/api/add", sha=opened.sha, effect="cogging", joint="elbow", options={"lines": "2", "k": ""})
+    assert "cogging: {joints: [elbow], lines: 2}" in opened.file.read_text()
+
+
+def test_a_stretch_of_time_names_the_preview_that_takes_it(opened):
+    key = previewed(opened, finding=0)
+    ask = lambda low, high: opened.get("/api/stretch", sha=opened.sha, part="test", **{"from": low, "to": high}).json()  # noqa: E731
+    whole = ask(-1.0, 1e6)
+    assert (first := whole["previews"][0])["sha"] == key and first["joint"] == EVIL and first["share"] > 0.5
     for entry in whole["joints"]:
         assert entry["here"] == pytest.approx(entry["whole"])
-    half = looks.stretch(4.0, 2.0)
+    half = ask(4.0, 2.0)
     assert half["from"] == 2.0 and 0 < half["rows"] < whole["rows"]
-    assert looks.stretch(50.0, 60.0)["rows"] == 0 and looks.stretch(50.0, 60.0)["suspects"] == []
+    assert ask(50.0, 60.0)["rows"] == 0 and ask(50.0, 60.0)["previews"] == []
+
+
+def test_a_stretch_is_masked_on_its_logs_own_clock(opened):
+    before = opened.file.read_text()
+    mask = {"part": "test", "from": 2.0, "to": 3.0, "joint": 1}
+    opened.post("/api/add", sha=opened.sha, mask=mask)
+    state = opened.wait()
+    (own,) = opened.session.history.experiment(opened.file.read_text()).preprocess.mask
+    first = opened.session.workspace(opened.sha).prediction("test").t[0]
+    assert own.log == "test.csv" and own.joints == ["elbow"] and own.start == pytest.approx(2.0 + first, abs=0.006)
+    assert state["undo"].startswith("mask 2.0") and state["undo"].endswith("on elbow")
+    opened.post("/api/add", sha=state["sha"], mask={**mask, "joint": None})
+    assert len(opened.session.history.experiment(opened.file.read_text()).preprocess.mask) == 2
+    state = opened.wait()
+    for wrong in (3, {"part": "both", "from": 0, "to": 1}, {**mask, "from": "x"}, {**mask, "joint": 9}, {**mask, "joint": "x"}, {**mask, "from": 90, "to": 91}):
+        assert opened.post("/api/add", sha=state["sha"], mask=wrong).status_code == 422, wrong
+    state = opened.post("/api/undo", sha=state["sha"]).json()
+    opened.post("/api/undo", sha=state["sha"])
+    assert opened.file.read_text() == before
+
+
+def test_a_motion_is_designed_with_its_files_to_take_along(opened, monkeypatch):
+    from sysid.studio import designs
+
+    asked = []
+
+    def design(experiment, *, separate, duration, processes, progress):
+        asked.append((experiment.name, separate, duration))
+        progress("searching", 0.5)
+        return "found"
+
+    def write(found, folder):
+        folder.mkdir(parents=True)
+        said = {"duration": 20.0, "separates": [{"a": "cogging:elbow", "b": "cable:elbow", "probability": 0.97}], "expected_std": {}}
+        (folder / "design.json").write_text(json.dumps(said))
+        (folder / "trajectory.csv").write_text("t,q\n")
+
+    monkeypatch.setattr(designs.designing, "design", design)
+    monkeypatch.setattr(designs.designing, "write", write)
+    answer = opened.post("/api/design", sha=opened.sha, separate=["cogging:elbow", "payload:*"]).json()
+    end = time.monotonic() + 10
+    while not (found := opened.get("/api/state").json()["designs"]) and time.monotonic() < end:
+        time.sleep(0.02)
+    assert asked == [("arm", [("cogging", "elbow"), ("payload", "*")], 20.0)]
+    assert found == [{"name": answer["design"], "says": "20 s of motion; cogging:elbow and cable:elbow will be told apart with probability 0.97"}]
+    assert answer["design"] == "cogging-elbow-against-payload-robot"
+    assert opened.get("/export/design", name=answer["design"], file="trajectory.csv").text == "t,q\n"
+    for name, file in (("../..", "design.json"), (answer["design"], "../../fit.json"), ("x", "trajectory.csv")):
+        assert opened.get("/export/design", name=name, file=file).status_code == 422
+    for body in ({"separate": "a"}, {"separate": [1]}, {"separate": ["a"]}, {"duration": "x"}):
+        assert opened.post("/api/design", sha=opened.sha, **body).status_code == 422
+
+
+def test_another_run_is_laid_over_this_one(opened):
+    fit = opened.session.diagnosed(opened.sha).fit
+    found = fit.predictions["test"]
+    worse = replace(fit, predictions={**fit.predictions, "test": replace(found, predicted=found.predicted + 0.1)})
+    loop.results.write(worse, opened.run.parent / "other")
+    loop.results.write(fit, opened.run / "steps" / "00-start")
+    assert opened.get("/api/view", sha=opened.sha).json()["runs"] == ["steps/00-start", "other"]
+    asked = {"sha": opened.sha, "joint": 1, "part": "test"}
+    told = opened.get("/api/window", **asked, beside="run:other").json()
+    assert told["laid"] and told["beside"] == pytest.approx(worse.rms("test")["elbow"], rel=1e-12)
+    same = opened.get("/api/window", **asked, beside="run:steps/00-start").json()
+    assert same["beside"] == same["rms"]
+
+
+def test_a_diagnosis_that_stands_is_not_made_again(arm, tmp_path, monkeypatch):
+    from sysid.statement import kept
+    from sysid.studio import session
+
+    folder, count = shutil.copytree(arm[0], tmp_path / "arm"), []
+    monkeypatch.setattr(session, "diagnose", lambda *a, **k: (count.append(1), diagnose(*a, **k))[1])
+    first = studio(folder, tmp_path / "run")
+    said = first.session.diagnosed(first.sha).said
+    again = studio(folder, tmp_path / "run")
+    assert len(count) == 1 and again.session.diagnosed(again.sha).said == said
+    assert kept.found(again.session.history.experiment(again.file.read_text()), again.session.diagnosed(again.sha).fit, tmp_path / "run") == said
+    again.file.write_text(again.file.read_text().replace("weight: 0.01", "weight: 0.02"))
+    studio(folder, tmp_path / "run")
+    assert len(count) == 2
 
 
 # ---- jobs
@@ -523,8 +635,8 @@ def test_shares_of_a_job_only_rise():
 def test_cancel_keeps_the_page_answering_and_the_file_whole(arm, tmp_path):
     folder = shutil.copytree(arm[0], tmp_path / "arm")
     own = studio.__new__(studio)
-    own.file, own.run, own.bench = folder / "config.yaml", tmp_path / "run", Bench(folder, tmp_path / "run")
-    own.client = TestClient(application(own.bench, port=PORT, csrf=CSRF), base_url=HOME)
+    own.file, own.run, own.session = folder / "config.yaml", tmp_path / "run", Session(folder, tmp_path / "run")
+    own.client = TestClient(application(own.session, port=PORT, csrf=CSRF), base_url=HOME)
     before = own.file.read_bytes()
     assert own.post("/api/run").json()["job"]["state"] == "running"
     own.post("/api/cancel")
@@ -536,7 +648,7 @@ def test_cancel_keeps_the_page_answering_and_the_file_whole(arm, tmp_path):
 
 
 def test_a_mistake_of_ours_ends_the_job_not_the_studio(opened, monkeypatch, capsys):
-    monkeypatch.setattr(Bench, "_work", lambda self, job, text: 1 / 0)
+    monkeypatch.setattr(Session, "_work", lambda self, job, text: 1 / 0)
     opened.post("/api/add", sha=opened.sha, effect="stribeck", joint="elbow")
     state = opened.wait()
     assert state["job"]["state"] == "failed" and "ZeroDivisionError" in state["job"]["error"] and state["undo"]
@@ -585,7 +697,7 @@ def test_changes_need_post_json_and_the_header(opened):
 
 
 def test_a_token_is_asked_of_everyone(opened):
-    app = application(opened.bench, host="192.0.2.7", port=PORT, token="geheim", csrf=CSRF)
+    app = application(opened.session, host="192.0.2.7", port=PORT, token="geheim", csrf=CSRF)
     home = f"http://192.0.2.7:{PORT}"
     for path in ("/", "/?token=wrong", "/api/state", "/studio.js", "/api/state?token=geheim"):
         assert TestClient(app, base_url=home).get(path).status_code == 401, path
@@ -602,14 +714,14 @@ def test_a_token_is_asked_of_everyone(opened):
 @pytest.mark.parametrize("token", [None, "", "with space", "semi;colon", "ümlaut"])
 def test_no_address_is_served_to_others_without_a_token(opened, token):
     with pytest.raises((ValueError, SysidError)):
-        application(opened.bench, host="0.0.0.0", port=PORT, token=token)
+        application(opened.session, host="0.0.0.0", port=PORT, token=token)
     if token is not None:
         with pytest.raises(SysidError, match="token"):
             serve(opened.file, host="127.0.0.1", port=0, token=token, out=opened.run)
 
 
 def test_bound_to_every_address_names_of_others_are_refused(opened):
-    app = application(opened.bench, host="0.0.0.0", port=PORT, token="geheim")
+    app = application(opened.session, host="0.0.0.0", port=PORT, token="geheim")
     auth = {"authorization": "Bearer geheim"}
     for host, status in (("192.0.2.7:8765", 200), ("[2001:db8::1]:8765", 200), (f"{socket.gethostname()}:8765", 200), ("evil.example:8765", 403), ("192.0.2.7:80", 403), ("192.0.2.7", 403)):
         assert TestClient(app).get("/api/state", headers={"host": host, **auth}).status_code == status, host
@@ -621,7 +733,7 @@ def test_every_answer_carries_the_policy(opened):
         policy = answer.headers["content-security-policy"]
         assert "default-src 'none'" in policy and "frame-ancestors 'none'" in policy and "script-src 'self' 'unsafe-eval';" in policy and "http:" not in policy
         assert answer.headers["x-content-type-options"] == "nosniff"
-    assert opened.client.get("/", headers={"host": "evil"}).headers["content-security-policy"] == guard.POLICY
+    assert opened.client.get("/", headers={"host": "evil"}).headers["content-security-policy"] == security.POLICY
 
 
 # ---- names are text
@@ -641,7 +753,7 @@ def test_names_show_as_text(opened, arm):
         assert EVIL not in section["html"], name
         assert not [1 for tag, a in Elements(section["html"]).found if tag in ("script", "iframe", "object") or any(k.startswith("on") for k in a)]
     for joint in range(2):
-        chart = opened.get("/api/residual", sha=opened.sha, joint=joint, finding=0)
+        chart = opened.get("/api/window", sha=opened.sha, joint=joint, part="test")
         assert "<b>" not in chart.text and chart.headers["content-type"] == "application/json"
 
 
@@ -694,7 +806,7 @@ def test_the_command_serves_until_interrupted(experiment, tmp_path):
     assert process.returncode == 0 and err == "" and out == ""
 
 
-def test_the_desk_refuses_a_run_folder_that_cannot_be(arm, tmp_path):
+def test_the_history_refuses_a_run_folder_that_cannot_be(arm, tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(SysidError):
-        Desk(arm[0], tmp_path / "file" / "run")
+        History(arm[0], tmp_path / "file" / "run")

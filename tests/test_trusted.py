@@ -107,17 +107,17 @@ def test_who_is_there_is_asked(stranger, tmp_path, answer, status):
 
 def test_the_studio_runs_a_neighbour_s_file_only_where_it_was_allowed(experiment, stranger, cli, monkeypatch):
     from sysid.studio import serve
-    from sysid.studio.shelf import Shelf, beside
+    from sysid.studio.experiments import Experiments, beside
 
     (stranger / "config.yaml").rename(stranger / "theirs.yaml")
     own = stranger / "mine.yaml"
     own.write_text(dump({"robot": {"urdf": "robot.urdf"}}))
     monkeypatch.setattr(serve, "serve", lambda path, **how: None)
     assert cli("studio", own).status == 0 and not (stranger / "ran").exists()
-    shelf = Shelf(beside(own), stranger.parent / "run")
-    theirs = shelf.names.index("theirs")
-    job = shelf.bench(theirs).run()["job"]
-    while (job := shelf.bench(theirs).state()["job"])["state"] == "running":
+    experiments = Experiments(beside(own), stranger.parent / "run")
+    theirs = experiments.names.index("theirs")
+    job = experiments.session(theirs).run()["job"]
+    while (job := experiments.session(theirs).state()["job"])["state"] == "running":
         pass
     assert job["state"] == "failed" and "--trust" in job["error"] and not (stranger / "ran").exists()
     assert cli("studio", own, "--trust").status == 0

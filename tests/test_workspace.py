@@ -59,7 +59,7 @@ def test_the_error_of_a_window_is_that_of_its_rows(arm):
     workspace, found = Workspace(arm), arm.predictions["test"]
     told = workspace.window("test", 1)
     assert told["rms"] == pytest.approx(arm.rms("test")[arm.joints[1]], rel=1e-12)
-    assert told["here"] == told["rms"] and told["before"] is None
+    assert told["here"] == told["rms"] and told["beside"] is None
     t = workspace.line("test")["t"]
     part = workspace.window("test", 1, 1.0, 2.0)
     inside = (t >= 1.0) & (t <= 2.0)
@@ -74,16 +74,22 @@ def test_before_and_after_stand_in_the_same_chart(arm):
     found = arm.predictions["test"]
     worse = replace(found, predicted=found.predicted + 0.1)
     before = Workspace(replace(arm, predictions={**arm.predictions, "test": worse}))
-    told = Workspace(arm).window("test", 0, before=before)
-    assert told["before"] > told["rms"]
-    assert trace(told["chart"], "predicted before") and trace(told["chart"], "residual before")
-    # other rows are not laid over these
-    other = replace(
-        found, **{k: getattr(found, k)[1:] for k in ("t", "log", "measured", "predicted")}
-    )
-    other = replace(other, use=None if found.use is None else found.use[1:])
-    apart = Workspace(replace(arm, predictions={**arm.predictions, "test": other}))
-    assert Workspace(arm).window("test", 0, before=apart)["before"] is None
+    told = Workspace(arm).window("test", 0, beside=before)
+    assert told["beside"] > told["rms"] and told["laid"]
+    assert trace(told["chart"], "predicted beside") and trace(told["chart"], "residual beside")
+    assert trace(told["chart"], "difference")["y"][50] == pytest.approx(-0.1, rel=1e-3)
+    # another filter leaves other edges: the rows of both are laid over each other
+    part = {k: getattr(found, k)[7:-9] for k in ("t", "log", "measured", "predicted")}
+    part["use"] = None if found.use is None else found.use[7:-9]
+    other = Workspace(replace(arm, predictions={**arm.predictions, "test": replace(found, **part)}))
+    told = Workspace(arm).window("test", 0, beside=other)
+    assert told["laid"] and told["beside"] == other.window("test", 0)["rms"]
+    assert trace(told["chart"], "predicted beside")["y"][0] is None
+    # another log is not
+    apart = replace(found, t=found.t + 1e-3)
+    apart = Workspace(replace(arm, predictions={**arm.predictions, "test": apart}))
+    told = Workspace(arm).window("test", 0, beside=apart)
+    assert not told["laid"] and told["beside"] == told["rms"]
 
 
 def test_every_row_of_a_window_as_csv(arm):

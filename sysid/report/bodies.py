@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..diagnose.diagnosis import Diagnosis
 from ..estimate import Fit
 from . import ellipsoids, solids
 from .section import Section
 from .words import number
 
 
-def bodies(fit: Fit, diagnosis: Diagnosis) -> Section:
+def bodies(fit: Fit) -> Section:
     """The bodies as ellipsoids on the robot, at the middle of its motion."""
     robot = fit.model.robot
-    q = [piece.q[piece.core] for piece in diagnosis.view.motion.pieces]
-    middle = (np.min([x.min(0) for x in q], 0) + np.max([x.max(0) for x in q], 0)) / 2
+    states = fit.predictions["train"].states
+    q = np.zeros((1, robot.dof)) if states is None or not len(states.q) else states.q
+    middle = (q.min(0) + q.max(0)) / 2
     placed = solids.frames(robot, middle)
     now, before = solids.solids(robot, fit.pi, placed), solids.solids(robot, fit.prior, placed)
     found, rows = [], []

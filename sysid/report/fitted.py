@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from ..estimate import Fit
-from ..events import WORDS
+from ..events import WORDS, plural
 from . import charts, residual_charts, torque_chart
 from .section import Section
 from .words import SPACE, level, number, percentage, raised, units
@@ -104,8 +104,7 @@ def _event(found: dict) -> dict:
 def _counted(found: list[dict]) -> str:
     """How many events of each kind there are."""
     count = {kind: sum(e["kind"] == kind for e in found) for kind in (e["kind"] for e in found)}
-    said = [f"{n} {WORDS.get(kind, kind)}{'s' if n > 1 else ''}" for kind, n in count.items()]
-    return ", ".join(said)
+    return ", ".join(f"{n} {plural(kind, n)}" for kind, n in count.items())
 
 
 def failures(fit: Fit, document: dict) -> Section:

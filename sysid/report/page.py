@@ -16,7 +16,6 @@ from jinja2.utils import htmlsafe_json_dumps
 from markupsafe import Markup
 
 from .. import results
-from ..diagnose.diagnosis import Diagnosis
 from ..estimate import Fit
 from . import rendering
 from . import sections as parts
@@ -28,13 +27,13 @@ _SHORT = {
 }  # fmt: skip
 
 
-def write(fit: Fit, diagnosis: Diagnosis, document: dict, history: list[dict], path: Path) -> Path:
+def write(fit: Fit, document: dict, history: list[dict], path: Path) -> Path:
     """Write the report of a diagnosed experiment as one HTML file.
 
     Raises:
         SysidError: the file cannot be written.
     """
-    text = page(fit.experiment.name, parts.sections(fit, diagnosis, document, history))
+    text = page(fit.experiment.name, parts.sections(fit, document, history))
     results.write_atomically(path, lambda p: p.write_text(text, encoding="utf-8"))
     return path
 

@@ -15,7 +15,7 @@ from markupsafe import Markup
 
 from .words import pieces
 
-_SCRIPTS = ("theme.js", "time.js", "charts.js", "paper.js")
+_SCRIPTS = ("theme.js", "time.js", "take.js", "charts.js", "paper.js")
 _STYLES = ("theme.css", "page.css", "sections.css", "narrow.css", "paper.css")
 
 

@@ -7,7 +7,6 @@ templates.
 
 from __future__ import annotations
 
-from ..diagnose.diagnosis import Diagnosis
 from ..estimate import Fit
 from .bodies import bodies
 from .detectable import detectable
@@ -20,9 +19,7 @@ from .suspects import suspects
 from .verdict import verdict
 
 
-def sections(
-    fit: Fit, diagnosis: Diagnosis, document: dict, history: list[dict]
-) -> dict[str, dict]:
+def sections(fit: Fit, document: dict, history: list[dict]) -> dict[str, dict]:
     """The sections in the order of the page: {name: {"title", "html", "charts"}}.
 
     Args:
@@ -30,14 +27,14 @@ def sections(
             first; may be empty.
     """
     made: dict[str, Section] = {
-        "verdict": verdict(fit, diagnosis, document),
+        "verdict": verdict(fit, document),
         "torque": torque(fit, document),
-        "steps": steps(fit, diagnosis, document, history),
+        "steps": steps(fit, document, history),
         "failures": failures(fit, document),
-        "suspects": suspects(diagnosis, document),
+        "suspects": suspects(document),
         "detectable": detectable(fit, document),
         "parameters": parameters(fit),
-        "bodies": bodies(fit, diagnosis),
+        "bodies": bodies(fit),
         "provenance": provenance(fit, document),
     }
     return {

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 
-from ..diagnose.diagnosis import Diagnosis
 from ..estimate import Fit
 from .section import Section
 from .staircase import staircase
 from .words import level, plus_minus, raised, units
 
 
-def steps(fit: Fit, diagnosis: Diagnosis, document: dict, history: list[dict]) -> Section:
+def steps(fit: Fit, document: dict, history: list[dict]) -> Section:
     """The held-out error of each joint over the steps, against its noise floor."""
     now = {joint: entry["rms"]["test"] for joint, entry in document["joints"].items()}
     unit = units(fit)
@@ -19,7 +18,7 @@ def steps(fit: Fit, diagnosis: Diagnosis, document: dict, history: list[dict]) -
     done = usable or [{"added": None, "joint": None, "rms_test": now}]
     same = all(_close(done[-1]["rms_test"].get(joint), rms) for joint, rms in now.items())
     begun = all(_close(done[0]["rms_test"].get(joint), rms) for joint, rms in now.items())
-    ahead = _expected(diagnosis) if same else []
+    ahead = _expected(document) if same else []
     every = [_name(s) for s in done] + [f"(+ {word})" for word, _ in ahead]
     axis = _short(every, done, ahead)
     drawn = []
@@ -84,14 +83,15 @@ def _close(a, b) -> bool:
     return a is not None and b is not None and math.isclose(a, b, rel_tol=1e-9)
 
 
-def _expected(diagnosis: Diagnosis) -> list[tuple[str, dict[str, float]]]:
+def _expected(document: dict) -> list[tuple[str, dict[str, float]]]:
     """What comes of the effects that are claimed, added one after another.
 
     Returns:
         [(what is added, {joint: held-out RMS})].
     """
     out = []
-    for claim in diagnosis.claims:
-        where = "" if claim.head.joint == "*" else f" on {claim.head.joint}"
-        out.append((claim.head.effect + where, claim.after.rms("test")))
+    for claim in document["claims"]:
+        head = document["findings"][claim["findings"][0]]
+        where = "" if head["joint"] == "*" else f" on {head['joint']}"
+        out.append((head["effect"] + where, claim["rms_test_after"]))
     return out

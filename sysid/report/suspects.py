@@ -6,30 +6,20 @@ import math
 
 import numpy as np
 
-from ..diagnose.diagnosis import Diagnosis
 from .section import Section
 from .words import chance, known, level, number, percentage, placed
 
 
-def families(diagnosis: Diagnosis) -> list[list[int]]:
-    """Places in the findings, those of each claim together, in its order."""
-    out, at = [], 0
-    for claim in diagnosis.claims:
-        out.append(list(range(at, at + len(claim.findings))))
-        at += len(claim.findings)
-    return out
-
-
-def suspects(diagnosis: Diagnosis, document: dict) -> Section:
+def suspects(document: dict) -> Section:
     """The effects that these logs support, step by step; what is tied in one bracket."""
     found = document["findings"]
     groups = [
         {
-            "words": _step_words(step, claim.set, [found[k] for k in family]),
-            "tied": len(claim.set) > 1,
-            "suspects": [_suspect(k, found[k]) for k in family],
+            "words": _step_words(step, claim["set"], [found[k] for k in claim["findings"]]),
+            "tied": len(claim["set"]) > 1,
+            "suspects": [_suspect(k, found[k]) for k in claim["findings"]],
         }
-        for step, (claim, family) in enumerate(zip(diagnosis.claims, families(diagnosis)), start=1)
+        for step, claim in enumerate(document["claims"], start=1)
     ]
     separate = {f["separate_by"]: None for f in found if f["tied_with"] and f["separate_by"]}
     refused = [(placed(r["effect"], r["joint"]), r["why"]) for r in document["not_claimed"]]
@@ -42,7 +32,11 @@ def _step_words(step: int, tied, findings: list[dict]) -> str:
     if len(tied) > 1:
         words += f": these {len(tied)} are tied, the logs cannot tell them apart"
     listed = {(f["effect"], f["joint"]) for f in findings}
-    rest = [f"{placed(e, j)} ({chance(p)})" for e, j, p in tied if (e, j) not in listed]
+    rest = [
+        f"{placed(one['effect'], one['joint'])} ({chance(one['probability'])})"
+        for one in tied
+        if (one["effect"], one["joint"]) not in listed
+    ]
     return words + (f". Not fitted here: {', '.join(rest)}" if rest else "")
 
 

@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-import math
-
-from ..diagnose.diagnosis import Diagnosis
-from ..effect import describe
+from ..addition import apart, designs
 from ..estimate import Fit, given_shapes, said_of_shapes
-from ..statement.text import designs
 from ..statement.words import followed, percent
 from .section import Section
 from .words import (
@@ -39,7 +35,7 @@ _LEAD = {
 }
 
 
-def verdict(fit: Fit, diagnosis: Diagnosis, document: dict) -> Section:
+def verdict(fit: Fit, document: dict) -> Section:
     """What the diagnosis says of each joint, in words."""
     proven = "proven" if fit.certificate.globally_optimal else "not proven"
     given = given_shapes(fit)
@@ -48,11 +44,12 @@ def verdict(fit: Fit, diagnosis: Diagnosis, document: dict) -> Section:
         proof += f" {'. '.join(said)}."
     values = {
         "lead": _lead(document),
-        "cards": [_card(found, fit, diagnosis, document) for found in document["verdict"]],
+        "cards": [_card(found, fit, document) for found in document["verdict"]],
         "converged": fit.solution.converged,
         "proof": proof,
         "consistent": fit.physically_consistent,
         "notices": document["notices"],
+        "made": document.get("made", ""),
     }
     return Section("Verdict", "verdict", values)
 
@@ -71,7 +68,7 @@ def _lead(document: dict) -> str:
     return lead[0].upper() + lead[1:]
 
 
-def _card(found: dict, fit: Fit, diagnosis: Diagnosis, document: dict) -> dict:
+def _card(found: dict, fit: Fit, document: dict) -> dict:
     """One joint: its status, the parts of the sentences on it, its figures."""
     joint, status = found["joint"], found["status"]
     entry = document["joints"][joint]
@@ -81,14 +78,16 @@ def _card(found: dict, fit: Fit, diagnosis: Diagnosis, document: dict) -> dict:
     if floor is not None:
         stands = f"{plus_minus(floor, entry['noise_floor_se'])}{SPACE}{force}{ratio}"
     commands = found.get("commands", [])
-    heads = [c for command in commands for c in diagnosis.claims if c.head.command == command]
-    names = [placed(c.head.effect, c.head.joint, joint) for c in heads]
+    findings, claims = document["findings"], document["claims"]
+    told = [(findings[c["findings"][0]], c["set"]) for c in claims]
+    heads = [one for command in commands for one in told if one[0]["command"] == command]
+    names = [placed(head["effect"], head["joint"], joint) for head, _ in heads]
     if status == "explained":
         names = [placed(c["effect"], c["joint"]) for c in found["by"]]
     fall = ""
-    if status in ("explained", "missing") or (status == "unresolved" and diagnosis.claims):
-        fall = _fall(found, diagnosis, document)
-    several = len(diagnosis.claims) > 1
+    if status in ("explained", "missing") or (status == "unresolved" and claims):
+        fall = _fall(found, fit, document)
+    several = len(claims) > 1
     says = found.get("says") or ""
     return {
         "joint": joint,
@@ -97,9 +96,9 @@ def _card(found: dict, fit: Fit, diagnosis: Diagnosis, document: dict) -> dict:
         "said": _SAID[status],
         "names": names,
         "effect": found.get("effect", ""),
-        "claims": [_claim(c, joint, several, document) for c in heads],
+        "claims": [_claim(*one, joint, several) for one in heads],
         "fall": fall,
-        "left": left_words(found, diagnosis.fit),
+        "left": left_words(found, fit),
         "says": says[:1].upper() + says[1:],
         "commands": commands,
         "error": f"{level(error)}{SPACE}{force}",
@@ -107,16 +106,14 @@ def _card(found: dict, fit: Fit, diagnosis: Diagnosis, document: dict) -> dict:
     }
 
 
-def _fall(found: dict, diagnosis: Diagnosis, document: dict) -> str:
+def _fall(found: dict, fit: Fit, document: dict) -> str:
     """What the held-out error does with all that is claimed, and the share of the misfit."""
     joint = found["joint"]
-    entry, last = (
-        document["joints"][joint],
-        diagnosis.claims[-1].after if diagnosis.claims else diagnosis.fit,
-    )
-    force = raised(units(diagnosis.fit)[joint][0])
-    it = "With it" if len(diagnosis.claims) == 1 else "With all that is named"
-    error, then = level(entry["rms"]["test"]), level(last.rms("test")[joint])
+    entry, claims = document["joints"][joint], document["claims"]
+    last = claims[-1]["rms_test_after"] if claims else fit.rms("test")
+    force = raised(units(fit)[joint][0])
+    it = "With it" if len(claims) == 1 else "With all that is named"
+    error, then = level(entry["rms"]["test"]), level(last[joint])
     fall = f"the held-out error goes from {error} to {then}{SPACE}{force}"
     if entry["noise_floor"] is None or found.get("explained") is None:
         return f"{it} {fall}"
@@ -129,29 +126,30 @@ def _share(value: float) -> str:
     return percent(max(value, 0.0)).replace(" ", SPACE)
 
 
-def _claim(claim, joint: str, several: bool, document: dict) -> dict:
+def _claim(head: dict, tied: list[dict], joint: str, several: bool) -> dict:
     """One effect that is named: what it takes and is, its parameters, what is tied with it."""
-    head = claim.head
     values = [
-        known(name, value, std, unit)
-        for name, (value, std, unit) in head.parameters.items()
-        if math.isfinite(value)
+        known(name, p["value"], p["std"], p["unit"])
+        for name, p in head["parameters"].items()
+        if p["value"] is not None
     ]
+    effect = head["effect"], head["joint"]
     takes = ""
     if several:
-        found = next(f for f in document["findings"] if f["command"] == head.command)
-        where = "" if head.joint == joint else " on all joints"
-        takes = f"It takes {_share(found['misfit_removed'])} of what was left{where}"
-    summary = describe(head.candidate.effect)["summary"].replace("`", "").split(". ")[0].rstrip(".")
-    others = [(e, j, p) for e, j, p in claim.set if (e, j) != (head.effect, head.joint)]
+        where = "" if head["joint"] == joint else " on all joints"
+        takes = f"It takes {_share(head['misfit_removed'])} of what was left{where}"
+    summary = head["summary"].replace("`", "").split(". ")[0].rstrip(".")
+    every = [(one["effect"], one["joint"], one["probability"]) for one in tied]
+    others = [one for one in every if one[:2] != effect]
     return {
-        "effect": head.effect,
+        "effect": head["effect"],
         "figures": ": ".join(part for part in (takes, ", ".join(values)) if part),
         "summary": summary,
-        "probability": chance(head.probability),
-        "others": [f"{placed(e, j, head.joint)}{SPACE}({chance(p)})" for e, j, p in others],
-        "separate_by": head.candidate.effect.separate_by,
-        "design": designs(head.command, (head.effect, head.joint), others) if others else "",
+        "probability": chance(head["probability"]),
+        "others": [f"{placed(e, j, head['joint'])}{SPACE}({chance(p)})" for e, j, p in others],
+        "separate_by": head["separate_by"],
+        "design": designs(head["command"], effect, others) if others else "",
+        "separate": ",".join(apart(effect, others)) if others else "",
     }
 
 

@@ -6,6 +6,7 @@ import math
 import re
 
 from ..estimate import Fit
+from ..filters import settled
 
 SPACE = "\u00a0"  # between a number and what belongs to it: no line ends there
 
@@ -86,6 +87,16 @@ def units(fit: Fit) -> dict[str, tuple[str, str]]:
         joint: ("N", "m") if slides else ("N m", "rad")
         for joint, slides in zip(fit.joints, fit.model.robot.prismatic)
     }
+
+
+def band(fit: Fit) -> str:
+    """What the torque of a fit's errors went through, on both sides: the band that they are of."""
+    spec = settled(fit.experiment.preprocess, fit.filters)
+    if spec.torque == "low-pass" and spec.filter != "none":
+        return f"torque under a low-pass of {number(spec.cutoff, 3)}{SPACE}Hz"
+    if spec.torque == "same" and spec.filter != "none":
+        return "torque through the angles' filter"
+    return "torque as logged"
 
 
 def percentage(share, se=None) -> str:

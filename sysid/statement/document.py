@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..diagnose.claims import Claim
 from ..diagnose.diagnosis import Diagnosis
-from ..diagnose.findings import Finding
 from ..diagnose.verdict import Verdict
 from ..flexible import Unknown
 from ..model import ROBOT
 from ..results import number, versions
+from .claims import chances, claims, finding
 
 
 def document(found: Diagnosis, run="") -> dict:
@@ -26,7 +25,8 @@ def document(found: Diagnosis, run="") -> dict:
             }
             for v in found.verdict
         },
-        "findings": [_finding(f, claim, found) for claim in found.claims for f in claim.findings],
+        "findings": [finding(f, claim, found) for claim in found.claims for f in claim.findings],
+        "claims": list(claims(found)),
         "verdict": [_verdict(v) for v in found.verdict],
         "detectable": [
             {
@@ -111,37 +111,6 @@ def _floor(floor) -> dict:
     }
 
 
-def _finding(f: Finding, claim: Claim, found: Diagnosis) -> dict:
-    before, after = f.rms_before**2, f.rms_after**2
-    names = found.fit.joints if f.joint == "*" else [f.joint]
-    levels = [found.floors[j].rms for j in names]
-    floor = (
-        np.mean([level**2 for level in levels])
-        if None not in levels
-        else min(after, claim.after_square(names))
-    )
-    misfit = max(before - floor, abs(before - after), 1e-9 * before, 1e-300)
-    return {
-        "effect": f.effect,
-        "joint": f.joint,
-        "options": dict(f.candidate.options),
-        "probability": f.probability,
-        "q_value": f.p,
-        "rms_test_before": f.rms_before,
-        "rms_test_after": f.rms_after,
-        "misfit_removed": float((before - after) / misfit),
-        "misfit_removed_se": number(2.0 * f.rms_after * f.fall_se / misfit),
-        "parameters": {
-            name: {"value": number(v), "std": number(s), "unit": u}
-            for name, (v, s, u) in f.parameters.items()
-        },
-        "tied_with": list(f.tied_with),
-        "separate_by": f.candidate.effect.separate_by,
-        "command": f.command,
-        "joins_as_step": None if f.step is None else f.step + 1,
-    }
-
-
 def _verdict(v: Verdict) -> dict:
     out: dict = {"joint": v.joint, "status": v.status}
     if v.status in ("missing", "unknown") and v.claims:
@@ -150,7 +119,7 @@ def _verdict(v: Verdict) -> dict:
             "effect": first.head.effect,
             "tied_with": list(first.head.tied_with),
             "command": first.head.command,
-            "set": [{"effect": e, "joint": j, "probability": p} for e, j, p in first.set],
+            "set": chances(first),
             "explained": number(v.explained),
         }
         also = [c.head.effect for c in v.claims[1:]]

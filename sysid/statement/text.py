@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import shlex
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from ..addition import designs
 from .words import followed, listed, percent, placed, quantity, valued, wrapped
 
 if TYPE_CHECKING:
@@ -120,15 +120,6 @@ def _head(f: dict, of: Told, joint: str, width: int, said: dict[str, str]) -> li
         out += wrapped(f"  to separate them: {f['separate_by']}; or the motion of", width, "    ")
         out.append(designs(f["command"], (f["effect"], f["joint"]), others))
     return [*out, "  add it with", f["command"]]
-
-
-def designs(added: str, head: tuple[str, str], others) -> str:
-    """What is typed for a motion that separates an effect (effect, joint), which the command
-    `added` adds, from those it is not told from: (effect, joint, probability)."""
-    likely = [(e, j) for e, j, p in others if p >= 0.01] or [others[0][:2]]  # others: "less than"
-    suspects = ",".join(f"{e}:{j}" for e, j in (head, *likely))
-    target = shlex.split(added)[2]
-    return shlex.join(["sysid", "design", target, "--separate", suspects, "--out", "next"])
 
 
 def _options(f: dict) -> str:

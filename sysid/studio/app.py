@@ -13,24 +13,24 @@ from starlette.responses import Response
 from starlette.routing import Route
 
 from ..errors import SysidError
-from . import page
-from .bench import Bench
-from .desk import Changed
-from .guard import Guard
-from .shelf import Absent, Shelf
-from .view import dumped
+from . import designs, page
+from .diagnosed import dumped
+from .experiments import Absent, Experiments
+from .history import Changed
+from .security import Guard
+from .session import Session
 
 _CHANGED = 409
 
 
-def application(shelf: Shelf | Bench, *, host: str = "127.0.0.1", port: int = 8765, token: str | None = None, csrf: str | None = None) -> Guard:
-    """The ASGI application on the experiments of a shelf, behind its guard: the first at `/`, each at `/NUMBER/`."""
-    shelf = shelf if isinstance(shelf, Shelf) else Shelf.of(shelf)
+def application(experiments: Experiments | Session, *, host: str = "127.0.0.1", port: int = 8765, token: str | None = None, csrf: str | None = None) -> Guard:
+    """The ASGI application on several experiments, behind its guard: the first at `/`, each at `/NUMBER/`."""
+    experiments = experiments if isinstance(experiments, Experiments) else Experiments.of(experiments)
     app = Starlette()
     guard = Guard(app, host=host, port=port, token=token, csrf=csrf)
 
-    def at(request: Request) -> Bench:
-        return shelf.bench(request.path_params.get("number", 0))
+    def at(request: Request) -> Session:
+        return experiments.session(request.path_params.get("number", 0))
 
     def routed(path: str, endpoint, method: str) -> None:
         for place in (path, "/{number:int}" + path):
@@ -43,8 +43,8 @@ def application(shelf: Shelf | Bench, *, host: str = "127.0.0.1", port: int = 87
         routed(path, endpoint, "GET")
 
     async def state(request: Request) -> Response:
-        bench = shelf.opened(request.path_params.get("number", 0))
-        glanced = bench and bench.glance(lambda look: asyncio.get_running_loop().run_in_executor(None, look))
+        session = experiments.opened(request.path_params.get("number", 0))
+        glanced = session and session.glance(lambda look: asyncio.get_running_loop().run_in_executor(None, look))
         return _json(glanced) if glanced else await run_in_threadpool(_said, lambda: _json(at(request).state()))
 
     def changing(path: str, act) -> None:
@@ -62,63 +62,65 @@ def application(shelf: Shelf | Bench, *, host: str = "127.0.0.1", port: int = 87
     def own(path: str, answer) -> None:
         reading(path, lambda r: answer(at(r), r))
 
-    own("/", lambda bench, r: _text(page.shell(bench.desk.name, guard.csrf, shelf.names, r.path_params.get("number", 0)), "text/html"))
+    own("/", lambda session, r: _text(page.shell(session.history.name, guard.csrf, experiments.names, r.path_params.get("number", 0)), "text/html"))
     reading("/studio.js", lambda r: _text(page.script(), "text/javascript"))
     reading("/studio.css", lambda r: _text(page.style(), "text/css"))
     reading("/plotly.js", lambda r: Response(page.engine(), media_type="text/javascript", headers={"cache-control": "private, max-age=3600"}))
     routed("/api/state", state, "GET")
-    own("/api/view", lambda bench, r: _json(bench.page(_word(r, "sha"))))
+    own("/api/view", lambda session, r: _json(session.page(_word(r, "sha"))))
     own("/api/figure", _figure)
-    own("/api/residual", lambda bench, r: _json(bench.view(_word(r, "sha")).looks.residual(_whole(r, "joint"), _whole(r, "finding") if "finding" in r.query_params else None)))
-    own("/api/stretch", lambda bench, r: _json(bench.view(_word(r, "sha")).looks.stretch(_number(r, "from"), _number(r, "to"))))
-    own("/api/fitted", lambda bench, r: _json(bench.fitted(_word(r, "sha"))))
+    own("/api/stretch", _stretch)
+    own("/api/fitted", lambda session, r: _json(session.fitted(_word(r, "sha"))))
     own("/api/window", _window)
-    own("/api/cloud", lambda bench, r: _json(bench.workspace(_word(r, "sha")).cloud(_word(r, "part"), _whole(r, "joint"))))
-    own("/api/film", lambda bench, r: _json(bench.workspace(_word(r, "sha")).film(_word(r, "part"))))
+    own("/api/cloud", lambda session, r: _json(_seen(session, r).cloud(_word(r, "part"), _whole(r, "joint"))))
+    own("/api/film", lambda session, r: _json(_seen(session, r).film(_word(r, "part"))))
     own("/export/rows.csv", _window_csv)
-    own("/api/compare", lambda bench, r: _json(bench.compare(_whole(r, "from"), _whole(r, "to"))))
-    own("/export/report.html", lambda bench, r: _file(bench.report(_word(r, "sha")), "text/html", f"{bench.desk.name}.html"))
-    own("/export/experiment.yaml", lambda bench, r: _file(bench.desk.text(), "application/yaml", f"{bench.desk.name}.yaml"))
-    changing("/api/run", lambda bench, b: bench.run(_given(b, "sha", optional=True)))
-    changing("/api/cancel", lambda bench, b: bench.cancel())
-    changing("/api/undo", lambda bench, b: bench.undo(_given(b, "sha")))
-    changing("/api/redo", lambda bench, b: bench.redo(_given(b, "sha")))
-    changing("/api/add", _add)
+    own("/export/design", _design)
+    own("/api/compare", lambda session, r: _json(session.compare(_whole(r, "from"), _whole(r, "to"))))
+    own("/export/report.html", lambda session, r: _file(session.report(_word(r, "sha")), "text/html", f"{session.history.name}.html"))
+    own("/export/experiment.yaml", lambda session, r: _file(session.history.text(), "application/yaml", f"{session.history.name}.yaml"))
+    changing("/api/run", lambda session, b: session.run(_given(b, "sha", optional=True)))
+    changing("/api/cancel", lambda session, b: session.cancel())
+    changing("/api/undo", lambda session, b: session.undo(_given(b, "sha")))
+    changing("/api/redo", lambda session, b: session.redo(_given(b, "sha")))
+    changing("/api/add", lambda session, b: session.add(_given(b, "sha"), b))
+    changing("/api/preview", lambda session, b: session.preview(_given(b, "sha"), b))
+    changing("/api/design", lambda session, b: session.design(_given(b, "sha"), b.get("separate"), b.get("duration", 20.0)))
     return guard
 
 
-def _add(bench: Bench, body: dict) -> dict:
-    sha = _given(body, "sha")
-    if "finding" in body:
-        number = body["finding"]
-        if isinstance(number, bool) or not isinstance(number, int):
-            raise SysidError("finding must be a number")
-        return bench.add_finding(sha, number)
-    if body.get("steps") is True:
-        return bench.add_steps(sha)
-    joint = _given(body, "joint", optional=True)
-    if "formula" in body:
-        return bench.add_formula(sha, _given(body, "formula"), joint)
-    return bench.add_effect(sha, _given(body, "effect"), joint)
-
-
-def _figure(bench: Bench, request: Request) -> Response:
-    found = bench.view(_word(request, "sha")).chart(_word(request, "id"))
+def _figure(session: Session, request: Request) -> Response:
+    found = session.diagnosed(_word(request, "sha")).chart(_word(request, "id"))
     if found is None:
         return _json({"error": "there is no such chart"}, 404)
     return Response(found, media_type="application/json", headers={"cache-control": "no-store"})
 
 
-def _window(bench: Bench, request: Request) -> Response:
-    sha = _word(request, "sha")
-    before = bench.before(sha, _whole(request, "before")) if "before" in request.query_params else None
-    return _json(bench.workspace(sha).window(*_what(request), before))
+def _seen(session: Session, request: Request):
+    return session.workspace(_word(request, "sha"), _word(request, "shown"))
 
 
-def _window_csv(bench: Bench, request: Request) -> Response:
+def _window(session: Session, request: Request) -> Response:
+    which = _word(request, "beside")
+    beside = session.beside(_word(request, "sha"), which) if which else None
+    return _json(_seen(session, request).window(*_what(request), beside))
+
+
+def _stretch(session: Session, request: Request) -> Response:
+    part = _word(request, "part") or "test"
+    return _json(session.stretch(_word(request, "sha"), part, _number(request, "from"), _number(request, "to")))
+
+
+def _design(session: Session, request: Request) -> Response:
+    name, which = _word(request, "name"), _word(request, "file")
+    text = designs.file(session.history.run, name, which)
+    return _file(text, designs.FILES[which], f"{name}-{which}")
+
+
+def _window_csv(session: Session, request: Request) -> Response:
     part, joint, low, high = _what(request)
-    found = bench.workspace(_word(request, "sha"))
-    return _file(found.csv(part, joint, low, high), "text/csv", f"{bench.desk.name}-{found.joint(joint)}.csv")
+    found = _seen(session, request)
+    return _file(found.csv(part, joint, low, high), "text/csv", f"{session.history.name}-{found.joint(joint)}.csv")
 
 
 def _what(request: Request) -> tuple:

@@ -8,8 +8,11 @@ from markupsafe import Markup
 
 from ..report import rendering
 
-_SCRIPTS = ("workspace.js", "studio.js")
-_STYLES = ("studio.css",)
+_SCRIPTS = (
+    "asking.js", "standing.js", "workspace.js", "drawn.js", "cursor.js", "brush.js", "sections.js",
+    "remedies.js", "begin.js",
+)  # fmt: skip
+_STYLES = ("studio.css", "joint.css")
 
 
 def shell(name: str, csrf: str, names: list[str] | None = None, number: int = 0) -> str:

@@ -5,15 +5,16 @@ from __future__ import annotations
 import numpy as np
 
 from ..report import charts
-from ..report.charts import BLUE, GREY, INK, ORANGE, PURPLE, VERMILLION
+from ..report.charts import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, VERMILLION
 from ..report.residual_charts import residual_map
 
 _LINES = {
     "measured": (GREY, 1.6, "y", "solid"),
-    "predicted before": (PURPLE, 1.0, "y", "dot"),
+    "predicted beside": (PURPLE, 1.0, "y", "dot"),
     "predicted": (BLUE, 1.2, "y", "solid"),
-    "residual before": (PURPLE, 0.9, "y2", "dot"),
+    "residual beside": (PURPLE, 0.9, "y2", "dot"),
     "residual": (VERMILLION, 1.0, "y2", "solid"),
+    "difference": (GREEN, 1.2, "y2", "solid"),
 }
 _MARKED = 400  # samples in sight below which each is a dot
 

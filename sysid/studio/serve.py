@@ -10,7 +10,7 @@ from pathlib import Path
 
 from ..config import file_of
 from ..errors import SysidError
-from .guard import checked, is_local
+from .security import checked, is_local
 
 PORT = 8765
 SWITCH = 5e-4  # s
@@ -32,23 +32,23 @@ def serve(path: Path, *, out: Path | None = None, host: str = "127.0.0.1", port:
     except ImportError as error:
         raise SysidError(f"the studio needs {error.name}, which is not installed", do="pip install 'sysid[studio]'") from None
     from .app import application
-    from .shelf import Shelf, beside
+    from .experiments import Experiments, beside
 
     if token is None and not is_local(host):
         token = secrets.token_urlsafe(24)
     if token is not None:
         checked(token)
-    shelf = Shelf(beside(file_of(path)), out)
-    bench = shelf.bench(0)
-    bench.desk.text()  # a file that is not there is bad input; one that cannot be meant is said on the page
+    experiments = Experiments(beside(file_of(path)), out)
+    session = experiments.session(0)
+    session.history.text()  # a file that is not there is bad input; one that cannot be meant is said on the page
     found = _listening(host, port)
     responsive()
     with found:
         port = found.getsockname()[1]
-        app = application(shelf, host=host, port=port, token=token)
+        app = application(experiments, host=host, port=port, token=token)
         server = uvicorn.Server(uvicorn.Config(app, log_level="error", access_log=False, lifespan="off", server_header=False, timeout_graceful_shutdown=1))
         try:
-            bench.run()
+            session.run()
         except SysidError:
             pass  # the page says it
         name = "127.0.0.1" if host in ("0.0.0.0", "::", "") else f"[{host}]" if ":" in host and not host.startswith("[") else host
@@ -60,7 +60,7 @@ def serve(path: Path, *, out: Path | None = None, host: str = "127.0.0.1", port:
         except KeyboardInterrupt:
             pass  # the way to stop it
         finally:
-            shelf.cancel()
+            experiments.cancel()
 
 
 def responsive() -> None:

@@ -18,8 +18,9 @@ from ..estimate import Fit, Prediction
 from ..report import charts, solids
 from ..report.decimate import kept
 from ..report.fitted import log_names, placed
-from ..report.words import units
+from ..report.words import band, units
 from . import panels
+from .rows import Shown, rms, same_rows
 
 MOST = 3000  # samples of a line before it is thinned
 _DOTS = 3000  # of a cloud
@@ -34,12 +35,19 @@ class Workspace:
     def __init__(self, fit: Fit):
         self.fit = fit
         self._lines: dict[str, dict] = {}
+        self._told: dict[str, list[float | None]] = {}
 
     def prediction(self, part: str) -> Prediction:
         """The prediction of a part of the logs. Raises SysidError: there is none."""
         if part not in PARTS or part not in self.fit.predictions:
             raise SysidError(f"there is no part {part!r}", allowed=", ".join(PARTS), do="reload")
         return self.fit.predictions[part]
+
+    def told(self, part: str) -> list[float | None]:
+        """The RMS of each joint on a part of the logs, as the fit has it everywhere."""
+        if part not in self._told:
+            self._told[part] = self.prediction(part).told()
+        return self._told[part]
 
     def joint(self, number: int) -> str:
         """The name of a joint. Raises SysidError: there is none of that number."""
@@ -58,19 +66,19 @@ class Workspace:
     # ---- a window of time
 
     def window(
-        self, part: str, joint: int, low=None, high=None, before: Workspace | None = None
+        self, part: str, joint: int, low=None, high=None, beside: Shown | None = None
     ) -> dict:
         """Torque measured and predicted, and the residual, between two times.
 
         Args:
             low, high: on the axis of the logs end to end [s]; None for all of it.
-            before: the same logs under another model, drawn beside.
+            beside: the same logs under another model, laid over these, with the difference.
 
         Returns:
             {"chart", "from", "to", "samples", "drawn", "whole": [first, last], "joint", "unit",
-            "left_out", "rms", "here", "before"}: rows in sight that do
-            not count, and RMS of all rows, of those of the window, and of all under the
-            other model (None where there is none, or its rows are others).
+            "left_out", "rms", "here", "beside", "laid", "band"}: rows in sight that do not count,
+            RMS of all rows that count, of those of the window, and of all of the other model's own
+            (None where there is none); whether its rows are among these.
         """
         name, line, found = self.joint(joint), self.line(part), self.prediction(part)
         t, left = line["t"], found.counted_residual(joint)
@@ -80,9 +88,11 @@ class Workspace:
         rows = slice(max(int(first), 0), min(int(last), len(t)))
         lines = {"measured": found.measured[:, joint], "predicted": found.predicted[:, joint]}
         lines["residual"] = left
-        beside = None if before is None else before.same_rows(self, part, joint)
-        if beside is not None:
-            lines |= {"predicted before": beside[0], "residual before": beside[1]}
+        other = None if beside is None else same_rows(beside, self, part, joint)
+        if other is not None:
+            lines |= {"predicted beside": other[0], "residual beside": other[1]}
+            counted = np.isfinite(left) & np.isfinite(other[1])
+            lines["difference"] = np.where(counted, lines["predicted"] - other[0], np.nan)
         lines = {word: values[rows] for word, values in lines.items()}
         keep = np.unique(np.concatenate([kept(v, MOST) for v in lines.values()]))
         keep = keep if rows.stop - rows.start > MOST else np.arange(rows.stop - rows.start)
@@ -96,8 +106,10 @@ class Workspace:
             "chart": chart, "from": low, "to": high, "samples": int(inside.sum()),
             "drawn": int(len(keep)), "whole": [float(t[0]), float(t[-1])], "joint": name,
             "unit": units(self.fit)[name][0], "left_out": int(np.isnan(left[inside]).sum()),
-            "rms": _rms(left), "here": _rms(left[inside]),
-            "before": None if beside is None else _rms(beside[1]),
+            "rms": (whole := self.told(part)[joint]),
+            "here": whole if inside.all() else rms(left[inside]),
+            "beside": None if beside is None else beside.told(part)[joint],
+            "laid": other is not None, "band": band(self.fit),
         }  # fmt: skip
 
     def csv(self, part: str, joint: int, low=None, high=None) -> str:
@@ -136,13 +148,16 @@ class Workspace:
             raise SysidError("a window of time needs two numbers, the first the less")
         return float(low), float(high)
 
-    def same_rows(self, other: Workspace, part: str, joint: int):
-        """Predicted torque and residual (n,) of this model on another's rows; None where its own
-        are others: the logs, or the filter that was chosen for them, changed."""
-        mine, theirs = self.prediction(part), other.prediction(part)
-        if mine.t.shape != theirs.t.shape or not np.array_equal(mine.t, theirs.t):
-            return None
-        return mine.predicted[:, joint], mine.counted_residual(joint)
+    def own_clocks(self, part: str, low: float, high: float) -> list[tuple[str, float, float]]:
+        """The logs that a stretch of time touches, and from when to when by their own clocks."""
+        line, found, out = self.line(part), self.prediction(part), []
+        low, high = self._bounds(line["t"], min(low, high), max(low, high))
+        for begin, end, name in line["spans"]:
+            rows = (line["t"] >= max(low, begin)) & (line["t"] <= min(high, end))
+            if rows.any():
+                own = found.t[rows]
+                out.append((name, float(f"{own.min():.9g}"), float(f"{own.max():.9g}")))
+        return out
 
     def _disturbed(self, part: str, joint: str, low, high) -> list[tuple[float, float, str]]:
         """What disturbed a joint's log in a window: from, to, kind."""
@@ -219,11 +234,6 @@ def workspace_page(workspace: Workspace, steps: dict) -> dict:
 
 def _listed(frames) -> list:
     return [[charts.rounded(axis, 4) for axis in frame] for frame in frames]
-
-
-def _rms(values) -> float | None:
-    known = values[np.isfinite(values)]
-    return float(np.sqrt(np.mean(known**2))) if len(known) else None
 
 
 def _own_clock(line: dict, rows, found: Prediction) -> list[list]:

@@ -35,11 +35,14 @@ function show(place, read) {
     if (plot.data) { Plotly.react(plot, data, layout, settings); return; }
     plot.replaceChildren();
     Plotly.newPlot(plot, data, layout, settings);
+    if (!place.querySelector(".take")) place.append(sysid.taken(place, () => named(place)));
     if (chart.link === "time") sysid.time.join(plot);
   } catch (error) {
     failed(place, error);
   }
 }
+
+const named = place => document.title.split(" ·")[0] + "-" + place.getAttribute("aria-label");
 
 function failed(place, error) {
   const note = document.createElement("p");
@@ -105,6 +108,9 @@ function begin() {
   }
 }
 
-Object.assign(sysid, {begin, draw, redraw, show: (place, chart) => show(place, () => chart)});
+Object.assign(sysid, {
+  begin, draw, redraw, show: (place, chart) => show(place, () => chart),
+  chartOf: place => drawn.get(place),
+});
 requestAnimationFrame(() => setTimeout(begin, 0));
 })();

@@ -38,16 +38,17 @@ function shift(what) {
     if (first) sysid.draw(first);
   }
   if (!whole) return;
-  const [a, b] = range || whole, width = b - a, middle = (a + b) / 2;
-  if (what === "all") range = null;
-  else if (what === "in") range = [middle - width / 4, middle + width / 4];
-  else if (what === "out") {
-    range = width * 2 >= whole[1] - whole[0] ? null : [middle - width, middle + width];
-  } else {
-    const by = (what === "on" ? 1 : -1) * width / 2;
-    range = [a + by, b + by];
-  }
+  range = stepped(what, range || whole, whole);
   follow(null);
+}
+
+// what is in sight after a step, null for the whole
+function stepped(what, [a, b], whole) {
+  const width = b - a, middle = (a + b) / 2, by = (what === "on" ? 1 : -1) * width / 2;
+  if (what === "all") return null;
+  if (what === "in") return [middle - width / 4, middle + width / 4];
+  if (what !== "out") return [a + by, b + by];
+  return width * 2 >= whole[1] - whole[0] ? null : [middle - width, middle + width];
 }
 
 function keyed(event) {
@@ -57,7 +58,7 @@ function keyed(event) {
 }
 
 sysid.time = {
-  join, shift, keyed,
+  KEYS, join, shift, stepped, keyed,
   placed(layout) { if (range) layout.xaxis.range = [...range]; },
   begin() {  // the page was changed
     for (const plot of plots) if (!plot.isConnected) plots.delete(plot);

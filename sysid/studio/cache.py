@@ -8,29 +8,29 @@ from collections import OrderedDict
 from pathlib import Path
 
 from ..specs import Experiment
-from .view import View
+from .diagnosed import Diagnosed
 
-_KEPT, _SAMPLES = 8, 4_000_000  # views in memory; samples that they hold together (at least two are kept)
+_KEPT, _SAMPLES = 8, 4_000_000  # results in memory; samples that they hold together (at least two are kept)
 
 
-class Views:
-    """The views of all experiments; the one looked at longest ago is forgotten first. Safe to use from several threads."""
+class Cache:
+    """What was found on all experiments; what was looked at longest ago is forgotten first. Safe to use from several threads."""
 
     def __init__(self):
-        self._kept: OrderedDict[tuple[Path, str], View] = OrderedDict()
+        self._kept: OrderedDict[tuple[Path, str], Diagnosed] = OrderedDict()
         self._lock = threading.RLock()
 
-    def keep(self, file: Path, key: str, view: View) -> None:
-        """Remember a view of an experiment file, and forget the oldest where they grow too many."""
+    def keep(self, file: Path, key: str, found: Diagnosed) -> None:
+        """Remember what was found on an experiment file, and forget the oldest where they grow too many."""
         with self._lock:
-            for old in [k for k, v in self._kept.items() if k[0] == file and v.sha == view.sha]:
+            for old in [k for k, v in self._kept.items() if k[0] == file and v.sha == found.sha]:
                 del self._kept[old]
-            self._kept[file, key] = view
+            self._kept[file, key] = found
             while len(self._kept) > _KEPT or (len(self._kept) > 2 and sum(v.samples for v in self._kept.values()) > _SAMPLES):
                 self._kept.popitem(last=False)
 
-    def find(self, file: Path, sha: str) -> View | None:
-        """The view of an experiment file under the text with a hash; None where there is none, or a log or the URDF changed."""
+    def find(self, file: Path, sha: str) -> Diagnosed | None:
+        """What was found on an experiment file under the text with a hash; None where there is none, or a log or the URDF changed."""
         with self._lock:
             found = next(((k, v) for k, v in self._kept.items() if k[0] == file and v.sha == sha), None)
         if found is None or found[0][1] != key(sha, found[1].fit.experiment):

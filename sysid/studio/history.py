@@ -28,7 +28,7 @@ def hashed(text: str) -> str:
     return hashlib.sha256(text.encode("utf-8")).hexdigest()
 
 
-class Desk:
+class History:
     """One experiment file with its history. Safe to use from several threads."""
 
     def __init__(self, path: Path, out: Path | None = None):
@@ -77,7 +77,7 @@ class Desk:
             redo = _said(self._items[self._at + 1]) if self._at + 1 < len(self._items) else None
             return undo, redo
 
-    def history(self) -> list[dict]:
+    def steps(self) -> list[dict]:
         """The steps up to the text that stands now, as `sysid history` has them, with those whose error is known."""
         with self._lock:
             out = list(self._before)
@@ -109,12 +109,12 @@ class Desk:
             Changed: another text stands there. SysidError: the new text cannot be meant.
         """
         with self._lock:
-            text = self._as_seen(seen)
+            text = self.as_seen(seen)
         before = text.encode("utf-8")
         new = experiment_file.edited(before, make(experiment_file.text(before))).decode("utf-8")
         pipeline.build(self.experiment(new))  # takes a while: who asks for the state need not wait
         with self._lock, state.locked(self.path):
-            self._as_seen(seen)
+            self.as_seen(seen)
             self._write(text, new)
             self._append(new, added, joint)
             self._save()
@@ -143,7 +143,8 @@ class Desk:
 
     # ---- inside
 
-    def _as_seen(self, seen: str) -> str:
+    def as_seen(self, seen: str) -> str:
+        """The text, where it is the one with a hash. Raises Changed."""
         now = self.sync()
         if now != seen:
             raise Changed("the experiment file changed", do="reload")
@@ -151,7 +152,7 @@ class Desk:
 
     def _move(self, seen: str, by: int) -> str:
         with self._lock, state.locked(self.path):
-            text = self._as_seen(seen)
+            text = self.as_seen(seen)
             if not 0 <= self._at + by < len(self._items):
                 raise SysidError("there is nothing to undo" if by < 0 else "there is nothing to redo")
             new = self._items[self._at + by]["text"]
@@ -167,7 +168,7 @@ class Desk:
     def _tell(self) -> None:
         """Write the steps for `sysid history`, where this page made any."""
         if any(item["added"] not in (None, _EDIT) for item in self._items):
-            results.write_json(self.run / "history.json", {"steps": [{k: v for k, v in step.items() if k != "sha"} for step in self.history()]})
+            results.write_json(self.run / "history.json", {"steps": [{k: v for k, v in step.items() if k != "sha"} for step in self.steps()]})
 
     def _append(self, text: str, added: str | None, joint: str | None) -> None:
         kept = self._items[: self._at + 1] if self._items else []

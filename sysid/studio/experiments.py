@@ -1,6 +1,6 @@
 """The experiments that a studio was opened on: the one that was named, and those beside it.
 
-The page names them by number. No path of a request reaches the disk; what stands on the shelf is settled at the start.
+The page names them by number. No path of a request reaches the disk; which there are is settled at the start.
 """
 
 from __future__ import annotations
@@ -11,8 +11,8 @@ from pathlib import Path
 
 from ..errors import SysidError
 from ..specs import Experiment
-from .bench import Bench
-from .views import Views
+from .cache import Cache
+from .session import Session
 
 _LOOKED_AT = 100_000  # bytes of a file, to see whether it is an experiment
 
@@ -21,42 +21,42 @@ class Absent(SysidError):
     """There is no experiment with that number."""
 
 
-class Shelf:
+class Experiments:
     """Experiments by number, the first is the one that was named. Safe to use from several threads."""
 
     def __init__(self, paths: list[Path], out: Path | None = None):
         self._paths, self._out = paths, out
         self.names = [Experiment(path=path).name for path in paths]
-        self._benches: dict[int, Bench] = {}
-        self._views, self._turn, self._lock = Views(), threading.Lock(), threading.Lock()
+        self._sessions: dict[int, Session] = {}
+        self._cache, self._turn, self._lock = Cache(), threading.Lock(), threading.Lock()
 
     @classmethod
-    def of(cls, bench: Bench) -> Shelf:
-        """A shelf that holds one experiment."""
-        shelf = cls([bench.desk.path])
-        shelf._benches[0] = bench
-        return shelf
+    def of(cls, session: Session) -> Experiments:
+        """One experiment that is open already."""
+        experiments = cls([session.history.path])
+        experiments._sessions[0] = session
+        return experiments
 
-    def bench(self, number: int) -> Bench:
+    def session(self, number: int) -> Session:
         """The experiment with a number, opened when it is first asked for. Raises Absent, SysidError."""
         if not 0 <= number < len(self._paths):
             raise Absent("there is no such experiment", do="go back to the first")
         with self._lock:
-            if number not in self._benches:
+            if number not in self._sessions:
                 # two experiments never share a run folder that was given for one
                 out = self._out if self._out is None or number == 0 else self._out / self.names[number]
-                self._benches[number] = Bench(self._paths[number], out, views=self._views, turn=self._turn)
-            return self._benches[number]
+                self._sessions[number] = Session(self._paths[number], out, cache=self._cache, turn=self._turn)
+            return self._sessions[number]
 
-    def opened(self, number: int) -> Bench | None:
+    def opened(self, number: int) -> Session | None:
         """The experiment with a number where it is open already; never waits."""
-        return self._benches.get(number)
+        return self._sessions.get(number)
 
     def cancel(self) -> None:
         """Ask every job to stop."""
         with self._lock:
-            for bench in self._benches.values():
-                bench.worker.cancel()
+            for session in self._sessions.values():
+                session.worker.cancel()
 
 
 def beside(path: Path) -> list[Path]:

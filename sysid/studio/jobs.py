@@ -27,6 +27,7 @@ class Job:
     stage: str = "waiting for its turn"
     share: float = 0.0
     error: str | None = None
+    said: str = ""
     stop: threading.Event = field(default_factory=threading.Event)
     _course: Course = field(default_factory=lambda: Course(asks=True))
 
@@ -38,7 +39,7 @@ class Job:
 
     def document(self) -> dict:
         """What the page polls."""
-        return {"number": self.number, "sha": self.sha, "state": "cancelling" if self.state == "running" and self.stop.is_set() else self.state, "stage": self.stage, "share": self.share, "error": self.error}
+        return {"number": self.number, "sha": self.sha, "state": "cancelling" if self.state == "running" and self.stop.is_set() else self.state, "stage": self.stage, "share": self.share, "error": self.error, "said": self.said}
 
 
 class Worker:
@@ -51,15 +52,19 @@ class Worker:
         self.job: Job | None = None
         self._count = 0
 
-    def start(self, sha: str, work: Callable[[Job], None]) -> Job:
-        """Begin a job on the text with a hash, unless it is the one that runs."""
+    def start(self, sha: str, work: Callable[[Job], None], said: str = "", *, asks: bool = True) -> Job:
+        """Begin a job on the text with a hash, unless it is the one that runs.
+
+        Args:
+            said: what it does, in words. asks: whether it questions a fit, as a diagnosis does (`progress.Course`).
+        """
         with self._lock:
             if self.job is not None and self.job.state == "running" and not self.job.stop.is_set():
-                if self.job.sha == sha:
+                if (self.job.sha, self.job.said) == (sha, said):
                     return self.job
                 self.job.stop.set()
             self._count += 1
-            self.job = job = Job(self._count, sha)
+            self.job = job = Job(self._count, sha, said=said, _course=Course(asks=asks))
             threading.Thread(target=self._run, args=(job, work), name=f"sysid-job-{job.number}", daemon=True).start()
             return job
 

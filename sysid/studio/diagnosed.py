@@ -5,27 +5,24 @@ from __future__ import annotations
 import json
 from functools import cache
 
-from ..diagnose.diagnosis import Diagnosis
 from ..effect import describe, find, vocabulary
 from ..estimate import Fit
 from ..report.sections import sections
 from ..report.steps import steps
 from ..report.words import units
-from ..statement.document import document
-from .look import Looks
 from .workspace import Workspace
 
-ORDER = ("verdict", "workspace", "steps", "suspects", "look", "torque", "failures", "detectable", "parameters", "bodies", "provenance")
+ORDER = ("verdict", "workspace", "steps", "suspects", "torque", "failures", "detectable", "parameters", "bodies", "provenance")
 
 
-class View:
+class Diagnosed:
     """Everything about one text of the experiment file that the page may ask for, made once."""
 
-    def __init__(self, sha: str, fit: Fit, diagnosis: Diagnosis, run=""):
-        self.sha, self.fit, self.diagnosis = sha, fit, diagnosis
-        self.said = document(diagnosis, run)
-        self.looks, self.workspace = Looks(diagnosis), Workspace(fit)
-        made = sections(fit, diagnosis, self.said, [])
+    def __init__(self, sha: str, fit: Fit, said: dict):
+        """said: the document of the diagnosis."""
+        self.sha, self.fit, self.said = sha, fit, said
+        self.workspace = Workspace(fit)
+        made = sections(fit, self.said, [])
         self._html = {name: {"title": section["title"], "html": section["html"]} for name, section in made.items() if name != "steps"}
         self._charts = {chart["id"]: dumped(chart) for section in made.values() for chart in section["charts"]}
 
@@ -41,7 +38,7 @@ class View:
 
     def page(self, history: list[dict]) -> dict:
         """What the page needs to show itself, but for the charts."""
-        made = steps(self.fit, self.diagnosis, self.said, history)
+        made = steps(self.fit, self.said, history)
         self._charts |= {chart["id"]: dumped(chart) for chart in made.charts}
         joints, unit = self.fit.joints, units(self.fit)
         offered = [{"finding": k, "step": step, "effect": self.said["findings"][k]["effect"], "joint": self.said["findings"][k]["joint"]} for step, k in self.offered()]
@@ -50,7 +47,7 @@ class View:
             "joints": [{"name": j, "unit": unit[j][0]} for j in joints],
             "findings": [{"effect": f["effect"], "joint": f["joint"]} for f in self.said["findings"]],
             "verdict": [{"joint": v["joint"], "status": v["status"]} for v in self.said["verdict"]], "offered": offered,
-            "vocabulary": spoken(), "converged": bool(self.fit.solution.converged),
+            "vocabulary": spoken(), "made": self.said.get("made"), "converged": bool(self.fit.solution.converged),
         }  # fmt: skip
 
     def chart(self, name: str) -> bytes | None:
@@ -62,7 +59,10 @@ class View:
 def spoken() -> list[dict]:
     """The effects that may be added, each with what it says."""
     found = {name: find(name) for name in vocabulary()}
-    return [{"effect": name, "scope": effect.scope, "says": describe(effect)["summary"].replace("`", "")} for name, effect in found.items()]
+    return [
+        {"effect": name, "scope": effect.scope, "says": (said := describe(effect))["summary"].replace("`", ""), "options": [{"name": o, "says": words} for o, words in said["options"].items()]}
+        for name, effect in found.items()
+    ]  # fmt: skip
 
 
 def step_name(step: dict) -> str:

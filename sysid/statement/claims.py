@@ -1,0 +1,68 @@
+"""The steps that a diagnosis claims, and their findings, as the document has them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from ..addition import spelled
+from ..diagnose.claims import Claim
+from ..diagnose.diagnosis import Diagnosis
+from ..diagnose.findings import Finding
+from ..effect import describe
+from ..results import number
+
+
+def claims(found: Diagnosis) -> Iterator[dict]:
+    """Of each step that stands: the numbers of its findings, the head first; what may stand in its
+    place; the held-out error with it and all before it in the model."""
+    first = 0
+    for claim in found.claims:
+        last = first + len(claim.findings)
+        yield {
+            "findings": list(range(first, last)),
+            "set": chances(claim),
+            "rms_test_after": claim.after.rms("test"),
+        }
+        first = last
+
+
+def chances(claim: Claim) -> list[dict]:
+    """What may stand in a step's place, with probabilities."""
+    return [{"effect": e, "joint": j, "probability": p} for e, j, p in claim.set]
+
+
+def finding(f: Finding, claim: Claim, found: Diagnosis) -> dict:
+    """An effect that the logs support, as the contract has it and more."""
+    before, after = f.rms_before**2, f.rms_after**2
+    names = found.fit.joints if f.joint == "*" else [f.joint]
+    levels = [found.floors[j].rms for j in names]
+    floor = (
+        np.mean([level**2 for level in levels])
+        if None not in levels
+        else min(after, claim.after_square(names))
+    )
+    misfit = max(before - floor, abs(before - after), 1e-9 * before, 1e-300)
+    return {
+        "effect": f.effect,
+        "joint": f.joint,
+        "options": dict(f.candidate.options),
+        # as an experiment file spells it
+        "adds": dict(zip(("effect", "joints", "options"), spelled(f.candidate, f.joint))),
+        "summary": describe(f.candidate.effect)["summary"],
+        "probability": f.probability,
+        "q_value": f.p,
+        "rms_test_before": f.rms_before,
+        "rms_test_after": f.rms_after,
+        "misfit_removed": float((before - after) / misfit),
+        "misfit_removed_se": number(2.0 * f.rms_after * f.fall_se / misfit),
+        "parameters": {
+            name: {"value": number(v), "std": number(s), "unit": u}
+            for name, (v, s, u) in f.parameters.items()
+        },
+        "tied_with": list(f.tied_with),
+        "separate_by": f.candidate.effect.separate_by,
+        "command": f.command,
+        "joins_as_step": None if f.step is None else f.step + 1,
+    }

@@ -1,0 +1,118 @@
+"""A diagnosis that was made and written, used again as long as it is of what stands there now.
+
+    runs/<experiment>/diagnosis.json
+
+says what it was made of. It is read again where all of that is as it was: the experiment, with
+every key that it leaves out; the bytes of the URDF, of a previous run that is its prior and of
+Python files that it names; the SHA-256 of every log, as the fit read them; the versions of
+packages, and the program itself. And it is whole: a file that was edited or cut is none.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterator
+from datetime import UTC, datetime
+from functools import cache
+from pathlib import Path
+
+from .. import bounded, pipeline, results, urdf
+from ..diagnose.diagnosis import Diagnosis, diagnose
+from ..errors import SysidError
+from ..estimate import Fit
+from ..specs import Experiment, is_own
+from .document import document
+
+FILE = "diagnosis.json"
+
+
+def diagnosed(
+    experiment: Experiment, run: Path, *, progress: pipeline.Progress | None = None
+) -> tuple[Fit, dict]:
+    """The fit of an experiment and the document of its diagnosis, both in its run folder: the one
+    that stands there where it is of this experiment, else a new one.
+
+    Raises:
+        SysidError: bad input.
+    """
+    if _read(experiment, run) is not None:
+        fit = pipeline.fit(experiment, progress=progress)
+        if (said := found(experiment, fit, run)) is not None:
+            results.write(fit, run)
+            return fit, said
+        made = diagnose(experiment, fit=fit, progress=progress)  # of other logs
+    else:
+        made = diagnose(experiment, progress=progress)
+    return made.fit, written(experiment, made, run)
+
+
+def found(experiment: Experiment, fit: Fit, run: Path) -> dict | None:
+    """The diagnosis in a run folder, where it is of an experiment and of the logs of its fit."""
+    said = _read(experiment, run)
+    if said is None or said["logs"] != json.loads(json.dumps(list(fit.logs))):
+        return None
+    return {**said, "run": str(run)}
+
+
+def written(experiment: Experiment, made: Diagnosis, run: Path) -> dict:
+    """Write a fit and its diagnosis into a run folder; returns the diagnosis's document, which
+    says what it is of and when it was made."""
+    results.write(made.fit, run)
+    now = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
+    # as it will be read again
+    said = json.loads(json.dumps(document(made, run), allow_nan=False))
+    said |= {"made": now, "of": of(experiment)}
+    said["seal"] = _seal(said)
+    results.write_json(run / FILE, said)
+    return said
+
+
+def _read(experiment: Experiment, run: Path) -> dict | None:
+    try:
+        said = json.loads(bounded.read_text(run / FILE))
+        whole = said["seal"] == _seal(said)
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+        return None
+    return said if whole and said.get("of") == of(experiment) else None
+
+
+def _seal(said: dict) -> str:
+    rest = {key: value for key, value in said.items() if key != "seal"}
+    return hashlib.sha256(json.dumps(rest, sort_keys=True).encode()).hexdigest()
+
+
+def of(experiment: Experiment) -> str:
+    """SHA-256 of all that a diagnosis depends on but its logs."""
+    keys = experiment.model_dump(mode="json", by_alias=True)
+    state = hashlib.sha256(json.dumps(keys, sort_keys=True, default=str).encode())
+    for path in files(experiment):
+        try:
+            state.update(hashlib.sha256(bounded.read_bytes(path)).digest())
+        except OSError:
+            state.update(b"not there")
+    state.update(json.dumps(results.versions(), sort_keys=True).encode())
+    state.update(_program().encode())
+    return state.hexdigest()
+
+
+def files(experiment: Experiment) -> Iterator[Path]:
+    """What an experiment names beside logs: the URDF, the run that is its prior, own effects."""
+    try:
+        yield urdf.locate(experiment.robot.urdf, experiment.folder)
+    except SysidError:
+        pass  # who reads it says so
+    if experiment.prior.source != "urdf":
+        source = experiment.folder / experiment.prior.source
+        yield source / "fit.json" if source.is_dir() else source
+    names = [spec.name for spec in (*experiment.model.effects, *experiment.model.candidates)]
+    yield from (experiment.folder / n.rpartition(":")[0] for n in names if is_own(n))
+
+
+@cache
+def _program() -> str:
+    """SHA-256 of this package's own modules: a version number stays while a program is changed."""
+    folder, state = Path(__file__).resolve().parent.parent, hashlib.sha256()
+    for path in sorted(folder.rglob("*.py")):
+        state.update(path.relative_to(folder).as_posix().encode() + path.read_bytes())
+    return state.hexdigest()

@@ -1,0 +1,2 @@
+// Everything stands: begin.
+window.sysid.standing.begin();
