@@ -1,23 +1,18 @@
-"""Precision: information against random motions and a design for the condition number, and whether
-the promised standard deviations come true."""
+"""Precision: information against random motions and a design for the condition number."""
 
 from __future__ import annotations
 
-import json
-import tempfile
 import time
 import warnings
-from pathlib import Path
 
 import numpy as np
 
-from scripts.design_parts.robots import RATE, experiment_with, unlogged
+from scripts.design_parts.robots import unlogged
 from sysid.design import search, solve
 from sysid.design.problem import told, value
 
 ROBOTS = ("leg", "ur5", "panda", "ur10e")
 RANDOM = 1000  # motions that keep to the limits
-DRAWS = 20  # of the noise
 _SPREAD = 1e-9  # of the largest eigenvalue: below, no motion shows a direction
 
 
@@ -27,10 +22,9 @@ def case(seed: int, number: int, robots=ROBOTS) -> dict:
 
 
 def trial(case: dict) -> dict:
-    """log det of three designs, from the URDF; then the promise, where a first log can be
-    simulated."""
+    """log det of three designs, from the URDF."""
     out = {**case, "cpu": {}}
-    with warnings.catch_warnings(), tempfile.TemporaryDirectory() as place:
+    with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         problem, pose, rounds = unlogged(case["robot"])
         fastest = max(rounds) * problem.family.harmonics / problem.family.duration
@@ -50,8 +44,6 @@ def trial(case: dict) -> dict:
             problem, pose, rounds, case["seed"], found
         )
         out["cpu"]["condition"] = time.process_time() - begun
-        if case["robot"] in RATE:
-            out["promise"] = _promise(case, Path(place))
     return out
 
 
@@ -111,62 +103,12 @@ def _gram(columns) -> np.ndarray:
     return flat.T @ flat
 
 
-def _promise(case: dict, folder: Path) -> dict:
-    """Promised over achieved standard deviation of what two logs determine, over draws of the torque's
-    noise on both."""
-    import polars
-
-    from sysid import design, pipeline
-    from sysid.config import loads
-
-    first = experiment_with(case["robot"], folder / "first", case["seed"])
-    begun = time.process_time()
-    found = design(first, processes=1)
-    spent = time.process_time() - begun
-    both = experiment_with(
-        case["robot"], folder / "both", case["seed"], motions=[(found.t, found.q)]
-    )
-    fit = pipeline.fit(both)
-    # the prior's weight as it was chosen: another one would be another estimator
-    text = (both.folder / "config.yaml").read_text()
-    text = text.replace("weight: auto", f"weight: {fit.strength.value:.6g}")
-    logs = {name: polars.read_csv(both.folder / name) for name in ("train.csv", "next_0.csv")}
-    noise = json.loads((both.folder / "truth.json").read_text())["torque_noise_std"]
-    rng = np.random.default_rng(case["seed"])
-    drawn = []
-    for _ in range(DRAWS):
-        for name, log in logs.items():
-            more = {
-                f"tau_{j}": log[f"tau_{j}"].to_numpy() + rng.normal(0.0, noise[j], len(log))
-                for j in fit.joints
-            }
-            log.with_columns(**{k: polars.Series(v) for k, v in more.items()}).write_csv(
-                both.folder / name
-            )
-        drawn.append(pipeline.fit(loads(text, both.folder / "config.yaml")).x)
-    achieved = np.std(drawn, axis=0, ddof=1)
-    names, own = fit.model.names, fit.uncertainty
-    ratio = [
-        float(found.deviations[name]["after"] / achieved[k])
-        for k, name in enumerate(names)
-        if name in found.deviations and own.from_data[k] > 0.9 and achieved[k] > 0.0
-    ]
-    return {"ratio": ratio, "cpu": spent}
-
-
 def table(results: list[dict]) -> list[str]:
-    """log det beside the others', and the share of promises within a quarter."""
+    """log det beside the others'."""
     out = ["robot     designed   best random     condition number (kappa; of the designed motion)"]
     for r in results:
         out.append(
             f"{r['robot']:8s} {r['designed']:9.1f}  {r['random']:9.1f} of {r['drawn']}  "
             f"{r['condition']:9.1f}  ({r['kappa']:.0f}; {r['kappa_designed']:.0f})"
         )
-    for r in results:
-        if len(ratio := np.array(r.get("promise", {}).get("ratio", []))):
-            within = np.mean(np.abs(np.log(ratio)) < np.log(1.25))
-            out.append(
-                f"{r['robot']:8s} promised / achieved deviation of {len(ratio)} parameters: median "
-                f"{np.median(ratio):.2f}, within a quarter {within:.0%}"
-            )
     return out

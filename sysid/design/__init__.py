@@ -11,6 +11,7 @@ information.py  what a motion is worth: log det M, evidence between suspects, an
 problem.py      a motion against its limits, and how far it must shrink
 solve.py        linear programs within a trust region
 search.py       several starts in several processes
+spectrum.py     the noise that a fit's residual tells, and what it makes of a fit
 promise.py      deviations now and after, and which suspects will be told apart
 basis.py        what a design starts from
 designed.py     all of it on one page

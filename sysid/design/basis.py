@@ -14,6 +14,7 @@ from ..candidates import Candidate, candidates, own_effects
 from ..errors import ConfigError, LogError, SysidWarning
 from ..estimate import Fit
 from ..filters import settled
+from ..log import Log
 from ..model import ROBOT, Model
 from ..motion import Motion
 from ..preprocess import prepare
@@ -35,7 +36,7 @@ _USUAL = 10.0  # s of a motion that says how a robot usually moves, where no log
 
 @dataclass(frozen=True)
 class Basis:
-    """What a design starts from."""
+    """What a design starts from. logs: those of the fit; motion: these, filtered."""
 
     robot: Robot
     fit: Fit | None
@@ -45,6 +46,7 @@ class Basis:
     rate: float
     window: float
     levels: Mapping[str, str]
+    logs: tuple[Log, ...] = ()
 
     @property
     def fastest(self) -> float:
@@ -58,13 +60,13 @@ def basis(
     """What an experiment knows of its robot at {group: level}. Raises SysidError."""
     machine, structure, prior = pipeline.build(experiment)
     levels = _levels(structure, levels)
-    fit = motion = None
+    fit, motion, logs = None, None, ()
     if _has_logs(experiment):
         read = pipeline.read_all(experiment)
         fit = pipeline.fit(experiment, progress=tell, measured=read)
         spec = settled(fit.experiment.preprocess, fit.filters)
         motion = prepare(read.train, spec, machine.joints)
-        structure, x = fit.model, fit.x
+        structure, x, logs = fit.model, fit.x, tuple(read.train)
         noise = noise_of(fit)
         pose = np.concatenate([p.q for p in motion.pieces]).mean(axis=0)
         rate = 1.0 / motion.pieces[0].step
@@ -85,7 +87,7 @@ def basis(
         rate, window = experiment.data.rate or _RATE, _WINDOW
     asked = _suspects(experiment, structure, separate)
     known = _known(structure, levels, fit, x, noise, prior, asked, motion)
-    return Basis(machine, fit, motion, known, pose, rate, window, levels)
+    return Basis(machine, fit, motion, known, pose, rate, window, levels, logs)
 
 
 def _levels(model: Model, levels: Mapping[str, str]) -> dict[str, str]:
