@@ -55,7 +55,7 @@ def _condition(problem, pose, rounds, seed: int, designed) -> tuple[float, float
     grams = []
     for k in range(8):
         start = search.start(problem, pose, (seed, rounds[k % len(rounds)], 5000 + k))
-        grams.append(_gram(told(problem.with_rounds(start.rounds), start.z)))
+        grams.append(_gram(told(problem.of(start.family), start.z)))
     typical = np.sum(grams, axis=0)
     scale = 1.0 / np.sqrt(np.maximum(np.diagonal(typical), 1e-300))
     values, vectors = np.linalg.eigh(typical * np.outer(scale, scale))
@@ -80,21 +80,21 @@ def _condition(problem, pose, rounds, seed: int, designed) -> tuple[float, float
         starts = [one for one in starts if np.isfinite(one.value)]
 
         def kappa(found) -> float:
-            own = problem.with_rounds(found.rounds)
+            own = problem.of(found.family)
             weights = own.samples / len(own.nodes)
             return -worth(known, known.before + weights * _gram(told(own, found.z)))[0]
 
         starts = sorted(starts, key=kappa)[: search.IMPROVED]
         ended = []
         for one in starts:
-            climb = solve.Climb(one.rounds, one.z)
+            climb = solve.Climb(one.family, one.z)
             while not climb.over:
                 climb = solve.climbed(problem, climb, 100)
-            ended.append(solve.Found.of(problem.with_rounds(climb.rounds), climb.z))
+            ended.append(solve.Found.of(problem.of(climb.family), climb.z))
     finally:
         solve.worth = kept
     best = min((one for one in ended if np.isfinite(one.value)), key=kappa)
-    log_det = value(problem.with_rounds(best.rounds), best.z)[1]
+    log_det = value(problem.of(best.family), best.z)[1]
     return log_det, float(np.exp(kappa(best))), float(np.exp(kappa(designed)))
 
 

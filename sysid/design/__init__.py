@@ -1,6 +1,7 @@
 """The next motion to log: the most informative within its limits, or one that separates suspects.
 
-fourier.py      motions: sums of harmonics, at rest at both ends
+fourier.py      motions: sums of harmonics, at rest at both ends, with maneuvers after them
+maneuvers.py    ladders of constant speeds, slow reversals, poses, chirps
 limits.py       positions, speeds, accelerations, jerks, torques, clearance, floor
 links.py        what links look like
 collision.py    how close they come to each other along a motion

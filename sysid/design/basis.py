@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 import numpy as np
@@ -20,8 +20,9 @@ from ..motion import Motion
 from ..preprocess import prepare
 from ..projection import inverted
 from ..robot import Robot
-from ..simulate.motion import draw
-from ..specs import Experiment
+from ..simulate.motion import draw, top_speeds
+from ..smoother import Smoother
+from ..specs import Experiment, PreprocessSpec
 from .columns import instant_of
 from .information import Known, own_size
 from .noise import noise_of, size_of
@@ -31,6 +32,7 @@ _WINDOW = 0.1  # s, where none is known
 _FASTEST = 0.25  # of a period of the filter's window: what it still lets through of the fastest
 _GUESSED = 0.02  # of a joint's torque: its noise, where no log says
 _RATE = 500.0  # Hz, where no log says
+_STILL, _STILL_SHARE = 0.03, 0.03  # rad/s or m/s, of the top speed: slower is standing (`preprocess`)
 _USUAL = 10.0  # s of a motion that says how a robot usually moves, where no log does
 
 
@@ -87,7 +89,23 @@ def basis(
         rate, window = experiment.data.rate or _RATE, _WINDOW
     asked = _suspects(experiment, structure, separate)
     known = _known(structure, levels, fit, x, noise, prior, asked, motion)
+    known = replace(known, **_left_out(machine, experiment, fit, rate, window))
     return Basis(machine, fit, motion, known, pose, rate, window, levels, logs)
+
+
+def _left_out(machine: Robot, experiment: Experiment, fit, rate: float, window: float) -> dict:
+    """Which rows of a joint a fit leaves out: `reach` [s] of a reversal within which, and the speed
+    (dof,) below which."""
+    spec = experiment.preprocess if fit is None else settled(fit.experiment.preprocess, fit.filters)
+    if spec.standstill == "keep":
+        return {}
+    if fit is None:
+        spec = PreprocessSpec(window=window, standstill=spec.standstill)
+    rows, _ = Smoother(spec, 1.0 / rate).smear(spec.torque == "same" and spec.filter != "none")
+    if spec.standstill not in ("auto", "mask"):
+        return {"slowest": np.full(machine.dof, float(spec.standstill))}
+    slowest = np.minimum(_STILL, _STILL_SHARE * top_speeds(machine))
+    return {"reach": rows / rate if spec.standstill == "auto" else 0.0, "slowest": slowest}
 
 
 def _levels(model: Model, levels: Mapping[str, str]) -> dict[str, str]:

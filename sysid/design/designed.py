@@ -36,7 +36,6 @@ from .problem import Problem, shares, torque
 from .result import Design
 from .search import searched
 from .solve import Found
-from .suspects import played
 
 HARMONICS = 5
 
@@ -75,7 +74,7 @@ def design(
             )  # fmt: skip
         for text in bounds.said:
             warnings.warn(SysidWarning(text), stacklevel=2)
-    return _told(base, problem.with_rounds(found.rounds), bounds, found, random_best, notices)
+    return _told(base, problem.of(found.family), bounds, found, random_best, notices)
 
 
 def posed(
@@ -135,11 +134,10 @@ def _told(
         seen = _seen(base, t, q, needed)
         spread = promise.deviations(base.fit, base.motion, seen, _of_angles(base))
         if len(base.known.suspects) > 1:
-            joints = base.robot.joints
-            new = played(q, qd, qdd, 1.0 / base.rate, joints, levels=base.levels)
-            pairs = promise.pairs(base.fit, base.known.suspects, base.motion, new, len(t))
+            pairs = promise.pairs(base.fit, base.known.suspects, base.motion, seen, seen.samples)
     return Design(
         joints=base.robot.joints, family=family, coefficients=family.coefficients(found.z),
+        amounts=found.z[:, family.waves :],
         t=t, q=q, qd=qd, qdd=qdd, torque=needed, log_det=found.log_det, random_best=random_best,
         deviations=spread, pairs=tuple(pairs), margins=_margins(problem, bounds, found),
         limits=bounds, said=tuple(notices),
