@@ -38,8 +38,8 @@ def test_tables():
     one = {"robot": "leg", "tie": [["a", "j", 0.6], ["b", "j", 0.4]], "arms": {arm: {"alone": arm == "designed", "promised": 0.99 if arm == "designed" else None} for arm in ties.ARMS}}
     said = "\n".join(ties.table([one, {"robot": "leg", "tie": None, "arms": {}}]))
     assert "2 robots, 1 with a tie" in said and "alone 1/1 = 100%" in said and "alone 0/1" in said
-    row = {"robot": "leg", "designed": 10.0, "random": 8.0, "drawn": 1000, "condition": 7.0, "kappa": 30.0, "kappa_designed": 90.0}
-    assert "(33; " not in (said := "\n".join(precision.table([row]))) and "8.0 of 1000" in said
+    row = {"robot": "leg", **{kind: {"designed": 10.0, "random": 8.0} for kind in ("log_det", "error", "kappa")}}
+    assert "10.0, error 10.000 (10)" in (said := precision.table([row]))[1] and said[1].endswith("-")
     rows = [{"name": n, "promised": p, "stated": 2.0, "few": 1.0, "all": 1.0} for n, p in (("a", 1.0), ("b", 1.1), ("c", 2.0))]
     assert "median 1.10, within a quarter 67%" in "\n".join(promise.table([{"robot": "leg", "seed": 7, "parameters": rows}]))
     assert promise.right(20) == pytest.approx(0.83, abs=0.01)
