@@ -1,15 +1,17 @@
-"""Does a designed motion keep its word? Four studies of `sysid design` on simulated robots.
+"""Does a designed motion keep its word? Five studies of `sysid design` on simulated robots.
 
     python scripts/design_study.py ties --number 20 --seed 7 --out runs/design
     python scripts/design_study.py precision --number 4 --seed 7 --out runs/design
+    python scripts/design_study.py promise --number 6 --seed 7 --out runs/design
     python scripts/design_study.py limits --number 20 --seed 7 --out runs/design
     python scripts/design_study.py solvers --number 3 --seed 7 --out runs/design
 
 ties: robots with a poor first log that leaves a tie of two or more that holds what is hidden; a second log of 20 s, designed to
 separate them, designed for precision, or random; how many are then named alone.
 
-precision: log det of the designed motion against the best of many random ones and a design for the condition number; predicted
-against achieved standard deviations over draws of the noise.
+precision: log det of the designed motion against the best of many random ones and a design for the condition number.
+
+promise: predicted against achieved standard deviations over draws of the noise.
 
 limits: every design is looked at again at a kilohertz by code that shares none with the design.
 
@@ -53,7 +55,7 @@ def main(arguments: list[str] | None = None) -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("study", choices=("ties", "precision", "limits", "solvers"))
+    parser.add_argument("study", choices=("ties", "precision", "promise", "limits", "solvers"))
     parser.add_argument("--seed", type=int, default=7)
     parser.add_argument("--number", type=int, default=8)
     parser.add_argument("--jobs", type=int, default=1)

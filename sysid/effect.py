@@ -114,7 +114,8 @@ class Effect(ABC):
 
     scope: "joint", or "robot" for an effect of the whole robot, whose joint is called `*`.
     options: {name: what it says} of the keys beside `joints` that an experiment file may give.
-    tied_with: words of the vocabulary that look alike; `separate_by`: the experiment that tells them apart.
+    tied_with: words of the vocabulary that look alike; `separate_by`: the experiment that tells them apart; maneuvers: the kinds
+        of `design.maneuvers` that show it, of those that the harmonics of a designed motion do badly.
     reach: samples on either side of a row that its columns look at; memory: they look back to the start of the log.
     mimics_mass: bodies take its place where a model lacks it, and their masses are off.
     uses_load: they need `motion.load` (n, dof), the torque that the bodies alone are predicted to need.
@@ -134,6 +135,7 @@ class Effect(ABC):
     looks_like: ClassVar[str]
     tied_with: ClassVar[tuple[str, ...]] = ()
     separate_by: ClassVar[str]
+    maneuvers: ClassVar[tuple[str, ...]] = ()
     source: ClassVar[str]
     scope: ClassVar[str] = "joint"
     options: ClassVar[dict[str, str]] = {}
@@ -450,5 +452,5 @@ def describe(effect: Effect) -> dict:
             {"name": s.name, "unit": s.unit, "lower": s.low, "upper": s.high, "share_of": s.of, "start": s.start, "says": s.says} for s in effect.shapes()
         ],
         "options": dict(effect.options), "looks_like": effect.looks_like, "tied_with": list(effect.tied_with),
-        "separate_by": effect.separate_by, "source": effect.source,
+        "separate_by": effect.separate_by, "maneuvers": list(effect.maneuvers), "source": effect.source,
     }  # fmt: skip

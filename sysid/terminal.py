@@ -180,11 +180,17 @@ _NEVER = 0.05  # probability below which a motion is no answer
 _SHOWN_STD = 20  # parameters whose deviation falls most
 
 
+_SEEN = 0.01  # rad or m: what less of a maneuver does is none
+
+
 def show_design(document: dict) -> None:
     """What a designed motion promises, and what is left of its limits."""
     best = document["criterion"]["random_best"]
     beside = "" if best is None else f", {document['criterion']['log_det'] - best:.1f} above the best of the random motions it began from"
     print(f"{document['duration']:g} s of motion; log det of the information {document['criterion']['log_det']:.1f}{beside}")
+    for own in document.get("maneuvers", ()):
+        moved = [f"{joint} {size:+.2g}" for joint, size in own["joints"].items() if abs(size) > _SEEN]
+        print(f"from {own['start']:g} s on a maneuver of {own['duration']:g} s, {own['kind']}: {', '.join(moved) or 'left out'}")
     left = [f"{name} {100 * share:.1f} %" for name, share in document["margins"].items() if name != "collision"]
     near = document["margins"].get("collision")
     print(f"left of the limits: {', '.join(left)}" + ("" if near is None else f"; links keep {near:.3g} m apart"))
@@ -349,6 +355,8 @@ def show_effects(found: list[dict]) -> None:
         print(f"  looks like   {effect['looks_like']}")
         print(f"  tied with    {', '.join(effect['tied_with']) or 'nothing known'}")
         print(f"  separate by  {effect['separate_by']}")
+        if effect.get("maneuvers"):
+            print(f"  maneuvers    {', '.join(effect['maneuvers'])}: `sysid design --separate` tries them")
         print(f"  source       {effect['source']}")
 
 

@@ -316,8 +316,10 @@ def test_a_joint_whose_torque_is_unused_tells_nothing(poor):
     assert np.isinf(known.noise[1]) and known.noise[0] < 1.0
     # the information of the shoulder's rows alone, by hand
     t = (np.arange(500) + 0.5) * 4.0 / 500
-    moved = columns(known.model, *_motion(found, t))[0]
-    whole = known.before + 2.0 / known.noise[0] ** 2 * moved @ moved.T
+    share = known.counted(*_motion(found, t)[1:])
+    moved = columns(known.model, *_motion(found, t))[0] * share[0]
+    assert not share[1].any() and 0.9 / known.noise[0] < share[0].max() <= 1.0 / known.noise[0]
+    whole = known.before + 2.0 * moved @ moved.T
     told = information(known, known.all_columns(*_motion(found, t)), np.full(500, 2.0))
     np.testing.assert_allclose(told, whole, rtol=1e-9, atol=1e-9 * np.abs(whole).max())
     assert found.log_det > found.random_best

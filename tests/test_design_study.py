@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from scripts.design_parts import limits, precision, robots, solvers, ties
+from scripts.design_parts import limits, precision, promise, robots, solvers, ties
 from sysid import design
 
 
@@ -38,8 +38,11 @@ def test_tables():
     one = {"robot": "leg", "tie": [["a", "j", 0.6], ["b", "j", 0.4]], "arms": {arm: {"alone": arm == "designed", "promised": 0.99 if arm == "designed" else None} for arm in ties.ARMS}}
     said = "\n".join(ties.table([one, {"robot": "leg", "tie": None, "arms": {}}]))
     assert "2 robots, 1 with a tie" in said and "alone 1/1 = 100%" in said and "alone 0/1" in said
-    row = {"robot": "leg", "designed": 10.0, "random": 8.0, "drawn": 1000, "condition": 7.0, "kappa": 30.0, "kappa_designed": 90.0, "promise": {"ratio": [1.0, 1.1, 2.0]}}
-    assert "within a quarter 67%" in "\n".join(precision.table([row]))
+    row = {"robot": "leg", **{kind: {"designed": 10.0, "random": 8.0} for kind in ("log_det", "error", "kappa")}}
+    assert "10.0, error 10.000 (10)" in (said := precision.table([row]))[1] and said[1].endswith("-")
+    rows = [{"name": n, "promised": p, "stated": 2.0, "few": 1.0, "all": 1.0} for n, p in (("a", 1.0), ("b", 1.1), ("c", 2.0))]
+    assert "median 1.10, within a quarter 67%" in "\n".join(promise.table([{"robot": "leg", "seed": 7, "parameters": rows}]))
+    assert promise.right(20) == pytest.approx(0.83, abs=0.01)
     assert "+1.5 in 2.0 s" in "\n".join(solvers.table([{"robot": "leg", "start": 1.0, "solvers": {"linear programs": {"worth": 2.5, "cpu": 2.0}}}]))
-    for part in (limits, precision, solvers, ties):
+    for part in (limits, precision, promise, solvers, ties):
         assert part.case(3, 5) == part.case(3, 5) and part.case(3, 5)["robot"] in part.ROBOTS

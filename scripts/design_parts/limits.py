@@ -9,13 +9,16 @@ from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
+from scipy.interpolate import BPoly
 from scipy.spatial import ConvexHull
 
 from scripts.design_parts.robots import experiment_with, unlogged_experiment
+from sysid import robot as robots
 from sysid.design.limits import LimitsSpec
 
 ROBOTS = ("planar", "leg", "ur5", "panda", "ur10e")
 _EVERY = 7  # instants of a kilohertz between two looks at distances; a design looks at every tenth
+_PAIR = ("stribeck", "presliding", "delay", "torque_bias", "quadratic_drag", "elasticity")
 _LOGGED = 3  # of so many designs one rests on a log
 
 
@@ -45,26 +48,28 @@ def trial(case: dict) -> dict:
         begun = time.process_time()
         found = design(
             experiment, duration=case["duration"], limits_spec=spec, seed=case["seed"] % 1000,
-            processes=1,
+            separate=_suspects(experiment, case), processes=1,
         )  # fmt: skip
-        told = {**case, "cpu": time.process_time() - begun}
+        told = {**case, "maneuvers": [own.kind for own in found.family.maneuvers], "cpu": time.process_time() - begun}
         return told | checked(experiment, found, case)
+
+
+def _suspects(experiment, case: dict) -> list[tuple[str, str]]:
+    """Two effects on a joint, in half of all designs."""
+    rng = np.random.default_rng(case["seed"])
+    if rng.random() < 0.5:
+        return []
+    joint = str(rng.choice(robots.load(experiment.robot, experiment.folder).joints))
+    return [(str(e), joint) for e in rng.choice(_PAIR, 2, replace=False)]
 
 
 def checked(experiment, found, case: dict) -> dict:
     """From the coefficients in design.json's own words: position, velocity, torque by Pinocchio with
     friction by hand, distance by hulls made here."""
-    from sysid import robot as robots
-
     machine = robots.load(experiment.robot, experiment.folder)
     family = found.family
     t = np.arange(0.0, family.duration + 5e-4, 1e-3)
-    w = 2.0 * np.pi * family.rounds / family.duration * np.arange(1, family.harmonics + 1)
-    c, a, b = np.split(found.coefficients, [1, 1 + family.harmonics], axis=1)
-    angle = w * t[:, None]
-    q = c.T + np.sin(angle) @ a.T + np.cos(angle) @ b.T
-    qd = np.cos(angle) @ (w * a).T - np.sin(angle) @ (w * b).T
-    qdd = -np.sin(angle) @ (w**2 * a).T - np.cos(angle) @ (w**2 * b).T
+    q, qd, qdd = _played(found, t) if family.maneuvers else _summed(found, t)
     kept = 1.0 - case["margin"]
     own, shares = [machine.source.joints[j] for j in machine.joints], {}
     low, high = np.array([j.limits for j in own]).T
@@ -82,6 +87,25 @@ def checked(experiment, found, case: dict) -> dict:
         least = _least(machine, *shapes, q[::_EVERY], base, case["clearance"])
         told |= {"least": least, "distance": least - case["clearance"]}
     return told
+
+
+def _summed(found, t):
+    """q, qd, qdd (n, dof) at times t (n,) [s] of the harmonics, by hand."""
+    w = 2.0 * np.pi * found.family.rounds / found.family.duration
+    w = w * np.arange(1, found.family.harmonics + 1)
+    c, a, b = np.split(found.coefficients, [1, 1 + found.family.harmonics], axis=1)
+    angle = w * t[:, None]
+    q = c.T + np.sin(angle) @ a.T + np.cos(angle) @ b.T
+    qd = np.cos(angle) @ (w * a).T - np.sin(angle) @ (w * b).T
+    return q, qd, -np.sin(angle) @ (w**2 * a).T - np.cos(angle) @ (w**2 * b).T
+
+
+def _played(found, t):
+    """The same of a motion with maneuvers, by polynomials of the fifth degree between the samples of
+    what will be played."""
+    rows = np.stack([found.q, found.qd, found.qdd], axis=1)
+    own = BPoly.from_derivatives(found.t, rows)
+    return own(t), own.derivative()(t), own.derivative(2)(t)
 
 
 def found_pose(experiment, machine) -> np.ndarray:

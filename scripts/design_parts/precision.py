@@ -1,24 +1,35 @@
-"""Precision: information against random motions and a design for the condition number, and whether
-the promised standard deviations come true."""
+"""Precision: a design's information and what parameters err by, against random motions, a design for
+the condition number, and FIGAROH's.
+
+FIGAROH (1.0.2) seeks the least condition number of the base regressor as it stands, over cubic splines
+through waypoints, by cyipopt with differences. cyipopt has no wheel; its criterion and its motions are
+here, with CasADi's IPOPT and exact slopes. What ends is shrunk to the same limits as everything else.
+"""
 
 from __future__ import annotations
 
-import json
 import tempfile
 import time
 import warnings
+from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from scipy.linalg import qr
 
-from scripts.design_parts.robots import RATE, experiment_with, unlogged
+from scripts.design_parts import solvers
+from scripts.design_parts.robots import unlogged, unlogged_experiment
+from scripts.design_parts.splines import Splines
 from sysid.design import search, solve
-from sysid.design.problem import told, value
+from sysid.design.problem import shrunk, told, torque, value
 
 ROBOTS = ("leg", "ur5", "panda", "ur10e")
 RANDOM = 1000  # motions that keep to the limits
-DRAWS = 20  # of the noise
+LOGS = 20  # of which parameters are fitted
+RATE = 100.0  # Hz of these
 _SPREAD = 1e-9  # of the largest eigenvalue: below, no motion shows a direction
+_STARTS = 2  # of FIGAROH's
 
 
 def case(seed: int, number: int, robots=ROBOTS) -> dict:
@@ -27,83 +38,181 @@ def case(seed: int, number: int, robots=ROBOTS) -> dict:
 
 
 def trial(case: dict) -> dict:
-    """log det of three designs, from the URDF; then the promise, where a first log can be
-    simulated."""
-    out = {**case, "cpu": {}}
-    with warnings.catch_warnings(), tempfile.TemporaryDirectory() as place:
+    """log det and mean parameter error of four motions, from the URDF."""
+    out, motions = {**case, "cpu": {}, "log_det": {}, "error": {}, "kappa": {}}, {}
+    seed = case["seed"]
+    with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         problem, pose, rounds = unlogged(case["robot"])
         fastest = max(rounds) * problem.family.harmonics / problem.family.duration
-        begun = time.process_time()
-        found, _ = search.searched(problem, pose, fastest, case["seed"], processes=1)
-        out["cpu"]["designed"] = time.process_time() - begun
-        out["designed"] = found.log_det
-        begun = time.process_time()
-        best, count, k = -np.inf, 0, 0
-        while count < RANDOM and k < 20 * RANDOM:
-            own = search.start(problem, pose, (case["seed"], rounds[k % len(rounds)], 10_000 + k))
-            best, count, k = max(best, own.log_det), count + bool(np.isfinite(own.value)), k + 1
-        out["cpu"]["random"] = time.process_time() - begun
-        out["random"], out["drawn"] = best, count
-        begun = time.process_time()
-        out["condition"], out["kappa"], out["kappa_designed"] = _condition(
-            problem, pose, rounds, case["seed"], found
-        )
-        out["cpu"]["condition"] = time.process_time() - begun
-        if case["robot"] in RATE:
-            out["promise"] = _promise(case, Path(place))
+        base, tell = _base(problem, pose, rounds, seed)
+
+        def timed(name, work):
+            begun = time.process_time()
+            motions[name] = work()
+            out["cpu"][name] = time.process_time() - begun
+
+        timed("designed", lambda: search.searched(problem, pose, fastest, seed, processes=1)[0])
+        timed("random", lambda: _random(problem, pose, rounds, seed))
+        timed("condition", lambda: _condition(problem, pose, rounds, seed, base))
+        if "IPOPT" in solvers.SOLVERS:
+            timed("FIGAROH", lambda: _figaroh(problem, pose, seed))
+        for name, found in motions.items():
+            if found is None:
+                continue
+            own = problem.of(found.family)
+            out["log_det"][name] = value(own, found.z)[1]
+            out["kappa"][name] = _kappa(own, found.z, base)
+            begun = time.process_time()
+            out["error"][name] = _error(case["robot"], own, found.z, tell, seed)
+            out["cpu"][f"{LOGS} fits, {name}"] = time.process_time() - begun
     return out
 
 
-def _condition(problem, pose, rounds, seed: int, designed) -> tuple[float, float, float]:
-    """log det of the motion with the least condition number that the same search finds, that number,
-    and the designed motion's own. Of base parameters, each in units of what a random motion tells of
-    it: the usual design, Gautier & Khalil 1992."""
-    known = problem.known
+def _random(problem, pose, rounds, seed: int):
+    """The best of many random motions that keep to the limits."""
+    best, count, k = None, 0, 0
+    while count < RANDOM and k < 20 * RANDOM:
+        own = search.start(problem, pose, (seed, rounds[k % len(rounds)], 10_000 + k))
+        count, k = count + bool(np.isfinite(own.value)), k + 1
+        best = own if best is None or own.log_det > best.log_det else best
+    return best
+
+
+def _base(problem, pose, rounds, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """(size, base) directions that random motions show, each a deviation that one of them would leave:
+    base parameters, all alike. And (base, size) what changes of parameters are of them."""
     grams = []
     for k in range(8):
         start = search.start(problem, pose, (seed, rounds[k % len(rounds)], 5000 + k))
-        grams.append(_gram(told(problem.with_rounds(start.rounds), start.z)))
-    typical = np.sum(grams, axis=0)
+        grams.append(_gram(told(problem.of(start.family), start.z)))
+    typical = np.mean(grams, axis=0) * problem.samples / len(problem.nodes)
     scale = 1.0 / np.sqrt(np.maximum(np.diagonal(typical), 1e-300))
     values, vectors = np.linalg.eigh(typical * np.outer(scale, scale))
     shown = values > _SPREAD * values[-1]
     base = scale[:, None] * vectors[:, shown] / np.sqrt(values[shown])
+    return base, base.T @ typical
+
+
+def _kappa(problem, z, base) -> float:
+    """Condition number of the regressor of base parameters in such units."""
+    values = np.linalg.eigvalsh(base.T @ _gram(told(problem, z)) @ base)
+    return float(np.sqrt(values[-1] / max(values[0], 1e-300)))
+
+
+@contextmanager
+def _least_condition(problem, base):
+    """Within, what a motion is worth is the condition number of its regressor of base (size, base)
+    parameters, less; in units as log det has, so that prices and thresholds mean the same."""
+    weight, kept = float(problem.known.model.size), solve.worth
 
     def worth(known, information):
         own = base.T @ (information - known.before) @ base
-        values, vectors = np.linalg.eigh(own)
-        low, high = base @ vectors[:, 0], base @ vectors[:, -1]
+        scale = 1.0 / np.sqrt(np.max(np.diagonal(own)))
+        values, vectors = np.linalg.eigh(own * scale**2)
+        values = np.maximum(values, 1e-14 * values[-1])
+        low, high = (scale * base @ vectors[:, k] for k in (0, -1))
         slope = np.outer(low, low) / values[0] - np.outer(high, high) / values[-1]
-        return float(np.log(values[0] / values[-1])), slope
+        return weight * float(np.log(values[0] / values[-1])), weight * slope
 
-    # of the order of hundreds, as log det is, so that prices and thresholds mean the same
-    weight = float(known.model.size)
-    kept = solve.worth
-    solve.worth = lambda *asked: tuple(weight * part for part in worth(*asked))
+    solve.worth = worth
     try:
-        starts = [
-            search.start(problem, pose, (seed, r, k)) for r in rounds for k in range(search.DRAWN)
-        ]
-        starts = [one for one in starts if np.isfinite(one.value)]
-
-        def kappa(found) -> float:
-            own = problem.with_rounds(found.rounds)
-            weights = own.samples / len(own.nodes)
-            return -worth(known, known.before + weights * _gram(told(own, found.z)))[0]
-
-        starts = sorted(starts, key=kappa)[: search.IMPROVED]
-        ended = []
-        for one in starts:
-            climb = solve.Climb(one.rounds, one.z)
-            while not climb.over:
-                climb = solve.climbed(problem, climb, 100)
-            ended.append(solve.Found.of(problem.with_rounds(climb.rounds), climb.z))
+        yield worth
     finally:
         solve.worth = kept
-    best = min((one for one in ended if np.isfinite(one.value)), key=kappa)
-    log_det = value(problem.with_rounds(best.rounds), best.z)[1]
-    return log_det, float(np.exp(kappa(best))), float(np.exp(kappa(designed)))
+
+
+def _condition(problem, pose, rounds, seed: int, base):
+    """The motion with the least condition number that the same search finds, each base parameter in
+    units of what a random motion tells of it: the usual design, Gautier & Khalil 1992."""
+    kappa = lambda found: _kappa(problem.of(found.family), found.z, base)  # noqa: E731
+    starts = [
+        search.start(problem, pose, (seed, r, k)) for r in rounds for k in range(search.DRAWN)
+    ]
+    starts = sorted((one for one in starts if np.isfinite(one.value)), key=kappa)
+    ended = []
+    with _least_condition(problem, base):
+        for one in starts[: search.IMPROVED]:
+            climb = solve.Climb(one.family, one.z)
+            while not climb.over:
+                climb = solve.climbed(problem, climb, 100)
+            ended.append(solve.Found.of(problem.of(climb.family), climb.z))
+    return min((one for one in ended if np.isfinite(one.value)), key=kappa)
+
+
+def _figaroh(problem, pose, seed: int):
+    """FIGAROH's criterion over its motions; None where none keeps to the limits."""
+    family = Splines(problem.family.duration, problem.family.dof)
+    own = problem.of(family)
+    shapes = problem.geometry.shapes.copy()
+    shapes.removeAllCollisionPairs()
+    free = replace(own, geometry=replace(problem.geometry, shapes=shapes))
+    rng, ended, base = np.random.default_rng(seed), [], None
+    for _ in range(_STARTS):
+        z = shrunk(own, family.drawn(problem.limits, pose, rng))
+        if z is None:
+            continue
+        if base is None:
+            base = _independent(told(own, z) * problem.known.noise[:, None, None])
+        with _least_condition(problem, base):
+            ends, _ = solvers.SOLVERS["IPOPT"](free, z)
+        kept = [found for end in (*ends, z) if (found := shrunk(own, end)) is not None]
+        ended += [(_kappa(own, one, base), one) for one in kept]
+    if not ended:
+        return None
+    best = min(ended, key=lambda one: one[0])[1]
+    return solve.Found(family, best, *value(own, best))
+
+
+def _independent(columns) -> np.ndarray:
+    """(size, base) unit vectors of columns (dof, size, n) none of which the others make."""
+    flat = np.moveaxis(columns, 1, 2).reshape(-1, columns.shape[1])
+    _, r, order = qr(flat, mode="economic", pivoting=True)
+    size = np.abs(np.diagonal(r))
+    return np.eye(columns.shape[1])[:, np.sort(order[size > 1e-7 * size[0]])]
+
+
+def _error(robot: str, problem, z, tell, seed: int) -> float:
+    """Mean error of base parameters, each in the deviation that a random motion would tell it with, over
+    fits of logs of a motion that a robot like its URDF makes."""
+    from sysid import pipeline
+    from sysid.compress import compress
+    from sysid.estimate import identify
+    from sysid.held_apart import chosen
+    from sysid.log import Log
+    from sysid.model import moving_coefficients
+    from sysid.preprocess import prepare
+    from sysid.prior_weight import with_weight
+    from sysid.segment import Segment
+    from sysid.simulate.truth import true_bodies
+
+    known, rng = problem.known, np.random.default_rng([seed, 3])
+    t = np.arange(int(round(problem.family.duration * RATE)) + 1) / RATE
+    q, qd, qdd, _ = problem.family.motion(z, t)
+    usual = np.abs(torque(problem, q, qd, qdd)).mean(axis=0)
+    found, weight = [], None
+    with tempfile.TemporaryDirectory() as place:
+        experiment = unlogged_experiment(robot, Path(place))
+        _, model, prior = pipeline.build(experiment)
+        spec = experiment.preprocess.model_copy(update={"filter": "savitzky-golay", "window": 0.1})
+        for _ in range(LOGS):
+            x = np.array(known.x)
+            count = 10 * known.model.bodies
+            x[:count] = true_bodies(known.model.robot, rng).ravel()
+            for k, c in enumerate(known.model.coefficients):
+                speed = np.abs(qd[:, c.joint]).mean()
+                x[count + k] = 0.1 * usual[c.joint] / (speed if c.effect == "viscous" else 1.0)
+            true = replace(problem, known=replace(known, x=x))
+            tau = torque(true, q, qd, qdd) + known.noise * rng.standard_normal(q.shape)
+            log = Log("log", Path("log"), "", (Segment(t, 1.0 / RATE, q, tau, None, None, {}),))
+            motion = prepare([log], spec, model.robot.joints)
+            data, moving = compress(model, motion), moving_coefficients(model, motion)
+            if weight is None:  # as the first log chooses it
+                weight = chosen(with_weight(experiment, "auto"), model, data, moving, prior).value
+            fit = identify(with_weight(experiment, weight), model, motion, data, prior)
+            place_of = [model.names.index(name) for name in known.model.names]
+            found.append(np.mean(np.abs(tell @ (fit.x[place_of] - x))))
+    return float(np.mean(found))
 
 
 def _gram(columns) -> np.ndarray:
@@ -111,62 +220,17 @@ def _gram(columns) -> np.ndarray:
     return flat.T @ flat
 
 
-def _promise(case: dict, folder: Path) -> dict:
-    """Promised over achieved standard deviation of what two logs determine, over draws of the torque's
-    noise on both."""
-    import polars
-
-    from sysid import design, pipeline
-    from sysid.config import loads
-
-    first = experiment_with(case["robot"], folder / "first", case["seed"])
-    begun = time.process_time()
-    found = design(first, processes=1)
-    spent = time.process_time() - begun
-    both = experiment_with(
-        case["robot"], folder / "both", case["seed"], motions=[(found.t, found.q)]
-    )
-    fit = pipeline.fit(both)
-    # the prior's weight as it was chosen: another one would be another estimator
-    text = (both.folder / "config.yaml").read_text()
-    text = text.replace("weight: auto", f"weight: {fit.strength.value:.6g}")
-    logs = {name: polars.read_csv(both.folder / name) for name in ("train.csv", "next_0.csv")}
-    noise = json.loads((both.folder / "truth.json").read_text())["torque_noise_std"]
-    rng = np.random.default_rng(case["seed"])
-    drawn = []
-    for _ in range(DRAWS):
-        for name, log in logs.items():
-            more = {
-                f"tau_{j}": log[f"tau_{j}"].to_numpy() + rng.normal(0.0, noise[j], len(log))
-                for j in fit.joints
-            }
-            log.with_columns(**{k: polars.Series(v) for k, v in more.items()}).write_csv(
-                both.folder / name
-            )
-        drawn.append(pipeline.fit(loads(text, both.folder / "config.yaml")).x)
-    achieved = np.std(drawn, axis=0, ddof=1)
-    names, own = fit.model.names, fit.uncertainty
-    ratio = [
-        float(found.deviations[name]["after"] / achieved[k])
-        for k, name in enumerate(names)
-        if name in found.deviations and own.from_data[k] > 0.9 and achieved[k] > 0.0
-    ]
-    return {"ratio": ratio, "cpu": spent}
-
-
 def table(results: list[dict]) -> list[str]:
-    """log det beside the others', and the share of promises within a quarter."""
-    out = ["robot     designed   best random     condition number (kappa; of the designed motion)"]
+    """log det, mean parameter error and condition number of each motion, by robot."""
+    names = ("designed", "random", "condition", "FIGAROH")
+    out = ["robot    " + "".join(f"{name:>30s}" for name in names)]
     for r in results:
-        out.append(
-            f"{r['robot']:8s} {r['designed']:9.1f}  {r['random']:9.1f} of {r['drawn']}  "
-            f"{r['condition']:9.1f}  ({r['kappa']:.0f}; {r['kappa_designed']:.0f})"
-        )
-    for r in results:
-        if len(ratio := np.array(r.get("promise", {}).get("ratio", []))):
-            within = np.mean(np.abs(np.log(ratio)) < np.log(1.25))
-            out.append(
-                f"{r['robot']:8s} promised / achieved deviation of {len(ratio)} parameters: median "
-                f"{np.median(ratio):.2f}, within a quarter {within:.0%}"
-            )
+        cells = [
+            f"{r['log_det'][n]:.1f}, error {r['error'][n]:.3f} ({r['kappa'][n]:.0f})"
+            if n in r["log_det"]
+            else "-"
+            for n in names
+        ]
+        out.append(f"{r['robot']:9s}" + "".join(f"{cell:>30s}" for cell in cells))
+    out.append(f"log det, mean error of base parameters over {LOGS} logs (condition number)")
     return out

@@ -51,7 +51,7 @@ def trial(case: dict) -> dict:
 
 
 def _programs(problem, z):
-    climb = solve.climbed(problem, solve.Climb(_ROUNDS, z), sum(solve.STEPS))
+    climb = solve.climbed(problem, solve.Climb(problem.family, z), sum(solve.STEPS))
     return [climb.z], None
 
 

@@ -1,6 +1,7 @@
 """The next motion to log: the most informative within its limits, or one that separates suspects.
 
-fourier.py      motions: sums of harmonics, at rest at both ends
+fourier.py      motions: sums of harmonics, at rest at both ends, with maneuvers after them
+maneuvers.py    ladders of constant speeds, slow reversals, poses, chirps
 limits.py       positions, speeds, accelerations, jerks, torques, clearance, floor
 links.py        what links look like
 collision.py    how close they come to each other along a motion
@@ -11,6 +12,7 @@ information.py  what a motion is worth: log det M, evidence between suspects, an
 problem.py      a motion against its limits, and how far it must shrink
 solve.py        linear programs within a trust region
 search.py       several starts in several processes
+spectrum.py     the noise that a fit's residual tells, and what it makes of a fit
 promise.py      deviations now and after, and which suspects will be told apart
 basis.py        what a design starts from
 designed.py     all of it on one page

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 import numpy as np
@@ -14,13 +14,15 @@ from ..candidates import Candidate, candidates, own_effects
 from ..errors import ConfigError, LogError, SysidWarning
 from ..estimate import Fit
 from ..filters import settled
+from ..log import Log
 from ..model import ROBOT, Model
 from ..motion import Motion
 from ..preprocess import prepare
 from ..projection import inverted
 from ..robot import Robot
-from ..simulate.motion import draw
-from ..specs import Experiment
+from ..simulate.motion import draw, top_speeds
+from ..smoother import Smoother
+from ..specs import Experiment, PreprocessSpec
 from .columns import instant_of
 from .information import Known, own_size
 from .noise import noise_of, size_of
@@ -30,12 +32,13 @@ _WINDOW = 0.1  # s, where none is known
 _FASTEST = 0.25  # of a period of the filter's window: what it still lets through of the fastest
 _GUESSED = 0.02  # of a joint's torque: its noise, where no log says
 _RATE = 500.0  # Hz, where no log says
+_STILL, _STILL_SHARE = 0.03, 0.03  # rad/s or m/s, of the top speed: slower is standing (`preprocess`)
 _USUAL = 10.0  # s of a motion that says how a robot usually moves, where no log does
 
 
 @dataclass(frozen=True)
 class Basis:
-    """What a design starts from."""
+    """What a design starts from. logs: those of the fit; motion: these, filtered."""
 
     robot: Robot
     fit: Fit | None
@@ -45,6 +48,7 @@ class Basis:
     rate: float
     window: float
     levels: Mapping[str, str]
+    logs: tuple[Log, ...] = ()
 
     @property
     def fastest(self) -> float:
@@ -58,13 +62,13 @@ def basis(
     """What an experiment knows of its robot at {group: level}. Raises SysidError."""
     machine, structure, prior = pipeline.build(experiment)
     levels = _levels(structure, levels)
-    fit = motion = None
+    fit, motion, logs = None, None, ()
     if _has_logs(experiment):
         read = pipeline.read_all(experiment)
         fit = pipeline.fit(experiment, progress=tell, measured=read)
         spec = settled(fit.experiment.preprocess, fit.filters)
         motion = prepare(read.train, spec, machine.joints)
-        structure, x = fit.model, fit.x
+        structure, x, logs = fit.model, fit.x, tuple(read.train)
         noise = noise_of(fit)
         pose = np.concatenate([p.q for p in motion.pieces]).mean(axis=0)
         rate = 1.0 / motion.pieces[0].step
@@ -85,7 +89,23 @@ def basis(
         rate, window = experiment.data.rate or _RATE, _WINDOW
     asked = _suspects(experiment, structure, separate)
     known = _known(structure, levels, fit, x, noise, prior, asked, motion)
-    return Basis(machine, fit, motion, known, pose, rate, window, levels)
+    known = replace(known, **_left_out(machine, experiment, fit, rate, window))
+    return Basis(machine, fit, motion, known, pose, rate, window, levels, logs)
+
+
+def _left_out(machine: Robot, experiment: Experiment, fit, rate: float, window: float) -> dict:
+    """Which rows of a joint a fit leaves out: `reach` [s] of a reversal within which, and the speed
+    (dof,) below which."""
+    spec = experiment.preprocess if fit is None else settled(fit.experiment.preprocess, fit.filters)
+    if spec.standstill == "keep":
+        return {}
+    if fit is None:
+        spec = PreprocessSpec(window=window, standstill=spec.standstill)
+    rows, _ = Smoother(spec, 1.0 / rate).smear(spec.torque == "same" and spec.filter != "none")
+    if spec.standstill not in ("auto", "mask"):
+        return {"slowest": np.full(machine.dof, float(spec.standstill))}
+    slowest = np.minimum(_STILL, _STILL_SHARE * top_speeds(machine))
+    return {"reach": rows / rate if spec.standstill == "auto" else 0.0, "slowest": slowest}
 
 
 def _levels(model: Model, levels: Mapping[str, str]) -> dict[str, str]:

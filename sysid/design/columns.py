@@ -7,7 +7,7 @@ pass over stacked copies of the motion.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
@@ -15,7 +15,6 @@ from ..model import Model
 from ..motion import Piece
 
 _STEP = 1e-5  # rad, rad/s, rad/s^2 or metres: forward; columns may be differences themselves
-_RUN = 4096  # samples
 
 
 def of_the_instant(model: Model) -> Model:
@@ -54,13 +53,6 @@ def columns(model: Model, q, qd, qdd) -> np.ndarray:
     for joint, own in enumerate(found):
         out[joint, model.support(joint)] = own
     return out
-
-
-def in_runs(model: Model, q, qd, qdd) -> Iterator[tuple[slice, np.ndarray]]:
-    """Rows and `columns` of them, so few at once that memory does not grow with the motion."""
-    for start in range(0, len(q), _RUN):
-        rows = slice(start, start + _RUN)
-        yield rows, columns(model, q[rows], qd[rows], qdd[rows])
 
 
 def with_changes(of: Callable, q, qd, qdd) -> tuple[np.ndarray, np.ndarray]:

@@ -21,12 +21,13 @@ from ..errors import ConfigError, SysidWarning
 from ..estimate import Fit
 from ..filters import settled
 from ..log import Log
+from ..motion import Motion
+from ..noise import of_angles
 from ..preprocess import prepare
 from ..segment import Segment
 from ..specs import Experiment
 from . import promise
 from .basis import Basis, basis
-from .columns import in_runs, instant_of
 from .fourier import Fourier
 from .limits import Limits, LimitsSpec, limits
 from .links import geometry
@@ -35,7 +36,6 @@ from .problem import Problem, shares, torque
 from .result import Design
 from .search import searched
 from .solve import Found
-from .suspects import played
 
 HARMONICS = 5
 
@@ -74,7 +74,7 @@ def design(
             )  # fmt: skip
         for text in bounds.said:
             warnings.warn(SysidWarning(text), stacklevel=2)
-    return _told(base, problem.with_rounds(found.rounds), bounds, found, random_best, notices)
+    return _told(base, problem.of(found.family), bounds, found, random_best, notices)
 
 
 def posed(
@@ -131,43 +131,43 @@ def _told(
     needed = torque(problem, q, qd, qdd)
     spread, pairs = {}, []
     if base.fit is not None:
-        spread = promise.deviations(base.fit, _more(base.fit, base.levels, t, q, needed))
+        seen = _seen(base, t, q, needed)
+        spread = promise.deviations(base.fit, base.motion, seen, _of_angles(base))
         if len(base.known.suspects) > 1:
-            joints = base.robot.joints
-            new = played(q, qd, qdd, 1.0 / base.rate, joints, levels=base.levels)
-            pairs = promise.pairs(base.fit, base.known.suspects, base.motion, new, len(t))
+            pairs = promise.pairs(base.fit, base.known.suspects, base.motion, seen, seen.samples)
     return Design(
         joints=base.robot.joints, family=family, coefficients=family.coefficients(found.z),
+        amounts=found.z[:, family.waves :],
         t=t, q=q, qd=qd, qdd=qdd, torque=needed, log_det=found.log_det, random_best=random_best,
         deviations=spread, pairs=tuple(pairs), margins=_margins(problem, bounds, found),
         limits=bounds, said=tuple(notices),
     )  # fmt: skip
 
 
-def _more(fit: Fit, levels: Mapping[str, str], t, q, needed) -> np.ndarray:
-    """C'C (dof, size, size) of a motion's rows in the fit's parameters; zero for effects that look
-    back in time.
-
-    The motion is filtered as its log will be: what is left out around a reversal tells nothing.
+def _seen(base: Basis, t, q, needed) -> Motion:
+    """The motion (n, dof) as a fit of its log will see it: filtered, rows around reversals left out,
+    its other signals as they usually are.
 
     Args:
-        t (n,) [s]; q (n, dof); needed (n, dof), the torque of the motion.
+        t (n,) [s]; needed (n, dof), the torque of the motion.
     """
-    spec, joints = settled(fit.experiment.preprocess, fit.filters), fit.joints
-    segment = Segment(t, float(t[1] - t[0]), q, needed, None, None, {})
+    fit, old = base.fit, base.motion
+    spec = settled(fit.experiment.preprocess, fit.filters)
+    usual = {
+        name: np.full(len(t), np.median(np.concatenate([p.signals[name] for p in old.pieces])))
+        for name in old.pieces[0].signals
+    }
+    segment = Segment(t, float(t[1] - t[0]), q, needed, None, None, usual)
+    log = Log("designed", Path("designed"), "", (segment,), unused=old.unused, levels=base.levels)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SysidWarning)
-        seen = prepare([Log("designed", Path("designed"), "", (segment,))], spec, joints)
-    instant, places = instant_of(fit.model, levels)
-    out = np.zeros((len(joints), fit.model.size, fit.model.size))
-    for piece in seen.pieces:
-        core = piece.core
-        use = np.ones((piece.samples, len(joints)), bool) if piece.use is None else piece.use[core]
-        for rows, found in in_runs(instant, piece.q[core], piece.qd[core], piece.qdd[core]):
-            for j, own in enumerate(found):
-                kept = own[:, use[rows, j]]
-                out[j][np.ix_(places, places)] += kept @ kept.T
-    return out
+        return prepare([log], spec, fit.joints)
+
+
+def _of_angles(base: Basis) -> np.ndarray:
+    """(n, dof) what the noise of the angles, drawn once more, adds to the torque of the logs' rows."""
+    spec = settled(base.fit.experiment.preprocess, base.fit.filters)
+    return np.concatenate(of_angles([base.logs], spec, base.fit).torque)
 
 
 def _margins(problem: Problem, bounds: Limits, found: Found) -> dict[str, float]:

@@ -24,8 +24,18 @@ def document(found: Design, run: str | Path = "") -> dict:
         "coefficients": {
             "rounds": found.family.rounds,
             "harmonics": found.family.harmonics,
+            "duration": found.family.time,
             "joints": dict(zip(found.joints, found.coefficients.tolist())),
         },
+        "maneuvers": [
+            {
+                "kind": own.kind,
+                "start": own.start,
+                "duration": own.duration,
+                "joints": dict(zip(found.joints, found.amounts[:, k].tolist())),
+            }
+            for k, own in enumerate(found.family.maneuvers)
+        ],
         "notices": list(found.said),
         "versions": versions(),
         "run": str(run),

@@ -22,7 +22,7 @@ from functools import cached_property
 import numpy as np
 
 from ..inertia import DIVERGENCES
-from ..model import Model
+from ..model import ROBOT, Model
 from .columns import columns
 from .suspects import Suspect, along
 
@@ -34,7 +34,8 @@ class Known:
     model: of the instant, at its shape values; x (size,): parameters; noise (dof,): standard
     deviation of a row's torque [N m], infinite where no row counts; suspects: what it may lack,
     whose coefficients stand after its parameters; before (all, all): information of the logs that
-    exist and the prior.
+    exist and the prior. reach [s], slowest (dof,) [rad/s or m/s]: a joint's rows within so much of a
+    reversal, or as slow, do not count, as a fit leaves them out.
     """
 
     model: Model
@@ -42,11 +43,25 @@ class Known:
     noise: np.ndarray
     before: np.ndarray
     suspects: tuple[Suspect, ...] = ()
+    reach: float = 0.0
+    slowest: np.ndarray | None = None
 
     @property
     def dof(self) -> int:
         """Joints."""
         return self.model.robot.dof
+
+    @property
+    def maneuvers(self) -> tuple[str, ...]:
+        """Kinds of maneuvers that the suspects ask for, each once."""
+        kinds = (kind for one in self.suspects for kind in one.candidate.effect.maneuvers)
+        return tuple(dict.fromkeys(kinds))
+
+    @property
+    def joints(self) -> tuple[int, ...]:
+        """The suspects' joints; none where one is of the whole robot."""
+        found = sorted({one.candidate.joint for one in self.suspects})
+        return () if ROBOT in found else tuple(found)
 
     @cached_property
     def places(self) -> list[np.ndarray]:
@@ -55,15 +70,25 @@ class Known:
         return [np.arange(a, b) for a, b in zip(ends[:-1], ends[1:])]
 
     def all_columns(self, q, qd, qdd) -> np.ndarray:
-        """(dof, all, n) of samples (n, dof), each over its joint's noise. Zero of suspects that look
-        back in time."""
+        """(dof, all, n) of samples (n, dof), each over its joint's noise, as far as it counts. Zero of
+        suspects that look back in time."""
         own = [columns(self.model, q, qd, qdd)]
         for one in self.suspects:
             if one.looks_back:
                 own.append(np.zeros((self.dof, len(one.size), len(q))))
             else:
                 own.append(along([one], self.model, self.x, q, qd, qdd))
-        return np.concatenate(own, axis=1) / self.noise[:, None, None]
+        return np.concatenate(own, axis=1) * self.counted(qd, qdd)[:, None]
+
+    def counted(self, qd, qdd) -> np.ndarray:
+        """(dof, n) what a row of each joint is multiplied by: one over its noise, less where it moves
+        hardly faster than what does not count, nothing where it is slower. Smooth, so that slopes
+        know of it."""
+        over = np.repeat(1.0 / self.noise[:, None], len(qd), axis=1)
+        if self.slowest is None:
+            return over
+        u = np.clip(np.abs(qd) / (self.slowest + self.reach * np.abs(qdd)) - 0.5, 0.0, 1.0).T
+        return over * u**2 * (3.0 - 2.0 * u)
 
 
 _ENOUGH = 100.0  # of lambda: ten standard deviations

@@ -40,8 +40,7 @@ class Problem:
     @cached_property
     def nodes(self) -> np.ndarray:
         """Times (n,) [s] at which the criterion is looked at."""
-        fastest = self.family.rounds * self.family.harmonics / self.family.duration
-        count = int(np.ceil(_NODES * fastest * self.family.duration))
+        count = int(np.ceil(_NODES * self.family.fastest * self.family.duration))
         return (np.arange(count) + 0.5) * self.family.duration / count
 
     @property
@@ -59,9 +58,13 @@ class Problem:
         """The family's basis (4, n, size) at these times."""
         return self.family.basis(self.checked)
 
-    def with_rounds(self, rounds: int) -> Problem:
+    def of(self, family: Fourier) -> Problem:
         """The same of another family of motions."""
-        return replace(self, family=replace(self.family, rounds=rounds))
+        return replace(self, family=family)
+
+    def with_rounds(self, rounds: int) -> Problem:
+        """The same of harmonics of other frequencies."""
+        return self.of(replace(self.family, rounds=rounds))
 
 
 def told(problem: Problem, z) -> np.ndarray:
@@ -83,7 +86,7 @@ def looking_back(problem: Problem, suspect: Suspect, z) -> np.ndarray:
     motion = family.motion(z, step * (np.arange(count * between) + 0.5))
     rows = slice(between // 2, None, between)
     found = along([suspect], known.model, known.x, *motion[:3], step, rows)
-    return found / known.noise[:, None, None]
+    return found * known.counted(*motion[1:3, rows])[:, None]
 
 
 def value(problem: Problem, z) -> tuple[float, float]:
@@ -191,13 +194,26 @@ def drawn(problem: Problem, pose, rng: np.random.Generator) -> np.ndarray:
     room = 0.8 * limits.half
     near = pose + 0.3 * limits.half * rng.uniform(-1.0, 1.0, family.dof)
     z[:, 0] = np.clip(near, limits.middle - room, limits.middle + room)
-    z[:, 1:] = rng.standard_normal((family.dof, family.size - 1))
-    waves = np.concatenate([0.0 * z[:, :1], z[:, 1:]], 1)
-    q, qd, qdd, jerk = family.motion(waves, problem.nodes)
-    room = limits.half - np.abs(z[:, 0] - limits.middle)
-    share = [
-        room / np.abs(q).max(0), limits.velocity / np.abs(qd).max(0),
-        limits.acceleration / np.abs(qdd).max(0), limits.jerk / np.abs(jerk).max(0),
-    ]  # fmt: skip
-    z[:, 1:] *= (rng.uniform(0.3, 1.0) * np.min(share, axis=0))[:, None]
+    z[:, 1 : family.waves] = rng.standard_normal((family.dof, family.waves - 1))
+    z[:, 1:] *= (rng.uniform(0.3, 1.0) * _room(problem, z))[:, None]
+    here = family.basis(np.array([family.time]))[0] @ z.T
+    for k, own in enumerate(family.maneuvers, family.waves):
+        part = 0.0 * z
+        part[:, k] = rng.choice([-1.0, 1.0], family.dof)
+        part[:, 0] = here[0]
+        joints = list(own.joints or range(family.dof))
+        z[joints, k] = (part[:, k] * rng.uniform(0.3, 1.0) * _room(problem, part))[joints]
     return z
+
+
+def _room(problem: Problem, z) -> np.ndarray:
+    """(dof,) how many times as large about its middle pose a motion could be."""
+    family, limits = problem.family, problem.limits
+    waves = np.concatenate([0.0 * z[:, :1], z[:, 1:]], 1)
+    most = [np.maximum(np.abs(part).max(0), 1e-12) for part in family.motion(waves, problem.nodes)]
+    room = np.maximum(limits.half - np.abs(z[:, 0] - limits.middle), 0.0)
+    share = [
+        room / most[0], limits.velocity / most[1], limits.acceleration / most[2],
+        limits.jerk / most[3],
+    ]  # fmt: skip
+    return np.min(share, axis=0)

@@ -1,15 +1,20 @@
 """What a designed log will tell: deviations now and after, and which suspects it will tell apart.
 
-Standard deviations are those of the fit's own estimator, (H^-1 S H^-1) with H the Hessian of data
-and prior and S what noise makes of the gradient; what the fit itself says now is scaled by how the
-formula falls.
+Standard deviations are what noise makes of the fit's own estimate, to first order:
+
+    cov = H^-1 (sum_j w_j^4 C_j' N_j C_j + the prior's claim) H^-1,    H = sum_j w_j^2 C_j' C_j + prior,
+
+over the rows of the old logs and of the new one, filtered as a fit filters them, with those left out
+that it leaves out; N_j is the covariance of joint j's noise, whose spectrum the first fit's residual
+tells (`spectrum`). What a fit of few blocks states of its own deviations, from their spread, is uncertain
+by a third: it allows for noise of any kind, and for what a model lacks.
 
 A suspect a that is true leaves, of its torque s_a, what the model and its rival b cannot make
 between them, lambda = min_x |s_a - X x|^2 over the noise, on the old logs and the new one together.
 The log of the likelihood ratio is then normal with mean lambda / 2 and variance lambda, and a set
 holds one name where it exceeds log 9.
 
-Source: Atkinson & Fedorov 1975 (T-optimality); Wald 1943.
+Source: White 1980 (H^-1 S H^-1); Atkinson & Fedorov 1975 (T-optimality); Wald 1943.
 """
 
 from __future__ import annotations
@@ -20,11 +25,14 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import ndtr
 
+from ..compress import Linearised
 from ..estimate import Fit
 from ..inertia import DIVERGENCES
 from ..motion import Motion
+from ..prior_weight import weakest
 from .information import own_size
-from .noise import noise_of, size_of
+from .noise import size_of
+from .spectrum import Noise, noise_left, scatter, stretches
 from .suspects import Seen, Suspect
 
 _ODDS = np.log(9.0)  # a set at 90 % holds one of two
@@ -83,49 +91,105 @@ def _apart(parts, prior, own, size, rival) -> float:
     return float(ndtr((0.5 * left - _ODDS) / np.sqrt(left))) if left > 0.0 else 0.0
 
 
-def deviations(fit: Fit, more: np.ndarray) -> dict[str, dict[str, float | None]]:
-    """{parameter: {now, after}} of what a fit determines, its deviation now and with a new log.
+def deviations(fit: Fit, old: Motion, new: Motion, made) -> dict[str, dict[str, float | None]]:
+    """{parameter: {now, after}} of what a fit determines, shape values too: the deviation that noise and
+    the prior's width make of a fit of the old logs, and of the old ones and the new one together.
 
     Args:
-        more: (dof, size, size) of the new log's rows, C'C for each joint, in the fit's parameters;
-            a joint none of whose rows counts takes no part.
+        old, new: motions of the logs of the fit and of the one to come, filtered as the fit filters.
+        made (n, dof): what the angles' noise, drawn once more, adds to the torque of the old one's rows.
     """
-    counts = np.isfinite(noise := noise_of(fit))
-    more = more * counts[:, None, None]
-    size, weights = fit.model.size, np.ones(len(fit.joints)) if fit.weights is None else fit.weights
-    old = np.zeros_like(more)
-    for factor in fit.compressed.by_joint:
-        pick = np.ix_([factor.joint], factor.columns, factor.columns)
-        r = factor.triangle[:, :-1]
-        old[pick] += (r.T @ r)[None]
-    variance = np.where(counts, noise, 0.0) ** 2 * weights**4
-    beside = np.zeros((size, size))
-    if fit.experiment.prior.weight:
-        metric = _prior(fit)
-        for b, block in enumerate(metric):
-            beside[10 * b : 10 * b + 10, 10 * b : 10 * b + 10] = 0.5 * block
-    free = np.isfinite(fit.uncertainty.std)
+    model = Linearised(fit.model, fit.x)
+    std = np.concatenate([fit.uncertainty.std, fit.shape_std[model.free]])
+    names = (*fit.model.names, *(fit.model.shape_values[k].name for k in model.free))
+    free, count = np.isfinite(std), len(std)
+    weights = np.ones(len(fit.joints)) if fit.weights is None else fit.weights
+    own, more = (_gram(model, motion, weights, count) for motion in (old, new))
+    beside, (variance, claim) = _beside(fit, count), _claim(fit, weights)
+    noises = _noises(fit, model, old, made, beside / (variance * claim), free)
+    claimed = variance * claim * beside
 
-    def spread(grams):
-        hessian = np.einsum("j,jab->ab", weights**2, grams) + beside
-        noise = np.einsum("j,jab->ab", variance, grams)
-        h, s = hessian[np.ix_(free, free)], noise[np.ix_(free, free)]
-        scale = 1.0 / np.sqrt(np.maximum(np.diagonal(h), 1e-300))
-        inverse = np.linalg.pinv(h * np.outer(scale, scale), rcond=1e-13) * np.outer(scale, scale)
-        typical = float(np.mean(variance[variance > 0.0])) if variance.any() else 1.0
-        total = inverse @ (s + typical * beside[np.ix_(free, free)]) @ inverse
-        return np.sqrt(np.maximum(np.diagonal(total), 0.0))
+    def deviation(hessian, noise):
+        inverse = _inverse(hessian + beside, free)
+        spread = np.diagonal(inverse @ (noise + claimed) @ inverse)
+        return np.sqrt(np.maximum(spread, 0.0))
 
-    now, after = spread(old), spread(old + more)
-    names = [name for name, kept in zip(fit.model.names, free) if kept]
-    std = fit.uncertainty.std[free]
-    share = np.divide(after, now, out=np.ones_like(now), where=now > 0.0)
-    return {
-        name: {"now": float(s), "after": float(s * min(r, 1.0))}
-        for name, s, r in zip(names, std, share)
-    }
+    first, then = (_scatter(model, motion, weights, noises, count) for motion in (old, new))
+    now, after = deviation(own, first), deviation(own + more, first + then)
+    kept = np.flatnonzero(free)
+    return {names[k]: {"now": float(now[k]), "after": float(after[k])} for k in kept}
 
 
-def _prior(fit: Fit) -> np.ndarray:
-    divergence = DIVERGENCES[fit.experiment.prior.divergence](fit.prior)
-    return fit.experiment.prior.weight * np.asarray(divergence.hessian(fit.pi))
+def _scatter(model, motion: Motion, weights, noises, size: int) -> np.ndarray:
+    """(size, size) covariance of C'e of a motion's rows, each joint's with its weight."""
+    out = np.zeros((size, size))
+    for part in stretches(model, motion):
+        at = np.ix_(part.support, part.support)
+        out[at] += weights[part.joint] ** 4 * scatter(part, noises[part.joint])
+    return out
+
+
+def _gram(model, motion: Motion, weights, size: int) -> np.ndarray:
+    """(size, size) C'C of a motion's rows that count, each joint's with its weight."""
+    out = np.zeros((size, size))
+    for part in stretches(model, motion):
+        rows = weights[part.joint] * part.columns
+        out[np.ix_(part.support, part.support)] += rows @ rows.T
+    return out
+
+
+def _noises(fit: Fit, model, old: Motion, made, claimed, free) -> list[Noise]:
+    """The noise of each joint.
+
+    Where joints are not as loud as each other, the noise of one bends what another leaves; and a strong
+    prior bends what all leave. So it is told of what a fit leaves in which each joint counts by its
+    own noise and the prior by what it claims to know (size, size).
+    """
+    told = fit.predictions["train"]
+    left, even = told.residual, _over(told.errors()["rms"])
+    inverse = _inverse(_gram(model, old, even, len(free)) + claimed, free)
+    pull = np.zeros(len(free))
+    for part in stretches(model, old):
+        pull[part.support] += even[part.joint] ** 2 * part.columns @ left[part.rows, part.joint]
+
+    def takes(part, seen):
+        at = np.ix_(part.support, part.support)
+        return even[part.joint] ** 2 * np.einsum("am,am->m", seen.conj(), inverse[at] @ seen).real
+
+    return noise_left(stretches(model, old), left, inverse @ pull, made, takes)
+
+
+def _over(size) -> np.ndarray:
+    """One over each (n,), zero where it is zero."""
+    return np.divide(1.0, size, out=np.zeros(len(size)), where=np.asarray(size) > 0.0)
+
+
+def _beside(fit: Fit, size: int) -> np.ndarray:
+    """(size, size) what the prior adds to C'C: half its Hessian."""
+    out = np.zeros((size, size))
+    if weight := fit.experiment.prior.weight:
+        divergence = DIVERGENCES[fit.experiment.prior.divergence](fit.prior)
+        for b, block in enumerate(np.asarray(divergence.hessian(fit.pi))):
+            out[10 * b : 10 * b + 10, 10 * b : 10 * b + 10] = 0.5 * weight * block
+    return out
+
+
+def _claim(fit: Fit, weights) -> tuple[float, float]:
+    """The variance of what a fit left, and the weight of its prior over that of one that claims no
+    more than it knows, or one (`sysid.uncertainty`)."""
+    told = fit.predictions["train"]
+    variance = float(np.sum((told.residual * weights) ** 2) / max(int(told.counts.sum()), 1))
+    relative = DIVERGENCES[fit.experiment.prior.divergence](fit.prior).relative
+    least = weakest(variance) if relative else np.inf
+    share = fit.experiment.prior.weight / least if least > 0.0 else 1.0
+    return max(variance, 1e-300), max(1.0, share)
+
+
+def _inverse(gram, free) -> np.ndarray:
+    """The inverse (size, size) over the parameters that are free, zero elsewhere."""
+    own = gram[np.ix_(free, free)]
+    scale = 1.0 / np.sqrt(np.maximum(np.diagonal(own), 1e-300))
+    out = np.zeros_like(gram)
+    inverse = np.linalg.pinv(own * np.outer(scale, scale), rcond=1e-13, hermitian=True)
+    out[np.ix_(free, free)] = inverse * np.outer(scale, scale)
+    return out

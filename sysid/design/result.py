@@ -16,7 +16,8 @@ from .promise import Pair
 class Design:
     """A motion and what it promises.
 
-    t (n,) [s]; q, qd, qdd (n, dof); torque (n, dof) as predicted, and its deviation; log_det of the
+    coefficients (dof, 1 + 2 harmonics): of sines and cosines, amounts (dof, maneuvers): of the family's
+    maneuvers. t (n,) [s]; q, qd, qdd (n, dof); torque (n, dof) as predicted, and its deviation; log_det of the
     information, and that of the best random motion; deviations: {parameter: {now, after}}; pairs of
     suspects; margins: shares of each range that are left, and metres. said: what to know of it.
     """
@@ -24,6 +25,7 @@ class Design:
     joints: tuple[str, ...]
     family: Fourier
     coefficients: np.ndarray
+    amounts: np.ndarray
     t: np.ndarray
     q: np.ndarray
     qd: np.ndarray

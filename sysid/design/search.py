@@ -25,7 +25,9 @@ from .solve import Climb, Found
 
 _ROUNDS = (1, 2, 4, 8)  # of the slowest harmonic
 DRAWN = 4  # random motions for each number of rounds
+MANEUVERS = 0.4  # of the time: what maneuvers have where they are tried
 IMPROVED = 4  # starts of a search: the best of them
+_CLEAR = 1.0  # of its worth: less is what one start is above another
 _WORTH = 8.0  # s of work from which others help: a process takes two to begin
 _SLICE = 12  # linear programs, less than a second or two
 
@@ -42,13 +44,15 @@ def searched(
             many as there are cores, where it is None.
     """
     work = _shared(1)
-    asked = [
-        (problem, pose, (seed, r, k)) for r in rounds(problem.family, fastest) for k in range(DRAWN)
-    ]
+    asked = _starts(problem, pose, fastest, seed)
     starts = [found for found in work(start, asked) if np.isfinite(found.value)]
-    random_best = max((found.log_det for found in starts), default=-np.inf)
-    starts = sorted(starts, key=lambda found: -found.value)[:IMPROVED]
-    climbs = [Climb(found.rounds, found.z) for found in starts]
+    random_best = max((f.log_det for f in starts if not f.family.maneuvers), default=-np.inf)
+    if kinds := problem.known.maneuvers:
+        family = problem.family.followed_by(kinds, problem.known.joints, MANEUVERS, fastest)
+        asked = _starts(problem.of(family), pose, fastest, seed)
+        starts += [found for found in work(start, asked) if np.isfinite(found.value)]
+    starts = _improved(starts)
+    climbs = [Climb(found.family, found.z) for found in starts]
     try:
         if climbs:
             begun = time.perf_counter()
@@ -65,12 +69,32 @@ def searched(
         work = _shared(1)
     if climbs:
         starts += work(solve.ended, [(problem, climb) for climb in climbs])
-    return max(starts, key=lambda found: found.value, default=None), random_best
+    plain = [found for found in starts if not found.family.maneuvers]
+    best = max(starts, key=lambda found: found.value, default=None)
+    simple = max(plain, key=lambda found: found.value, default=best)
+    # what maneuvers add must be more than where searches happen to end
+    return (best if best is None or best.value > simple.value + _CLEAR else simple), random_best
+
+
+def _improved(starts: list[Found]) -> list[Found]:
+    """The best of the random motions; one of them has maneuvers where any has: these tell little until
+    they have found their sizes."""
+    ordered = sorted(starts, key=lambda found: -found.value)
+    best, more = ordered[:IMPROVED], [one for one in ordered if one.family.maneuvers]
+    if more and not any(one.family.maneuvers for one in best):
+        best[-1:] = more[:1]
+    return best
+
+
+def _starts(problem: Problem, pose, fastest: float, seed: int) -> list[tuple]:
+    """What `start` is asked for."""
+    own = rounds(problem.family, fastest)
+    return [(problem, pose, (seed, r, k)) for r in own for k in range(DRAWN)]
 
 
 def rounds(family: Fourier, fastest: float) -> list[int]:
     """Numbers of rounds with which no harmonic is above a frequency [Hz]; one at least."""
-    return [r for r in _ROUNDS if r * family.harmonics / family.duration <= fastest] or [1]
+    return [r for r in _ROUNDS if r * family.harmonics / family.time <= fastest] or [1]
 
 
 def start(problem: Problem, pose, seed: tuple[int, int, int]) -> Found:

@@ -18,6 +18,7 @@ from scipy.optimize import linprog
 from ..model import ROBOT
 from .collision import Near
 from .columns import with_changes
+from .fourier import Fourier
 from .information import information, worth
 from .problem import Problem, looking_back, passed, shares, shrunk, told, torque, value
 
@@ -35,10 +36,10 @@ _SIGHT = 0.03  # m beyond the clearance: pairs that a step minds; others are loo
 
 @dataclass(frozen=True)
 class Found:
-    """A motion z (dof, size) of a number of rounds, what it is worth, and log det M alone; -inf where
-    none keeps to the limits."""
+    """A motion z (dof, size) of a family, what it is worth, and log det M alone; -inf where none keeps
+    to the limits."""
 
-    rounds: int
+    family: Fourier
     z: np.ndarray
     value: float
     log_det: float = -np.inf
@@ -46,17 +47,17 @@ class Found:
     @classmethod
     def of(cls, problem: Problem, z: np.ndarray) -> Found:
         """The largest share of a motion that keeps to every limit."""
-        kept, rounds = shrunk(problem, z), problem.family.rounds
-        return cls(rounds, z, -np.inf) if kept is None else cls(rounds, kept, *value(problem, kept))
+        kept, family = shrunk(problem, z), problem.family
+        return cls(family, z, -np.inf) if kept is None else cls(family, kept, *value(problem, kept))
 
 
 @dataclass(frozen=True)
 class Climb:
-    """Where a search stands: coordinates z (dof, size) of a motion of a number of rounds, the trust
+    """Where a search stands: coordinates z (dof, size) of a motion of a family, the trust
     region's radius, times (n,) [s] beside the nodes at which limits are looked at, how often these
     have grown, and the linear programs since."""
 
-    rounds: int
+    family: Fourier
     z: np.ndarray
     radius: float = _FIRST
     extra: np.ndarray = field(default_factory=lambda: np.zeros(0))
@@ -75,9 +76,9 @@ class Climb:
 
 
 def climbed(problem: Problem, climb: Climb, steps: int) -> Climb:
-    """A search after so many linear programs more, or where it ends. The problem's own number of
-    rounds is not looked at: the search has one."""
-    problem = problem.with_rounds(climb.rounds)
+    """A search after so many linear programs more, or where it ends. The problem's own family
+    is not looked at: the search has one."""
+    problem = problem.of(climb.family)
     while steps > 0 and not climb.over:
         grid = _grid(problem, climb.extra)
         at, radius, done, settled = _look(problem, climb.z, grid), climb.radius, climb.steps, False
@@ -99,7 +100,7 @@ def climbed(problem: Problem, climb: Climb, steps: int) -> Climb:
 
 def ended(problem: Problem, climb: Climb) -> Found:
     """The motion of a search, shrunk to what keeps to every limit."""
-    return Found.of(problem.with_rounds(climb.rounds), climb.z)
+    return Found.of(problem.of(climb.family), climb.z)
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,7 @@ class Armature(TorqueEffect):
     looks_like = "residual in proportion to the joint's own acceleration"
     tied_with = ("the link's moment of inertia on a first joint that does not tilt",)
     separate_by = "a chirp in two poses of the joints behind it"
+    maneuvers = ("chirp",)
     source = "Featherstone 2008, section 9.6"
     mimics_mass = True
     elementwise = True

@@ -13,6 +13,7 @@ class AsymmetricViscous(TorqueEffect):
     looks_like = "residual in proportion to |qd|, of one sign"
     tied_with = ("asymmetric_coulomb", "torque_bias")
     separate_by = "a ladder of constant speeds, both ways"
+    maneuvers = ("ladder",)
     source = "the asymmetric counterpart of viscous friction; no reference"
     elementwise = True
 

@@ -19,6 +19,7 @@ class Backlash(Deflection):
     looks_like = "no torque, then a blow, where the load torque changes sign"
     tied_with = ("presliding", "elasticity", "coulomb")
     separate_by = "the same motion in a pose that preloads the gear and in one that balances it"
+    maneuvers = ("reversals",)
     source = "Nordin & Gutman 2002"
     blows = True
 

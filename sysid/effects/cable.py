@@ -13,6 +13,7 @@ class Cable(TorqueEffect):
     looks_like = "residual that is smooth in the angle"
     tied_with = ("spring", "cogging", "position_friction", "gravity")
     separate_by = "static scans both ways, with and without the cable"
+    maneuvers = ("ladder",)
     source = "a polynomial fit; no reference"
     elementwise = True
     options = {"order": "highest power of the angle, from 1 (default 5)"}

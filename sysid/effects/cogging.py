@@ -17,6 +17,7 @@ class Cogging(TorqueEffect):
     looks_like = "lines at the frequency k qd / 2 pi, the same torque at any speed and both ways"
     tied_with = ("spring", "cable", "position_friction", "encoder_eccentricity", "gravity where k is 1")
     separate_by = "a slow scan both ways over several periods"
+    maneuvers = ("ladder",)
     source = "Holtz 1996"
     elementwise = True
     options = {"lines": "how many multiples of k, from 1 (default 1)"}

@@ -11,6 +11,7 @@ class Coulomb(TorqueEffect):
     looks_like = "a step wherever the speed changes sign"
     tied_with = ("torque_bias", "asymmetric_coulomb")
     separate_by = "slow sweeps both ways"
+    maneuvers = ("ladder",)
     source = "Rucker & Wensing 2022, eq. 14"
     elementwise = True
     simulators = {"friction": "Fc"}

@@ -13,6 +13,7 @@ class CurrentLag(SensorEffect):
     looks_like = "residual in proportion to the rate of the torque"
     tied_with = ("delay", "elasticity")
     separate_by = "steps or a random binary torque: a lag rounds them, a delay moves them"
+    maneuvers = ("chirp",)
     source = "first-order lag; no reference"
     reach = 1
 

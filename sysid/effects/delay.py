@@ -16,6 +16,7 @@ class Delay(SensorEffect):
     looks_like = "residual in proportion to the rate of the torque, and to the jerk"
     tied_with = ("current_lag", "elasticity")
     separate_by = "motions of several frequencies: a delay turns the phase in proportion to frequency, a lag saturates"
+    maneuvers = ("chirp",)
     source = "elementary; no reference"
     reach = 64
 

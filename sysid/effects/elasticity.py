@@ -14,6 +14,7 @@ class Elasticity(Deflection):
     looks_like = "residual in proportion to the second derivative of the torque; ringing at the link's resonance"
     tied_with = ("delay", "current_lag", "encoder_eccentricity", "backlash")
     separate_by = "a chirp past the resonance, or the output locked and the motor pushing"
+    maneuvers = ("chirp",)
     source = "Spong 1987"
 
     compliance = Shape("rad/(N m)", 0.0, 0.1, of="softness", start=0.0, says="angle that the joint gives per torque")

@@ -18,6 +18,7 @@ class EncoderEccentricity(MotionEffect):
     looks_like = "residual once per turn, that grows with the speed"
     tied_with = ("encoder_offset", "cogging")
     separate_by = "constant speeds over a full turn, with another encoder to compare"
+    maneuvers = ("ladder",)
     source = "elementary; no reference"
 
     s = Shape("rad", -0.2, 0.2, start=0.0, says="sine of the error")

@@ -15,6 +15,7 @@ class EncoderOffset(MotionEffect):
     looks_like = "residual like the change of torque with the angle: gravity turned in the pose"
     tied_with = ("centre of mass of the links behind it", "gravity_tilt")
     separate_by = "static poses over the full range of several joints"
+    maneuvers = ("poses",)
     source = "elementary; no reference"
     simulators = {"zero": "d"}
 

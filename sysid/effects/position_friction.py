@@ -13,6 +13,7 @@ class PositionFriction(TorqueEffect):
     looks_like = "friction that changes with the angle and turns its sign with the direction"
     tied_with = ("cogging", "spring", "cable")
     separate_by = "the same slow scan both ways: half the difference is friction, half the sum is not"
+    maneuvers = ("ladder",)
     source = "Bittencourt, Wernholt, Sander-Tavallaey & Brogardh 2010"
     elementwise = True
     options = {

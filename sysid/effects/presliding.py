@@ -16,6 +16,7 @@ class Presliding(TorqueEffect):
     looks_like = "a loop against the angle after each reversal; has memory"
     tied_with = ("stribeck", "backlash", "coulomb")
     separate_by = "reversals of growing size, from a tenth of x0 to ten times it"
+    maneuvers = ("reversals",)
     source = "Dahl 1968; Canudas 1995"
     memory = True
 

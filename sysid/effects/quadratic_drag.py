@@ -13,6 +13,7 @@ class QuadraticDrag(TorqueEffect):
     looks_like = "residual that is odd in the speed and grows faster than it"
     tied_with = ("stribeck", "sublinear_viscous", "warmup")
     separate_by = "a wide ladder of constant speeds at a fixed temperature"
+    maneuvers = ("ladder",)
     source = "the drag equation at high Reynolds number; no reference"
     elementwise = True
     simulators = {"drag": "c"}

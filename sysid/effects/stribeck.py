@@ -13,6 +13,7 @@ class Stribeck(TorqueEffect):
     looks_like = "a bump at speeds below about 3 vs, odd in the speed"
     tied_with = ("presliding", "quadratic_drag", "sublinear_viscous")
     separate_by = "creep both ways at several constant speeds, without reversing"
+    maneuvers = ("ladder",)
     source = "Armstrong 1994"
     elementwise = True
     simulators = {"breakaway": "dF"}

@@ -13,6 +13,7 @@ class SublinearViscous(TorqueEffect):
     looks_like = "residual that is odd in the speed and bends down as it grows"
     tied_with = ("stribeck", "quadratic_drag", "warmup")
     separate_by = "a ladder of constant speeds, at several temperatures"
+    maneuvers = ("ladder",)
     source = "Wolf & Iskandar 2018"
     elementwise = True
 

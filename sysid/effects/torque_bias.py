@@ -13,6 +13,7 @@ class TorqueBias(TorqueEffect):
     looks_like = "a constant residual"
     tied_with = ("asymmetric_coulomb", "gravity on a joint that always holds the same load")
     separate_by = "torque at rest, and slow sweeps both ways"
+    maneuvers = ("poses",)
     source = "Janot, Gautier & Brunot 2019 (the offset of EMPS)"
     mimics_mass = True
     elementwise = True

@@ -13,6 +13,7 @@ class TorqueSaturation(TorqueEffect):
     looks_like = "flat or sharpened tops of the torque: residual like the cube of the torque"
     tied_with = ("torque_gain", "load_friction")
     separate_by = "a ladder of static torques up to the largest"
+    maneuvers = ("poses",)
     source = "the magnetisation curve of a motor's iron; no reference"
     uses_load = True
     elementwise = True

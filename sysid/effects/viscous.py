@@ -11,6 +11,7 @@ class Viscous(TorqueEffect):
     looks_like = "residual in proportion to speed"
     tied_with = ("warmup",)
     separate_by = "constant speeds, both ways, cold and warm"
+    maneuvers = ("ladder",)
     source = "Rucker & Wensing 2022, eq. 14"
     elementwise = True
     simulators = {"damping": "Fv"}

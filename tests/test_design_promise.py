@@ -1,0 +1,94 @@
+"""What noise will make of a fit of the logs that are still to come."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from sysid.design import spectrum
+from sysid.design.spectrum import Noise, Stretch, noise_left, scatter, white
+
+
+def coloured(rng, n, step, levels):
+    """Noise (n,) whose spectrum is that of a `Noise`."""
+    f = np.fft.rfftfreq(n, step)
+    return np.fft.irfft(np.fft.rfft(rng.standard_normal(n)) * np.sqrt(levels.density(f)), n)
+
+
+SLOW = Noise(np.array([0.5, 2.0, 8.0, 60.0]), np.log(np.array([9.0, 4.0, 1.0, 1.0])))
+
+
+def part_of(columns, step=0.004, use=None):
+    count = columns.shape[1] if use is None else int(use.sum())
+    return Stretch(0, np.arange(len(columns)), columns, step, count, slice(0, columns.shape[1]))
+
+
+@pytest.mark.parametrize("true", [white(2.0), SLOW], ids=["white", "slow"])
+def test_the_spectrum_of_noise_is_found_in_what_a_fit_leaves(true):
+    """Twelve slow columns take most of what is below 2 Hz of an 8 s log: what a fit leaves there says nothing, and its leverage says so."""
+    rng, n, step = np.random.default_rng(0), 2000, 0.004
+    t = step * np.arange(n)
+    columns = np.stack([w(2 * np.pi * k * t / 8.3) for k in range(1, 7) for w in (np.sin, np.cos)])
+    part, hat = part_of(columns), np.linalg.pinv(columns)
+    inverse = np.linalg.inv(columns @ columns.T)
+    takes = lambda part, seen: np.einsum("am,am->m", seen.conj(), inverse @ seen).real  # noqa: E731
+    ask = np.array([0.3, 3.0, 20.0, 100.0])
+    found, naive = [], []
+    for _ in range(25):
+        noise = coloured(rng, n, step, true)
+        change = noise @ hat
+        (own,) = noise_left([part], noise[:, None], change, np.zeros((n, 1)), takes)
+        (other,) = noise_left([part], noise[:, None], change, np.zeros((n, 1)), lambda part, seen: 0.0 * seen[0].real)
+        found.append(np.log(own.density(ask)))
+        naive.append(np.log(other.density(ask)))
+    off = np.mean(found, axis=0) - np.log(true.density(ask))
+    np.testing.assert_allclose(off[1:], 0.0, atol=0.15)
+    # below 0.7 Hz little but its neighbourhood tells it
+    missed = np.mean(naive, axis=0)[0] - np.log(true.density(ask))[0]
+    assert missed < -0.8 and abs(off[0]) < 0.5 * abs(missed)
+
+
+def test_what_noise_of_a_spectrum_makes_of_columns():
+    """Against draws of it; rows that do not count are zero."""
+    rng, n = np.random.default_rng(1), 1500
+    t = 0.004 * np.arange(n)
+    columns = np.stack([np.sin(3 * t), np.cos(7 * t), np.sign(np.sin(2 * t))])
+    use = np.abs(np.sin(2 * t)) > 0.1
+    part = part_of(columns * use, use=use)
+    drawn = np.array([part.columns @ coloured(rng, n, 0.004, SLOW) for _ in range(4000)])
+    said = scatter(part, SLOW)
+    scale = np.sqrt(np.diagonal(said))
+    np.testing.assert_allclose(np.cov(drawn.T) / np.outer(scale, scale), said / np.outer(scale, scale), atol=0.07)
+    np.testing.assert_allclose(scatter(part, white(4.0)), 4.0 * part.columns @ part.columns.T, rtol=1e-9, atol=1e-9)
+
+
+def test_what_angles_make_is_told_from_torque_s_own_noise():
+    """Their shape is known: white noise beside a hump is white where the hump is not."""
+    rng, n, step = np.random.default_rng(2), 4000, 0.004
+    hump = Noise(np.array([2.0, 8.0, 15.0, 30.0, 60.0]), np.log(np.array([1e-3, 1.0, 4.0, 1.0, 1e-3])))
+    left = rng.standard_normal(n) + coloured(rng, n, step, hump)
+    made = coloured(rng, n, step, hump)
+    (found,) = noise_left([part_of(np.zeros((1, n)))], left[:, None], np.zeros(1), made[:, None], lambda part, seen: 0.0 * seen[0].real)
+    np.testing.assert_allclose(found.density(np.array([0.1, 1.0, 100.0])), 1.0, rtol=0.15)
+    assert found.density(np.array([15.0]))[0] == pytest.approx(5.0, rel=0.3)
+
+
+def test_nothing_left_is_no_noise():
+    n = 500
+    (found,) = noise_left([part_of(np.ones((1, n)))], np.zeros((n, 1)), np.zeros(1), np.zeros((n, 1)), lambda part, seen: 0.0 * seen[0].real)
+    assert found.density(np.array([1.0]))[0] < 1e-200
+
+
+def test_columns_come_in_stretches_of_rows_that_count(monkeypatch):
+    """Of two pieces, one longer than a stretch: every row once, those that do not count zero."""
+    monkeypatch.setattr(spectrum, "_STRETCH", 400)
+    rng = np.random.default_rng(3)
+    model = SimpleNamespace(remembered=lambda piece: None, support=lambda joint, piece: np.array([joint]), columns=lambda piece, rows, _: [piece.q[rows, j][None] for j in range(2)])
+    piece = SimpleNamespace(samples=1000, core=slice(10, 1010), q=rng.normal(size=(1020, 2)), use=rng.random((1020, 2)) > 0.2, step=0.01)
+    short = SimpleNamespace(**{**vars(piece), "samples": 300, "core": slice(0, 300), "use": None})
+    found = list(spectrum.stretches(model, SimpleNamespace(pieces=(piece, short))))
+    assert [p.rows for p in found if p.joint == 0] == [slice(0, 500), slice(500, 1000), slice(1000, 1300)] and found[0].count < 500
+    first = np.concatenate([p.columns[0] for p in found if p.joint == 1][:2])
+    np.testing.assert_array_equal(first, np.where(piece.use[10:1010, 1], piece.q[10:1010, 1], 0.0))
+    assert replace(found[0], count=1).frequency[1] == pytest.approx(1.0 / 5.0)
