@@ -11,6 +11,11 @@ time    The whole `sysid fit configs/cheetah3.yaml` process over a floor: a proc
         counts with its median.
 memory  Peak memory of `sysid fit` on the leg's log and on one 50 times as long, per joint and sample that it grew by.
         The regressor kept whole would take 1440 bytes.
+long    A seven-joint arm with friction at 1 kHz, 0.7 million samples and four times as many (--samples): processor time a
+        sample of the whole `sysid fit` process, from the file to the run folder with its predictions, over that of a plain
+        Python process which reads the log, differentiates it, calls pin.computeJointTorqueRegressor in a loop and takes a
+        QR of every 4096 samples' rows; and peak memory of the longer log over that of the shorter. At most 1 and 1.1 are
+        the aims. Beside it the time of the loop's calls alone.
 diagnose  The whole `sysid diagnose configs/cheetah3.yaml` process, the whole catalogue on every joint, over `sysid fit` on
         the same experiment, in turns. At most 10 is the aim.
 torque  `torque(q, qd, qdd)` of a seven-joint arm with viscous and Coulomb friction beside a bare `pin.rnea` of its bodies, one
@@ -36,7 +41,7 @@ ROOT = Path(__file__).resolve().parent.parent
 CONFIG = ROOT / "configs" / "cheetah3.yaml"
 LOG = ROOT / "data" / "cheetah3" / "train.parquet"
 TIMES = 50
-PARTS = ["time", "memory", "diagnose", "torque", "cpu", "solve"]
+PARTS = ["time", "memory", "long", "diagnose", "torque", "cpu", "solve"]
 PANDA = "example-robot-data://panda_description/urdf/panda.urdf"
 
 FLOOR = '''
@@ -72,12 +77,44 @@ rows[:, :, 66] = tau
 print(np.linalg.qr(rows.reshape(-1, 67), mode="r").shape)
 '''
 
+LOOP = '''
+import os, sys, time
+os.environ["OPENBLAS_NUM_THREADS"] = "1"  # as sysid: threads cost more than they give
+import numpy as np
+import pinocchio as pin
+import polars
+import scipy.signal
+
+joints = [f"panda_joint{k}" for k in range(1, 8)]
+full = pin.buildModelFromUrdf(sys.argv[1])
+others = [k for k in range(1, full.njoints) if full.names[k] not in joints]
+model = pin.buildReducedModel(full, others, pin.neutral(full))
+table = polars.read_parquet(sys.argv[2])
+columns = lambda kind: np.column_stack([table[f"{kind}_{j}"].to_numpy() for j in joints])
+q, tau = columns("q"), columns("tau")
+del table
+q, qd, qdd = (scipy.signal.savgol_filter(q, 101, 4, deriv=d, delta=1e-3, axis=0) for d in range(3))
+data, calls, triangle = model.createData(), 0.0, np.zeros((0, 85))
+for start in range(0, len(q), 4096):
+    part = range(start, min(start + 4096, len(q)))
+    rows = np.zeros((len(part), 7, 85))
+    begun = time.process_time()
+    for n, k in enumerate(part):
+        rows[n, :, :70] = pin.computeJointTorqueRegressor(model, data, q[k], qd[k], qdd[k])
+    calls += time.process_time() - begun
+    for j in range(7):
+        rows[:, j, 70 + j], rows[:, j, 77 + j], rows[:, j, 84] = qd[part, j], np.sign(qd[part, j]), tau[part, j]
+    triangle = np.linalg.qr(np.concatenate([triangle, rows.reshape(-1, 85)]), mode="r")
+sys.stderr.write(str(calls))
+'''
+
 
 def main() -> None:
     """Run the benchmarks and print them; with --json as one document."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--repeats", type=int, default=7, help="runs of each process; the median counts")
     parser.add_argument("--only", choices=PARTS)
+    parser.add_argument("--samples", type=int, default=2_800_000, help="of the longer log of `long`")
     parser.add_argument("--json", action="store_true")
     options = parser.parse_args()
     found = {}
@@ -86,6 +123,8 @@ def main() -> None:
         found["fit_over_floor"] = fit_over_floor(options.repeats)
     if "memory" in wanted:
         found["memory"] = memory()
+    if "long" in wanted:
+        found["long"] = long(options.samples)
     if "diagnose" in wanted:
         found["diagnose_over_fit"] = diagnose_over_fit(min(options.repeats, 3))
     if "torque" in wanted:
@@ -105,6 +144,13 @@ def main() -> None:
         print(
             f"peak memory {entry['megabytes'][0]:.0f} MB on {entry['samples'][0]} samples, {entry['megabytes'][1]:.0f} MB on {entry['samples'][1]}: "
             f"{entry['bytes_per_joint_sample']:.0f} bytes per joint and sample"
+        )
+    if "long" in found:
+        entry = found["long"]
+        print(
+            f"{entry['samples'][1]} samples of seven joints: sysid fit {entry['fit_microseconds']:.1f} us a sample / plain loop {entry['loop_microseconds']:.1f} us "
+            f"(its calls alone {entry['calls_microseconds']:.1f} us) = {entry['ratio']:.2f}; peak memory {entry['megabytes'][1]:.0f} MB, "
+            f"{entry['megabytes'][0]:.0f} MB on {entry['samples'][0]} samples: {entry['growth']:.2f} times"
         )
     if "diagnose_over_fit" in found:
         entry = found["diagnose_over_fit"]
@@ -127,11 +173,13 @@ def main() -> None:
         )
 
 
-def _run(command: list[str]) -> tuple[float, int, float]:
-    """Wall time [s], peak memory [bytes] and processor time [s] of a process."""
+def _run(command: list[str], told: list[str] | None = None) -> tuple[float, int, float]:
+    """Wall time [s], peak memory [bytes] and processor time [s] of a process; what it said on standard error is appended to `told`."""
     start = time.perf_counter()
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, env=_environment())
     said = process.stderr.read()
+    if told is not None:
+        told.append(said.decode())
     _, status, usage = os.wait4(process.pid, 0)
     process.returncode = os.waitstatus_to_exitcode(status)
     if process.returncode:
@@ -235,6 +283,66 @@ def memory() -> dict:
             peaks.append(_run([sys.executable, "-m", "sysid", "fit", str(path / "long.yaml"), "--quiet", "--out", str(path / "run")])[1])
     growth = (peaks[1] - peaks[0]) / (3 * (samples[1] - samples[0]))
     return {"bytes_per_joint_sample": growth, "samples": samples, "megabytes": [peak / 1e6 for peak in peaks]}
+
+
+def write_arm_log(path: Path, samples: int, seed: int) -> None:
+    """A log of the seven-joint arm with viscous and Coulomb friction and noise, a row group every 100 000 samples; the motion of
+    sines repeats in no time that a log lasts."""
+    import numpy as np
+    import polars as pl
+
+    from sysid import regressor, robot
+    from sysid.specs import RobotSpec
+
+    joints = [f"panda_joint{k}" for k in range(1, 8)]
+    machine = robot.load(RobotSpec(urdf=PANDA, joints=joints))
+    rng = np.random.default_rng(0)
+    rate, size, phase = 2.0 * np.pi * rng.uniform(0.05, 1.0, (7, 6)), 0.3 * rng.normal(size=(7, 6)), rng.uniform(0.0, 2.0 * np.pi, (7, 6))
+    viscous, coulomb = rng.uniform(0.5, 2.0, 7), rng.uniform(0.3, 1.5, 7)
+    middle = np.array([0.0, -0.5, 0.0, -1.8, 0.0, 1.5, 0.7])
+    parts, every = [], 100_000
+    for start in range(0, samples, every):
+        t = 1e-3 * np.arange(start, min(start + every, samples))
+        turn = rate * (t[:, None, None] + 1e3 * seed) + phase
+        q = middle + (size * np.sin(turn)).sum(-1)
+        qd, qdd = (size * rate * np.cos(turn)).sum(-1), (-size * rate**2 * np.sin(turn)).sum(-1)
+        noise = np.random.default_rng([seed, start])
+        tau = regressor.torque(machine, machine.prior * 1.05, q, qd, qdd) + viscous * qd + coulomb * np.sign(qd) + 0.3 * noise.normal(size=q.shape)
+        q = q + 1e-5 * noise.normal(size=q.shape)
+        columns = {f"{kind}_{joint}": values[:, k] for kind, values in (("q", q), ("tau", tau)) for k, joint in enumerate(joints)}
+        part = path.with_name(f"{path.stem}.{start}.part")
+        pl.DataFrame({"t": t, **columns}).write_parquet(part)
+        parts.append(part)
+    pl.scan_parquet(parts).sink_parquet(path, row_group_size=every)
+    for part in parts:
+        part.unlink()
+
+
+def long(samples: int) -> dict:
+    """`sysid fit` and the plain loop on the longer log, once each, and `sysid fit` on 0.7 million samples."""
+    sys.path.insert(0, str(ROOT))
+    from sysid import urdf
+
+    counts, joints = [700_000, samples], ", ".join(f"panda_joint{k}" for k in range(1, 8))
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder)
+        write_arm_log(path / "test.parquet", 20_000, 1)
+        runs = []
+        for count in counts:
+            write_arm_log(path / f"{count}.parquet", count, 0)
+            (path / f"{count}.yaml").write_text(
+                f"robot: {{urdf: '{PANDA}', joints: [{joints}]}}\n"
+                f"data: {{train: [{count}.parquet], test: [test.parquet], columns: {{time: t, position: 'q_{{joint}}', torque: 'tau_{{joint}}'}}}}\n"
+                "model: {effects: [viscous, coulomb]}\n"
+            )
+            runs.append(_run([sys.executable, "-m", "sysid", "fit", str(path / f"{count}.yaml"), "--quiet", "--out", str(path / "run")]))
+        said: list[str] = []
+        loop = _run([sys.executable, "-c", LOOP, str(urdf.locate(PANDA, path)), str(path / f"{samples}.parquet")], said)
+    peaks = [1e-6 * run[1] for run in runs]
+    return {
+        "ratio": runs[1][2] / loop[2], "fit_microseconds": 1e6 * runs[1][2] / samples, "loop_microseconds": 1e6 * loop[2] / samples,
+        "calls_microseconds": 1e6 * float(said[0]) / samples, "samples": counts, "megabytes": peaks, "growth": peaks[1] / peaks[0],
+    }  # fmt: skip
 
 
 def solve(repeats: int) -> dict:

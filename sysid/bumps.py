@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.ndimage import maximum_filter1d, median_filter
 
 from .events import Event
 from .log import Log
@@ -37,6 +36,8 @@ def bumps(robot: Robot, logs: Sequence[Log]) -> list[Event]:
     The size of what is left, under the low-pass of a diagnosis, over the usual: the larger of the
     joint's own and of what is about it. A knock is where it surprises on two joints.
     """
+    from scipy.ndimage import maximum_filter1d
+
     if robot.dof < 2 or (motion := lowpassed(logs, robot.joints, cutoff := widest(logs))) is None:
         return []
     model = build(robot, [EffectSpec(name=name) for name in _EFFECTS])
@@ -84,6 +85,8 @@ def _left(rows: Rows, kind: np.ndarray) -> np.ndarray:
 
 def _surprise(size, use, piece, step: float) -> np.ndarray:
     """How surprising (n,) sizes are among those that count; less than nothing where none does."""
+    from scipy.ndimage import median_filter
+
     out = np.full(len(size), -1.0)
     if use.sum() < _FEWEST:
         return out

@@ -6,7 +6,7 @@ a weight), and leaving one out is leaving it out of the stack. Every solve, rest
 certificate works on them.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -16,21 +16,13 @@ from .blocks import FEWEST, divided
 from .effect import NotFinite
 from .model import Model
 from .motion import Motion, Piece
+from .reduction import Reduction, triangle
 from .rows import difference_step
 
 # samples: with fewer rows than columns a triangle would be no smaller than they are
 _SHORTEST_BLOCK = 200
-_FILTERED_STRETCH = 16384  # samples
-
-
-def triangle(rows: np.ndarray) -> np.ndarray:
-    """The R factor (min(n, k), k) of rows (n, k); overwrites a Fortran-ordered argument."""
-    from scipy.linalg.lapack import dgeqrf
-
-    if rows.shape[0] == 0:
-        return np.zeros((0, rows.shape[1]))
-    factor = dgeqrf(np.asfortranarray(rows), overwrite_a=1)[0]
-    return np.triu(factor[: min(rows.shape)])
+# samples whose columns stand in memory at once: a filter needs margins on each stretch
+_STRETCH, _FILTERED_STRETCH = 4096, 16384
 
 
 @dataclass(frozen=True)
@@ -55,6 +47,11 @@ class Linearised:
     def size(self) -> int:
         """Linear parameters and free shape values."""
         return self.model.size + len(self.free)
+
+    @property
+    def reach(self) -> int:
+        """The model's."""
+        return self.model.reach
 
     def support(self, joint: int, piece: Piece | None = None) -> np.ndarray:
         """The model's, and every slope of values that are there."""
@@ -259,48 +256,62 @@ def _edges(motion: Motion, kinds: Sequence[bytes]) -> list[np.ndarray]:
     return [p.core.start + np.arange(n + 1) * p.samples // n for p, n in zip(pieces, counts)]
 
 
-def _kept(start: int, stop: int, origin: int, every: int) -> tuple[slice, slice]:
-    """Of the rows from start up to stop every so many, counted from origin: which of the piece, and which of those kept."""
-    first, last = (-(-(row - origin) // every) for row in (start, stop))
-    return slice(origin + first * every, stop, every), slice(first, last)
+def _stretches(edges: np.ndarray, most: int) -> Iterator[list[tuple[int, int, int]]]:
+    """The rows between edges in stretches of at most so many: (block, start, stop) of each part, where a stretch holds several
+    blocks, or a part of one."""
+    parts: list[tuple[int, int, int]] = []
+    for block, (start, stop) in enumerate(zip(edges.tolist(), edges[1:].tolist())):
+        if parts and stop - parts[0][1] > most:
+            yield parts
+            parts = []
+        if stop - start > most:
+            yield from ([(block, at, min(at + most, stop))] for at in range(start, stop, most))
+        else:
+            parts.append((block, start, stop))
+    if parts:
+        yield parts
 
 
 def compress(model: Model | Linearised, motion: Motion, *, thin: int = 1, progress: Callable[[float], None] | None = None) -> Compressed:
     """Reduce a motion under a model to triangles.
 
     Args:
-        thin: use every `thin`-th row only (for quick comparisons).
+        thin: use every `thin`-th row of each block only (for quick comparisons).
         progress: called with the share done, from 0 to 1.
     """
-    size = model.size
-    supported = [[model.support(joint, piece) for joint in range(model.robot.dof)] for piece in motion.pieces]
-    factors, block, done = [], 0, 0
+    joints = range(model.robot.dof)
+    supported = [[model.support(joint, piece) for joint in joints] for piece in motion.pieces]
     kinds = [b"|".join(support.tobytes() for support in supports) for supports in supported]
+    factors, first, done = [], 0, 0
     for piece, supports, edges in zip(motion.pieces, supported, _edges(motion, kinds)):
-        # a filter needs margins on each stretch, so a filtered stretch holds many blocks
-        filtered, length = piece.smoother is not None, max(1, piece.samples // (len(edges) - 1))
-        many = max(1, _FILTERED_STRETCH // length) if filtered else 1
-        remembered = model.remembered(piece)
-        for first in range(0, len(edges) - 1, many):
-            within = edges[first : first + many + 1].tolist()
-            # rows that are not wanted need no columns, unless a filter runs over them; of those that a low-pass
-            # makes alike, one stands for `every`
-            every = piece.smoother.every if filtered and thin == 1 else 1
-            wanted = slice(within[0], within[-1], every if filtered else thin)
+        remembered, filtered = model.remembered(piece), piece.smoother is not None
+        # of the rows that a low-pass makes alike, one stands for `every`
+        every = piece.smoother.every if filtered and thin == 1 else 1
+        # rows that are not wanted need no columns, unless a filter or an effect looks at them
+        sparse = thin > 1 and not filtered and not model.reach
+        begun: list[Reduction] = []
+        for parts in _stretches(edges, _FILTERED_STRETCH if filtered else thin * _STRETCH):
+            kept = [_kept(start, stop, edges[0] if every > 1 else edges[block], every * thin) for block, start, stop in parts]
+            from_, at = kept[0].start, 0
+            wanted = np.concatenate([np.arange(piece.core.stop)[rows] for rows in kept]) if sparse else slice(from_, parts[-1][2], every)
             columns = model.columns(piece, wanted, remembered)
-            for start, stop in zip(within, within[1:]):
-                if every > 1:
-                    own, part = _kept(start, stop, within[0], every)
-                else:
-                    own = slice(start, stop, thin)
-                    part = slice(start - within[0], stop - within[0], thin) if filtered else slice(None)
-                for joint, (values, support) in enumerate(zip(columns, supports)):
-                    stacked = np.concatenate([values[:, part], piece.tau[None, own, joint]])
-                    if piece.use is not None:
-                        stacked = stacked[:, piece.use[own, joint]]
-                    factors.append(Factor(joint, block, support, np.sqrt(every) * triangle(stacked.T), every * stacked.shape[1]))
-                block += 1
-            done += within[-1] - within[0]
+            for (block, _, stop), rows in zip(parts, kept):
+                count = len(range(rows.start, rows.stop, rows.step))
+                own = slice(at, at + count) if sparse else slice((rows.start - from_) // every, (rows.stop - 1 - from_) // every + 1, thin)
+                at, begun = at + count, begun or [Reduction() for _ in joints]
+                for joint, values in enumerate(columns):
+                    stacked = np.concatenate([values[:, own], piece.tau[None, rows, joint]])
+                    begun[joint].add(stacked if piece.use is None else stacked[:, piece.use[rows, joint]])
+                if stop == edges[block + 1]:
+                    factors += [Factor(j, first + block, supports[j], np.sqrt(every) * one.triangle(), every * one.rows) for j, one in enumerate(begun)]
+                    begun = []
+            done += parts[-1][2] - parts[0][1]
             if progress:
                 progress(done / motion.samples)
-    return Compressed(size, model.robot.dof, tuple(factors), motion.samples)
+        first += len(edges) - 1
+    return Compressed(model.size, model.robot.dof, tuple(factors), motion.samples)
+
+
+def _kept(start: int, stop: int, origin: int, every: int) -> slice:
+    """Of the rows from start up to stop every so many, counted from origin."""
+    return slice(int(origin - (origin - start) // every * every), stop, every)

@@ -9,7 +9,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 
 from . import motor_side
 from .effect import Linear, Shape, TorqueEffect, called
@@ -209,6 +208,8 @@ def rescaled(model: Model, experiment: Experiment, pi, prior) -> Model:
     Args:
         pi, prior: (bodies, 10) found, and before any data.
     """
+    from scipy.optimize import minimize_scalar  # its import takes as long as a small fit
+
     if scale_is_told(experiment, model.robot.joints) or not experiment.prior.weight:
         return model
     divergence = DIVERGENCES[experiment.prior.divergence](prior)

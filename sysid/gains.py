@@ -15,8 +15,6 @@ from dataclasses import replace
 from functools import cache
 
 import numpy as np
-from scipy.interpolate import make_interp_spline
-from scipy.optimize import minimize_scalar
 
 from . import log as logs
 from . import model, motor_side, rows
@@ -142,6 +140,8 @@ def delays(left: list) -> list[float]:
     Args:
         left: of each joint, what its columns leave at a delay; None where there is too little to tell.
     """
+    from scipy.optimize import minimize_scalar  # its import takes as long as a small fit
+
     left = [one if one is None else cache(one) for one in left]
     told = [one for one in left if one is not None]
     if not told:
@@ -164,6 +164,8 @@ def delays(left: list) -> list[float]:
 
 def _left(found: rows.Rows, motion: Motion, commands: Motion, j: int, own: motor_side.Drive):
     """The share of its torque that a joint's own columns leave where its command acts a delay [s] late; None where rows are too few."""
+    from scipy.interpolate import make_interp_spline
+
     use = found.use[:, j]
     columns = found.columns[j]
     columns = columns[:, columns.any(axis=0)]

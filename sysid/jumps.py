@@ -8,7 +8,6 @@ alone. There the two sides of the equation of motion do not meet, whatever the m
 from __future__ import annotations
 
 import numpy as np
-from scipy.ndimage import maximum_filter1d, median_filter
 
 from .outliers import CHANCE, NOTHING, SPIKE, quantum, surprise
 
@@ -24,6 +23,8 @@ def jumps(tau, reach: int) -> np.ndarray:
     the steps L rows earlier and later, which a torque that bends smoothly makes as well; out of
     the ordinary among all of its log.
     """
+    from scipy.ndimage import maximum_filter1d, median_filter
+
     out = np.zeros(tau.shape, dtype=bool)
     length = max(1, reach // 2)
     if len(tau) < 16 * length:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.ndimage import median_filter
 
 from .outliers import BURST, CHANCE, FEWEST, NOTHING, RESTING, bursts, quantum, ratio, surprise
 
@@ -68,6 +67,8 @@ def _most(angle, torque) -> np.ndarray:
 
 def _bursts(values, first, length: int, near: int, moves, nothing: float) -> np.ndarray:
     """Surprise (windows,) of what is unexplained in windows of `length` samples from `first`."""
+    from scipy.ndimage import median_filter
+
     total = np.concatenate([[0.0], np.cumsum(unexplained(values, length) ** 2)])
     level = np.sqrt(np.maximum(total[first + length] - total[first], 0.0) / length)
     usual = np.median(level[moves]) if moves.any() else np.median(level)

@@ -305,7 +305,8 @@ class Model:
         here, there = effect.gain(**at), effect.gain(**{**at, value.shape.name: self.shapes[k] + step})
         return (there - here) / (step * here)
 
-    def _reach(self, piece: Piece) -> int:
+    @property
+    def reach(self) -> int:
         """Samples on either side of a row that its columns look at."""
         return max([effect.reach for effect, _ in self.terms], default=0)
 
@@ -361,6 +362,7 @@ class Model:
         """For each joint the columns (support in this piece, n) of the rows `rows` of a piece, filtered where its torque is.
 
         Args:
+            rows: a slice, or the rows' numbers where nothing looks beside them (no filter, no `reach`).
             remembered: `remembered(piece)`, where it is at hand.
             keep: the bodies' columns for whoever asks again for these rows, of this model or of one that grew from it.
         """
@@ -368,7 +370,6 @@ class Model:
         if remembered is None:
             remembered = self.remembered(piece)
         part = self._seen(piece, wide, remembered)
-        rigid = self._bodies_of(piece, rows, part, wide, inner, keep)
         by_joint: list[list[np.ndarray]] = [[] for _ in self.robot.joints]
         for term, (effect, joints) in enumerate(self.terms):
             for joint in joints if effect.present(piece) else ():
@@ -379,26 +380,42 @@ class Model:
                 elif isinstance(effect, WrenchEffect):
                     for own, values in zip(by_joint, effect.columns(part, self.robot, **self.shapes_of(term, joint))):
                         own.append(values)
+        first = wide.start if isinstance(wide, slice) else 0
+        own = [piece.settled(self.sensed(np.concatenate(one), piece, joint), inner, joint, first) if one else None for joint, one in enumerate(by_joint)]
+        room = [0 if one is None else len(one) for one in own]
         out = []
-        for joint, effects in enumerate(by_joint):
-            own = [piece.settled(self.sensed(np.concatenate(effects), piece, joint), inner, joint, wide.start)] if effects else []
-            out.append(np.concatenate([rigid[joint], *own]))
+        for joint, (rigid, effects) in enumerate(zip(self._bodies_of(piece, rows, part, wide, inner, keep, room), own)):
+            size = len(self._support_of_bodies[joint])
+            if len(rigid) == size:
+                rigid = rigid if effects is None else np.concatenate([rigid, effects])
+            elif effects is not None:
+                rigid[size:] = effects
+            out.append(rigid)
         return out
 
-    def _bodies_of(self, piece: Piece, rows: slice, part: Piece, wide: slice, inner: slice, keep: bool) -> list[np.ndarray]:
-        """The bodies' columns (support, n) in each joint's torque at rows of a piece, seen as `part`, filtered."""
+    @cached_property
+    def _support_of_bodies(self) -> list[np.ndarray]:
+        """Of each joint, the bodies' parameters that enter its torque."""
+        count = 10 * self.bodies
+        return [own[own < count] for own in (self.support(joint) for joint in range(self.robot.dof))]
+
+    def _bodies_of(self, piece: Piece, rows: slice, part: Piece, wide: slice, inner: slice, keep: bool, room: list[int]) -> list[np.ndarray]:
+        """The bodies' columns (support, n) in each joint's torque at rows of a piece, seen as `part`, filtered; with `room` for as many
+        more where nothing is to be done to them."""
         # with what they were made of, so that nothing else comes to its place
-        key = (id(piece.q), id(piece.smoother), rows.start, rows.stop, rows.step)
-        moved = any(isinstance(effect, MotionEffect) or (isinstance(effect, SensorEffect) and not effect.constant_gain) for effect, _ in self.terms)
+        key = (id(piece.q), id(piece.smoother), rows.start, rows.stop, rows.step) if isinstance(rows, slice) else None
+        sensors = [effect for effect, _ in self.terms if isinstance(effect, SensorEffect)]
+        moved = any(isinstance(effect, MotionEffect) for effect, _ in self.terms) or any(not effect.constant_gain for effect in sensors)
         gained = lambda out: [self.sensed(own, piece, joint) for joint, own in enumerate(out)]  # noqa: E731
         if not moved and key in self._rigid:
             return gained(self._rigid[key][2])
-        inertial = regressor.columns(self.robot, part.q, part.qd, part.qdd, gravity=part.gravity, deflection=part.deflection)
-        out = []
-        for joint in range(self.robot.dof):
-            bodies = self.support(joint)
-            own = inertial[joint, bodies[bodies < inertial.shape[1]]]
-            out.append(piece.settled(self.sensed(own, piece, joint) if moved else own, inner, joint, wide.start))
+        plain = piece.smoother is None and not sensors and not keep and inner == slice(None)
+        spare = room if plain else [0] * self.robot.dof
+        inertial = regressor.by_joint(self.robot, part.q, part.qd, part.qdd, gravity=part.gravity, deflection=part.deflection, room=spare)
+        if plain:
+            return inertial
+        first = wide.start if isinstance(wide, slice) else 0
+        out = [piece.settled(self.sensed(own, piece, joint) if moved else own, inner, joint, first) for joint, own in enumerate(inertial)]
         if keep and not moved:
             self._rigid[key] = (piece.q, piece.smoother, out)
         return out if moved else gained(out)
@@ -447,7 +464,7 @@ class Model:
     def _widened(self, piece: Piece, rows: slice) -> tuple[slice, slice]:
         """Rows with the margin that filters and effects need for them to come out as over the whole piece, and where the
         rows stand among these."""
-        margin = self._reach(piece)
+        margin = self.reach
         if piece.smoother is None and not margin:
             return rows, slice(None)
         if piece.smoother is not None:

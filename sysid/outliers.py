@@ -14,7 +14,6 @@ a statistic of smooth or coarse values may have no spread.
 from __future__ import annotations
 
 import numpy as np
-from scipy.ndimage import median_filter
 
 CHANCE = 0.01  # of one event of a kind in a clean log
 SPIKE = 3  # samples: "one or a few"
@@ -103,6 +102,8 @@ def spikes(tau) -> list[list[tuple[int, int]]]:
 
 def _pulses(tau):
     """Pulses of tau (n,) of each width: first sample, size over the usual step, is it alone."""
+    from scipy.ndimage import median_filter  # its import takes as long as a small fit
+
     step = np.diff(tau)
     size = np.abs(step)
     least = max(np.median(size), quantum(tau), NOTHING * np.std(tau))
@@ -134,6 +135,8 @@ def ratio(values, scale) -> np.ndarray:
 
 def _thereabouts(values) -> np.ndarray:
     """Running median (n,) of values, constant in blocks."""
+    from scipy.ndimage import median_filter
+
     blocks = -(-len(values) // _BLOCK)
     padded = np.pad(values, (0, blocks * _BLOCK - len(values)), mode="reflect")
     middle = median_filter(np.median(padded.reshape(blocks, _BLOCK), axis=1), 5, mode="nearest")

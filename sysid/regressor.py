@@ -176,6 +176,24 @@ def columns(robot: Robot, q, qd, qdd, **how) -> np.ndarray:
     return out
 
 
+def by_joint(robot: Robot, q, qd, qdd, *, room=None, **how) -> list[np.ndarray]:
+    """Of each joint, the columns (10 bodies that move with it, n) of the regressor, without those that are zero whatever the motion.
+
+    Args:
+        room: (dof,) how many rows to leave at the end of each for other columns. how: see `body_motions`.
+    """
+    motions = body_motions(robot, q, qd, qdd, **how)
+    moved = [sum(j in motion.jacobian for motion in motions) for j in range(robot.dof)]
+    spare = [0] * robot.dof if room is None else room
+    out = [np.empty((10 * count + more, np.shape(q)[0])) for count, more in zip(moved, spare)]
+    at = [0] * robot.dof
+    for motion in motions:
+        for j, (linear, angular) in motion.jacobian.items():
+            wrench_columns(motion, linear, angular, out[j][at[j] : at[j] + 10])
+            at[j] += 10
+    return out
+
+
 def regressor(robot: Robot, q, qd, qdd) -> np.ndarray:
     """Y (n, dof, 10 bodies) with torque = Y @ pi.ravel(), pi (bodies, 10) about the joints' frames.
 

@@ -12,7 +12,6 @@ from . import motor_side
 from .drives import DriveDamping, FreeGain, LateCommand, factors
 from .model import Model
 from .motion import Motion, Piece
-from .simulate.plant import Plant, Truth
 from .specs import Experiment
 
 _PERIOD = 1e-3  # s, at most, in which the commanded torque is constant
@@ -33,6 +32,8 @@ def rolled(experiment: Experiment, model: Model, x, motion: Motion) -> list[np.n
     Args:
         x: (size,) linear parameters.
     """
+    from .simulate.plant import Plant, Truth  # few experiments need a simulator
+
     robot = model.robot
     value = lambda name, joint: _of(model, x, f"{name}.{joint}")  # noqa: E731
     viscous = np.array([value("viscous", j) + value(DriveDamping.name, j) for j in robot.joints])

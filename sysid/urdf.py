@@ -221,6 +221,15 @@ def rotation_rpy(rpy) -> np.ndarray:
     ])  # fmt: skip
 
 
+def rpy_of(turn) -> tuple[float, float, float]:
+    """Roll, pitch, yaw [rad] of a rotation matrix (3, 3), as `rotation_rpy` reads them; no roll where the pitch is a right angle."""
+    level = math.hypot(turn[0][0], turn[1][0])  # cos of the pitch
+    pitch = math.atan2(-turn[2][0], level)
+    if level < 1e-12:
+        return 0.0, pitch, math.atan2(-turn[0][1], turn[1][1])
+    return math.atan2(turn[2][1], turn[2][2]), pitch, math.atan2(turn[1][0], turn[0][0])
+
+
 def _pose(element, path: Path, owner: str):
     origin = element.find("origin")
     xyz = _numbers(origin, "xyz", 3, "0 0 0", path, owner)

@@ -9,7 +9,6 @@ inertia. Locked joints become fixed at their angle.
 
 import io
 import os
-import warnings
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +16,7 @@ import numpy as np
 from .drives import DRIVE_EFFECTS
 from .estimate import Fit
 from .inertia import pseudo
+from .urdf import rotation_rpy, rpy_of
 
 SAYS = frozenset({"damping", "friction"})  # of `Effect.simulators`
 
@@ -37,18 +37,30 @@ def identified_urdf(fit: Fit, folder: Path | None = None) -> bytes:
     return text(tree(robot, fit.pi[: robot.dof], dynamics, folder=folder), _unsaid(fit))
 
 
+#: What a URDF is to identification: other elements (transmissions, those of one simulator) say
+#: things of a robot that was not identified.
+_KEPT = {
+    "robot": ("link", "joint", "material"),
+    "link": ("inertial", "visual", "collision"),
+    "joint": (
+        "parent", "child", "origin", "axis", "limit", "dynamics", "mimic", "calibration",
+        "safety_controller",
+    ),
+}  # fmt: skip
+
+
 def tree(
     robot, links, dynamics: dict[str, tuple[float, float]], *, zero=None, folder: Path | None = None
 ):
-    """The robot's URDF with other bodies and friction, as yourdfpy writes it (an lxml tree).
+    """The robot's URDF with other bodies and friction (an lxml tree); what it says beside these
+    stands as in the source.
 
     Args:
         links: (dof, 10) about the joints' frames. dynamics: damping and friction by joint.
         zero: (dof,) that the joints stand ahead of their encoders, put into their origins.
         folder: as for `identified_urdf`.
     """
-    import yourdfpy
-    from yourdfpy.urdf import Dynamics, Inertial
+    from lxml import etree
 
     def named(file: str) -> str:
         if folder is None or "://" in file or os.path.isabs(file):
@@ -57,35 +69,58 @@ def tree(
             os.path.relpath((robot.source.path.parent / file).resolve(), Path(folder).resolve())
         ).as_posix()
 
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        document = yourdfpy.URDF.load(
-            io.BytesIO(robot.source.text.encode()),
-            build_scene_graph=False,
-            load_meshes=False,
-            filename_handler=named,
-        )
-    links_there = {link.name: link for link in document.robot.links}
-    joints = {joint.name: joint for joint in document.robot.joints}
+    # no white space of the source, so that the whole is indented alike
+    parser = etree.XMLParser(remove_blank_text=True, resolve_entities=False, no_network=True)
+    root = etree.fromstring(robot.source.text.encode(), parser)
+    for owner in [root, *root.findall("link"), *root.findall("joint")]:
+        for element in [one for one in owner if one.tag not in _KEPT[owner.tag]]:
+            owner.remove(element)
+    for mesh in root.iter("mesh"):
+        mesh.set("filename", named(mesh.get("filename")))
+    links_there = {link.get("name"): link for link in root.findall("link")}
+    joints = {joint.get("name"): joint for joint in root.findall("joint")}
     for name, angle in robot.locked.items():
         joint = joints[name]
-        joint.origin = _moved(joint, angle)
-        joint.type, joint.axis = "fixed", None
-        joint.limit, joint.dynamics, joint.mimic = None, None, None
+        _move(joint, angle)
+        joint.set("type", "fixed")
+        _without(joint, "axis", "limit", "dynamics", "mimic")
     carried = _carriers(robot)
     for name, link in links_there.items():
         if carried.get(name) is not None:
-            link.inertial = None
+            _without(link, "inertial")
     for body, pi in zip(robot.bodies, links):
-        mass, com, central = pseudo.to_central(pi)
-        origin = np.eye(4)
-        origin[:3, 3] = com
-        links_there[body.name].inertial = Inertial(origin=origin, mass=float(mass), inertia=central)
+        _set_inertial(links_there[body.name], pi)
     for name, ahead in zip(robot.joints, np.zeros(robot.dof) if zero is None else zero):
-        joints[name].dynamics = Dynamics(*dynamics[name])
+        damping, friction = dynamics[name]
+        _without(joints[name], "dynamics")
+        said = {"damping": _word(damping), "friction": _word(friction)}
+        etree.SubElement(joints[name], "dynamics", attrib=said)
         if ahead:
-            joints[name].origin = _moved(joints[name], float(ahead))
-    return document.write_xml()
+            _move(joints[name], float(ahead))
+    return etree.ElementTree(root)
+
+
+def _word(*values) -> str:
+    return " ".join(repr(float(value)) for value in values)
+
+
+def _without(element, *tags: str) -> None:
+    for one in [one for one in element if one.tag in tags]:
+        element.remove(one)
+
+
+def _set_inertial(link, pi) -> None:
+    """Put the parameters (10,) about its frame in the place of what a link's element states."""
+    from lxml import etree
+
+    mass, com, central = pseudo.to_central(pi)
+    _without(link, "inertial")
+    inertial = etree.Element("inertial")
+    link.insert(0, inertial)
+    etree.SubElement(inertial, "origin", attrib={"xyz": _word(*com), "rpy": "0 0 0"})
+    etree.SubElement(inertial, "mass", attrib={"value": _word(mass)})
+    axes = [(f"i{a}{b}", (i, j)) for i, a in enumerate("xyz") for j, b in enumerate("xyz") if i <= j]
+    etree.SubElement(inertial, "inertia", attrib={key: _word(central[at]) for key, at in axes})
 
 
 def text(written, said: str) -> bytes:
@@ -153,15 +188,22 @@ def _carriers(robot) -> dict[str, str | None]:
     return {link: mover(link) for link in robot.source.links}
 
 
-def _moved(joint, angle: float) -> np.ndarray:
-    """The origin (4, 4) of a joint that stands at an angle [rad or m] where it now stands at
-    zero."""
-    axis = np.array([1.0, 0.0, 0.0] if joint.axis is None else joint.axis, dtype=float)
+def _move(joint, angle: float) -> None:
+    """Let a joint's element stand at an angle [rad or m] where it now stands at zero."""
+    from lxml import etree
+
+    numbers = lambda element, key, none: [  # noqa: E731
+        float(word) for word in (none if element is None else element.get(key, none)).split()
+    ]
+    axis = np.array(numbers(joint.find("axis"), "xyz", "1 0 0"))
     axis = axis / np.linalg.norm(axis)
-    motion = np.eye(4)
-    if joint.type == "prismatic":
-        motion[:3, 3] = angle * axis
+    origin = joint.find("origin")
+    xyz, turn = np.array(numbers(origin, "xyz", "0 0 0")), rotation_rpy(numbers(origin, "rpy", "0 0 0"))
+    if joint.get("type") == "prismatic":
+        xyz = xyz + turn @ (angle * axis)
     else:
         skew = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
-        motion[:3, :3] += np.sin(angle) * skew + (1.0 - np.cos(angle)) * skew @ skew
-    return motion if joint.origin is None else joint.origin @ motion
+        turn = turn @ (np.eye(3) + np.sin(angle) * skew + (1.0 - np.cos(angle)) * skew @ skew)
+    origin = etree.SubElement(joint, "origin") if origin is None else origin
+    origin.set("xyz", _word(*xyz))
+    origin.set("rpy", _word(*rpy_of(turn)))

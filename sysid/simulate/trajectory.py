@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from scipy.interpolate import make_interp_spline
 
 from ..errors import LogError
 from ..readers import open_table
@@ -27,6 +26,8 @@ class Played:
 
     def reference(self, t) -> Reference:
         """The motion at times t, at rest before it begins and after it ends."""
+        from scipy.interpolate import make_interp_spline
+
         inside = np.clip(t, 0.0, self.duration)
         spline = make_interp_spline(self.t, self.q, k=5)
         moves = ((t >= 0.0) & (t <= self.duration))[:, None]
