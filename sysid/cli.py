@@ -180,6 +180,38 @@ def compare(
 
 
 @app.command()
+def fleet(
+    experiments: Annotated[list[str], typer.Argument(metavar="EXPERIMENT...", help="Three or more experiments of one type of robot: files, folders, folders of folders, patterns.")],
+    rate: Annotated[float, typer.Option("--rate", help="Probability of any false alarm in the whole table.")] = 0.05,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of the fleets that are drawn to find the threshold.")] = 0,
+    opened: Annotated[bool, typer.Option("--open", help="Open the page in the browser.")] = False,
+    trust: Trust = False, as_json: Json = False, out: Out = None, quiet: Quiet = False,
+) -> None:  # fmt: skip
+    """Many robots or many days: what they share, what differs, which one is odd and in what."""
+    from . import fleet as fleets
+    from . import results
+    from .report.fleet import write
+
+    run = results.folder(out or Path("runs") / "fleet")
+    with _progress(quiet or as_json) as progress:
+        found = fleets.fleet(experiments, rate=rate, seed=seed, progress=progress)
+    said = fleets.document(found, run)
+    results.write_json(run / "fleet.json", said)
+    page = write(said, run / "fleet.html")
+    if as_json:
+        print(json.dumps(said, allow_nan=False))
+    elif not quiet:
+        from .terminal import show_fleet
+
+        show_fleet(said)
+        print(page)
+    if opened:
+        import webbrowser
+
+        webbrowser.open(page.resolve().as_uri())
+
+
+@app.command()
 def simulate(
     experiment: ExperimentPath,
     out: Annotated[Path, typer.Option("--out", help="The folder to write: config.yaml, robot.urdf, train.csv, test.csv, truth.json.")],
