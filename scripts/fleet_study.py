@@ -1,9 +1,12 @@
 """Does `sysid fleet` keep its word? Studies on simulated robots.
 
     python scripts/fleet_study.py oddities --number 25 --seed 1 --out runs/fleet
+    python scripts/fleet_study.py questions --number 1 --seed 1 --out runs/fleet
 
 oddities: fleets of 40 arms with drawn differences; four of five without a fault, in each fifth one
 has a worn joint and another something left on its hand: found, named, sized, and false alarms.
+
+questions: a held model and 200 logs of 10 s, each asked what changed on it; seconds.
 
 All resume: finished cases stand in a journal in --out, named after the seed and the state of the
 package's source.
@@ -25,7 +28,7 @@ sys.path.insert(0, str(ROOT))
 os.environ["PYTHONPATH"] = os.pathsep.join(
     [str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])]
 )
-STUDIES = ("oddities",)
+STUDIES = ("oddities", "questions")
 
 
 def _state() -> str:

@@ -299,6 +299,18 @@ def show_fleet(document: dict) -> None:
     print(f"probability of any false alarm: {100 * document['false_alarm_rate']:g} %")
 
 
+def show_against(document: dict) -> None:
+    """What is different on each of many logs while a fitted model is held."""
+    rows = []
+    for log, entry in document["logs"].items():
+        changes = [f"{f['effect']} on {f['joint']}" + (f" {m['value']:.3g} kg" if (m := f["parameters"].get("payload.*.m")) else "") for f in entry["changes"]]
+        ratio = max((entry["rms_held"][j] / after if after else 1.0) for j, after in entry["rms_after"].items())
+        rows.append([log, ", ".join(changes) or "nothing changed", f"{ratio:.3g}"])
+    _table(f"against {document['against']}: what changed, and how many times smaller the error of a joint is with it", ["log", "changed", "times"], rows)
+    for entry in document["failed"]:
+        Console().print(f"[red]left out[/red] {escape(entry['log'])}: {escape(entry['says'])}", soft_wrap=True, highlight=False)
+
+
 def show_added(document: dict) -> None:
     """The held-out error before and after an effect."""
     before, after = document["rms_test_before"], document["rms_test_after"]

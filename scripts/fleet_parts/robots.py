@@ -111,13 +111,21 @@ def coloured(rng, shape, step: float, memory: float = MEMORY) -> np.ndarray:
     return np.sqrt(0.5) * (slow + rng.standard_normal(shape))
 
 
-def logged(kind: Type, one: Drawn, rng: np.random.Generator, seconds: float) -> pl.DataFrame:
-    """A log of a robot."""
+def logged(
+    kind: Type,
+    one: Drawn,
+    rng: np.random.Generator,
+    seconds: float,
+    *,
+    rate: float = RATE,
+    bias=0.0,
+) -> pl.DataFrame:
+    """A log of a robot. bias: (dof,) of its torque [N m]."""
     machine = kind.machine
-    t, q, qd, qdd = moved(rng, seconds, machine.dof)
+    t, q, qd, qdd = moved(rng, seconds, machine.dof, rate)
     tau = regressor.torque(machine, one.pi, q, qd, qdd)
-    tau = tau + one.viscous * qd + one.coulomb * np.sign(qd)
-    tau = tau + TORQUE_NOISE * np.sqrt(np.mean(tau**2, axis=0)) * coloured(rng, tau.shape, 1 / RATE)
+    tau = tau + one.viscous * qd + one.coulomb * np.sign(qd) + bias
+    tau = tau + TORQUE_NOISE * np.sqrt(np.mean(tau**2, axis=0)) * coloured(rng, tau.shape, 1 / rate)
     q = np.round(q / GRAIN) * GRAIN
     columns = {"t": t}
     columns |= {f"q_{joint}": q[:, j] for j, joint in enumerate(machine.joints)}

@@ -20,6 +20,7 @@ from .spread import Spread, inflation, judged
 DRAWS = 1000
 _NUMBERS = 2e9  # random numbers that a calibration may take: a large fleet has fewer draws
 _FEWEST = 200
+_TOGETHER = 200_000  # numbers of drawn tables that stand in memory at once
 
 
 @dataclass(frozen=True)
@@ -49,29 +50,34 @@ def threshold(
     """
     n, m = table.values.shape
     draws = int(np.clip(_NUMBERS / (n * m * m), _FEWEST, DRAWS))
-    told = np.isfinite(table.values)
+    told = np.isfinite(table.values)[:, None]
     likeness = alike(table, found, factor)
     common, alone = np.sqrt(kept(likeness)), np.sqrt(1.0 - kept(likeness))
-    scale, again = np.sqrt(factor), np.sqrt(factor * table.variances_again)
-    variances = table.variances * factor
-    least = np.ones(draws)
-    typical = np.nanmedian(np.where(told, table.variances * factor, np.nan), axis=0)
+    scale, again = np.sqrt(factor), np.sqrt(factor * table.variances_again)[:, None]
+    stated = np.where(told[:, 0], table.variances, np.nan)
+    typical = np.array([_median(v) for v in (stated * factor).T])
     total, freedom = found.between**2 + typical, np.maximum(found.count - 1.0, 1.0)
-    for k in range(draws):
+    least: list[np.ndarray] = []
+    while (done := sum(map(len, least))) < draws:
+        d = min(max(1, _TOGETHER // (n * m)), draws - done)
         # few robots leave their spread uncertain
-        drawn = total * freedom / rng.chisquare(freedom) - typical
-        likes = common * (rng.standard_normal((n, n)) @ likeness)
-        likes += alone * rng.standard_normal((n, m))
-        between = np.sqrt(np.maximum(drawn, 0.0)) * likes
-        noise = np.einsum("nij,nj->ni", table.roots, rng.standard_normal((n, m))) * scale
+        spare = np.sqrt(np.maximum(total * freedom / rng.chisquare(freedom, (d, m)) - typical, 0.0))
+        likes = common * (rng.standard_normal((n, d, n)) @ likeness)
+        between = spare * (likes + alone * rng.standard_normal((n, d, m)))
+        noise = np.einsum("nij,ndj->ndi", table.roots, rng.standard_normal((n, d, m))) * scale
         values = np.where(told, between + noise, np.nan)
-        if table.again.size:
-            other = between + again * rng.standard_normal((n, m))
-            own = inflation(values - other, table.variances + table.variances_again)
-            variances = table.variances * own
-        p = judged(values, variances).p
-        least[k] = np.nanmin(p) if np.isfinite(p).any() else 1.0
-    return float(np.quantile(least, rate, method="lower"))
+        other = between + again * rng.standard_normal((n, d, m))
+        wide = np.broadcast_to(table.variances[:, None], values.shape)
+        both = wide + table.variances_again[:, None]
+        wide = wide * inflation(values - other, both)
+        p = judged(values.reshape(n, -1), wide.reshape(n, -1)).p.reshape(n, d, m)
+        least.append(np.where(np.isfinite(p), p, 1.0).min(axis=(0, 2)))
+    return float(np.quantile(np.concatenate(least), rate, method="lower"))
+
+
+def _median(values) -> float:
+    known = values[np.isfinite(values)]
+    return float(np.median(known)) if len(known) else np.nan
 
 
 def alike(table: Table, found: Spread, factor) -> np.ndarray:

@@ -58,14 +58,13 @@ def start(values, variances) -> tuple[np.ndarray, np.ndarray]:
     """Median (m,) of values (n, m), and the variance (m,) between robots by the median square."""
     nobody = ~np.isfinite(values).any(axis=0)
     values, variances = np.where(nobody, 0.0, values), np.where(nobody, 1.0, variances)
-    median = np.median if np.isfinite(values).all() else np.nanmedian
-    middle = median(values, axis=0)
+    middle = _median(values)
     squares = (values - middle) ** 2
     low, high = np.zeros(middle.shape), np.nanmax(squares, axis=0) / MIDDLE + 1e-300
-    spare = median(squares / variances, axis=0) <= MIDDLE
+    spare = _median(squares / variances) <= MIDDLE
     for _ in range(_HALVINGS):
         half = 0.5 * (low + high)
-        above = median(squares / (variances + half), axis=0) > MIDDLE
+        above = _median(squares / (variances + half)) > MIDDLE
         low, high = np.where(above, half, low), np.where(above, high, half)
     return middle, np.where(spare, 0.0, 0.5 * (low + high))
 
@@ -139,30 +138,31 @@ def judged(values, variances) -> Judged:
 
 
 def inflation(apart, variances) -> np.ndarray:
-    """By how much (m,) the variances of two sets of logs of one robot fall short of how far their
-    values lie apart, at least one.
+    """By how much (..., m) the variances of two sets of logs of one robot fall short of how far
+    their values lie apart, at least one.
 
     Each parameter's factor, by the median over robots, is drawn to the typical factor as far as
     it is uncertain beside how much the factors differ.
 
     Args:
-        apart: (n, m) differences. variances: (n, m) that these should have.
+        apart: (n, ..., m) differences. variances: (n, ..., m) that these should have.
     """
     with np.errstate(invalid="ignore", divide="ignore"):
-        squares = apart**2 / variances
-    squares[~np.isfinite(squares)] = np.nan
-    count = np.isfinite(squares).sum(axis=0)
-    own = np.nanmedian(np.where(count > 0, squares, MIDDLE), axis=0) / MIDDLE
+        squares = (apart**2 / variances).reshape(len(apart), -1, apart.shape[-1])
+    told = np.isfinite(squares)
+    squares[~told] = np.nan
+    count = told.sum(axis=0)
+    own = _median(np.where(count > 0, squares, MIDDLE)) / MIDDLE
     known = (count > 0) & (own > 0.0)
-    if not known.any():
-        return np.ones(squares.shape[1])
-    logs = np.log(np.where(known, own, 1.0))[:, None]
-    errors = (2.0 / (EFFICIENCY * np.maximum(count, 1)))[:, None]
-    logs, errors = logs[known], errors[known]
+    logs = np.where(known, np.log(np.where(known, own, 1.0)), np.nan).T
+    errors = 2.0 / (EFFICIENCY * np.maximum(count.T, 1))
     found = spread(logs, errors)
-    between = np.nan_to_num(found.between[0] ** 2)
-    share = np.where(found.typical[:, 0], between / (between + errors[:, 0]), 1.0)
-    middle = float(np.where(np.isfinite(found.mean[0]), found.mean[0], np.median(logs)))
-    out = np.full(squares.shape[1], np.exp(middle))
-    out[known] = np.exp(middle + share * (logs[:, 0] - middle))
-    return np.maximum(out, 1.0)
+    middle = np.where(np.isfinite(found.mean), found.mean, 0.0)
+    between = np.nan_to_num(found.between) ** 2
+    share = np.where(found.typical, between / (between + errors), 1.0)
+    out = np.exp(middle + np.where(known.T, share * (logs - middle), 0.0))
+    return np.maximum(out.T.reshape(apart.shape[1:]), 1.0)
+
+
+def _median(values) -> np.ndarray:
+    return (np.median if np.isfinite(values).all() else np.nanmedian)(values, axis=0)
