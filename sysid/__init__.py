@@ -12,6 +12,7 @@
     sysid.write(fit, "runs/mine")
     sysid.read_run("runs/mine").torque(q, qd, qdd)
     sysid.export("runs/mine", "mjcf", "simulation")
+    sysid.fleet(["robots/*"]).odd
 
 Names are imported when they are first used, so that `import sysid` costs nothing.
 """
@@ -20,7 +21,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from . import check, design, diagnose, export
+    from . import check, design, diagnose, export, fleet
     from .comparison import Difference, compare
     from .errors import SysidError, SysidWarning
     from .estimate import Fit, Prediction
@@ -36,7 +37,7 @@ _WHERE = {
     "write": ("results", "write"), "compare": ("comparison", "compare"), "Difference": ("comparison", "Difference"),
     "Experiment": ("config", "Experiment"), "Fit": ("estimate", "Fit"), "Prediction": ("estimate", "Prediction"),
     "read_run": ("run", "read_run"), "Run": ("run", "Run"),
-    "trust": ("trusted", "trust"), "check": ("check", None), "design": ("design", None), "diagnose": ("diagnose", None), "export": ("export", None), "SysidError": ("errors", "SysidError"), "SysidWarning": ("errors", "SysidWarning"),
+    "trust": ("trusted", "trust"), "check": ("check", None), "design": ("design", None), "diagnose": ("diagnose", None), "export": ("export", None), "fleet": ("fleet", None), "SysidError": ("errors", "SysidError"), "SysidWarning": ("errors", "SysidWarning"),
 }  # fmt: skip
 
 
@@ -54,5 +55,5 @@ def __dir__():
 
 __all__ = [
     "Difference", "Experiment", "Fit", "Prediction", "Run", "SysidError", "SysidWarning", "check", "compare", "design", "diagnose", "export",
-    "fit", "load", "predict", "read_run", "trust", "write",
+    "fit", "fleet", "load", "predict", "read_run", "trust", "write",
 ]

@@ -17,6 +17,7 @@ from .errors import SysidError
 # It must be said before NumPy is loaded; a user's own setting wins.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
+_CORES = os.cpu_count() or 1
 app = typer.Typer(add_completion=False, invoke_without_command=True, pretty_exceptions_enable=False, rich_markup_mode=None, help="Identify what a robot is made of, and name the physics its model lacks.")
 
 Json = Annotated[bool, typer.Option("--json", help="One JSON document on standard output, nothing else there.")]
@@ -177,6 +178,68 @@ def compare(
         show_comparison(found)
     if not all(found.solution.converged for found in fits):
         raise typer.Exit(1)
+
+
+@app.command()
+def fleet(
+    experiments: Annotated[list[str], typer.Argument(metavar="EXPERIMENT...", help="Three or more experiments of one type of robot: files, folders, folders of folders, patterns. With --against: logs, files or patterns.")],
+    against: Annotated[Optional[Path], typer.Option("--against", metavar="RUN", help="A run folder: hold its fitted model, and ask of each log what changed.")] = None,  # noqa: UP045
+    level: Level = None,
+    jobs: Annotated[int, typer.Option("--jobs", min=1, help="Processes, of --against.")] = _CORES,
+    rate: Annotated[float, typer.Option("--rate", help="Probability of any false alarm in the whole table, or in all logs.")] = 0.05,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of the fleets that are drawn to find the threshold.")] = 0,
+    opened: Annotated[bool, typer.Option("--open", help="Open the page in the browser.")] = False,
+    trust: Trust = False, as_json: Json = False, out: Out = None, quiet: Quiet = False,
+) -> None:  # fmt: skip
+    """Many robots or many days: what they share, what differs, which one is odd and in what.
+
+    With --against RUN: what changed on each of many logs, while the model of a run folder is held.
+    """
+    from . import results, terminal
+
+    if not 0.0 < rate < 1.0:
+        raise SysidError(f"--rate {rate:g}", allowed="a probability above 0, below 1")
+    run = results.folder(out or Path("runs") / "fleet")
+    if against is not None:
+        said, page = _against(against, experiments, _levels(level), rate, jobs, run, quiet or as_json), None
+    else:
+        if level:
+            raise SysidError("--level goes with --against: a fleet has all levels of each experiment", do="leave it out")
+        said, page = _fleet(experiments, rate, seed, run, quiet or as_json)
+    if as_json:
+        print(json.dumps(said, allow_nan=False))
+    elif not quiet:
+        (terminal.show_fleet if page else terminal.show_against)(said)
+        print(page or f"run folder: {said['run']}")
+    if opened and page:
+        import webbrowser
+
+        webbrowser.open(page.resolve().as_uri())
+
+
+def _fleet(experiments: list[str], rate: float, seed: int, run: Path, silent: bool) -> tuple[dict, Path]:
+    from . import fleet as fleets
+    from . import results
+    from .report.fleet import write
+
+    with _progress(silent) as progress:
+        found = fleets.fleet(experiments, rate=rate, seed=seed, progress=progress)
+    said = fleets.document(found, run)
+    results.write_json(run / "fleet.json", said)
+    return said, write(said, run / "fleet.html")
+
+
+def _against(model: Path, logs: list[str], levels: dict[str, str], rate: float, jobs: int, run: Path, silent: bool) -> dict:
+    from . import results
+    from .changes import many
+    from .statement.changes import many_document
+
+    with _progress(silent) as progress:
+        tell = None if progress is None else lambda share: progress("asking the logs", share)
+        found, failed = many(model, logs, levels, rate=rate, jobs=jobs, progress=tell)
+    said = many_document(found, failed, model, run)
+    results.write_json(run / "against.json", said)
+    return said
 
 
 @app.command()
@@ -502,7 +565,6 @@ def fetch(dataset: Annotated[Optional[str], typer.Argument(help="One data set; w
 
 study = typer.Typer(no_args_is_help=True, help="The paper's two studies, and the choice of the prior's weight. Interrupted studies go on where they were.")
 app.add_typer(study, name="study")
-_CORES = os.cpu_count() or 1
 Jobs = Annotated[int, typer.Option("--jobs", min=1, help="Processes.")]
 Seed = Annotated[int, typer.Option("--seed", min=0, help="Seed of everything random.")]
 

@@ -6,7 +6,7 @@ what a diagnosis asks its questions of: few enough to keep, spread over the whol
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -59,10 +59,22 @@ def starts(motion: Motion, stride: int) -> list[slice]:
     return [slice(piece.core.start, piece.core.stop, stride) for piece in motion.pieces]
 
 
+def measured(motion: Motion, stride: int) -> Rows:
+    """The rows of a motion, without columns (dof, n, 0)."""
+    kept = [np.arange(rows.start, rows.stop, stride) for rows in starts(motion, stride)]
+    joined = lambda pick: np.concatenate([pick(piece)[own] for piece, own in zip(motion.pieces, kept)])  # noqa: E731
+    use = joined(lambda p: np.ones(p.q.shape, dtype=bool) if p.use is None else p.use)
+    tau = np.where(use, joined(lambda p: p.tau), 0.0)
+    return Rows(
+        np.zeros((tau.shape[1], len(tau), 0)), tau, use, joined(lambda p: p.t), joined(lambda p: np.full(len(p.t), p.log)),
+        np.concatenate([np.full(len(own), k) for k, own in enumerate(kept)]), np.concatenate(kept),
+    )  # fmt: skip
+
+
 def stack(model: Model, motion: Motion, stride: int) -> Rows:
     """The rows of a motion under a model."""
-    kept = [np.arange(rows.start, rows.stop, stride) for rows in starts(motion, stride)]
-    n, dof = sum(map(len, kept)), model.robot.dof
+    found = measured(motion, stride)
+    n, dof = len(found.tau), model.robot.dof
     columns = np.zeros((dof, n, model.size))
     at = 0
     for piece in motion.pieces:
@@ -74,14 +86,8 @@ def stack(model: Model, motion: Motion, stride: int) -> Rows:
             for joint, (values, support) in enumerate(zip(parts, supports)):
                 columns[joint, at : at + size, support] = values
             at += size
-    joined = lambda pick: np.concatenate([pick(piece)[own] for piece, own in zip(motion.pieces, kept)])  # noqa: E731
-    use = joined(lambda p: np.ones(p.q.shape, dtype=bool) if p.use is None else p.use)
-    tau = np.where(use, joined(lambda p: p.tau), 0.0)
-    columns *= use.T[:, :, None]
-    return Rows(
-        columns, tau, use, joined(lambda p: p.t), joined(lambda p: np.full(len(p.t), p.log)),
-        np.concatenate([np.full(len(own), k) for k, own in enumerate(kept)]), np.concatenate(kept),
-    )  # fmt: skip
+    columns *= found.use.T[:, :, None]
+    return replace(found, columns=columns)
 
 
 def predicted(model: Model, motion: Motion, x, stride: int) -> np.ndarray:

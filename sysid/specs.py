@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime
 import math
 import re
 from pathlib import Path
@@ -166,6 +167,18 @@ def _label(value: Any) -> Any:
 
 
 Label = Annotated[str, BeforeValidator(_label)]
+
+
+def _date(value: Any) -> Any:
+    if isinstance(value, datetime.date) and not isinstance(value, datetime.datetime):
+        return value.isoformat()
+    try:
+        return datetime.date.fromisoformat(value).isoformat()
+    except (TypeError, ValueError):
+        raise ValueError("must be a day, as in 2026-03-31") from None
+
+
+Day = Annotated[str, BeforeValidator(_date)]
 
 
 def _episodes(value: Any) -> Any:
@@ -341,6 +354,7 @@ class DataSpec(_Spec):
     torque: dict[str, Sum] = {}
     position: dict[str, Annotated[dict[str, NonZero], Field(min_length=1)]] = {}
     unused: list[str] = []
+    date: Day | None = None
 
     @property
     def logged(self) -> tuple[str, ...]:

@@ -73,11 +73,11 @@ _FLAT = 1e-12  # eigenvalues that are none, as a share of the largest
 
 def _noise(compressed: Compressed, x, weights, hessian, free) -> np.ndarray:
     """The covariance (free, free) that noise gives the estimate."""
-    basis = _whitening(hessian[np.ix_(free, free)])
-    return basis @ blocks.covariance(*_by_block(compressed, x, weights, basis, free)) @ basis.T
+    basis = whitening(hessian[np.ix_(free, free)])
+    return basis @ blocks.covariance(*by_block(compressed, x, weights, basis, free)) @ basis.T
 
 
-def _by_block(compressed: Compressed, x, weights, basis, free):
+def by_block(compressed: Compressed, x, weights, basis, free):
     """In coordinates z, parameters = basis @ z, where the Hessian is one: each block's score
     (blocks, z) and share of the Hessian (blocks, z, z), and the variance of its score under white
     noise of each joint's own size."""
@@ -96,7 +96,7 @@ def _by_block(compressed: Compressed, x, weights, basis, free):
     return scores, own, spread
 
 
-def _whitening(hessian) -> np.ndarray:
+def whitening(hessian) -> np.ndarray:
     """A basis (size, range) with basis' hessian basis = 1."""
     scale = np.sqrt(np.where(np.diagonal(hessian) > 0.0, np.diagonal(hessian), 1.0))
     values, vectors = np.linalg.eigh(hessian / np.outer(scale, scale))

@@ -7,7 +7,7 @@ import pytest
 
 from scripts.blind_benchmark import PLANAR
 from sysid import pipeline, regressor, results
-from sysid.changes import changed
+from sysid.changes import changed, many
 from sysid.errors import ConfigError, LogError, SysidError
 from sysid.statement.changes import document as changes_document
 from tests.conftest import csv
@@ -108,3 +108,29 @@ def test_questions_about_a_change_that_cannot_be_asked(fitted, tmp_path):
         with pytest.raises(kind, match=words) as caught:
             changed(*asked)
         assert "\n" not in str(caught.value)
+
+
+def test_many_logs_are_asked_at_once(fitted, cli, tmp_path):
+    logs = ["same.csv", "loaded.csv", "rough.csv", "short.csv"]
+    done = cli("fleet", "--against", fitted / "run", *(fitted / log for log in logs), "--json")
+    assert done.status == 0 and not done.err
+    said = json.loads(done.out)
+    assert json.loads((done.run / "against.json").read_text()) == said
+    found = {log.rpartition("/")[2]: [(c["effect"], c["joint"]) for c in entry["changes"]] for log, entry in said["logs"].items()}
+    assert found == {"same.csv": [], "loaded.csv": [("payload", "*")], "rough.csv": [("coulomb", "elbow")]}
+    assert [f["log"].endswith("short.csv") for f in said["failed"]] == [True] and "too short" in said["failed"][0]["says"]
+    one = what_changed(fitted, "loaded.csv")["findings"][0]["parameters"]
+    (own,) = [entry for log, entry in said["logs"].items() if log.endswith("loaded.csv")]
+    assert own["changes"][0]["parameters"]["payload.*.m"]["value"] == pytest.approx(one["payload.*.m"]["value"], rel=1e-9)
+    assert cli("fleet", "--against", fitted / "run", fitted / "nothing*.csv").status == 2
+    assert cli("fleet", fitted, "--level", "robot=r1").status == 2
+
+
+def test_processes_change_nothing(fitted):
+    logs = [str(fitted / log) for log in ("same.csv", "loaded.csv", "rough.csv", "test.csv", "train.csv")]
+    logs += [f"{folder}/../{folder.split('/')[-1]}/{log}" for folder in [str(fitted)] for log in ("same.csv", "loaded.csv", "rough.csv", "test.csv", "train.csv")]
+    alone, together = (many(fitted / "run", logs, jobs=jobs)[0] for jobs in (1, 2))
+    assert list(alone) == list(together) == logs
+    for one, other in zip(alone.values(), together.values()):
+        assert [c.effect for c in one.changes] == [c.effect for c in other.changes]
+        np.testing.assert_allclose(one.rms_after, other.rms_after, rtol=1e-12)

@@ -115,8 +115,8 @@ def test_deviations_are_right_under_white_noise():
                 factors.append(Factor(j, b, np.arange(size), r, rows))
         data = Compressed(size, 2, tuple(factors), blocks * rows)
         x = inverse @ sum(a.T @ b for a, b in zip(slow, y))
-        basis = uncertainty._whitening(2.0 * normal)
-        moves, _ = parameters.left_out(*uncertainty._by_block(data, x, None, basis, np.arange(size)))
+        basis = uncertainty.whitening(2.0 * normal)
+        moves, _ = parameters.left_out(*uncertainty.by_block(data, x, None, basis, np.arange(size)))
         plain[k] = np.diagonal(basis @ parameters.neighbours(moves) @ basis.T)
         found = uncertainty._noise(data, x, None, 2.0 * normal, np.arange(size)) / parameters.widening(blocks) ** 2
         corrected[k], along[k] = np.diagonal(found), direction @ found @ direction

@@ -12,9 +12,11 @@ that is physically possible; standard deviations are those of leaving a block of
     halves.py      which of them one half of the log tells of the other
     fitted.py      these together on the whole log, with their deviations
     new_log.py     all of it
+    many.py        many logs, one model
 """
 
 from .fitted import Change
+from .many import many
 from .new_log import Changed, changed
 
-__all__ = ["Change", "Changed", "changed"]
+__all__ = ["Change", "Changed", "changed", "many"]

@@ -1,5 +1,5 @@
 """The changes that a log supports, fitted together on all of it, with the deviations of leaving a
-block of time out."""
+block of time out, to first order."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from ..effect import find
 from ..inertia import DIVERGENCES, PARAMETERIZATIONS, pseudo
 from ..model import ROBOT, Model
 from ..objective import Objective
+from ..projection import inverted
 from ..solve import Coordinates, solve
 from .halves import Key, Question, least_squares
 
@@ -31,20 +32,18 @@ class Change:
 
 
 def together(model: Model, asked: Question, chosen) -> tuple[tuple[Change, ...], np.ndarray]:
-    """The changes fitted together on the whole log, and what they leave (n, dof)."""
-    residual, blocks = asked.residual, asked.blocks
+    """The changes fitted together on the whole log, and the sums of squares (dof,) that they
+    leave."""
+    places = asked.places(chosen)
     if not chosen:
-        return (), residual
-    columns = asked.stacked(chosen)
-    ends = np.cumsum([asked.columns[key].shape[2] for key in chosen])
-    spans = {
-        key: slice(e - asked.columns[key].shape[2], e) for key, e in zip(chosen, ends.tolist())
-    }
+        return (), asked.squares(places, np.zeros(0)).sum(axis=0)
+    ends = np.cumsum([asked.spans[key].stop - asked.spans[key].start for key in chosen]).tolist()
+    spans = dict(zip(chosen, (slice(a, b) for a, b in zip([0, *ends], ends))))
     body = spans.get(("payload", ROBOT))
-    c = _possible(columns, residual, asked.weights, body)
-    kept = [blocks != b for b in range(blocks.max() + 1)]
-    without = [_possible(columns[:, k], residual[k], asked.weights, body) for k in kept]
-    without = np.array(without)
+    whole = asked.by_block.sum(axis=0)
+    c, around = _possible(whole, places, body)
+    pull = whole[places, -1] - whole[np.ix_(places, places)] @ c
+    without = np.array([_nearby(whole - b, places, c, around, pull) for b in asked.by_block])
     with_all, out = asked.across(chosen), []
     for key, own in spans.items():
         rest = asked.across([other for other in chosen if other != key])
@@ -54,29 +53,45 @@ def together(model: Model, asked: Question, chosen) -> tuple[tuple[Change, ...],
         out.append(
             Change(key[0], joint, share, error, _parameters(model, key, c[own], without[:, own]))
         )
-    left = residual - np.einsum("jnk,k->nj", columns, c)
+    left = asked.squares(places, c).sum(axis=0)
     return tuple(sorted(out, key=lambda change: -change.removed)), left
 
 
-def _possible(columns, residual, weights, own: slice | None) -> np.ndarray:
-    """Least squares, with a body's ten columns kept physically possible."""
+def _possible(products, places, own: slice | None) -> tuple[np.ndarray, np.ndarray]:
+    """Least squares by products, with a body's ten columns kept physically possible; and half the
+    Hessian (k, k) of what is beside the data there."""
+    size = len(places)
     if own is None:
-        return least_squares(columns, residual, weights)
+        return least_squares(products, places), np.zeros((size, size))
     body = list(range(own.start, own.stop))
-    order = [*body, *(k for k in range(columns.shape[2]) if k not in body)]
-    parts = zip(weights, columns, residual.T)
-    stacked = np.concatenate([w * np.column_stack([a[:, order], r]) for w, a, r in parts])
-    triangle = np.linalg.qr(stacked, mode="r")
+    order = [*body, *(k for k in range(size) if k not in body)]
+    at = [places[k] for k in order]
+    root = _root(products[np.ix_([*at, -1], [*at, -1])])
     ball = pseudo.sphere(1.0, np.zeros(3), 0.05)
-    objective = Objective(triangle, DIVERGENCES["log-det"](ball[None]), _WEAK)
-    flat = np.zeros(len(order) - 10, dtype=bool)
+    objective = Objective(root, DIVERGENCES["log-det"](ball[None]), _WEAK)
+    flat = np.zeros(size - 10, dtype=bool)
     coordinates = Coordinates(PARAMETERIZATIONS["log-cholesky"](), 1, flat, flat)
-    start = np.concatenate([ball, least_squares(columns, residual, weights)[order[10:]]])
+    start = np.concatenate([ball, least_squares(products, at)[10:]])
     theta = coordinates.theta(start)
     found = solve(objective, coordinates, theta, tolerance=1e-10, max_iterations=200, handover=0.5)
-    out = np.empty(len(order))
+    out, around = np.empty(size), np.zeros((size, size))
     out[order] = found.x
-    return out
+    around[own, own] = 0.5 * objective.prior_hessian(found.x)[0]
+    return out, around
+
+
+def _root(products) -> np.ndarray:
+    """A triangle R with R'R = products."""
+    size = np.sqrt(np.maximum(np.diagonal(products), 1e-300))
+    values, vectors = np.linalg.eigh(products / np.outer(size, size))
+    return np.linalg.qr(np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T * size, mode="r")
+
+
+def _nearby(products, places, c, around, pull) -> np.ndarray:
+    """Where coefficients c that are best for all data go when these are a little less: a step of
+    Newton's. pull: (k,) of the data, at c, against what is beside them."""
+    here = products[np.ix_(places, places)]
+    return c + inverted(here + around) @ (products[places, -1] - here @ c - pull)
 
 
 def _parameters(model: Model, key: Key, c, without) -> dict[str, tuple[float, float, str]]:

@@ -1,15 +1,20 @@
 """Which changes one half of a log tells of the other: each is fitted on one and judged on the
-other."""
+other.
+
+Squares of columns and residual, block by block, hold all that is asked: no question goes back to
+the rows.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
+from scipy import stats
 
-from ..blocks import folds, summed, z_score
+from ..blocks import folds, z_score
 from ..model import ROBOT
 from ..projection import inverted
 
@@ -25,53 +30,84 @@ Key = tuple[str, int]  # an effect's word and its joint
 class Question:
     """A held model on a new log, and what each change would add to it.
 
-    columns: {change: (dof, n, k)}; residual: (n, dof) of the held model; weights: (dof,) by which
-    joints count; blocks: (n,) the block of each row.
+    spans: {change: its columns}; products: (blocks, dof, k + 1, k + 1) of the columns of all
+    changes, then the residual of the held model; weights: (dof,) by which joints count.
     """
 
-    columns: dict[Key, np.ndarray]
-    residual: np.ndarray
+    spans: dict[Key, slice]
+    products: np.ndarray
     weights: np.ndarray
-    blocks: np.ndarray
+    _kept: dict = field(default_factory=dict, repr=False, compare=False)
 
-    def stacked(self, keys: Sequence[Key]) -> np.ndarray:
-        """Columns (dof, n, k) of some changes, one after the other."""
-        return np.concatenate([self.columns[key] for key in keys], axis=2)
+    def weighed(self, weights) -> Question:
+        """The same question with other weights."""
+        return replace(self, weights=weights, _kept={})
+
+    def places(self, keys: Sequence[Key]) -> list[int]:
+        """The columns of some changes, one after the other."""
+        return [k for key in keys for k in range(self.spans[key].start, self.spans[key].stop)]
 
     @cached_property
     def halves(self) -> np.ndarray:
-        """(n,) bool, the rows of the first half."""
-        return folds(self.blocks.max() + 1, 2)[self.blocks] == 0
+        """(blocks,) bool, those of the first half."""
+        return folds(len(self.products), 2) == 0
+
+    @cached_property
+    def by_block(self) -> np.ndarray:
+        """(blocks, k + 1, k + 1) products over all joints, weighed."""
+        return np.einsum("bjkl,j->bkl", self.products, self.weights**2)
+
+    def squares(self, places: Sequence[int], c) -> np.ndarray:
+        """(blocks, dof) sums of squares that coefficients c (blocks, k) of columns leave."""
+        at = [*places, self.products.shape[-1] - 1]
+        own = self.products[:, :, at][:, :, :, at]
+        v = np.append(-np.atleast_2d(c), np.ones((len(np.atleast_2d(c)), 1)), axis=1)
+        v = np.broadcast_to(v, (len(own), len(at)))
+        return np.maximum(np.einsum("bk,bjkl,bl->bj", v, own, v), 0.0)
 
     def across(self, keys: Sequence[Key]) -> np.ndarray:
-        """The residual (n, dof) of each half after what the other half says of some changes."""
-        if not keys:
-            return self.residual
-        columns, out = self.stacked(keys), np.empty_like(self.residual)
-        for half in (self.halves, ~self.halves):
-            c = least_squares(columns[:, ~half], self.residual[~half], self.weights)
-            out[half] = self.residual[half] - np.einsum("jnk,k->nj", columns[:, half], c)
-        return out
+        """Sums of squares (blocks, dof) that each half leaves after what the other half says of
+        some changes."""
+        if (known := frozenset(keys)) not in self._kept:
+            places, c = self.places(keys), np.zeros((len(self.products), 0))
+            if places:
+                c = np.empty((len(self.products), len(places)))
+                for half in (self.halves, ~self.halves):
+                    c[half] = least_squares(self.by_block[~half].sum(axis=0), places)
+            self._kept[known] = self.squares(places, c)
+        return self._kept[known]
 
     def taken(self, key: Key, before, after) -> tuple[float, float]:
-        """The share that a change takes of a residual's weighted square on its joints, and how many
-        standard errors it stands from zero."""
+        """The share that a change takes of sums of squares (blocks, dof) on its joints, weighed,
+        and how many standard errors it stands from zero."""
         joints = slice(None) if key[1] == ROBOT else [key[1]]
-        fall = summed(self.blocks, ((before**2 - after**2) * self.weights**2)[:, joints]).sum(1)
-        whole = max(np.sum((before * self.weights)[:, joints] ** 2), 1e-300)
+        fall = ((before - after) * self.weights**2)[:, joints].sum(1)
+        whole = max(float(np.sum((before * self.weights**2)[:, joints])), 1e-300)
         return float(fall.sum() / whole), z_score(fall)
 
-    def supported(self) -> list[Key]:
-        """The changes that the halves support, the one that takes most first, each beside those."""
+    def evenly(self, key: Key, before, after) -> float:
+        """How many standard errors the share that a change takes of each block's own square stands
+        from zero: where the change is clear, all blocks say so, however much each has of it."""
+        joints = slice(None) if key[1] == ROBOT else [key[1]]
+        first, then = ((own * self.weights**2)[:, joints].sum(1) for own in (before, after))
+        return z_score((first - then) / np.maximum(first + then, 1e-300))
+
+    def supported(self, least: float = 0.0) -> list[Key]:
+        """The changes that the halves support, the one that takes most first, each beside those.
+
+        Args:
+            least: standard errors that each must stand from zero `evenly`.
+        """
         chosen: list[Key] = []
-        current = self.residual
+        current = self.across(chosen)
         while len(chosen) < _MOST:
             found = {}
-            for key in self.columns:
+            for key in self.spans:
                 if key not in chosen:
                     after = self.across([*chosen, key])
                     share, z = self.taken(key, current, after)
-                    if share >= _WORTH and z >= _SUPPORT:
+                    even = share >= _WORTH and self.evenly(key, current, after) >= least
+                    if even and z >= _SUPPORT:
                         found[key] = (share, after)
             if not found:
                 break
@@ -80,7 +116,40 @@ class Question:
         return chosen
 
 
-def least_squares(columns, residual, weights) -> np.ndarray:
-    """Coefficients (k,) of columns (dof, n, k) that leave least of residual (n, dof), weighted."""
-    system = sum(w**2 * a.T @ a for w, a in zip(weights, columns))
-    return inverted(system) @ sum(w**2 * a.T @ r for w, a, r in zip(weights, columns, residual.T))
+def support(rate: float, questions: int) -> float:
+    """How many standard errors a change must stand from zero `evenly`, that any of so many
+    questions is answered wrongly with no more than a probability: by Student's law of the blocks,
+    after Bonferroni."""
+    return float(stats.t.isf(0.5 * rate / questions, BLOCKS - 1))
+
+
+def question(columns: dict[Key, np.ndarray], residual, weights, blocks) -> Question:
+    """A question of rows.
+
+    Args:
+        columns: {change: (dof, n, k)}. residual: (n, dof) of the held model. weights: (dof,).
+        blocks: (n,) the block of each row.
+    """
+    ends = np.cumsum([own.shape[2] for own in columns.values()]).tolist()
+    spans = {key: slice(e - own.shape[2], e) for (key, own), e in zip(columns.items(), ends)}
+    count, dof = int(blocks.max()) + 1, residual.shape[1]
+    products = np.zeros((count, dof, ends[-1] + 1, ends[-1] + 1))
+    for j in range(dof):
+        at = [
+            k
+            for key in columns
+            if key[1] in (ROBOT, j)
+            for k in range(*spans[key].indices(ends[-1]))
+        ]
+        own = [values[j] for key, values in columns.items() if key[1] in (ROBOT, j)]
+        wide = np.column_stack([*own, residual[:, j]])
+        at = np.array([*at, ends[-1]])
+        for b in range(count):
+            part = wide[blocks == b]
+            products[b, j][np.ix_(at, at)] = part.T @ part
+    return Question(spans, products, np.asarray(weights))
+
+
+def least_squares(products, places: Sequence[int]) -> np.ndarray:
+    """Coefficients (k,) of columns that leave least of the last, by their products."""
+    return inverted(products[np.ix_(places, places)]) @ products[places, -1]

@@ -1,8 +1,9 @@
-"""The model that a run folder holds, for logs of an experiment's robot."""
+"""The model that a run folder holds, for logs of its robot: read once, asked of many."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -13,23 +14,37 @@ from ..model import Model
 from ..specs import Experiment
 
 
+@dataclass(frozen=True)
+class Held:
+    """A model and its parameters x (size,), and the experiment that says how logs are read."""
+
+    experiment: Experiment
+    model: Model
+    x: np.ndarray
+
+
 def held(
-    folder: Path, experiment: Experiment, levels: Mapping[str, str]
-) -> tuple[Model, np.ndarray]:  # fmt: skip
-    """The model and the parameters x (size,) of a run folder of `sysid fit`, at a level of each
-    group of logs.
+    folder: Path, experiment: Experiment | None = None, levels: Mapping[str, str] | None = None
+) -> Held:  # fmt: skip
+    """The model and the parameters of a run folder of `sysid fit`, at a level of each group of
+    logs.
+
+    Args:
+        experiment: of the logs; by default the run's own.
 
     Raises:
         SysidError: a level that is not there, or is not said.
         ConfigError: the folder holds no fit, or one of another robot than the experiment's.
     """
     found = run.read_run(folder)
-    _, own, _ = pipeline.build(experiment)
-    if own.robot.joints != found.joints:
-        raise ConfigError(
-            f"the run moved {', '.join(found.joints)}",
-            where=str(folder),
-            allowed=", ".join(own.robot.joints),
-            do="give the experiment that was fitted",
-        )
-    return found.model.at(levels, found.x)
+    experiment = found.experiment if experiment is None else experiment
+    if experiment is not found.experiment:
+        _, own, _ = pipeline.build(experiment)
+        if own.robot.joints != found.joints:
+            raise ConfigError(
+                f"the run moved {', '.join(found.joints)}",
+                where=str(folder),
+                allowed=", ".join(own.robot.joints),
+                do="give the experiment that was fitted",
+            )
+    return Held(experiment, *found.model.at(levels or {}, found.x))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -12,11 +12,13 @@ from .. import datasets, pipeline, rows
 from ..blocks import numbered
 from ..errors import LogError
 from ..lowpass import LEAST, lowpassed, stride_of
+from ..model import Model
 from ..noise import floors_of
 from ..specs import Experiment, LogSpec
 from .fitted import Change, together
-from .halves import BLOCKS, Question
-from .held import held
+from .halves import BLOCKS, support
+from .halves import question as asked_of
+from .held import Held, held
 from .signatures import signatures
 
 
@@ -47,8 +49,23 @@ def changed(
     Raises:
         SysidError: no such run, log or level, or a log too short to be split in halves.
     """
-    structure, x = held(run, experiment, levels or {})
-    robot = structure.robot
+    return asked(held(run, experiment, levels), logs, floors=True)
+
+
+def asked(
+    model: Held, logs: list[str], *, floors: bool = False, rate: float | None = None, among: int = 1
+) -> Changed:  # fmt: skip
+    """What is different on logs, with a model held.
+
+    Args:
+        logs: as of `changed`. floors: whether the noise floors are asked for too, which costs as
+            much as all else; without them there are none.
+        rate: of false alarms among so many questions like this one; None: three standard errors.
+
+    Raises:
+        SysidError: no such log, or one too short to be split in halves.
+    """
+    experiment, x, robot = model.experiment, model.x, model.model.robot
     specs = [LogSpec(file=_located(log)) for log in logs]
     with pipeline.noticed():
         motion = lowpassed(pipeline.read(experiment, robot, specs), robot.joints, LEAST)
@@ -57,26 +74,33 @@ def changed(
             "the log is too short to say what changed", where=", ".join(logs),
             allowed="4 s or more of motion", do="give a longer log",
         )  # fmt: skip
-    structure = structure.scaled_by(motion)
+    structure = model.model.scaled_by(motion)
     stride = stride_of(motion, LEAST)
-    data = rows.stack(structure, motion, stride)
-    residual = data.residual(x)
-    by_size = lambda left: 1.0 / np.maximum(data.rms(left), 1e-12)  # noqa: E731
+    data = rows.measured(motion, stride)
+    residual = (data.tau - rows.predicted(structure, motion, x, stride)) * data.use
+    counted = np.maximum(data.use.sum(axis=0), 1)
+    by_size = lambda squares: 1.0 / np.maximum(np.sqrt(squares / counted), 1e-12)  # noqa: E731
     blocks = numbered(data.t, data.piece, shortest=np.inf, fewest=BLOCKS)
     tried = signatures(structure, x, motion, stride, data.use)
     tried = {key: columns for key, columns in tried.items() if np.any(columns)}
-    question = Question(tried, residual, by_size(residual), blocks)
-    chosen = question.supported()
+    squares = (residual**2).sum(axis=0)
+    question = asked_of(tried, residual, by_size(squares), blocks)
+    least = {} if rate is None else {"least": support(rate, among * len(tried))}
+    chosen = question.supported(**least)
     changes, after = together(structure, question, chosen)
     if changes:  # a joint counts by what is left of it, not by what the changes made of it
-        question = replace(question, weights=by_size(after))
-        changes, after = together(structure, question, question.supported() or chosen)
+        question = question.weighed(by_size(after))
+        changes, after = together(structure, question, question.supported(**least) or chosen)
+    rms = [np.sqrt(own / counted) for own in (squares, after)]
+    found = _floors(structure, x, motion) if floors else ()
+    return Changed(robot.joints, *rms, found, changes, _notes(experiment, changes))
+
+
+def _floors(structure: Model, x, motion) -> tuple:
     count = 10 * structure.bodies
     bodies, rest = x[:count].reshape(-1, 10), x[count:]
     predicted = np.concatenate([structure.torque(piece, bodies, rest) for piece in motion.pieces])
-    found = floors_of(motion.pieces, predicted)
-    notes = _notes(experiment, changes)
-    return Changed(robot.joints, data.rms(residual), data.rms(after), found, changes, notes)
+    return floors_of(motion.pieces, predicted)
 
 
 def _located(log: str) -> str:

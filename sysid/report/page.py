@@ -38,8 +38,14 @@ def write(fit: Fit, document: dict, history: list[dict], path: Path) -> Path:
     return path
 
 
-def page(name: str, made: dict[str, dict]) -> str:
-    """The HTML of sections, {name: {"title", "html", "charts"}}, under an experiment's name."""
+def page(
+    name: str, made: dict[str, dict], *, template: str = "page", short: dict[str, str] | None = None
+) -> str:
+    """The HTML of sections, {name: {"title", "html", "charts"}}, under an experiment's name.
+
+    Args:
+        template: name of the page's file, without the ending. short: what links call sections.
+    """
     from plotly.offline import get_plotlyjs
 
     # what would end the element that holds it
@@ -50,8 +56,9 @@ def page(name: str, made: dict[str, dict]) -> str:
         "style-src 'unsafe-inline'; img-src data: blob:; worker-src blob:; base-uri 'none'; "
         "form-action 'none'"
     )
-    return rendering.environment("report").get_template("report/page.html").render(
-        name=name, sections=made, short=_SHORT, policy=policy, embedded=embedded,
+    return rendering.environment("report").get_template(f"report/{template}.html").render(
+        name=name, sections=made, short=_SHORT if short is None else short, policy=policy,
+        embedded=embedded,
         version=results.versions()["sysid"], style=rendering.style(), script=script,
         engine=Markup(engine),
     )  # fmt: skip

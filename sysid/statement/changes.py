@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..changes import Changed
+from ..changes import Change, Changed
 from ..results import number
 
 
@@ -22,20 +22,7 @@ def document(found: Changed, run="") -> dict:
             }
             for j, joint in enumerate(found.joints)
         },
-        "findings": [
-            {
-                "effect": c.effect,
-                "joint": c.joint,
-                "misfit_removed": c.removed,
-                "misfit_removed_se": number(c.removed_se),
-                "parameters": {
-                    name: {"value": v, "std": number(s), "unit": u}
-                    for name, (v, s, u) in c.parameters.items()
-                },
-                "tied_with": [],
-            }
-            for c in found.changes
-        ],
+        "findings": [_finding(change) for change in found.changes],
         "not_visible": [],
         "verdict": [
             {
@@ -50,5 +37,37 @@ def document(found: Changed, run="") -> dict:
             for joint in found.joints
         ],
         "notices": list(found.notes),
+        "run": str(run),
+    }
+
+
+def _finding(c: Change) -> dict:
+    return {
+        "effect": c.effect,
+        "joint": c.joint,
+        "misfit_removed": c.removed,
+        "misfit_removed_se": number(c.removed_se),
+        "parameters": {
+            name: {"value": v, "std": number(s), "unit": u}
+            for name, (v, s, u) in c.parameters.items()
+        },
+        "tied_with": [],
+    }
+
+
+def many_document(found: dict[str, Changed], failed: dict[str, str], held, run="") -> dict:
+    """The document of `sysid fleet --against`."""
+    return {
+        "against": str(held),
+        "logs": {
+            log: {
+                "rms_held": dict(zip(one.joints, one.rms_held.tolist())),
+                "rms_after": dict(zip(one.joints, one.rms_after.tolist())),
+                "changes": [_finding(change) for change in one.changes],
+                "notices": list(one.notes),
+            }
+            for log, one in found.items()
+        },
+        "failed": [{"log": log, "says": why} for log, why in failed.items()],
         "run": str(run),
     }
