@@ -6,6 +6,8 @@ looked at for nothing else. Friction truly sticks, as in a simulation.
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from . import motor_side
@@ -13,6 +15,9 @@ from .drives import DriveDamping, FreeGain, LateCommand, factors
 from .model import Model
 from .motion import Motion, Piece
 from .specs import Experiment
+
+if TYPE_CHECKING:
+    from .simulate.plant import Plant
 
 _PERIOD = 1e-3  # s, at most, in which the commanded torque is constant
 _KNOWN = ("viscous", "coulomb", "armature")  # what the plant has beside the drive
