@@ -35,7 +35,7 @@ from .inertia.consistency import is_consistent
 from .model import Model
 from .specs import Experiment, is_own
 
-_PACKAGES = ("sysid", "pin", "numpy", "scipy", "lxml", "polars")
+_PACKAGES = ("sysid", "pin", "numpy", "scipy", "yourdfpy", "lxml", "polars")
 
 
 def document(fit: Fit, run: str | Path = "") -> dict:

@@ -307,6 +307,19 @@ def test_isaac_lab_s_file_is_python_of_its_classes(leg_run, tmp_path):
         group["friction"] == group["dynamic_friction"] and group["effort_limit_sim"]["hip"] == 230.0
     )
     assert found.check.agrees and "Isaac Lab itself was not asked" in found.check.by
+    assert "yourdfpy" in found.check.by
+
+
+def test_a_second_reader_has_to_find_the_same_bodies(leg_run, tmp_path):
+    sysid.export(leg_run[1], "isaaclab", tmp_path)
+    run = sysid.read_run(leg_run[1])
+    said = stated(run.model, run.x, isaaclab.KNOWS, isaaclab.SHOWS)
+    written = {name: tmp_path / name for name in ("robot.urdf", "actuators.py")}
+    isaaclab.loaded(written, said)
+    other = said.links.copy()
+    other[1, 0] *= 1.001
+    with pytest.raises(RuntimeError, match="yourdfpy reads another body of thigh"):
+        isaaclab.loaded(written, replace(said, links=other))
 
 
 @pytest.fixture(scope="module")

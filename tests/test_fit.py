@@ -10,6 +10,7 @@ import numpy as np
 import pinocchio as pin
 import polars as pl
 import pytest
+import yourdfpy
 
 import sysid
 from sysid import config, effect, regressor, results, robot
@@ -84,7 +85,12 @@ def test_identified_urdf_gives_the_fit_s_torque(leg, run):
     assert [model.names[1:][k] for k in range(3)] == ["abad", "hip", "knee"]
     values = {entry["name"]: entry["value"] for entry in document["parameters"]}
     pi = leg.pi.copy()
+    read = {link.name: link.inertial for link in yourdfpy.URDF.load(out / "identified.urdf", load_meshes=False, build_scene_graph=False).robot.links}
     for b, body in enumerate(leg.model.robot.bodies[:3]):
+        mass, com, central = pseudo.to_central(leg.pi[b])
+        np.testing.assert_allclose(read[body.name].mass, mass, rtol=1e-12)
+        np.testing.assert_allclose(read[body.name].origin[:3, 3], com, rtol=1e-12)
+        np.testing.assert_allclose(read[body.name].inertia, central, rtol=1e-9, atol=1e-15)
         theirs = pseudo.from_pinocchio(model.inertias[b + 1].toDynamicParameters())
         np.testing.assert_allclose(theirs, [values[f"{body.name}.{p}"] for p in PARAMETERS], rtol=1e-10, atol=1e-14)
         pi[b] = theirs

@@ -12,6 +12,7 @@ import numpy as np
 import pinocchio as pin
 
 from .. import robot as robots
+from ..inertia import pseudo
 from ..specs import RobotSpec
 from ..urdf_export import text, tree
 from .stated import Stated
@@ -72,8 +73,13 @@ def files(said: Stated, comment: str, folder: Path) -> dict[str, bytes]:
 
 def loaded(written: dict[str, Path], said: Stated):
     """Pinocchio's inverse dynamics of the written URDF, with what the written configuration says
-    of its joints; see `mjcf.loaded`."""
+    of its joints; see `mjcf.loaded`.
+
+    Raises:
+        RuntimeError: yourdfpy reads other bodies from the file than those that are stated.
+    """
     names = said.robot.joints
+    reader = _read_alike(written["robot.urdf"], said)
     machine = robots.load(RobotSpec(urdf=str(written["robot.urdf"]), joints=list(names)))
     config = read(written["actuators.py"].read_text(encoding="utf-8"))
     keys = [re.escape(name) for name in names]
@@ -89,7 +95,31 @@ def loaded(written: dict[str, Path], said: Stated):
         bodies = np.array([pin.rnea(machine.model, data, *sample) for sample in samples]) @ drive
         return bodies + armature * qdd + wet * qd + dry * np.sign(qd)
 
-    return torque, f"pinocchio {pin.__version__} (Isaac Lab itself was not asked)"
+    by = f"pinocchio {pin.__version__}, bodies read by {reader} alike"
+    return torque, f"{by} (Isaac Lab itself was not asked)"
+
+
+def _read_alike(path: Path, said: Stated) -> str:
+    """What else reads the file, where it finds the stated bodies: a second reader, for the importer
+    is none of ours."""
+    import yourdfpy
+
+    document = yourdfpy.URDF.load(
+        str(path), build_scene_graph=False, build_collision_scene_graph=False, load_meshes=False
+    )
+    links = {link.name: link.inertial for link in document.robot.links}
+    for body, pi in zip(said.robot.bodies, said.links):
+        mass, com, central = pseudo.to_central(pi)
+        found = links[body.name]
+        turn = found.origin[:3, :3]
+        same = (
+            np.allclose(found.mass, mass, rtol=1e-9)
+            and np.allclose(found.origin[:3, 3], com, rtol=1e-9, atol=1e-12)
+            and np.allclose(turn @ found.inertia @ turn.T, central, rtol=1e-9, atol=1e-12)
+        )
+        if not same:
+            raise RuntimeError(f"yourdfpy reads another body of {body.name}")
+    return f"yourdfpy {yourdfpy.__version__}"
 
 
 def read(source: str) -> dict:
