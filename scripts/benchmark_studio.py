@@ -4,7 +4,8 @@
 
 The log is synthetic (a UR5 with friction, a hidden Stribeck effect and noise). It is fitted and questioned once, with a
 few candidates unless --whole asks for the whole vocabulary; then the application answers requests in this process, each
-timed from the request to the last byte of its answer. Prints a table; exits with 1 where one takes 300 ms or more.
+timed from the request to the last byte of its answer. Prints a table; exits with 1 where the median of one is 100 ms or its worst
+300 ms, or where the first charts are not there within a second of the fit.
 """
 
 from __future__ import annotations
@@ -29,7 +30,8 @@ from sysid.studio.app import application
 from sysid.studio.serve import responsive
 from sysid.studio.session import Session
 
-LIMIT, PORT, CSRF = 0.3, 8765, "benchmark"
+LIMIT, WORST, FIRST = 0.1, 0.3, 1.0  # s: of a click the median and the worst; from the fit to its first charts
+PORT, CSRF = 8765, "benchmark"
 URDF = "example-robot-data://ur_description/urdf/ur5_robot.urdf"
 ASKED = ("stribeck", "asymmetric_coulomb", "torque_bias", "armature")
 
@@ -84,6 +86,16 @@ class Clicks:
             time.sleep(0.1)
 
 
+def first_charts(clicks: Clicks, sha: str, since: float) -> list[tuple[str, float]]:
+    """What the page asks for as soon as a fit stands, each with the seconds from the last look at which it did not stand."""
+    asked = {"the page's words": "/api/fitted?", "torque over time": "/api/window?joint=0&part=test&", "residual over position and speed": "/api/cloud?joint=0&part=test&", "the robot": "/api/film?part=test&"}
+    out = []
+    for name, path in asked.items():
+        clicks.ask(f"{path}sha={sha}")
+        out.append((name, time.perf_counter() - since))
+    return out
+
+
 def main() -> int:
     """Prints the table; 1 where a click is too slow."""
     words = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -105,10 +117,15 @@ def main() -> int:
         clicks = Clicks(session)
         start = time.perf_counter()
         clicks.ask("/api/run", {})
-        during = []
+        during, charts = [], None
         while session.worker.job.state == "running":
-            during.append(clicks.ask("/api/state")[1])
-            time.sleep(0.25)
+            last = time.perf_counter()
+            answer, seconds = clicks.ask("/api/state")
+            during.append(seconds)
+            if charts is None and answer.json()["fitted"]:
+                print(f"fitted in {time.perf_counter() - start:.1f} s", flush=True)
+                charts = first_charts(clicks, answer.json()["sha"], last)
+            time.sleep(0.25 if charts else 0.02)
         first = clicks.settle()["sha"]
         print(f"fitted and questioned in {time.perf_counter() - start:.1f} s", flush=True)
         start = time.perf_counter()
@@ -134,10 +151,11 @@ def main() -> int:
             times["undo (cached)"].append(clicks.ask("/api/undo", {"sha": second})[1])
             times["redo (cached)"].append(clicks.ask("/api/redo", {"sha": first})[1])
         times["state, while it works"], times["time, while it works"] = during, previewed
-        slow = 0
+        slow = charts[-1][1] >= FIRST
+        print("\nfrom the fit to its first charts, while the diagnosis is at work: " + ", ".join(f"{name} {seconds:.2f} s" for name, seconds in charts))
         print(f"\n{'click':<26}{'median':>10}{'worst':>10}   (ms; {given.repeat} times, while it works {len(during)} and {len(previewed)})")
         for name, own in times.items():
-            over = max(own) >= LIMIT
+            over = float(np.median(own)) >= LIMIT or max(own) >= WORST
             slow += over
             print(f"{name:<26}{1000 * float(np.median(own)):>10.1f}{1000 * max(own):>10.1f}{'   TOO SLOW' if over else ''}")
         print(f"memory at most: {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6:.2f} GB")

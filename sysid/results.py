@@ -25,7 +25,7 @@ from pathlib import Path
 
 import numpy as np
 
-from . import bounded, prior_weight, state
+from . import base_parameters, bounded, prior_weight, state
 from .differences import per_group, told
 from .errors import ConfigError, SysidError
 from .estimate import Fit, at_edge
@@ -75,6 +75,10 @@ def document(fit: Fit, run: str | Path = "") -> dict:
         "left_out": fit.left_out,
         "parameters": parameters,
         **own_groups,
+        # sums of parameters that the logs tell where they cannot tell each
+        "base_parameters": [
+            {"name": one.words, "value": one.value, "std": number(one.std), "unit": one.unit, "terms": dict(one.terms)} for one in base_parameters.combinations(fit)
+        ],
         # what the effects that look at the load took for the bodies; the last step towards `parameters` is not taken again
         "load_bodies": _by_body(fit.model),
         "drives": [{"joint": d.joint, "name": d.name, "value": d.value, "std": number(d.std), "unit": d.unit} for d in fit.drives],

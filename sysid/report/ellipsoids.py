@@ -4,34 +4,37 @@ from __future__ import annotations
 
 import numpy as np
 
-from .charts import BLUE, INK, ORANGE, PURPLE, chart, plain, rounded, scene
+from .charts import BLUE, GREY, INK, ORANGE, PURPLE, chart, plain, rounded, scene
 
 
 def bodies(name: str, found: list[dict], lines: list) -> dict:
     """The bodies as ellipsoids on the robot.
 
     Args:
-        found: [{"name", "kind", "words", "identified": Solid | None, "prior": Solid | None}].
+        found: [{"name", "kind", "words", "told", "identified": Solid | None, "prior": Solid |
+            None}], told: the share of it that the data say; 0 draws a ghost.
         lines: pairs of ends (3,) [m] of the links.
     """
     data = []
     shown = set()
     for entry in found:
-        colour = BLUE if entry["kind"] == "link" else PURPLE
+        ghost = entry["told"] <= 0.0
+        colour = GREY if ghost else BLUE if entry["kind"] == "link" else PURPLE
+        group = f"{entry['kind']}, prior alone" if ghost else f"{entry['kind']}, identified"
         if entry["identified"] is not None:
             points, faces = entry["identified"].surface()
-            first = entry["kind"] not in shown
-            shown.add(entry["kind"])
+            first = group not in shown
+            shown.add(group)
             data.append(
                 {
                     "type": "mesh3d",
                     **{key: rounded(points[:, k], 4) for k, key in enumerate("xyz")},
                     **{key: faces[:, k].tolist() for k, key in enumerate("ijk")},
                     "color": colour,
-                    "opacity": 0.55,
+                    "opacity": 0.12 if ghost else round(0.3 + 0.3 * entry["told"], 2),
                     "flatshading": False,
-                    "name": f"{entry['kind']}, identified",
-                    "legendgroup": entry["kind"],
+                    "name": group,
+                    "legendgroup": group,
                     "showlegend": first,
                     "hovertemplate": f"{plain(entry['name'])}: {plain(entry['words'])}",
                 }
