@@ -2,10 +2,11 @@
 
 Standard deviations are what noise makes of the fit's own estimate, to first order:
 
-    cov = H^-1 (sum_j w_j^4 C_j' N_j C_j + the prior's claim) H^-1,    H = sum_j w_j^2 C_j' C_j + prior,
+    cov = H^-1 (sum_j w_j^4 C_j' N_j C_j + s^2 prior) H^-1,    H = sum_j w_j^2 C_j' C_j + prior,
 
 over the rows of the old logs and of the new one, filtered as a fit filters them, with those left out
-that it leaves out; N_j is the covariance of joint j's noise, whose spectrum the first fit's residual
+that it leaves out; the prior says that bodies are within a factor of the URDF's, whatever weight the poor
+log was fitted under; N_j is the covariance of joint j's noise, whose spectrum the first fit's residual
 tells (`spectrum`). What a fit of few blocks states of its own deviations, from their spread, is uncertain
 by a third: it allows for noise of any kind, and for what a model lacks.
 
@@ -112,11 +113,13 @@ def deviations(fit: Fit, old: Motion, new: Motion, made) -> dict[str, dict[str, 
     own, more = (_gram(model, motion, weights, count) for motion in (old, new))
     beside, (variance, claim) = _beside(fit, count), _claim(fit, weights)
     noises = _noises(fit, model, old, made, beside / (variance * claim), free)
-    claimed = variance * claim * beside
+
+    # a poor log lets a strong prior be chosen, which the next one will not: it claims what it knows
+    honest = beside / claim
 
     def deviation(hessian, noise):
-        inverse = _inverse(hessian + beside, free)
-        spread = np.diagonal(inverse @ (noise + claimed) @ inverse)
+        inverse = _inverse(hessian + honest, free)
+        spread = np.diagonal(inverse @ (noise + variance * honest) @ inverse)
         return np.sqrt(np.maximum(spread, 0.0))
 
     first, then = (_scatter(model, motion, weights, noises, count) for motion in (old, new))
