@@ -78,9 +78,9 @@ def test_what_a_motion_is_worth_and_its_slope(arm, tmp_path, name):
         way = rng.normal(size=z.shape)
         if any(one.looks_back for one in known.suspects):
             way[0] = 0.0  # of what looks back, the slope is that of its own joint's motion
-        h = 1e-6 if name == "history" else 1e-5  # presliding has corners
+        h = 1e-6 if name == "history" else 1e-5  # presliding has corners; differences forward err by 1e-5 over 0.03 rad/s
         numeric = (problem.value(posed, z + h * way)[0] - problem.value(posed, z - h * way)[0]) / (2.0 * h)
-        assert float(np.sum(slope * way)) == pytest.approx(numeric, rel=2e-3 if name in ("none", "instant", "load") else 3e-2, abs=0.05)
+        assert float(np.sum(slope * way)) == pytest.approx(numeric, rel=2e-3 if name in ("none", "instant", "load") else 3e-2, abs=max(0.05, 1e-3 * np.linalg.norm(slope)))
 
 
 def test_evidence_is_what_a_rival_and_the_model_leave_of_a_suspect(arm, tmp_path):

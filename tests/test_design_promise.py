@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from sysid.design import spectrum
+from sysid.design import promise, spectrum, suspects
 from sysid.design.spectrum import Noise, Stretch, noise_left, scatter, white
 
 
@@ -72,6 +72,39 @@ def test_what_angles_make_is_told_from_torque_s_own_noise():
     (found,) = noise_left([part_of(np.zeros((1, n)))], left[:, None], np.zeros(1), made[:, None], lambda part, seen: 0.0 * seen[0].real)
     np.testing.assert_allclose(found.density(np.array([0.1, 1.0, 100.0])), 1.0, rtol=0.15)
     assert found.density(np.array([15.0]))[0] == pytest.approx(5.0, rel=0.3)
+
+
+def test_what_is_left_of_a_suspect_and_whether_it_is_named():
+    """Against least squares on rows; the smallest of many candidates must stand above the best of noise."""
+    rng = np.random.default_rng(4)
+    base, rival, signature = rng.normal(size=(60, 4)), rng.normal(size=(60, 2)), rng.normal(size=60)
+    prior = np.diag([1.0, 2.0, 0.0, 3.0])
+    stacked = np.vstack([np.hstack([base, rival]), np.hstack([np.sqrt(prior), np.zeros((4, 2))])])
+    target = np.append(signature, np.zeros(4))
+    left = target - stacked @ np.linalg.lstsq(stacked, target, rcond=None)[0]
+    assert promise._left(base, prior, signature, rival) == pytest.approx(float(left @ left))
+    assert promise._named(3.6**2, 65) == pytest.approx(0.5, abs=0.02) and promise._named(36.0, 65) > 0.98
+    assert promise._apart(0.0) == 0.0 and promise._apart(20.0) > 0.9
+
+
+def test_a_likely_size_is_what_logs_and_usual_sizes_suggest():
+    """A signature that the model nearly makes itself says little: what is left of it in a residual is no size."""
+    rng, n = np.random.default_rng(5), 400
+    base = rng.normal(size=(n, 3))
+    near = base[:, 0] + 0.01 * rng.normal(size=n)  # of another column all but a hundredth
+    columns = np.stack([near, rng.normal(size=n)], axis=1)
+    size = suspects.usual(columns[None], np.array([2.0]))
+    np.testing.assert_allclose(size * np.abs(columns).max(axis=0), 0.2)
+    for k, true in ((0, 0.05), (1, 0.3)):
+        left = true * columns[:, k] + 0.1 * rng.normal(size=n)
+        left = left - base @ np.linalg.lstsq(base, left, rcond=None)[0]  # as a fit leaves it
+        rows = SimpleNamespace(columns=base[None], tau=2.0 * np.ones((n, 1)), residual=lambda x, left=left: left[:, None])
+        seen = SimpleNamespace(rows=rows, weights=np.array([10.0]), source=None)
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(suspects, "tried", lambda source, candidate: [{}])
+            patch.setattr(suspects, "on_every_joint", lambda source, candidate, at, k=k: columns[None, :, k : k + 1])
+            found = suspects.suspected(seen, SimpleNamespace(x=None), np.zeros((3, 3)), None)
+        assert 0.7 * (true if k else size[0]) < abs(found.size[0]) < 1.3 * max(true, size[0] if k == 0 else 0.0)
 
 
 def test_nothing_left_is_no_noise():

@@ -160,25 +160,25 @@ def _known(
     instant, places = instant_of(model, levels)
     own = np.asarray(x)[places]
     typical = np.maximum(20.0 * noise, 1e-6) if fit is None else size_of(fit)
-    before = own_size(instant, prior, own, typical)
+    before = alone = own_size(instant, prior, own, typical)
     if not asked:
         if fit is not None:
             before = before + _told(fit, levels, places, noise)
-        return Known(instant, own, noise, before)
+        return Known(instant, own, noise, before, alone=alone)
     count = 10 * instant.bodies
     if instant.reference is None:
         instant = instant.with_reference(own[:count].reshape(-1, 10))
     if fit is None:
         q, qd, qdd = usual = _usual(model.robot)
         instant = instant.scaled_by(played(q, qd, qdd, 1.0 / _RATE, model.robot.joints))
-        torque = float(np.sqrt(np.mean(typical**2)))
-        suspects = tuple(unseen(instant, own, *usual, one, torque) for one in asked)
+        suspects = tuple(unseen(instant, own, *usual, one, typical) for one in asked)
         columns = along(suspects, instant, own, *usual)
         each, more = np.sqrt(np.mean(columns**2, axis=(0, 2))), None
     else:
         instant = instant.scaled_by(motion)
         seen = Seen.of(fit, motion, motion.samples)
-        suspects = tuple(suspected(seen, fit, one) for one in asked)
+        wide = own_size(fit.model, fit.prior, fit.x, typical)
+        suspects = tuple(suspected(seen, fit, wide, one) for one in asked)
         columns = np.concatenate([seen.columns(one) for one in suspects], axis=2)
         each, more = np.sqrt(np.mean(columns**2, axis=(0, 1))), seen
     size = np.zeros(instant.size + len(each))
@@ -188,11 +188,12 @@ def _known(
     large = (each / np.max(typical)) ** 2
     k = np.arange(instant.size, len(size))
     whole[k, k] = np.where(large > 0.0, large, 1.0)
+    alone = whole.copy()
     if more is not None:
         both = np.concatenate([more.rows.columns[:, :, places], columns], axis=2)
         flat = (both * more.weights[:, None, None]).reshape(-1, len(size))
         whole += flat.T @ flat
-    return Known(instant, own, noise, whole, suspects)
+    return Known(instant, own, noise, whole, suspects, alone)
 
 
 def _told(fit: Fit, levels: Mapping[str, str], places, noise) -> np.ndarray:

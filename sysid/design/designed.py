@@ -17,10 +17,12 @@ from pathlib import Path
 import numpy as np
 
 from .. import pipeline
+from ..candidates import candidates
 from ..errors import ConfigError, SysidWarning
 from ..estimate import Fit
 from ..filters import settled
 from ..log import Log
+from ..lowpass import lowpassed, widest
 from ..motion import Motion
 from ..noise import of_angles
 from ..preprocess import prepare
@@ -131,10 +133,12 @@ def _told(
     needed = torque(problem, q, qd, qdd)
     spread, pairs = {}, []
     if base.fit is not None:
-        seen = _seen(base, t, q, needed)
-        spread = promise.deviations(base.fit, base.motion, seen, _of_angles(base))
+        log = _log(base, t, q, needed)
+        spread = promise.deviations(base.fit, base.motion, _fitted(base, log), _of_angles(base))
         if len(base.known.suspects) > 1:
-            pairs = promise.pairs(base.fit, base.known.suspects, base.motion, seen, seen.samples)
+            seen = _questioned(base, log)
+            asked = len(candidates(base.fit.model, ()))
+            pairs = promise.pairs(base.fit, base.known.suspects, seen, seen.samples, asked)
     return Design(
         joints=base.robot.joints, family=family, coefficients=family.coefficients(found.z),
         amounts=found.z[:, family.waves :],
@@ -144,24 +148,34 @@ def _told(
     )  # fmt: skip
 
 
-def _seen(base: Basis, t, q, needed) -> Motion:
-    """The motion (n, dof) as a fit of its log will see it: filtered, rows around reversals left out,
-    its other signals as they usually are.
+def _log(base: Basis, t, q, needed) -> Log:
+    """The log of a motion (n, dof), its other signals as they usually are.
 
     Args:
         t (n,) [s]; needed (n, dof), the torque of the motion.
     """
-    fit, old = base.fit, base.motion
-    spec = settled(fit.experiment.preprocess, fit.filters)
+    old = base.motion
     usual = {
         name: np.full(len(t), np.median(np.concatenate([p.signals[name] for p in old.pieces])))
         for name in old.pieces[0].signals
     }
     segment = Segment(t, float(t[1] - t[0]), q, needed, None, None, usual)
-    log = Log("designed", Path("designed"), "", (segment,), unused=old.unused, levels=base.levels)
+    return Log("designed", Path("designed"), "", (segment,), unused=old.unused, levels=base.levels)
+
+
+def _fitted(base: Basis, log: Log) -> Motion:
+    """A log as a fit sees it: filtered, rows around reversals left out."""
+    spec = settled(base.fit.experiment.preprocess, base.fit.filters)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SysidWarning)
-        return prepare([log], spec, fit.joints)
+        return prepare([log], spec, base.fit.joints)
+
+
+def _questioned(base: Basis, log: Log) -> Motion:
+    """A log as a diagnosis sees it: under its low-pass, standstill left out; as a fit does where it is
+    too short for that."""
+    found = lowpassed([log], base.fit.joints, widest([*base.logs, log]))
+    return _fitted(base, log) if found is None else found
 
 
 def _of_angles(base: Basis) -> np.ndarray:

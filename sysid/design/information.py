@@ -8,7 +8,9 @@ that no motion can show hold P in all designs alike, so log det M counts the oth
 leaves open.
 
 A suspect a of coefficients s_a is told from its rival b by lambda_ab = min_x |c_a s_a - (c, c_b) x|^2,
-over the noise and on the old logs and the new one together: the Schur complement of M.
+over the noise: the Schur complement of M, without what the old logs tell. The new log must say it by
+itself: what is told apart by one log's bodies in another log's few slow rows is not confirmed by blocks
+of time held apart, nor is a robot the same on another day.
 
 Source: Fedorov 1972 (D-optimality); Atkinson & Fedorov 1975 (lambda); Rucker & Wensing 2022 for the
 metric of P.
@@ -34,7 +36,7 @@ class Known:
     model: of the instant, at its shape values; x (size,): parameters; noise (dof,): standard
     deviation of a row's torque [N m], infinite where no row counts; suspects: what it may lack,
     whose coefficients stand after its parameters; before (all, all): information of the logs that
-    exist and the prior. reach [s], slowest (dof,) [rad/s or m/s]: a joint's rows within so much of a
+    exist and the prior, alone (all, all): of the prior. reach [s], slowest (dof,) [rad/s or m/s]: a joint's rows within so much of a
     reversal, or as slow, do not count, as a fit leaves them out.
     """
 
@@ -43,6 +45,7 @@ class Known:
     noise: np.ndarray
     before: np.ndarray
     suspects: tuple[Suspect, ...] = ()
+    alone: np.ndarray | None = None
     reach: float = 0.0
     slowest: np.ndarray | None = None
 
@@ -137,7 +140,8 @@ def worth(known: Known, information: np.ndarray) -> tuple[float, np.ndarray]:
     scale = 1.0 / np.sqrt(np.diagonal(information))
     inverse = np.linalg.inv(information * np.outer(scale, scale)) * np.outer(scale, scale)
     total, slope, weight = log_det(information), inverse, float(known.model.size)
-    for told, way in evidence(known, information):
+    fresh = information if known.alone is None else information - known.before + known.alone
+    for told, way in evidence(known, fresh):
         total += weight * np.log((told + 1.0) / (told + _ENOUGH))
         share = weight * (1.0 / (told + 1.0) - 1.0 / (told + _ENOUGH))
         slope = slope + share * np.outer(way, way)

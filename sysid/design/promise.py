@@ -2,17 +2,19 @@
 
 Standard deviations are what noise makes of the fit's own estimate, to first order:
 
-    cov = H^-1 (sum_j w_j^4 C_j' N_j C_j + the prior's claim) H^-1,    H = sum_j w_j^2 C_j' C_j + prior,
+    cov = H^-1 (sum_j w_j^4 C_j' N_j C_j + s^2 prior) H^-1,    H = sum_j w_j^2 C_j' C_j + prior,
 
 over the rows of the old logs and of the new one, filtered as a fit filters them, with those left out
-that it leaves out; N_j is the covariance of joint j's noise, whose spectrum the first fit's residual
+that it leaves out; the prior says that bodies are within a factor of the URDF's, whatever weight the poor
+log was fitted under; N_j is the covariance of joint j's noise, whose spectrum the first fit's residual
 tells (`spectrum`). What a fit of few blocks states of its own deviations, from their spread, is uncertain
 by a third: it allows for noise of any kind, and for what a model lacks.
 
 A suspect a that is true leaves, of its torque s_a, what the model and its rival b cannot make
-between them, lambda = min_x |s_a - X x|^2 over the noise, on the old logs and the new one together.
-The log of the likelihood ratio is then normal with mean lambda / 2 and variance lambda, and a set
-holds one name where it exceeds log 9.
+between them, lambda = min_x |s_a - X x|^2 over the noise, on the new log alone and as a diagnosis sees it:
+under its low-pass, with standstill left out. The log of the likelihood ratio is then normal with mean
+lambda / 2 and variance lambda, and a set holds one name where it exceeds log 9. And that it is named at
+all, lambda against nothing must stand above what the best of all candidates makes of noise.
 
 Source: White 1980 (H^-1 S H^-1); Atkinson & Fedorov 1975 (T-optimality); Wald 1943.
 """
@@ -23,7 +25,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import ndtr
+from scipy.special import ndtr, ndtri
 
 from ..compress import Linearised
 from ..estimate import Fit
@@ -33,9 +35,10 @@ from ..prior_weight import weakest
 from .information import own_size
 from .noise import size_of
 from .spectrum import Noise, noise_left, scatter, stretches
-from .suspects import Seen, Suspect
+from .suspects import Seen, Suspect, solved
 
 _ODDS = np.log(9.0)  # a set at 90 % holds one of two
+_ACCUSED = 0.01  # family-wise: how often a diagnosis accuses anything where nothing is there
 
 
 @dataclass(frozen=True)
@@ -48,47 +51,50 @@ class Pair:
 
 
 def pairs(
-    fit: Fit, suspects: Sequence[Suspect], old: Motion, new: Motion, samples: float
+    fit: Fit, suspects: Sequence[Suspect], new: Motion, samples: float, asked: int
 ) -> list[Pair]:
-    """How likely it is that each two suspects will be told apart by the old logs with the new one.
+    """How likely it is that each two suspects will be told apart by a new log, and named at all.
 
     Args:
-        samples: of the new log.
+        new: the new log's motion, as a diagnosis sees it; samples: of it. asked: candidates that a
+            diagnosis questions.
     """
-    seen = Seen.of(fit, old, old.samples), Seen.of(fit, new, samples)
-    parts = [(one.rows, one.weights) for one in seen]
-    blocks = [[one.columns(suspect) for suspect in suspects] for one in seen]
+    seen = Seen.of(fit, new, samples)
+    weigh = lambda columns: (columns * seen.weights[:, None, None]).reshape(-1, columns.shape[2])  # noqa: E731
+    base = weigh(seen.rows.columns)
+    own = [weigh(seen.columns(one)) for one in suspects]
     prior = own_size(fit.model, fit.prior, fit.x, size_of(fit))
+    named = [_named(_left(base, prior, a @ one.size, a[:, :0]), asked) for a, one in zip(own, suspects)]
     out = []
     for i, a in enumerate(suspects):
         for j, b in enumerate(suspects[:i]):
-            probability = min(
-                _apart(
-                    parts, prior, [own[k] for own in blocks], suspects[k].size,
-                    [own[m] for own in blocks],
-                )
+            apart = [
+                _apart(_left(base, prior, own[k] @ suspects[k].size, own[m]))
                 for k, m in ((i, j), (j, i))
-            )  # fmt: skip
+            ]
+            probability = min(*apart, named[i], named[j])
             out.append(Pair(b.named(fit.joints), a.named(fit.joints), probability))
     return out
 
 
-def _apart(parts, prior, own, size, rival) -> float:
-    """The probability that a suspect (columns a part) of a size is told from a rival."""
-    square, cross, k = 0.0, 0.0, rival[0].shape[2]
-    gram = np.zeros((len(prior) + k, len(prior) + k))
-    gram[: len(prior), : len(prior)] = prior
-    for (rows, weights), mine, other in zip(parts, own, rival):
-        beside = np.concatenate([rows.columns, other], axis=2) * weights[:, None, None]
-        signature = (mine @ size) * weights[:, None]
-        flat = beside.reshape(-1, beside.shape[2])
-        gram = gram + flat.T @ flat
-        cross = cross + flat.T @ signature.ravel()
-        square += float(np.sum(signature**2))
-    scale = np.sqrt(np.maximum(np.diagonal(gram), 1e-300))
-    x = np.linalg.lstsq(gram / np.outer(scale, scale), cross / scale, rcond=1e-12)[0] / scale
-    left = max(square - float(cross @ x), 0.0)
+def _left(base, prior, signature, rival) -> float:
+    """lambda: what of a signature (n,) neither the model's columns (n, size), under a prior, nor a
+    rival's (n, k) make."""
+    beside = np.concatenate([base, rival], axis=1)
+    gram = beside.T @ beside
+    gram[: len(prior), : len(prior)] += prior
+    cross = beside.T @ signature
+    return max(float(signature @ signature - cross @ solved(gram, cross[:, None])[:, 0]), 0.0)
+
+
+def _apart(left: float) -> float:
+    """The probability that a set will hold one of two."""
     return float(ndtr((0.5 * left - _ODDS) / np.sqrt(left))) if left > 0.0 else 0.0
+
+
+def _named(left: float, asked: int) -> float:
+    """The probability that one of so many candidates stands above what noise makes of the best."""
+    return float(ndtr(np.sqrt(left) + ndtri(_ACCUSED / max(asked, 1))))
 
 
 def deviations(fit: Fit, old: Motion, new: Motion, made) -> dict[str, dict[str, float | None]]:
@@ -107,11 +113,13 @@ def deviations(fit: Fit, old: Motion, new: Motion, made) -> dict[str, dict[str, 
     own, more = (_gram(model, motion, weights, count) for motion in (old, new))
     beside, (variance, claim) = _beside(fit, count), _claim(fit, weights)
     noises = _noises(fit, model, old, made, beside / (variance * claim), free)
-    claimed = variance * claim * beside
+
+    # a poor log lets a strong prior be chosen, which the next one will not: it claims what it knows
+    honest = beside / claim
 
     def deviation(hessian, noise):
-        inverse = _inverse(hessian + beside, free)
-        spread = np.diagonal(inverse @ (noise + claimed) @ inverse)
+        inverse = _inverse(hessian + honest, free)
+        spread = np.diagonal(inverse @ (noise + variance * honest) @ inverse)
         return np.sqrt(np.maximum(spread, 0.0))
 
     first, then = (_scatter(model, motion, weights, noises, count) for motion in (old, new))

@@ -23,7 +23,8 @@ from .columns import piece
 from .noise import noise_of
 
 _RATE = 50.0  # Hz of the rows of a log that suspects are asked on
-_TYPICAL = 0.03  # of the joint's torque: the size of an effect of which no log says any
+_TYPICAL = 0.1  # of the joint's torque, at most: an effect of which no log says any
+_NOTHING = 1e-3  # of what is not known of its torque squared: what logs say of it is nothing
 
 
 @dataclass(frozen=True)
@@ -118,43 +119,70 @@ class Seen:
         return on_every_joint(self.source, suspect.candidate, suspect.shapes)
 
 
-def suspected(seen: Seen, fit: Fit, candidate: Candidate) -> Suspect:
-    """A candidate with the shape values that take most of what the first logs leave, as large as
-    these suggest, at least a few per cent of the joint's torque."""
-    left = seen.rows.residual(fit.x)
+def suspected(seen: Seen, fit: Fit, prior: np.ndarray, candidate: Candidate) -> Suspect:
+    """A candidate with the shape values that take most of what the first logs leave once the model has
+    taken what it can, as large as these logs and `usual` sizes suggest between them: what is expected
+    of the square of its torque.
+
+    Args:
+        prior: (size, size) information of the model's parameters beside the logs.
+    """
+    weigh = lambda columns: (columns * seen.weights[:, None, None]).reshape(-1, columns.shape[2])  # noqa: E731
+    target = (seen.rows.residual(fit.x) * seen.weights).T.ravel()
+    base = weigh(seen.rows.columns)
+    inner, pulled = base.T @ base + prior, base.T @ target
     asked = tried(seen.source, candidate)  # which looks at the model's scales alone
-    target = (left * seen.weights).T.ravel()
-    found = [on_every_joint(seen.source, candidate, at) for at in asked]
-    best = max(range(len(asked)), key=lambda k: _taken(found[k], target, seen.weights))
-    columns = found[best]
-    flat = (columns * seen.weights[:, None, None]).reshape(-1, columns.shape[2])
-    size = np.linalg.lstsq(flat, target, rcond=1e-8)[0]
-    return Suspect(candidate, asked[best], grown(columns, size, np.sqrt(np.mean(seen.rows.tau**2))))
+    torque = np.sqrt(np.mean(seen.rows.tau**2, axis=0))
+    best = None
+    for at in asked:
+        columns = on_every_joint(seen.source, candidate, at)
+        own = weigh(columns)
+        if not np.all(np.isfinite(own)):
+            continue
+        cross = solved(inner, base.T @ own)
+        size = usual(columns, torque)
+        left = own.T @ own - own.T @ base @ cross + np.diag(size**-2.0)
+        pull = own.T @ target - cross.T @ pulled
+        spread = np.linalg.pinv(left * np.outer(size, size), hermitian=True) * np.outer(size, size)
+        mean = spread @ pull
+        if best is None or pull @ mean > best[0]:
+            best = pull @ mean, at, mean, spread, own.T @ own, size
+    if best is None:
+        return Suspect(candidate, asked[0], np.ones(1))
+    _, at, mean, spread, gram, size = best
+    made = float(mean @ gram @ mean)
+    if made <= _NOTHING * float(np.sum(spread * gram)):
+        return Suspect(candidate, at, size / np.sqrt(len(size)))
+    return Suspect(candidate, at, mean * np.sqrt(1.0 + float(np.sum(spread * gram)) / made))
 
 
-def grown(columns, size, torque: float) -> np.ndarray:
-    """Coefficients (k,) that make a few per cent of a torque [N m] at least."""
-    if not np.any(columns @ size):
-        each = np.sqrt(np.mean(columns**2, axis=(0, 1)))
-        size = np.divide(1.0, each, out=np.zeros_like(each), where=each > 0.0)
-    made = np.sqrt(np.mean((columns @ size) ** 2))
-    return size * max(1.0, _TYPICAL * torque / made) if made > 0.0 else np.ones(len(size))
+def solved(gram, right) -> np.ndarray:
+    """gram^-1 right of a positive semidefinite matrix, scaled to a unit diagonal first."""
+    scale = 1.0 / np.sqrt(np.maximum(np.diagonal(gram), 1e-300))
+    found = np.linalg.lstsq(gram * np.outer(scale, scale), scale[:, None] * right, rcond=1e-12)[0]
+    return scale[:, None] * found
 
 
-def unseen(model: Model, x, q, qd, qdd, candidate: Candidate, torque: float) -> Suspect:
-    """A candidate without any log: midway between the shape values that it may have, a few per cent
-    of the torque of a usual motion (n, dof)."""
+def usual(columns, torque) -> np.ndarray:
+    """Coefficients (k,) that make a tenth of a joint's torque where they make most of it.
+
+    Args:
+        columns (dof, n, k); torque (dof,) of each joint [N m].
+    """
+    share = np.abs(columns).max(axis=1) / np.maximum(torque, 1e-12)[:, None]
+    return _TYPICAL / np.maximum(share.max(axis=0), 1e-12)
+
+
+def unseen(model: Model, x, q, qd, qdd, candidate: Candidate, torque) -> Suspect:
+    """A candidate without any log: midway between the shape values that it may have, of the `usual`
+    size in a usual motion (n, dof).
+
+    Args:
+        torque (dof,) of each joint [N m].
+    """
     asked = tried(SimpleNamespace(model=model), candidate)
     at = asked[len(asked) // 2]
     blank = Suspect(candidate, at, np.zeros(0))
     columns = np.moveaxis(along([blank], model, x, q, qd, qdd), 1, 2)
-    return Suspect(candidate, at, grown(columns, np.zeros(columns.shape[2]), torque))
-
-
-def _taken(columns, target, weights) -> float:
-    flat = (columns * weights[:, None, None]).reshape(-1, columns.shape[2])
-    size = np.linalg.norm(flat, axis=0)
-    if not np.all(np.isfinite(flat)) or not size.any():
-        return -1.0
-    kept = flat[:, size > 0] / size[size > 0]
-    return float(np.linalg.norm(kept @ np.linalg.lstsq(kept, target, rcond=1e-8)[0]))
+    size = usual(columns, torque)
+    return Suspect(candidate, at, size / np.sqrt(len(size)))
