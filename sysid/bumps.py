@@ -13,7 +13,7 @@ import numpy as np
 
 from .events import Event
 from .log import Log
-from .lowpass import lowpassed, stride_of, widest
+from .lowpass import band, lowpassed, stride_of, widest
 from .model import build
 from .motion import Motion
 from .outliers import BURST, CHANCE, bursts, ratio, surprise
@@ -38,7 +38,10 @@ def bumps(robot: Robot, logs: Sequence[Log]) -> list[Event]:
     """
     from scipy.ndimage import maximum_filter1d
 
-    if robot.dof < 2 or (motion := lowpassed(logs, robot.joints, cutoff := widest(logs))) is None:
+    if robot.dof < 2:
+        return []
+    cutoff = widest(logs, known=(own_band := band(logs)))
+    if (motion := lowpassed(logs, robot.joints, cutoff, known=own_band)) is None:
         return []
     model = build(robot, [EffectSpec(name=name) for name in _EFFECTS])
     stride = stride_of(motion, cutoff)

@@ -249,7 +249,7 @@ def _edges(motion: Motion, kinds: Sequence[bytes]) -> list[np.ndarray]:
         kinds: of each piece, which parameters it tells: pieces of one kind are divided together, as what only they tell is known
             by their blocks alone.
     """
-    pieces, counts, several = motion.pieces, np.zeros(len(motion.pieces), dtype=int), len(set(kinds)) > 1
+    pieces, counts, several = motion.outlines, np.zeros(len(motion.outlines), dtype=int), len(set(kinds)) > 1
     for kind in dict.fromkeys(kinds):
         own = [k for k, other in enumerate(kinds) if other == kind]
         counts[own] = divided([pieces[k].samples for k in own], shortest=_SHORTEST_BLOCK, fewest=FEWEST if several else 1)
@@ -280,7 +280,7 @@ def compress(model: Model | Linearised, motion: Motion, *, thin: int = 1, progre
         progress: called with the share done, from 0 to 1.
     """
     joints = range(model.robot.dof)
-    supported = [[model.support(joint, piece) for joint in joints] for piece in motion.pieces]
+    supported = [[model.support(joint, piece) for joint in joints] for piece in motion.outlines]
     kinds = [b"|".join(support.tobytes() for support in supports) for supports in supported]
     factors, first, done = [], 0, 0
     for piece, supports, edges in zip(motion.pieces, supported, _edges(motion, kinds)):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -15,7 +16,7 @@ from .inertia import DIVERGENCES, PARAMETERIZATIONS
 from .inertia.consistency import is_consistent
 from .inverse_dynamics import WithTorque
 from .model import Model, moving_coefficients
-from .motion import Motion
+from .motion import Motion, Piece
 from .multistart import Searched
 from .nearby import from_nearby
 from .objective import Objective, posed
@@ -32,6 +33,19 @@ class States:
     index: np.ndarray
     q: np.ndarray
     qd: np.ndarray
+
+
+@dataclass(frozen=True)
+class Sums:
+    """What errors are made of, over the rows that count, each (dof,): squared residuals, squared torques, torques, and how many rows."""
+
+    squares: np.ndarray
+    size: np.ndarray
+    total: np.ndarray
+    counts: np.ndarray
+
+    def __add__(self, other: Sums) -> Sums:
+        return Sums(self.squares + other.squares, self.size + other.size, self.total + other.total, self.counts + other.counts)
 
 
 @dataclass(frozen=True)
@@ -66,6 +80,10 @@ class Prediction:
             columns |= {} if self.use is None else {f"used_{joint}": self.use[:, k]}
         return polars.DataFrame(columns)
 
+    def lazy(self):
+        """`to_dataframe` as polars' lazy frame: of what is in files nothing is read."""
+        return self.to_dataframe().lazy()
+
     @property
     def residual(self) -> np.ndarray:
         """measured - predicted (n, dof), zero on rows that do not count."""
@@ -83,6 +101,16 @@ class Prediction:
         n, dof = self.measured.shape
         return np.full(dof, n) if self.use is None else self.use.sum(0)
 
+    def sums(self) -> Sums:
+        """What errors are made of."""
+        kept = self.measured if self.use is None else np.where(self.use, self.measured, 0.0)
+        return Sums(_sum(self.residual**2), _sum(kept**2), _sum(kept), self.counts)
+
+    def greatest(self, count: int) -> np.ndarray:
+        """(count, dof) the greatest sizes of each joint's measured torque, falling; fewer where there are fewer rows."""
+        size, count = np.abs(self.measured), min(count, len(self.measured))
+        return -np.sort(-np.partition(size, len(size) - count, axis=0)[len(size) - count :], axis=0)
+
     def told(self) -> list[float | None]:
         """RMS [N m] of each joint, None where no row of it counts."""
         return [float(rms) if count else None for rms, count in zip(self.errors()["rms"], self.counts)]
@@ -91,11 +119,9 @@ class Prediction:
         """`rms` [N m], `relative_error` (norm of the residual over that of the torque), `r2`, each (dof,), and their
         totals over all joints under `total`; NaN where the torque itself is zero or constant. The RMS of a joint no row
         of which counts is zero: `told` says None."""
-        squares = _sum(self.residual**2)
-        kept = self.measured if self.use is None else np.where(self.use, self.measured, 0.0)
-        counts = np.maximum(self.counts, 1)
-        size = _sum(kept**2)
-        spread = size - _sum(kept) ** 2 / counts
+        sums = self.sums()
+        squares, size, counts = sums.squares, sums.size, np.maximum(sums.counts, 1)
+        spread = size - sums.total**2 / counts
         # a spread that is rounding of a constant is none
         spread = np.where(spread > 1e-12 * size, spread, 0.0)
         share = lambda part, whole: np.divide(part, whole, out=np.full(np.shape(whole), np.nan), where=np.asarray(whole) > 0)  # noqa: E731
@@ -439,10 +465,21 @@ _STATES = 20_000  # rows: more than a screen has points
 
 
 def _states(motion: Motion) -> States:
-    stride, first, parts = max(1, -(-motion.samples // _STATES)), 0, []
+    first, parts = 0, []
     for piece in motion.pieces:
-        own = np.arange(-first % stride, piece.samples, stride)
-        rows = piece.core.start + own
-        parts.append((first + own, piece.q[rows], piece.qd[rows]))
+        parts.append(states(piece, first, motion.samples))
         first += piece.samples
-    return States(*(np.concatenate(part) for part in zip(*parts)))
+    return joined_states(parts)
+
+
+def states(piece: Piece, first: int, samples: int) -> States:
+    """Where the joints were in a piece that stands from row `first` on in a prediction of so many rows."""
+    stride = max(1, -(-samples // _STATES))
+    own = np.arange(-first % stride, piece.samples, stride)
+    rows = piece.core.start + own
+    return States(first + own, piece.q[rows], piece.qd[rows])
+
+
+def joined_states(parts: Sequence[States]) -> States:
+    """Those of all pieces, one after the other."""
+    return States(*(np.concatenate([getattr(part, name) for part in parts]) for name in ("index", "q", "qd")))

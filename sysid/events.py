@@ -13,7 +13,7 @@ mask        no event: a stretch that the user leaves out (`masks`)
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -82,6 +82,27 @@ def find(segment: Segment, joints: Sequence[str], *, log: str = "") -> tuple[Eve
     for first, last, members in knocks(segment.q, calm, segment.step, spiked=segment.tau):
         tell("knock", first, last, members, "both")
     return ordered(found)
+
+
+def clipped(events: Sequence[Event], start: float, stop: float) -> list[Event]:
+    """The parts of events that stand between two times [s] on their log's clock."""
+    within = [e for e in events if e.stop >= start and e.start <= stop]
+    return [replace(e, start=max(e.start, start), stop=min(e.stop, stop)) for e in within]
+
+
+def joined(events: Sequence[Event], step: float) -> tuple[Event, ...]:
+    """Events of a log that was looked at span by span, in order of time: one that goes on in the next span, a `step` [s] later, is
+    one."""
+    out: list[Event] = []
+    last: dict[tuple, int] = {}
+    for event in ordered(events):
+        key = (event.kind, event.log, event.joints, event.signal)
+        if key in last and 0.0 < event.start - out[last[key]].stop <= 1.5 * step and event.kind != "spike":
+            out[last[key]] = replace(out[last[key]], stop=event.stop)
+            continue
+        last[key] = len(out)
+        out.append(event)
+    return tuple(out)
 
 
 def ordered(events: Sequence[Event]) -> tuple[Event, ...]:

@@ -24,6 +24,7 @@ from .model import Model, moving_coefficients
 from .multistart import finite
 from .preprocess import prepare
 from .smoother import Smoother
+from .spans import Spans
 from .specs import Experiment, PreprocessSpec
 
 _WINDOWS = (0.02, 0.03, 0.05, 0.07, 0.1, 0.15, 0.2, 0.3, 0.4, 0.6, 0.8)  # s
@@ -93,13 +94,14 @@ def _of_the_motion(experiment: Experiment, model: Model, logs: Sequence[Log], pr
     """The filters that a motion asks for: both sides as far as its joints' speeds go, or an octave beyond where its slowest servo swings,
     as from there on noise of the angles, which inertia makes torque of, grows with the square of frequency; the angles far beyond.
     """
-    spec, segments = experiment.preprocess, [segment for log in logs for segment in log.segments]
+    spec = experiment.preprocess
     own = {key for key in ("window", "cutoff") if key in spec.model_fields_set and getattr(spec, key) != "auto"}
-    cutoff, step = spec.cutoff, max(segment.step for segment in segments)
+    # of each, its step and angles thinned: a long one does not stand in memory
+    thinned = [(len(s.t), s.step, s.q[:: -(-len(s.q) // _POSES)].copy()) for log in logs for s in log.segments]
+    cutoff, step = spec.cutoff, max(step for _, step, _ in thinned)
     if "cutoff" not in own:
-        longest = max(segments, key=lambda s: len(s.t))
-        q = longest.q[:: -(-len(longest.q) // _POSES)]
-        cutoff = max(min(band(logs), 2.0 * slowest(experiment, model.robot, prior, q)), 1.0 / (longest.step * len(longest.t)))
+        rows, its_step, q = max(thinned, key=lambda one: one[0])
+        cutoff = max(min(band(logs), 2.0 * slowest(experiment, model.robot, prior, q)), 1.0 / (its_step * rows))
     window = spec.window if "window" in own else max(1.0 / (_ANGLES * cutoff), 2.0 * (spec.order // 2) * step)
     return {
         "filter": spec.filter, "torque": "low-pass", "standstill": spec.standstill, "order": spec.order, "window": window, "cutoff": cutoff,
@@ -142,6 +144,8 @@ def settled(spec: PreprocessSpec, chosen: dict) -> PreprocessSpec:
 
 def _middle(log: Log) -> Log:
     """The longest segment's middle, of at most `_MOST_SAMPLES`."""
+    if isinstance(log.segments, Spans):
+        return replace(log, segments=(log.segments.middle(_MOST_SAMPLES),))
     segment = max(log.segments, key=lambda s: len(s.t))
     n = len(segment.t)
     if n <= _MOST_SAMPLES:

@@ -6,7 +6,7 @@ refused with its row; what can be mended (an irregular clock, a gap) is mended w
 
 import hashlib
 import warnings
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -19,12 +19,13 @@ from .events import Event
 from .groups import levels_of
 from .recording import Recording, recorded
 from .segment import Segment
+from .spans import Spans
 from .specs import ActuatorSpec, DataSpec, LogSpec
 
 # A step longer than this many median steps is a hole that interpolation would invent motion for.
 GAP_STEPS = 10.0
 # Steps that all stay this close to the median are uniform sampling with rounded time stamps.
-_UNIFORM = 0.02
+UNIFORM = 0.02
 # Of a step: stamps that are off by less are right.
 _TOLD = 1e-3
 _LARGEST = 1e20  # no unit makes a measured signal larger (a clock in ns, logged as a signal, reads 2e18)
@@ -40,16 +41,21 @@ class Log:
     name: str
     path: Path
     sha256: str
-    segments: tuple[Segment, ...]
+    segments: Sequence[Segment]
     events: tuple[Event, ...] = ()
     hashes: dict[str, str] = field(default_factory=dict)
     unused: tuple[str, ...] = ()
     levels: Mapping[str, str] = field(default_factory=dict)
 
     @property
+    def stretches(self) -> int:
+        """Number of stretches without a gap."""
+        return self.segments.stretches if isinstance(self.segments, Spans) else len(self.segments)
+
+    @property
     def samples(self) -> int:
         """Number of samples over all segments."""
-        return sum(len(segment.t) for segment in self.segments)
+        return self.segments.samples if isinstance(self.segments, Spans) else sum(len(segment.t) for segment in self.segments)
 
 
 def read(log: LogSpec, data: DataSpec, joints: tuple[str, ...], prismatic, folder: Path = Path(), actuators=NO_ACTUATORS) -> Log:
@@ -68,7 +74,7 @@ def read(log: LogSpec, data: DataSpec, joints: tuple[str, ...], prismatic, folde
 
 def assembled(samples: Recording, log: LogSpec, data: DataSpec) -> Log:
     """The log of what was `measured` of an entry of an experiment: resampled where its clock is irregular, split at gaps and where a recording ends."""
-    hashes = {name: _sha256(path) for name, path in samples.files.items()}
+    hashes = {name: sha256(path) for name, path in samples.files.items()}
     each = list(hashes.values())
     whole = each[0] if len(each) == 1 else hashlib.sha256("".join(each).encode()).hexdigest()
     segments = tuple(_segments(samples.t, samples.signals, samples.where, samples.breaks))
@@ -77,14 +83,19 @@ def assembled(samples: Recording, log: LogSpec, data: DataSpec) -> Log:
     )  # fmt: skip
 
 
-def measured(log: LogSpec, data: DataSpec, joints: tuple[str, ...], prismatic, folder: Path = Path(), actuators=NO_ACTUATORS) -> Recording:
+def measured(
+    log: LogSpec, data: DataSpec, joints: tuple[str, ...], prismatic, folder: Path = Path(), actuators=NO_ACTUATORS, *, table=None, first: int = 0
+) -> Recording:  # fmt: skip
     """The samples of a log with signals in SI units, before they are resampled or split.
+
+    Args:
+        table: what to read instead of the log's files, and `first`, the number of its first row in these.
 
     Raises:
         LogError: as `read`.
     """
     drives = {joint: motor_side.drive(spec) for joint, spec in actuators.items()}
-    samples, first = recorded(log, data, joints, folder, drives), 0
+    samples = recorded(log, data, joints, folder, drives, table=table)
     if log.start is not None or log.stop is not None:
         first, samples = _piece(samples, log)
     for name, values in samples.signals.items():
@@ -191,7 +202,7 @@ def _segments(t, signals, where: str, breaks: Iterable[int] = ()):
             continue
         if _is_uniform(clock, step):
             mean = (clock[-1] - clock[0]) / (len(clock) - 1)
-            yield _segment(clock[0] + mean * np.arange(len(clock)), mean, part)
+            yield segment(clock[0] + mean * np.arange(len(clock)), mean, part)
             continue
         own = np.diff(clock)
         # as many samples as were measured: the mean step, without the samples that are missing
@@ -204,7 +215,7 @@ def _segments(t, signals, where: str, breaks: Iterable[int] = ()):
         if told:
             left = true.at(clock, own)
         resampled += 1
-        yield replace(_segment(clock, own, part), clock=left)
+        yield replace(segment(clock, own, part), clock=left)
     if resampled:
         warnings.warn(
             SysidWarning(f"{where}: steps of {np.delete(steps, cuts - 1).min():.4g} to {np.delete(steps, cuts - 1).max():.4g} s were resampled to a uniform {own:.4g} s"),
@@ -221,7 +232,7 @@ def _segments(t, signals, where: str, breaks: Iterable[int] = ()):
 
 def _is_uniform(t, step: float) -> bool:
     """A steady clock: every step close to the median one, or every stamp a steady one that was rounded."""
-    if np.abs(np.diff(t) - step).max() <= _UNIFORM * step:
+    if np.abs(np.diff(t) - step).max() <= UNIFORM * step:
         return True
     steady = np.linspace(t[0], t[-1], len(t))
     since = t - t[0]
@@ -233,7 +244,8 @@ def _is_uniform(t, step: float) -> bool:
     return False
 
 
-def _segment(t, step, part) -> Segment:
+def segment(t, step, part) -> Segment:
+    """Signals by name, those of no joint as `signals.name`, over an even clock t (n,) [s]."""
     signals = {name.removeprefix("signals."): values for name, values in part.items() if name.startswith("signals.")}
     return Segment(t, step, part["q"], part["tau"], part.get("qd"), part.get("qdd"), signals)
 
@@ -251,6 +263,7 @@ def _resampled(t, part, step):
     return clock, out
 
 
-def _sha256(path: Path) -> str:
+def sha256(path: Path) -> str:
+    """The SHA-256 of a file, in hexadecimal digits."""
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()

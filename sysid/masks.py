@@ -8,9 +8,12 @@ import warnings
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from .errors import ConfigError, SysidWarning
 from .events import Event, ordered
 from .log import Log
+from .spans import clocks
 from .specs import MaskSpec
 
 
@@ -37,10 +40,9 @@ def _with(log: Log, masks: Sequence[MaskSpec], joints: Sequence[str]) -> Log:
     found = []
     for mask in masks:
         own = tuple(joints if mask.joints is None else mask.joints)
-        held = [s for s in log.segments if s.t[0] <= mask.stop and s.t[-1] >= mask.start]
+        held = [(a, b) for a, b in clocks(log.segments) if a <= mask.stop and b >= mask.start]
         found += [
-            Event("mask", log.name, max(mask.start, s.t[0]), min(mask.stop, s.t[-1]), own)
-            for s in held
+            Event("mask", log.name, max(mask.start, a), min(mask.stop, b), own) for a, b in held
         ]
         if not held:
             warnings.warn(SysidWarning(_nothing(log, mask)), stacklevel=2)
@@ -48,7 +50,7 @@ def _with(log: Log, masks: Sequence[MaskSpec], joints: Sequence[str]) -> Log:
 
 
 def _nothing(log: Log, mask: MaskSpec) -> str:
-    first, last = (log.segments[0].t[0], log.segments[-1].t[-1]) if log.segments else (0.0, 0.0)
+    first, last = np.ravel(clocks(log.segments))[[0, -1]] if log.segments else (0.0, 0.0)
     return (
         f"preprocess.mask: {log.name} has no row from {mask.start:g} to {mask.stop:g} s; "
         f"its own clock goes from {first:g} to {last:g} s"

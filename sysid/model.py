@@ -14,6 +14,7 @@ import numpy as np
 from . import own_effects, regressor, two_masses, units
 from .effect import Asked, Deflection, Effect, LinkEffect, MotionEffect, SensorEffect, Shape, TorqueEffect, WrenchEffect, find
 from .errors import ConfigError, SysidError, SysidWarning
+from .extent import Extent
 from .formula import Formula
 from .inertia import PARAMETERS, UNITS
 from .motion import Motion, Piece, never_move
@@ -81,27 +82,13 @@ class Scales:
 
 def scales(motion: Motion) -> Scales:
     """The scales of a motion."""
-    most = lambda name: np.max([np.abs(getattr(p, name)).max(0) for p in motion.pieces], axis=0)  # noqa: E731
-    low, high = (np.array([reach(p.q, 0) for p in motion.pieces]) for reach in (np.min, np.max))
+    if (found := motion.extent) is None:
+        found = Extent(motion.samples)
+        for piece in motion.pieces:
+            found.add(piece)
     positive = lambda x: np.where(x > 0, x, 1.0)  # noqa: E731 - of a joint that never moves nothing can be said anyway
-    return Scales(positive(most("qd")), positive(most("tau")), positive(high.max(0) - low.min(0)), float(max(np.ptp(p.t) for p in motion.pieces)), _sample(motion), motion.samples)
-
-
-_SAMPLED = 1000  # rows that say how large a motion is
-
-
-def _sample(motion: Motion) -> Piece:
-    """Some rows of a motion, then the row after each."""
-    stride = max(1, motion.samples // _SAMPLED)
-    picked = [np.arange(p.core.start, p.core.stop - 1, stride) for p in motion.pieces]
-
-    def joined(pick) -> np.ndarray:
-        return np.concatenate([pick(p)[own + later] for later in (0, 1) for p, own in zip(motion.pieces, picked)])
-
-    first = motion.pieces[0]
-    arrays = {name: joined(lambda p, name=name: getattr(p, name)) for name in ("t", "q", "qd", "qdd", "tau", "measured")}
-    signals = {name: joined(lambda p, name=name: p.signals[name]) for name in first.signals if all(name in p.signals for p in motion.pieces)}
-    return replace(first, **arrays, signals=signals, use=None, smoother=None, sight=None, core=slice(0, len(arrays["t"])), load=None, deflection=None)
+    longest = float(max(found.duration.values()))
+    return Scales(positive(found.speed), positive(found.torque), positive(found.high + found.low), longest, replace(found.sample(), rest=motion.outlines[0].rest), motion.samples)
 
 
 @dataclass(frozen=True)
@@ -266,6 +253,12 @@ class Model:
     def uses_load(self) -> bool:
         """Whether an effect looks at the load."""
         return any(effect.uses_load for effect, _ in self.terms)
+
+    @property
+    def local(self) -> bool:
+        """Whether each row of a log is a row of columns by itself, or with a few beside it, whatever the rest of the log says."""
+        parts = (effect for effect, _ in self.terms)
+        return not self.shape_values and all(isinstance(e, (TorqueEffect, WrenchEffect)) and not (e.memory or e.uses_load or e.reach) for e in parts)
 
     @property
     def deflects(self) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -78,10 +78,37 @@ class Piece:
             deflection=None if self.deflection is None else self.deflection[:, rows],
         )  # fmt: skip
 
+    def outline(self) -> Piece:
+        """The piece without its rows: where it is from, how many there are, and the filter of both sides."""
+        none = np.zeros((0, self.q.shape[1]))
+        return replace(
+            self, t=none[:, 0], q=none, qd=none, qdd=none, tau=none, measured=none, signals={}, use=None, load=None, deflection=None, weight=None,
+        )  # fmt: skip
+
     @property
     def samples(self) -> int:
         """Number of usable rows."""
         return self.core.stop - self.core.start
+
+
+class Pieces(Sequence):
+    """Pieces of long logs, each made whenever it is asked for.
+
+    Args:
+        make: number -> piece. outlines: of each, its `outline()`. extent: how large they are together, an `Extent`.
+        masked: whether a row of some does not count.
+    """
+
+    def __init__(self, make: Callable[[int], Piece], outlines: tuple[Piece, ...], extent=None, masked=True) -> None:
+        self._make, self.outlines, self.extent, self.masked = make, outlines, extent, masked
+
+    def __len__(self) -> int:
+        return len(self.outlines)
+
+    def __getitem__(self, number):
+        if isinstance(number, slice):
+            raise TypeError("pieces of a long log are asked for one by one")
+        return self._make(range(len(self))[number])
 
 
 @dataclass(frozen=True)
@@ -95,7 +122,7 @@ class Motion:
     """
 
     joints: tuple[str, ...]
-    pieces: tuple[Piece, ...]
+    pieces: Sequence[Piece]
     still: tuple[str, ...]
     standing: np.ndarray
     left_out: np.ndarray
@@ -107,15 +134,30 @@ class Motion:
     @property
     def samples(self) -> int:
         """Number of usable rows over all pieces."""
-        return sum(piece.samples for piece in self.pieces)
+        return sum(piece.samples for piece in self.outlines)
 
     @property
     def duration(self) -> float:
         """Seconds of motion over all pieces."""
-        return sum(piece.samples * piece.step for piece in self.pieces)
+        return sum(piece.samples * piece.step for piece in self.outlines)
+
+    @property
+    def extent(self):
+        """How large the motion is, where that has been found: an `Extent`."""
+        return self.pieces.extent if isinstance(self.pieces, Pieces) else None
+
+    @property
+    def outlines(self) -> tuple[Piece, ...]:
+        """The pieces, for what needs none of their rows."""
+        return self.pieces.outlines if isinstance(self.pieces, Pieces) else self.pieces
 
 
 def never_move(pieces: Sequence[Piece]) -> np.ndarray:
     """(dof,) bool: the joints that none of the pieces shows in motion."""
-    travel = np.ptp(np.concatenate([[p.q[p.core].min(0), p.q[p.core].max(0)] for p in pieces]), axis=0)
-    return travel < np.maximum(_NEVER_MOVES, NOISE_TRAVEL * np.max([piece.noise for piece in pieces], axis=0))
+    low, high = (np.array([end(p.q[p.core], axis=0) for p in pieces]) for end in (np.min, np.max))
+    return never_moved(low.min(0), high.max(0), np.max([piece.noise for piece in pieces], axis=0))
+
+
+def never_moved(low, high, noise) -> np.ndarray:
+    """(dof,) bool: the joints whose angle, of such noise, stays between such ends."""
+    return high - low < np.maximum(_NEVER_MOVES, NOISE_TRAVEL * noise)

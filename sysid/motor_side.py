@@ -122,24 +122,25 @@ def summed(sums: Mapping[str, Mapping[str, float]], joints: tuple[str, ...], log
     Raises:
         ConfigError: sums that need each other.
     """
+    if not sums:
+        return logged
     out: dict[str, np.ndarray] = {}
-    waiting: list[str] = []
+    return np.stack([_value(joint, sums, joints, logged, signal, key, out, []) for joint in joints], axis=1)
 
-    def value(joint: str) -> np.ndarray:
-        if joint in out:
-            return out[joint]
-        own = logged[:, joints.index(joint)]
-        if joint not in sums:
-            return own
-        if joint in waiting:
-            raise ConfigError(f"{key}: {' and '.join(waiting)} need each other", allowed="sums that end at logged columns", do="correct one")
-        waiting.append(joint)
-        terms = [f * (own if name == joint else value(name) if name in joints else signal(name)) for name, f in sums[joint].items()]
-        waiting.pop()
-        out[joint] = np.sum(terms, axis=0)
+
+def _value(joint: str, sums, joints, logged, signal, key: str, out: dict[str, np.ndarray], waiting: list[str]) -> np.ndarray:
+    """The values (n,) of a joint, of those that its sum needs first; each sum is kept in `out`."""
+    if joint in out:
         return out[joint]
-
-    return np.stack([value(joint) for joint in joints], axis=1) if sums else logged
+    own = logged[:, joints.index(joint)]
+    if joint not in sums:
+        return own
+    if joint in waiting:
+        raise ConfigError(f"{key}: {' and '.join(waiting)} need each other", allowed="sums that end at logged columns", do="correct one")
+    further = [*waiting, joint]
+    other = lambda name: _value(name, sums, joints, logged, signal, key, out, further) if name in joints else signal(name)  # noqa: E731
+    out[joint] = np.sum([f * (own if name == joint else other(name)) for name, f in sums[joint].items()], axis=0)
+    return out[joint]
 
 
 def command_name(joint: str) -> str:

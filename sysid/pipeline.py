@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from . import config, drives, events, gains, groups, held_apart, masks, masses, model, robot, rollout, shape
+from . import config, drives, events, gains, groups, held_apart, long_log, masks, masses, model, robot, rollout, shape
 from . import filters as filtering
 from . import log as logs
 from .bumps import bumps
@@ -27,13 +27,15 @@ from .effect import NotFinite
 from .errors import LogError, SysidWarning
 from .estimate import Fit, Prediction, identify, predict
 from .inertia.consistency import is_consistent
+from .long_motion import prepare
+from .long_prediction import predicted
 from .model import Model, moving_coefficients
 from .motion import Motion
 from .multistart import Searched, finite
 from .plausible import implausible
-from .preprocess import prepare
 from .prior_weight import PriorWeight, is_auto, with_weight
 from .robot import Robot
+from .spans import Spans, released
 from .specs import AUTO, Experiment, LogSpec
 from .threads import single_threaded
 
@@ -59,16 +61,31 @@ def build(experiment: Experiment) -> tuple[Robot, Model, np.ndarray]:
     return machine, structure, _prior(experiment, structure)
 
 
-def read(experiment: Experiment, machine: Robot, specs: list[LogSpec]) -> list[logs.Log]:
+def read(experiment: Experiment, machine: Robot, specs: list[LogSpec], *, structure: Model | None = None) -> list[logs.Log]:
     """The logs of an experiment's `data.train` or `data.test`, with their events where these are left out, and what the experiment
-    masks. Raises LogError, ConfigError."""
-    read = [logs.read(spec, experiment.data, machine.joints, machine.prismatic, experiment.folder, experiment.actuator) for spec in specs]
+    masks.
+
+    Args:
+        structure: the model that they are read for: where nothing of it looks at a log as a whole, long logs are spans, which are read
+            when they are asked for. None: they are read whole.
+
+    Raises:
+        LogError: as `log.read`. ConfigError: a mask that cannot be.
+    """
+    reader = long_log if structure is not None and structure.local else logs
+    read = [reader.read(spec, experiment.data, machine.joints, machine.prismatic, experiment.folder, experiment.actuator) for spec in specs]
     found = read if experiment.preprocess.events == "keep" else with_events(machine, read)
     return masks.masked(found, experiment.preprocess.mask, machine.joints)
 
 
+_BESIDE = 1024  # rows of a span's neighbours that are looked at with it: more than an event's surroundings
+
+
 def with_events(machine: Robot, read: list[logs.Log]) -> list[logs.Log]:
-    """Logs with their events: first those that the signals show, then those that only the robot's equations do."""
+    """Logs with their events: first those that the signals show, then those that only the robot's equations do. Each span of a long
+    log is looked at by itself."""
+    if any(isinstance(log.segments, Spans) for log in read):
+        return [with_events(machine, [log])[0] if not isinstance(log.segments, Spans) else _with_events_of_spans(machine, log) for log in read]
     told = lambda log, e: not (e.signal == "torque" and set(e.joints) <= set(log.unused))  # noqa: E731
     found = [
         replace(log, events=tuple(e for s in log.segments for e in events.find(s, machine.joints, log=log.name) if told(log, e))) for log in read
@@ -76,6 +93,17 @@ def with_events(machine: Robot, read: list[logs.Log]) -> list[logs.Log]:
     felt = bumps(machine, found)
     more = [[e for e in felt if e.log == log.name] for log in found]
     return [replace(log, events=events.ordered([*log.events, *own])) if own else log for log, own in zip(found, more)]
+
+
+def _with_events_of_spans(machine: Robot, log: logs.Log) -> logs.Log:
+    found, step = [], 0.0
+    for number in range(len(log.segments)):
+        released()
+        span = log.segments.around(number, _BESIDE)
+        (own,) = with_events(machine, [replace(log, segments=(replace(span, core=None),))])
+        found += events.clipped(own.events, *span.t[[span.core.start, span.core.stop - 1]])
+        step = span.step
+    return replace(log, events=events.joined(found, step))
 
 
 @dataclass(frozen=True)
@@ -118,7 +146,7 @@ def fit(experiment: Experiment, *, filters: dict | None = None, strength: PriorW
         for text in measured.notices if measured else ():
             warnings.warn(SysidWarning(text), stacklevel=2)
         with _timed(seconds, "read", tell):
-            train = measured.train if measured else read(experiment, machine, experiment.data.train)
+            train = measured.train if measured else read(experiment, machine, experiment.data.train, structure=structure)
         _refuse_no_torque(train)
         provenance = [_provenance("train", log, spec) for log, spec in zip(train, experiment.data.train)]
         with _timed(seconds, "filters", tell):
@@ -148,17 +176,17 @@ def fit(experiment: Experiment, *, filters: dict | None = None, strength: PriorW
         if heavy is not None:
             warnings.warn(SysidWarning(heavy.says), stacklevel=2)
         with _timed(seconds, "predict", tell):
-            predictions = {"train": predict(structure, found.x, motion)}
+            predictions = {"train": predicted(structure, found.x, motion)}
             samples, left_out = {"train": motion.samples}, {"train": _left_out(motion)}
             del motion
         with _timed(seconds, "test", tell):
-            held_out = measured.test if measured else read(experiment, machine, experiment.data.test)
+            held_out = measured.test if measured else read(experiment, machine, experiment.data.test, structure=structure)
             provenance += [_provenance("test", log, spec) for log, spec in zip(held_out, experiment.data.test)]
             _tell_overlap(experiment, provenance)
             motion = prepare(held_out, preprocess, machine.joints)
             del held_out
             disturbed += _tell_events("test", motion)
-            predictions["test"] = predict(structure, found.x, motion)
+            predictions["test"] = predicted(structure, found.x, motion)
             samples["test"], left_out["test"] = motion.samples, _left_out(motion)
             told = drives.found(experiment, structure, found.x, found.uncertainty.std, found.shape_std)
             let_go = rollout.rms(experiment, structure, found.x, motion)
@@ -348,7 +376,7 @@ _NO_TORQUE = 1e-12  # N m: no robot is moved by less
 
 
 def _refuse_no_torque(train: list[logs.Log]) -> None:
-    if max(np.abs(segment.tau).max(initial=0.0) for log in train for segment in log.segments) < _NO_TORQUE:
+    if not any(np.abs(segment.tau).max(initial=0.0) >= _NO_TORQUE for log in train for segment in log.segments):
         raise LogError("the torque of every joint is 0 in every row: none was logged", where=str(train[0].path), do="name the columns of torque in data.columns.torque, or what drives the joints in actuator")
 
 
@@ -394,7 +422,7 @@ def _provenance(part: str, log: logs.Log, spec: LogSpec) -> dict:
     chosen = {key: value for key in ("topic", "episode") if (value := getattr(spec, key)) is not None}
     return {
         "part": part, "log": log.name, "sha256": log.sha256, "start": spec.start, "stop": spec.stop,
-        "samples": log.samples, "segments": len(log.segments), **chosen, **({"files": log.hashes} if len(log.hashes) > 1 else {}),
+        "samples": log.samples, "segments": log.stretches, **chosen, **({"files": log.hashes} if len(log.hashes) > 1 else {}),
     }  # fmt: skip
 
 

@@ -18,9 +18,9 @@ def implausible(fit: Fit) -> Iterator[str]:
     worse = [f"{joint} (R2 {r2:.2g})" for joint, r2 in zip(fit.joints, test["r2"]) if r2 < 0.0]
     if worse:
         yield f"implausible: the model is worse than none on the test logs of {', '.join(worse)}; {_ASK}"
-    robot = fit.model.robot
+    robot, greatest = fit.model.robot, fit.predictions["train"].greatest(_FEWEST)
     for j, joint in enumerate(fit.joints):
         allowed = robot.source.joints[joint].effort
-        torque = np.abs(fit.predictions["train"].measured[:, j])
+        torque = greatest[:, j]
         if np.sum(torque > _EFFORT * allowed) >= _FEWEST:
             yield f"implausible: the torque of {joint} reaches {torque.max():.4g}, the URDF allows its drive {allowed:.4g}; {_ASK}"

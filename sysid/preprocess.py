@@ -25,10 +25,10 @@ from .specs import PreprocessSpec
 
 # `standstill: mask` leaves a joint's rows out below this share of its own rms speed, at most 0.03 rad/s or m/s:
 # there friction may have any value up to its greatest.
-_STANDSTILL_SHARE, _STANDSTILL_MOST = 0.05, 0.03
+_STANDSTILL_SHARE, STANDSTILL_MOST = 0.05, 0.03
 _MOST = 0.5  # of the weight that a low-pass has
 _KEPT_A_CYCLE = 8.0  # rows a cycle of a low-pass: what it lets through at half as many is 0.4 %
-_ROUNDING = 1e-9  # share of a joint's top speed that is none
+ROUNDING = 1e-9  # share of a joint's top speed that is none
 
 
 def prepare(logs: Sequence[Log], spec: PreprocessSpec, joints: tuple[str, ...]) -> Motion:
@@ -41,12 +41,10 @@ def prepare(logs: Sequence[Log], spec: PreprocessSpec, joints: tuple[str, ...]) 
     for number, log in enumerate(logs):
         before = len(pieces)
         for segment in log.segments:
-            clean = replace(segment, tau=mended(segment, log.events, joints)) if log.events else segment
-            if (piece := _piece(number, clean, spec)) is not None:
-                own = replace(piece, source=log.name, levels=log.levels)
-                pieces.append(without_events(own, log.events, joints, *_reaches(spec, segment.step)) if log.events else own)
+            if (piece := piece_of(number, log, segment, spec, joints)) is not None:
+                pieces.append(piece)
         if len(pieces) == before:
-            shortest = _needs(spec, log.segments[0].step) if log.segments else 2
+            shortest = needs(spec, log.segments[0].step) if log.segments else 2
             raise LogError(f"{log.samples} samples are fewer than the filter's window of {shortest}", where=str(log.path), do="give a longer log or narrow preprocess.window")
         if dropped := len(log.segments) - (len(pieces) - before):
             warnings.warn(SysidWarning(f"{log.path}: {dropped} segment(s) shorter than the filter's window were left out"), stacklevel=2)
@@ -60,6 +58,30 @@ def prepare(logs: Sequence[Log], spec: PreprocessSpec, joints: tuple[str, ...]) 
         pieces = [under_lowpass(piece, spec) for piece in pieces]
     events = tuple(event for log in logs for event in log.events)
     return replace(assembled(joints, pieces, stuck, unused_of(logs)), events=events, disturbed=disturbed)
+
+
+def piece_of(number: int, log: Log, segment: Segment, spec: PreprocessSpec, joints: tuple[str, ...]) -> Piece | None:
+    """A segment of a log filtered, without the rows that the log's events reach; None where it is shorter than the filter."""
+    clean = replace(segment, tau=mended(segment, log.events, joints)) if log.events else segment
+    if (piece := _piece(number, clean, spec)) is None:
+        return None
+    own = replace(piece, source=log.name, levels=log.levels)
+    return without_events(own, log.events, joints, *_reaches(spec, segment.step)) if log.events else own
+
+
+def without_still_rows(piece: Piece, spec: PreprocessSpec, threshold) -> Piece:
+    """The piece without the rows that `standstill` leaves out.
+
+    Args:
+        threshold: (dof,) or a number, of a standstill [rad/s or m/s], where it is one of the whole motion.
+    """
+    if spec.standstill == "keep":
+        return piece
+    if spec.standstill != "auto":
+        return without_standstill(piece, threshold, 0 if piece.smoother is None else piece.smoother.reach)
+    if spec.filter == "none":
+        return without_standstill(piece, np.where(turns(piece.qd), np.inf, threshold), 0)
+    return clear_of_reversals([piece], spec)[0]
 
 
 def unused_of(logs: Sequence[Log]) -> tuple[str, ...]:
@@ -76,7 +98,7 @@ def assembled(joints: tuple[str, ...], pieces: Sequence[Piece], stuck=False, unu
     if unused:
         counts = np.array([joint not in unused for joint in joints])
         pieces = [replace(p, use=counts & (np.ones(p.q.shape, dtype=bool) if p.use is None else p.use)) for p in pieces]
-    rest = _ROUNDING * np.max([np.abs(piece.qd).max(axis=0) for piece in pieces], axis=0)
+    rest = ROUNDING * np.max([np.abs(piece.qd).max(axis=0) for piece in pieces], axis=0)
     never = never_move(pieces) | stuck
     still = tuple(joint for joint, stays in zip(joints, never) if stays)
     if any(piece.use is not None for piece in pieces):
@@ -109,14 +131,15 @@ def on_both_sides(spec: PreprocessSpec, step: float) -> Smoother | Gaussian | No
     return Gaussian(cutoff, step, every=max(1, int(1.0 / (_KEPT_A_CYCLE * cutoff * step))))
 
 
-def _needs(spec: PreprocessSpec, step: float) -> int:
+def needs(spec: PreprocessSpec, step: float) -> int:
+    """How many rows a log must have for the filter's window."""
     sides = on_both_sides(spec, step)
     return 2 * Smoother(spec, step).reach + (0 if sides is None else 2 * sides.reach) + 1
 
 
 def _piece(number: int, segment: Segment, spec: PreprocessSpec) -> Piece | None:
     smoother = Smoother(spec, segment.step)
-    if len(segment.t) < _needs(spec, segment.step):
+    if len(segment.t) < needs(spec, segment.step):
         return None
     if spec.filter == "none":
         if segment.qd is None or segment.qdd is None:
@@ -130,10 +153,13 @@ def _piece(number: int, segment: Segment, spec: PreprocessSpec) -> Piece | None:
     tau = segment.tau if sides is None else sides(segment.tau)
     n = rows.stop - rows.start
     margin = 0 if sides is None else sides.reach
+    core = slice(margin, n - margin)
+    if segment.core is not None:  # of a span, what is its own
+        core = slice(max(core.start, segment.core.start - edge), min(core.stop, segment.core.stop - edge))
     return Piece(
         log=number, step=segment.step, t=segment.t[rows], q=q[rows], qd=qd[rows], qdd=qdd[rows], tau=tau[rows],
         measured=segment.tau[rows], signals={name: values[rows] for name, values in segment.signals.items()}, use=None,
-        smoother=sides, core=slice(margin, n - margin), rest=np.zeros(q.shape[1]),
+        smoother=sides, core=core, rest=np.zeros(q.shape[1]),
         noise=np.sqrt(np.mean((segment.q[rows] - q[rows]) ** 2, axis=0)), sight=None if sides is not None or spec.filter == "none" else smoother,
     )  # fmt: skip
 
@@ -205,7 +231,7 @@ def under_lowpass(piece: Piece, spec: PreprocessSpec) -> Piece:
     weight = None
     if piece.use is not None and not piece.use.all():
         weight = np.sin(0.5 * np.pi * np.minimum(_apart(piece.use) * piece.step / spec.window, 1.0)) ** 2
-    out = replace(piece, smoother=sides, weight=weight, core=slice(sides.reach, n - sides.reach), sight=None)
+    out = replace(piece, smoother=sides, weight=weight, core=slice(max(piece.core.start, sides.reach), min(piece.core.stop, n - sides.reach)), sight=None)
     whole = slice(0, n)
     tau = np.stack([out.settled(own, whole, j) for j, own in enumerate(piece.tau.T)], axis=1)
     use = None if weight is None else sides(weight, axis=0) > _MOST
@@ -241,7 +267,12 @@ def _largest_about(values, reach: int) -> np.ndarray:
 def standstill_speed(pieces) -> np.ndarray:
     """Speed (dof,) below which a joint counts as standing, from its own rms speed."""
     square = sum(np.sum(p.qd[p.core] ** 2, axis=0) for p in pieces) / sum(p.samples for p in pieces)
-    return np.minimum(_STANDSTILL_SHARE * np.sqrt(square), _STANDSTILL_MOST)
+    return slow(square)
+
+
+def slow(square) -> np.ndarray:
+    """`standstill_speed` (dof,) of joints whose speed has the mean square `square`."""
+    return np.minimum(_STANDSTILL_SHARE * np.sqrt(square), STANDSTILL_MOST)
 
 
 def standing(pieces) -> np.ndarray:

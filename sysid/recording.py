@@ -21,7 +21,7 @@ from .readers.table import Table
 from .specs import ColumnsSpec, DataSpec, LogSpec
 
 _EPOCH = 1e6  # s: a clock that reads more counts from 1970, not from the log's start
-_EPISODE = "episode_index"  # the column in which LeRobot numbers episodes
+EPISODE = "episode_index"  # the column in which LeRobot numbers episodes
 _DEFAULTS = ColumnsSpec()
 
 
@@ -53,18 +53,22 @@ class Recording:
 
 
 def recorded(
-    log: LogSpec, data: DataSpec, joints: tuple[str, ...], folder: Path, drives: dict
+    log: LogSpec, data: DataSpec, joints: tuple[str, ...], folder: Path, drives: dict, *, table=None
 ) -> Recording:
     """What an entry of an experiment holds, in the units of its files but for time.
 
     Args:
         joints: names, in order. folder: what relative paths are relative to. drives: {joint: what
             drives it} where torque was not logged; `signals.command.joint` is then its command.
+        table: what to read instead of the entry's files.
 
     Raises:
         LogError: a file or a column is not there, or what it holds is no log.
     """
-    tables = {name: _table(name, log, folder) for name in log.names}
+    if table is not None:
+        tables = {log.names[0]: table}
+    else:
+        tables = {name: table_of(name, log, folder) for name in log.names}
     where = " + ".join(str(table.path) for table in tables.values())
     loaded = [_load(table, data, joints, log.episodes, drives) for table in tables.values()]
     if len({unit for _, unit, _, _ in loaded}) > 1:
@@ -103,7 +107,8 @@ def _joined(parts: list[np.ndarray]) -> np.ndarray:
     return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
 
-def _table(name: str, log: LogSpec, folder: Path) -> Table:
+def table_of(name: str, log: LogSpec, folder: Path) -> Table:
+    """The table that a name of an entry stands for. Raises LogError."""
     if (dataset := datasets.reference(name)) is not None:
         return dataset.open(dataset.locate())
     return open_table((folder / name).resolve(), log.topic)
@@ -129,10 +134,10 @@ def _load(table: Table, data: DataSpec, joints, episodes, drives):
             wanted[name] = there
     wanted |= _signals(table, data, joints, drives)
     time = None if data.rate else _time(table, _meant(table, spec, "time"))
-    counted = _EPISODE if table.has(_EPISODE) else None
+    counted = EPISODE if table.has(EPISODE) else None
     if episodes is not None and counted is None:
         raise LogError(
-            f"an episode is asked for, and there is no column {_EPISODE!r}", where=str(table.path),
+            f"an episode is asked for, and there is no column {EPISODE!r}", where=str(table.path),
             do="remove episode, or give start and stop",
         )  # fmt: skip
     asked = [*filter(None, (time, counted)), *(c for names in wanted.values() for c in names if c)]
@@ -313,11 +318,29 @@ def _single(table: Table, column, signal: str) -> str:
 
 def _seconds(t, unit: str) -> np.ndarray:
     scale = units.TIME[unit]
+    return from_origin(t, origin(t, scale), scale)
+
+
+def origin(t, scale: float):
+    """What the stamps of a clock [1 / scale s] are counted from: their own begin where they count
+    from 1970."""
     # large stamps (ns since 1970) lose nothing if the start is taken off before the unit is
     # converted
-    t = t.astype(np.int64, copy=False) if t.dtype.kind in "iu" else t
-    start = t[0] if _EPOCH <= abs(t[0] * scale) < np.inf else 0
-    return (t - start) * scale
+    return _whole(t)[0] if _EPOCH <= abs(t[0] * scale) < np.inf else 0
+
+
+def from_origin(t, start, scale: float) -> np.ndarray:
+    """Stamps in seconds."""
+    return (_whole(t) - start) * scale
+
+
+def _whole(t) -> np.ndarray:
+    return t.astype(np.int64, copy=False) if t.dtype.kind in "iu" else t
+
+
+def time_column(table: Table, spec: ColumnsSpec) -> str:
+    """The column of a table that is its clock. Raises LogError."""
+    return _time(table, _meant(table, spec, "time"))
 
 
 def _increasing(t, breaks, where: str) -> np.ndarray:

@@ -50,7 +50,8 @@ class Reduction:
         self._gram: np.ndarray | None = None  # sum of B'B, upper half
 
     def add(self, rows: np.ndarray) -> None:
-        """Take n rows of k numbers, given as columns (k, n) with samples last; may be overwritten."""
+        """Take n rows of k numbers, given as columns (k, n) with samples last; may be
+        overwritten."""
         from scipy.linalg.blas import dsyrk, dtrsm
 
         self.rows += rows.shape[1]

@@ -216,6 +216,19 @@ def parquet(table) -> Callable[[Path], None]:
     return write
 
 
+def sunk(table) -> Callable[[Path], None]:
+    """As `parquet`, of a lazy table: one that is in files does not come into memory whole."""
+    import polars as pl
+
+    def write(path: Path) -> None:
+        try:
+            table.sink_parquet(path)
+        except pl.exceptions.PolarsError as error:
+            raise OSError(str(error)) from None
+
+    return write
+
+
 def _settle(filled: Path, place: Path) -> None:
     """Bring a file to the disk, with the mode and the owner of the one that it replaces."""
     with filled.open("r+b") as file:
@@ -250,7 +263,7 @@ def write(fit: Fit, out: str | Path) -> dict:
     }  # fmt: skip
     table = _predictions(fit)
     texts["fit.json"] = (json.dumps(found, indent=1, allow_nan=False) + "\n").encode()
-    files = {path / "predictions.parquet": parquet(table)}
+    files = {path / "predictions.parquet": sunk(table)}
     with state.locked(path):
         other = _another(path, texts["fit.json"])
         write_together(files | {path / name: lambda p, c=content: p.write_bytes(c) for name, content in texts.items()})
@@ -272,17 +285,18 @@ def _another(path: Path, text: bytes) -> bool:
 def _predictions(fit: Fit):
     import polars as pl
 
+    kept = {part: prediction.lazy() for part, prediction in fit.predictions.items()}
+    told = {part: set(table.collect_schema().names()) for part, table in kept.items()}
+    masked = any(f"used_{joint}" in names for names in told.values() for joint in fit.joints)
     frames = []
-    masked = any(prediction.use is not None for prediction in fit.predictions.values())
-    for part, prediction in fit.predictions.items():
-        columns = {"log": prediction.log, "t": prediction.t}
-        for k, joint in enumerate(fit.joints):
-            columns[f"measured_{joint}"] = prediction.measured[:, k]
-            columns[f"predicted_{joint}"] = prediction.predicted[:, k]
-            if masked:
-                columns[f"used_{joint}"] = True if prediction.use is None else prediction.use[:, k]
-        frames.append(pl.DataFrame(columns).select(pl.lit(part).alias("part"), pl.all()))
-    return pl.concat(frames, rechunk=False)
+    for part, table in kept.items():
+        columns = [pl.lit(part).alias("part"), pl.col("log"), pl.col("t")]
+        for joint in fit.joints:
+            columns += [pl.col(f"measured_{joint}"), pl.col(f"predicted_{joint}")]
+            used = f"used_{joint}"
+            columns += [] if not masked else [pl.col(used) if used in told[part] else pl.lit(True).alias(used)]
+        frames.append(table.select(columns))
+    return pl.concat(frames)
 
 
 def _relocated(experiment: Experiment, run: Path) -> dict:

@@ -12,7 +12,8 @@ from .clock import Left
 @dataclass(frozen=True)
 class Segment:
     """Uniformly sampled signals without a gap. t (n,) [s]; q, tau (n, dof); qd, qdd (n, dof) or None where not logged.
-    clock: what is left of the errors of stamps that were corrected."""
+    clock: what is left of the errors of stamps that were corrected. core: the rows that are its own where it is a
+    span of a longer stretch and the others are its neighbours', which filters look at; None where all are."""
 
     t: np.ndarray
     step: float
@@ -22,3 +23,4 @@ class Segment:
     qdd: np.ndarray | None
     signals: dict[str, np.ndarray]
     clock: Left | None = None
+    core: slice | None = None

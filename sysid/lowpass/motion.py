@@ -39,8 +39,14 @@ _SELDOM = 0.05  # of an octave
 MOST_ROWS = 12_000
 
 
-def lowpassed(logs: Sequence[Log], joints: tuple[str, ...], cutoff: float) -> Motion | None:
-    """Logs as a motion under one low-pass on both sides; None where they are too short for it."""
+def lowpassed(
+    logs: Sequence[Log], joints: tuple[str, ...], cutoff: float, *, known: float | None = None
+) -> Motion | None:
+    """Logs as a motion under one low-pass on both sides; None where they are too short for it.
+
+    Args:
+        known: their `band`, where it is at hand.
+    """
     pieces: list[Piece] = []
     sights: list[int] = []  # rows
     for number, log in enumerate(logs):
@@ -66,13 +72,18 @@ def lowpassed(logs: Sequence[Log], joints: tuple[str, ...], cutoff: float) -> Mo
     moving = [without_standstill(*each) for each in zip(pieces, still, sights)]
     motion = assembled(joints, moving, unused=unused_of(logs))
     events = tuple(event for log in logs for event in log.events)
-    return replace(motion, events=events, disturbed=disturbed, band=band(logs))
+    own_band = band(logs) if known is None else known
+    return replace(motion, events=events, disturbed=disturbed, band=own_band)
 
 
-def widest(logs: Sequence[Log]) -> float:
+def widest(logs: Sequence[Log], *, known: float | None = None) -> float:
     """Cutoff [Hz] that the motion itself asks for: several times the frequency below which its
-    speeds stay."""
-    return max(LEAST, _MOTION * band(logs))
+    speeds stay.
+
+    Args:
+        known: their `band`, where it is at hand.
+    """
+    return max(LEAST, _MOTION * (band(logs) if known is None else known))
 
 
 def band(logs: Sequence[Log]) -> float:

@@ -1,5 +1,7 @@
 """Parquet: only the columns that are asked for are read, one at a time. A column of lists of one length is a matrix."""
 
+import copy
+
 import numpy as np
 import polars as pl
 
@@ -19,6 +21,7 @@ class ParquetTable(Table):
 
     def __init__(self, path):
         self.path = path
+        self._part: tuple[int, int] | None = None  # first row and number of rows, where not all are meant
         try:
             with silenced():
                 self._schema = pl.read_parquet_schema(path)
@@ -28,6 +31,7 @@ class ParquetTable(Table):
                 self._widths = {name: width for name, kind in self._schema.items() if (width := self._width(name, kind))}
         except _CORRUPT as error:
             raise self._unreadable(error) from None
+        self.rows = rows
         self.names, self._elements = [], {}
         for name in self._schema:
             self.names.append(name)
@@ -63,6 +67,12 @@ class ParquetTable(Table):
         where = str(self.path) if name is None else f"{self.path} column {name!r}"
         return LogError(f"not a readable Parquet file ({said})", where=where, do="write it again")
 
+    def between(self, first: int, last: int) -> "ParquetTable":
+        """The rows from `first` up to, not including, `last`: only the row groups that hold them are read."""
+        part = copy.copy(self)
+        part._part, part.rows = (first, last - first), last - first
+        return part
+
     def load(self, names):
         out, held = {}, {}
         for name in names:
@@ -79,12 +89,12 @@ class ParquetTable(Table):
         try:
             # column by column, so that the file never stands in memory beside the arrays
             with silenced():
-                values = pl.read_parquet(self.path, columns=[name], use_statistics=False)[name]
+                values = self._values(name)
                 self._check_null(name, values, 1)
                 if isinstance(kind, pl.List) and (other := values.list.len() != width).any():
-                    row = int(other.arg_max())
+                    row = int(other.arg_max()) + (self._part or (0,))[0]
                     raise LogError(
-                        f"a list of {len(values[row])} numbers where the first row has {width}",
+                        f"a list of {int(values.list.len()[int(other.arg_max())])} numbers where the first row has {width}",
                         where=f"{self.path} column {name!r} row {row}", do="leave the row out",
                     )  # fmt: skip
                 values = values.explode() if width else values
@@ -95,7 +105,12 @@ class ParquetTable(Table):
         out = values.to_numpy()
         return out.reshape(-1, width) if width and width > 1 else out
 
+    def _values(self, name) -> pl.Series:
+        if self._part is None:
+            return pl.read_parquet(self.path, columns=[name], use_statistics=False)[name]
+        return pl.scan_parquet(self.path, use_statistics=False).select(name).slice(*self._part).collect()[name]
+
     def _check_null(self, name, values, width: int) -> None:
         if values.null_count():
-            row = int(values.is_null().arg_max()) // width
+            row = int(values.is_null().arg_max()) // width + (self._part or (0,))[0]
             raise LogError("a value is missing", where=f"{self.path} column {name!r} row {row}", do="leave the row out")

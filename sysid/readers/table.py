@@ -24,7 +24,8 @@ class Table(ABC):
 
     usual: what the format itself calls its signals, {"time", "position", "velocity", "torque" or "command": a column, or a
         pattern with {joint}}; it stands in for the defaults of an experiment. clock: the unit of that time where the format
-        says it. rate: samples a second, where a file without a clock says it.
+        says it. rate: samples a second, where a file without a clock says it. rows: how many it has, where `between(first, last)` gives a
+        table of some of them without reading the others.
     """
 
     path: Path
@@ -32,6 +33,7 @@ class Table(ABC):
     usual: Mapping[str, str] = MappingProxyType({})
     clock: str | None = None
     rate: float | None = None
+    rows: int | None = None
 
     @property
     def files(self) -> tuple[Path, ...]:

@@ -1,0 +1,116 @@
+"""A long log as spans: what is read, looked at and filtered at a time, so that memory does not grow
+with the log.
+
+A span has a fixed number of rows, whatever fits in memory: what is usual in a log (for events, for
+jumps of its torque, for the noise of its angles) is what is usual in a span of it. Filters see
+beyond its ends: a span is read with as many rows of its neighbours as they need, and these stand
+outside its `core`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from ctypes import CDLL
+from dataclasses import replace
+from functools import cache
+from itertools import pairwise
+
+from .segment import Segment
+
+SPAN = 2**18  # rows; at 1 kHz four minutes
+
+#: (first, last) -> those rows of a stretch without a gap
+Rows = Callable[[int, int], Segment]
+
+
+class Spans(Sequence):
+    """The segments of a long log, each read when it is asked for; neighbours of one stretch meet.
+
+    Args:
+        stretches: of each stretch without a gap, what reads its rows, and how many it has.
+    """
+
+    def __init__(self, stretches: Sequence[tuple[Rows, int]]) -> None:
+        self._spans = [
+            (rows, first, last, n) for rows, n in stretches for first, last in pairwise(edges(n))
+        ]
+        self.samples = sum(n for _, n in stretches)
+
+    def __len__(self) -> int:
+        return len(self._spans)
+
+    def __getitem__(self, number):
+        return self.around(number, 0)
+
+    @property
+    def stretches(self) -> int:
+        """How many stretches without a gap there are."""
+        return len({id(rows) for rows, *_ in self._spans})
+
+    def clocks(self) -> list[tuple[float, float]]:
+        """First and last time [s] of each stretch without a gap."""
+        whole = {id(rows): (rows, n) for rows, _, _, n in self._spans}
+        return [(float(rows(0, 2).t[0]), float(rows(n - 2, n).t[-1])) for rows, n in whole.values()]
+
+    def middle(self, most: int) -> Segment:
+        """The middle of the longest stretch, of at most so many rows."""
+        rows, _, _, n = max(self._spans, key=lambda span: span[3])
+        return rows(max((n - most) // 2, 0), min((n + most) // 2, n))
+
+    def step(self, number: int) -> float:
+        """Seconds between a span's rows."""
+        rows, first, *_ = self._spans[number]
+        return rows(first, first + 2).step
+
+    def around(self, number: int, margin: int) -> Segment:
+        """A span with up to `margin` rows of what stands before and after it, outside its core."""
+        rows, first, last, n = self._spans[number]
+        begin, end = max(0, first - margin), min(n, last + margin)
+        return replace(rows(begin, end), core=slice(first - begin, last - begin))
+
+
+def edges(n: int) -> list[int]:
+    """Where the spans of n rows begin, and the end: as few as hold `SPAN` rows at most, of equal
+    length."""
+    count = -(-n // SPAN)
+    return [n * k // count for k in range(count + 1)]
+
+
+@cache
+def _trim():
+    """The C library's way to give back what is free; nothing where it has none."""
+    try:
+        return CDLL(None).malloc_trim
+    except (AttributeError, OSError, TypeError):
+        return lambda _: None
+
+
+def released() -> None:
+    """Give the memory of a span that is done with back to the system: what the C library keeps is
+    in pieces, and would grow from span to span."""
+    _trim()(0)
+
+
+def around(segments: Sequence[Segment], number: int, margin: int) -> Segment:
+    """A segment of any log, with up to `margin` rows about its core where it is a span."""
+    return segments.around(number, margin) if isinstance(segments, Spans) else segments[number]
+
+
+def clocks(segments: Sequence[Segment]) -> list[tuple[float, float]]:
+    """First and last time [s] of each stretch of any log that has no gap."""
+    if isinstance(segments, Spans):
+        return segments.clocks()
+    return [(float(segment.t[0]), float(segment.t[-1])) for segment in segments]
+
+
+def of_segment(segment: Segment) -> tuple[Rows, int]:
+    """What reads the rows of a segment that is in memory, and how many it has."""
+
+    def rows(first: int, last: int) -> Segment:
+        part = slice(first, last)
+        cut = lambda values: None if values is None else values[part]  # noqa: E731
+        signals = {name: values[part] for name, values in segment.signals.items()}
+        arrays = {name: cut(getattr(segment, name)) for name in ("t", "q", "tau", "qd", "qdd")}
+        return replace(segment, **arrays, signals=signals, core=None)
+
+    return rows, len(segment.t)

@@ -1,0 +1,207 @@
+"""Long logs in spans: what is found of them is what is found of the log as one."""
+
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+import pytest
+
+import sysid
+from sysid import config, events, long_log, long_motion, pipeline, preprocess, results, spans
+from sysid import log as logs
+from sysid.events import Event
+from sysid.motion import Pieces
+
+LEG = Path(__file__).resolve().parent.parent / "configs" / "cheetah3.yaml"
+
+
+@pytest.fixture
+def short_spans(monkeypatch):
+    monkeypatch.setattr(spans, "SPAN", 1100)
+
+
+def experiment(path=None, *, preprocess=None, train=None, **data):
+    found = config.load(LEG)
+    own = found.data.model_copy(update=data)
+    if path is not None:
+        entry = {"file": str(path), **(train or {})}
+        own = own.model_copy(update={"train": [type(found.data.train[0])(**entry)]})
+    how = found.preprocess if preprocess is None else type(found.preprocess)(**preprocess)
+    return found.model_copy(update={"data": own, "preprocess": how})
+
+
+def leg_table():
+    return pl.read_parquet(LEG.parent.parent / "data" / "cheetah3" / "train.parquet")
+
+
+EVERY_ROW = {"standstill": "keep", "events": "keep"}
+FILTERS = [
+    {}, {"torque": "same"}, {"filter": "butterworth", "cutoff": 20.0},
+    {"torque": "low-pass", "window": 0.03, "cutoff": 150.0},
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("filter_", FILTERS, ids=str)
+def test_a_log_in_spans_is_fitted_as_the_log_as_one(filter_, monkeypatch):
+    spec = experiment(preprocess={**EVERY_ROW, **filter_})
+    whole = sysid.fit(spec, filters={})
+    monkeypatch.setattr(spans, "SPAN", 1100)
+    found = sysid.fit(spec, filters={})
+    scale = np.maximum(np.abs(whole.x), 1e-3)
+    assert np.max(np.abs(found.x - whole.x) / scale) < 1e-9
+    assert found.samples == whole.samples and found.left_out == whole.left_out
+    assert found.notices == whole.notices and found.logs == whole.logs
+    for part in ("train", "test"):
+        one, other = whole.predictions[part], found.predictions[part]
+        for name in ("log", "t", "measured", "predicted"):
+            np.testing.assert_allclose(
+                getattr(other, name), getattr(one, name), rtol=1e-9, atol=1e-9
+            )
+        for key, value in one.errors().items():
+            np.testing.assert_allclose(other.errors()[key], value, rtol=1e-9)
+        assert other.told() == pytest.approx(one.told(), rel=1e-9)
+        np.testing.assert_array_equal(other.greatest(3), one.greatest(3))
+        np.testing.assert_array_equal(other.states.index, one.states.index)
+        np.testing.assert_allclose(other.states.q, one.states.q, atol=1e-12)
+
+
+@pytest.mark.parametrize("standstill", ["auto", "mask", 0.05])
+def test_rows_are_left_out_as_of_the_log_as_one(standstill, short_spans):
+    """All but jumps, which are judged by what is usual in a span: here the torque has none."""
+    spec = experiment(preprocess={"standstill": standstill, "events": "keep"})
+    machine, _, _ = pipeline.build(spec)
+    read = [
+        long_log.read(one, spec.data, machine.joints, machine.prismatic, spec.folder)
+        for one in spec.data.train
+    ]
+    assert isinstance(read[0].segments, spans.Spans)
+    whole = [
+        logs.read(one, spec.data, machine.joints, machine.prismatic, spec.folder)
+        for one in spec.data.train
+    ]
+    one, found = (
+        preprocess.prepare(whole, spec.preprocess, machine.joints),
+        long_motion.prepare(read, spec.preprocess, machine.joints),
+    )
+    assert isinstance(found.pieces, Pieces) and one.samples == found.samples
+
+    def joined(motion, name):
+        return np.concatenate([getattr(p, name)[p.core] for p in motion.pieces])
+
+    np.testing.assert_allclose(joined(found, "qdd"), joined(one, "qdd"), rtol=1e-9, atol=1e-9)
+    different = np.mean(joined(found, "use") != joined(one, "use"))
+    assert different < (
+        0.02 if standstill == "auto" else 1e-12
+    )  # a span's own noise says how slow is still
+    np.testing.assert_allclose(found.standing, one.standing, atol=2e-3 + different)
+    assert found.still == one.still and found.left_out == pytest.approx(
+        one.left_out, abs=0.02 * one.samples
+    )
+    np.testing.assert_allclose(found.pieces[0].rest, one.pieces[0].rest, rtol=1e-9)
+
+
+def test_a_file_is_read_in_parts_as_in_memory(short_spans, tmp_path):
+    """Whatever its row groups, with a gap, a piece of it, and a clock in ns since 1970."""
+    table = leg_table()
+    t = np.arange(len(table)) * 1_000_000 + 1_700_000_000_000_000_000
+    t[3000:] += 40_000_000
+    table = table.with_columns(pl.Series("t", t))
+    data = {"units": experiment().data.units.model_copy(update={"time": "ns"})}
+    found = []
+    for groups in (300, 100_000):
+        path = tmp_path / f"{groups}.parquet"
+        table.write_parquet(path, row_group_size=groups)
+        spec = experiment(path, train={"start": 0.2, "stop": 4.5}, **data)
+        rest = type(spec.data.train[0])(file=str(path), start=4.5)
+        spec = spec.model_copy(update={"data": spec.data.model_copy(update={"test": [rest]})})
+        machine, _, _ = pipeline.build(spec)
+        (entry,) = spec.data.train
+        with pytest.warns(sysid.SysidWarning, match=r"1 gap\(s\), the longest 0.041 s"):
+            read = long_log.read(entry, spec.data, machine.joints, machine.prismatic, spec.folder)
+        with pytest.warns(sysid.SysidWarning, match=r"1 gap\(s\), the longest 0.041 s"):
+            whole = logs.read(entry, spec.data, machine.joints, machine.prismatic, spec.folder)
+        assert (
+            len(whole.segments) == read.stretches == 2
+            and read.samples == whole.samples
+            and read.sha256 == whole.sha256
+        )
+        for name in ("t", "q", "tau"):
+            joined = np.concatenate([getattr(s, name) for s in read.segments])
+            np.testing.assert_array_equal(
+                joined, np.concatenate([getattr(s, name) for s in whole.segments])
+            )
+        found.append(sysid.fit(spec).x)
+    np.testing.assert_allclose(*found, rtol=1e-12)
+
+
+@pytest.mark.filterwarnings("ignore::sysid.SysidWarning")
+def test_bad_values_are_told_with_their_row(short_spans, tmp_path):
+    for column, value, said in (
+        ("tau_hip", np.nan, "row 2500"),
+        ("q_hip", None, "row 2500"),
+        ("t", 0.0, "row 2500"),
+    ):
+        values = leg_table()[column].to_list()
+        values[2500] = value
+        path = tmp_path / f"{column}.parquet"
+        leg_table().with_columns(pl.Series(column, values)).write_parquet(path)
+        with pytest.raises(sysid.SysidError, match=said):
+            sysid.fit(experiment(path))
+
+
+def test_the_run_folder_is_the_same(short_spans, tmp_path, monkeypatch):
+    spec = experiment()
+    found = sysid.fit(spec)
+    assert found.predictions["train"].files
+    document = results.write(found, tmp_path / "spans")
+    folder = found.predictions["train"].files[0].parent
+    read = sysid.read_run(tmp_path / "spans")
+    monkeypatch.setattr(spans, "SPAN", 2**18)
+    whole = results.write(sysid.fit(spec), tmp_path / "whole")
+    a, b = (pl.read_parquet(tmp_path / name / "predictions.parquet") for name in ("spans", "whole"))
+    assert a.schema == b.schema and a.height == b.height
+    np.testing.assert_allclose(
+        a.drop("part").to_numpy(), b.drop("part").to_numpy(), rtol=1e-9, atol=1e-9
+    )
+    assert document["rms"]["test"] == pytest.approx(whole["rms"]["test"], rel=1e-9)
+    assert folder.is_dir() and read.joints == found.joints
+    del found
+    assert not folder.exists()
+
+
+def test_models_that_look_back_have_the_log_whole(short_spans):
+    spec = experiment()
+    effects = [*spec.model.effects, type(spec.model.effects[0])(name="presliding")]
+    _, local, _ = pipeline.build(spec)
+    machine, structure, _ = pipeline.build(
+        spec.model_copy(update={"model": spec.model.model_copy(update={"effects": effects})})
+    )
+    assert local.local and not structure.local
+    (read,) = pipeline.read(spec, machine, spec.data.train, structure=structure)
+    assert len(read.segments) == 1 and isinstance(read.segments, tuple)
+
+
+def test_a_mask_is_one_event_however_many_spans_it_goes_through(short_spans, monkeypatch):
+    name = experiment().data.train[0].name
+    mask = {"log": name, "start": 0.5, "stop": 3.0}
+    spec = experiment(preprocess={"mask": [mask], "standstill": "keep"})
+    found = sysid.fit(spec)
+    monkeypatch.setattr(spans, "SPAN", 2**18)
+    assert found.events == sysid.fit(spec).events and len(found.events) == 1
+
+
+def test_events_go_on_from_span_to_span():
+    one = lambda start, stop, **how: Event(
+        **{"kind": "frozen", "log": "a", "start": start, "stop": stop, "joints": ("hip",), **how}
+    )  # noqa: E731
+    parts = [
+        one(1.0, 1.999),
+        one(2.0, 2.5),
+        one(2.0, 2.2, joints=("knee",)),
+        one(2.7, 2.8),
+        one(1.999, 1.999, kind="spike"),
+        one(2.0, 2.0, kind="spike"),
+    ]
+    found = events.joined(parts, 1e-3)
+    assert one(1.0, 2.5) in found and len(found) == 5
+    assert events.clipped([one(1.0, 3.0), one(0.0, 0.5)], 1.5, 2.0) == [one(1.5, 2.0)]
