@@ -28,7 +28,7 @@ sys.path.insert(0, str(ROOT))
 os.environ["PYTHONPATH"] = os.pathsep.join(
     [str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])]
 )
-STUDIES = ("oddities", "questions")
+STUDIES = ("oddities", "questions", "following")
 
 
 def _state() -> str:

@@ -13,6 +13,7 @@
     sysid.read_run("runs/mine").torque(q, qd, qdd)
     sysid.export("runs/mine", "mjcf", "simulation")
     sysid.fleet(["robots/*"]).odd
+    sysid.Online("runs/mine", rate=1000.0).add(q, tau)
 
 Names are imported when they are first used, so that `import sysid` costs nothing.
 """
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     from .comparison import Difference, compare
     from .errors import SysidError, SysidWarning
     from .estimate import Fit, Prediction
+    from .online import Online
     from .pipeline import fit, load
     from .pipeline import predict_log as predict
     from .results import write
@@ -37,7 +39,7 @@ _WHERE = {
     "write": ("results", "write"), "compare": ("comparison", "compare"), "Difference": ("comparison", "Difference"),
     "Experiment": ("config", "Experiment"), "Fit": ("estimate", "Fit"), "Prediction": ("estimate", "Prediction"),
     "read_run": ("run", "read_run"), "Run": ("run", "Run"),
-    "trust": ("trusted", "trust"), "check": ("check", None), "design": ("design", None), "diagnose": ("diagnose", None), "export": ("export", None), "fleet": ("fleet", None), "SysidError": ("errors", "SysidError"), "SysidWarning": ("errors", "SysidWarning"),
+    "trust": ("trusted", "trust"), "check": ("check", None), "design": ("design", None), "diagnose": ("diagnose", None), "export": ("export", None), "fleet": ("fleet", None), "Online": ("online", "Online"), "SysidError": ("errors", "SysidError"), "SysidWarning": ("errors", "SysidWarning"),
 }  # fmt: skip
 
 
@@ -54,6 +56,6 @@ def __dir__():
 
 
 __all__ = [
-    "Difference", "Experiment", "Fit", "Prediction", "Run", "SysidError", "SysidWarning", "check", "compare", "design", "diagnose", "export",
+    "Difference", "Experiment", "Fit", "Online", "Prediction", "Run", "SysidError", "SysidWarning", "check", "compare", "design", "diagnose", "export",
     "fit", "fleet", "load", "predict", "read_run", "trust", "write",
 ]

@@ -41,7 +41,7 @@ def together(model: Model, asked: Question, chosen) -> tuple[tuple[Change, ...],
     spans = dict(zip(chosen, (slice(a, b) for a, b in zip([0, *ends], ends))))
     body = spans.get(("payload", ROBOT))
     whole = asked.by_block.sum(axis=0)
-    c, around = _possible(whole, places, body)
+    c, around = possible(whole, places, body)
     pull = whole[places, -1] - whole[np.ix_(places, places)] @ c
     without = np.array([_nearby(whole - b, places, c, around, pull) for b in asked.by_block])
     with_all, out = asked.across(chosen), []
@@ -57,7 +57,7 @@ def together(model: Model, asked: Question, chosen) -> tuple[tuple[Change, ...],
     return tuple(sorted(out, key=lambda change: -change.removed)), left
 
 
-def _possible(products, places, own: slice | None) -> tuple[np.ndarray, np.ndarray]:
+def possible(products, places, own: slice | None) -> tuple[np.ndarray, np.ndarray]:
     """Least squares by products, with a body's ten columns kept physically possible; and half the
     Hessian (k, k) of what is beside the data there."""
     size = len(places)
