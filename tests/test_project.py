@@ -25,7 +25,7 @@ ORDER = [
     "reduction", "compress", "interior", "nearby", "certificate", "solve", "prior_weight", "uncertainty", "differences", "estimate",
     "long_prediction", "base_parameters", "held_apart", "masses", "plausible", "shape_search", "shape", "bumps", "filters", "results",
     "experiment_file", "yaml_edit", "urdf_export", "gains", "simulate", "rollout", "pipeline", "run", "export", "check", "init", "comparison",
-    "transfer", "noise", "candidates", "design", "view", "failures", "shown", "diagnose", "changes", "online", "fleet", "statement", "loop", "report",
+    "transfer", "noise", "candidates", "design", "view", "failures", "unexplained", "shown", "diagnose", "changes", "online", "fleet", "statement", "loop", "report",
     "studies", "studio", "terminal", "cli", "__main__",
 ]  # fmt: skip
 # Late imports that close a loop on purpose: a path that names a data set, a prior that is a previous run, the effects

@@ -12,13 +12,13 @@ from sysid import pipeline
 from sysid.candidates import candidates
 from sysid.comparison import Difference
 from sysid.diagnose import claims
-from sysid.diagnose.ask import ask
+from sysid.diagnose.ask import Asked, ask
 from sysid.diagnose.detectable import detectable
 from sysid.diagnose.diagnosis import diagnose
 from sysid.diagnose.select import WORTH, search
 from sysid.diagnose.verdict import _UNKNOWN, predictable, verdicts
 from sysid.effect import Linear, TorqueEffect
-from sysid.flexible import Unknown
+from sysid.flexible import Agreement, Unknown
 from sysid.noise import NoiseFloor
 from sysid.simulate import simulate, write
 from sysid.statement.document import _verdict, dependences
@@ -159,9 +159,9 @@ def test_the_greater_part_gives_the_name(taken, share, status):
 def test_error_above_the_floor_that_nothing_predicts_is_unresolved():
     found = elbow(2.0)
     assert found.status == "unresolved" and "2 times the noise floor" in found.says
-    refused = SimpleNamespace(effect="backlash", joint="elbow", why="its parameters are nothing")
+    refused = claims.Refused(effect="backlash", joint="elbow", why="its parameters are nothing")
     assert "backlash was looked at and is not claimed: its parameters are nothing" in elbow(2.0, refused=[refused]).says
-    assert "backlash" not in elbow(2.0, refused=[SimpleNamespace(effect="backlash", joint="shoulder", why="x")]).says
+    assert "backlash" not in elbow(2.0, refused=[claims.Refused(effect="backlash", joint="shoulder", why="x")]).says
 
 
 @pytest.mark.parametrize(("weighed", "train", "told"), [(1.05, 2.0, True), (1.6, 2.0, False), (1.05, 1.0, True), (2.0, 2.0, False)])
@@ -301,3 +301,50 @@ def test_twice_the_size_is_found_and_a_fifth_is_not(control, simulated, effect, 
         steps, *_ = search(first_view(experiment, pipeline.fit(experiment)), most=1)
         named[times] = [(m.candidate.name, m.candidate.joint) for s in steps for m, _ in s.choice.members]
     assert named[0.2] == [] and (effect, joint) in named[2.0], (size, named)
+
+
+# ---- asked once more, of joints above their floors
+
+
+def asked_of_elbow(error: float, *, gain: float = 0.3, chance: float = 1e-3, near: str = "", weighed=None):
+    """The elbow's verdict where ridge regression says nothing; the joints that were asked what their blocks agree on."""
+    seen = []
+
+    def agreed(j: int) -> Agreement:
+        seen.append(j)
+        return Agreement(chance, "q_elbow and qd_shoulder", gain * NOISE.total)
+
+    found = verdicts(
+        fitted(error), [], [NOISE, NOISE], [floor(), floor()], (), (), weighed, agreed, lambda j, own: near if own > 0 else ""
+    )
+    return found[1], seen
+
+
+def test_blocks_are_asked_of_joints_above_their_floors_alone():
+    found, seen = asked_of_elbow(3.0)
+    assert found.status == "unknown" and seen == [1] and found.left.agreed == pytest.approx(0.3)
+    found, seen = asked_of_elbow(1.0)
+    assert found.status == "complete" and seen == []
+    # nor where the weights of the fit are most of it
+    found, seen = asked_of_elbow(3.0, weighed={"shoulder": 1.0, "elbow": 1.2})
+    assert found.status == "unresolved" and seen == []
+
+
+@pytest.mark.parametrize(("gain", "chance"), [(0.3, 0.2), (0.5 * WORTH, 1e-3)])
+def test_blocks_that_agree_by_chance_or_on_little_say_nothing(gain, chance):
+    assert asked_of_elbow(3.0, gain=gain, chance=chance)[0].status == "unresolved"
+
+
+def test_the_catalogue_is_not_said_to_lack_what_an_effect_of_it_may_be():
+    found, _ = asked_of_elbow(3.0, near="stribeck")
+    assert found.status == "unresolved" and "what is left may be stribeck or a law" in found.says
+    assert found.left is not None  # the variables are told all the same
+
+
+def test_an_effect_is_near_that_stands_at_five_per_cent_and_takes_half():
+    maxima = np.linspace(0.0, 4.0, 401)
+    group = lambda name: SimpleNamespace(candidate=SimpleNamespace(name=name))  # noqa: E731
+    one = ([group("spring"), group("cable"), group("cogging")], np.array([3.9, 3.95, 3.0]), np.array([6.0, 4.0, 9.0]), maxima)
+    asked = Asked({0: one})
+    assert asked.near(0, 10.0) == "spring"  # cable takes less than half, cogging may be chance
+    assert asked.near(0, 7.0) == "cable" and asked.near(0, 20.0) == "" and asked.near(1, 10.0) == ""

@@ -13,6 +13,9 @@ from . import null
 from .evidence import Group, gain
 from .projected import groups
 
+_MAY_BE = 0.05  # family-wise: an effect that may be there, though it is not claimed
+_HALF = 0.5  # of what functions of the motion predict: that much may be the effect
+
 
 @dataclass(frozen=True)
 class Asked:
@@ -44,6 +47,15 @@ class Asked:
     def p(self, k: int) -> float:
         """Family-wise p-value of a group."""
         return float((1 + np.sum(self.maxima >= self.statistics[k])) / (1 + len(self.maxima)))
+
+    def near(self, joint: int, gain: float) -> str:
+        """The effect on a joint that may be there and takes half of a gain, the most likely one;
+        empty where none does."""
+        found, statistics, gains, _ = self.by_joint.get(joint, ([], [], [], None))
+        least = np.quantile(self.maxima, 1.0 - _MAY_BE)
+        told = zip(statistics, gains, found)
+        takes = [(s, g.candidate.name) for s, own, g in told if s > least and own > _HALF * gain]
+        return max(takes, default=(0.0, ""))[1]
 
 
 def ask(view: View, extra=(), tell=lambda share: None, *, before=None, anew=()) -> Asked:

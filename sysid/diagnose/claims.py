@@ -52,6 +52,11 @@ class Refused:
     joint: str
     why: str
 
+    @property
+    def told(self) -> str:
+        """In words."""
+        return f"{self.effect} was looked at and is not claimed: {self.why}"
+
 
 def claimed(
     steps: list[Step], fit: Fit, measured: pipeline.Read, tell: Callable[[str, float], None]

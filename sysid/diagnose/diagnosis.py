@@ -80,7 +80,7 @@ def diagnose(
     fit = fit or pipeline.fit(experiment, progress=progress, measured=measured)
     with pipeline.noticed():
         view = first_view(fit.experiment, fit, measured.train)
-        steps, asked, _, undecided = select.search(view, extra, level=level, tell=tell)
+        steps, asked, then_asked, undecided = select.search(view, extra, level=level, tell=tell)
         claims, refused = claiming.claimed(steps, fit, measured, tell)
         refused += [claiming.undecided(choice, fit) for choice in undecided[-1:]]
         after, last = (claims[-1].step.after, claims[-1].after) if claims else (view, fit)
@@ -90,7 +90,7 @@ def diagnose(
         x = after.settled.x + after.design.change[: after.model.size]
         parts = measured.train, measured.test
         found, weighed = floors_of_fit(experiment, last, after.model, x, parts)
-        more = refused, transfers(last), weighed, after.agreement
+        more = refused, transfers(last), weighed, after.agreement, then_asked.near
         said = verdicts(fit, claims, after.unknown, found, *more)
         errors = last.rms("test").values()
         levels = np.array([e if f.rms is None else f.rms for f, e in zip(found, errors)])

@@ -35,7 +35,7 @@ def search(
             effect must take.
 
     Returns:
-        (steps, asked first, last view, what is there and cannot be told from effects elsewhere)
+        (steps, asked first, asked last, what is there and cannot be told from effects elsewhere)
     """
     first_view, steps, open_ = view, list[Step](), list[Choice]()
     first = asked = ask(view, extra, lambda share: tell("ask", share))
@@ -49,7 +49,7 @@ def search(
         kept = [s.candidate for s in steps] == [s.candidate for s in joined_]
         say = lambda share, word=step.candidate.name: tell(f"ask, with {word}", share)  # noqa: E731
         asked = ask(view, extra, say, before=asked if kept else None, anew=step.changed)
-    return steps, first, view, open_
+    return steps, first, asked, open_
 
 
 def _next(view: View, asked: Asked, level: float, worth: float, open_: list[Choice]) -> Step | None:

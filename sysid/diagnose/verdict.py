@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from ..estimate import Fit
 from ..flexible import Agreement, Unknown
 from ..transfer import Transfer
+from ..unexplained import unexplained
 from .claims import Claim
 from .select import WORTH
 
@@ -47,6 +48,7 @@ def verdicts(
     carried: Sequence[Transfer] = (),
     weighed: dict[str, float] | None = None,
     agreed: Callable[[int], Agreement] | None = None,
+    near: Callable[[int, float], str] | None = None,
 ) -> list[Verdict]:
     """The verdict on every joint.
 
@@ -54,7 +56,8 @@ def verdicts(
         fit: of the experiment as it is. left: what functions of the motion predict with all claims
             in the model. floors: of each joint's noise. carried: whether the model with all claims
             carries over, of each joint. weighed: {joint: RMS where each counts by its noise}.
-            agreed: what blocks of time agree on of a joint, asked where `left` says nothing.
+            agreed: what blocks of time agree on of a joint, asked where `left` says nothing. near:
+            the effect that may be what is left of a joint, by what the motion predicts of it.
     """
     last = claims[-1].after if claims else fit
     errors = last.rms("train"), last.rms("test")
@@ -75,14 +78,18 @@ def verdicts(
         if agreed and asked[j] and then > 0.0 and not predictable(seen, among):
             seen = seen.with_agreement(agreed(j))
         remains = seen if predictable(seen, among) else None
+        looks = near(j, remains.share * remains.total) if near and remains else ""
         reached = reaches[j] and first > 0.0 and not _above(remains, then, floor)
         taken = sum(c.step.shares[j] for c in own)
         if own and (remains is None or remains.share * max(1.0 - taken, 0.0) <= _MOST * taken):
             told = ("missing", own, explained, remains)
-        elif own or (remains is not None and not reached and not evens[j]):
+        elif own or (remains is not None and not looks and not reached and not evens[j]):
             told = ("unknown", own or others, explained, remains)
         elif not reached:
-            why = _why(fit, j, floors[j], then, last, refused, weighed[joint] if evens[j] else None)
+            carries = not _at(floors[j], last.rms("train")[joint])
+            even = weighed[joint] if evens[j] else None
+            why = unexplained(then, floors[j], looks, even, carries)
+            why += "".join(f"; {r.told}" for r in refused if r.joint in (joint, "*"))
             told = ("unresolved", others, explained, remains, why)
         elif _at(floors[j], first) or not claims:
             told = ("complete",)
@@ -119,33 +126,3 @@ def _above(remains: Unknown | None, error: float, floor: float) -> bool:
     more than the floor's doubt lets pass."""
     left = 1.0 if remains is None else 1.0 - remains.share
     return left < (1.0 + _FLOOR) ** -2 and left * error**2 >= floor**2
-
-
-def _why(fit: Fit, j: int, floor, error: float, last: Fit, refused, weighed: float | None) -> str:
-    joint, train = fit.joints[j], last.rms("train")[fit.joints[j]]
-    if not error > 0.0:
-        said = "none of its rows on the test logs counts: unused, at a standstill, or disturbed"
-    elif floor.rms is None:
-        said = (
-            f"its noise floor is not known ({floor.detail}), so nobody can say what error is left "
-            "above it"
-        )
-    elif weighed is not None:
-        said = (
-            f"its error is {error / floor.rms:.2g} times the noise floor because joints with more "
-            "noise count as much as quiet ones in this fit; with solver.weighting: noise it would "
-            f"be {weighed / floor.rms:.2g} times"
-        )
-    elif _at(floor, train):
-        said = (
-            "the training logs are explained and the test logs are not: the model does not carry "
-            "over to them"
-        )
-    else:
-        said = (
-            f"its error is {error / max(floor.rms, 1e-300):.2g} times the noise floor, and nothing "
-            "in the motion of these logs predicts the rest"
-        )
-    asked = [r for r in refused if r.joint in (joint, "*")]
-    words = [f"{r.effect} was looked at and is not claimed: {r.why}" for r in asked]
-    return "; ".join([said, *words])
