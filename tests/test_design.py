@@ -199,7 +199,7 @@ def test_a_design_keeps_to_every_limit_as_an_independent_check_sees_it(poor, des
 
 def test_a_design_tells_more_than_random_motions(designed):
     assert designed.log_det > designed.random_best + 5.0
-    assert all(0.0 <= s["after"] <= s["now"] for s in designed.deviations.values())
+    assert all(0.0 <= s["after"] <= s["now"] * (1.0 + 1e-6) for s in designed.deviations.values())
 
 
 def test_its_files(poor, designed, tmp_path):

@@ -6,8 +6,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from sysid.design import promise, spectrum, suspects
+from sysid import config
+from sysid.design import basis, promise, spectrum, suspects
+from sysid.design.columns import columns
 from sysid.design.spectrum import Noise, Stretch, noise_left, scatter, white
+from sysid.errors import SysidWarning
+from tests.conftest import URDF
 
 
 def coloured(rng, n, step, levels):
@@ -99,12 +103,32 @@ def test_a_likely_size_is_what_logs_and_usual_sizes_suggest():
         left = true * columns[:, k] + 0.1 * rng.normal(size=n)
         left = left - base @ np.linalg.lstsq(base, left, rcond=None)[0]  # as a fit leaves it
         rows = SimpleNamespace(columns=base[None], tau=2.0 * np.ones((n, 1)), residual=lambda x, left=left: left[:, None])
-        seen = SimpleNamespace(rows=rows, weights=np.array([10.0]), source=None)
+        seen = SimpleNamespace(rows=rows, weights=np.array([10.0]), source=SimpleNamespace(model=None))
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(suspects, "tried", lambda source, candidate: [{}])
             patch.setattr(suspects, "on_every_joint", lambda source, candidate, at, k=k: columns[None, :, k : k + 1])
-            found = suspects.suspected(seen, SimpleNamespace(x=None), np.zeros((3, 3)), None)
+            found = suspects.suspected(seen, SimpleNamespace(x=None), np.zeros((3, 3)), SimpleNamespace(effect=None))
         assert 0.7 * (true if k else size[0]) < abs(found.size[0]) < 1.3 * max(true, size[0] if k == 0 else 0.0)
+
+
+def test_a_small_delay_and_a_small_lag_are_told_apart_by_what_is_beyond_their_slopes(tmp_path):
+    """Against the effects themselves on the predicted torque."""
+    (tmp_path / "robot.urdf").write_text(URDF)
+    text = "robot: {urdf: robot.urdf}\nmodel: {effects: [viscous]}\n"
+    with pytest.warns(SysidWarning, match="no log yet"):
+        known = basis.basis(config.loads(text, tmp_path / "c.yaml"), [("delay", "elbow"), ("current_lag", "elbow")], None).known
+    t = 0.002 * np.arange(2000)
+    q, qd, qdd = (np.stack([f(3 * t), f(5 * t)], axis=1) * s for f, s in ((np.sin, 1.0), (np.cos, [3.0, 5.0]), (np.sin, [-9.0, -25.0])))
+    both = suspects.along(known.suspects, known.model, known.x, q, qd, qdd, 0.002)[1][:, 300:-300]
+    torque = np.einsum("pn,p->n", columns(known.model, q, qd, qdd)[1], known.x)
+    for own, one in zip(both, known.suspects):
+        (value,) = one.shapes.values()
+        assert value != 0.0 and one.size == pytest.approx([value])
+        exact = one.candidate.effect.sensed(torque[None], 0.002, **one.shapes)[0] - torque
+        np.testing.assert_allclose(own * one.size[0], exact[300:-300], atol=1e-6 * np.abs(torque).max())
+    a, b = both
+    left = a - b * (a @ b) / (b @ b)
+    assert 1e-4 < np.linalg.norm(left) / np.linalg.norm(a) < 0.5
 
 
 def test_nothing_left_is_no_noise():

@@ -13,11 +13,12 @@ from types import MappingProxyType, SimpleNamespace
 
 import numpy as np
 
-from ..candidates import Candidate, columns_of, tried
+from ..candidates import Candidate, bounds_of, columns_of, tried
+from ..effect import SensorEffect, Shape
 from ..estimate import Fit
 from ..model import ROBOT, Model
 from ..motion import Motion
-from ..rows import Rows, stack
+from ..rows import Rows, stack, starts
 from ..source import Source
 from .columns import piece
 from .noise import noise_of
@@ -88,13 +89,47 @@ def played(
 
 def on_every_joint(source: Source, candidate: Candidate, at: dict[str, float]) -> np.ndarray:
     """Columns (dof, n, k) of a candidate on the rows of a source."""
-    found = columns_of(source, candidate, [at])[0]
+    if (own := _value(candidate)) and at[own.name] != own.start:
+        found = _secant(source, candidate, at, own.name)
+    else:
+        found = columns_of(source, candidate, [at])[0]
     dof = source.use.shape[1]
     if len(found) == dof:
         return found
     out = np.zeros((dof, *found.shape[1:]))
     out[candidate.joint] = found[0]
     return out
+
+
+def _value(candidate: Candidate) -> Shape | None:
+    """The one value of a sensor effect, from zero on; None of any other."""
+    if not isinstance(candidate.effect, SensorEffect):
+        return None
+    values = candidate.effect.shapes()
+    return values[0] if len(values) == 1 and values[0].start == 0.0 else None
+
+
+def _secant(source: Source, candidate: Candidate, at: dict[str, float], name: str) -> np.ndarray:
+    """(1, n, 1) what a sensor effect of one value makes of the predicted torque of its joint, over that
+    value: of a small delay and a small lag the slopes at zero are the same, and only what is beyond
+    tells them apart."""
+    out, joint = [], candidate.joint
+    kept = starts(source.motion, source.stride)
+    for part, torque, rows in zip(source.motion.pieces, source.unfiltered, kept):
+        base = torque[None, joint]
+        change = (candidate.effect.sensed(base, part.step, **at) - base)[0] / at[name]
+        out.append(part.settled(change, rows, joint))
+    return (np.concatenate(out) * source.use[:, joint])[None, :, None]
+
+
+def _at_size(model: Model, suspect: Suspect) -> Suspect:
+    """A suspect of a sensor effect of one value at that value, which is its size."""
+    own = _value(suspect.candidate)
+    if own is None:
+        return suspect
+    ((_, low, high, _),) = bounds_of(model, suspect.candidate)
+    value = float(np.clip(suspect.size[0], low, high))
+    return replace(suspect, shapes={own.name: value}, size=np.array([value])) if value else suspect
 
 
 @dataclass(frozen=True)
@@ -152,8 +187,10 @@ def suspected(seen: Seen, fit: Fit, prior: np.ndarray, candidate: Candidate) -> 
     _, at, mean, spread, gram, size = best
     made = float(mean @ gram @ mean)
     if made <= _NOTHING * float(np.sum(spread * gram)):
-        return Suspect(candidate, at, size / np.sqrt(len(size)))
-    return Suspect(candidate, at, mean * np.sqrt(1.0 + float(np.sum(spread * gram)) / made))
+        likely = size / np.sqrt(len(size))
+    else:
+        likely = mean * np.sqrt(1.0 + float(np.sum(spread * gram)) / made)
+    return _at_size(seen.source.model, Suspect(candidate, at, likely))
 
 
 def solved(gram, right) -> np.ndarray:
@@ -185,4 +222,4 @@ def unseen(model: Model, x, q, qd, qdd, candidate: Candidate, torque) -> Suspect
     blank = Suspect(candidate, at, np.zeros(0))
     columns = np.moveaxis(along([blank], model, x, q, qd, qdd), 1, 2)
     size = usual(columns, torque)
-    return Suspect(candidate, at, size / np.sqrt(len(size)))
+    return _at_size(model, Suspect(candidate, at, size / np.sqrt(len(size))))
