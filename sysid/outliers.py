@@ -79,7 +79,10 @@ def spikes(tau) -> list[list[tuple[int, int]]]:
     while True:
         pairs = zip((z for _, z, _ in found), hit)
         s = [surprise(z, _WHITE, z[~own], _TAIL) if len(z) else z for z, own in pairs]
-        ranked = np.sort(np.concatenate(s))[::-1]
+        # ranks of those alone that are high enough at any rank: the others have none
+        count = max(sum(map(len, s)), 1)
+        lowest = np.log(SPIKE * n * dof / (CHANCE * count))
+        ranked = np.sort(np.concatenate([own[own > lowest] for own in s]))[::-1]
         allowed = CHANCE * np.arange(1, len(ranked) + 1)
         enough = np.flatnonzero(ranked > np.log(SPIKE * n * dof / allowed))
         least = ranked[enough[-1]] if len(enough) else np.inf
