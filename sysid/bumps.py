@@ -30,11 +30,14 @@ _WHITE = 0.706  # z75 - z50 of a normal variable's size over its median
 _PASSES = 2  # the second with every joint weighted by what the first leaves
 
 
-def bumps(robot: Robot, logs: Sequence[Log]) -> list[Event]:
+def bumps(robot: Robot, logs: Sequence[Log], *, among: int = 1) -> list[Event]:
     """Knocks in what rigid bodies with friction, fitted to logs of a robot, leave of them.
 
     The size of what is left, under the low-pass of a diagnosis, over the usual: the larger of the
     joint's own and of what is about it. A knock is where it surprises on two joints.
+
+    Args:
+        among: as of `outliers.spikes`.
     """
     from scipy.ndimage import maximum_filter1d
 
@@ -50,7 +53,7 @@ def bumps(robot: Robot, logs: Sequence[Log]) -> list[Event]:
     size = np.abs(_left(rows, _kinds(motion)[rows.piece]))
     own = np.stack([_surprise(a, u, rows.piece, step) for a, u in zip(size.T, rows.use.T)], axis=1)
     span = len(own) * step
-    level = np.log(span / BURST * robot.dof / CHANCE)
+    level = np.log(span / BURST * robot.dof * among / CHANCE)
     found = []
     for number, piece in enumerate(motion.pieces):
         (at,) = np.nonzero(rows.piece == number)
