@@ -78,12 +78,18 @@ def _left(rows: Rows, kind: np.ndarray) -> np.ndarray:
     """What least squares leave (n, dof), every joint in units of its median; of rows of each kind
     (n,) by itself."""
     weights, left = np.ones(rows.tau.shape[1]), np.zeros(rows.tau.shape)
+    every, parts = slice(None), []
+    for own in (kind == number for number in np.unique(kind)):
+        own = every if own.all() else own
+        tau = rows.tau[own]
+        columns = [values[own] for values in rows.columns]
+        squares = np.stack([values.T @ values for values in columns])
+        along = np.stack([values.T @ torque for values, torque in zip(columns, tau.T)])
+        parts.append((own, tau, columns, squares, along))
     for _ in range(_PASSES):
-        for own in (kind == number for number in np.unique(kind)):
-            columns = rows.columns[:, own] * weights[:, None, None]
-            system = np.einsum("jnk,jnl->kl", columns, columns, optimize=True)
-            x = inverted(system) @ np.einsum("jnk,nj->k", columns, rows.tau[own] * weights)
-            left[own] = rows.tau[own] - np.einsum("jnk,k->nj", rows.columns[:, own], x)
+        for own, tau, columns, squares, along in parts:
+            x = inverted(np.tensordot(weights**2, squares, 1)) @ (weights**2 @ along)
+            left[own] = tau - np.stack([values @ x for values in columns], axis=1)
         usual = [np.median(np.abs(e[u])) if u.any() else 0.0 for e, u in zip(left.T, rows.use.T)]
         weights = ratio(np.ones(len(usual)), np.array(usual))
     return left * weights
