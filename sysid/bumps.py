@@ -30,11 +30,14 @@ _WHITE = 0.706  # z75 - z50 of a normal variable's size over its median
 _PASSES = 2  # the second with every joint weighted by what the first leaves
 
 
-def bumps(robot: Robot, logs: Sequence[Log]) -> list[Event]:
+def bumps(robot: Robot, logs: Sequence[Log], *, among: int = 1) -> list[Event]:
     """Knocks in what rigid bodies with friction, fitted to logs of a robot, leave of them.
 
     The size of what is left, under the low-pass of a diagnosis, over the usual: the larger of the
     joint's own and of what is about it. A knock is where it surprises on two joints.
+
+    Args:
+        among: as of `outliers.spikes`.
     """
     from scipy.ndimage import maximum_filter1d
 
@@ -50,7 +53,7 @@ def bumps(robot: Robot, logs: Sequence[Log]) -> list[Event]:
     size = np.abs(_left(rows, _kinds(motion)[rows.piece]))
     own = np.stack([_surprise(a, u, rows.piece, step) for a, u in zip(size.T, rows.use.T)], axis=1)
     span = len(own) * step
-    level = np.log(span / BURST * robot.dof / CHANCE)
+    level = np.log(span / BURST * robot.dof * among / CHANCE)
     found = []
     for number, piece in enumerate(motion.pieces):
         (at,) = np.nonzero(rows.piece == number)
@@ -75,12 +78,18 @@ def _left(rows: Rows, kind: np.ndarray) -> np.ndarray:
     """What least squares leave (n, dof), every joint in units of its median; of rows of each kind
     (n,) by itself."""
     weights, left = np.ones(rows.tau.shape[1]), np.zeros(rows.tau.shape)
+    every, parts = slice(None), []
+    for own in (kind == number for number in np.unique(kind)):
+        own = every if own.all() else own
+        tau = rows.tau[own]
+        columns = [values[own] for values in rows.columns]
+        squares = np.stack([values.T @ values for values in columns])
+        along = np.stack([values.T @ torque for values, torque in zip(columns, tau.T)])
+        parts.append((own, tau, columns, squares, along))
     for _ in range(_PASSES):
-        for own in (kind == number for number in np.unique(kind)):
-            columns = rows.columns[:, own] * weights[:, None, None]
-            system = np.einsum("jnk,jnl->kl", columns, columns, optimize=True)
-            x = inverted(system) @ np.einsum("jnk,nj->k", columns, rows.tau[own] * weights)
-            left[own] = rows.tau[own] - np.einsum("jnk,k->nj", rows.columns[:, own], x)
+        for own, tau, columns, squares, along in parts:
+            x = inverted(np.tensordot(weights**2, squares, 1)) @ (weights**2 @ along)
+            left[own] = tau - np.stack([values @ x for values in columns], axis=1)
         usual = [np.median(np.abs(e[u])) if u.any() else 0.0 for e, u in zip(left.T, rows.use.T)]
         weights = ratio(np.ones(len(usual)), np.array(usual))
     return left * weights

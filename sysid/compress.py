@@ -22,7 +22,7 @@ from .rows import difference_step
 # samples: with fewer rows than columns a triangle would be no smaller than they are
 _SHORTEST_BLOCK = 200
 # samples whose columns stand in memory at once: a filter needs margins on each stretch
-_STRETCH, _FILTERED_STRETCH = 4096, 16384
+_STRETCH, _FILTERED_STRETCH = 8192, 16384
 
 
 @dataclass(frozen=True)
@@ -300,8 +300,7 @@ def compress(model: Model | Linearised, motion: Motion, *, thin: int = 1, progre
                 own = slice(at, at + count) if sparse else slice((rows.start - from_) // every, (rows.stop - 1 - from_) // every + 1, thin)
                 at, begun = at + count, begun or [Reduction() for _ in joints]
                 for joint, values in enumerate(columns):
-                    stacked = np.concatenate([values[:, own], piece.tau[None, rows, joint]])
-                    begun[joint].add(stacked if piece.use is None else stacked[:, piece.use[rows, joint]])
+                    begun[joint].add(_counted(values, own, piece.tau[rows, joint], None if piece.use is None else piece.use[rows, joint]))
                 if stop == edges[block + 1]:
                     factors += [Factor(j, first + block, supports[j], np.sqrt(every) * one.triangle(), every * one.rows) for j, one in enumerate(begun)]
                     begun = []
@@ -310,6 +309,17 @@ def compress(model: Model | Linearised, motion: Motion, *, thin: int = 1, progre
                 progress(done / motion.samples)
         first += len(edges) - 1
     return Compressed(model.size, model.robot.dof, tuple(factors), motion.samples)
+
+
+def _counted(values: np.ndarray, own: slice, tau: np.ndarray, use: np.ndarray | None) -> np.ndarray:
+    """Columns (k + 1, m) of torque after columns (k, n) at the rows `own`, those that count."""
+    if use is None or use.all():
+        return np.concatenate([values[:, own], tau[None]])
+    kept = np.flatnonzero(use)
+    out = np.empty((len(values) + 1, len(kept)))
+    np.take(values, own.start + (own.step or 1) * kept, axis=1, out=out[:-1], mode="clip")
+    out[-1] = tau[kept]
+    return out
 
 
 def _kept(start: int, stop: int, origin: int, every: int) -> slice:

@@ -47,11 +47,15 @@ class Event:
     signal: str = "torque"
 
 
-def find(segment: Segment, joints: Sequence[str], *, log: str = "") -> tuple[Event, ...]:
+def find(
+    segment: Segment, joints: Sequence[str], *, log: str = "", among: int = 1
+) -> tuple[Event, ...]:
     """The events of a segment, in order of time.
 
     Args:
         segment: a stretch of a log. joints: its joints' names, in order. log: the log's name.
+        among: how many parts its log has that are looked at by themselves: a false event is as
+            seldom in all of them as in a log that is looked at as one.
     """
     found: list[Event] = []
 
@@ -61,7 +65,7 @@ def find(segment: Segment, joints: Sequence[str], *, log: str = "") -> tuple[Eve
 
     calm = segment.tau
     for _ in range(_PASSES):
-        more = [(j, *run) for j, own in enumerate(spikes(calm)) for run in own]
+        more = [(j, *run) for j, own in enumerate(spikes(calm, among=among)) for run in own]
         if not more:
             break
         for j, first, last in more:
@@ -70,7 +74,7 @@ def find(segment: Segment, joints: Sequence[str], *, log: str = "") -> tuple[Eve
     usual = float(np.sqrt(np.mean(np.diff(segment.q, axis=0) ** 2, axis=0)).max())
     for j in range(len(joints)):
         tau, q = segment.tau[:, j], segment.q[:, j]
-        for first, last in held_torque(tau, segment.step):
+        for first, last in held_torque(tau, segment.step, among=among):
             extreme = tau[first] != 0.0 and tau[first] in (tau.min(), tau.max())  # no limit is 0
             kind = "brake" if rests(q, first, last, usual) else "frozen"
             kind = "saturation" if extreme else kind
@@ -79,7 +83,8 @@ def find(segment: Segment, joints: Sequence[str], *, log: str = "") -> tuple[Eve
             tell("brake", 0, len(q) - 1, [j])
         for first, last in held_angle(q):
             tell("frozen", first, last, [j], "position")
-    for first, last, members in knocks(segment.q, calm, segment.step, spiked=segment.tau):
+    struck = knocks(segment.q, calm, segment.step, spiked=segment.tau, among=among)
+    for first, last, members in struck:
         tell("knock", first, last, members, "both")
     return ordered(found)
 
@@ -91,14 +96,15 @@ def clipped(events: Sequence[Event], start: float, stop: float) -> list[Event]:
 
 
 def joined(events: Sequence[Event], step: float) -> tuple[Event, ...]:
-    """Events of a log that was looked at span by span, in order of time: one that goes on in the next span, a `step` [s] later, is
-    one."""
+    """Events of a log that was looked at span by span, in order of time: one that goes on in the
+    next span, a `step` [s] later, is one."""
     out: list[Event] = []
     last: dict[tuple, int] = {}
     for event in ordered(events):
         key = (event.kind, event.log, event.joints, event.signal)
-        if key in last and 0.0 < event.start - out[last[key]].stop <= 1.5 * step and event.kind != "spike":
-            out[last[key]] = replace(out[last[key]], stop=event.stop)
+        before = out[last[key]] if key in last and event.kind != "spike" else None
+        if before is not None and 0.0 < event.start - before.stop <= 1.5 * step:
+            out[last[key]] = replace(before, stop=event.stop)
             continue
         last[key] = len(out)
         out.append(event)

@@ -15,7 +15,7 @@ _WHITE = 0.27
 _WHITE_MOST, _TAIL_MOST = 0.24, 1.8
 
 
-def knocks(q, tau, step: float, *, spiked=None) -> list[tuple[int, int, list[int]]]:
+def knocks(q, tau, step: float, *, spiked=None, among: int = 1) -> list[tuple[int, int, list[int]]]:
     """First and last sample, and joints, of knocks in angles and torque (n, dof), `step` [s] apart.
 
     The level of what is unexplained in windows of `BURST`, over the usual: the larger of the log's
@@ -25,7 +25,7 @@ def knocks(q, tau, step: float, *, spiked=None) -> list[tuple[int, int, list[int
 
     Args:
         spiked: the torque with its spikes, which `tau` is without: what comes on most joints at
-            once is none. None: it has none.
+            once is none. None: it has none. among: as of `spikes`.
     """
     n, dof = tau.shape
     length = max(FEWEST, 2 * round(0.5 * BURST / step) + 1)
@@ -42,7 +42,7 @@ def knocks(q, tau, step: float, *, spiked=None) -> list[tuple[int, int, list[int
     angle, torque = told(q, _FINEST), told(tau, NOTHING)
     whole = torque if spiked is None or spiked is tau else told(spiked, NOTHING)
     own = np.maximum(angle, torque)
-    level = np.log(len(first) * dof / CHANCE)
+    level = np.log(len(first) * dof * among / CHANCE)
     both = np.minimum(angle, torque)[0] if dof == 1 else np.sort(own, axis=0)[-2]
     if dof > 3:
         both = np.maximum(both, _most(angle, whole) + np.log(dof))  # whose level has no joints in it

@@ -60,7 +60,7 @@ def bursts(s, level: float) -> list[tuple[int, int]]:
     return [(a, b) for a, b in runs(s > 0.5 * level) if s[a : b + 1].max() > level]
 
 
-def spikes(tau) -> list[list[tuple[int, int]]]:
+def spikes(tau, *, among: int = 1) -> list[list[tuple[int, int]]]:
     """First and last samples of the spikes of each joint's torque (n, dof).
 
     Of up to `SPIKE` samples that are entered and left by steps of opposite sign, min(|in|, |out|)
@@ -68,6 +68,10 @@ def spikes(tau) -> list[list[tuple[int, int]]]:
     it on either side. So the peak of a fast smooth wave, entered and left by steps like those
     beside it, is none, nor is an edge. Where a log has k spikes, chance is allowed k times as many:
     no more than a share `CHANCE` of what is found is false.
+
+    Args:
+        among: how many parts its log has that are looked at by themselves, of all of which `CHANCE`
+            is.
 
     Source: Benjamini & Hochberg 1995.
     """
@@ -79,9 +83,12 @@ def spikes(tau) -> list[list[tuple[int, int]]]:
     while True:
         pairs = zip((z for _, z, _ in found), hit)
         s = [surprise(z, _WHITE, z[~own], _TAIL) if len(z) else z for z, own in pairs]
-        ranked = np.sort(np.concatenate(s))[::-1]
+        # ranks of those alone that are high enough at any rank: the others have none
+        count, asked = max(sum(map(len, s)), 1), SPIKE * n * dof * among
+        lowest = np.log(asked / (CHANCE * count))
+        ranked = np.sort(np.concatenate([own[own > lowest] for own in s]))[::-1]
         allowed = CHANCE * np.arange(1, len(ranked) + 1)
-        enough = np.flatnonzero(ranked > np.log(SPIKE * n * dof / allowed))
+        enough = np.flatnonzero(ranked > np.log(asked / allowed))
         least = ranked[enough[-1]] if len(enough) else np.inf
         more = [own | (values >= least) for own, values in zip(hit, s)]
         if all(map(np.array_equal, hit, more)):

@@ -81,16 +81,20 @@ def read(experiment: Experiment, machine: Robot, specs: list[LogSpec], *, struct
 _BESIDE = 1024  # rows of a span's neighbours that are looked at with it: more than an event's surroundings
 
 
-def with_events(machine: Robot, read: list[logs.Log]) -> list[logs.Log]:
+def with_events(machine: Robot, read: list[logs.Log], *, among: int = 1) -> list[logs.Log]:
     """Logs with their events: first those that the signals show, then those that only the robot's equations do. Each span of a long
-    log is looked at by itself."""
+    log is looked at by itself.
+
+    Args:
+        among: how many parts their log has, where these are the spans of one.
+    """
     if any(isinstance(log.segments, Spans) for log in read):
         return [with_events(machine, [log])[0] if not isinstance(log.segments, Spans) else _with_events_of_spans(machine, log) for log in read]
     told = lambda log, e: not (e.signal == "torque" and set(e.joints) <= set(log.unused))  # noqa: E731
     found = [
-        replace(log, events=tuple(e for s in log.segments for e in events.find(s, machine.joints, log=log.name) if told(log, e))) for log in read
+        replace(log, events=tuple(e for s in log.segments for e in events.find(s, machine.joints, log=log.name, among=among) if told(log, e))) for log in read
     ]  # fmt: skip
-    felt = bumps(machine, found)
+    felt = bumps(machine, found, among=among)
     more = [[e for e in felt if e.log == log.name] for log in found]
     return [replace(log, events=events.ordered([*log.events, *own])) if own else log for log, own in zip(found, more)]
 
@@ -100,7 +104,7 @@ def _with_events_of_spans(machine: Robot, log: logs.Log) -> logs.Log:
     for number in range(len(log.segments)):
         released()
         span = log.segments.around(number, _BESIDE)
-        (own,) = with_events(machine, [replace(log, segments=(replace(span, core=None),))])
+        (own,) = with_events(machine, [replace(log, segments=(replace(span, core=None),))], among=len(log.segments))
         found += events.clipped(own.events, *span.t[[span.core.start, span.core.stop - 1]])
         step = span.step
     return replace(log, events=events.joined(found, step))

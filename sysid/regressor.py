@@ -147,7 +147,7 @@ def _rotation_to_child(placement, subspace, angle) -> np.ndarray:
 
 
 def _cross(a, b) -> np.ndarray:
-    out = np.empty((3, *np.broadcast_shapes(np.shape(a)[1:], np.shape(b)[1:])))
+    out = np.empty((3, max(np.shape(a)[1], np.shape(b)[1])))
     for k, (i, j) in enumerate(((1, 2), (2, 0), (0, 1))):
         np.multiply(a[i], b[j], out=out[k])
         out[k] -= a[j] * b[i]

@@ -15,12 +15,15 @@ _HELD = 10  # samples at least of an angle that froze and never caught up
 _OFTEN = 0.25  # of the rows: what comes more often is the logger's way, not an event
 
 
-def held_torque(tau, step: float) -> list[tuple[int, int]]:
+def held_torque(tau, step: float, *, among: int = 1) -> list[tuple[int, int]]:
     """First and last samples of runs in which one joint's torque (n,), `step` [s] apart, is held.
 
     Where a share p of the samples repeats the one before, the longest of n runs of chance has
     1 + ln(n / chance) / ln(1 / p) samples; p is that of the other runs. And a run is entered or
     left by a jump that is none of the values' own grain: a coarse signal leaves its crest by one.
+
+    Args:
+        among: as of `spikes`.
     """
     n = len(tau)
     size = np.abs(np.diff(tau))
@@ -31,7 +34,7 @@ def held_torque(tau, step: float) -> list[tuple[int, int]]:
     length = every[:, 1] - every[:, 0] + 1
     while True:
         p = max(np.sum(length[~long] - 1), 1.0) / max(n - 1 - np.sum(length[long] - 1), 2.0)
-        longest = 1.0 + np.log(n / CHANCE) / np.log(1.0 / min(p, 1.0 - 1.0 / n))
+        longest = 1.0 + np.log(n * among / CHANCE) / np.log(1.0 / min(p, 1.0 - 1.0 / n))
         more = long | (length > max(longest, _FEWEST, _SHORTEST / step))
         if np.array_equal(more, long):
             break

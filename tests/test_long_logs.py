@@ -7,7 +7,17 @@ import polars as pl
 import pytest
 
 import sysid
-from sysid import config, events, long_log, long_motion, pipeline, preprocess, results, spans
+from sysid import (
+    config,
+    events,
+    long_log,
+    long_motion,
+    outliers,
+    pipeline,
+    preprocess,
+    results,
+    spans,
+)  # fmt: skip
 from sysid import log as logs
 from sysid.events import Event
 from sysid.motion import Pieces
@@ -205,3 +215,17 @@ def test_events_go_on_from_span_to_span():
     found = events.joined(parts, 1e-3)
     assert one(1.0, 2.5) in found and len(found) == 5
     assert events.clipped([one(1.0, 3.0), one(0.0, 0.5)], 1.5, 2.0) == [one(1.5, 2.0)]
+
+
+def test_a_false_event_is_as_seldom_in_all_spans_as_in_one_log():
+    rng = np.random.default_rng(0)
+    tau = rng.normal(size=(20_000, 3))
+    size, found = np.linspace(8.0, 30.0, 45), []
+    for among in (1, 1000):
+        hit = []
+        for height in size:
+            struck = tau.copy()
+            struck[9000, 1] += height
+            hit.append(any(outliers.spikes(struck, among=among)))
+        found.append(size[np.argmax(hit)])
+    assert size[0] < found[0] < found[1] < size[-1]
