@@ -24,7 +24,7 @@ from .rows import Shown, rms, same_rows
 
 MOST = 3000  # samples of a line before it is thinned
 _DOTS = 3000  # of a cloud
-_FRAMES = 600  # of the robot
+_FRAMES = 400  # of the robot
 _CELLS = (28, 20)  # of a map, over position and speed
 PARTS = ("test", "train")
 
@@ -36,6 +36,8 @@ class Workspace:
         self.fit = fit
         self._lines: dict[str, dict] = {}
         self._told: dict[str, list[float | None]] = {}
+        self._left: dict[tuple[str, int], np.ndarray] = {}
+        self._films: dict[str, dict] = {}
 
     def prediction(self, part: str) -> Prediction:
         """The prediction of a part of the logs. Raises SysidError: there is none."""
@@ -48,6 +50,14 @@ class Workspace:
         if part not in self._told:
             self._told[part] = self.prediction(part).told()
         return self._told[part]
+
+    def residual(self, part: str, joint: int) -> np.ndarray:
+        """(n,) as `Prediction.counted_residual`; of the joint looked at last kept at hand."""
+        found = self._left.get((part, joint))  # another thread may put its own in place of it
+        if found is None:
+            found = self.prediction(part).counted_residual(joint)
+            self._left = {(part, joint): found}
+        return found
 
     def joint(self, number: int) -> str:
         """The name of a joint. Raises SysidError: there is none of that number."""
@@ -81,7 +91,7 @@ class Workspace:
             (None where there is none); whether its rows are among these.
         """
         name, line, found = self.joint(joint), self.line(part), self.prediction(part)
-        t, left = line["t"], found.counted_residual(joint)
+        t, left = line["t"], self.residual(part, joint)
         low, high = self._bounds(t, low, high)
         # one row beyond either edge, so that lines reach it
         first, last = np.searchsorted(t, low) - 1, np.searchsorted(t, high, side="right") + 1
@@ -205,6 +215,11 @@ class Workspace:
             {"chart": of the first moment, "t": (f,) [s], "links": (f, 3, k), None between links,
             "joints": (f, 3, dof), "names"}.
         """
+        if part not in self._films:
+            self._films[part] = self._film(part)
+        return self._films[part]
+
+    def _film(self, part: str) -> dict:
         states, robot = self.prediction(part).states, self.fit.model.robot
         if states is None or not len(states.index):
             raise SysidError("where the joints were was not kept", do="reload")
