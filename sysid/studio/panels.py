@@ -29,7 +29,8 @@ def time(joint: str, unit: str, t, lines: dict, *, own, breaks, window, shaded) 
     """
     x = charts.rounded(np.insert(np.asarray(t, dtype=float), breaks, np.nan), 7)
     named = [[charts.plain(log), clock] for log, clock in own]
-    left = [_words(v) for v in np.insert(lines["residual"], breaks, np.nan)]
+    left = charts.rounded(np.insert(lines["residual"], breaks, np.nan), 4)
+    left = ["–" if value is None else value for value in left]
     told = {
         "measured": np.insert(np.array(named, dtype=object), breaks, None, axis=0).tolist(),
         "predicted": left,
@@ -148,13 +149,9 @@ def robot(links, joints, names: list[str]) -> dict:
         },
     ]  # fmt: skip
     layout = {
-        "scene": charts.scene(middle, size, (1.4, 1.25, 0.5), -0.15),
+        "scene": charts.scene(middle, size, (1.0, 0.9, 0.35), -0.1),
         "margin": {"l": 0, "r": 0, "t": 0, "b": 0},
     }
     return charts.chart(
         "workspace-robot", "The robot at the moment under the cursor", data, layout, height=300
     )
-
-
-def _words(value) -> str:
-    return "–" if value is None or not np.isfinite(value) else f"{value:.4g}".replace("-", "−")
