@@ -142,6 +142,13 @@ def settled(spec: PreprocessSpec, chosen: dict) -> PreprocessSpec:
     return spec.model_copy(update={key: chosen[key] for key in ("window", "cutoff", "torque") if key in chosen})
 
 
+def torque_band(spec: PreprocessSpec) -> str:
+    """What torque went through, on both sides of the equation: the band that errors are of, in words."""
+    if spec.torque == "low-pass" and spec.filter != "none":
+        return f"torque under a low-pass of {spec.cutoff:.3g} Hz"
+    return "torque through the filter of the angles" if spec.torque == "same" and spec.filter != "none" else "torque as logged"
+
+
 def _middle(log: Log) -> Log:
     """The longest segment's middle, of at most `_MOST_SAMPLES`."""
     if isinstance(log.segments, Spans):

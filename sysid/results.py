@@ -29,7 +29,7 @@ from . import base_parameters, bounded, prior_weight, state
 from .differences import per_group, told
 from .errors import ConfigError, SysidError
 from .estimate import Fit, at_edge
-from .filters import settled
+from .filters import settled, torque_band
 from .inertia import PARAMETERS
 from .inertia.consistency import is_consistent
 from .model import Model
@@ -59,6 +59,7 @@ def document(fit: Fit, run: str | Path = "") -> dict:
     own_groups = {"groups": groups} if (groups := per_group(fit)) else {}
     return {
         "rms": {part: dict(zip(fit.joints, fit.predictions[part].told())) for part in errors},
+        "band": torque_band(settled(fit.experiment.preprocess, fit.filters)),
         "relative_error": {part: {**by_joint(part, "relative_error"), "*": number(errors[part]["total"][1])} for part in errors},
         "r2": {part: by_joint(part, "r2") for part in errors},
         "objective": fit.objective,

@@ -99,6 +99,7 @@ def show_fit(fit: Fit, document: dict) -> None:
         for joint, slides in zip(fit.joints, robot.prismatic)
     ]  # fmt: skip
     _table(f"{fit.experiment.name}: residual by joint", ["joint", "", "RMS train", "RMS test", "relative test", "R2 test"], rows)
+    print(f"RMS over the rows that count, {document['band']}")
     _show_groups(document.get("groups", {}))
     certificate = document["certificate"]
     for own in document["drives"]:

@@ -442,3 +442,16 @@ def test_a_diagnosis_of_another_fit_does_not_stay(clean, tmp_path):
     assert (run / "diagnosis.json").is_file()
     results.write(replace(fit, x=fit.x * 1.01), run)
     assert not (run / "diagnosis.json").exists()
+
+
+@given(arrays(float, st.integers(1, 40), elements=st.floats(allow_nan=True, allow_infinity=True, width=64)), st.integers(2, 8))
+@settings(max_examples=200, deadline=None)
+def test_rounded_numbers_are_what_a_format_makes_of_them(values, digits):
+    for value, said in zip(values.tolist(), charts.rounded(values, digits)):
+        if not np.isfinite(value):
+            assert said is None
+            continue
+        wanted = float(f"{value:.{digits}g}")
+        # a value half way between two may go to either
+        assert said == wanted or abs(said - value) <= abs(wanted - value) * (1 + 1e-9)
+        assert said == float(f"{said:.{digits}g}")

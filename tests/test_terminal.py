@@ -54,6 +54,7 @@ def document(**more):
         "floor_detail": "not determined: 2 s are too short",
     }
     return {
+        "band": "torque as logged",
         "joints": joints,
         "findings": [
             finding("cogging", FIRST, COMMAND, 1, parameters=parameters),

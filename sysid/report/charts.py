@@ -26,6 +26,9 @@ INK, GREY, BLUE, VERMILLION, GREEN, ORANGE, PURPLE, SKY = (
 MIDDLE, EMPTY = "#FDFDFD", "#DCDCDC"  # of a map's scale; cells where no row is
 
 
+_TENS = np.array([float(f"1e{k}") for k in range(23)])  # exact in binary
+
+
 def plain(text) -> str:
     """A text as Plotly shows it letter by letter."""
     return html.escape(str(text), quote=False)
@@ -33,10 +36,16 @@ def plain(text) -> str:
 
 def rounded(values, digits: int = 5) -> list:
     """Numbers as JSON can hold them, to so many significant digits; None for NaN and infinity."""
-    return [
-        float(f"{v:.{digits}g}") if math.isfinite(v) else None
-        for v in np.asarray(values, dtype=float).ravel().tolist()
-    ]
+    v = np.asarray(values, dtype=float).ravel()
+    size = np.abs(v)
+    usual = (size > 1e-9) & (size < 1e15)  # whose powers of ten, and products, are exact
+    power = digits - 1 - np.floor(np.log10(size, where=usual, out=np.zeros_like(v))).astype(int)
+    up, down = _TENS[np.maximum(power, 0)], _TENS[np.maximum(-power, 0)]
+    with np.errstate(invalid="ignore", over="ignore"):
+        out = (np.round(v * up / down) / up * down).tolist()
+    for k in np.flatnonzero(~usual):
+        out[k] = float(f"{v[k]:.{digits}g}") if math.isfinite(v[k]) else None
+    return out
 
 
 def chart(

@@ -21,13 +21,13 @@ def kept(y, most: int = 2000) -> np.ndarray:
         return np.arange(n)
     buckets = max((most - 2) // 2, 1)
     size = -(-n // buckets)
-    padded = np.append(y, np.full(-n % size, np.nan)).reshape(-1, size)
-    nothing = np.isnan(padded)
-    start = np.arange(len(padded)) * size
-    lows, highs = (
-        start + np.argmin(np.where(nothing, np.inf, sign * padded), axis=1) for sign in (1.0, -1.0)
-    )
-    return np.unique(np.concatenate([[0], lows, highs, [n - 1]]))
+    padded = np.empty((-(-n // size), size))
+    padded.ravel()[:n], padded.ravel()[n:] = y, y[n - 1]  # its last again is no other sample
+    nothing, start = np.isnan(padded), np.arange(len(padded)) * size
+    some = bool(nothing.any())
+    low, high = (np.where(nothing, end, padded) if some else padded for end in (np.inf, -np.inf))
+    found = np.concatenate([[0], start + low.argmin(1), start + high.argmax(1), [n - 1]])
+    return np.unique(np.minimum(found, n - 1))
 
 
 def broken(t, y, breaks, most: int = 2000) -> tuple[np.ndarray, np.ndarray]:

@@ -94,7 +94,7 @@ def _time(axis, found: dict, force: str) -> None:
         )
     axis.set_ylim(bottom=0)
     axis.set_xlabel("time in the test log [s]")
-    axis.set_ylabel(f"residual RMS [{force}]")
+    axis.set_ylabel(f"low-passed RMS [{force}]")
     if len(np.unique(log)) > 1:
         axis.legend(frameon=False, fontsize=7)
 

@@ -99,7 +99,7 @@ def residual_time(name: str, joint: str, unit: str, found: dict) -> dict:
         )
     layout = {
         "xaxis": axis("time in the test log [s]"),
-        "yaxis": axis(f"residual RMS [{unit}]", rangemode="tozero"),
+        "yaxis": axis(f"low-passed RMS [{unit}]", rangemode="tozero"),
         "showlegend": len(numbers) > 1,
         "legend": LEGEND,
         **_titled("over time", 34 if len(numbers) < 2 else 58),

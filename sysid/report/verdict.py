@@ -8,6 +8,7 @@ from ..statement.words import followed, percent
 from .section import Section
 from .words import (
     SPACE,
+    band,
     chance,
     known,
     level,
@@ -50,6 +51,7 @@ def verdict(fit: Fit, document: dict) -> Section:
         "consistent": fit.physically_consistent,
         "notices": document["notices"],
         "made": document.get("made", ""),
+        "band": band(fit),
     }
     return Section("Verdict", "verdict", values)
 

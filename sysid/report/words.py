@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 import re
 
+from .. import filters
 from ..estimate import Fit
-from ..filters import settled
 
 SPACE = "\u00a0"  # between a number and what belongs to it: no line ends there
 
@@ -90,13 +90,8 @@ def units(fit: Fit) -> dict[str, tuple[str, str]]:
 
 
 def band(fit: Fit) -> str:
-    """What the torque of a fit's errors went through, on both sides: the band that they are of."""
-    spec = settled(fit.experiment.preprocess, fit.filters)
-    if spec.torque == "low-pass" and spec.filter != "none":
-        return f"torque under a low-pass of {number(spec.cutoff, 3)}{SPACE}Hz"
-    if spec.torque == "same" and spec.filter != "none":
-        return "torque through the angles' filter"
-    return "torque as logged"
+    """The band that a fit's errors are of, in words."""
+    return filters.torque_band(filters.settled(fit.experiment.preprocess, fit.filters))
 
 
 def percentage(share, se=None) -> str:

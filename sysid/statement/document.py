@@ -6,6 +6,7 @@ import numpy as np
 
 from ..diagnose.diagnosis import Diagnosis
 from ..diagnose.verdict import Verdict
+from ..filters import settled, torque_band
 from ..flexible import Unknown
 from ..model import ROBOT
 from ..results import number, versions
@@ -17,6 +18,7 @@ def document(found: Diagnosis, run="") -> dict:
     fit, joints = found.fit, found.fit.joints
     rms = {part: dict(zip(joints, fit.predictions[part].told())) for part in ("train", "test")}
     return {
+        "band": torque_band(settled(fit.experiment.preprocess, fit.filters)),
         "joints": {
             v.joint: {
                 "rms": {part: rms[part][v.joint] for part in rms},

@@ -43,7 +43,8 @@ def errors(of: Told, width: int) -> list[str]:
             ]
         )
         how.setdefault(entry["floor_detail"], []).append(joint)
-    out = ["RMS error against the noise floor", *fitted(heads, rows, 2, width)]
+    of_rows = f"  over the rows that count, {of.document['band']}"
+    out = ["RMS error against the noise floor", of_rows, *fitted(heads, rows, 2, width)]
     for detail, joints in how.items():
         out += wrapped(f"  noise floor of {listed(joints, 'and')}: {detail}", width, "    ")
     return out

@@ -12,6 +12,7 @@ from ..errors import SysidError
 from ..estimate import Fit, Prediction
 from ..run import read_run
 from .diagnosed import step_name
+from .rows import Columns, columns
 
 _MOST = 40  # run folders that are offered
 
@@ -30,6 +31,10 @@ class OtherRun:
     def told(self, part: str) -> list[float | None]:
         """The RMS of each joint. Raises SysidError, as `prediction`."""
         return _told(self.folder, self._stamp(), part)
+
+    def columns(self, part: str, joint: int) -> Columns:
+        """What is drawn of a joint. Raises SysidError, as `prediction`."""
+        return columns(self.prediction(part), joint)
 
     def _stamp(self) -> int:
         return (self.folder / "predictions.parquet").stat().st_mtime_ns

@@ -27,24 +27,27 @@ def time(joint: str, unit: str, t, lines: dict, *, own, breaks, window, shaded) 
             before which a log was interrupted. window: what is in sight [s]. shaded: (from, to,
             kind) of events.
     """
-    x = np.insert(np.asarray(t, dtype=float), breaks, np.nan)
-    named = [[charts.plain(log), clock, ""] for log, clock in own]
-    seen = np.insert(np.array(named, dtype=object), breaks, None, axis=0)
-    residual = lines["residual"]
-    seen[:, 2] = [_words(v) for v in np.insert(residual, breaks, np.nan)]
+    x = charts.rounded(np.insert(np.asarray(t, dtype=float), breaks, np.nan), 7)
+    named = [[charts.plain(log), clock] for log, clock in own]
+    left = charts.rounded(np.insert(lines["residual"], breaks, np.nan), 4)
+    left = ["–" if value is None else value for value in left]
+    told = {
+        "measured": np.insert(np.array(named, dtype=object), breaks, None, axis=0).tolist(),
+        "predicted": left,
+    }
     clock = "%{customdata[0]} at %{customdata[1]} s"
     data = []
     for word, (colour, width, place, dash) in _LINES.items():
         if word not in lines:
             continue
         first = f"{clock}\n" if word == "measured" else ""
-        also = f", residual %{{customdata[2]}} {unit}" if word == "predicted" else ""
+        also = f", residual %{{customdata}} {unit}" if word == "predicted" else ""
         data.append({
             "type": "scatter", "mode": "lines+markers" if len(t) < _MARKED else "lines",
-            "x": charts.rounded(x, 7), "y": charts.rounded(np.insert(lines[word], breaks, np.nan)),
+            "x": x, "y": charts.rounded(np.insert(lines[word], breaks, np.nan)),
             "name": word, "line": {"color": colour, "width": width, "dash": dash}, "yaxis": place,
-            "marker": {"size": 4, "color": colour}, "customdata": seen.tolist(),
-            "connectgaps": False,
+            "marker": {"size": 4, "color": colour}, "connectgaps": False,
+            **({"customdata": told[word]} if word in told else {}),
             "hovertemplate": f"{first}{word} %{{y:.4g}} {unit}{also}",
         })  # fmt: skip
     shapes = [
@@ -146,13 +149,9 @@ def robot(links, joints, names: list[str]) -> dict:
         },
     ]  # fmt: skip
     layout = {
-        "scene": charts.scene(middle, size, (1.4, 1.25, 0.5), -0.15),
+        "scene": charts.scene(middle, size, (1.0, 0.9, 0.35), -0.1),
         "margin": {"l": 0, "r": 0, "t": 0, "b": 0},
     }
     return charts.chart(
         "workspace-robot", "The robot at the moment under the cursor", data, layout, height=300
     )
-
-
-def _words(value) -> str:
-    return "–" if value is None or not np.isfinite(value) else f"{value:.4g}".replace("-", "−")

@@ -229,7 +229,9 @@ class Session:
         state = key(hashed(text), experiment)
         fit = self.aside.previews.fit(hashed(text), state)
         fit = fit or pipeline.fit(experiment, progress=job.tell)
-        self._early = hashed(text), Workspace(fit)  # seen while the diagnosis is at work
+        early = Workspace(fit)
+        early.told("test")  # what the first look asks for
+        self._early = hashed(text), early  # seen while the diagnosis is at work
         said = kept.found(experiment, fit, run)
         if said is None:
             made = diagnose(experiment, fit=fit, progress=job.tell)

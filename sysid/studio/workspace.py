@@ -20,11 +20,11 @@ from ..report.decimate import kept
 from ..report.fitted import log_names, placed
 from ..report.words import band, units
 from . import panels
-from .rows import Shown, rms, same_rows
+from .rows import Columns, Shown, columns, rms, same_rows
 
-MOST = 3000  # samples of a line before it is thinned
+MOST = 2000  # samples of a line before it is thinned: two for each pixel of a wide screen
 _DOTS = 3000  # of a cloud
-_FRAMES = 600  # of the robot
+_FRAMES = 400  # of the robot
 _CELLS = (28, 20)  # of a map, over position and speed
 PARTS = ("test", "train")
 
@@ -36,6 +36,8 @@ class Workspace:
         self.fit = fit
         self._lines: dict[str, dict] = {}
         self._told: dict[str, list[float | None]] = {}
+        self._columns: dict[tuple[str, int], Columns] = {}
+        self._films: dict[str, dict] = {}
 
     def prediction(self, part: str) -> Prediction:
         """The prediction of a part of the logs. Raises SysidError: there is none."""
@@ -48,6 +50,14 @@ class Workspace:
         if part not in self._told:
             self._told[part] = self.prediction(part).told()
         return self._told[part]
+
+    def columns(self, part: str, joint: int) -> Columns:
+        """What is drawn of a joint; of the one looked at last it is kept at hand."""
+        found = self._columns.get((part, joint))  # another thread may put its own in its place
+        if found is None:
+            found = columns(self.prediction(part), joint)
+            self._columns = {(part, joint): found}
+        return found
 
     def joint(self, number: int) -> str:
         """The name of a joint. Raises SysidError: there is none of that number."""
@@ -81,19 +91,20 @@ class Workspace:
             (None where there is none); whether its rows are among these.
         """
         name, line, found = self.joint(joint), self.line(part), self.prediction(part)
-        t, left = line["t"], found.counted_residual(joint)
+        t, (measured, predicted, left) = line["t"], self.columns(part, joint)
         low, high = self._bounds(t, low, high)
         # one row beyond either edge, so that lines reach it
         first, last = np.searchsorted(t, low) - 1, np.searchsorted(t, high, side="right") + 1
         rows = slice(max(int(first), 0), min(int(last), len(t)))
-        lines = {"measured": found.measured[:, joint], "predicted": found.predicted[:, joint]}
-        lines["residual"] = left
+        lines = {
+            "measured": measured[rows], "predicted": predicted[rows], "residual": left[rows],
+        }  # fmt: skip
         other = None if beside is None else same_rows(beside, self, part, joint)
         if other is not None:
-            lines |= {"predicted beside": other[0], "residual beside": other[1]}
-            counted = np.isfinite(left) & np.isfinite(other[1])
-            lines["difference"] = np.where(counted, lines["predicted"] - other[0], np.nan)
-        lines = {word: values[rows] for word, values in lines.items()}
+            there, missed = (values[rows] for values in other)
+            lines |= {"predicted beside": there, "residual beside": missed}
+            # where rows do not count, neither model is asked
+            lines["difference"] = missed - lines["residual"]
         keep = np.unique(np.concatenate([kept(v, MOST) for v in lines.values()]))
         keep = keep if rows.stop - rows.start > MOST else np.arange(rows.stop - rows.start)
         chart = panels.time(
@@ -205,6 +216,11 @@ class Workspace:
             {"chart": of the first moment, "t": (f,) [s], "links": (f, 3, k), None between links,
             "joints": (f, 3, dof), "names"}.
         """
+        if part not in self._films:
+            self._films[part] = self._film(part)
+        return self._films[part]
+
+    def _film(self, part: str) -> dict:
         states, robot = self.prediction(part).states, self.fit.model.robot
         if states is None or not len(states.index):
             raise SysidError("where the joints were was not kept", do="reload")
@@ -241,7 +257,7 @@ def _own_clock(line: dict, rows, found: Prediction) -> list[list]:
     names = [name.rpartition("/")[2] for _, _, name in line["spans"]]
     ends = np.array([end for _, end, _ in line["spans"]])
     which = np.minimum(np.searchsorted(ends, line["t"][rows] - 1e-9), len(names) - 1)
-    return [[names[k], float(f"{t:.6g}")] for k, t in zip(which, found.t[rows])]
+    return [[names[k], t] for k, t in zip(which, charts.rounded(found.t[rows], 6))]
 
 
 def _breaks(line: dict, rows) -> np.ndarray:

@@ -35,9 +35,9 @@ function fell(found) {
   at("fall").hidden = !steps || !most.length;
   if (at("fall").hidden) return;
   const first = most[0], by = first.to <= first.from ? "falls" : "rises";
-  const words = found.steps[steps] + ": the held-out error of " + first.joint + " " + by + " from "
-    + level(first.from) + " to " + level(first.to) + " " + first.unit + " ("
-    + change(first.from, first.to) + ").";
+  const words = found.steps[steps].replace(/^\+ /, "") + ": the held-out error of "
+    + first.joint + " " + by + " from " + level(first.from) + " to " + level(first.to) + " "
+    + first.unit + " (" + change(first.from, first.to) + ").";
   const rows = most.slice(0, 7).map(f => [f.joint, level(f.from) + " " + f.unit,
     level(f.to) + " " + f.unit, make("td", {class: f.to <= f.from ? "falls" : "rises"},
       make("span", {class: "drop", "aria-hidden": "true", style: "--now:"
