@@ -186,6 +186,8 @@ def fleet(
     against: Annotated[Optional[Path], typer.Option("--against", metavar="RUN", help="A run folder: hold its fitted model, and ask of each log what changed.")] = None,  # noqa: UP045
     level: Level = None,
     jobs: Annotated[int, typer.Option("--jobs", min=1, help="Processes, of --against.")] = _CORES,
+    workers: Annotated[int, typer.Option("--workers", min=1, help="Processes that share the experiments, on a Dask cluster of this machine.")] = 1,
+    scheduler: Annotated[Optional[str], typer.Option("--scheduler", metavar="ADDRESS", help="A Dask scheduler whose workers share the experiments, tcp://HOST:PORT.")] = None,  # noqa: UP045
     rate: Annotated[float, typer.Option("--rate", help="Probability of any false alarm in the whole table, or in all logs.")] = 0.05,
     seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of the fleets that are drawn to find the threshold.")] = 0,
     opened: Annotated[bool, typer.Option("--open", help="Open the page in the browser.")] = False,
@@ -205,7 +207,7 @@ def fleet(
     else:
         if level:
             raise SysidError("--level goes with --against: a fleet has all levels of each experiment", do="leave it out")
-        said, page = _fleet(experiments, rate, seed, run, quiet or as_json)
+        said, page = _fleet(experiments, rate, seed, workers, scheduler, run, quiet or as_json)
     if as_json:
         print(json.dumps(said, allow_nan=False))
     elif not quiet:
@@ -217,13 +219,13 @@ def fleet(
         webbrowser.open(page.resolve().as_uri())
 
 
-def _fleet(experiments: list[str], rate: float, seed: int, run: Path, silent: bool) -> tuple[dict, Path]:
+def _fleet(experiments: list[str], rate: float, seed: int, workers: int, scheduler: str | None, run: Path, silent: bool) -> tuple[dict, Path]:
     from . import fleet as fleets
     from . import results
     from .report.fleet import write
 
     with _progress(silent) as progress:
-        found = fleets.fleet(experiments, rate=rate, seed=seed, progress=progress)
+        found = fleets.fleet(experiments, rate=rate, seed=seed, workers=workers, scheduler=scheduler, progress=progress)
     said = fleets.document(found, run)
     results.write_json(run / "fleet.json", said)
     return said, write(said, run / "fleet.html")

@@ -119,13 +119,16 @@ def logged(
     *,
     rate: float = RATE,
     bias=0.0,
+    noise=None,
 ) -> pl.DataFrame:
-    """A log of a robot. bias: (dof,) of its torque [N m]."""
+    """A log of a robot. bias: (dof,) of its torque [N m]; noise: (dof,) its standard deviation
+    [N m], by default a share of what this log's motion needs."""
     machine = kind.machine
     t, q, qd, qdd = moved(rng, seconds, machine.dof, rate)
     tau = regressor.torque(machine, one.pi, q, qd, qdd)
     tau = tau + one.viscous * qd + one.coulomb * np.sign(qd) + bias
-    tau = tau + TORQUE_NOISE * np.sqrt(np.mean(tau**2, axis=0)) * coloured(rng, tau.shape, 1 / rate)
+    noise = TORQUE_NOISE * np.sqrt(np.mean(tau**2, axis=0)) if noise is None else noise
+    tau = tau + noise * coloured(rng, tau.shape, 1 / rate)
     q = np.round(q / GRAIN) * GRAIN
     columns = {"t": t}
     columns |= {f"q_{joint}": q[:, j] for j, joint in enumerate(machine.joints)}

@@ -12,7 +12,7 @@ from ..errors import SysidError
 from ..estimate import Fit
 from ..filters import settled
 from ..motion import Motion
-from ..preprocess import prepare
+from ..long_motion import prepare
 from ..specs import Experiment
 from .coordinates import Coordinates, coordinates
 from .dates import Dated, dated

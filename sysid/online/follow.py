@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..compress import Compressed, Factor, triangle
-from ..estimate import pose
+from ..estimate import Problem, pose
 from ..model import Model
 from ..specs import Experiment
 from .stream import Rows
@@ -60,10 +60,19 @@ class Follower:
             factor = Factor(0, 0, whole, self.factor, max(self.rows, 1))
             data = Compressed(self.model.size, 1, (factor,), max(self.rows, 1))
             problem = pose(self.experiment, self.model, data, self.moving, self.prior)
-            near = None
-            if self._x is not None:
-                near = problem.from_nearby(self._x, self.experiment.solver.tolerance)
-            start = None if near is None else problem.coordinates.theta(near)
+            # without a barrier a body may stand on the edge of what is possible, where no search
+            # can begin
+            inside = self._x is not None and problem.objective.barrier
+            start = self._begun(problem) if inside else None
             self._x = problem.solve(self.experiment, start).x
             self._asked_at = self.rows
         return self._x
+
+    def _begun(self, problem: Problem) -> np.ndarray:
+        """The last optimum in a problem's coordinates. What is held stays where the problem holds
+        it; what stood at zero begins where the problem would begin."""
+        coordinates, x, count = problem.coordinates, self._x.copy(), 10 * self.model.bodies
+        fresh = coordinates.physical(problem.start)[count:]
+        again = coordinates.held | (coordinates.positive & (x[count:] <= 0.0))
+        x[count:] = np.where(again, fresh, x[count:])
+        return coordinates.theta(x)

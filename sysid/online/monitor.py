@@ -8,7 +8,7 @@ ticks
     V = sum columns' columns + H P H',      H = sum columns' A,
 
 is a chi-square where nothing changed: A are the model's own columns, P the covariance that its
-parameters would have by logs known to be sound. f is what S was on these logs over its freedom, at
+parameters have by logs known to be sound. f is what S was on these logs over its freedom, at
 least 1: whatever the whitening leaves of the noise's memory, and what the model lacks, is in it.
 As these logs are short, S is judged by F, with as many degrees of freedom as they hold windows. The
 level is the rate of false alarms, shared among all changes, windows and ticks of an hour

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -17,10 +17,11 @@ from ..specs import LogSpec
 from .change import Change
 from .follow import Follower
 from .monitor import WINDOWS
-from .stream import Rows, Stream
+from .stream import MOST, Rows, Stream
 from .watch import PER_TICK, Alarm, Watch
 
 _AVERAGED = 0.016  # s: finer than any change that is asked for, coarser than white noise
+_LEARNED = 300.0  # s of sound logs: the level of the test hardly falls beyond
 _SAME = 0.01  # of a step: two rates that are one
 
 
@@ -42,7 +43,7 @@ class Online:
             was seen is forgotten (its weight falls to 1/e), None to forget nothing.
         standstill: [rad/s or m/s] (one, or one a joint) below which a joint's rows do not count.
         sound: logs on which nothing was changed, to learn how the residual looks then; by default
-            the experiment's test logs. alarms: false ones an hour, at most.
+            the experiment's own logs. alarms: false ones an hour, at most.
         follow, watch: whether parameters are followed, and whether changes are looked for.
 
     Raises:
@@ -151,25 +152,29 @@ class Online:
         experiment = found.experiment.model_copy(update={"prior": settings})
         return Follower(experiment, self.model, prior, ~held, forgetting)
 
-    def _sound(self, sound) -> list[list[Rows]]:
-        """Rows of each stretch of logs on which nothing was changed."""
+    def _sound(self, sound) -> list[Iterator[Rows]]:
+        """Rows of each stretch of logs on which nothing was changed, some minutes in all."""
         logs = [LogSpec(file=str(Path(log).resolve())) for log in sound] if sound else None
+        step, left = self._stream.step, _LEARNED
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", SysidWarning)
-            specs = logs or list(self.experiment.data.test)
+            specs = logs or [*self.experiment.data.test, *self.experiment.data.train]
             read = pipeline.read(self.experiment, self.model.robot, specs)
-        step = self._stream.step
-        out = [
-            self._begin().add(segment.q, segment.tau)
-            for log in read
-            for segment in log.segments
-            if abs(segment.step / step - 1.0) < _SAME
-        ]
-        least = 2.0 * min(WINDOWS)
-        out = [rows for rows in out if sum(len(own.t) for own in rows) * step > least + self.tick]
+        least, out = 2.0 * (min(WINDOWS) + self.late) + self.tick, []
+        for segment in (s for log in read for s in log.segments):
+            n = min(len(segment.t), round(left / step))
+            if abs(segment.step / step - 1.0) < _SAME and n * step > least:
+                out.append(self._rows(segment.q[:n], segment.tau[:n]))
+                left -= n * step
         if not out:
             raise SysidError(
-                f"the sound logs hold no {least + self.tick:.2g} s at {1 / step:g} Hz in one piece",
+                f"the sound logs hold no {least:.2g} s at {1 / step:g} Hz in one piece",
                 where="Online", do="give sound=[log, ...], longer ones at the rate of the samples",
             )  # fmt: skip
         return out
+
+    def _rows(self, q, tau) -> Iterator[Rows]:
+        """Rows of a log, a few at a time."""
+        stream = self._begin()
+        for first in range(0, len(q), MOST):
+            yield from stream.add(q[first : first + MOST], tau[first : first + MOST])

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import deque
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +17,7 @@ from .stream import Rows
 from .whitening import whitening
 
 PER_TICK = 8  # averages
+_MEMORY = 30.0  # s: of how large noise is; it tells it to a few per cent
 
 
 @dataclass(frozen=True)
@@ -35,7 +37,7 @@ class Watch:
 
     Args:
         held: (size,) its parameters. each: rows that are averaged. tick: [s]. sound: rows of logs
-            on which nothing was changed, one list for each stretch. alarms: false ones an hour.
+            on which nothing was changed, for each stretch. alarms: false ones an hour.
     """
 
     def __init__(
@@ -44,7 +46,7 @@ class Watch:
         held: np.ndarray,
         each: int,
         tick: float,
-        sound: Sequence[Sequence[Rows]],
+        sound: Sequence[Iterable[Rows]],
         alarms: float,
     ):
         self.model, self.held, self.each, self.tick = model, held, each, tick
@@ -53,6 +55,13 @@ class Watch:
         self._white = whitening(*(np.concatenate(own, axis=1) for own in zip(*map(_seen, parts))))
         white = [self._white(own, _seen(own)[1]) for own in parts]
         self._unsure = monitor.unsure([own[:, :, 14:] for own in white])
+        # the model that is watched is the one that the sound logs say, and as sure as these make
+        # it: a fit that weighs all joints alike, or noise as white, is less sure than it could be
+        own = [(w[:, :, 14:] @ self._unsure, w[:, :, 13]) for w in white]
+        better = self._unsure @ sum(np.einsum("jnr,jn->r", a, r) for a, r in own)
+        self.held = self.held + better
+        for w in white:
+            w[:, :, 13] -= w[:, :, 14:] @ better
         ticks = None
         for own in white:
             own = np.concatenate([own[:, :, :14], own[:, :, 14:] @ self._unsure], axis=2)
@@ -62,6 +71,8 @@ class Watch:
         lengths = [max(1, round(window / tick)) for window in monitor.WINDOWS]
         self._level = monitor.calibrated(ticks, lengths, alarms, tick)
         self._lengths = lengths[: len(self._level.inflation)]
+        self._waiting: deque[tuple[np.ndarray, np.ndarray]] = deque()
+        self._size = np.ones(self.model.robot.dof)
         self.clear()
 
     def clear(self) -> None:
@@ -92,7 +103,8 @@ class Watch:
         averages = np.concatenate([self._before, self._averages(rows)], axis=1)
         self._before = averages[:, averages.shape[1] - self._white.order :]
         t = rows.t[self.each * PER_TICK - 1 :: self.each * PER_TICK]
-        ticks = monitor.ticks_of(self._white(averages, _seen(averages)[1]), t, PER_TICK)
+        white = self._white(averages, _seen(averages)[1])
+        ticks = monitor.ticks_of(self._sized(white), t, PER_TICK)
         if self._fresh:
             skipped = min(self._fresh, len(ticks.t))
             self._fresh -= skipped
@@ -107,6 +119,20 @@ class Watch:
             self._since = known[known.t > self.alarm.since + 1.5 * self.tick]
         self._ticks = known[max(0, len(known.t) - max(self._lengths)) :]
         return self.alarm
+
+    def _sized(self, white: np.ndarray) -> np.ndarray:
+        """Innovations (dof, n, ...) of unit variance where noise is larger than on the sound logs:
+        in units of what it was over half a minute, until before the longest window."""
+        squares = (white[:, :, 13] ** 2).reshape(len(white), -1, PER_TICK).sum(axis=2)
+        counted = (white[:, :, 2] != 0.0).reshape(len(white), -1, PER_TICK).sum(axis=2)
+        sizes = np.empty(squares.shape)
+        for k, own in enumerate(zip(squares.T, counted.T)):
+            self._waiting.append(own)
+            if len(self._waiting) > max(self._lengths):
+                square, count = self._waiting.popleft()
+                self._size += (square - count * self._size) * (self.tick / PER_TICK / _MEMORY)
+            sizes[:, k] = np.maximum(self._size, 1.0)
+        return white / np.sqrt(np.repeat(sizes, PER_TICK, axis=1))[:, :, None]
 
     def _averages(self, rows: Rows) -> np.ndarray:
         """(dof, n, 14 + ...) columns of every change, the residual, and the model's own columns, in
