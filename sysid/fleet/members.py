@@ -11,8 +11,8 @@ from ..compress import Compressed, Factor, Linearised, compress
 from ..errors import SysidError
 from ..estimate import Fit
 from ..filters import settled
-from ..motion import Motion
 from ..long_motion import prepare
+from ..motion import Motion
 from ..specs import Experiment
 from .coordinates import Coordinates, coordinates
 from .dates import Dated, dated
