@@ -67,4 +67,5 @@ def test_ctrl_c_says_what_is_kept(experiment, tmp_path, command, kept):
     time.sleep(0.3)
     os.kill(work.pid, signal.SIGINT)
     _, said = work.communicate(timeout=30)
-    assert work.returncode == 130 and said.splitlines()[-1] == f"sysid: interrupted; {kept}", said
+    # Python ends itself by the signal, 130 to a shell, where it came while an import ran a string as code
+    assert work.returncode in (130, -signal.SIGINT) and said.splitlines()[-1] == f"sysid: interrupted; {kept}", said

@@ -46,16 +46,19 @@ class Asked:
 
     def p(self, k: int) -> float:
         """Family-wise p-value of a group."""
-        return float((1 + np.sum(self.maxima >= self.statistics[k])) / (1 + len(self.maxima)))
+        return self._chance(self.statistics[k])
+
+    def _chance(self, statistic: float) -> float:
+        return float((1 + np.sum(self.maxima >= statistic)) / (1 + len(self.maxima)))
 
     def near(self, joint: int, gain: float) -> str:
         """The effect on a joint that may be there and takes half of a gain, the most likely one;
         empty where none does."""
         found, statistics, gains, _ = self.by_joint.get(joint, ([], [], [], None))
-        least = np.quantile(self.maxima, 1.0 - _MAY_BE)
-        told = zip(statistics, gains, found)
-        takes = [(s, g.candidate.name) for s, own, g in told if s > least and own > _HALF * gain]
-        return max(takes, default=(0.0, ""))[1]
+        takes = [k for k, own in enumerate(gains) if own > _HALF * gain]
+        best = max(takes, key=lambda k: statistics[k], default=None)
+        may = best is not None and self._chance(statistics[best]) <= _MAY_BE
+        return found[best].candidate.name if may else ""
 
 
 def ask(view: View, extra=(), tell=lambda share: None, *, before=None, anew=()) -> Asked:
