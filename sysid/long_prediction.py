@@ -6,11 +6,7 @@ Of the errors, sums are kept; whoever asks for the torques themselves has them r
 
 from __future__ import annotations
 
-import shutil
-import tempfile
-import weakref
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
@@ -18,6 +14,7 @@ from .errors import SysidError
 from .estimate import Prediction, Sums, joined_states, predict, states, units
 from .model import Model
 from .motion import Motion, Pieces
+from .unfinished import temporary_folder
 
 _ARRAYS = ("log", "t", "measured", "predicted", "use")
 _GREATEST = 8  # torques of each joint that are remembered
@@ -28,7 +25,7 @@ class LongPrediction(Prediction):
     what `to_dataframe` says, in order."""
 
     def __init__(
-        self, joints: tuple[str, ...], units: tuple[str, ...], folder: Path, masked: bool
+        self, joints: tuple[str, ...], units: tuple[str, ...], masked: bool
     ) -> None:
         own = {
             "joints": joints,
@@ -42,8 +39,7 @@ class LongPrediction(Prediction):
         }
         for name, value in own.items():
             object.__setattr__(self, name, value)
-        object.__setattr__(self, "_folder", folder)
-        weakref.finalize(self, shutil.rmtree, folder, ignore_errors=True)
+        object.__setattr__(self, "_folder", temporary_folder(self))
 
     def _took(self, part: Prediction) -> None:
         """Write a part and count it in."""
@@ -111,8 +107,7 @@ def predicted(model: Model, x, motion: Motion) -> Prediction:
     it."""
     if not isinstance(motion.pieces, Pieces):
         return predict(model, x, motion)
-    folder = Path(tempfile.mkdtemp(prefix="sysid-"))
-    out = LongPrediction(model.robot.joints, units(model.robot), folder, motion.pieces.masked)
+    out = LongPrediction(model.robot.joints, units(model.robot), motion.pieces.masked)
     kept, first = [], 0
     for piece in motion.pieces:
         out._took(predict(model, x, replace(motion, pieces=(piece,))))

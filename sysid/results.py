@@ -9,15 +9,12 @@
 Each file is written under a temporary name and renamed, so that a run folder never holds half a file.
 """
 
-import hashlib
 import io
 import json
 import math
 import os
 import platform
-import shutil
 import stat
-import uuid
 from collections.abc import Callable
 from contextlib import suppress
 from importlib.metadata import PackageNotFoundError, version
@@ -34,6 +31,7 @@ from .inertia import PARAMETERS
 from .inertia.consistency import is_consistent
 from .model import Model
 from .specs import Experiment, is_own
+from .unfinished import beside
 
 _PACKAGES = ("sysid", "pin", "numpy", "scipy", "yourdfpy", "lxml", "polars")
 
@@ -141,9 +139,9 @@ def folder(out: str | Path) -> Path:
         SysidError: it cannot.
     """
     path = Path(out)
-    probe = path / f".{uuid.uuid4().hex}"
     try:
         path.mkdir(parents=True, exist_ok=True)
+        probe = beside(path / "probe")
         probe.touch()
         probe.unlink()
     except OSError as error:
@@ -156,9 +154,10 @@ def write_atomically(path: Path, write: Callable[[Path], object]) -> None:
     write_together({path: write})
 
 
-def write_together(files: dict[Path, Callable[[Path], object]]) -> None:
+def write_together(files: dict[Path, Callable[[Path], object]], *, without: tuple[Path, ...] = ()) -> None:
     """Write several files or none: each is filled beside its place, and only when all are whole and on the disk they are
-    renamed, in this order. A file keeps the mode of the one in whose place it comes.
+    renamed, in this order. A file keeps the mode of the one in whose place it comes. Files of `without`, which the new ones make
+    untrue, are removed before: whoever is killed in between leaves none of them beside new ones.
 
     Raises:
         SysidError: the disk refuses; everything is as it was.
@@ -169,6 +168,8 @@ def write_together(files: dict[Path, Callable[[Path], object]]) -> None:
         for path, write in files.items():
             write(temporary[path])
             _settle(temporary[path], path)
+        for path in without:
+            path.unlink(missing_ok=True)
         for path, filled in temporary.items():
             os.replace(filled, path)
     except OSError as error:
@@ -178,30 +179,6 @@ def write_together(files: dict[Path, Callable[[Path], object]]) -> None:
         for filled in temporary.values():
             with suppress(OSError):
                 filled.unlink(missing_ok=True)
-
-
-def beside(path: Path) -> Path:
-    """A name beside a path to fill before it is renamed. What processes of this machine that were killed left of that kind is removed."""
-    kind, here = f".{path.name[:100]}.", hashlib.sha256(platform.node().encode()).hexdigest()[:8]
-    with suppress(OSError):
-        for old in path.parent.iterdir():
-            host, _, process = old.name.removeprefix(kind).partition("-")
-            number = process.partition("-")[0]
-            if old.name.startswith(kind) and host == here and number.isdigit() and not _alive(int(number)):
-                shutil.rmtree(old) if old.is_dir() else old.unlink()
-    return path.with_name(f"{kind}{here}-{os.getpid()}-{uuid.uuid4().hex[:8]}")
-
-
-def _alive(process: int) -> bool:
-    if os.name != "posix":
-        return True  # asking would end it
-    try:
-        os.kill(process, 0)
-    except ProcessLookupError:
-        return False
-    except (OSError, OverflowError):
-        return True
-    return True
 
 
 def parquet(table) -> Callable[[Path], None]:
@@ -266,10 +243,9 @@ def write(fit: Fit, out: str | Path) -> dict:
     texts["fit.json"] = (json.dumps(found, indent=1, allow_nan=False) + "\n").encode()
     files = {path / "predictions.parquet": sunk(table)}
     with state.locked(path):
-        other = _another(path, texts["fit.json"])
-        write_together(files | {path / name: lambda p, c=content: p.write_bytes(c) for name, content in texts.items()})
-        if other:  # what it says is of a model that stands here no more
-            (path / "diagnosis.json").unlink(missing_ok=True)
+        # a diagnosis of another model than the one that will stand here
+        untrue = (path / "diagnosis.json",) if _another(path, texts["fit.json"]) else ()
+        write_together(files | {path / name: lambda p, c=content: p.write_bytes(c) for name, content in texts.items()}, without=untrue)
     return found
 
 

@@ -1,5 +1,6 @@
 """Killed at any moment, two at once, no room, no right to write, no home: nothing half-written, nothing lost, and the next run works."""
 
+import gzip
 import json
 import os
 import random
@@ -8,12 +9,13 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from sysid import loop, pipeline
+from sysid import loop, pipeline, results
 from sysid.errors import SysidError
 from tests.conftest import CONFIG, dump, put
 
@@ -209,3 +211,73 @@ def test_without_a_home(experiment, tmp_path):
     assert np.isfinite(json.loads((tmp_path / "run" / "fit.json").read_text())["objective"])
     sound(folder, tmp_path / "run")
     assert not (folder / "nonexistent").exists() and not Path("~").exists()
+
+
+def test_nothing_is_left_in_the_temporary_folder(experiment, arm_logs, tmp_path):
+    """A packed log, in spans: both are in temporary files, which a killed fit leaves and the next one removes; and no other's."""
+    folder, tmp = experiment(config=TEXT), tmp_path / "temporary"
+    tmp.mkdir()
+    for part in ("train", "test"):
+        (folder / f"{part}.csv.gz").write_bytes(gzip.compress((folder / f"{part}.csv").read_bytes(), 1))
+        (folder / f"{part}.csv").unlink()
+    (folder / "config.yaml").write_text(TEXT.replace(".csv", ".csv.gz"))
+    code = (
+        "import os, sys\nfrom sysid import pipeline, results, spans\nspans.SPAN = 300\nfit = pipeline.fit(pipeline.load(sys.argv[1]))\n"
+        "if len(sys.argv) > 2: os.kill(os.getpid(), 9)\n"
+    )
+    run = lambda *more: subprocess.run([sys.executable, "-c", code, folder, *more], cwd=ROOT, env={**os.environ, "TMPDIR": str(tmp)}).returncode  # noqa: E731
+    assert run("killed") == -signal.SIGKILL
+    left = [p.name for p in tmp.iterdir() if p.name.startswith(".sysid.")]
+    assert left and all(p.stat().st_mode & 0o77 == 0 for p in tmp.iterdir() if p.name in left)
+    alive = tmp / left[0].replace(left[0].split("-")[1], str(os.getpid()))
+    strange = tmp / left[0].replace(left[0].split("-")[0], ".sysid.0123abcd")  # of another machine or container
+    alive.mkdir()
+    strange.mkdir()
+    assert run() == 0
+    assert {p.name for p in tmp.iterdir() if p.name.startswith(".sysid.")} == {alive.name, strange.name}
+
+
+def test_no_diagnosis_of_another_model_is_left_by_a_kill(experiment, monkeypatch, tmp_path):
+    """After each rename of a fit in turn: where fit.json is the new one, the old diagnosis is gone. A refused write keeps it."""
+    folder, out = experiment(config=TEXT), tmp_path / "run"
+    fit = pipeline.fit(pipeline.load(folder))
+    results.write(fit, out)
+    old, replace = (out / "fit.json").read_text().replace('"value": ', '"value": 1'), os.replace
+    for at in range(6):
+        (out / "fit.json").write_text(old)
+        (out / "diagnosis.json").write_text("{}")
+        count = [0]
+
+        def counted(*given, at=at, count=count):
+            replace(*given)
+            if count[0] == at:
+                raise KeyboardInterrupt
+            count[0] += 1
+
+        monkeypatch.setattr(os, "replace", counted)
+        with pytest.raises(KeyboardInterrupt) if at < 5 else suppress():
+            results.write(fit, out)
+        assert not (out / "diagnosis.json").exists() or (out / "fit.json").read_text() == old
+    monkeypatch.undo()
+    (out / "fit.json").write_text(old)
+    (out / "diagnosis.json").write_text("{}")
+    monkeypatch.setattr(os, "fsync", lambda file: os.strerror(os.close(10**6)))  # a disk that refuses
+    with pytest.raises(SysidError, match="cannot be written"):
+        results.write(fit, out)
+    assert (out / "diagnosis.json").exists() and (out / "fit.json").read_text() == old
+
+
+def test_a_killed_init_leaves_nothing(experiment, tmp_path):
+    """What it worked in goes with the next run."""
+    folder = experiment(config=TEXT)
+    code = (
+        "import os, sys\nfrom pathlib import Path\nfrom sysid import init\n"
+        "def ended(*given): os._exit(9)\n"
+        "if len(sys.argv) > 3: os.replace = ended\n"
+        "init.init(sys.argv[1] + '/robot.urdf', [sys.argv[1] + '/train.csv', sys.argv[1] + '/test.csv'], Path(sys.argv[2]))\n"
+    )
+    out = tmp_path / "new"
+    run = lambda *more: subprocess.run([sys.executable, "-c", code, folder, out, *more], cwd=ROOT).returncode  # noqa: E731
+    assert run("killed") == 9 and not (out / "config.yaml").exists()
+    assert run() == 0 and pipeline.load(out)
+    assert not [p for p in tmp_path.iterdir() if p.name.startswith(".")]

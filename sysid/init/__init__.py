@@ -16,10 +16,10 @@ from __future__ import annotations
 
 import os
 import shutil
-import uuid
 from pathlib import Path
 
 from ..errors import SysidError
+from ..unfinished import beside
 from . import text
 from .draft import Wishes, draft
 from .guess import Draft
@@ -45,7 +45,7 @@ def init(
             do="give another folder with --out, or remove it",
         )
     # beside the folder, so that paths from inside are the same
-    work = out.absolute().parent / f".{uuid.uuid4().hex}"
+    work = beside(out.absolute())
     try:
         work.mkdir(parents=True)
         found = draft(reference, logs, work, wishes or Wishes())

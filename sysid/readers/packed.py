@@ -6,13 +6,11 @@ from __future__ import annotations
 import bz2
 import gzip
 import lzma
-import shutil
-import tempfile
-import weakref
 import zlib
 from pathlib import Path
 
 from ..errors import LogError
+from ..unfinished import temporary_folder
 from .table import Table, most_bytes
 
 OPENERS = {".gz": gzip.open, ".bz2": bz2.open, ".xz": lzma.open}
@@ -24,9 +22,7 @@ class PackedTable(Table):
 
     def __init__(self, path: Path, open_inner):
         self.path = path
-        folder = tempfile.mkdtemp(prefix="sysid-")
-        weakref.finalize(self, shutil.rmtree, folder, ignore_errors=True)
-        self._unpacked = Path(folder) / path.stem
+        self._unpacked = temporary_folder(self) / path.stem
         self._unpack()
         self._table = self._told(lambda: open_inner(self._unpacked))
         self.names, self.usual, self.clock = self._table.names, self._table.usual, self._table.clock

@@ -10,7 +10,6 @@ import json
 import os
 import re
 import shutil
-import uuid
 import warnings
 from pathlib import Path
 
@@ -18,10 +17,10 @@ import numpy as np
 
 from .. import bounded, config
 from ..errors import SysidError, SysidWarning
-from ..results import beside
 from ..robot import Robot
 from ..robot import load as robot_of
 from ..specs import AUTO, Experiment, PreprocessSpec
+from ..unfinished import beside
 from .run import SimulatedLog, Simulation
 
 _LOG = re.compile(r"(train|train_[0-9]+|test)\.csv")
@@ -55,9 +54,9 @@ def prepare(out: str | Path, *, force: bool = False) -> Path:
             f"{' and '.join(changed)} of this simulation changed since it was written, and would be lost", where=str(path),
             allowed="a new or empty folder", do="give another with --out, or --force to write over them",
         )  # fmt: skip
-    probe = path.absolute().parent / f".{uuid.uuid4().hex}"
     try:
-        probe.parent.mkdir(parents=True, exist_ok=True)
+        path.absolute().parent.mkdir(parents=True, exist_ok=True)
+        probe = beside(path.absolute())
         probe.touch()
         probe.unlink()
     except OSError as error:
