@@ -127,7 +127,10 @@ def test_interruption_is_one_line_and_keeps_what_was_done(tmp_path):
         time.sleep(0.02)
     process.send_signal(signal.SIGINT)
     said, complaint = process.communicate(timeout=60)
-    assert process.returncode == 130 and said == "" and complaint.startswith("sysid: interrupted") and complaint.count("\n") == 1
+    assert process.returncode == 130 and said == "" and complaint.count("sysid: interrupted") == 1
+    # before it nothing but how far it is, which a slow machine is told every few seconds
+    *progress, last = complaint.splitlines()
+    assert last.startswith("sysid: interrupted") and all(line.startswith("sysid: bodies, ") for line in progress)
     assert journal.read_bytes().count(b"\n") >= 2
 
 
