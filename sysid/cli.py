@@ -552,12 +552,10 @@ def fetch(dataset: Annotated[Optional[str], typer.Argument(help="One data set; w
 
     if dataset is not None and dataset not in DATASETS:
         raise SysidError(f"there is no data set {dataset!r}", allowed=", ".join(DATASETS))
-    if out:
-        os.environ["SYSID_DATA_DIR"] = str(out)
     found = []
     for name in [dataset] if dataset else DATASETS:
         with _progress(quiet or as_json, len(DATASETS[name].files)) as progress:
-            files = DATASETS[name].fetch(progress=progress)
+            files = DATASETS[name].fetch(into=out, progress=progress)
         found.append({"dataset": name, "licence": DATASETS[name].licence, "citation": DATASETS[name].citation, "files": [str(f) for f in files]})
         if not (quiet or as_json):
             print(f"{name}: {len(files)} files in {files[0].parent}\n  {DATASETS[name].citation}\n  licence: {DATASETS[name].licence}")

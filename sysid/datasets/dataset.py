@@ -48,15 +48,16 @@ class Dataset:
         """Files that are not in the data folder."""
         return [file for file in self.files if not (data_folder() / self.name / file).is_file()]
 
-    def fetch(self, *, progress: Callable[[str, float], None] | None = None) -> list[Path]:
+    def fetch(self, *, into: Path | None = None, progress: Callable[[str, float], None] | None = None) -> list[Path]:
         """Download what is missing and check every file. Raises LogError where that fails.
 
         Args:
+            into: a data folder in place of the usual one.
             progress: called with the name of a file and the share of it that is here.
         """
         import pooch
 
-        folder, paths = data_folder() / self.name, []
+        folder, paths = (into or data_folder()) / self.name, []
         for file, (remote, sha256) in self.files.items():
             bar = False if progress is None else _Bar(lambda share, file=file: progress(f"fetch {file}", share))
             try:
