@@ -27,7 +27,6 @@ import os
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import argparse
-import hashlib
 import sys
 from pathlib import Path
 
@@ -38,18 +37,11 @@ os.environ["PYTHONPATH"] = os.pathsep.join(
 )
 
 
-def _state() -> str:
-    """A hash of the package's source."""
-    text = hashlib.sha256()
-    for path in sorted((ROOT / "sysid").rglob("*.py")):
-        text.update(path.read_bytes())
-    return text.hexdigest()[:8]
-
-
 def main(arguments: list[str] | None = None) -> None:
     """Run a study, print its table."""
     import importlib
 
+    from sysid import results
     from sysid.studies.journal import Journal, run
 
     parser = argparse.ArgumentParser(
@@ -66,7 +58,7 @@ def main(arguments: list[str] | None = None) -> None:
     part = importlib.import_module(f"scripts.design_parts.{options.study}")
     robots = tuple(options.robots.split(",")) if options.robots else part.ROBOTS
     options.out.mkdir(parents=True, exist_ok=True)
-    settings = {"seed": options.seed, "source": _state(), "robots": robots}
+    settings = {"seed": options.seed, "source": results.program()[:8], "robots": robots}
     path = (
         options.out
         / f"{options.study}_{options.seed}_{'_'.join(robots)}_{settings['source']}.jsonl"

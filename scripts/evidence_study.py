@@ -25,7 +25,6 @@ import os
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import argparse
-import hashlib
 import json
 import sys
 import tempfile
@@ -226,7 +225,7 @@ def main() -> None:
 
     level = options.level if options.level is not None else 0.05 if options.study == "size" else LEVEL
     worth = options.worth if options.worth is not None else 0.0 if options.study == "size" else WORTH
-    digest = hashlib.sha256(b"".join(f.read_bytes() for f in sorted((ROOT / "sysid").rglob("*.py")))).hexdigest()[:10]
+    digest = results.program()[:10]
     out = results.folder(options.out)
     settings = {"study": options.study, "seed": options.seed, "level": level, "worth": worth, "source": digest}
     journal = Journal(out / f"{options.study}-{options.seed}-{level:g}-{worth:g}-{digest}.jsonl", settings)

@@ -19,7 +19,6 @@ import os
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import argparse
-import hashlib
 import sys
 from pathlib import Path
 
@@ -31,18 +30,11 @@ os.environ["PYTHONPATH"] = os.pathsep.join(
 STUDIES = ("oddities", "questions", "following")
 
 
-def _state() -> str:
-    """A hash of the package's source."""
-    text = hashlib.sha256()
-    for path in sorted((ROOT / "sysid").rglob("*.py")):
-        text.update(path.read_bytes())
-    return text.hexdigest()[:8]
-
-
 def main(arguments: list[str] | None = None) -> None:
     """Run a study, print its table."""
     import importlib
 
+    from sysid import results
     from sysid.studies.journal import Journal, run
 
     parser = argparse.ArgumentParser(
@@ -56,7 +48,7 @@ def main(arguments: list[str] | None = None) -> None:
     given = parser.parse_args(arguments)
     part = importlib.import_module(f"scripts.fleet_parts.{given.study}")
     given.out.mkdir(parents=True, exist_ok=True)
-    path = given.out / f"{given.study}-{given.seed}-{_state()}.jsonl"
+    path = given.out / f"{given.study}-{given.seed}-{results.program()[:8]}.jsonl"
     cases = [part.case(given.seed, k) for k in range(given.number)]
     tasks = [(str(k), (case,)) for k, case in enumerate(cases)]
     journal = Journal(path, {"study": given.study, "seed": given.seed})

@@ -69,7 +69,7 @@ def combinations(fit: Fit) -> tuple[Combination, ...]:
     columns = fit.compressed.total(fit.weights)[:, :size]
     length = np.linalg.norm(columns, axis=0)
     seen = [k for k in _ordered(fit.model.bodies, size) if length[k] > _ALIKE * length.max()]
-    kept, left = _independent(columns / np.where(length > 0.0, length, 1.0), seen)
+    kept, left = independent(columns / np.where(length > 0.0, length, 1.0), seen, _ALIKE)
     factors = np.zeros((len(kept), size))
     factors[np.arange(len(kept)), kept] = 1.0
     if left:
@@ -130,17 +130,22 @@ def _ordered(bodies: int, size: int) -> list[int]:
     return [*range(10 * bodies, size), *(10 * b + k for b in range(bodies) for k in own)]
 
 
-def _independent(columns: np.ndarray, order: list[int]) -> tuple[list[int], list[int]]:
-    """Which columns stay, and which others make up, in an order (Gram-Schmidt, twice is enough)."""
-    basis = np.zeros((len(columns), 0))
+def independent(columns: np.ndarray, order, alike: float) -> tuple[list[int], list[int]]:
+    """Which columns (n, k) of unit length stay, and which others make up, in an order
+    (Gram-Schmidt, twice is enough).
+
+    Args:
+        alike: what is left of a column beside those before it, and is rounding.
+    """
+    basis = np.empty((len(columns), len(order)), order="F")
     kept, left = [], []
-    for k in order:
-        rest = columns[:, k]
+    for k in map(int, order):
+        known, rest = basis[:, : len(kept)], columns[:, k]
         for _ in range(2):
-            rest = rest - basis @ (basis.T @ rest)
+            rest = rest - known @ (known.T @ rest)
         size = float(np.linalg.norm(rest))
-        if size > _ALIKE:
-            basis = np.column_stack([basis, rest / size])
+        if size > alike:
+            basis[:, len(kept)] = rest / size
             kept.append(k)
         else:
             left.append(k)

@@ -101,3 +101,11 @@ def inverted(system: np.ndarray) -> np.ndarray:
     )
     keep = values > max(1e-11 * values[-1], 1e-100)
     return (vectors[:, keep] / values[keep]) @ vectors[:, keep].T / np.outer(scale, scale)
+
+
+def root(products: np.ndarray) -> np.ndarray:
+    """R (k, k) with R R' = a positive semidefinite matrix, whatever the units of its rows."""
+    diagonal = np.diagonal(products)
+    scale = np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
+    values, vectors = np.linalg.eigh(products / np.outer(scale, scale))
+    return scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))

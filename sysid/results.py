@@ -9,6 +9,7 @@
 Each file is written under a temporary name and renamed, so that a run folder never holds half a file.
 """
 
+import hashlib
 import io
 import json
 import math
@@ -17,6 +18,7 @@ import platform
 import stat
 from collections.abc import Callable
 from contextlib import suppress
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
@@ -34,6 +36,7 @@ from .specs import Experiment, is_own
 from .unfinished import beside
 
 _PACKAGES = ("sysid", "pin", "numpy", "scipy", "yourdfpy", "lxml", "polars")
+_SOURCES = Path(__file__).resolve().parent
 
 
 def document(fit: Fit, run: str | Path = "") -> dict:
@@ -130,6 +133,15 @@ def versions() -> dict[str, str]:
         except PackageNotFoundError:
             found[package] = "not installed"
     return found
+
+
+@cache
+def program() -> str:
+    """SHA-256 of this package's own modules: a version number stays while a program is changed."""
+    state = hashlib.sha256()
+    for path in sorted(_SOURCES.rglob("*.py")):
+        state.update(path.relative_to(_SOURCES).as_posix().encode() + path.read_bytes())
+    return state.hexdigest()
 
 
 def folder(out: str | Path) -> Path:

@@ -6,6 +6,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from scripts.design_parts.limits import summed
 from sysid import config, pipeline, robot
 from sysid import model as models
 from sysid.design import basis, design, document, limits, links, problem, search, solve
@@ -178,7 +179,7 @@ def test_a_design_keeps_to_every_limit_as_an_independent_check_sees_it(poor, des
     """Positions, speeds, torque by Pinocchio and friction by hand, at a kilohertz."""
     machine = poor[1]
     t = np.arange(0.0, 8.0, 1e-3)
-    q, qd, qdd = _motion(designed, t)
+    q, qd, qdd = summed(designed, t)
     own = [machine.source.joints[j] for j in machine.joints]
     assert (np.abs(q) <= [0.95 * j.limits[1] + 1e-9 for j in own]).all()
     assert (np.abs(qd) <= [0.95 * j.velocity + 1e-9 for j in own]).all()
@@ -316,26 +317,16 @@ def test_a_joint_whose_torque_is_unused_tells_nothing(poor):
     assert np.isinf(known.noise[1]) and known.noise[0] < 1.0
     # the information of the shoulder's rows alone, by hand
     t = (np.arange(500) + 0.5) * 4.0 / 500
-    share = known.counted(*_motion(found, t)[1:])
-    moved = columns(known.model, *_motion(found, t))[0] * share[0]
+    share = known.counted(*summed(found, t)[1:])
+    moved = columns(known.model, *summed(found, t))[0] * share[0]
     assert not share[1].any() and 0.9 / known.noise[0] < share[0].max() <= 1.0 / known.noise[0]
     whole = known.before + 2.0 * moved @ moved.T
-    told = information(known, known.all_columns(*_motion(found, t)), np.full(500, 2.0))
+    told = information(known, known.all_columns(*summed(found, t)), np.full(500, 2.0))
     np.testing.assert_allclose(told, whole, rtol=1e-9, atol=1e-9 * np.abs(whole).max())
     assert found.log_det > found.random_best
     assert found.pairs[0].probability == 0.0 and "viscous.elbow.Fv" not in found.deviations
     assert any(s["after"] < 0.9 * s["now"] for s in found.deviations.values())
     assert np.isfinite(found.margins["torque"])
-
-
-def _motion(found, t):
-    """q, qd, qdd of a design at times, from its coefficients."""
-    w = 2.0 * np.pi * found.family.rounds / found.family.duration * np.arange(1, found.family.harmonics + 1)
-    c, a, b = np.split(found.coefficients, [1, 1 + found.family.harmonics], axis=1)
-    angle = w * t[:, None]
-    q = c.T + np.sin(angle) @ a.T + np.cos(angle) @ b.T
-    qd = np.cos(angle) @ (w * a).T - np.sin(angle) @ (w * b).T
-    return q, qd, -np.sin(angle) @ (w**2 * a).T - np.cos(angle) @ (w**2 * b).T
 
 
 def test_without_any_log_the_urdf_is_what_is_known(poor, tmp_path):

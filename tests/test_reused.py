@@ -122,7 +122,7 @@ def test_another_version_or_program_questions_anew(arm, tmp_path, monkeypatch):
         patch.setattr(kept.results, "versions", lambda: {"sysid": "another"})
         assert kept.of(experiment) != state
     with monkeypatch.context() as patch:
-        patch.setattr(kept, "_program", lambda: "another")
+        patch.setattr(kept.results, "program", lambda: "another")
         assert kept.of(experiment) != state
     assert kept.of(experiment) == state
 

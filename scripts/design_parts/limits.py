@@ -69,7 +69,7 @@ def checked(experiment, found, case: dict) -> dict:
     machine = robots.load(experiment.robot, experiment.folder)
     family = found.family
     t = np.arange(0.0, family.duration + 5e-4, 1e-3)
-    q, qd, qdd = _played(found, t) if family.maneuvers else _summed(found, t)
+    q, qd, qdd = _played(found, t) if family.maneuvers else summed(found, t)
     kept = 1.0 - case["margin"]
     own, shares = [machine.source.joints[j] for j in machine.joints], {}
     low, high = np.array([j.limits for j in own]).T
@@ -89,7 +89,7 @@ def checked(experiment, found, case: dict) -> dict:
     return told
 
 
-def _summed(found, t):
+def summed(found, t):
     """q, qd, qdd (n, dof) at times t (n,) [s] of the harmonics, by hand."""
     w = 2.0 * np.pi * found.family.rounds / found.family.duration
     w = w * np.arange(1, found.family.harmonics + 1)

@@ -12,7 +12,7 @@ from ..effect import find
 from ..inertia import DIVERGENCES, PARAMETERIZATIONS, pseudo
 from ..model import ROBOT, Model
 from ..objective import Objective
-from ..projection import inverted
+from ..projection import inverted, root
 from ..solve import Coordinates, solve
 from .halves import Key, Question, least_squares
 
@@ -66,9 +66,9 @@ def possible(products, places, own: slice | None) -> tuple[np.ndarray, np.ndarra
     body = list(range(own.start, own.stop))
     order = [*body, *(k for k in range(size) if k not in body)]
     at = [places[k] for k in order]
-    root = _root(products[np.ix_([*at, -1], [*at, -1])])
+    triangle = np.linalg.qr(root(products[np.ix_([*at, -1], [*at, -1])]).T, mode="r")
     ball = pseudo.sphere(1.0, np.zeros(3), 0.05)
-    objective = Objective(root, DIVERGENCES["log-det"](ball[None]), _WEAK)
+    objective = Objective(triangle, DIVERGENCES["log-det"](ball[None]), _WEAK)
     flat = np.zeros(size - 10, dtype=bool)
     coordinates = Coordinates(PARAMETERIZATIONS["log-cholesky"](), 1, flat, flat)
     start = np.concatenate([ball, least_squares(products, at)[10:]])
@@ -78,13 +78,6 @@ def possible(products, places, own: slice | None) -> tuple[np.ndarray, np.ndarra
     out[order] = found.x
     around[own, own] = 0.5 * objective.prior_hessian(found.x)[0]
     return out, around
-
-
-def _root(products) -> np.ndarray:
-    """A triangle R with R'R = products."""
-    size = np.sqrt(np.maximum(np.diagonal(products), 1e-300))
-    values, vectors = np.linalg.eigh(products / np.outer(size, size))
-    return np.linalg.qr(np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T * size, mode="r")
 
 
 def _nearby(products, places, c, around, pull) -> np.ndarray:

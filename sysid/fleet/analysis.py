@@ -17,6 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import stats
 
+from ..projection import root
 from .calibration import Table, alike, threshold
 from .coordinates import Coordinates
 from .drift import Drift, drift
@@ -110,7 +111,7 @@ def _table(members: list[Member]) -> tuple[Table, np.ndarray]:
     covariance *= (told[:, None] & told)[None]
     variances = np.where(told, stack(lambda m: m.train.variance) * wide, np.nan)
     other = stack(lambda m: m.test.variance) * _typical(stack(lambda m: m.test.widened))
-    table = Table(values, variances, again, other, np.array([_root(c) for c in covariance]))
+    table = Table(values, variances, again, other, np.array([root(c) for c in covariance]))
     return table, table.inflated()
 
 
@@ -119,12 +120,6 @@ def _typical(widened) -> np.ndarray:
     known = np.isfinite(widened)
     mean = np.where(known, widened, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
     return np.maximum(mean, 1.0)
-
-
-def _root(covariance) -> np.ndarray:
-    scale = np.sqrt(np.where(np.diagonal(covariance) > 0.0, np.diagonal(covariance), 1.0))
-    values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
-    return scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
 
 
 def _without_drift(table: Table, days, moved: Drift | None, level: float) -> Table:
@@ -162,8 +157,8 @@ def _odd(kind, members, table, factor, found, by_others, least) -> dict[int, lis
     scale, out = np.sqrt(factor), {}
     freedom = np.maximum(found.count - 1.0, 1.0)
     for i in stands_out:
-        root = table.roots[i] * scale[:, None]
-        within = root @ root.T
+        own_root = table.roots[i] * scale[:, None]
+        within = own_root @ own_root.T
         # the spread of the others, and how well their mean is known
         own = np.nan_to_num(by_others.std[i]) ** 2
         between = np.sqrt(np.maximum(own - np.diagonal(within), 1e-9 * own))

@@ -17,6 +17,7 @@ from functools import cached_property
 
 import numpy as np
 
+from ..base_parameters import independent
 from ..compress import Linearised, triangle
 from ..model import Model
 from ..motion import Motion, Piece
@@ -87,15 +88,7 @@ def _chosen(factor, order) -> tuple[np.ndarray, np.ndarray]:
     """Columns that are new, in an order, and what each column is of them (new, columns)."""
     size = np.linalg.norm(factor, axis=0)
     scaled = factor / np.where(size > 0.0, size, 1.0)
-    basis = np.zeros((len(factor), 0))
-    chosen = []
-    for k in order[size[order] > 0.0]:
-        rest = scaled[:, k] - basis @ (basis.T @ scaled[:, k])
-        rest -= basis @ (basis.T @ rest)
-        left = np.linalg.norm(rest)
-        if left > _ALIKE:
-            chosen.append(int(k))
-            basis = np.column_stack([basis, rest / left])
+    chosen, _ = independent(scaled, order[size[order] > 0.0], _ALIKE)
     own = scaled[:, chosen]
     groups = np.linalg.lstsq(own, scaled, rcond=None)[0]
     groups = groups * size[None] / size[chosen][:, None]

@@ -27,6 +27,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .. import blocks
+from .functions import of_unit_size
 
 _RIDGES = (1e-4, 3e-3, 3e-2)  # of the rows' number, for columns of unit size: stiff and loose
 _DRAWS = 2000
@@ -97,11 +98,9 @@ def agreement(
 
 def _products(values, use, model: Projection, count: int):
     """(blocks, blocks) what each block tells of each other by one family, for each ridge."""
-    kept = np.where(use[:, None], values, 0.0)
-    kept = kept[:, kept.std(0) > 1e-9]
+    kept = of_unit_size(values, use)
     if not kept.shape[1]:
         return
-    kept = kept / np.sqrt(np.mean(kept**2, axis=0))
     across = kept.T @ model.columns
     absorbed = across @ model.inverse
     scores = blocks.summed(model.number, kept * model.residual[:, None], count)

@@ -45,7 +45,7 @@ def groups(
     out = {"*": np.concatenate(features, axis=1)}
     for name in known:
         if not name.startswith(("load_", "qdd_")):
-            out[name] = np.concatenate([parts[name], direction * parts[name]], axis=1)
+            out[name] = _both_ways(parts[name], direction)
     return out
 
 
@@ -62,7 +62,7 @@ def families(
     speed, push = known[f"qd_{joint}"], known[f"qdd_{joint}"]
     direction = np.sign(speed)[:, None]
     parts = {name: _splines(name, values) for name, values in known.items()}
-    out = {name: np.concatenate([own, direction * own], axis=1) for name, own in parts.items()}
+    out = {name: _both_ways(own, direction) for name, own in parts.items()}
     for name, own in parts.items():
         if name.startswith("q_") or name in (f"qdd_{joint}", f"load_{joint}"):
             out[f"qd_{joint} and {name}"] = speed[:, None] * own
@@ -75,6 +75,18 @@ def families(
             if name != own:
                 out[f"{own} and {name}, waves"] = _cosines(known, own, name, 2 * _WAVES, rng)
     return out
+
+
+def of_unit_size(values: np.ndarray, use) -> np.ndarray:
+    """Functions (n, k) at rows that count (n,), zero at others, each with a mean square of one;
+    without those that say nothing there."""
+    kept = np.where(use[:, None], values, 0.0)
+    kept = kept[:, kept.std(0) > 1e-9]
+    return kept / np.sqrt(np.mean(kept**2, axis=0))
+
+
+def _both_ways(values: np.ndarray, direction: np.ndarray) -> np.ndarray:
+    return np.concatenate([values, direction * values], axis=1)
 
 
 def _splines(name: str, values: np.ndarray) -> np.ndarray:

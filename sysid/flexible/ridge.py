@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from .functions import of_unit_size
+
 _APART = (
     0.15  # s, several memories of the filters: what is predicted, and what it is predicted from
 )
@@ -28,11 +30,9 @@ def stretches(fold, t, piece) -> list[tuple[np.ndarray, np.ndarray]]:
 def predicted(features, y, use, spans) -> tuple[np.ndarray, np.ndarray]:
     """What ridge regression predicts (n,) of the rows of each fold from rows apart from it, and its
     gain (folds,)."""
-    kept = np.where(use[:, None], features, 0.0)
-    kept = kept[:, kept.std(0) > 1e-9]
-    if not kept.shape[1]:
+    scaled = of_unit_size(features, use)
+    if not scaled.shape[1]:
         return np.zeros(len(y)), np.zeros(len(spans))
-    scaled = kept / np.sqrt(np.mean(kept**2, axis=0))
     system, right = scaled.T @ scaled, scaled.T @ y
     # the ridge of a fold is the one that serves the other folds best
     gains, all_told = np.zeros((len(_RIDGES), len(spans))), np.zeros((len(_RIDGES), len(y)))

@@ -14,7 +14,6 @@ import hashlib
 import json
 from collections.abc import Iterator
 from datetime import UTC, datetime
-from functools import cache
 from pathlib import Path
 
 from .. import bounded, pipeline, results, urdf
@@ -36,11 +35,11 @@ def diagnosed(
     Raises:
         SysidError: bad input.
     """
-    if _read(experiment, run) is not None:
+    if (said := _read(experiment, run)) is not None:
         fit = pipeline.fit(experiment, progress=progress)
-        if (said := found(experiment, fit, run)) is not None:
+        if _of_its_logs(said, fit):
             results.write(fit, run)
-            return fit, said
+            return fit, {**said, "run": str(run)}
         made = diagnose(experiment, fit=fit, progress=progress)  # of other logs
     else:
         made = diagnose(experiment, progress=progress)
@@ -50,9 +49,11 @@ def diagnosed(
 def found(experiment: Experiment, fit: Fit, run: Path) -> dict | None:
     """The diagnosis in a run folder, where it is of an experiment and of the logs of its fit."""
     said = _read(experiment, run)
-    if said is None or said["logs"] != json.loads(json.dumps(list(fit.logs))):
-        return None
-    return {**said, "run": str(run)}
+    return {**said, "run": str(run)} if said is not None and _of_its_logs(said, fit) else None
+
+
+def _of_its_logs(said: dict, fit: Fit) -> bool:
+    return said["logs"] == json.loads(json.dumps(list(fit.logs)))
 
 
 def written(experiment: Experiment, made: Diagnosis, run: Path) -> dict:
@@ -92,7 +93,7 @@ def of(experiment: Experiment) -> str:
         except OSError:
             state.update(b"not there")
     state.update(json.dumps(results.versions(), sort_keys=True).encode())
-    state.update(_program().encode())
+    state.update(results.program().encode())
     return state.hexdigest()
 
 
@@ -107,12 +108,3 @@ def files(experiment: Experiment) -> Iterator[Path]:
         yield source / "fit.json" if source.is_dir() else source
     names = [spec.name for spec in (*experiment.model.effects, *experiment.model.candidates)]
     yield from (experiment.folder / n.rpartition(":")[0] for n in names if is_own(n))
-
-
-@cache
-def _program() -> str:
-    """SHA-256 of this package's own modules: a version number stays while a program is changed."""
-    folder, state = Path(__file__).resolve().parent.parent, hashlib.sha256()
-    for path in sorted(folder.rglob("*.py")):
-        state.update(path.relative_to(folder).as_posix().encode() + path.read_bytes())
-    return state.hexdigest()
