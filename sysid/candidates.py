@@ -195,9 +195,8 @@ def at_start(candidate: Candidate, shapes: dict[str, float]) -> bool:
 def grown(source, candidate: Candidate, shapes: dict[str, float]) -> Model:
     """A source's model with a candidate at shape values, in the place of what it has of the same
     effect on that joint."""
-    model = source.model.without(*candidate.key).with_effect(candidate.effect, (candidate.joint,))
-    if candidate.effect.uses_load and model.reference is None:
-        model = model.with_reference(source.x[: 10 * model.bodies].reshape(-1, 10))
+    model = source.referenced if candidate.effect.uses_load else source.model
+    model = model.without(*candidate.key).with_effect(candidate.effect, (candidate.joint,))
     own = model.last_shapes
     asked = [
         shapes.get(v.shape.name, at) for v, at in zip(model.shape_values[own], model.shapes[own])

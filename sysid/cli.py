@@ -324,15 +324,10 @@ def diagnose(
     said = kept.written(spec, found, run)
     if as_json:
         print(json.dumps(said, allow_nan=False))
-    else:
-        from .report.failures import failures
+    elif not quiet:
+        from .terminal import show_diagnosis
 
-        robot = found.fit.model.robot
-        failures(said, run, {joint for joint, slides in zip(robot.joints, robot.prismatic) if slides})
-        if not quiet:
-            from .terminal import show_diagnosis
-
-            show_diagnosis(found, said)
+        show_diagnosis(found, said)
     if not found.fit.solution.converged:
         raise typer.Exit(1)
 

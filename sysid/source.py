@@ -31,6 +31,13 @@ class Source:
         return row.seen(self.model, self.motion)
 
     @cached_property
+    def referenced(self) -> Model:
+        """The model with bodies that effects of the load look at: its own, or those of x."""
+        if self.model.reference is not None:
+            return self.model
+        return self.model.with_reference(self.x[: 10 * self.model.bodies].reshape(-1, 10))
+
+    @cached_property
     def _bent(self) -> dict:
         return {}
 

@@ -20,7 +20,6 @@ from sysid import pipeline, regressor, results, robot, specs
 from sysid.diagnose.diagnosis import diagnose
 from sysid.report import charts, page, residual_charts, solids, torque_chart
 from sysid.report.decimate import broken, kept
-from sysid.report.failures import failures
 from sysid.report.sections import sections
 from sysid.report.words import quantity
 from sysid.statement.document import document
@@ -404,15 +403,6 @@ def test_sliding_joints_have_newtons_and_metres(missing):
     slides = residual_charts.residual_map("m", "x", "N", "m", said["fails_where"][0]["map"])["figure"]["layout"]
     assert slides["xaxis"]["title"]["text"] == "position q [m]" and slides["yaxis"]["title"]["text"] == "speed qd [m/s]"
     assert torque_chart.torque("t", "x", "N", {}, {}, 1)["figure"]["layout"]["yaxis"]["title"]["text"] == "force [N]"
-
-
-def test_figures_on_paper(missing, tmp_path):
-    _, said = missing
-    said = copy.deepcopy(said)
-    said["fails_where"][0]["joint"] = EVIL + " $x$"
-    paths = failures(said, tmp_path, {"elbow"})
-    assert [p.name for p in paths] == ["where_it_fails.png"] and all(p.stat().st_size > 1000 for p in paths)
-    assert failures({"fails_where": []}, tmp_path) == []
 
 
 def test_command_writes_the_page(clean, tmp_path, monkeypatch, capsys):

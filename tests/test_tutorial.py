@@ -98,7 +98,7 @@ def test_the_tutorial_s_commands_give_what_it_shows(tmp_path, monkeypatch):
     assert '"load_friction"' in truth and '"torque_bias"' in truth
     written = (tmp_path / "leg" / "config.yaml").read_text()
     assert "load_friction: {joints: [knee]}" in written and "torque_bias: {joints: [hip]}" in written
-    for name in ("report.html", "where_it_fails.png", "history.json", "steps"):
+    for name in ("report.html", "history.json", "steps"):
         assert (tmp_path / "runs" / "leg" / name).exists()
 
 

@@ -49,18 +49,18 @@ class Group:
     back: np.ndarray
     sizes: np.ndarray
 
-    @property
+    @cached_property
     def c(self) -> np.ndarray:
         """(k,) coefficients of the orthonormal columns."""
         return self.scores.sum(0) + self.kept
 
-    @property
+    @cached_property
     def moves(self) -> np.ndarray:
         """(blocks, k) how far they move when a block is left out."""
         own = self.loud - self.loud_squares @ self.c
         return np.einsum("bkl,bl->bk", left_out(self.squares), own)
 
-    @property
+    @cached_property
     def freedom(self) -> tuple[float, float]:
         """Degrees of freedom: directions that take part (Satterthwaite 1946), and blocks that they
         rest on."""
