@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ... import blocks
 from ...model import build
 from ...projection import inverted
+from ...robot import Robot
 from ...rows import stack
 from ..fault import WARNING, Fault
 from ..look import Look, Seen
@@ -29,7 +30,6 @@ AFTER, SENSELESS = (
 # five real ones, stand between a quarter and twice these
 _WEIGHT = (1.0 / 6.0, 3.0)
 _CLEAR = 4.0  # standard errors
-_FELT = 0.1  # of a joint's torque, RMS: a weight that is less says nothing
 _PASSES = 3  # the last two with every joint weighted by what the one before left
 
 
@@ -38,16 +38,18 @@ def find(look: Look) -> Iterator[Fault]:
     is, which says what brings masses back."""
     if look.seen is None:
         return
-    times, error, felt = weights(look.seen)
+    weights = weighed(look.seen)
     far = {} if look.fit is None else look.fit.masses
     cured = {link["link"] for link in far["far"]} if far.get("effect") else set()
+    clear = weights.misfit > 1.0  # else other weights, all of them plausible, do as well
     held = set()
     for b, body in enumerate(look.robot.bodies):
-        own, se = float(times[b]), float(error[b])
+        own, se = float(weights.times[b]), float(weights.error[b])
         low, high = own - _CLEAR * se, own + _CLEAR * se
+        least, most = weights.plausible[:, b]
         # of a centre of mass on the other side the mass says nothing
-        implausible = low > _WEIGHT[1] or (high < _WEIGHT[0] and own > -_WEIGHT[0])
-        if body.kind != "link" or felt[b] < _FELT or not implausible:
+        implausible = low > most or (high < least and own > -least)
+        if body.kind != "link" or not (clear and implausible):
             continue
         held.add(body.name)
         word = (
@@ -65,7 +67,8 @@ def find(look: Look) -> Iterator[Fault]:
             far["do"] if body.name in cured else f"check {word}",
             body.joint,
         )
-    for link in far.get("far", ()):
+    # where no effect stands for it, what the logs hardly tell of a mass is no fault of theirs
+    for link in far.get("far", ()) if cured or clear else ():
         if link["link"] not in held:
             says = (
                 f"a fit gives the link of {link['joint']} {link['mass']:.3g} kg, the URDF "
@@ -74,14 +77,24 @@ def find(look: Look) -> Iterator[Fault]:
             yield Fault("mass_implausible", WARNING, says, far["do"], link["joint"])
 
 
-def weights(seen: Seen) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """By how much the torque of each body's weight (bodies,) is what the URDF says, its standard
-    error, and the greatest share of a joint's torque that this weight makes, by the URDF or by the
-    logs.
+@dataclass(frozen=True)
+class Weights:
+    """By how much the torque of each body's weight is what the URDF says, times (bodies,), with its
+    standard error and what is plausible (2, bodies).
 
-    Least squares of the torque by each body's weight and by the rest of its torque, in factors of
-    their own, beside what any joint has.
+    misfit: what torque the plausible ones cannot give, over what none can, RMS of the joint with
+    the most. Up to 1 what passes for a weight may be misfit as well as the rest of the misfit is.
     """
+
+    times: np.ndarray
+    error: np.ndarray
+    plausible: np.ndarray
+    misfit: float
+
+
+def weighed(seen: Seen) -> Weights:
+    """Least squares of the torque by each body's weight and by the rest of its torque, in factors
+    of their own, beside what any joint has; and the same with plausible weights alone."""
     robot, rows, bodies = seen.model.robot, seen.rows, seen.model.bodies
     pieces = tuple(replace(p, qd=0.0 * p.qd, qdd=0.0 * p.qdd) for p in seen.motion.pieces)
     still = stack(build(robot, []), replace(seen.motion, pieces=pieces), seen.stride).columns
@@ -102,7 +115,39 @@ def weights(seen: Seen) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     )
     scores = blocks.summed(number, np.einsum("jnk,nj,j->nk", a, left, w**2, optimize=True))
     error = np.sqrt(np.sum((scores @ inverse) ** 2, axis=0))
-    rms = lambda values: np.sqrt((values**2).sum(1) / count[:, None])  # noqa: E731
-    torque = np.sqrt((rows.tau**2).sum(0) / count + 1e-300)
-    felt = (rms(weight) / torque[:, None]).max(axis=0)
-    return x[:bodies], error[:bodies], felt * np.maximum(1.0, np.abs(x[:bodies]))
+    plausible = _plausible(robot, np.sqrt((weight**2).sum(1) / count[:, None]))
+    bounds = np.full((2, len(x)), [[-np.inf], [np.inf]])
+    bounds[:, :bodies] = plausible
+    asked = np.einsum("jnk,nj,j->k", a, rows.tau * rows.use, w**2, optimize=True)
+    other = np.einsum("jnk,k->nj", a, x - _bounded(system, asked, bounds))
+    misfit = np.sqrt((other**2).sum(0) / np.maximum((left**2).sum(0), 1e-300)).max()
+    return Weights(x[:bodies], error[:bodies], plausible, float(misfit))
+
+
+def _plausible(robot: Robot, torque) -> np.ndarray:
+    """The least and the most (2, bodies) that weights may be, over the URDF's; torque (dof, bodies)
+    [N m or N] is what they make, RMS.
+
+    A joint feels a weight by its lever alone, so a factor of it may be a centre of mass elsewhere:
+    a body's mass is its radius of gyration away from its centre, on the mean, and so far the centre
+    may be off. Where the lever is short, as under an upright axis, that is any factor.
+    """
+    mass, first, second = robot.prior[:, 0], robot.prior[:, 1:4], robot.prior[:, 4:7]
+    square = 0.5 * second.sum(1) / mass - (first**2).sum(1) / mass**2
+    slides = np.asarray(robot.prismatic)[:, None]  # carries the weight itself, wherever it is
+    heavy = mass * np.linalg.norm(robot.gravity) + 1e-300
+    lever = np.where(slides, np.where(torque > 0.0, np.inf, 0.0), torque / heavy).max(0)
+    moved = np.sqrt(np.maximum(square, 0.0)) / np.maximum(lever, 1e-300)
+    return np.array([np.minimum(_WEIGHT[0], 1.0 - moved), np.maximum(_WEIGHT[1], 1.0 + moved)])
+
+
+def _bounded(system, asked, bounds) -> np.ndarray:
+    """Least squares within bounds (2, k), from products (k, k) and (k,)."""
+    from scipy.optimize import lsq_linear
+
+    size = np.sqrt(np.maximum(np.diag(system), 1e-300))
+    values, vectors = np.linalg.eigh(system / np.outer(size, size))
+    keep = values > 1e-11 * values[-1]
+    a = np.sqrt(values[keep])[:, None] * vectors[:, keep].T
+    b = vectors[:, keep].T @ (asked / size) / np.sqrt(values[keep])
+    return lsq_linear(a, b, bounds * size, method="bvls").x / size
