@@ -52,7 +52,7 @@ def _root(
 ) -> None:
     """Keeps `sysid fit` a command of its own however many there are."""
     if context.invoked_subcommand is None:
-        raise SysidError("which command? `sysid init URDF LOG...` begins with a robot and its logs, `sysid check EXPERIMENT` looks at logs, `sysid fit EXPERIMENT` identifies, `sysid diagnose EXPERIMENT` names what is missing; `sysid --help` lists all")
+        raise SysidError("which command? `sysid init URDF LOG...` begins with a robot and its logs, `sysid check EXPERIMENT` looks at logs, `sysid fit EXPERIMENT` identifies, `sysid diagnose EXPERIMENT` names what is missing; `sysid --help` lists all in their order")
 
 
 @app.command()
@@ -77,9 +77,9 @@ def fit(experiment: ExperimentPath, trust: Trust = False, as_json: Json = False,
 
 @app.command()
 def init(
-    robot: Annotated[str, typer.Argument(metavar="URDF", help="A URDF, xacro or MJCF file.")],
-    logs: Annotated[list[str], typer.Argument(metavar="LOG...", help="Logs: files, folders, patterns.")],
-    out: Annotated[Optional[Path], typer.Option("--out", help="The experiment folder to write (default: named as the URDF).")] = None,  # noqa: UP045
+    robot: Annotated[str, typer.Argument(metavar="URDF", help="A URDF, xacro or MJCF file; or a folder that holds one and its logs.")],
+    logs: Annotated[Optional[list[str]], typer.Argument(metavar="LOG...", help="Logs: files, folders, patterns.")] = None,  # noqa: UP045
+    out: Annotated[Optional[Path], typer.Option("--out", help="The experiment folder to write (default: named as the URDF; the folder, where one was given alone).")] = None,  # noqa: UP045
     joints: Annotated[Optional[str], typer.Option("--joints", metavar="A,B,...", help="The joints that the columns are of, in their order.")] = None,  # noqa: UP045
     topic: Annotated[Optional[str], typer.Option("--topic", help="The topic of a bag, where several have joint states.")] = None,  # noqa: UP045
     rate: Annotated[Optional[float], typer.Option("--rate", metavar="HZ", help="Samples a second of logs without a clock.")] = None,  # noqa: UP045
@@ -91,7 +91,7 @@ def init(
     if rate is not None and not 0.0 < rate < float("inf"):
         raise SysidError("--rate must be samples a second, above 0", where=f"--rate {rate:g}")
     wishes = beginning.Wishes(tuple(filter(None, (joints or "").split(","))), topic, rate)
-    found, file = beginning.init(robot, logs, out or Path(Path(robot).stem), wishes)
+    found, file = beginning.init(*beginning.sorted_out(robot, logs or [], out), wishes)
     if as_json:
         print(json.dumps(beginning.document(found, file), allow_nan=False))
     elif not quiet:
@@ -684,7 +684,7 @@ def main() -> None:
     try:
         while True:
             try:
-                status = app(standalone_mode=False)
+                status = app(prog_name="sysid", standalone_mode=False)
                 if sys.stdout is not None:  # closed
                     sys.stdout.flush()
                 break
@@ -709,7 +709,9 @@ def main() -> None:
     except Exception as error:
         # what click raises for a mistyped command carries its own status and message
         if hasattr(error, "format_message"):
-            _fail(error.format_message(), getattr(error, "exit_code", 2))
+            from .mistyped import said
+
+            _fail(said(error), getattr(error, "exit_code", 2))
         if os.environ.get("SYSID_DEBUG"):
             raise
         _fail(f"internal error, {type(error).__name__}: {error}; SYSID_DEBUG=1 shows where", 1)

@@ -7,6 +7,7 @@ stays the truth; nothing here writes it.
 from __future__ import annotations
 
 import difflib
+import shlex
 from pathlib import Path
 from typing import Any, get_args
 
@@ -16,6 +17,7 @@ from . import bounded, datasets, groups
 from .effect import find, vocabulary
 from .errors import ConfigError
 from .formula import parse
+from .mistyped import FEW, standing
 from .readers import is_log_folder, listed
 from .specs import ENTRY, EffectSpec, Experiment, LogSpec, is_own
 
@@ -44,15 +46,21 @@ def load(path: str | Path) -> Experiment:
     word = "a log" if path.suffix.lower() in _LOGS else "a robot" if path.suffix.lower() in _ROBOTS else ""
     if given.is_dir() and not path.is_file():
         word = "a log" if is_log_folder(given) else "a folder without config.yaml"
+    if (given / "experiment.yaml").is_file() and (given / "fit.json").is_file() and word:
+        raise ConfigError(
+            "a run folder, and no experiment", where=str(given), allowed="a YAML file, or a folder with config.yaml",
+            do=f"give the experiment that it is of, or {given / 'experiment.yaml'}, which gives the same fit",
+        )  # fmt: skip
     if word:
         raise ConfigError(
             f"{word}, and no experiment", where=str(given), allowed="a YAML file, or a folder with config.yaml",
-            do="`sysid init URDF LOG...` writes one from a robot and its logs",
+            do=f"`sysid init {_begins(given)}` writes one from a robot and its logs" + _standing(),
         )  # fmt: skip
     try:
         data = bounded.read_bytes(path)
     except OSError as error:
-        raise ConfigError(f"the experiment file cannot be read ({error.strerror})", where=str(path), do="check its name") from None
+        do = f"check its name{_standing()}"
+        raise ConfigError(f"the experiment file cannot be read ({error.strerror})", where=str(path), do=do) from None
     if len(data) > _LARGEST_FILE:
         raise ConfigError(f"an experiment file of {len(data)} bytes", where=str(path), allowed=f"at most {_LARGEST_FILE}")
     try:
@@ -60,6 +68,19 @@ def load(path: str | Path) -> Experiment:
     except UnicodeDecodeError:
         raise ConfigError("not UTF-8 text", where=str(path), do="give an experiment in YAML") from None
     return loads(text, path)
+
+
+def _begins(given: Path) -> str:
+    """What `sysid init` is given in the place of what is no experiment: a folder that holds a robot, else both."""
+    holds = given.is_dir() and any(one.suffix.lower() in _ROBOTS for one in given.iterdir())
+    return shlex.quote(str(given)) if holds else "URDF LOG..."
+
+
+def _standing() -> str:
+    """The experiments of the folder that we are in, as an error ends."""
+    there = standing()
+    more = ", ..." if len(there) > FEW else ""
+    return f"; experiments here: {', '.join(there[:FEW])}{more}" if there else ""
 
 
 def loads(text: str, path: Path) -> Experiment:
@@ -153,8 +174,8 @@ def _known(name: str) -> str:
         raise ValueError(f"{name!r} names no class; write {name.partition('.py')[0]}.py:Name")
     names = vocabulary()
     if name not in names:
-        close = difflib.get_close_matches(name, names, n=3, cutoff=0.4) or names
-        raise ValueError(f"there is no effect {name!r}; allowed: {', '.join(close)}; see `sysid effects`")
+        close = difflib.get_close_matches(name.lower(), names, n=3, cutoff=0.4) or names
+        raise ValueError(f"there is no effect {name!r}; allowed: {', '.join(close)}; `sysid effects` lists all")
     return name
 
 
@@ -196,9 +217,21 @@ def parse_yaml(text: str, *, where: str):
     except MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         line = f" line {mark.line + 1}" if mark else ""
-        raise ConfigError(f"not YAML ({error.problem or error.context})", where=f"{where}{line}", do="correct the line") from None
+        said = str(error.problem or error.context)
+        raise ConfigError(f"not YAML ({said})", where=f"{where}{line}", do=_cure(said)) from None
     except (YAMLError, ValueError, RecursionError) as error:
         raise ConfigError(f"not YAML ({str(error).splitlines()[0]})", where=where) from None
+
+
+def _cure(said: str) -> str:
+    """What to do about what a reader of YAML says, which speaks of its own parts."""
+    if "'\\t'" in said:
+        return "put spaces in the place of the tab"
+    if "<block" in said or "mapping values" in said:
+        return "bring the line to the column of its neighbours: keys of one mapping begin at the same one"
+    if "',' or" in said:
+        return "close the bracket, or part its entries with commas"
+    return "correct the line"
 
 
 def _check_events(events, where: str) -> None:

@@ -426,8 +426,8 @@ def find(name: str) -> Effect:
 
     names = vocabulary()
     if name not in names:
-        close = difflib.get_close_matches(name, names, n=3, cutoff=0.5) or names
-        raise ConfigError(f"there is no effect {name!r}", allowed=", ".join(close), do="see `sysid effects`")
+        close = difflib.get_close_matches(name.lower(), names, n=3, cutoff=0.5) or names
+        raise ConfigError(f"there is no effect {name!r}", allowed=", ".join(close), do="`sysid effects` lists all")
     module = import_module(f"sysid.effects.{name}")
     (kind,) = [
         value for value in vars(module).values()

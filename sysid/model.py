@@ -13,7 +13,7 @@ import numpy as np
 
 from . import own_effects, regressor, two_masses, units
 from .effect import Asked, Deflection, Effect, LinkEffect, MotionEffect, SensorEffect, Shape, TorqueEffect, WrenchEffect, find
-from .errors import ConfigError, SysidError, SysidWarning
+from .errors import ConfigError, SysidError, SysidWarning, meant
 from .extent import Extent
 from .formula import Formula
 from .inertia import PARAMETERS, UNITS
@@ -520,7 +520,7 @@ def build(robot: Robot, effects, folder: Path = Path(), signals=(), groups: Mapp
         joints = []
         for name in names:
             if effect.scope != "robot" and name not in robot.joints:
-                raise ConfigError(f"model.effects: {effect.name} names the joint {name!r}", allowed=", ".join(robot.joints), do="correct the joint, or leave `joints` out for all of them")
+                raise ConfigError(f"model.effects: {effect.name} names the joint {name!r}", allowed=", ".join(robot.joints), do=meant(name, robot.joints, "leave the joint out for all of them"))
             if (effect.name, name) in seen:
                 where = "" if name == "*" else f" on joint {name!r}"
                 do = "give each a `name` of its own" if "formula" in spec.options else "leave one out"

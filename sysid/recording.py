@@ -196,6 +196,7 @@ def _check_headers(table: Table, data: DataSpec, wanted: dict, time: str | None)
         if name
     ]
     for quantity, name in asked:
+        name = table.titled(name)
         stated, taken = units.in_header(name, quantity), getattr(data.units, quantity)
         if not stated or units.agree(stated, taken):
             continue

@@ -16,7 +16,7 @@ from .differences import give_or_take
 from .estimate import Fit, given_shapes, said_of_shapes
 from .export import exported
 from .init.text import flow
-from .statement import tables, text
+from .statement import faults, tables, text
 
 _LOW = 0.1  # below this share the prior, not the data, gave a parameter
 
@@ -81,14 +81,22 @@ def progress_lines(course):
 
 def show_init(found, file) -> None:
     """What was guessed of a robot and its logs, and why."""
-    print("guessed")
-    for guess in found.guesses.values():
-        for words, indent in ((f"  {guess.key}: {flow(guess.value)}", "      "), (f"      because: {guess}", "        ")):
-            print("\n".join(text.wrapped(words, _width(), indent)))
-    for note in found.notes:
-        print(f"look {note}")
-    place = shlex.quote(str(file.parent))
-    print(f"wrote {file}; next: sysid check {place}, sysid fit {place}")
+    print(f"guessed, and written into {file} with the reasons")
+    guesses = list(found.guesses.values())
+    for guess in guesses:
+        print("\n".join(text.wrapped(f"  {guess.key}: {flow(guess.value)} ({guess.why})", _width(), "      ")))
+    doubts = [f"{guess.key}: {guess.doubt}" for guess in guesses if guess.doubt]
+    for look in [*doubts, *found.notes]:
+        print("\n".join(text.wrapped(f"LOOK {look}", _width(), "     ")))
+    said = f"correct {file} where this is wrong" if doubts or found.notes else ""
+    _next("check", file.parent, first=said)
+
+
+def _next(command: str, *words, first: str = "") -> None:
+    """The last line of a command: what is typed next, and what comes before it."""
+    if first:
+        print("\n".join(text.wrapped(f"{first}; then", _width(), "  ")))
+    print(f"next: {shlex.join(['sysid', command, *map(str, words)])}")
 
 
 def show_fit(fit: Fit, document: dict) -> None:
@@ -158,23 +166,8 @@ def _show_filter(chosen: dict) -> None:
 
 
 def show_check(document: dict) -> None:
-    """Every fault of the logs with its cure, the gravest first; the same fault of several joints or logs under one cure."""
-    width = shutil.get_terminal_size().columns
-    groups: dict[tuple[str, str, str], list[str]] = {}
-    for f in document["faults"]:
-        groups.setdefault((f["severity"], f["fault"], f["do"]), []).append(f["says"])
-    for (severity, fault, do), says in groups.items():
-        print(f"{severity}: {fault}")
-        for line in says:
-            print("\n".join(text.wrapped(f"  {line}", width, "    ")))
-        print("\n".join(text.wrapped(f"  -> {do}", width, "     ")))
-    errors, all_ = (sum(f["severity"] == "error" for f in document["faults"]), len(document["faults"]))
-    if not all_:
-        print("no fault was found")
-    elif document["ok"]:
-        print(f"{all_} warning{'s' * (all_ > 1)}; a fit can be trusted beyond them")
-    else:
-        print(f"{errors} error{'s' * (errors > 1)}, {all_ - errors} warning{'s' * (all_ - errors != 1)}: a fit of these logs would be wrong")
+    """Every fault of the logs with its cure, the gravest first."""
+    print("\n".join(faults.lines(document, _width())))
 
 
 _NEVER = 0.05  # probability below which a motion is no answer

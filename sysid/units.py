@@ -41,6 +41,11 @@ def in_header(name: str, quantity: str) -> str:
     return (WORDS[quantity] | _SYMBOLS[quantity]).get(said, "")
 
 
+def is_unit(word: str) -> bool:
+    """Whether a word alone names a unit of any quantity of a log, "deg" or "rad/s"."""
+    return any(in_header(f"[{word.strip('[]()')}]", quantity) for quantity in WORDS)
+
+
 def agree(stated: str, taken: str) -> bool:
     """Whether numbers in one unit may be read in another: the same, or, as one unit is named for turning and for sliding
     joints, the other kind's own of which 1 is 1 (rad and m, N m and N)."""

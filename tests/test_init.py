@@ -619,7 +619,7 @@ def test_wrapped_angles_are_told(experiment, cli):
 def test_what_a_person_sees(experiment, cli):
     folder = experiment()
     said = cli("init", folder / "robot.urdf", folder / "train.csv", out=folder / "mine")
-    assert said.status == 0 and "data.units.position" in said.out and "sysid fit" in said.out
+    assert said.status == 0 and "data.units.position" in said.out and said.out.splitlines()[-1].startswith("next: sysid check ")
     (folder / "bag").mkdir()
     (folder / "bag/metadata.yaml").write_text("")
     (folder / "config.yaml").unlink()

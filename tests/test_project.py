@@ -18,7 +18,7 @@ ROOT = Path(__file__).resolve().parent.parent
 
 # The order of the method: a module imports only from modules above it.
 ORDER = [
-    "errors", "bounded", "unfinished", "state", "trusted", "progress", "units", "picture", "threads", "silence", "callable_module", "workers", "inertia", "urdf", "readers", "datasets", "specs", "groups", "prior", "robot", "regressor", "outliers", "knocks", "jumps", "repeats",
+    "errors", "mistyped", "bounded", "unfinished", "state", "trusted", "progress", "units", "picture", "threads", "silence", "callable_module", "workers", "inertia", "urdf", "readers", "datasets", "specs", "groups", "prior", "robot", "regressor", "outliers", "knocks", "jumps", "repeats",
     "frequencies", "clock", "segment", "spans", "events", "motor_side", "recording", "log", "even_clock", "long_log", "masks", "gaussian", "smoother",
     "motion", "extent", "preprocess", "long_motion", "blocks", "two_masses", "lowpass", "flexible", "effect", "formula", "effects", "own_effects",
     "per_level", "config", "addition", "model", "drives", "inverse_dynamics", "rows", "objective", "projection", "landscape", "multistart", "source",

@@ -1,5 +1,6 @@
 """A robot and its logs -> an experiment folder, with what was guessed and why.
 
+given.py    which of what was typed is the robot, which are logs
 words.py    what names of columns say
 columns.py  columns and joints -> which column is which joint's
 logged.py   the logs, opened and read
@@ -16,12 +17,14 @@ from __future__ import annotations
 
 import os
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 from ..errors import SysidError
 from ..unfinished import beside
 from . import text
 from .draft import Wishes, draft
+from .given import sorted_out
 from .guess import Draft
 
 
@@ -50,9 +53,11 @@ def init(
         work.mkdir(parents=True)
         found = draft(reference, logs, work, wishes or Wishes())
         command = (
-            f"sysid init {Path(reference).name} {' '.join(Path(log).name for log in logs[:4])}"
+            f"sysid init {Path(reference).name} "
+            + " ".join(Path(log).name or log for log in logs[:4])
             + (" ..." if len(logs) > 4 else "")
         )
+        found = _from_inside(found, out)
         (work / "config.yaml").write_text(text.yaml(found, command), encoding="utf-8")
         _moved(work, out)
     except OSError as error:
@@ -64,6 +69,22 @@ def init(
     finally:
         shutil.rmtree(work, ignore_errors=True)
     return found, out / "config.yaml"
+
+
+def _from_inside(found: Draft, out: Path) -> Draft:
+    """The draft with paths from its own folder, which was looked at from beside."""
+    own = f"../{out.resolve().name}/"
+
+    def inside(value):
+        if isinstance(value, list):
+            return [inside(one) for one in value]
+        if isinstance(value, dict):
+            return {key: inside(one) for key, one in value.items()}
+        return value.removeprefix(own) if isinstance(value, str) else value
+
+    parts = [found.guesses[key] for key in ("data.train", "data.test")]
+    moved = [replace(guess, value=inside(guess.value)) for guess in parts]
+    return replace(found, urdf=inside(found.urdf)).having(*moved)
 
 
 def _moved(work: Path, out: Path) -> None:
@@ -95,4 +116,4 @@ def document(found: Draft, file: Path) -> dict:
     }
 
 
-__all__ = ["Draft", "Wishes", "document", "draft", "init"]
+__all__ = ["Draft", "Wishes", "document", "draft", "init", "sorted_out"]

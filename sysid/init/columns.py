@@ -79,7 +79,7 @@ def _named(table: Table, joints: list[str]) -> Iterable[Found]:
     known = _aliases(joints)
     by_rest: dict[tuple, dict[str, str]] = {}
     for column in _single(table):
-        said = words(column)
+        said = words(table.titled(column))
         hits = [
             (len(alias), alias, joint) for alias, joint in known.items() if _at(said, alias) >= 0
         ]
@@ -103,7 +103,7 @@ def _counted(table: Table, joints: list[str]) -> Iterable[Found]:
     """Numbered columns q1, q2, ... or q_0, q_1, ..., and the columns of a matrix."""
     by_name: dict[tuple, dict[int, str]] = {}
     for column in _single(table):
-        said = words(column)
+        said = words(table.titled(column))
         if said and said[-1].isdigit():
             by_name.setdefault(said[:-1], {}).setdefault(int(said[-1]), column)
         elif len(digits := [k for k, word in enumerate(said) if word.isdigit()]) == 1:

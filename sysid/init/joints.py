@@ -66,8 +66,10 @@ def chosen(
     order = [joint for joint in arm if joint in used]
     out = [Guess("robot.joints", order, *_why(robot, signals, order))]
     if unused:
-        why = "they move, and no torque of theirs was logged, or one that never changes"
-        out.append(Guess("data.unused", [joint for joint in order if joint in unused], why))
+        own = [joint for joint in order if joint in unused]
+        why = "they move, and no column holds their torque, or one that never changes"
+        doubt = f"is the torque of {', '.join(own)} logged under another name?"
+        out.append(Guess("data.unused", own, why, doubt))
     if robot.locked:
         whys.append(f"{', '.join(robot.locked)}, by <mimic>: locked at 0")
     return order, [*out, Guess("robot.lock", lock, "; ".join(whys))] if whys else out

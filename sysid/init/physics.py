@@ -106,12 +106,9 @@ def _scaled(amperes: Guess | None, scales: dict[str, float], joints: list[str]) 
     """The factors of the torques, as torque constants."""
     why = "with the URDF's masses the joints need far more torque than was logged: these are "
     why += "currents, or torques of the motors; A stands for either"
-    factor = (
-        "brings each joint's torques to those of the URDF's masses, so that these stay as heavy"
-    )
-    doubt = (
-        "where you know it, put in the gear's ratio, times the torque constant [N m/A] of a current"
-    )
+    factor = "with these the logged torques are those that the URDF's masses need"
+    doubt = "masses and friction follow these: where you know it, "
+    doubt += "write the gear's ratio, times the torque constant [N m/A] of a current"
     return [
         Guess("data.units.torque", "A", amperes.why if amperes else why),
         Guess("data.units.torque_constant", {j: scales[j] for j in joints}, factor, doubt),

@@ -83,9 +83,9 @@ def position_unit(q: dict[str, np.ndarray], slides: dict[str, bool], named: str)
     joint = max(largest, key=largest.get)
     if largest[joint] > DEGREES:
         turns = largest[joint] / _TURN
-        why = f"{joint} reaches {largest[joint]:.4g}: as rad that were {turns:.2g} turns"
-        return Guess(key, "deg", why, "unless it turns on and on")
-    return Guess(key, "rad", f"no joint reaches more than {largest[joint]:.3g}")
+        why = f"{joint} reaches {largest[joint]:.4g}, which in rad would be {turns:.2g} turns"
+        return Guess(key, "deg", why, "write rad where a joint turns on and on")
+    return Guess(key, "rad", f"the largest angle is {largest[joint]:.3g}")
 
 
 def _counts(values) -> bool:
@@ -123,7 +123,8 @@ def clock(data: list[Logged], found: Signals, stated: float | None) -> list[Gues
         own = found.time == data[0].table.usual.get("time")
         why = "the clock of the log's format" if own else "its name says so"
         out = [Guess("data.columns.time", found.time, why)]
-        return out if own and data[0].table.clock else [*out, time_unit(data[0].t, found.time)]
+        named = data[0].table.titled(found.time)
+        return out if own and data[0].table.clock else [*out, time_unit(data[0].t, named)]
     if (rate := data[0].table.rate) is not None:
         return [
             Guess("data.rate", rate, "the logs have no clock; an attribute of the file says so")

@@ -3,7 +3,7 @@
 from glob import has_magic
 from pathlib import Path
 
-from ..errors import LogError
+from ..errors import LogError, meant
 from . import lerobot, listing
 from .listing import is_log_folder, listed
 from .table import Table
@@ -27,7 +27,9 @@ def open_table(path: Path, topic: str | None = None) -> Table:
     if not path.is_file():
         what = "no file matches" if has_magic(path.name) else "there is no such file"
         what = "a pipe or a device, no plain file" if path.exists() else what
-        raise LogError(what, where=where, do="check data.train and data.test")
+        beside = [one.name for one in path.parent.iterdir()] if path.parent.is_dir() else []
+        do = ": ".join(filter(None, ("check data.train and data.test", meant(path.name, beside, ""))))
+        raise LogError(what, where=where, do=do)
     if path.suffix.lower() in listing.PACKED and kind:
         from .packed import PackedTable
 

@@ -10,6 +10,7 @@ from collections import Counter
 
 import polars as pl
 
+from .. import units
 from ..errors import LogError, SysidWarning
 from .table import Table
 
@@ -41,6 +42,12 @@ class CsvTable(Table):
         self.names = cells if self._header else [str(k) for k in range(len(cells))]
         if self._header and (twice := sorted(c for c, count in Counter(cells).items() if count > 1)):
             raise LogError(f"two columns are named {twice[0]!r}", where=str(path), do="rename one")
+        # a second line of units, "s,deg,Nm": no number in it, and a unit
+        below = self._cells(second.decode("utf-8", errors="replace"))[: len(cells)]
+        bare = not any(_NUMBER.fullmatch(self._point(cell)) for cell in below)
+        self._above = int(self._header)
+        if self._header and bare and any(map(units.is_unit, below)):
+            self._above, self.stated = 2, {n: u.strip("[]()") for n, u in zip(cells, below)}
         # columns that no name stands above shift the names, or not: nobody can know
         if any(below := self._cells(second.decode("utf-8", errors="replace"))[len(cells) :]):
             raise LogError(f"{len(cells) + len(below)} cells where the first line has {len(cells)}", where=f"{path} line 2", do="name every column in the first line")
@@ -64,7 +71,7 @@ class CsvTable(Table):
         # polars wants ascending positions and each once; the header is skipped because we name the columns
         wanted = sorted(set(positions))
         rows, blank, truncated = self._end()
-        if self._header and rows == 1:
+        if self._header and rows == self._above:
             raise LogError("there is a header and no row below it", where=str(self.path), do="give a log with samples")
         try:
             try:
@@ -88,13 +95,13 @@ class CsvTable(Table):
             if bad.any():
                 row = int(bad.arg_max())
                 said = "the cell is empty" if cells[row] is None else f"{cells[row][:60]!r} is no number"
-                raise LogError(said, where=f"{self.path} line {row + 1 + self._header} column {name!r}", do="correct the row or leave it out")
+                raise LogError(said, where=f"{self.path} line {row + 1 + self._above} column {name!r}", do="correct the row or leave it out")
             out[name] = values.to_numpy()
         return {name: out[name] for name in names}
 
     def _frame(self, wanted, schema) -> pl.DataFrame:
         return pl.read_csv(
-            self._evenly_spaced() if self._separator == " " else self.path, has_header=False, skip_rows=int(self._header),
+            self._evenly_spaced() if self._separator == " " else self.path, has_header=False, skip_rows=self._above,
             separator=self._separator, columns=wanted, infer_schema=False, schema_overrides=schema,
         )  # fmt: skip
 

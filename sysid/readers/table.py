@@ -24,8 +24,9 @@ class Table(ABC):
 
     usual: what the format itself calls its signals, {"time", "position", "velocity", "torque" or "command": a column, or a
         pattern with {joint}}; it stands in for the defaults of an experiment. clock: the unit of that time where the format
-        says it. rate: samples a second, where a file without a clock says it. rows: how many it has, where `between(first, last)` gives a
-        table of some of them without reading the others.
+        says it. stated: {column: the unit that a row below the names says}. rate: samples a second, where a file without a
+        clock says it. rows: how many it has, where `between(first, last)` gives a table of some of them without reading the
+        others.
     """
 
     path: Path
@@ -33,12 +34,17 @@ class Table(ABC):
     usual: Mapping[str, str] = MappingProxyType({})
     clock: str | None = None
     rate: float | None = None
+    stated: Mapping[str, str] = MappingProxyType({})
     rows: int | None = None
 
     @property
     def files(self) -> tuple[Path, ...]:
         """The files that the table was read from."""
         return (self.path,)
+
+    def titled(self, name: str) -> str:
+        """A column's name with the unit that a row below the names states, as a header does: "q [deg]"."""
+        return f"{name} [{self.stated[name]}]" if self.stated.get(name) else name
 
     @abstractmethod
     def load(self, names: list[str]) -> dict[str, np.ndarray]:

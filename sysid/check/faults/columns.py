@@ -19,7 +19,8 @@ _BETTER = 1.0
 _ROUNDS = 4
 _EXPLAINS = 0.2  # of a joint's torque squared: less of the URDF's torque tells no factor
 _THOUSAND = (500.0, 2000.0)
-_OUT_OF = "compare the logger's order and signs with the URDF's"
+_KEYS = {"angle": "position", "torque": "torque"}
+_OUT_OF = "or take it as it is, where the URDF is what is wrong"
 
 
 def find(look: Look) -> Iterator[Fault]:
@@ -74,21 +75,48 @@ def _clear(before: Scored, after: Scored, joints) -> bool:
 
 def _told(look: Look, kind: str, joints, word: str) -> Iterator[Fault]:
     names = [look.robot.joints[j] for j in joints]
+    kinds = ["position", "torque"] if word in ("", "angle and torque") else [_KEYS[word]]
     for name in names:
         if kind == "joint_order":
-            other = names[1 - names.index(name)]
-            what = f"the {word} column" if word else "the columns"
+            what = f"the {word} columns" if word else "the columns"
             says = (
-                f"{what} of {name} and {other} look exchanged: the URDF's robot "
+                f"{what} of {names[0]} and {names[1]} look exchanged: the URDF's robot "
                 "explains them in the other order"
             )
-            yield Fault(kind, ERROR, says, f"correct data.columns; {_OUT_OF}", name)
+            do = "; ".join(_exchanged(look, key, names) for key in kinds)
         else:
             says = (
                 f"the {word} of {name} has the sign against the URDF's: as it is, "
                 "friction would drive the joint or gravity lift it"
             )
-            yield Fault(kind, ERROR, says, f"turn the sign before it is logged; {_OUT_OF}", name)
+            do = "; ".join(_negated(look, key, name) for key in kinds)
+        yield Fault(kind, ERROR, says, f"{do}; {_OUT_OF}", name)
+
+
+def _column(look: Look, key: str, joint: str) -> str | None:
+    """The name of a joint's column, None where it goes by a number or stands in a matrix."""
+    given = getattr(look.experiment.data.columns, key)
+    if isinstance(given, str):
+        return given.replace("{joint}", joint) if "{joint}" in given else None
+    own = given[look.robot.joints.index(joint)]
+    return own if isinstance(own, str) else None
+
+
+def _exchanged(look: Look, key: str, names: list[str]) -> str:
+    found = [_column(look, key, joint) for joint in names]
+    every = [_column(look, key, joint) for joint in look.robot.joints]
+    if None in every:
+        return f"exchange the two in data.columns.{key}"
+    other = dict(zip(found, reversed(found)))
+    return f"write data.columns.{key}: [{', '.join(other.get(c, c) for c in every)}]"
+
+
+def _negated(look: Look, key: str, joint: str) -> str:
+    """How an experiment says that a column has the other sign."""
+    column = _column(look, key, joint)
+    if column is None or joint in getattr(look.experiment.data, key):
+        return f"log the {key} with the other sign"
+    return f"write data.{key}: {{{joint}: {{{column}: -1}}}}"
 
 
 def _factors(look: Look, equations: Equations, reading: Reading, scored: Scored) -> Iterator[Fault]:

@@ -14,19 +14,23 @@ AFTER, SENSELESS = 0, ()
 _KINDS = {
     "spike": (
         "spikes",
-        "single samples of the torque of {joint} stand alone",
-        "mend the reading; fits leave them out",
+        "the torque of {joint} has spikes of a sample or a few",
+        "a fit leaves these samples out; where there are many, mend the reading of the torque",
     ),
-    "knock": ("knock", "the arm was pushed or hit", "log again without; fits leave these rows out"),
+    "knock": (
+        "knock",
+        "the arm was pushed or hit",
+        "a fit leaves these rows out; log again where it happens often",
+    ),
     "brake": (
         "brake_closed",
         "the torque of {joint} is held while it rests, as by a closed brake",
-        "nothing, where a brake closed: fits leave these rows out",
+        "a fit leaves these rows out; nothing to mend where the joint has a brake",
     ),
     "frozen": (
         "values_held",
         "the reading of {joint} stood still while it moved",
-        "mend the logger; fits leave these rows out",
+        "a fit leaves these rows out; mend the logger, which writes a value twice",
     ),
     "saturation": (
         "saturation",
@@ -54,7 +58,7 @@ def find(look: Look) -> Iterator[Fault]:
                 fault,
                 WARNING,
                 (
-                    f"{says.format(joint=joint)} {len(own)} time{'s' * (len(own) > 1)} in "
+                    f"{says.format(joint=joint)}, {len(own)} time{'s' * (len(own) > 1)} in "
                     f"{log.log.name}, at {shown} s"
                 ),
                 do,
