@@ -42,11 +42,11 @@ class CsvTable(Table):
         self.names = cells if self._header else [str(k) for k in range(len(cells))]
         if self._header and (twice := sorted(c for c, count in Counter(cells).items() if count > 1)):
             raise LogError(f"two columns are named {twice[0]!r}", where=str(path), do="rename one")
-        # a second line of units, "s,deg,Nm": no number in it, and a unit
+        # a second line of units, "s,deg,Nm": no number in it, and units for the most part
         below = self._cells(second.decode("utf-8", errors="replace"))[: len(cells)]
         bare = not any(_NUMBER.fullmatch(self._point(cell)) for cell in below)
         self._above = int(self._header)
-        if self._header and bare and any(map(units.is_unit, below)):
+        if self._header and bare and 2 * sum(map(units.is_unit, below)) > len(cells):
             self._above, self.stated = 2, {n: u.strip("[]()") for n, u in zip(cells, below)}
         # columns that no name stands above shift the names, or not: nobody can know
         if any(below := self._cells(second.decode("utf-8", errors="replace"))[len(cells) :]):

@@ -1,0 +1,208 @@
+"""What stopped a reader on the way from a log to an added effect stays mended."""
+
+import numpy as np
+import pytest
+
+from sysid import check, config, pipeline
+from sysid.check.faults import masses
+from sysid.check.look import looked
+from sysid.errors import meant
+from sysid.statement import faults
+from tests.conftest import JOINTS, csv
+
+BOTH = ("shoulder", "elbow")
+
+
+
+
+def test_a_folder_alone_becomes_the_experiment(experiment, cli):
+    """`sysid init FOLDER`: config.yaml stands beside the robot and its logs, with paths from there."""
+    folder = experiment(config=None)
+    said = cli("init", folder, out=folder)
+    assert said.status == 0, said.err
+    made = pipeline.load(folder)
+    assert made.robot.urdf == "robot.urdf"
+    assert [log.file for log in (*made.data.train, *made.data.test)] == ["train.csv", "test.csv"]
+    assert said.out.splitlines()[-1] == f"next: sysid check {folder}"
+    assert pipeline.fit(made).solution.converged
+
+
+def test_the_robot_may_stand_behind_its_logs(experiment, cli):
+    folder = experiment(config=None)
+    said = cli("init", folder / "train.csv", folder / "robot.urdf", out=folder / "mine")
+    assert said.status == 0 and pipeline.load(folder / "mine").robot.urdf == "../robot.urdf"
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["robot.urdf"], ["which logs?", "`sysid init", "LOG..."]),
+        (["robot.urdf", "trian.csv"], ["there is no such log", "did you mean train.csv?"]),
+        (["train.csv", "test.csv"], ["no robot", "`sysid init robot.urdf"]),
+    ],
+)
+def test_init_says_what_to_type(experiment, cli, words, told):
+    folder = experiment(config=None)
+    cli("init", *(folder / word for word in words), out=folder / "mine").complains(*told)
+
+
+def test_a_folder_with_two_robots_names_them(experiment, cli):
+    folder = experiment(config=None)
+    (folder / "old.urdf").write_text("<robot/>")
+    cli("init", folder, out=folder / "mine").complains("2 files of a robot", "old.urdf", "robot.urdf")
+
+
+def with_units(columns, position):
+    header, *rows = csv(columns).splitlines()
+    units = ["s" if name == "t" else position if name.startswith("q_") else "Nm" for name in header.split(",")]
+    return "\n".join([header, ",".join(units), *rows]) + "\n"
+
+
+def test_a_row_of_units_is_read(experiment, cli):
+    plain = pipeline.fit(pipeline.load(experiment(name="plain")))
+    folder = experiment(train=lambda c: with_units(c, "rad"), test=lambda c: with_units(c, "rad"))
+    assert pipeline.fit(pipeline.load(folder)).x == pytest.approx(plain.x, rel=1e-12)
+    (folder / "config.yaml").unlink()
+    turned = lambda c: with_units({k: np.rad2deg(v) if k.startswith("q_") else v for k, v in c.items()}, "[deg]")
+    own = experiment(config=None, train=turned, test=turned, name="degrees")
+    assert cli("init", own, out=own).status == 0
+    assert pipeline.load(own).data.units.position == "deg"
+
+
+def test_units_that_disagree_are_refused(experiment, cli):
+    given = {"data.units": {"position": "rad"}}
+    folder = experiment(train=lambda c: with_units(c, "deg"), test=lambda c: with_units(c, "deg"))
+    cli("fit", folder).complains("says deg", "data.units.position")
+    told = experiment(config=given, train=lambda c: with_units(c, "deg"), name="told")
+    assert any("says deg" in notice for notice in pipeline.fit(pipeline.load(told)).notices)
+
+
+def test_a_row_of_text_is_no_row_of_units(experiment, cli):
+    rows = lambda c: csv(c).replace("\n", "\nfirst,second,third,fourth,fifth\n", 1)
+    cli("fit", experiment(train=rows)).complains("line 2", "'first' is no number")
+
+
+def test_the_cure_of_a_sign_can_be_typed(experiment):
+    """What `check` writes for a turned torque, in the experiment, and nothing is found any more."""
+    turned = lambda c: c | {"tau_elbow": -c["tau_elbow"]}
+    found = check.check(pipeline.load(experiment(train=turned, test=turned)))
+    (fault,) = [f for f in found if f.fault == "sign_flipped"]
+    cure = "write data.torque: {elbow: {tau_elbow: -1}}"
+    assert fault.do.startswith(cure)
+    mended = {"data.torque": {"elbow": {"tau_elbow": -1}}}
+    found = check.check(pipeline.load(experiment(config=mended, train=turned, test=turned, name="mended")))
+    assert not [f for f in found if f.severity == "error"]
+
+
+def test_exchanged_columns_are_told_once_with_the_list_to_write(experiment):
+    swapped = lambda c: c | {"tau_elbow": c["tau_shoulder"], "tau_shoulder": c["tau_elbow"]}
+    found = check.check(pipeline.load(experiment(train=swapped, test=swapped)))
+    own = [f for f in found if f.fault == "joint_order"]
+    assert len({f.says for f in own}) == 1 and {f.joint for f in own} == set(BOTH)
+    assert own[0].do.startswith("write data.columns.torque: [tau_elbow, tau_shoulder]")
+
+
+def fault(joint, log, rows=1, **more):
+    told = {"fault": "spikes", "severity": "warning", "joint": joint, "log": log, "times": [], "rows": rows}
+    return told | {"says": f"{joint} in {log}: {rows}", "do": "nothing"} | more
+
+
+def test_many_places_of_one_fault_are_counted():
+    document = {"ok": True, "faults": [fault(f"j{j}", f"{log}.csv", 10 * j + log) for j in range(3) for log in range(4)]}
+    lines = faults.lines(document, 80)
+    assert lines[1] == "  j2 in 3.csv: 23"
+    assert lines[2] == "  12 such in all: j0 in 4 logs, j1 in 4 logs, j2 in 4 logs"
+    assert lines[-1] == "1 kind of warning, no error: these logs can be fitted" and len(lines) == 5
+    few = {"ok": True, "faults": document["faults"][:2]}
+    assert [line.strip() for line in faults.lines(few, 80)[1:3]] == ["j0 in 0.csv: 0", "j0 in 1.csv: 1"]
+
+
+@pytest.mark.parametrize(
+    ("word", "known", "told"),
+    [
+        ("elbow", ["elbow_joint", "wrist_joint"], "did you mean elbow_joint?"),
+        ("Stribeck", ["stribeck", "spring"], "did you mean stribeck?"),
+        ("wrist", ["wrist_1_joint", "wrist_2_joint"], "otherwise"),  # two hold it: which?
+        ("xyz", ["stribeck"], "otherwise"),
+    ],
+)
+def test_what_was_meant(word, known, told):
+    assert meant(word, known, "otherwise") == told
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("data:\n\ttrain: [a.csv]\n", "put spaces in the place of the tab"),
+        ("data:\n  train: [a.csv]\n test: [b.csv]\n", "bring the line to the column of its neighbours"),
+        ("model:\n  effects: [viscous, coulomb\n", "close the bracket"),
+    ],
+)
+def test_what_is_no_yaml_has_a_cure(text, told, tmp_path):
+    with pytest.raises(config.ConfigError, match=told):
+        config.loads(text, tmp_path / "config.yaml")
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["fit"], ["which experiment?", "as in `sysid fit experiment`"]),
+        (["add", "experiment", "stribeck", "elbow"], ["a joint is named with --joint"]),
+        (["fit", "experiment", "--joint", "elbow"], ["No such option: --joint", "`sysid fit --help`"]),
+        (["init", "robot.urdf", "a.csv", "--rate", "250hz"], ["'--rate': a number is needed"]),
+        (["fit", "nothere"], ["check its name; experiments here: experiment"]),
+        (["fit", "."], ["`sysid init URDF LOG...` writes one", "experiments here: experiment"]),
+    ],
+)
+def test_a_command_line_that_lacks_something_says_what_to_type(experiment, cli, words, told):
+    experiment()
+    cli(*words).complains(*told)
+
+
+# ---- masses that the log cannot show
+
+UPRIGHT = """<robot name="column">
+  <link name="base"/>
+  <link name="post"><inertial><origin xyz="0 1e-6 0.3"/><mass value="2"/>
+    <inertia ixx="0.02" iyy="0.02" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <link name="arm"><inertial><origin xyz="0.3 0 0"/><mass value="3"/>
+    <inertia ixx="0.01" iyy="0.05" izz="0.05" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <joint name="shoulder" type="revolute"><parent link="base"/><child link="post"/>
+    <axis xyz="0 0 1"/><limit lower="-9" upper="9" effort="900" velocity="90"/></joint>
+  <joint name="elbow" type="revolute"><parent link="post"/><child link="arm"/>
+    <origin xyz="0 0 0.6"/><axis xyz="0 1 0"/><limit lower="-9" upper="9" effort="900" velocity="90"/></joint>
+</robot>"""
+
+
+def moved(seed, more=lambda q: 0.0, arm=1.0):
+    """A log of the column: the arm's own torque by hand (m c^2 + I, m g c cos q), friction, noise."""
+    t, rng = np.arange(0.0, 8.0, 0.004), np.random.default_rng(seed)
+    q = np.stack([0.8 * np.sin((1.1 + 0.3 * k) * t + k + seed) + 0.3 * np.sin(3.1 * t + k) for k in range(2)])
+    qd, qdd = (np.gradient(a, t, axis=1) for a in (q, np.gradient(q, t, axis=1)))
+    tau = np.stack([0.4 * qdd[0] + more(q[0]), arm * (0.32 * qdd[1] - 3 * 9.81 * 0.3 * np.cos(q[1]))])
+    tau += 0.5 * qd + 0.4 * np.sign(qd) + 0.05 * rng.standard_normal(q.shape)
+    return {"t": t, **{f"q_{j}": q[k] for k, j in enumerate(JOINTS)}, **{f"tau_{j}": tau[k] for k, j in enumerate(JOINTS)}}
+
+
+def column(experiment, name="column", **more):
+    """A link under an upright axis, its centre a millionth of a metre beside it, and an arm on it."""
+    given = {"robot": {"urdf": "robot.urdf"}, "model.effects": ["viscous", "coulomb"]}
+    return experiment(config=given, urdf=UPRIGHT, train=lambda c: moved(0, **more), test=lambda c: moved(1, **more), name=name)
+
+
+def implausible(folder):
+    return [f.joint for f in masses.find(looked(pipeline.load(folder)))]
+
+
+def test_a_link_under_an_upright_axis_has_no_weight_to_be_wrong(experiment):
+    """A cable's torque looks like the weight of a link ten thousands of times as heavy, whose lever is nothing."""
+    folder = column(experiment, more=lambda q: 0.8 * np.sin(q))
+    found = masses.weighed(looked(pipeline.load(folder)).seen)
+    assert found.plausible[1, 0] > 1e4  # for all that its lever can show
+    assert implausible(folder) == []
+
+
+@pytest.mark.parametrize("arm", [1.0, 8.0])
+def test_a_weight_that_a_joint_carries_is_told(experiment, arm):
+    """The same arm eight times as heavy as its URDF says."""
+    assert implausible(column(experiment, arm=arm)) == (["elbow"] if arm > 1.0 else [])
