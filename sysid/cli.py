@@ -56,14 +56,19 @@ def _root(
 
 
 @app.command()
-def fit(experiment: ExperimentPath, trust: Trust = False, as_json: Json = False, out: Out = None, quiet: Quiet = False) -> None:
+def fit(
+    experiment: ExperimentPath,
+    workers: Annotated[int, typer.Option("--workers", min=1, help="Processes that share long logs, on a Dask cluster of this machine.")] = 1,
+    scheduler: Annotated[Optional[str], typer.Option("--scheduler", metavar="ADDRESS", help="A Dask scheduler whose workers share long logs, tcp://HOST:PORT.")] = None,  # noqa: UP045
+    trust: Trust = False, as_json: Json = False, out: Out = None, quiet: Quiet = False,
+) -> None:  # fmt: skip
     """Identify an experiment and write its run folder."""
     from . import pipeline, results
 
     spec = pipeline.load(experiment)
     run = results.folder(out or Path("runs") / spec.name)
     with _progress(quiet or as_json) as progress:
-        found = pipeline.fit(spec, progress=progress)
+        found = pipeline.fit(spec, progress=progress, workers=workers, scheduler=scheduler)
     document = results.write(found, run)
     if as_json:
         print(json.dumps(document, allow_nan=False))

@@ -282,33 +282,61 @@ def compress(model: Model | Linearised, motion: Motion, *, thin: int = 1, progre
     joints = range(model.robot.dof)
     supported = [[model.support(joint, piece) for joint in joints] for piece in motion.outlines]
     kinds = [b"|".join(support.tobytes() for support in supports) for supports in supported]
-    factors, first, done = [], 0, 0
-    for piece, supports, edges in zip(motion.pieces, supported, _edges(motion, kinds)):
-        remembered, filtered = model.remembered(piece), piece.smoother is not None
-        # of the rows that a low-pass makes alike, one stands for `every`
-        every = piece.smoother.every if filtered and thin == 1 else 1
-        # rows that are not wanted need no columns, unless a filter or an effect looks at them
-        sparse = thin > 1 and not filtered and not model.reach
-        begun: list[Reduction] = []
-        for parts in _stretches(edges, _FILTERED_STRETCH if filtered else thin * _STRETCH):
-            kept = [_kept(start, stop, edges[0] if every > 1 else edges[block], every * thin) for block, start, stop in parts]
-            from_, at = kept[0].start, 0
-            wanted = np.concatenate([np.arange(piece.core.stop)[rows] for rows in kept]) if sparse else slice(from_, parts[-1][2], every)
-            columns = model.columns(piece, wanted, remembered)
-            for (block, _, stop), rows in zip(parts, kept):
-                count = len(range(rows.start, rows.stop, rows.step))
-                own = slice(at, at + count) if sparse else slice((rows.start - from_) // every, (rows.stop - 1 - from_) // every + 1, thin)
-                at, begun = at + count, begun or [Reduction() for _ in joints]
-                for joint, values in enumerate(columns):
-                    begun[joint].add(_counted(values, own, piece.tau[rows, joint], None if piece.use is None else piece.use[rows, joint]))
-                if stop == edges[block + 1]:
-                    factors += [Factor(j, first + block, supports[j], np.sqrt(every) * one.triangle(), every * one.rows) for j, one in enumerate(begun)]
-                    begun = []
-            done += parts[-1][2] - parts[0][1]
-            if progress:
-                progress(done / motion.samples)
+    divisions, factors, first = _edges(motion, kinds), [], 0
+    done = _Counted(progress, motion.samples)
+    here = done if motion.mapped is None else None  # no other process can tell this one row by row
+    tasks = ((model, supports, edges, thin, here) for supports, edges in zip(supported, divisions))
+    for edges, found in zip(divisions, motion.each(_of_piece, tasks)):
+        factors += [replace(factor, block=first + factor.block) for factor in found]
         first += len(edges) - 1
+        if here is None:
+            done(int(edges[-1] - edges[0]))
     return Compressed(model.size, model.robot.dof, tuple(factors), motion.samples)
+
+
+class _Counted:
+    """Told how many rows more are done, it tells the share of them all."""
+
+    def __init__(self, progress: Callable[[float], None] | None, rows: int):
+        self._progress, self._rows, self._done = progress, rows, 0
+
+    def __call__(self, rows: int) -> None:
+        self._done += rows
+        if self._progress:
+            self._progress(self._done / self._rows)
+
+
+def _of_piece(piece: Piece, model: Model | Linearised, supports: Sequence[np.ndarray], edges: np.ndarray, thin: int, done: _Counted | None) -> list[Factor]:
+    """The triangles of one piece.
+
+    Args:
+        supports: of each joint, the parameters that can enter its torque here. edges: rows at which blocks begin, and the end.
+        thin: as of `compress`. done: is told how many rows more are done.
+    """
+    joints, factors = range(model.robot.dof), []
+    remembered, filtered = model.remembered(piece), piece.smoother is not None
+    # of the rows that a low-pass makes alike, one stands for `every`
+    every = piece.smoother.every if filtered and thin == 1 else 1
+    # rows that are not wanted need no columns, unless a filter or an effect looks at them
+    sparse = thin > 1 and not filtered and not model.reach
+    begun: list[Reduction] = []
+    for parts in _stretches(edges, _FILTERED_STRETCH if filtered else thin * _STRETCH):
+        kept = [_kept(start, stop, edges[0] if every > 1 else edges[block], every * thin) for block, start, stop in parts]
+        from_, at = kept[0].start, 0
+        wanted = np.concatenate([np.arange(piece.core.stop)[rows] for rows in kept]) if sparse else slice(from_, parts[-1][2], every)
+        columns = model.columns(piece, wanted, remembered)
+        for (block, _, stop), rows in zip(parts, kept):
+            count = len(range(rows.start, rows.stop, rows.step))
+            own = slice(at, at + count) if sparse else slice((rows.start - from_) // every, (rows.stop - 1 - from_) // every + 1, thin)
+            at, begun = at + count, begun or [Reduction() for _ in joints]
+            for joint, values in enumerate(columns):
+                begun[joint].add(_counted(values, own, piece.tau[rows, joint], None if piece.use is None else piece.use[rows, joint]))
+            if stop == edges[block + 1]:
+                factors += [Factor(j, block, supports[j], np.sqrt(every) * one.triangle(), every * one.rows) for j, one in enumerate(begun)]
+                begun = []
+        if done:
+            done(parts[-1][2] - parts[0][1])
+    return factors
 
 
 def _counted(values: np.ndarray, own: slice, tau: np.ndarray, use: np.ndarray | None) -> np.ndarray:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -26,26 +26,22 @@ class Extent:
         self.duration: dict[int, float] = {}
         self._rows: list[tuple[Piece, Piece]] = []
 
-    def add(self, piece: Piece, *, goes_on: bool = False) -> None:
-        """Take one more piece.
+    def add(self, piece: Piece) -> None:
+        """Take one more piece."""
+        self.take(reach_of(piece, self.stride))
+
+    def take(self, own: Reach, *, goes_on: bool = False) -> None:
+        """Take what one more piece reaches.
 
         Args:
             goes_on: whether the log of the piece before goes on in it without a gap.
         """
-        ends = {
-            "speed": np.abs(piece.qd).max(0), "torque": np.abs(piece.tau).max(0), "low":
-            -piece.q.min(0), "high": piece.q.max(0),
-        }  # fmt: skip
-        for name, own in ends.items():
+        for name, end in own.ends.items():
             before = getattr(self, name)
-            setattr(self, name, own if before is None else np.maximum(before, own))
-        before = self.duration.get(piece.log, 0.0)
-        length = float(np.ptp(piece.t))
-        self.duration[piece.log] = (
-            before + piece.samples * piece.step if goes_on else max(before, length)
-        )
-        picked = np.arange(piece.core.start, piece.core.stop - 1, self.stride)
-        self._rows.append((_at(piece, picked), _at(piece, picked + 1)))
+            setattr(self, name, end if before is None else np.maximum(before, end))
+        before = self.duration.get(own.log, 0.0)
+        self.duration[own.log] = before + own.core if goes_on else max(before, own.length)
+        self._rows.append(own.rows)
 
     def sample(self) -> Piece:
         """Some rows of the motion, then the row after each."""
@@ -55,6 +51,29 @@ class Extent:
         arrays = {name: np.concatenate([getattr(part, name) for part in parts]) for name in _ARRAYS}
         signals = {name: np.concatenate([part.signals[name] for part in parts]) for name in shared}
         return replace(first, **arrays, signals=signals, core=slice(0, len(arrays["t"])))
+
+
+@dataclass(frozen=True)
+class Reach:
+    """What a piece adds to an extent: its log, its ends (dof,), how long it and its core are [s], and
+    some of its rows with the row after each."""
+
+    log: int
+    ends: dict[str, np.ndarray]
+    length: float
+    core: float
+    rows: tuple[Piece, Piece]
+
+
+def reach_of(piece: Piece, stride: int) -> Reach:
+    """How far a piece reaches, and one row in `stride`."""
+    ends = {
+        "speed": np.abs(piece.qd).max(0), "torque": np.abs(piece.tau).max(0), "low":
+        -piece.q.min(0), "high": piece.q.max(0),
+    }  # fmt: skip
+    picked = np.arange(piece.core.start, piece.core.stop - 1, stride)
+    rows = _at(piece, picked), _at(piece, picked + 1)
+    return Reach(piece.log, ends, float(np.ptp(piece.t)), piece.samples * piece.step, rows)
 
 
 def _at(piece: Piece, rows: np.ndarray) -> Piece:

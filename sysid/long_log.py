@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 import warnings
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -23,7 +23,7 @@ from .even_clock import EvenClock, Stretch
 from .groups import levels_of
 from .log import Log
 from .segment import Segment
-from .spans import Rows, Spans, edges, of_segment
+from .spans import Spans, edges, of_segment
 from .specs import DataSpec, LogSpec
 
 _DEGREES = re.compile(r"joint '.*' reaches")  # a notice whose number differs from span to span
@@ -44,6 +44,13 @@ def read(
     return spanned(logs.read(log, data, joints, prismatic, folder, actuators))
 
 
+def in_parts(
+    log: LogSpec, data: DataSpec, joints: tuple[str, ...], prismatic, folder: Path = Path(), actuators=logs.NO_ACTUATORS
+) -> bool:
+    """Whether a log's file is long, and can be read in parts."""
+    return not actuators and _source(log, data, joints, prismatic, folder) is not None
+
+
 def spanned(log: Log) -> Log:
     """A log that is in memory, in spans where it is long and its clock is even."""
     if max((len(s.t) for s in log.segments), default=0) <= spans.SPAN or any(
@@ -61,6 +68,17 @@ def _source(log: LogSpec, data: DataSpec, joints, prismatic, folder: Path) -> _S
     if table.rows is None or table.rows <= spans.SPAN or table.has(recording.EPISODE):
         return None
     return _Source(log, data, joints, prismatic, folder, table)
+
+
+@dataclass(frozen=True)
+class _Rows:
+    """What reads the rows of a stretch, in whichever process."""
+
+    source: _Source
+    stretch: Stretch
+
+    def __call__(self, first: int, last: int) -> Segment:
+        return self.source.rows(self.stretch, first, last)
 
 
 class _Source:
@@ -83,7 +101,7 @@ class _Source:
         found = self._stretches()
         if found is None:
             return None
-        stretches = [(self._reader(one), one.rows) for one in found]
+        stretches = [(_Rows(self, one), one.rows) for one in found]
         digest = logs.sha256(self._table.path)
         name, groups = self._spec.name, levels_of(self._data.groups, self._spec)
         return Log(
@@ -91,27 +109,23 @@ class _Source:
             unused=tuple(self._data.unused), levels=groups,
         )  # fmt: skip
 
-    def _reader(self, stretch: Stretch) -> Rows:
-        """What reads the rows of a stretch."""
-
-        def rows(first: int, last: int) -> Segment:
-            row = stretch.row + first
-            part = self._table.between(row, stretch.row + last)
-            spec = self._spec.model_copy(update={"start": None, "stop": None})
-            with warnings.catch_warnings(record=True) as caught:
-                warnings.simplefilter("always", SysidWarning)
-                how = (spec, self._data, self._joints, self._prismatic, self._folder)
-                samples = logs.measured(*how, table=part, first=row)
-            for warning in caught:
-                said = str(warning.message)
-                key = found[0] if (found := _DEGREES.findall(said)) else said
-                if key not in self._told:
-                    self._told.add(key)
-                    warnings.warn(warning.message, warning.category, stacklevel=2)
-            t = stretch.begin + stretch.step * np.arange(first, last)
-            return logs.segment(t, stretch.step, samples.signals)
-
-        return rows
+    def rows(self, stretch: Stretch, first: int, last: int) -> Segment:
+        """Rows of a stretch."""
+        row = stretch.row + first
+        part = self._table.between(row, stretch.row + last)
+        spec = self._spec.model_copy(update={"start": None, "stop": None})
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always", SysidWarning)
+            how = (spec, self._data, self._joints, self._prismatic, self._folder)
+            samples = logs.measured(*how, table=part, first=row)
+        for warning in caught:
+            said = str(warning.message)
+            key = found[0] if (found := _DEGREES.findall(said)) else said
+            if key not in self._told:
+                self._told.add(key)
+                warnings.warn(warning.message, warning.category, stacklevel=2)
+        t = stretch.begin + stretch.step * np.arange(first, last)
+        return logs.segment(t, stretch.step, samples.signals)
 
     def _stretches(self) -> list[Stretch] | None:
         """The stretches without a gap of the piece that is asked for; None where its clock is not

@@ -10,76 +10,71 @@ from __future__ import annotations
 
 import warnings
 import zlib
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from . import preprocess
 from .errors import LogError, SysidWarning
-from .extent import Extent
+from .extent import Extent, Reach, reach_of
 from .log import Log
 from .motion import Motion, Piece, Pieces, never_moved
 from .preprocess import ROUNDING, needs, on_both_sides, piece_of, under_lowpass
-from .spans import Spans, around, released
+from .spans import Spans, around, carried, released
 from .specs import PreprocessSpec
+from .workers import Mapped
 
 _SLOW = np.concatenate(
     [[0.0], np.geomspace(1e-9, preprocess.STANDSTILL_MOST, 4096)]
 )  # rad/s or m/s, edges of bins
+_NONE = np.zeros(0)
 
 
-def prepare(logs: Sequence[Log], spec: PreprocessSpec, joints: tuple[str, ...]) -> Motion:
+def prepare(
+    logs: Sequence[Log], spec: PreprocessSpec, joints: tuple[str, ...], mapped: Mapped | None = None
+) -> Motion:
     """As `preprocess.prepare`; of long logs the pieces are made whenever they are asked for.
 
     How much of a joint stands still is counted in 4096 classes of speed.
+
+    Args:
+        mapped: what shares work among processes, as of `workers.crew`; None: there is this one.
 
     Raises:
         LogError: a log is shorter than its filter. ConfigError: the filter cannot be.
     """
     if not any(isinstance(log.segments, Spans) for log in logs):
-        return preprocess.prepare(logs, spec, joints)
-    places = [(number, k) for number, log in enumerate(logs) for k in range(len(log.segments))]
-    made = lambda number, k: _filtered(logs[number], number, k, spec, joints)  # noqa: E731
-    threshold = _standstill(spec, places, made)
+        return replace(preprocess.prepare(logs, spec, joints), mapped=mapped)
+    share = mapped or (lambda work, arguments: (work(*each) for each in arguments))
+    places = [
+        _place(log, number, k, spec, joints)
+        for number, log in enumerate(logs)
+        for k in range(len(log.segments))
+    ]
+    threshold = _standstill(spec, places, share)
     stuck, passed = np.zeros(len(joints), dtype=bool), None
     while passed is None:
-        passed = _passed(places, made, spec, threshold, stuck, logs, joints)
+        passed = _passed(places, share, threshold, stuck, logs, joints)
         if spec.standstill == "auto" and (none := passed.counted == 0).any() and not stuck.any():
             stuck, passed = none, None  # no row of these is left: they have again what they had
-    unused = preprocess.unused_of(logs)
     rest = ROUNDING * passed.fastest
     never = never_moved(passed.low, passed.high, passed.noise) | stuck
     still = tuple(joint for joint, stays in zip(joints, never) if stays)
-    masked = any(mask is not None for mask in passed.masks)
-
-    def piece(number: int) -> Piece:
-        released()
-        own, mask = made(*passed.places[number]), passed.masks[number]
-        if spec.torque == "low-pass" and spec.filter != "none":
-            own = under_lowpass(
-                replace(own, use=_unpacked(passed.before[number], own.q.shape)), spec
-            )
-        use = (
-            None
-            if not masked
-            else np.ones(own.q.shape, dtype=bool)
-            if mask is None
-            else _unpacked(mask, own.q.shape)
-        )
-        return replace(own, use=use, rest=rest)
-
-    pieces = Pieces(
-        piece,
-        tuple(replace(outline, rest=rest) for outline in passed.outlines),
-        passed.extent,
-        masked,
-    )
+    masked = any(one.mask is not None for one in passed.seen)
+    makers = [
+        _Made(place, one.before, one.mask, masked, rest)
+        for place, one in zip(passed.places, passed.seen)
+    ]
+    outlines = tuple(replace(one.outline, rest=rest) for one in passed.seen)
+    pieces = Pieces(makers, outlines, passed.extent, masked)
     events = tuple(event for log in logs for event in log.events)
     left_out = passed.left_out if masked else np.zeros(len(joints), dtype=int)
+    unused = preprocess.unused_of(logs)
     return Motion(
-        joints, pieces, still, passed.standing(), left_out, events, passed.disturbed, unused=unused
-    )
+        joints, pieces, still, passed.standing(), left_out, events, passed.disturbed,
+        unused=unused, mapped=mapped,
+    )  # fmt: skip
 
 
 def margin(spec: PreprocessSpec, step: float) -> int:
@@ -89,14 +84,55 @@ def margin(spec: PreprocessSpec, step: float) -> int:
     return 8 * needs(spec, step) + (0 if sides is None else 2 * sides.reach) + 64
 
 
-def _filtered(log: Log, number: int, k: int, spec: PreprocessSpec, joints) -> Piece | None:
-    """A span as a piece whose rows all count but for those that events reach; None where it is too
-    short."""
+@dataclass(frozen=True)
+class _Place:
+    """A span of a log, or a segment of a short one, and how it becomes a piece, in whichever process:
+    `k` is its number among the segments of `log`, which may be a part of that of this number."""
+
+    log: Log
+    number: int
+    k: int
+    spec: PreprocessSpec
+    joints: tuple[str, ...]
+
+    def filtered(self) -> Piece | None:
+        """A piece whose rows all count but for those that events reach; None where it is too short."""
+        segments = self.log.segments
+        step = segments.step(self.k) if isinstance(segments, Spans) else segments[self.k].step
+        own = around(segments, self.k, margin(self.spec, step))
+        return piece_of(self.number, self.log, own, self.spec, self.joints)
+
+
+def _place(log: Log, number: int, k: int, spec: PreprocessSpec, joints) -> _Place:
     step = log.segments.step(k) if isinstance(log.segments, Spans) else log.segments[k].step
-    return piece_of(number, log, around(log.segments, k, margin(spec, step)), spec, joints)
+    segments, own = carried(log.segments, k, margin(spec, step))
+    return _Place(replace(log, segments=segments), number, own, spec, joints)
 
 
-def _standstill(spec: PreprocessSpec, places, made: Callable) -> np.ndarray | float | None:
+@dataclass(frozen=True)
+class _Made:
+    """Makes the piece of a place: which rows count, and did before those were left out that both sides
+    of the equation would see, is known by then."""
+
+    place: _Place
+    before: bytes | None
+    mask: bytes | None
+    masked: bool
+    rest: np.ndarray
+
+    def __call__(self) -> Piece:
+        released()
+        own, spec = self.place.filtered(), self.place.spec
+        if spec.torque == "low-pass" and spec.filter != "none":
+            own = under_lowpass(replace(own, use=_unpacked(self.before, own.q.shape)), spec)
+        use = None
+        if self.masked:
+            use = _unpacked(self.mask, own.q.shape)
+            use = np.ones(own.q.shape, dtype=bool) if use is None else use
+        return replace(own, use=use, rest=self.rest)
+
+
+def _standstill(spec: PreprocessSpec, places, share: Mapped) -> np.ndarray | float | None:
     """The speed (dof,) below which rows are left out, where the experiment asks for one of the
     whole motion."""
     if spec.standstill == "keep" or (spec.standstill == "auto" and spec.filter != "none"):
@@ -104,24 +140,28 @@ def _standstill(spec: PreprocessSpec, places, made: Callable) -> np.ndarray | fl
     if not isinstance(spec.standstill, str):
         return spec.standstill
     squares, rows = 0.0, 0
-    for place in places:
-        if (piece := made(*place)) is not None:
-            squares, rows = (
-                squares + np.sum(piece.qd[piece.core] ** 2, axis=0),
-                rows + piece.samples,
-            )
+    for own in share(_speeds, ((place,) for place in places)):
+        if own is not None:
+            squares, rows = squares + own[0], rows + own[1]
     return preprocess.slow(squares / max(rows, 1))
 
 
-@dataclass
-class _Passed:
-    """What one pass over the pieces tells: see `_passed`."""
+def _speeds(place: _Place) -> tuple[np.ndarray, int] | None:
+    """Sum (dof,) of squared speeds, and how many rows there are."""
+    released()
+    if (piece := place.filtered()) is None:
+        return None
+    return np.sum(piece.qd[piece.core] ** 2, axis=0), piece.samples
 
-    places: list
-    outlines: list
-    masks: list
-    before: list
-    extent: Extent
+
+@dataclass(frozen=True)
+class _Seen:
+    """What the first pass sees of one place: see `_passed`."""
+
+    outline: Piece
+    mask: bytes | None
+    before: bytes | None
+    reach: Reach
     fastest: np.ndarray
     low: np.ndarray
     high: np.ndarray
@@ -130,17 +170,62 @@ class _Passed:
     slow: np.ndarray
     counted: np.ndarray
     left_out: np.ndarray
-    lost: int = 0
-    samples: int = 0
-    rows: int = 0
+    lost: int
+    rows: int
 
-    @property
-    def disturbed(self) -> float:
-        return float(self.lost / max(self.rows * len(self.low), 1))
+
+def _seen(place: _Place, threshold, stuck: np.ndarray, counts: np.ndarray, stride: int) -> _Seen | None:
+    released()
+    if (piece := place.filtered()) is None:
+        return None
+    spec, rows = place.spec, piece.samples
+    lost = 0 if piece.use is None else int(np.sum(~piece.use[piece.core]))
+    had = True if piece.use is None else piece.use
+    piece = preprocess.without_still_rows(piece, spec, threshold)
+    if stuck.any():
+        piece = replace(piece, use=(True if piece.use is None else piece.use) | (stuck & had))
+    before, squares = _packed(piece.use), np.sum(piece.qd[piece.core] ** 2, axis=0)
+    if spec.torque == "low-pass" and spec.filter != "none":
+        piece = under_lowpass(piece, spec)
+    if not counts.all():
+        use = np.ones(piece.q.shape, dtype=bool) if piece.use is None else piece.use
+        piece = replace(piece, use=counts & use)
+    core, use, dof = piece.core, piece.use, len(counts)
+    slow = np.zeros((dof, len(_SLOW) - 1), dtype=int)
+    for j, own in enumerate(np.abs(piece.qd[core]).T):
+        own = own if use is None else own[use[core, j]]
+        slow[j] = np.histogram(own[own < _SLOW[-1]], _SLOW)[0]
+    counted = np.full(dof, piece.samples) if use is None else np.sum(use[core], axis=0)
+    left_out = np.zeros(dof, dtype=int) if use is None else np.sum(~use[core], axis=0)
+    q = piece.q[core]
+    return _Seen(
+        piece.outline(), _packed(use), before, reach_of(piece, stride),
+        np.abs(piece.qd).max(axis=0), q.min(0), q.max(0), piece.noise, squares, slow, counted,
+        left_out, lost, rows,
+    )  # fmt: skip
+
+
+@dataclass
+class _Passed:
+    """What one pass over the places tells: those that are no shorter than a filter, and sums over
+    them."""
+
+    places: list[_Place]
+    seen: list[_Seen]
+    extent: Extent
+    slow: np.ndarray
+
+    def __post_init__(self) -> None:
+        every = lambda name: [getattr(one, name) for one in self.seen]  # noqa: E731
+        self.low, self.high = np.min(every("low"), axis=0), np.max(every("high"), axis=0)
+        self.fastest, self.noise = (np.max(every(name), axis=0) for name in ("fastest", "noise"))
+        self.counted, self.left_out = (sum(every(name)) for name in ("counted", "left_out"))
+        self.disturbed = sum(every("lost")) / max(sum(every("rows")) * len(self.low), 1)
 
     def standing(self) -> np.ndarray:
         """Share (dof,) of the rows that count in which each joint stands still."""
-        speed = preprocess.slow(self.squares / max(self.samples, 1))
+        samples = sum(one.outline.samples for one in self.seen)
+        speed = preprocess.slow(sum(one.squares for one in self.seen) / max(samples, 1))
         slow = [
             np.interp(s, _SLOW, np.concatenate([[0], np.cumsum(own)]))
             for s, own in zip(speed, self.slow)
@@ -148,71 +233,22 @@ class _Passed:
         return np.array(slow) / np.maximum(self.counted, 1)
 
 
-def _passed(
-    places, made: Callable, spec: PreprocessSpec, threshold, stuck, logs, joints
-) -> _Passed:
-    dof = len(joints)
-    zero = lambda kind=float: np.zeros(dof, dtype=kind)  # noqa: E731
-    out = _Passed(
-        [],
-        [],
-        [],
-        [],
-        Extent(sum(log.samples for log in logs)),
-        zero(),
-        np.full(dof, np.inf),
-        np.full(dof, -np.inf),
-        zero(),
-        zero(),
-        np.zeros((dof, len(_SLOW) - 1), dtype=int),
-        zero(int),
-        zero(int),
-    )
-    unused = preprocess.unused_of(logs)
+def _passed(places, share: Mapped, threshold, stuck, logs, joints) -> _Passed:
+    extent, unused = Extent(sum(log.samples for log in logs)), preprocess.unused_of(logs)
     counts = np.array([joint not in unused for joint in joints])
-    many = np.zeros(len(logs), dtype=int)
-    for place in places:
-        piece = None
-        released()
-        if (piece := made(*place)) is None:
+    many, kept, seen, slow = np.zeros(len(logs), dtype=int), [], [], 0
+    work = ((place, threshold, stuck, counts, extent.stride) for place in places)
+    for place, one in zip(places, share(_seen, work)):
+        if one is None:
             continue
-        many[place[0]] += 1
-        out.lost += 0 if piece.use is None else int(np.sum(~piece.use[piece.core]))
-        out.rows += piece.samples
-        had = True if piece.use is None else piece.use
-        piece = preprocess.without_still_rows(piece, spec, threshold)
-        if stuck.any():
-            piece = replace(piece, use=(True if piece.use is None else piece.use) | (stuck & had))
-        out.before.append(_packed(piece.use))
-        out.squares += np.sum(piece.qd[piece.core] ** 2, axis=0)
-        if spec.torque == "low-pass" and spec.filter != "none":
-            piece = under_lowpass(piece, spec)
-        if unused:
-            piece = replace(
-                piece,
-                use=counts
-                & (np.ones(piece.q.shape, dtype=bool) if piece.use is None else piece.use),
-            )
-        out.extent.add(piece, goes_on=bool(out.places) and out.places[-1][0] == place[0])
-        core, use = piece.core, piece.use
-        out.fastest = np.maximum(out.fastest, np.abs(piece.qd).max(axis=0))
-        out.low, out.high = (
-            np.minimum(out.low, piece.q[core].min(0)),
-            np.maximum(out.high, piece.q[core].max(0)),
-        )
-        out.noise = np.maximum(out.noise, piece.noise)
-        for j, own in enumerate(np.abs(piece.qd[core]).T):
-            own = own if use is None else own[use[core, j]]
-            out.slow[j] += np.histogram(own[own < _SLOW[-1]], _SLOW)[0]
-        out.counted += piece.samples if use is None else np.sum(use[core], axis=0)
-        out.left_out += 0 if use is None else np.sum(~use[core], axis=0)
-        out.samples += piece.samples
-        out.masks.append(_packed(use))
-        out.places.append(place)
-        out.outlines.append(piece.outline())
+        many[place.number] += 1
+        extent.take(one.reach, goes_on=bool(kept) and kept[-1].number == place.number)
+        kept.append(place)
+        slow = slow + one.slow
+        seen.append(replace(one, slow=_NONE))  # large beside what else is kept of a place
     for log, count in zip(logs, many):
         if not count:
-            window = needs(spec, log.segments[0].step)
+            window = needs(places[0].spec, log.segments[0].step)
             raise LogError(
                 f"{log.samples} samples are fewer than the filter's window of {window}",
                 where=str(log.path), do="give a longer log or narrow preprocess.window",
@@ -220,7 +256,7 @@ def _passed(
         if dropped := len(log.segments) - count:
             said = f"{dropped} segment(s) shorter than the filter's window were left out"
             warnings.warn(SysidWarning(f"{log.path}: {said}"), stacklevel=2)
-    return out
+    return _Passed(kept, seen, extent, slow)
 
 
 def _packed(use) -> bytes | None:

@@ -6,15 +6,19 @@ Of the errors, sums are kept; whoever asks for the torques themselves has them r
 
 from __future__ import annotations
 
-from dataclasses import replace
+import io
+import os
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
 from .errors import SysidError
-from .estimate import Prediction, Sums, joined_states, predict, states, units
+from .estimate import Prediction, States, Sums, joined_states, predict, states, units
 from .model import Model
-from .motion import Motion, Pieces
-from .unfinished import temporary_folder
+from .motion import Motion, Piece, Pieces
+from .unfinished import beside, temporary_folder
 
 _ARRAYS = ("log", "t", "measured", "predicted", "use")
 _GREATEST = 8  # torques of each joint that are remembered
@@ -41,28 +45,23 @@ class LongPrediction(Prediction):
             object.__setattr__(self, name, value)
         object.__setattr__(self, "_folder", temporary_folder(self))
 
-    def _took(self, part: Prediction) -> None:
-        """Write a part and count it in."""
-        import polars as pl
+    @property
+    def place(self) -> Path:
+        """Where the next part is to be written."""
+        return self._folder / f"{len(self.files)}.parquet"
 
-        path = self._folder / f"{len(self.files)}.parquet"
-        try:
-            part.to_dataframe().write_parquet(path, compression="uncompressed", statistics=False)
-        except (OSError, pl.exceptions.PolarsError) as error:
-            said = str(error).splitlines()[0]
-            raise SysidError(
-                f"predictions cannot be written ({said})",
-                where=str(self._folder),
-                do="free the disk, or name another folder in TMPDIR",
-            ) from None
+    def _took(self, part: _Part) -> None:
+        """Count a part in, and write it where that is not done yet."""
+        path = self.place
+        if part.content is not None:
+            _written(path, lambda: path.write_bytes(part.content))
         self.files.append(path)
-        sums = part.sums()
-        greatest = part.greatest(_GREATEST)
+        sums, greatest = part.sums, part.greatest
         if self._sums is not None:
             sums, greatest = self._sums + sums, np.concatenate([self._greatest, greatest])
         object.__setattr__(self, "_sums", sums)
         object.__setattr__(self, "_greatest", -np.sort(-greatest, axis=0)[:_GREATEST])
-        object.__setattr__(self, "_samples", self._samples + len(part.t))
+        object.__setattr__(self, "_samples", self._samples + part.samples)
 
     def lazy(self):
         """As of `Prediction`."""
@@ -108,10 +107,57 @@ def predicted(model: Model, x, motion: Motion) -> Prediction:
     if not isinstance(motion.pieces, Pieces):
         return predict(model, x, motion)
     out = LongPrediction(model.robot.joints, units(model.robot), motion.pieces.masked)
-    kept, first = [], 0
-    for piece in motion.pieces:
-        out._took(predict(model, x, replace(motion, pieces=(piece,))))
-        kept.append(states(piece, first, motion.samples))
-        first += piece.samples
+    firsts = np.cumsum([0, *(outline.samples for outline in motion.outlines)]).tolist()
+    none = replace(motion, pieces=(), mapped=None)
+    tasks = (
+        (model, x, none, first, motion.samples, out.place.with_name(f"{number}.parquet"))
+        for number, first in enumerate(firsts[:-1])
+    )
+    kept = []
+    for part in motion.each(_part, tasks):
+        out._took(part)
+        kept.append(part.states)
     object.__setattr__(out, "states", joined_states(kept))
     return out
+
+
+@dataclass(frozen=True)
+class _Part:
+    """What is predicted of one piece: its errors' sums, greatest torques, some of its states, and the file where this process
+    could not put it in its place."""
+
+    sums: Sums
+    greatest: np.ndarray
+    states: States
+    samples: int
+    content: bytes | None
+
+
+def _part(piece: Piece, model: Model, x, motion: Motion, first: int, samples: int, path: Path) -> _Part:
+    found = predict(model, x, replace(motion, pieces=(piece,)))
+    table, content = found.to_dataframe(), None
+    how = {"compression": "uncompressed", "statistics": False}
+    if path.parent.is_dir():
+        # under a name of its own: a worker that was given up may still be at the same part
+        own = beside(path)
+        _written(path, lambda: (table.write_parquet(own, **how), os.replace(own, path)))
+    else:  # another machine
+        stream = io.BytesIO()
+        table.write_parquet(stream, **how)
+        content = stream.getvalue()
+    where = states(piece, first, samples)
+    return _Part(found.sums(), found.greatest(_GREATEST), where, len(found.t), content)
+
+
+def _written(path: Path, write: Callable[[], object]) -> None:
+    import polars as pl
+
+    try:
+        write()
+    except (OSError, pl.exceptions.PolarsError) as error:
+        said = str(error).splitlines()[0]
+        raise SysidError(
+            f"predictions cannot be written ({said})",
+            where=str(path.parent),
+            do="free the disk, or name another folder in TMPDIR",
+        ) from None

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from .events import Event
 from .smoother import Smoother
+from .workers import Mapped
 
 _NO_WEIGHT = 1e-9
 # A joint never moves where its filtered angle travels less than its own noise would make it, or than this [rad or m].
@@ -95,12 +96,12 @@ class Pieces(Sequence):
     """Pieces of long logs, each made whenever it is asked for.
 
     Args:
-        make: number -> piece. outlines: of each, its `outline()`. extent: how large they are together, an `Extent`.
-        masked: whether a row of some does not count.
+        makers: what makes each, in whichever process. outlines: of each, its `outline()`. extent: how large they are together,
+            an `Extent`. masked: whether a row of some does not count.
     """
 
-    def __init__(self, make: Callable[[int], Piece], outlines: tuple[Piece, ...], extent=None, masked=True) -> None:
-        self._make, self.outlines, self.extent, self.masked = make, outlines, extent, masked
+    def __init__(self, makers: Sequence[Callable[[], Piece]], outlines: tuple[Piece, ...], extent=None, masked=True) -> None:
+        self.makers, self.outlines, self.extent, self.masked = makers, outlines, extent, masked
 
     def __len__(self) -> int:
         return len(self.outlines)
@@ -108,7 +109,7 @@ class Pieces(Sequence):
     def __getitem__(self, number):
         if isinstance(number, slice):
             raise TypeError("pieces of a long log are asked for one by one")
-        return self._make(range(len(self))[number])
+        return self.makers[number]()
 
 
 @dataclass(frozen=True)
@@ -119,6 +120,7 @@ class Motion:
     a joint stands still. left_out (dof,): rows that do not count.
     events: what disturbed the logs; `disturbed` the share of all joints' rows that is left out for it.
     band: [Hz] below which the joints' speeds stay, where it was asked for, else zero. unused: joints whose torque is not used.
+    mapped: where there are several processes, what shares work among them, as of `workers.crew`.
     """
 
     joints: tuple[str, ...]
@@ -130,6 +132,15 @@ class Motion:
     disturbed: float = 0.0
     band: float = 0.0
     unused: tuple[str, ...] = ()
+    mapped: Mapped | None = None
+
+    def each(self, work: Callable, arguments: Iterable[tuple]) -> Iterator:
+        """`work(piece, *own)` of every piece with its own arguments, in order; in other processes, where there are any. What it
+        gives does not depend on that."""
+        if self.mapped is None:
+            return (work(piece, *own) for piece, own in zip(self.pieces, arguments))
+        makers = self.pieces.makers if isinstance(self.pieces, Pieces) else [_There(piece) for piece in self.pieces]
+        return self.mapped(_made, ((maker, work, own) for maker, own in zip(makers, arguments)))
 
     @property
     def samples(self) -> int:
@@ -150,6 +161,20 @@ class Motion:
     def outlines(self) -> tuple[Piece, ...]:
         """The pieces, for what needs none of their rows."""
         return self.pieces.outlines if isinstance(self.pieces, Pieces) else self.pieces
+
+
+@dataclass(frozen=True)
+class _There:
+    """A piece that is in memory, for another process."""
+
+    piece: Piece
+
+    def __call__(self) -> Piece:
+        return self.piece
+
+
+def _made(maker: Callable[[], Piece], work: Callable, own: tuple):
+    return work(maker(), *own)
 
 
 def never_move(pieces: Sequence[Piece]) -> np.ndarray:

@@ -38,6 +38,7 @@ from .robot import Robot
 from .spans import Spans, released
 from .specs import AUTO, Experiment, LogSpec
 from .threads import single_threaded
+from .workers import Mapped, crew
 
 #: called with the stage's name and the share of it done, 0 to 1
 Progress = Callable[[str, float], None]
@@ -61,21 +62,32 @@ def build(experiment: Experiment) -> tuple[Robot, Model, np.ndarray]:
     return machine, structure, _prior(experiment, structure)
 
 
-def read(experiment: Experiment, machine: Robot, specs: list[LogSpec], *, structure: Model | None = None) -> list[logs.Log]:
+def read(experiment: Experiment, machine: Robot, specs: list[LogSpec], *, structure: Model | None = None, mapped: Mapped | None = None) -> list[logs.Log]:
     """The logs of an experiment's `data.train` or `data.test`, with their events where these are left out, and what the experiment
     masks.
 
     Args:
         structure: the model that they are read for: where nothing of it looks at a log as a whole, long logs are spans, which are read
             when they are asked for. None: they are read whole.
+        mapped: what shares long logs among processes, as of `workers.crew`; None: there is this one.
 
     Raises:
         LogError: as `log.read`. ConfigError: a mask that cannot be.
     """
     reader = long_log if structure is not None and structure.local else logs
-    read = [reader.read(spec, experiment.data, machine.joints, machine.prismatic, experiment.folder, experiment.actuator) for spec in specs]
-    found = read if experiment.preprocess.events == "keep" else with_events(machine, read)
+    how = (experiment.data, machine.joints, machine.prismatic, experiment.folder, experiment.actuator)
+    if mapped and reader is long_log and any(long_log.in_parts(spec, *how) for spec in specs):
+        # where one log is long, each is looked at by itself
+        found = list(mapped(_read_one, ((machine, experiment.preprocess.events, spec, how) for spec in specs)))
+    else:
+        read = [reader.read(spec, *how) for spec in specs]
+        found = read if experiment.preprocess.events == "keep" else with_events(machine, read)
     return masks.masked(found, experiment.preprocess.mask, machine.joints)
+
+
+def _read_one(machine: Robot, kept: str, spec: LogSpec, how: tuple) -> logs.Log:
+    log = long_log.read(spec, *how)
+    return log if kept == "keep" else with_events(machine, [log])[0]
 
 
 _BESIDE = 1024  # rows of a span's neighbours that are looked at with it: more than an event's surroundings
@@ -128,19 +140,30 @@ def read_all(experiment: Experiment) -> Read:
 
 
 @single_threaded
-def fit(experiment: Experiment, *, filters: dict | None = None, strength: PriorWeight | None = None, progress: Progress | None = None, measured: Read | None = None) -> Fit:
+def fit(
+    experiment: Experiment, *, filters: dict | None = None, strength: PriorWeight | None = None, progress: Progress | None = None, measured: Read | None = None,
+    workers: int = 1, scheduler: str | None = None,
+) -> Fit:
     """Identify an experiment: everything from its logs to its errors on held-out data.
 
     Args:
         filters, strength: what an earlier fit of the same logs chose, `Fit.filters` and `Fit.strength`; by default filters
             are compared again, and the weight of the prior is chosen where the experiment says so.
         measured: its logs, where they are at hand.
+        workers, scheduler: as of `workers.crew`: who reads, filters, compresses and predicts. What is found does not depend on it.
 
     Raises:
         SysidError: bad input, with the one line that says so. A search that does not converge does not raise; it
             is `fit.solution.converged`.
     """
     tell = progress or (lambda stage, share: None)
+    if workers == 1 and scheduler is None:
+        return _fit(experiment, filters, strength, tell, measured, None)
+    with crew(workers, scheduler, lambda text: tell(text, 0.0)) as mapped:
+        return _fit(experiment, filters, strength, tell, measured, mapped)
+
+
+def _fit(experiment: Experiment, filters: dict | None, strength: PriorWeight | None, tell: Progress, measured: Read | None, mapped: Mapped | None) -> Fit:
     experiment = experiment if strength is None else with_weight(experiment, strength.value)
     seconds: dict[str, float] = {}
     with noticed() as notices:
@@ -150,14 +173,14 @@ def fit(experiment: Experiment, *, filters: dict | None = None, strength: PriorW
         for text in measured.notices if measured else ():
             warnings.warn(SysidWarning(text), stacklevel=2)
         with _timed(seconds, "read", tell):
-            train = measured.train if measured else read(experiment, machine, experiment.data.train, structure=structure)
+            train = measured.train if measured else read(experiment, machine, experiment.data.train, structure=structure, mapped=mapped)
         _refuse_no_torque(train)
         provenance = [_provenance("train", log, spec) for log, spec in zip(train, experiment.data.train)]
         with _timed(seconds, "filters", tell):
             chosen = filtering.compare(experiment, structure, train, prior, progress=lambda share: tell("filters", share)) if filters is None else filters
             preprocess = filtering.settled(experiment.preprocess, chosen)
         with _timed(seconds, "preprocess", tell):
-            motion = prepare(train, preprocess, machine.joints)
+            motion = prepare(train, preprocess, machine.joints, mapped)
             del train  # the filtered motion holds all that is needed from here on
         _tell_still(motion)
         _tell_left_out(motion, preprocess)
@@ -184,10 +207,10 @@ def fit(experiment: Experiment, *, filters: dict | None = None, strength: PriorW
             samples, left_out = {"train": motion.samples}, {"train": _left_out(motion)}
             del motion
         with _timed(seconds, "test", tell):
-            held_out = measured.test if measured else read(experiment, machine, experiment.data.test, structure=structure)
+            held_out = measured.test if measured else read(experiment, machine, experiment.data.test, structure=structure, mapped=mapped)
             provenance += [_provenance("test", log, spec) for log, spec in zip(held_out, experiment.data.test)]
             _tell_overlap(experiment, provenance)
-            motion = prepare(held_out, preprocess, machine.joints)
+            motion = prepare(held_out, preprocess, machine.joints, mapped)
             del held_out
             disturbed += _tell_events("test", motion)
             predictions["test"] = predicted(structure, found.x, motion)

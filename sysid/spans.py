@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from ctypes import CDLL
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cache
 from itertools import pairwise
 
@@ -62,6 +62,13 @@ class Spans(Sequence):
         rows, first, *_ = self._spans[number]
         return rows(first, first + 2).step
 
+    def carried(self, number: int, margin: int) -> tuple[Sequence[Segment], int]:
+        """Segments for another process, among which a span with such margins is, and its number: where a file can be read, how;
+        where it cannot, the rows."""
+        if isinstance(self._spans[number][0], Held):
+            return (self.around(number, margin),), 0
+        return self, number
+
     def around(self, number: int, margin: int) -> Segment:
         """A span with up to `margin` rows of what stands before and after it, outside its core."""
         rows, first, last, n = self._spans[number]
@@ -91,6 +98,13 @@ def released() -> None:
     _trim()(0)
 
 
+def carried(segments: Sequence[Segment], number: int, margin: int) -> tuple[Sequence[Segment], int]:
+    """Of any log, segments for another process and the number there of one of them, with its margins where it is a span."""
+    if isinstance(segments, Spans):
+        return segments.carried(number, margin)
+    return (segments[number],), 0
+
+
 def around(segments: Sequence[Segment], number: int, margin: int) -> Segment:
     """A segment of any log, with up to `margin` rows about its core where it is a span."""
     return segments.around(number, margin) if isinstance(segments, Spans) else segments[number]
@@ -106,11 +120,18 @@ def clocks(segments: Sequence[Segment]) -> list[tuple[float, float]]:
 def of_segment(segment: Segment) -> tuple[Rows, int]:
     """What reads the rows of a segment that is in memory, and how many it has."""
 
-    def rows(first: int, last: int) -> Segment:
-        part = slice(first, last)
-        cut = lambda values: None if values is None else values[part]  # noqa: E731
-        signals = {name: values[part] for name, values in segment.signals.items()}
-        arrays = {name: cut(getattr(segment, name)) for name in ("t", "q", "tau", "qd", "qdd")}
-        return replace(segment, **arrays, signals=signals, core=None)
+    return Held(segment), len(segment.t)
 
-    return rows, len(segment.t)
+
+@dataclass(frozen=True)
+class Held:
+    """The rows of a segment that is in memory."""
+
+    segment: Segment
+
+    def __call__(self, first: int, last: int) -> Segment:
+        part, own = slice(first, last), self.segment
+        cut = lambda values: None if values is None else values[part]  # noqa: E731
+        signals = {name: values[part] for name, values in own.signals.items()}
+        arrays = {name: cut(getattr(own, name)) for name in ("t", "q", "tau", "qd", "qdd")}
+        return replace(own, **arrays, signals=signals, core=None)

@@ -7,13 +7,23 @@ given. A worker that dies is replaced and its work is done again.
 from __future__ import annotations
 
 import logging
+import warnings
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from ctypes import CDLL
+from functools import cache
+from itertools import islice
 
 from .errors import SysidError
+from .threads import single_threaded
 
 _DEATHS = 3  # of workers at one piece of work, after which it is given up
 _PATIENCE = 10  # s to find a scheduler
+_AHEAD = 4  # pieces of work for each thread of the workers that wait: none of them is ever idle
+# M_TRIM_THRESHOLD and M_MMAP_THRESHOLD of glibc's malloc.h [bytes]: where its own adjustment ends (man mallopt)
+_MALLOC = {-1: 2**26, -3: 2**25}
+_UNKNOWN = 64  # pieces of work that wait where no worker is there yet
 
 Mapped = Callable[[Callable, Iterable[tuple]], Iterator]
 
@@ -83,14 +93,43 @@ def _joined(workers: int, scheduler: str | None):
 def _gathered(client, work: Callable, arguments: Iterable[tuple]) -> Iterator:
     from distributed import KilledWorker
 
-    futures = [client.submit(work, *each, pure=False) for each in arguments]
-    for number in range(len(futures)):
+    def submitted(each: tuple):
+        with warnings.catch_warnings():  # Dask's, of arguments that are large
+            warnings.simplefilter("ignore")
+            return client.submit(_worked, work, each, pure=False)
+
+    rest, number = iter(arguments), 0
+    ahead = _AHEAD * sum(client.ncores().values()) or _UNKNOWN
+    futures = deque(submitted(each) for each in islice(rest, ahead))
+    while futures:
+        number += 1
         try:
-            result = futures[number].result()
+            result, said = futures.popleft().result()
         except KilledWorker:
             raise Died(
-                f"{_DEATHS} workers died at piece {number + 1} of {len(futures)}",
-                do="give workers more memory",
+                f"{_DEATHS} workers died at piece {number}", do="give workers more memory"
             ) from None
-        futures[number] = None  # what was taken need not be kept
+        futures += (submitted(each) for each in islice(rest, 1))
+        for warning in said:
+            warnings.warn(warning, stacklevel=2)
         yield result
+
+
+@cache
+def _keeping_memory() -> None:
+    """Let the C library keep what is free, as it does where nobody says otherwise: Dask bids its workers give it back at once,
+    and to be given each array's pages again costs as much as what is done with them."""
+    with suppress(AttributeError, OSError, TypeError):
+        library = CDLL(None)
+        for option, size in _MALLOC.items():
+            library.mallopt(option, size)
+
+
+@single_threaded
+def _worked(work: Callable, each: tuple) -> tuple:
+    """What a piece of work gives, and the warnings that it gave."""
+    _keeping_memory()
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        result = work(*each)
+    return result, [one.message for one in said]
