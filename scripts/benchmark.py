@@ -16,6 +16,9 @@ long    A seven-joint arm with friction at 1 kHz, 0.7 million samples and four t
         Python process which reads the log, differentiates it, calls pin.computeJointTorqueRegressor in a loop and takes a
         QR of every 4096 samples' rows; and peak memory of the longer log over that of the shorter. At most 1 and 1.1 are
         the aims. Beside it the time of the loop's calls alone.
+workers  10 million samples of that arm in 20 files (--files, --each): wall time of `sysid fit` in one process over that of
+        `sysid fit --workers 2`, in turns (3 times); and of one of which a worker is killed half-way. At least 1.7 is the aim, equal
+        to 1e-10. Needs the extra dask and 2 GB of disk; it says the load that the machine had.
 diagnose  The whole `sysid diagnose configs/cheetah3.yaml` process, the whole catalogue on every joint, over `sysid fit` on
         the same experiment, in turns. At most 10 is the aim.
 torque  `torque(q, qd, qdd)` of a seven-joint arm with viscous and Coulomb friction beside a bare `pin.rnea` of its bodies, one
@@ -41,7 +44,7 @@ ROOT = Path(__file__).resolve().parent.parent
 CONFIG = ROOT / "configs" / "cheetah3.yaml"
 LOG = ROOT / "data" / "cheetah3" / "train.parquet"
 TIMES = 50
-PARTS = ["time", "memory", "long", "diagnose", "torque", "cpu", "solve"]
+PARTS = ["time", "memory", "long", "workers", "diagnose", "torque", "cpu", "solve"]
 PANDA = "example-robot-data://panda_description/urdf/panda.urdf"
 
 FLOOR = '''
@@ -115,8 +118,13 @@ def main() -> None:
     parser.add_argument("--repeats", type=int, default=7, help="runs of each process; the median counts")
     parser.add_argument("--only", choices=PARTS)
     parser.add_argument("--samples", type=int, default=2_800_000, help="of the longer log of `long`")
+    parser.add_argument("--files", type=int, default=20, help="of `workers`")
+    parser.add_argument("--each", type=int, default=500_000, help="samples of each file of `workers`")
     parser.add_argument("--json", action="store_true")
     options = parser.parse_args()
+    sys.path.insert(0, str(ROOT))
+    from scripts.benchmark_parts import workers
+
     found = {}
     wanted = [options.only] if options.only else PARTS
     if "time" in wanted:
@@ -125,6 +133,8 @@ def main() -> None:
         found["memory"] = memory()
     if "long" in wanted:
         found["long"] = long(options.samples)
+    if "workers" in wanted:
+        found["workers"] = workers.measured(options.files, options.each, min(options.repeats, 3))
     if "diagnose" in wanted:
         found["diagnose_over_fit"] = diagnose_over_fit(min(options.repeats, 3))
     if "torque" in wanted:
@@ -152,6 +162,8 @@ def main() -> None:
             f"(its calls alone {entry['calls_microseconds']:.1f} us) = {entry['ratio']:.2f}; peak memory {entry['megabytes'][1]:.0f} MB, "
             f"{entry['megabytes'][0]:.0f} MB on {entry['samples'][0]} samples: {entry['growth']:.2f} times"
         )
+    if "workers" in found:
+        print(workers.told(found["workers"]))
     if "diagnose_over_fit" in found:
         entry = found["diagnose_over_fit"]
         print(f"sysid diagnose {entry['diagnose_seconds']:.1f} s / sysid fit {entry['fit_seconds']:.2f} s = {entry['ratio']:.1f} (medians of {entry['runs']})")
@@ -176,7 +188,7 @@ def main() -> None:
 def _run(command: list[str], told: list[str] | None = None) -> tuple[float, int, float]:
     """Wall time [s], peak memory [bytes] and processor time [s] of a process; what it said on standard error is appended to `told`."""
     start = time.perf_counter()
-    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, env=_environment())
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, env=environment())
     said = process.stderr.read()
     if told is not None:
         told.append(said.decode())
@@ -188,7 +200,7 @@ def _run(command: list[str], told: list[str] | None = None) -> tuple[float, int,
     return time.perf_counter() - start, usage.ru_maxrss * scale, usage.ru_utime + usage.ru_stime
 
 
-def _environment() -> dict[str, str]:
+def environment() -> dict[str, str]:
     said = {name: value for name, value in os.environ.items() if not name.endswith("_NUM_THREADS")}
     return {**said, "PYTHONPATH": str(ROOT)}
 

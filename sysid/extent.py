@@ -55,8 +55,8 @@ class Extent:
 
 @dataclass(frozen=True)
 class Reach:
-    """What a piece adds to an extent: its log, its ends (dof,), how long it and its core are [s], and
-    some of its rows with the row after each."""
+    """What a piece adds to an extent: its log, its ends (dof,), how long it and its core are [s],
+    and some of its rows with the row after each."""
 
     log: int
     ends: dict[str, np.ndarray]

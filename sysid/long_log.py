@@ -45,7 +45,12 @@ def read(
 
 
 def in_parts(
-    log: LogSpec, data: DataSpec, joints: tuple[str, ...], prismatic, folder: Path = Path(), actuators=logs.NO_ACTUATORS
+    log: LogSpec,
+    data: DataSpec,
+    joints: tuple[str, ...],
+    prismatic,
+    folder: Path = Path(),
+    actuators=logs.NO_ACTUATORS,
 ) -> bool:
     """Whether a log's file is long, and can be read in parts."""
     return not actuators and _source(log, data, joints, prismatic, folder) is not None

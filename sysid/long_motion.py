@@ -86,8 +86,9 @@ def margin(spec: PreprocessSpec, step: float) -> int:
 
 @dataclass(frozen=True)
 class _Place:
-    """A span of a log, or a segment of a short one, and how it becomes a piece, in whichever process:
-    `k` is its number among the segments of `log`, which may be a part of that of this number."""
+    """A span of a log, or a segment of a short one, and how it becomes a piece, in whichever
+    process: `k` is its number among the segments of `log`, which may be a part of that of this
+    number."""
 
     log: Log
     number: int
@@ -96,7 +97,8 @@ class _Place:
     joints: tuple[str, ...]
 
     def filtered(self) -> Piece | None:
-        """A piece whose rows all count but for those that events reach; None where it is too short."""
+        """A piece whose rows all count but for those that events reach; None where it is too
+        short."""
         segments = self.log.segments
         step = segments.step(self.k) if isinstance(segments, Spans) else segments[self.k].step
         own = around(segments, self.k, margin(self.spec, step))
@@ -111,8 +113,8 @@ def _place(log: Log, number: int, k: int, spec: PreprocessSpec, joints) -> _Plac
 
 @dataclass(frozen=True)
 class _Made:
-    """Makes the piece of a place: which rows count, and did before those were left out that both sides
-    of the equation would see, is known by then."""
+    """Makes the piece of a place: which rows count, and did before those were left out that both
+    sides of the equation would see, is known by then."""
 
     place: _Place
     before: bytes | None
@@ -174,7 +176,9 @@ class _Seen:
     rows: int
 
 
-def _seen(place: _Place, threshold, stuck: np.ndarray, counts: np.ndarray, stride: int) -> _Seen | None:
+def _seen(
+    place: _Place, threshold, stuck: np.ndarray, counts: np.ndarray, stride: int
+) -> _Seen | None:
     released()
     if (piece := place.filtered()) is None:
         return None

@@ -28,9 +28,7 @@ class LongPrediction(Prediction):
     """As `Prediction`; its arrays are read from files whenever they are asked for. `files` hold
     what `to_dataframe` says, in order."""
 
-    def __init__(
-        self, joints: tuple[str, ...], units: tuple[str, ...], masked: bool
-    ) -> None:
+    def __init__(self, joints: tuple[str, ...], units: tuple[str, ...], masked: bool) -> None:
         own = {
             "joints": joints,
             "units": units,
@@ -123,8 +121,8 @@ def predicted(model: Model, x, motion: Motion) -> Prediction:
 
 @dataclass(frozen=True)
 class _Part:
-    """What is predicted of one piece: its errors' sums, greatest torques, some of its states, and the file where this process
-    could not put it in its place."""
+    """What is predicted of one piece: its errors' sums, greatest torques, some of its states, and
+    the file where this process could not put it in its place."""
 
     sums: Sums
     greatest: np.ndarray
@@ -133,7 +131,9 @@ class _Part:
     content: bytes | None
 
 
-def _part(piece: Piece, model: Model, x, motion: Motion, first: int, samples: int, path: Path) -> _Part:
+def _part(
+    piece: Piece, model: Model, x, motion: Motion, first: int, samples: int, path: Path
+) -> _Part:
     found = predict(model, x, replace(motion, pieces=(piece,)))
     table, content = found.to_dataframe(), None
     how = {"compression": "uncompressed", "statistics": False}

@@ -14,6 +14,7 @@ FIT = {
     "left": ("looking at what is left", 1),
 }  # fmt: skip
 _WORDS = {"starting": "reading the logs", "ask": "asking what is missing", "drawing": "drawing"}
+STAYS = "dashboard: "  # begins what is told once, and stays in sight
 _ASKED, _FIRST = 0.2, 0.5  # shares of a diagnosis: its fit, and the first round of questions
 _DRAWN = 0.97  # from here on a page is drawn
 _MOST = 0.99

@@ -63,8 +63,8 @@ class Spans(Sequence):
         return rows(first, first + 2).step
 
     def carried(self, number: int, margin: int) -> tuple[Sequence[Segment], int]:
-        """Segments for another process, among which a span with such margins is, and its number: where a file can be read, how;
-        where it cannot, the rows."""
+        """Segments for another process, among which a span with such margins is, and its number:
+        where a file can be read, how; where it cannot, the rows."""
         if isinstance(self._spans[number][0], Held):
             return (self.around(number, margin),), 0
         return self, number
@@ -99,7 +99,8 @@ def released() -> None:
 
 
 def carried(segments: Sequence[Segment], number: int, margin: int) -> tuple[Sequence[Segment], int]:
-    """Of any log, segments for another process and the number there of one of them, with its margins where it is a span."""
+    """Of any log, segments for another process and the number there of one of them, with its margins
+    where it is a span."""
     if isinstance(segments, Spans):
         return segments.carried(number, margin)
     return (segments[number],), 0

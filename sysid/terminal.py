@@ -33,6 +33,9 @@ def progress_bar(course=None):
         task = bar.add_task("", total=1.0, left="")
 
         def report(stage: str, share: float) -> None:
+            if stage.startswith(progress.STAYS):
+                bar.console.print(Text(f"sysid: {stage}"), soft_wrap=True)
+                return
             words, whole = course.tell(stage, share)
             rest = progress.left(whole, time.monotonic() - begun)
             told = "" if rest is None else f"about {progress.spoken(rest)} left"
@@ -57,8 +60,11 @@ def progress_lines(course):
         now["next"] = elapsed + _EVERY
         rest = progress.left(now["share"], elapsed)
         told = f"{progress.spoken(elapsed)} so far" if rest is None else f"about {progress.spoken(rest)} left"
+        line(f"{now['stage']}, {100 * now['share']:.0f} %, {told}")
+
+    def line(said: str) -> None:
         with suppress(OSError, ValueError):  # a log that nobody can write is no reason to stop
-            print(f"sysid: {now['stage']}, {100 * now['share']:.0f} %, {told}", file=sys.stderr, flush=True)
+            print(f"sysid: {said}", file=sys.stderr, flush=True)
 
     def tick() -> None:
         while not over.wait(1.0):
@@ -67,6 +73,9 @@ def progress_lines(course):
 
     def report(stage: str, share: float) -> None:
         with lock:
+            if stage.startswith(progress.STAYS):
+                line(stage)
+                return
             now["stage"], now["share"] = course.tell(stage, share)
             say()
 

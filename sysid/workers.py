@@ -21,7 +21,8 @@ from .threads import single_threaded
 _DEATHS = 3  # of workers at one piece of work, after which it is given up
 _PATIENCE = 10  # s to find a scheduler
 _AHEAD = 4  # pieces of work for each thread of the workers that wait: none of them is ever idle
-# M_TRIM_THRESHOLD and M_MMAP_THRESHOLD of glibc's malloc.h [bytes]: where its own adjustment ends (man mallopt)
+# M_TRIM_THRESHOLD and M_MMAP_THRESHOLD of glibc's malloc.h [bytes]: where its own adjustment ends
+# (man mallopt)
 _MALLOC = {-1: 2**26, -3: 2**25}
 _UNKNOWN = 64  # pieces of work that wait where no worker is there yet
 
@@ -117,8 +118,9 @@ def _gathered(client, work: Callable, arguments: Iterable[tuple]) -> Iterator:
 
 @cache
 def _keeping_memory() -> None:
-    """Let the C library keep what is free, as it does where nobody says otherwise: Dask bids its workers give it back at once,
-    and to be given each array's pages again costs as much as what is done with them."""
+    """Let the C library keep what is free, as it does where nobody says otherwise: Dask bids its
+    workers give it back at once, and to be given each array's pages again costs as much as what is
+    done with them."""
     with suppress(AttributeError, OSError, TypeError):
         library = CDLL(None)
         for option, size in _MALLOC.items():
