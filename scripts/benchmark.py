@@ -123,7 +123,7 @@ def main() -> None:
     parser.add_argument("--json", action="store_true")
     options = parser.parse_args()
     sys.path.insert(0, str(ROOT))
-    from scripts.benchmark_parts import workers
+    from scripts.scale_parts import workers
 
     found = {}
     wanted = [options.only] if options.only else PARTS
