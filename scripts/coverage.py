@@ -102,9 +102,9 @@ def _combinations(fit, true) -> np.ndarray:
     """Errors in deviations of the directions in the bodies' parameters that the data determine."""
     from scipy.linalg import eigh
 
-    from sysid.compress import Compressed
     from sysid.inertia import DIVERGENCES
     from sysid.objective import Objective, add_blocks
+    from sysid.triangles import Compressed
 
     data: Compressed = fit.compressed
     spec = fit.experiment.prior

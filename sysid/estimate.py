@@ -9,7 +9,6 @@ import numpy as np
 
 from . import uncertainty
 from .certificate import Certificate, certify
-from .compress import Compressed
 from .differences import difference
 from .errors import ConfigError
 from .inertia import DIVERGENCES, PARAMETERIZATIONS
@@ -24,6 +23,7 @@ from .prior_weight import PriorWeight, number, with_weight
 from .robot import Robot
 from .solve import Coordinates, Solution, solve
 from .specs import Experiment
+from .triangles import Compressed
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ import numpy as np
 
 from . import interior
 from .blocks import within_one_error
-from .compress import Compressed, compress
+from .compress import compress
 from .drives import slowest
 from .errors import SysidError, SysidWarning
 from .estimate import pose
@@ -26,6 +26,7 @@ from .preprocess import prepare
 from .smoother import Smoother
 from .spans import Spans
 from .specs import Experiment, PreprocessSpec
+from .triangles import Compressed
 
 _WINDOWS = (0.02, 0.03, 0.05, 0.07, 0.1, 0.15, 0.2, 0.3, 0.4, 0.6, 0.8)  # s
 _CUTOFFS = (1.0, 1.5, 2.0, 3.0, 5.0, 7.0, 10.0, 15.0, 20.0, 30.0, 50.0, 100.0)  # Hz

@@ -18,12 +18,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from .blocks import standard_error, within_one_error
-from .compress import Compressed
 from .estimate import Problem, known_bodies, noise_weights, pose
 from .interior import minimise
 from .model import Model
 from .prior_weight import USUAL, PriorWeight, is_auto, weakest, with_weight
 from .specs import Experiment
+from .triangles import Compressed
 
 _STRETCHES = 8
 FEWEST = 3  # of fewer no standard error can be told

@@ -17,14 +17,16 @@ import numpy as np
 from . import rows
 from .addition import command
 from .blocks import within_one_error
-from .compress import Compressed, Linearised, compress
+from .compress import compress
 from .effect import find, vocabulary
 from .estimate import Fit, pose
 from .held_apart import FEWEST, HeldApart, held_apart, judged, solved, strongest
+from .linearised import Linearised
 from .model import ROBOT, Coefficient, Model, moving_coefficients
 from .motion import Motion
 from .prior_weight import PLAUSIBLE
 from .robot import Robot
+from .triangles import Compressed
 
 _ROWS = 6000  # enough to tell masses from effects; a long log need not be read whole for it
 

@@ -21,12 +21,13 @@ from . import config, drives, events, gains, groups, held_apart, long_log, masks
 from . import filters as filtering
 from . import log as logs
 from .bumps import bumps
-from .compress import Compressed, Linearised, compress
+from .compress import compress
 from .drives import rescaled, scale_is_told, with_drives
 from .effect import NotFinite
 from .errors import LogError, SysidWarning
 from .estimate import Fit, Prediction, identify, predict
 from .inertia.consistency import is_consistent
+from .linearised import Linearised
 from .long_motion import prepare
 from .long_prediction import predicted
 from .model import Model, moving_coefficients
@@ -38,6 +39,7 @@ from .robot import Robot
 from .spans import Spans, released
 from .specs import AUTO, Experiment, LogSpec
 from .threads import single_threaded
+from .triangles import Compressed
 from .workers import Mapped, crew
 
 #: called with the stage's name and the share of it done, 0 to 1

@@ -16,7 +16,6 @@ import numpy as np
 
 from . import multistart
 from . import rows as row
-from .compress import Compressed, Factor, triangle
 from .effect import Deflection, NotFinite
 from .estimate import Fit, Problem, pose
 from .inertia import DIVERGENCES
@@ -26,8 +25,10 @@ from .multistart import Searched
 from .objective import add_blocks
 from .prior_weight import number, with_weight
 from .projection import Projection, inverted, prior_hessian
+from .reduction import triangle
 from .shape_search import Search
 from .specs import Experiment
+from .triangles import Compressed, Factor
 
 _MOST_ROWS, _STEPS, _SETTLED = 6000, 12, 1e-7
 _LEAST_SHARE = 0.25  # of the way to another load

@@ -14,9 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from . import blocks
-from .compress import Compressed
 from .objective import Objective, add_blocks
 from .prior_weight import weakest
+from .triangles import Compressed
 
 
 @dataclass(frozen=True)

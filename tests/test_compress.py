@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from sysid import estimate
-from sysid.compress import compress, merge
+from sysid.compress import compress
 from sysid.model import chunks
+from sysid.triangles import merge
 from tests.problems import arm, leg
 
 

@@ -8,7 +8,6 @@ import pytest
 import sysid
 from scripts.blind_benchmark import PLANAR
 from sysid import config, fleet, regressor
-from sysid.compress import Linearised
 from sysid.errors import SysidError
 from sysid.fleet import calibration, listing
 from sysid.fleet.calibration import Table
@@ -17,6 +16,7 @@ from sysid.fleet.dates import dated
 from sysid.fleet.drift import drift
 from sysid.fleet.oddity import causes
 from sysid.fleet.spread import inflation, judged, spread
+from sysid.linearised import Linearised
 from sysid.report.fleet import write
 from tests.conftest import csv
 from tests.problems import arm

@@ -6,11 +6,11 @@ import pytest
 import sysid
 from scripts.blind_benchmark import PLANAR
 from sysid import config, pipeline, regressor, results
-from sysid.compress import triangle
 from sysid.errors import SysidError
 from sysid.inertia.consistency import is_consistent
 from sysid.online import Online, monitor
 from sysid.online.whitening import whitening
+from sysid.reduction import triangle
 from tests.conftest import csv
 from tests.test_lowpass import smooth
 

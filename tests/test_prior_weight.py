@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from sysid import blocks, config, held_apart, pipeline, prior_weight, regressor, shape
-from sysid.compress import Linearised, compress
+from sysid.compress import compress
 from sysid.estimate import identify
 from sysid.inertia import LogCholesky
+from sysid.linearised import Linearised
 from sysid.log import Log
 from sysid.model import build, moving_coefficients
 from sysid.preprocess import prepare

@@ -5,13 +5,15 @@ from scipy.signal import lfilter
 
 from sysid import estimate, uncertainty
 from sysid.blocks import parameters
-from sysid.compress import Compressed, Factor, compress, triangle
+from sysid.compress import compress
 from sysid.inertia import LogCholesky
 from sysid.log import Log, Segment
 from sysid.model import build
 from sysid.preprocess import prepare
+from sysid.reduction import triangle
 from sysid.regressor import torque
 from sysid.specs import Experiment
+from sysid.triangles import Compressed, Factor
 from tests.problems import arm, fourier_motion, leg
 from tests.robots import load, urdf
 

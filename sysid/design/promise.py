@@ -27,9 +27,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import ndtr, ndtri
 
-from ..compress import Linearised
 from ..estimate import Fit
 from ..inertia import DIVERGENCES
+from ..linearised import Linearised
 from ..motion import Motion
 from ..prior_weight import weakest
 from .information import own_size

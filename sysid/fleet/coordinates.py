@@ -18,9 +18,10 @@ from functools import cached_property
 import numpy as np
 
 from ..base_parameters import independent
-from ..compress import Linearised, triangle
+from ..linearised import Linearised
 from ..model import Model
 from ..motion import Motion, Piece
+from ..reduction import triangle
 
 # Of a column's size: below it, what is left of a column is rounding.
 _ALIKE = 1e-6

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from .. import blocks, uncertainty
-from ..compress import Compressed
 from ..estimate import inverse
+from ..triangles import Compressed
 
 _PASSES = 3  # of weights by what the fit leaves
 _OPEN = 1e-6  # of a parameter's square, each in units of its own column

@@ -7,13 +7,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from .. import pipeline
-from ..compress import Compressed, Factor, Linearised, compress
+from ..compress import compress
 from ..errors import SysidError
 from ..estimate import Fit
 from ..filters import settled
+from ..linearised import Linearised
 from ..long_motion import prepare
 from ..motion import Motion
 from ..specs import Experiment
+from ..triangles import Compressed, Factor
 from .coordinates import Coordinates, coordinates
 from .dates import Dated, dated
 from .estimate import Estimate, estimate

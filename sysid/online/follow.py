@@ -14,10 +14,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..compress import Compressed, Factor, triangle
 from ..estimate import Problem, pose
 from ..model import Model
+from ..reduction import triangle
 from ..specs import Experiment
+from ..triangles import Compressed, Factor
 from .stream import Rows
 
 

@@ -6,10 +6,10 @@ The whole curve of what `prior.weight: auto` chooses from, on the same stretches
 import numpy as np
 
 from ..blocks import within_one_error
-from ..compress import Compressed
 from ..held_apart import held_apart, judged
 from ..model import Model
 from ..specs import Experiment
+from ..triangles import Compressed
 
 WEIGHTS = tuple(10.0 ** np.arange(-6, 7).astype(float))
 

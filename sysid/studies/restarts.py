@@ -10,11 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..compress import Compressed
 from ..estimate import Problem, noise_weights, pose
 from ..pipeline import prepared
 from ..results import number
 from ..specs import Experiment
+from ..triangles import Compressed
 
 
 @dataclass(frozen=True)
