@@ -25,8 +25,8 @@ from scipy.optimize import least_squares
 from sysid import pipeline, regressor, robot, rows, specs
 from sysid.compress import compress
 from sysid.effect import NotFinite
-from sysid.estimate import pose
 from sysid.model import moving_coefficients
+from sysid.posed_problem import pose
 from sysid.threads import single_threaded
 
 URDF = """<robot name="arm">

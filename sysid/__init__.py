@@ -25,10 +25,11 @@ if TYPE_CHECKING:
     from . import check, design, diagnose, export, fleet
     from .comparison import Difference, compare
     from .errors import SysidError, SysidWarning
-    from .estimate import Fit, Prediction
+    from .estimate import Fit
     from .online import Online
     from .pipeline import fit, load
     from .pipeline import predict_log as predict
+    from .prediction import Prediction
     from .results import write
     from .run import Run, read_run
     from .specs import Experiment
@@ -37,7 +38,7 @@ if TYPE_CHECKING:
 _WHERE = {
     "load": ("pipeline", "load"), "fit": ("pipeline", "fit"), "predict": ("pipeline", "predict_log"),
     "write": ("results", "write"), "compare": ("comparison", "compare"), "Difference": ("comparison", "Difference"),
-    "Experiment": ("config", "Experiment"), "Fit": ("estimate", "Fit"), "Prediction": ("estimate", "Prediction"),
+    "Experiment": ("config", "Experiment"), "Fit": ("estimate", "Fit"), "Prediction": ("prediction", "Prediction"),
     "read_run": ("run", "read_run"), "Run": ("run", "Run"),
     "trust": ("trusted", "trust"), "check": ("check", None), "design": ("design", None), "diagnose": ("diagnose", None), "export": ("export", None), "fleet": ("fleet", None), "Online": ("online", "Online"), "SysidError": ("errors", "SysidError"), "SysidWarning": ("errors", "SysidWarning"),
 }  # fmt: skip

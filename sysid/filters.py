@@ -16,12 +16,12 @@ from .blocks import within_one_error
 from .compress import compress
 from .drives import slowest
 from .errors import SysidError, SysidWarning
-from .estimate import pose
 from .events import usable
 from .log import Log
 from .lowpass import band
 from .model import Model, moving_coefficients
 from .multistart import finite
+from .posed_problem import pose
 from .preprocess import prepare
 from .smoother import Smoother
 from .spans import Spans

@@ -18,9 +18,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from .blocks import standard_error, within_one_error
-from .estimate import Problem, known_bodies, noise_weights, pose
 from .interior import minimise
 from .model import Model
+from .posed_problem import Problem, known_bodies, noise_weights, pose
 from .prior_weight import USUAL, PriorWeight, is_auto, weakest, with_weight
 from .specs import Experiment
 from .triangles import Compressed

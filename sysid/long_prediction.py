@@ -15,9 +15,9 @@ from pathlib import Path
 import numpy as np
 
 from .errors import SysidError
-from .estimate import Prediction, States, Sums, joined_states, predict, states, units
 from .model import Model
 from .motion import Motion, Piece, Pieces
+from .prediction import Prediction, States, Sums, joined_states, predict, states, units
 from .unfinished import beside, temporary_folder
 
 _ARRAYS = ("log", "t", "measured", "predicted", "use")
@@ -100,7 +100,7 @@ class LongPrediction(Prediction):
 
 
 def predicted(model: Model, x, motion: Motion) -> Prediction:
-    """As `estimate.predict`; over long logs it is in files, in a temporary folder that goes with
+    """As `prediction.predict`; over long logs it is in files, in a temporary folder that goes with
     it."""
     if not isinstance(motion.pieces, Pieces):
         return predict(model, x, motion)

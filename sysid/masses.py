@@ -19,11 +19,12 @@ from .addition import command
 from .blocks import within_one_error
 from .compress import compress
 from .effect import find, vocabulary
-from .estimate import Fit, pose
+from .estimate import Fit
 from .held_apart import FEWEST, HeldApart, held_apart, judged, solved, strongest
 from .linearised import Linearised
 from .model import ROBOT, Coefficient, Model, moving_coefficients
 from .motion import Motion
+from .posed_problem import pose
 from .prior_weight import PLAUSIBLE
 from .robot import Robot
 from .triangles import Compressed

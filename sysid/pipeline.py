@@ -25,7 +25,7 @@ from .compress import compress
 from .drives import rescaled, scale_is_told, with_drives
 from .effect import NotFinite
 from .errors import LogError, SysidWarning
-from .estimate import Fit, Prediction, identify, predict
+from .estimate import Fit, identify
 from .inertia.consistency import is_consistent
 from .linearised import Linearised
 from .long_motion import prepare
@@ -34,6 +34,7 @@ from .model import Model, moving_coefficients
 from .motion import Motion
 from .multistart import Searched, finite
 from .plausible import implausible
+from .prediction import Prediction, predict
 from .prior_weight import PriorWeight, is_auto, with_weight
 from .robot import Robot
 from .spans import Spans, released

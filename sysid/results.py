@@ -27,8 +27,9 @@ import numpy as np
 from . import base_parameters, bounded, prior_weight, state
 from .differences import per_group, told
 from .errors import ConfigError, SysidError
-from .estimate import Fit, at_edge
+from .estimate import Fit
 from .filters import settled, torque_band
+from .given_shapes import at_edge
 from .inertia import PARAMETERS
 from .inertia.consistency import is_consistent
 from .model import Model

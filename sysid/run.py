@@ -15,10 +15,10 @@ import numpy as np
 
 from . import bounded, config, pipeline
 from .errors import ConfigError, SysidWarning
-from .estimate import Prediction, units
 from .inertia import PARAMETERS
 from .inverse_dynamics import WithTorque
 from .model import Model
+from .prediction import Prediction, units
 from .results import read_fit
 from .specs import Experiment
 

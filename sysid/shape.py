@@ -17,12 +17,13 @@ import numpy as np
 from . import multistart
 from . import rows as row
 from .effect import Deflection, NotFinite
-from .estimate import Fit, Problem, pose
+from .estimate import Fit
 from .inertia import DIVERGENCES
 from .model import Model, moving_coefficients
 from .motion import Motion
 from .multistart import Searched
 from .objective import add_blocks
+from .posed_problem import Problem, pose
 from .prior_weight import number, with_weight
 from .projection import Projection, inverted, prior_hessian
 from .reduction import triangle

@@ -13,8 +13,9 @@ from rich.text import Text
 
 from . import progress
 from .differences import give_or_take
-from .estimate import Fit, given_shapes, said_of_shapes
+from .estimate import Fit
 from .export import exported
+from .given_shapes import given_shapes, said_of_shapes
 from .init.text import flow
 from .statement import faults, tables, text
 

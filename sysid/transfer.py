@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from . import blocks
-from .estimate import Fit, Prediction
+from .estimate import Fit
+from .prediction import Prediction
 
 _CLEAR = 3.0  # standard errors: one in some hundred joints would be told by chance
 _WORTH = 0.1  # of the training error: what a noise floor may be in doubt by

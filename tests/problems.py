@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sysid import config, estimate, pipeline, regressor, robot, specs
+from sysid import config, pipeline, posed_problem, regressor, robot, specs
 from sysid.compress import compress
 from sysid.log import Log, Segment
 from sysid.model import build, moving_coefficients
@@ -56,9 +56,9 @@ def arm() -> tuple:
     return experiment, structure, motion, compress(structure, motion), np.array(machine.prior)
 
 
-def posed(case: tuple, **changes) -> tuple[specs.Experiment, estimate.Problem]:
+def posed(case: tuple, **changes) -> tuple[specs.Experiment, posed_problem.Problem]:
     """The optimisation problem of a case, with sections of its experiment changed."""
     experiment, structure, motion, data, prior = case
     update = {key: getattr(experiment, key).model_copy(update=value) for key, value in changes.items()}
     experiment = experiment.model_copy(update=update)
-    return experiment, estimate.pose(experiment, structure, data, moving_coefficients(structure, motion), prior)
+    return experiment, posed_problem.pose(experiment, structure, data, moving_coefficients(structure, motion), prior)

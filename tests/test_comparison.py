@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sysid import comparison
-from sysid.estimate import Prediction
+from sysid.prediction import Prediction
 
 LOGS = ({"part": "test", "sha256": "a", "start": None, "stop": None},)
 

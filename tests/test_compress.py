@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sysid import estimate
+from sysid import prediction
 from sysid.compress import compress
 from sysid.model import chunks
 from sysid.triangles import merge
@@ -83,7 +83,7 @@ def test_prediction_is_the_columns_times_the_parameters():
     _, structure, motion, data, prior = arm()
     rows, torque = dense(structure, motion)
     x = np.append(prior.ravel(), np.random.default_rng(2).normal(size=len(structure.coefficients)))
-    predicted = estimate.predict(structure, x, motion)
+    predicted = prediction.predict(structure, x, motion)
     np.testing.assert_allclose(predicted.predicted, (rows @ x).T, atol=1e-10 * np.abs(predicted.predicted).max())
     np.testing.assert_allclose(predicted.errors()["rms"], np.sqrt(data.squares(x) / data.rows), rtol=1e-9)
 

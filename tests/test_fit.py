@@ -194,7 +194,7 @@ def test_compare_says_what_a_richer_model_gains(leg, tmp_path):
 def test_standard_error_of_a_difference_is_its_scatter():
     """Two models whose residuals differ by known noise: the jackknife against the scatter over repeats."""
     from sysid.comparison import _block_sums, _jackknife
-    from sysid.estimate import Prediction
+    from sysid.prediction import Prediction
 
     rng = np.random.default_rng(0)
     deltas, errors = [], []
@@ -211,7 +211,7 @@ def test_standard_error_of_a_difference_is_its_scatter():
 def test_blocks_stand_where_they_are_whatever_a_filter_leaves_out():
     """The same residual, cut at the ends as by a wider filter: block by block the same squares."""
     from sysid.comparison import _block_sums
-    from sysid.estimate import Prediction
+    from sysid.prediction import Prediction
 
     t, residual = np.arange(1000) * 0.01, np.random.default_rng(1).normal(size=(1000, 1))
     kept = (slice(0, 1000), slice(130, 1000))
@@ -320,7 +320,7 @@ def test_a_certificate_says_what_it_takes_as_given(leg):
     """Of a model with shape values only the rest is convex: what is proven is said to be so given these."""
     from types import SimpleNamespace
 
-    from sysid.estimate import at_edge, given_shapes, said_of_shapes
+    from sysid.given_shapes import at_edge, given_shapes, said_of_shapes
     from sysid.multistart import Searched
 
     assert given_shapes(leg) == "" and said_of_shapes(leg) == []

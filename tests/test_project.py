@@ -22,7 +22,7 @@ ORDER = [
     "frequencies", "clock", "segment", "spans", "events", "motor_side", "recording", "log", "even_clock", "long_log", "masks", "gaussian", "smoother",
     "motion", "extent", "preprocess", "long_motion", "blocks", "two_masses", "lowpass", "flexible", "effect", "formula", "effects", "own_effects",
     "per_level", "config", "addition", "model", "drives", "inverse_dynamics", "rows", "objective", "projection", "landscape", "multistart", "source",
-    "reduction", "triangles", "linearised", "compress", "interior", "nearby", "certificate", "solve", "prior_weight", "uncertainty", "differences", "estimate",
+    "reduction", "triangles", "linearised", "compress", "interior", "nearby", "certificate", "solve", "prior_weight", "uncertainty", "differences", "prediction", "posed_problem", "given_shapes", "estimate",
     "long_prediction", "base_parameters", "held_apart", "masses", "plausible", "shape_search", "shape", "bumps", "filters", "results",
     "experiment_file", "yaml_edit", "urdf_export", "gains", "simulate", "rollout", "pipeline", "run", "export", "check", "init", "comparison",
     "transfer", "noise", "candidates", "design", "view", "failures", "unexplained", "shown", "diagnose", "changes", "online", "fleet", "statement", "loop", "report",

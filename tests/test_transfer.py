@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from sysid.estimate import Prediction
+from sysid.prediction import Prediction
 from sysid.transfer import Transfer, transfers
 
 STEP = 0.01

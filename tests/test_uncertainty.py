@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.signal import lfilter
 
-from sysid import estimate, uncertainty
+from sysid import estimate, posed_problem, uncertainty
 from sysid.blocks import parameters
 from sysid.compress import compress
 from sysid.inertia import LogCholesky
@@ -85,7 +85,7 @@ def test_an_effect_tied_to_a_body_is_not_claimed_by_the_data():
 
 def test_noise_weighting_gives_quiet_joints_their_say():
     experiment, structure, motion, data, prior = arm()
-    weights = estimate.noise_weights(data, estimate.identify(experiment, structure, motion, data, prior).x)
+    weights = posed_problem.noise_weights(data, estimate.identify(experiment, structure, motion, data, prior).x)
     np.testing.assert_allclose(np.prod(weights), 1.0)
     weighted = experiment.model_copy(update={"solver": experiment.solver.model_copy(update={"weighting": "noise"})})
     fit = estimate.identify(weighted, structure, motion, data, prior)

@@ -13,7 +13,7 @@ import numpy as np
 
 from .. import blocks
 from ..candidates import Candidate, at_start, bounds_of, grown
-from ..estimate import inverse
+from ..posed_problem import inverse
 from ..view import View, by_block, looked_at
 from .evidence import Group
 

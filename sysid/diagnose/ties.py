@@ -13,7 +13,7 @@ import numpy as np
 
 from .. import blocks
 from ..candidates import columns_of
-from ..estimate import inverse
+from ..posed_problem import inverse
 from ..view import View
 from .evidence import Group
 from .projected import groups_at

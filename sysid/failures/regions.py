@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..estimate import Prediction
+from ..prediction import Prediction
 from .held_out import HeldOut
 
 _CUTS, _HALF = 10, 0.5  # quantiles a region may begin or end at; of the squared error

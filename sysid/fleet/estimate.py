@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .. import blocks, uncertainty
-from ..estimate import inverse
+from ..posed_problem import inverse
 from ..triangles import Compressed
 
 _PASSES = 3  # of weights by what the fit leaves

@@ -6,9 +6,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..estimate import Fit, predict
+from ..estimate import Fit
 from ..log import Log
 from ..lowpass import again, angle_noise, band, widest
+from ..prediction import predict
 from ..preprocess import prepare
 
 

@@ -4,10 +4,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..estimate import Fit, predict
+from ..estimate import Fit
 from ..filters import settled
 from ..log import Log
 from ..model import Model
+from ..prediction import predict
 from ..preprocess import on_both_sides, prepare
 from ..specs import Experiment
 from .floor import NoiseFloor

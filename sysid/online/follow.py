@@ -14,8 +14,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..estimate import Problem, pose
 from ..model import Model
+from ..posed_problem import Problem, pose
 from ..reduction import triangle
 from ..specs import Experiment
 from ..triangles import Compressed, Factor

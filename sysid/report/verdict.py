@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from ..addition import apart, designs
-from ..estimate import Fit, given_shapes, said_of_shapes
+from ..estimate import Fit
+from ..given_shapes import given_shapes, said_of_shapes
 from ..statement.words import followed, percent
 from .section import Section
 from .words import (

@@ -9,7 +9,8 @@ from pathlib import Path
 
 from .. import bounded
 from ..errors import SysidError
-from ..estimate import Fit, Prediction
+from ..estimate import Fit
+from ..prediction import Prediction
 from ..run import read_run
 from .diagnosed import step_name
 from .rows import Columns, columns

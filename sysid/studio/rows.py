@@ -6,7 +6,7 @@ from typing import Protocol
 
 import numpy as np
 
-from ..estimate import Prediction
+from ..prediction import Prediction
 
 Columns = tuple[np.ndarray, np.ndarray, np.ndarray]  # measured, predicted, residual, (n,) each
 

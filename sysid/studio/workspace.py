@@ -14,7 +14,8 @@ import io
 import numpy as np
 
 from ..errors import SysidError
-from ..estimate import Fit, Prediction
+from ..estimate import Fit
+from ..prediction import Prediction
 from ..report import charts, solids
 from ..report.decimate import kept
 from ..report.fitted import log_names, placed

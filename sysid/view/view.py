@@ -12,10 +12,11 @@ import numpy as np
 from .. import blocks, flexible, pipeline
 from .. import rows as row
 from ..errors import LogError
-from ..estimate import Fit, inverse
+from ..estimate import Fit
 from ..lowpass import again, calm, lowpassed, narrowed, stride_of, widest
 from ..model import Model
 from ..motion import Motion
+from ..posed_problem import inverse
 from ..prior_weight import USUAL, with_weight
 from ..shape import Settled, settle
 from ..source import Source

@@ -1,0 +1,141 @@
+"""The optimisation problem that an experiment poses on compressed data: objective, coordinates, start, weights."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .certificate import Certificate, certify
+from .errors import ConfigError
+from .inertia import DIVERGENCES, PARAMETERIZATIONS
+from .model import Model
+from .nearby import from_nearby
+from .objective import Objective, posed
+from .prior_weight import number
+from .solve import Coordinates, Solution, solve
+from .specs import Experiment
+from .triangles import Compressed
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Everything a solve needs: objective, coordinates, the default start."""
+
+    objective: Objective
+    coordinates: Coordinates
+    start: np.ndarray
+    weights: np.ndarray | None
+
+    def solve(self, experiment: Experiment, start=None, callback=None) -> Solution:
+        """Solve from `start` (default: the prior) with the experiment's settings."""
+        settings = experiment.solver
+        return solve(
+            self.objective, self.coordinates, self.start if start is None else start,
+            tolerance=settings.tolerance, max_iterations=settings.max_iterations, handover=settings.handover,
+            callback=callback,
+        )  # fmt: skip
+
+    def from_nearby(self, x, tolerance: float) -> np.ndarray | None:
+        """The optimum (size,) from that of a problem that differs a little; None where it is not near, or the prior is no barrier."""
+        if not self.objective.barrier:
+            return None
+        begun, held = np.array(x), 10 * self.coordinates.bodies + np.flatnonzero(self.coordinates.held)
+        begun[held] = self.coordinates.physical(self.start)[held]
+        return from_nearby(self.objective, self.coordinates.positive, self.coordinates.held, begun, tolerance=tolerance)
+
+    def certify(self, x) -> Certificate:
+        """The certificate of x (size,)."""
+        coordinates = self.coordinates
+        return certify(self.objective, x, coordinates.positive, coordinates.held, constrained=coordinates.constrained(self.objective))
+
+
+def pose(experiment: Experiment, model: Model, compressed: Compressed, moving: np.ndarray, prior: np.ndarray, weights=None) -> Problem:
+    """The compressed optimisation problem of an experiment.
+
+    Args:
+        compressed: may hold slopes of shape values after the model's own parameters: free coefficients that begin at zero.
+        moving: (coefficients,) bool, False for coefficients to hold at their prior.
+        prior: (bodies, 10).
+        weights: (joints,) that multiply the rows of each joint, or None.
+    """
+    spec = experiment
+    objective = posed(compressed.total(weights), DIVERGENCES[spec.prior.divergence](prior), number(spec), known_bodies(spec, model))
+    size = 10 * model.bodies + len(model.coefficients)
+    slopes = objective.triangle.shape[1] - 1 - size
+    positive = np.array([c.positive for c in model.coefficients] + [False] * slopes, dtype=bool)
+    moving = np.append(moving, np.ones(slopes, dtype=bool))
+    held = ~moving | undetermined(objective, model, moving)
+    coordinates = Coordinates(PARAMETERIZATIONS[spec.model.inertia](), model.bodies, positive, held)
+    x = np.concatenate([prior.ravel(), _starting_coefficients(model, objective, prior, positive, held)])
+    x[size:] = 0.0
+    return Problem(objective, coordinates, coordinates.theta(x), weights)
+
+
+def known_bodies(experiment: Experiment, model: Model) -> list[int]:
+    """The numbers of the bodies that `prior.known` names. Raises ConfigError: there is none of that name."""
+    names = [body.name for body in model.robot.bodies]
+    for name in experiment.prior.known:
+        if name not in names:
+            raise ConfigError(f"prior.known names the body {name!r}", allowed=", ".join(names), do="correct the name")
+    return [names.index(name) for name in experiment.prior.known]
+
+
+# A coefficient's column that others match to this share of its size is told from them by rounding alone.
+_ALIKE = 1e-6
+
+
+# Nothing of a robot is larger in SI units: what would have to be, to make torque of the size that was measured, is no number here.
+_LARGEST = 1e12
+
+
+def undetermined(objective: Objective, model: Model, moving) -> np.ndarray:
+    """(coefficients,) bool: those that no data of this kind can tell from what stands before them in the model."""
+    count = 10 * model.bodies
+    out = np.zeros(len(moving), dtype=bool)
+    columns, measured = objective.triangle[:, :-1], np.linalg.norm(objective.triangle[:, -1])
+    # bodies have a prior; only coefficients can be left without any hold
+    basis = np.zeros((len(columns), 0))
+    for k in np.flatnonzero(moving):
+        column = columns[:, count + k]
+        size = np.linalg.norm(column)
+        rest = column - basis @ (basis.T @ column)
+        rest -= basis @ (basis.T @ rest)
+        left = np.linalg.norm(rest)
+        if left <= _ALIKE * size or size * _LARGEST <= measured:
+            out[k] = True
+        else:
+            basis = np.column_stack([basis, rest / left])
+    return out
+
+
+def _starting_coefficients(model: Model, objective: Objective, prior, positive, held) -> np.ndarray:
+    """Held: what is given, or what the URDF states (viscous, coulomb), else zero. The rest: the size that the data alone suggest."""
+    count = prior.size
+    robot = model.robot
+    stated = {"viscous": robot.damping, "coulomb": robot.friction}
+    urdf = np.array([stated[c.effect][c.joint] if c.effect in stated else 0.0 for c in model.coefficients])
+    urdf = np.array([own if c.given is None else c.given for own, c in zip(urdf, model.coefficients)])
+    urdf = np.append(urdf, np.zeros(len(held) - len(urdf)))
+    columns = objective.triangle[:, count:-1]
+    rest = objective.triangle[:, -1] - objective.triangle[:, :count] @ prior.ravel()
+    squares = np.sum(columns**2, axis=0)
+    alone = columns.T @ rest / np.where(squares > 0, squares, 1.0)
+    size = np.linalg.norm(objective.triangle[:, -1]) / np.sqrt(np.where(squares > 0, squares, np.inf))
+    guess = np.where(positive, np.maximum(alone, 1e-3 * size), 0.0)
+    return np.where(held, urdf, guess)
+
+
+def noise_weights(compressed: Compressed, x) -> np.ndarray:
+    """(joints,) inverse residual RMS, scaled so that their geometric mean is one.
+
+    The objective is then the weighted sum; no single joint, however quiet, sets its size against the prior.
+    """
+    return inverse(np.sqrt(compressed.squares(x) / np.maximum(compressed.rows, 1)))
+
+
+def inverse(rms: np.ndarray) -> np.ndarray:
+    """(joints,) weights: the inverse of residual RMS, with a geometric mean of one; one for a joint that has no residual."""
+    there = rms > 0.0
+    weights = 1.0 / np.maximum(np.where(there, rms, 1.0), 1e-9 * rms.max())
+    return np.where(there, weights / np.exp(np.mean(np.log(weights[there]))), 1.0) if there.any() else np.ones(len(rms))
