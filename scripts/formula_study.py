@@ -22,7 +22,7 @@ import numpy as np
 from ruamel.yaml import YAML
 from scipy.optimize import least_squares
 
-from sysid import pipeline, regressor, robot, rows, specs
+from sysid import experiment_logs, pipeline, regressor, robot, rows, specs
 from sysid.compress import compress
 from sysid.effect import NotFinite
 from sysid.model import moving_coefficients
@@ -279,7 +279,7 @@ def found_motion(found):
     """The training motion of a fit, read again."""
     machine = found.model.robot
     return pipeline.prepare(
-        pipeline.read(found.experiment, machine, found.experiment.data.train),
+        experiment_logs.read(found.experiment, machine, found.experiment.data.train),
         found.experiment.preprocess,
         machine.joints,
     )

@@ -5,13 +5,14 @@ The rows of one joint over one stretch of time, [A | tau], are reduced by QR to 
 """
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from .blocks import FEWEST, divided
 from .linearised import Linearised
 from .model import Model
-from .motion import Motion
+from .motion import Motion, Piece
 from .reduction import Reduction
 from .triangles import Compressed, Factor
 

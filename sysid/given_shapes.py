@@ -1,5 +1,6 @@
 """Shape values in words: a certificate takes them as given, so what was done to find them is said."""
 
+
 def given_shapes(fit) -> str:
     """What a certificate takes as given, in words: it proves the rest of the model at the shape values that stand there, of which
     the objective is no convex function. Empty where the model has none."""

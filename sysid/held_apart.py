@@ -19,7 +19,8 @@ import numpy as np
 
 from .blocks import standard_error, within_one_error
 from .interior import minimise
-from .model import Model
+from .model import Model, moving_coefficients
+from .motion import Motion
 from .posed_problem import Problem, known_bodies, noise_weights, pose
 from .prior_weight import USUAL, PriorWeight, is_auto, weakest, with_weight
 from .specs import Experiment
@@ -225,3 +226,20 @@ def _greatest(problem: Problem) -> float:
         scaled = scaled[:, ~objective.known.any(axis=(1, 2))]
     size = np.linalg.norm(scaled.reshape(len(scaled), -1), ord=2) if scaled.size else 0.0
     return max(2.0 * float(size) ** 2, np.finfo(float).tiny)
+
+
+def prior_strength(experiment: Experiment, structure: Model, motion: Motion, data: Compressed, prior, before: PriorWeight | None = None) -> PriorWeight:
+    """The weight of the prior on training data, which may hold slopes of shape values after the model's own parameters.
+
+    Gains are found anew on what is held apart, to first order: what a gain is and what the bodies weigh is one product, and
+    gains that a strong prior chose would let no other weight be better.
+
+    Args:
+        before: what was chosen for the model before its shape values were found.
+    """
+    if not is_auto(experiment):
+        return PriorWeight(experiment.prior.weight)
+    if data.size > structure.size:
+        free = [k for k, value in enumerate(structure.shape_values) if not value.held]
+        data = data.only([*range(structure.size), *(structure.size + at for at, k in enumerate(free) if k in structure.gains)])
+    return chosen(experiment, structure, data, moving_coefficients(structure, motion), prior, before)

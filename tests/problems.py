@@ -5,11 +5,12 @@ from pathlib import Path
 
 import numpy as np
 
-from sysid import config, pipeline, posed_problem, regressor, robot, specs
+from sysid import config, posed_problem, regressor, robot, specs
 from sysid.compress import compress
 from sysid.log import Log, Segment
 from sysid.model import build, moving_coefficients
 from sysid.preprocess import prepare
+from sysid.studies import prepared
 
 ROOT = Path(__file__).resolve().parent.parent
 UR5 = "example-robot-data://ur_description/urdf/ur5_robot.urdf"
@@ -19,7 +20,7 @@ UR5 = "example-robot-data://ur_description/urdf/ur5_robot.urdf"
 def leg() -> tuple:
     """Experiment, model, motion, compressed data and prior of configs/cheetah3.yaml."""
     experiment = config.load(ROOT / "configs" / "cheetah3.yaml")
-    found = pipeline.prepared(experiment)
+    found = prepared.prepared(experiment)
     return experiment, found.model, found.motion, found.train, found.prior
 
 

@@ -6,9 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sysid import pipeline
+from sysid import experiment_logs, pipeline
 from sysid.bumps import bumps
 from sysid.events import Event
+from sysid.notices import noticed
 from sysid.simulate import hidden, load, simulate, write
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -31,8 +32,8 @@ def pushed(leg, tmp_path_factory):
 
 def read(experiment):
     machine, *_ = pipeline.build(experiment)
-    with pipeline.noticed():
-        return machine, pipeline.read(experiment, machine, [*experiment.data.train, *experiment.data.test])
+    with noticed():
+        return machine, experiment_logs.read(experiment, machine, [*experiment.data.train, *experiment.data.test])
 
 
 def test_pushes_that_no_signal_shows_are_found_and_left_out(pushed):

@@ -4,7 +4,7 @@ import dataclasses
 
 import pytest
 
-from sysid import config, pipeline, specs
+from sysid import config, experiment_logs, pipeline, specs
 from sysid.errors import ConfigError
 
 CONTRACT = """
@@ -64,7 +64,7 @@ def test_folder_with_an_empty_config(experiment):
     assert found.name == "experiment" and found.path == folder / "config.yaml"
     machine, model, prior = pipeline.build(found)
     assert machine.joints == ("shoulder", "elbow") and model.bodies == len(prior) == 2
-    assert [log.samples for log in pipeline.read(found, machine, found.data.test)] == [600]
+    assert [log.samples for log in experiment_logs.read(found, machine, found.data.test)] == [600]
     assert dataclasses.is_dataclass(pipeline.fit(found))
 
 

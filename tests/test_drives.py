@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from sysid import config, drives, pipeline, results, robot, rollout
+from sysid import config, drives, experiment_logs, pipeline, results, robot, rollout
 from sysid.diagnose.diagnosis import diagnose
 from sysid.errors import ConfigError, LogError
 from sysid.filters import settled
@@ -167,7 +167,7 @@ def test_the_closed_loop_let_go_follows_the_log(servo_fit):
     """Against angles of which it was told only where they begin; a wrong gain misses them by far."""
     assert all(value < 5e-4 for value in servo_fit.rollout.values())  # rad, of motions of a third of a radian
     machine, model = servo_fit.model.robot, servo_fit.model
-    read = pipeline.read(servo_fit.experiment, machine, servo_fit.experiment.data.test)
+    read = experiment_logs.read(servo_fit.experiment, machine, servo_fit.experiment.data.test)
     held_out = prepare(read, settled(servo_fit.experiment.preprocess, servo_fit.filters), machine.joints)
     weak = np.array(servo_fit.x)
     weak[model.names.index("viscous.joint_1.Fv")] *= 3.0

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from sysid import config, pipeline
+from sysid import config, experiment_logs, pipeline
 from sysid.events import Event, find, mended, told, usable
 from sysid.log import Log, Segment
 from sysid.lowpass import lowpassed
@@ -391,7 +391,7 @@ def real(name: str) -> dict[str, tuple[tuple[Event, ...], Log]]:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         machine = pipeline.build(experiment)[0]
-        logs = pipeline.read(experiment, machine, [*experiment.data.train, *experiment.data.test])
+        logs = experiment_logs.read(experiment, machine, [*experiment.data.train, *experiment.data.test])
     return {one.name: one for one in logs}
 
 

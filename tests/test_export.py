@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import sysid
-from sysid import effect, inverse_dynamics, pipeline, regressor
+from sysid import effect, experiment_logs, inverse_dynamics, regressor
 from sysid.errors import SysidError
 from sysid.export import FORMATS, Check, document, isaaclab, mjcf
 from sysid.export.cost import costs
@@ -19,6 +19,7 @@ from sysid.export.stated import stated
 from sysid.inertia import pseudo
 from sysid.inertia.consistency import is_consistent
 from sysid.model import ROBOT, Model
+from sysid.notices import noticed
 from sysid.run import Run
 from sysid.specs import Experiment, RobotSpec
 from tests import robots, servos
@@ -264,7 +265,7 @@ def test_costs_are_the_torque_of_each_effect(leg_run):
     said = stated(model, x, frozenset({"damping", "friction", "armature", "inertia"}))
     assert said.unsaid == (("stribeck", 1), ("delay", 2))
     spec = run.experiment
-    motion = prepare(pipeline.read(spec, model.robot, spec.data.test), spec.preprocess, run.joints)
+    motion = prepare(experiment_logs.read(spec, model.robot, spec.data.test), spec.preprocess, run.joints)
     found, together = costs(model, x, said, motion)
     own = {cost.what: cost.torque for cost in found}
     qd = np.concatenate([piece.qd[piece.core] for piece in motion.pieces])[:, 1]
@@ -423,7 +424,7 @@ def test_every_example_robot_comes_back(tmp_path):
     root, count = urdf._example_root(), 0
     for path in sorted(root.rglob("*.urdf")):
         try:
-            with pipeline.noticed():
+            with noticed():
                 machine = robot.load(
                     RobotSpec(urdf=f"example-robot-data://{path.relative_to(root)}")
                 )

@@ -129,11 +129,11 @@ def test_identified_urdf_says_what_it_cannot_say_and_keeps_mesh_names(leg, tmp_p
 
 
 def _test_motion(fit):
-    from sysid import filters, pipeline
+    from sysid import experiment_logs, filters
     from sysid.preprocess import prepare
 
     experiment, machine = fit.experiment, fit.model.robot
-    logs = pipeline.read(experiment, machine, experiment.data.test)
+    logs = experiment_logs.read(experiment, machine, experiment.data.test)
     (piece,) = prepare(logs, filters.settled(experiment.preprocess, fit.filters), machine.joints).pieces
     return piece
 

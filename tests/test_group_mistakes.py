@@ -13,6 +13,7 @@ from sysid.effect import find, vocabulary
 from sysid.errors import ConfigError, SysidError
 from sysid.groups import names
 from sysid.model import build
+from sysid.notices import noticed
 from sysid.per_level import at_level
 from sysid.specs import LogSpec
 from tests.conftest import dump, put
@@ -76,7 +77,7 @@ def test_what_only_the_model_knows_is_one_line_too(folder):
     with pytest.raises(ConfigError, match="both logs and per"):
         pipeline.build(config.experiment(given, folder / "config.yaml"))
     given = tree([{"payload": {"per": "payload"}}])
-    with pipeline.noticed() as notices:
+    with noticed() as notices:
         pipeline.build(config.experiment(given, folder / "config.yaml"))
     assert any("except: [LEVEL]" in notice for notice in notices)
     given = tree([{"viscous": {"per": "robot"}}, "viscous"])

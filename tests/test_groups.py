@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import sysid
-from sysid import config, pipeline, regressor
+from sysid import config, experiment_logs, pipeline, regressor
 from sysid.effect import find
 from sysid.errors import SysidError
 from sysid.inertia import DIVERGENCES
@@ -64,7 +64,7 @@ def dense(fitted):
         for name in ("viscous", "coulomb", "payload")
     }
     motion = pipeline.prepare(
-        pipeline.read(fitted.experiment, machine, fitted.experiment.data.train),
+        experiment_logs.read(fitted.experiment, machine, fitted.experiment.data.train),
         fitted.experiment.preprocess,
         machine.joints,
     )

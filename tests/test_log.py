@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sysid import log, pipeline, regressor, specs
+from sysid import experiment_logs, log, pipeline, regressor, specs
 from sysid.errors import LogError, SysidWarning
 from sysid.readers import open_table
 from tests.conftest import JOINTS, csv, matrices, motion, write_mat5, write_mat73, write_table
@@ -317,7 +317,7 @@ def test_public_log(tmp_path, cli, write):
     write(tmp_path / "data/cheetah3/CheetahSysID.mat", variables | {"Y": [np.zeros((3, 60))] * 3})
     experiment = pipeline.load(tmp_path / "configs/cheetah3_mit.yaml")
     machine = pipeline.build(experiment)[0]
-    found = [pipeline.read(experiment, machine, logs)[0].segments[0] for logs in (experiment.data.train, experiment.data.test)]
+    found = [experiment_logs.read(experiment, machine, logs)[0].segments[0] for logs in (experiment.data.train, experiment.data.test)]
     for name, values in variables.items():
         np.testing.assert_allclose(np.concatenate([getattr(segment, name) for segment in found]), values, **EXACT)
     said = cli("fit", experiment.path, "--json")

@@ -10,6 +10,7 @@ import sysid
 from sysid import (
     config,
     events,
+    experiment_logs,
     long_log,
     long_motion,
     outliers,
@@ -187,7 +188,7 @@ def test_models_that_look_back_have_the_log_whole(short_spans):
         spec.model_copy(update={"model": spec.model.model_copy(update={"effects": effects})})
     )
     assert local.local and not structure.local
-    (read,) = pipeline.read(spec, machine, spec.data.train, structure=structure)
+    (read,) = experiment_logs.read(spec, machine, spec.data.train, structure=structure)
     assert len(read.segments) == 1 and isinstance(read.segments, tuple)
 
 

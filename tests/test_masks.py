@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import yaml
 
-from sysid import config, pipeline, results
+from sysid import config, experiment_logs, pipeline, results
 from sysid.errors import ConfigError, SysidWarning
 from tests.test_report import EVIL, LOG, written
 
@@ -47,7 +47,7 @@ def test_rows_of_a_mask_count_nowhere(arm):
 def test_what_is_masked_does_not_move_the_parameters(arm):
     """Wrong torque in a masked stretch: the fit is the one without it."""
     experiment = with_mask(arm, {"log": LOG, "start": 2.0, "stop": 3.0})
-    read = pipeline.read_all(experiment)
+    read = experiment_logs.read_all(experiment)
     clean = pipeline.fit(experiment, measured=read)
     (segment,) = read.train[0].segments
     segment.tau[(segment.t >= 2.0) & (segment.t <= 3.0)] += 5.0

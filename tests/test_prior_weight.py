@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sysid import blocks, config, held_apart, pipeline, prior_weight, regressor, shape
+from sysid import blocks, config, held_apart, pipeline, prior_weight, regressor, shape, shape_refinement
 from sysid.compress import compress
 from sysid.estimate import identify
 from sysid.inertia import LogCholesky
@@ -246,15 +246,15 @@ def test_a_wrong_gain_does_not_speak_for_a_strong_prior(planar):
     structure = build(planar, experiment.model.effects)
     (_, _, motion, *_), _ = made(planar, 0, noise=0.3)
     prior = np.array(structure.robot.prior)
-    right = pipeline._strength(experiment, structure, motion, compress(structure, motion), prior)
+    right = held_apart.prior_strength(experiment, structure, motion, compress(structure, motion), prior)
     stuck = shape.settle(
         prior_weight.with_weight(experiment, 100.0 * right.value), structure, motion, prior
     )
     assert abs(stuck.model.shapes[0]) > 0.05  # the truth is 0
-    weight = lambda source: pipeline._strength(  # noqa: E731
+    weight = lambda source: held_apart.prior_strength(  # noqa: E731
         experiment, stuck.model, motion, compress(source, motion), prior
     ).value
     assert weight(stuck.model) > weight(Linearised(stuck.model, stuck.x)) == right.value
     # and the whole search ends there
-    settled, _, _, found = pipeline._settled(experiment, structure, motion, prior)
+    settled, _, _, found = shape_refinement.refined(experiment, structure, motion, prior)
     assert found.value == right.value and settled.shapes == pytest.approx([0.0], abs=0.01)

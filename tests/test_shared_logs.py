@@ -7,7 +7,7 @@ import polars as pl
 import pytest
 
 import sysid
-from sysid import long_prediction, pipeline, spans
+from sysid import experiment_logs, long_prediction, pipeline, spans
 from sysid.workers import crew
 from tests.test_long_logs import LEG, experiment, leg_table
 
@@ -90,7 +90,7 @@ def test_another_machine_sends_what_it_predicts(monkeypatch, tmp_path):
     monkeypatch.setattr(spans, "SPAN", SHORT)
     spec = experiment()
     machine, structure, prior = pipeline.build(spec)
-    (log,) = pipeline.read(spec, machine, spec.data.test, structure=structure)
+    (log,) = experiment_logs.read(spec, machine, spec.data.test, structure=structure)
     motion = pipeline.prepare([log], spec.preprocess, machine.joints)
     x = np.append(prior.ravel(), np.zeros(len(structure.coefficients)))
     here = long_prediction.predicted(structure, x, motion)

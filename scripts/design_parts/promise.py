@@ -30,7 +30,7 @@ def case(seed: int, number: int, robots=ROBOTS) -> dict:
 def trial(case: dict) -> dict:
     """Of each parameter that both logs determine, the promised deviation, the scatter, and what fits
     state."""
-    from sysid import design, pipeline
+    from sysid import design, experiment_logs, pipeline
     from sysid.prior_weight import with_weight
     from sysid.simulate import Played, simulate
 
@@ -49,7 +49,7 @@ def trial(case: dict) -> dict:
         _, machine = experiment_of(robot, folder)
         plain = simulate(machine, **how)
         played = simulate(machine, trajectory=Played(found.t, found.q), **how)
-        read = pipeline.read_all(both)
+        read = experiment_logs.read_all(both)
         fit = pipeline.fit(both, measured=read)
         # the prior's weight as it was chosen: another one would be another estimator
         held = with_weight(both, fit.strength.value)

@@ -8,12 +8,13 @@ from pathlib import Path
 
 import numpy as np
 
-from .. import datasets, pipeline, rows
+from .. import datasets, experiment_logs, rows
 from ..blocks import numbered
 from ..errors import LogError
 from ..lowpass import LEAST, lowpassed, stride_of
 from ..model import Model
 from ..noise import floors_of
+from ..notices import noticed
 from ..specs import Experiment, LogSpec
 from .fitted import Change, together
 from .halves import BLOCKS, support
@@ -67,8 +68,8 @@ def asked(
     """
     experiment, x, robot = model.experiment, model.x, model.model.robot
     specs = [LogSpec(file=_located(log)) for log in logs]
-    with pipeline.noticed():
-        motion = lowpassed(pipeline.read(experiment, robot, specs), robot.joints, LEAST)
+    with noticed():
+        motion = lowpassed(experiment_logs.read(experiment, robot, specs), robot.joints, LEAST)
     if motion is None or motion.duration < 4.0:
         raise LogError(
             "the log is too short to say what changed", where=", ".join(logs),

@@ -14,7 +14,7 @@ from importlib import import_module
 from pkgutil import iter_modules
 
 from ..callable_module import callable_module
-from ..pipeline import noticed
+from ..notices import noticed
 from ..specs import Experiment
 from .fault import ERROR, WARNING, Fault
 from .look import Look, looked

@@ -8,13 +8,14 @@ from pathlib import Path
 
 import numpy as np
 
+from .. import experiment_logs, pipeline, robot
 from .. import log as logs
-from .. import pipeline, robot
 from ..errors import SysidError
 from ..estimate import Fit
 from ..lowpass import lowpassed, stride_of, widest
 from ..model import Model, build, found
 from ..motion import Motion
+from ..notices import noticed
 from ..recording import Recording
 from ..robot import Robot
 from ..rows import Rows, stack
@@ -101,7 +102,7 @@ class Look:
             own = [one.joints or joints for one in differ if one.name == name]
             if left := [joint for joint in joints if not any(joint in them for them in own)]:
                 differ.append(EffectSpec(name=name, joints=left))
-        with pipeline.noticed():
+        with noticed():
             return build(self.robot, differ, *args, spec.data.groups)
 
     @cached_property
@@ -111,7 +112,7 @@ class Look:
         if self.experiment.preprocess.events == "keep":
             parts = ([replace(log, events=()) for log in part] for part in parts)
         try:
-            return pipeline.fit(self.experiment, measured=pipeline.Read(*parts, ()))
+            return pipeline.fit(self.experiment, measured=experiment_logs.Read(*parts, ()))
         except Untrusted:
             raise
         except SysidError:
@@ -137,7 +138,7 @@ def looked(experiment: Experiment) -> Look:
         specs = getattr(experiment.data, part)
         told = [logs.measured(spec, *args) for spec in specs]
         whole = [logs.assembled(one, spec, data) for one, spec in zip(told, specs)]
-        whole = pipeline.with_events(machine, whole)
+        whole = experiment_logs.with_events(machine, whole)
         for spec, one, log in zip(specs, told, whole):
             out += [_logged(part, spec, one.rows(*rows), log) for rows in one.parts]
     return Look(experiment, machine, tuple(out))

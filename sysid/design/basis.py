@@ -9,7 +9,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from .. import pipeline
+from .. import experiment_logs, pipeline
 from ..candidates import Candidate, candidates, own_effects
 from ..errors import ConfigError, LogError, SysidWarning
 from ..estimate import Fit
@@ -64,7 +64,7 @@ def basis(
     levels = _levels(structure, levels)
     fit, motion, logs = None, None, ()
     if _has_logs(experiment):
-        read = pipeline.read_all(experiment)
+        read = experiment_logs.read_all(experiment)
         fit = pipeline.fit(experiment, progress=tell, measured=read)
         spec = settled(fit.experiment.preprocess, fit.filters)
         motion = prepare(read.train, spec, machine.joints)

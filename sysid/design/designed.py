@@ -16,7 +16,6 @@ from pathlib import Path
 
 import numpy as np
 
-from .. import pipeline
 from ..candidates import candidates
 from ..errors import ConfigError, SysidWarning
 from ..estimate import Fit
@@ -25,6 +24,7 @@ from ..log import Log
 from ..lowpass import lowpassed, widest
 from ..motion import Motion
 from ..noise import of_angles
+from ..notices import noticed
 from ..preprocess import prepare
 from ..segment import Segment
 from ..specs import Experiment
@@ -63,7 +63,7 @@ def design(
     tell = progress or (lambda stage, share: None)
     if not 2.0 <= duration <= 600.0:
         raise ConfigError(f"--duration {duration:g}", allowed="2 to 600 s")
-    with pipeline.noticed() as notices:
+    with noticed() as notices:
         base = basis(experiment, separate, tell, levels or {})
         problem, bounds = posed(base, duration, limits_spec)
         found, random_best = searched(

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .. import comparison, pipeline
+from .. import comparison, experiment_logs, pipeline
 from ..addition import grown, spelled
 from ..estimate import Fit
 from .findings import Finding, finding, judged_by, nought, parameters, where
@@ -59,7 +59,7 @@ class Refused:
 
 
 def claimed(
-    steps: list[Step], fit: Fit, measured: pipeline.Read, tell: Callable[[str, float], None]
+    steps: list[Step], fit: Fit, measured: experiment_logs.Read, tell: Callable[[str, float], None]
 ) -> tuple[list[Claim], list[Refused]]:
     """Fit each step's head, and the best of what is tied with it, on top of what stands before it.
 

@@ -18,12 +18,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .. import pipeline
+from .. import experiment_logs, pipeline
 from ..candidates import candidates, own_effects
 from ..estimate import Fit
 from ..failures import Failure, HeldOut, failures
 from ..lowpass import lowpassed
 from ..noise import NoiseFloor, floors_of_fit
+from ..notices import noticed
 from ..shown import ShownDiagnosis
 from ..specs import Experiment
 from ..transfer import transfers
@@ -76,9 +77,9 @@ def diagnose(
     """
     tell = progress or (lambda stage, share: None)
     experiment = fit.experiment if fit else pipeline.started(experiment)
-    measured, extra = pipeline.read_all(experiment), own_effects(experiment)
+    measured, extra = experiment_logs.read_all(experiment), own_effects(experiment)
     fit = fit or pipeline.fit(experiment, progress=progress, measured=measured)
-    with pipeline.noticed():
+    with noticed():
         view = first_view(fit.experiment, fit, measured.train)
         steps, asked, then_asked, undecided = select.search(view, extra, level=level, tell=tell)
         claims, refused = claiming.claimed(steps, fit, measured, tell)

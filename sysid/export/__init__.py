@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from .. import pipeline
+from .. import experiment_logs
 from ..callable_module import callable_module
 from ..errors import SysidError, SysidWarning
 from ..estimate import Fit
@@ -23,6 +23,7 @@ from ..filters import settled
 from ..groups import levels_of
 from ..inertia.consistency import is_consistent
 from ..motion import Motion
+from ..notices import noticed
 from ..preprocess import prepare
 from ..results import folder, number, write_atomically
 from ..run import Run, read_run
@@ -139,7 +140,7 @@ def _test_motion(run: Run | Fit, levels: Mapping) -> tuple[Motion | None, str | 
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", SysidWarning)
-            logs = pipeline.read(spec, robot, tests)
+            logs = experiment_logs.read(spec, robot, tests)
             return prepare(logs, filters, robot.joints), None
     except SysidError as error:
         return None, str(error)
@@ -156,7 +157,7 @@ def _samples(run: Run | Fit, motion: Motion | None) -> list[np.ndarray]:
 
 def _asked(form, written: dict[str, Path], said, samples) -> Check:
     try:
-        with pipeline.noticed():
+        with noticed():
             torque, by = form.loaded(written, said)
     except ImportError:
         return Check(

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .. import pipeline
+from .. import experiment_logs, pipeline
 from ..compress import compress
 from ..errors import SysidError
 from ..estimate import Fit
@@ -88,7 +88,7 @@ def member(experiment: Experiment, name: str, kind: Kind) -> Member:
 
 def _fitted(experiment: Experiment, filters: dict | None) -> tuple[Fit, Motion, Motion]:
     """An experiment's fit, and its training and its test motion."""
-    read = pipeline.read_all(experiment)
+    read = experiment_logs.read_all(experiment)
     fit = pipeline.fit(experiment, filters=filters, measured=read)
     preprocess = settled(fit.experiment.preprocess, fit.filters)
     return fit, *(prepare(logs, preprocess, fit.joints) for logs in (read.train, read.test))

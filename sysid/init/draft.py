@@ -10,7 +10,7 @@ import numpy as np
 
 from .. import datasets
 from .. import robot as machines
-from ..pipeline import noticed
+from ..notices import noticed
 from ..specs import RobotSpec
 from . import joints, physics, robots, units
 from .guess import Draft, Guess

@@ -16,7 +16,7 @@ from .. import check, config
 from ..check.equations import Equations, Reading
 from ..check.look import Look, looked
 from ..errors import LogError
-from ..pipeline import noticed
+from ..notices import noticed
 from .guess import Draft, Guess
 from .logged import Signals
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from .. import pipeline
+from .. import experiment_logs, pipeline
 from ..errors import SysidError, SysidWarning
 from ..estimate import Fit
 from ..prior_weight import number
@@ -159,7 +159,7 @@ class Online:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", SysidWarning)
             specs = logs or [*self.experiment.data.test, *self.experiment.data.train]
-            read = pipeline.read(self.experiment, self.model.robot, specs)
+            read = experiment_logs.read(self.experiment, self.model.robot, specs)
         least, out = 2.0 * (min(WINDOWS) + self.late) + self.tick, []
         for segment in (s for log in read for s in log.segments):
             n = min(len(segment.t), round(left / step))

@@ -6,11 +6,11 @@ from pathlib import Path
 
 from .. import results
 from ..inertia import PARAMETERS as _NAMES
-from ..pipeline import prepared
 from ..report import figures
 from ..specs import Experiment
 from . import bodies, prior, restarts
 from .journal import Journal, run
+from .prepared import prepared
 
 Tell = Callable[[str, float], None]
 _BATCH = 10  # bodies a task: long against the cost of handing it to a process

@@ -10,11 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..pipeline import prepared
 from ..posed_problem import Problem, noise_weights, pose
 from ..results import number
 from ..specs import Experiment
 from ..triangles import Compressed
+from .prepared import prepared
 
 
 @dataclass(frozen=True)

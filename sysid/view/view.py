@@ -9,7 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
-from .. import blocks, flexible, pipeline
+from .. import blocks, experiment_logs, flexible
 from .. import rows as row
 from ..errors import LogError
 from ..estimate import Fit
@@ -209,7 +209,7 @@ def first_view(experiment: Experiment, fit: Fit, logs=None) -> View:
     """
     experiment = with_weight(experiment, USUAL) if fit.strength.auto else experiment
     if logs is None:
-        logs = pipeline.read(experiment, fit.model.robot, experiment.data.train)
+        logs = experiment_logs.read(experiment, fit.model.robot, experiment.data.train)
     cutoff = widest(logs)
     view = _under(experiment, fit, logs, cutoff)
     if view is None:

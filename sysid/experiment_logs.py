@@ -1,0 +1,94 @@
+"""An experiment's logs as they were measured: read, with their events, and without what it masks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from . import events, long_log, masks, robot
+from . import log as logs
+from .bumps import bumps
+from .model import Model
+from .notices import noticed
+from .robot import Robot
+from .spans import Spans, released
+from .specs import Experiment, LogSpec
+from .workers import Mapped
+
+
+def read(experiment: Experiment, machine: Robot, specs: list[LogSpec], *, structure: Model | None = None, mapped: Mapped | None = None) -> list[logs.Log]:
+    """The logs of an experiment's `data.train` or `data.test`, with their events where these are left out, and what the experiment
+    masks.
+
+    Args:
+        structure: the model that they are read for: where nothing of it looks at a log as a whole, long logs are spans, which are read
+            when they are asked for. None: they are read whole.
+        mapped: what shares long logs among processes, as of `workers.crew`; None: there is this one.
+
+    Raises:
+        LogError: as `log.read`. ConfigError: a mask that cannot be.
+    """
+    reader = long_log if structure is not None and structure.local else logs
+    how = (experiment.data, machine.joints, machine.prismatic, experiment.folder, experiment.actuator)
+    if mapped and reader is long_log and any(long_log.in_parts(spec, *how) for spec in specs):
+        # where one log is long, each is looked at by itself
+        found = list(mapped(_read_one, ((machine, experiment.preprocess.events, spec, how) for spec in specs)))
+    else:
+        read = [reader.read(spec, *how) for spec in specs]
+        found = read if experiment.preprocess.events == "keep" else with_events(machine, read)
+    return masks.masked(found, experiment.preprocess.mask, machine.joints)
+
+
+def _read_one(machine: Robot, kept: str, spec: LogSpec, how: tuple) -> logs.Log:
+    log = long_log.read(spec, *how)
+    return log if kept == "keep" else with_events(machine, [log])[0]
+
+
+_BESIDE = 1024  # rows of a span's neighbours that are looked at with it: more than an event's surroundings
+
+
+def with_events(machine: Robot, read: list[logs.Log], *, among: int = 1) -> list[logs.Log]:
+    """Logs with their events: first those that the signals show, then those that only the robot's equations do. Each span of a long
+    log is looked at by itself.
+
+    Args:
+        among: how many parts their log has, where these are the spans of one.
+    """
+    if any(isinstance(log.segments, Spans) for log in read):
+        return [with_events(machine, [log])[0] if not isinstance(log.segments, Spans) else _with_events_of_spans(machine, log) for log in read]
+    told = lambda log, e: not (e.signal == "torque" and set(e.joints) <= set(log.unused))  # noqa: E731
+    found = [
+        replace(log, events=tuple(e for s in log.segments for e in events.find(s, machine.joints, log=log.name, among=among) if told(log, e))) for log in read
+    ]  # fmt: skip
+    felt = bumps(machine, found, among=among)
+    more = [[e for e in felt if e.log == log.name] for log in found]
+    return [replace(log, events=events.ordered([*log.events, *own])) if own else log for log, own in zip(found, more)]
+
+
+def _with_events_of_spans(machine: Robot, log: logs.Log) -> logs.Log:
+    found, step = [], 0.0
+    for number in range(len(log.segments)):
+        released()
+        span = log.segments.around(number, _BESIDE)
+        (own,) = with_events(machine, [replace(log, segments=(replace(span, core=None),))], among=len(log.segments))
+        found += events.clipped(own.events, *span.t[[span.core.start, span.core.stop - 1]])
+        step = span.step
+    return replace(log, events=events.joined(found, step))
+
+
+@dataclass(frozen=True)
+class Read:
+    """An experiment's logs, read once for all who look at them, and what there was to say of them."""
+
+    train: list[logs.Log]
+    test: list[logs.Log]
+    notices: tuple[str, ...]
+
+
+def read_all(experiment: Experiment) -> Read:
+    """The training and the test logs of an experiment. Raises SysidError."""
+    machine = robot.load(experiment.robot, experiment.folder)
+    with noticed() as notices:
+        parts = [read(experiment, machine, part) for part in (experiment.data.train, experiment.data.test)]
+    return Read(*parts, tuple(notices))
+
+

@@ -1,0 +1,89 @@
+"""What was decided for the user on the way of a fit, in sentences, and how these are collected."""
+
+from __future__ import annotations
+
+import warnings
+from contextlib import contextmanager
+
+import numpy as np
+
+from . import events
+from . import log as logs
+from .errors import LogError, SysidWarning
+from .estimate import Fit
+from .model import moving_coefficients
+from .motion import Motion
+from .specs import Experiment
+
+
+def tell_undetermined(found: Fit, motion: Motion) -> None:
+    """What these logs cannot tell from the rest of the model."""
+    structure = found.model
+    moving = moving_coefficients(structure, motion)
+    of_level = [c.at is not None and structure.robot.joints[c.joint] not in motion.still for c in structure.coefficients]
+    names = [c.name for c, held, moves, own in zip(structure.coefficients, found.held, moving, of_level) if held and (moves or own)]
+    names += [v.name for v, std in zip(structure.shape_values, found.shape_std) if not (v.held or np.isfinite(std))]
+    if names:
+        warnings.warn(SysidWarning(f"this log cannot tell {', '.join(names)} from the rest of the model: held at the prior"), stacklevel=2)
+
+
+# Of a joint that moves through its reversals, a few per cent of the rows are slow; more means that it was held.
+_MUCH_STANDING = 0.1
+_NO_TORQUE = 1e-12  # N m: no robot is moved by less
+
+
+def refuse_no_torque(train: list[logs.Log]) -> None:
+    """Raises LogError: the torque of every joint is nought in every row."""
+    if not any(np.abs(segment.tau).max(initial=0.0) >= _NO_TORQUE for log in train for segment in log.segments):
+        raise LogError("the torque of every joint is 0 in every row: none was logged", where=str(train[0].path), do="name the columns of torque in data.columns.torque, or what drives the joints in actuator")
+
+
+def tell_still(motion: Motion) -> None:
+    """Joints that stand still in much of what they are logged in, or in all of it."""
+    for joint, share in zip(motion.joints, motion.standing):
+        if share > _MUCH_STANDING and joint not in motion.still:
+            warnings.warn(SysidWarning(f"joint {joint!r} stands still in {100 * share:.0f} % of its rows, where its friction may have any value up to its greatest; preprocess.standstill: auto leaves them out"), stacklevel=2)
+    for joint in motion.still:
+        warnings.warn(SysidWarning(f"joint {joint!r} never moves in the training logs, or never clear of a standstill; its friction is held at its prior, and its bodies are where the other joints' torque leaves them"), stacklevel=2)
+
+
+def tell_left_out(motion: Motion, spec) -> None:
+    """How many rows of each joint's reversals are left out."""
+    shares = [f"{joint} {100 * count / motion.samples:.0f} %" for joint, count in zip(motion.joints, motion.left_out) if count and joint not in motion.unused]
+    if spec.standstill == "auto" and shares:
+        warnings.warn(SysidWarning(f"rows around each joint's reversals and standstill, where the filter smears friction's jump, are left out of its fit and its error: {', '.join(shares)}; preprocess.standstill: keep uses every row"), stacklevel=2)
+
+
+def tell_events(part: str, motion: Motion) -> list[dict]:
+    """The events of a part as documents have them; the user is told."""
+    for notice in events.told(motion.events, motion.disturbed, {"train": "training"}.get(part, part)):
+        warnings.warn(SysidWarning(notice), stacklevel=2)
+    return [{"part": part, "kind": e.kind, "log": e.log, "start": e.start, "stop": e.stop, "joints": list(e.joints), "signal": e.signal} for e in motion.events]
+
+
+def tell_overlap(experiment: Experiment, found: list[dict]) -> None:
+    """Test logs that training has seen."""
+    hashes = [set(log.get("files", {}).values()) or {log["sha256"]} for log in found]
+    trained = list(zip(experiment.data.train, hashes))
+    for test, own in zip(experiment.data.test, hashes[len(trained) :]):
+        for train, other in trained:
+            if not logs.overlapping(test, own, train, other):
+                continue
+            if own == other and test.name != train.name:
+                warnings.warn(SysidWarning(f"test log {test.name} is the training log {train.name} under another name; its error is not held out"), stacklevel=2)
+            else:
+                warnings.warn(SysidWarning(f"test log {test.name} overlaps a training log; its error is not held out"), stacklevel=2)
+
+
+@contextmanager
+def noticed():
+    """Collect what was decided for the user, each once, as text; other warnings go on as what they are."""
+    notices: list[str] = []
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", SysidWarning)
+        yield notices
+    for warning in caught:
+        if not issubclass(warning.category, SysidWarning):
+            warnings.warn_explicit(warning.message, warning.category, warning.filename, warning.lineno)
+        elif str(warning.message) not in notices:
+            notices.append(str(warning.message))

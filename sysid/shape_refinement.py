@@ -1,0 +1,76 @@
+"""Shape values found on rows that fit in memory, refined on all rows, with the weight of the prior under them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from . import shape
+from .compress import compress
+from .drives import rescaled
+from .effect import NotFinite
+from .estimate import identify
+from .held_apart import prior_strength
+from .linearised import Linearised
+from .model import Model
+from .motion import Motion
+from .multistart import Searched, finite
+from .prior_weight import PriorWeight, is_auto, with_weight
+from .specs import Experiment
+
+_PASSES, _NEAR = 3, 0.1  # refinements on all rows; of a standard deviation
+_ROUNDS = 3  # of a prior's weight and the shape values under it
+
+
+def refined(experiment: Experiment, structure: Model, motion: Motion, prior) -> tuple[Model, Linearised | None, tuple[Searched, ...], PriorWeight | None]:
+    """The model measured by a motion, its shape values found: on rows that fit in memory, then by Gauss-Newton steps on all
+    of them. Its slopes there, None where no shape value is free, and what was done to find them. And the prior's weight, None
+    where it had no part in it."""
+    structure = finite(structure.measured_by(motion), motion)
+    if not (structure.shape_values or structure.uses_load):
+        return structure, None, (), None
+    strength = None
+    if is_auto(experiment):
+        begun = Linearised(structure, np.append(prior.ravel(), np.zeros(len(structure.coefficients))))
+        strength = prior_strength(experiment, structure, motion, compress(begun if structure.gains else structure, motion), prior)
+    weighed = experiment if strength is None else with_weight(experiment, strength.value)
+    found = shape.settle(weighed, structure, motion, prior, profile=True)
+    bodies, searched = found.x[: 10 * structure.bodies].reshape(-1, 10), found.searched
+    if (scaled := rescaled(found.model, weighed, bodies, prior)) is not found.model:
+        found = shape.settle(weighed, scaled, motion, prior, grid=False)
+    structure, slopes = found.model, Linearised(found.model, found.x)
+    if not slopes.free:
+        return structure, None, searched, None
+    best = None
+    for number in range(_PASSES):
+        try:
+            data = compress(slopes, motion)
+        except NotFinite:
+            if best is None:
+                raise
+            return best[1], best[2], searched, best[3]  # of a formula, the last step left its domain
+        for _ in range(_ROUNDS if number == 0 else 0):  # what was missing before is in the model now
+            before, strength = strength, prior_strength(experiment, structure, motion, data, prior, strength)
+            weighed = with_weight(experiment, strength.value)
+            if before is None or before.value == strength.value:
+                break
+            again = shape.settle(weighed, structure, motion, prior, grid=False, profile=True)
+            searched = tuple(one.checked_again(other) for one, other in zip(searched, again.searched))
+            structure, slopes = again.model, Linearised(again.model, again.x)
+            data = compress(slopes, motion)
+        fit = identify(weighed, structure, motion, data, prior, near=slopes.x)
+        # blows make valleys narrower than a step, and slopes say little at a corner: the last step is taken back
+        if best is not None and (structure.deflects or not structure.uses_load) and fit.objective > best[0]:
+            return best[1], best[2], searched, best[3]
+        best = fit.objective, structure, slopes, strength
+        change = shape.correction(fit, data)
+        values = np.array(structure.shapes)
+        low, high = (np.array([getattr(v, end) for v in structure.shape_values]) for end in ("low", "high"))
+        values[slopes.free] += change
+        structure = structure.with_shapes(np.clip(values, low, high))
+        if structure.uses_load:
+            structure = structure.with_reference(fit.pi)
+        slopes = Linearised(structure, fit.x)
+        std = fit.shape_std[slopes.free]
+        if not np.any(np.abs(change) > _NEAR * np.where(np.isfinite(std), std, np.inf)):
+            break
+    return structure, slopes, searched, strength
