@@ -8,10 +8,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from . import rows as row
-from .effect import Deflection, Effect, MotionEffect, SensorEffect, WrenchEffect, find, vocabulary
+from .deflection import Deflection
+from .effect import Effect, MotionEffect, SensorEffect, WrenchEffect
 from .model import ROBOT, Model
 from .model import found as found_effect
 from .specs import Experiment, is_own
+from .vocabulary import find, vocabulary
 
 # What every model has to begin with is added first where it lacks; then what has a law; then what
 # can bend to anything.

@@ -530,7 +530,7 @@ def export(
 @app.command()
 def effects(name: Annotated[Optional[str], typer.Argument(help="One effect; without it, all.")] = None, as_json: Json = False, out: Out = None, quiet: Quiet = False) -> None:  # noqa: UP045
     """The catalogue of physical effects: equation, parameters, units, what it looks like, what it is confused with."""
-    from .effect import describe, find, vocabulary
+    from .vocabulary import describe, find, vocabulary
 
     found = [describe(find(word)) for word in ([name] if name else vocabulary())]
     if out:

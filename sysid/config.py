@@ -14,12 +14,12 @@ from typing import Any, get_args
 from pydantic import BaseModel, ValidationError
 
 from . import bounded, datasets, groups
-from .effect import find, vocabulary
 from .errors import ConfigError
 from .formula import parse
 from .mistyped import FEW, standing
 from .readers import is_log_folder, listed
 from .specs import ENTRY, EffectSpec, Experiment, LogSpec, is_own
+from .vocabulary import find, vocabulary
 
 _LARGEST_FILE = 1_000_000  # bytes
 _MOST_ALIASED_NODES = 10_000

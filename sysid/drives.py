@@ -11,7 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from . import motor_side
-from .effect import Linear, Shape, TorqueEffect, called
+from .effect import TorqueEffect
+from .effect_parameters import Linear, Shape, called
 from .effects.torque_gain import TorqueGain
 from .effects.viscous import Viscous
 from .errors import ConfigError

@@ -18,7 +18,6 @@ from . import rows
 from .addition import command
 from .blocks import within_one_error
 from .compress import compress
-from .effect import find, vocabulary
 from .estimate import Fit
 from .held_apart import FEWEST, HeldApart, held_apart, judged, solved, strongest
 from .linearised import Linearised
@@ -28,6 +27,7 @@ from .posed_problem import pose
 from .prior_weight import PLAUSIBLE
 from .robot import Robot
 from .triangles import Compressed
+from .vocabulary import find, vocabulary
 
 _ROWS = 6000  # enough to tell masses from effects; a long log need not be read whole for it
 

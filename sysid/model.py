@@ -12,7 +12,9 @@ from types import MappingProxyType
 import numpy as np
 
 from . import own_effects, regressor, two_masses, units
-from .effect import Asked, Deflection, Effect, LinkEffect, MotionEffect, SensorEffect, Shape, TorqueEffect, WrenchEffect, find
+from .deflection import Deflection
+from .effect import Effect, LinkEffect, MotionEffect, SensorEffect, TorqueEffect, WrenchEffect
+from .effect_parameters import Asked, Shape
 from .errors import ConfigError, SysidError, SysidWarning, meant
 from .extent import Extent
 from .formula import Formula
@@ -21,6 +23,7 @@ from .motion import Motion, Piece, never_move
 from .per_level import at_level
 from .robot import Robot
 from .specs import is_own
+from .vocabulary import find
 
 _CHUNK = 4096  # samples whose columns stand in memory at once
 ROBOT = -1  # the "joint" of an effect of the whole robot, called `*`

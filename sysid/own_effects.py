@@ -30,10 +30,11 @@ from pathlib import Path
 import numpy as np
 
 from . import bounded, regressor, trusted
-from .effect import KINDS, Effect, MotionEffect, NotFinite, SensorEffect, WrenchEffect, vocabulary
+from .effect import KINDS, Effect, MotionEffect, NotFinite, SensorEffect, WrenchEffect
 from .errors import ConfigError, SysidError
 from .motion import Piece
 from .specs import Experiment, is_own
+from .vocabulary import vocabulary
 
 _STATED = ("equation", "looks_like", "separate_by", "source")
 _LOADED: dict[tuple[str, str], dict] = {}  # what a file holds, by its path and its content

@@ -10,7 +10,8 @@ from functools import cache
 
 import numpy as np
 
-from .effect import Deflection, Effect, MotionEffect, SensorEffect, TorqueEffect, WrenchEffect
+from .deflection import Deflection
+from .effect import Effect, MotionEffect, SensorEffect, TorqueEffect, WrenchEffect
 from .errors import SysidError
 
 _OWN = ("group", "level", "levels")

@@ -16,7 +16,8 @@ import numpy as np
 
 from . import multistart
 from . import rows as row
-from .effect import Deflection, NotFinite
+from .deflection import Deflection
+from .effect import NotFinite
 from .estimate import Fit
 from .inertia import DIVERGENCES
 from .model import Model, moving_coefficients

@@ -160,7 +160,7 @@ def test_cases_are_as_promised(blind):
     assert len(full) >= 300 and len(full) - kinds["control"] >= 200 and kinds["control"] >= 100 and kinds["two"] >= 30 and kinds["outside"] >= 40
     assert len(robots) == 4 and min(robots.values()) >= 20
     effects = Counter(h["effect"] for c in full if c.kind == "one" for h in c.hidden)
-    from sysid.effect import vocabulary
+    from sysid.vocabulary import vocabulary
 
     assert set(effects) == set(vocabulary()) - set(blind.BASELINE) and min(effects[e] for e in blind.EFFECTS) >= 6
     assert len({c.hidden[0]["effect"] for c in full if c.kind == "outside"}) >= 6

@@ -11,9 +11,9 @@ from sysid.design.designed import posed
 from sysid.design.fourier import Fourier
 from sysid.design.information import Known
 from sysid.design.maneuvers import KINDS, Maneuver
-from sysid.effect import find, vocabulary
 from sysid.errors import SysidWarning
 from sysid.specs import RobotSpec
+from sysid.vocabulary import find, vocabulary
 from tests.conftest import URDF
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from sysid import effect, regressor, robot, specs
+from sysid import effect, regressor, robot, specs, vocabulary
 from sysid.errors import ConfigError
 from sysid.inertia import pseudo
 from sysid.motion import Piece
@@ -80,8 +80,8 @@ def applied(found, machine, piece, joint, shapes) -> list[np.ndarray]:
     return [moved.q, moved.qd, moved.qdd, *more]
 
 
-MOVERS = [name for name in effect.vocabulary() if isinstance(effect.find(name), effect.MotionEffect)]
-SENSORS = [name for name in effect.vocabulary() if isinstance(effect.find(name), effect.SensorEffect)]
+MOVERS = [name for name in vocabulary.vocabulary() if isinstance(vocabulary.find(name), effect.MotionEffect)]
+SENSORS = [name for name in vocabulary.vocabulary() if isinstance(vocabulary.find(name), effect.SensorEffect)]
 
 
 def torque_of(machine, piece) -> np.ndarray:
@@ -98,7 +98,7 @@ def rnea(machine, piece, *, model=None) -> np.ndarray:
 
 def test_grid_of_cogging_misses_no_line():
     """Two neighbouring k turn against each other by less than a quarter turn over the whole travel."""
-    k = effect.find("cogging").k
+    k = vocabulary.find("cogging").k
     for angle in (0.05, 1.0, 6.0):
         values = k.values(k.low, k.high, angle)
         assert values[0] == k.low and values[-1] == k.high and np.diff(values).max() * angle <= np.pi / 2
@@ -106,22 +106,22 @@ def test_grid_of_cogging_misses_no_line():
 
 
 def test_a_ripple_that_is_there_may_have_more_lines():
-    found = effect.find("cogging").richer(k=14.0)
+    found = vocabulary.find("cogging").richer(k=14.0)
     for lines, k in ((4, 14.0), (4, 7.0), (2, 7.0)):
         assert ({"lines": lines}, {"k": k}) in found
     # the line that is there stays, and does not come alone
     assert min(options["lines"] * at["k"] for options, at in found) == 14.0 and all(options["lines"] > 1 for options, _ in found)
-    assert all(at["k"] >= 1.0 for _, at in effect.find("cogging").richer(k=2.5))
-    assert not effect.find("cogging").given(lines=8).richer(k=14.0) and not effect.find("spring").richer(q0=0.0)
+    assert all(at["k"] >= 1.0 for _, at in vocabulary.find("cogging").richer(k=2.5))
+    assert not vocabulary.find("cogging").given(lines=8).richer(k=14.0) and not vocabulary.find("spring").richer(q0=0.0)
 
 
 @pytest.mark.parametrize("name", MOVERS + SENSORS)
 @pytest.mark.parametrize("make", [moving, arm_moving])
 def test_start_changes_nothing(name, make):
     machine, piece = make()
-    for joint in [-1] if effect.find(name).scope == "robot" else range(machine.dof):
-        for options in effect.find(name).variants(machine, joint):
-            found = effect.find(name).given(**options).bound(machine, joint)
+    for joint in [-1] if vocabulary.find(name).scope == "robot" else range(machine.dof):
+        for options in vocabulary.find(name).variants(machine, joint):
+            found = vocabulary.find(name).given(**options).bound(machine, joint)
             shapes = middle(found, machine, piece, joint) | {s.name: s.start for s in found.shapes() if s.start is not None}
             if name in SENSORS:
                 np.testing.assert_array_equal(found.sensed(piece.tau.T, piece.step, **shapes), piece.tau.T)
@@ -140,8 +140,8 @@ def test_columns_of_a_stretch_are_those_of_the_whole(name, filtered):
     spec = specs.PreprocessSpec(torque=filtered)
     motion = prepare([arm_log(machine, np.random.default_rng(0), seconds=4.0)], spec, machine.joints)
     (piece,) = motion.pieces
-    joint = ROBOT if effect.find(name).scope == "robot" else 1
-    found = effect.find(name).bound(machine, joint)
+    joint = ROBOT if vocabulary.find(name).scope == "robot" else 1
+    found = vocabulary.find(name).bound(machine, joint)
     model = Model(machine, ((found, (joint,)),)).measured_by(motion)
     shapes = [0.3 * value.high if value.shape.start == 0 else at for value, at in zip(model.shape_values, initial(model))]
     model = model.with_shapes(shapes)
@@ -159,7 +159,7 @@ def test_columns_of_a_stretch_are_those_of_the_whole(name, filtered):
 def test_delay_shifts_a_sine(d):
     step = 0.001
     t = np.arange(2000) * step
-    delay = effect.find("delay")
+    delay = vocabulary.find("delay")
     wave = lambda t: np.stack([np.sin(2 * np.pi * 5 * t), np.cos(2 * np.pi * 12 * t + 1)])  # noqa: E731
     inner = slice(delay.reach, -delay.reach)
     np.testing.assert_allclose(delay.sensed(wave(t), step, d)[:, inner], wave(t - d)[:, inner], atol=1e-6)
@@ -168,7 +168,7 @@ def test_delay_shifts_a_sine(d):
 
 def test_delay_by_whole_samples_is_exact_and_holds_the_edges():
     torque = np.random.default_rng(0).normal(size=(3, 200))
-    delay = effect.find("delay")
+    delay = vocabulary.find("delay")
     np.testing.assert_array_equal(delay.sensed(torque, 0.5, 2.0)[:, 4:], torque[:, :-4])
     np.testing.assert_array_equal(delay.sensed(torque, 0.5, 2.0)[:, :4], np.repeat(torque[:, :1], 4, 1))
     np.testing.assert_array_equal(delay.sensed(torque, 0.5, -1.0)[:, -2:], np.repeat(torque[:, -1:], 2, 1))
@@ -181,13 +181,13 @@ def test_lag_is_undone_by_its_low_pass():
 
     t = np.arange(4000) * 0.001
     torque, T = np.sin(2 * np.pi * 3 * t) * (1 - np.exp(-10 * t)), 0.02
-    read = effect.find("current_lag").sensed(torque[None], 0.001, T)[0]
+    read = vocabulary.find("current_lag").sensed(torque[None], 0.001, T)[0]
     np.testing.assert_allclose(lsim(lti([1.0], [T, 1.0]), read, t)[1], torque, atol=5e-4)
-    assert effect.find("current_lag").sensed(torque[None, :1], 0.001, T).shape == (1, 1)
+    assert vocabulary.find("current_lag").sensed(torque[None, :1], 0.001, T).shape == (1, 1)
 
 
 def test_gain_multiplies():
-    np.testing.assert_allclose(effect.find("torque_gain").sensed(np.array([[1.0, -2.0]]), 0.01, 0.3), [[1.3, -2.6]])
+    np.testing.assert_allclose(vocabulary.find("torque_gain").sensed(np.array([[1.0, -2.0]]), 0.01, 0.3), [[1.3, -2.6]])
 
 
 # ---- motion
@@ -196,7 +196,7 @@ def test_gain_multiplies():
 @pytest.mark.parametrize("make", [moving, arm_moving])
 def test_tilt_turns_gravity(make):
     machine, piece = make()
-    tilt = effect.find("gravity_tilt").bound(machine, -1)
+    tilt = vocabulary.find("gravity_tilt").bound(machine, -1)
     model = machine.model.copy()
     model.gravity.linear = pin.rpy.rpyToMatrix(0.2, -0.3, 0.0).T @ machine.gravity
     moved = tilt.moved(piece, -1, roll=0.2, pitch=-0.3)
@@ -205,7 +205,7 @@ def test_tilt_turns_gravity(make):
 
 def test_offset_is_another_pose():
     machine, piece = arm_moving()
-    moved = effect.find("encoder_offset").moved(piece, 2, d=0.1)
+    moved = vocabulary.find("encoder_offset").moved(piece, 2, d=0.1)
     shifted = replace(piece, q=piece.q + 0.1 * (np.arange(6) == 2))
     np.testing.assert_allclose(torque_of(machine, moved), rnea(machine, shifted), atol=1e-9)
 
@@ -215,7 +215,7 @@ def test_eccentricity_follows_the_chain_rule():
     t = np.arange(2000) * 1e-4
     q, qd, qdd = (np.repeat(x[:, None], 6, 1) for x in (np.sin(3 * t), 3 * np.cos(3 * t), -9 * np.sin(3 * t)))
     piece = piece_of(machine, t, q, qd, qdd)
-    moved = effect.find("encoder_eccentricity").moved(piece, 1, s=0.06, c=0.08)
+    moved = vocabulary.find("encoder_eccentricity").moved(piece, 1, s=0.06, c=0.08)
     np.testing.assert_allclose(moved.q[:, 1], q[:, 1] + 0.1 * np.sin(q[:, 1] + np.arctan2(0.08, 0.06)), atol=1e-12)
     np.testing.assert_allclose(moved.qd[1:-1, 1], np.gradient(moved.q[:, 1], 1e-4)[1:-1], atol=1e-6)
     np.testing.assert_allclose(moved.qdd[1:-1, 1], np.gradient(moved.qd[:, 1], 1e-4)[1:-1], atol=1e-5)
@@ -241,7 +241,7 @@ def test_a_soft_joint_parts_link_and_motor(tmp_path, encoder, name):
     piece = piece_of(machine, t, q, qd, qdd)
     load = (5 * np.sin(7 * t), 35 * np.cos(7 * t), -245 * np.sin(7 * t))
     piece = replace(piece, load=load[0][:, None])
-    found = effect.find(name).given(encoder=encoder)
+    found = vocabulary.find(name).given(encoder=encoder)
     if name == "elasticity":
         moved = found.moved(piece, 0, compliance=0.01, damping=0.1)
         behind = [0.01 * x for x in load]
@@ -262,7 +262,7 @@ def test_a_soft_joint_parts_link_and_motor(tmp_path, encoder, name):
 
 def test_two_soft_effects_add_up():
     machine, piece = arm_moving()
-    soft = effect.find("elasticity")
+    soft = vocabulary.find("elasticity")
     once = soft.moved(soft.moved(piece, 1, compliance=0.002, damping=0.1), 1, compliance=0.003, damping=0.1)
     np.testing.assert_allclose(once.deflection, soft.moved(piece, 1, compliance=0.005, damping=0.1).deflection, atol=1e-12)
     assert not np.any(once.deflection[:, :, [0, 2, 3, 4, 5]])
@@ -283,8 +283,8 @@ def test_presliding_against_a_fine_integration():
     piece = piece_of(machine, t, q, still, still)
     for x0 in (0.002, 0.02):
         truth = solve_ivp(lambda t, z, x0=x0: (speed(t) - abs(speed(t)) * z) / x0, (0, t[-1]), [0.0], t_eval=t, rtol=1e-9, atol=1e-10, max_step=0.005).y[0]
-        np.testing.assert_allclose(effect.find("presliding").columns(piece, 3, x0=x0)[0], truth, atol=2e-3)
-    assert not np.any(effect.find("presliding").columns(piece, 0, x0=0.01))  # a joint that never moves
+        np.testing.assert_allclose(vocabulary.find("presliding").columns(piece, 3, x0=x0)[0], truth, atol=2e-3)
+    assert not np.any(vocabulary.find("presliding").columns(piece, 0, x0=0.01))  # a joint that never moves
 
 
 def test_presliding_is_the_recurrence_of_its_samples():
@@ -296,7 +296,7 @@ def test_presliding_is_the_recurrence_of_its_samples():
     for move in np.diff(q[:, 2]):
         z = np.sign(move) + (z - np.sign(move)) * np.exp(-abs(move) / 0.02)
         out.append(z)
-    np.testing.assert_allclose(effect.find("presliding").columns(piece, 2, x0=0.02)[0], out, atol=1e-12)
+    np.testing.assert_allclose(vocabulary.find("presliding").columns(piece, 2, x0=0.02)[0], out, atol=1e-12)
 
 
 def small_piece():
@@ -332,19 +332,19 @@ BY_HAND = {
 @pytest.mark.parametrize("name", BY_HAND)
 def test_columns_by_hand(name):
     options, shapes, wanted = BY_HAND[name]
-    found = effect.find(name).given(**options)
+    found = vocabulary.find(name).given(**options)
     np.testing.assert_allclose(found.columns(small_piece(), 1, **shapes), wanted, atol=1e-12)
 
 
 def test_more_columns_by_hand():
     piece = small_piece()
-    speed = effect.find("position_friction").given(times="speed", harmonics=2)
+    speed = vocabulary.find("position_friction").given(times="speed", harmonics=2)
     np.testing.assert_allclose(speed.columns(piece, 1)[2], np.cos(2 * piece.q[:, 1]) * piece.qd[:, 1])
     assert [c.name for c in speed.coefficients()] == ["a1", "b1", "a2", "b2"] and speed.coefficients()[0].unit == "N m s/rad"
-    cold = effect.find("warmup").columns(piece, 1, T=2.0)
+    cold = vocabulary.find("warmup").columns(piece, 1, T=2.0)
     np.testing.assert_allclose(cold, np.stack([piece.qd[:, 1], np.sign(piece.qd[:, 1])]) * np.exp(-piece.t / 2.0))
     machine, _ = arm_moving()
-    other = effect.find("joint_coupling").given(other=machine.joints[0]).bound(machine, 2)
+    other = vocabulary.find("joint_coupling").given(other=machine.joints[0]).bound(machine, 2)
     np.testing.assert_array_equal(other.columns(piece, 2)[0], piece.qdd[:, 0])
     assert len(other.variants(machine, 2)) == 5
 
@@ -352,9 +352,9 @@ def test_more_columns_by_hand():
 def test_payload_is_an_added_inertia():
     machine, piece = arm_moving()
     held = pseudo.box(1.5, (0.02, -0.03, 0.1), (0.1, 0.2, 0.15))
-    payload = effect.find("payload").bound(machine, -1)
+    payload = vocabulary.find("payload").bound(machine, -1)
     for link in (None, machine.bodies[3].name):
-        payload = effect.find("payload").given(link=link).bound(machine, -1)
+        payload = vocabulary.find("payload").given(link=link).bound(machine, -1)
         row = 5 if link is None else 3
         heavier = np.array(machine.prior)
         heavier[row] += held
@@ -368,7 +368,7 @@ def test_payload_is_an_added_inertia():
 @pytest.mark.parametrize("make", [moving, arm_moving])
 def test_external_force_is_the_jacobian_s(make):
     machine, piece = make()
-    contact = effect.find("external_force").given(during=[[0.5, 1.5], [1.6, 1.7]]).bound(machine, -1)
+    contact = vocabulary.find("external_force").given(during=[[0.5, 1.5], [1.6, 1.7]]).bound(machine, -1)
     assert [c.name for c in contact.coefficients()] == ["f1x", "f1y", "f1z", "f2x", "f2y", "f2z"]
     columns = contact.columns(piece, machine)
     data = machine.model.createData()
@@ -381,7 +381,7 @@ def test_external_force_is_the_jacobian_s(make):
         np.testing.assert_allclose(columns[:, :3, k], weight * jacobian.T, atol=1e-12)
     assert columns.shape == (machine.dof, 6, len(piece.t)) and not np.any(columns[:, 3:, inside])
     edge = columns[:, 0, (piece.t > 0.5) & (piece.t < 0.55)]
-    assert np.any(edge) and effect.find("external_force").columns(piece, machine).shape == (machine.dof, 0, len(piece.t))
+    assert np.any(edge) and vocabulary.find("external_force").columns(piece, machine).shape == (machine.dof, 0, len(piece.t))
 
 
 REFUSED = {
@@ -401,25 +401,25 @@ REFUSED = {
 def test_options_that_cannot_be_are_refused(name, options):
     machine, _ = moving()
     with pytest.raises(ConfigError, match=name) as error:
-        effect.find(name).given(**options).bound(machine, -1 if effect.find(name).scope == "robot" else 1)
+        vocabulary.find(name).given(**options).bound(machine, -1 if vocabulary.find(name).scope == "robot" else 1)
     assert "allowed: " in str(error.value)
 
 
 def test_signals_and_neighbours_that_are_not_there(tmp_path):
     with pytest.raises(ConfigError, match="'cold' is not logged; allowed: heat"):
-        effect.find("warmup").given(signal="cold").columns(small_piece(), 1)
+        vocabulary.find("warmup").given(signal="cold").columns(small_piece(), 1)
     file = tmp_path / "pendulum.urdf"
     file.write_text(PENDULUM)
     machine = robot.load(specs.RobotSpec(urdf=str(file)))
     with pytest.raises(ConfigError, match="second joint"):
-        effect.find("joint_coupling").bound(machine, 0)
-    assert effect.find("joint_coupling").variants(machine, 0) == []
+        vocabulary.find("joint_coupling").bound(machine, 0)
+    assert vocabulary.find("joint_coupling").variants(machine, 0) == []
 
 
 def test_every_effect_is_shown(capsys):
     from sysid.terminal import show_effects
 
-    show_effects([effect.describe(effect.find(name)) for name in effect.vocabulary()])
+    show_effects([vocabulary.describe(vocabulary.find(name)) for name in vocabulary.vocabulary()])
     said = capsys.readouterr().out
     assert "  k            1/rad, 1 to 120: " in said and "  vs           rad/s, 0.003 to 0.7 times the joint's top speed: " in said
     assert "  Fc           N m, not negative: " in said and "  encoder:     motor where" in said

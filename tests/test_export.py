@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import sysid
-from sysid import effect, experiment_logs, inverse_dynamics, regressor
+from sysid import experiment_logs, inverse_dynamics, regressor, vocabulary
 from sysid.errors import SysidError
 from sysid.export import FORMATS, Check, document, isaaclab, mjcf
 from sysid.export.cost import costs
@@ -42,7 +42,7 @@ def built(machine, names, seed=0) -> tuple[Model, np.ndarray]:
     rng = np.random.default_rng(seed)
     terms, shapes, c = [], [], []
     for name in names:
-        found = effect.find(name)
+        found = vocabulary.find(name)
         joints = (ROBOT,) if found.scope == "robot" else tuple(range(machine.dof))
         for joint in joints:
             found = found.bound(machine, joint)
@@ -257,8 +257,8 @@ def test_costs_are_the_torque_of_each_effect(leg_run):
 
     _, folder = leg_run
     run = sysid.read_run(folder)
-    model = run.model.with_effect(effect.find("stribeck"), (1,)).with_effect(
-        effect.find("delay"), (2,)
+    model = run.model.with_effect(vocabulary.find("stribeck"), (1,)).with_effect(
+        vocabulary.find("delay"), (2,)
     )
     model = model.with_shapes([0.5, 0.004])
     x = np.append(run.x, 2.0)

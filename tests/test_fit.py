@@ -13,7 +13,7 @@ import pytest
 import yourdfpy
 
 import sysid
-from sysid import config, effect, regressor, results, robot
+from sysid import config, regressor, results, robot, vocabulary
 from sysid.inertia import PARAMETERS, pseudo
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -115,7 +115,7 @@ def test_identified_urdf_says_what_it_cannot_say_and_keeps_mesh_names(leg, tmp_p
     meshes = "".join(f'<visual><geometry><mesh filename="{name}"/></geometry></visual>' for name in ("package://leg/meshes/a.stl", "meshes/b.stl"))
     shaped = replace(source, text=source.text.replace('<link name="abad">', f'<link name="abad">{meshes}', 1))
     machine = replace(leg.model.robot, source=shaped)
-    model = replace(leg.model, robot=machine, terms=(*leg.model.terms, (effect.find("armature"), (1,)), (effect.find("stribeck"), (0,))), shapes=(0.2,))
+    model = replace(leg.model, robot=machine, terms=(*leg.model.terms, (vocabulary.find("armature"), (1,)), (vocabulary.find("stribeck"), (0,))), shapes=(0.2,))
     found = replace(leg, model=model, x=np.append(leg.x, [0.05, 1.5]))
     said = identified_urdf(found, tmp_path).decode()
     assert "armature.hip: Ia = 0.05 kg m^2" in said and "stribeck.abad: dF = 1.5 N m, vs = 0.2 rad/s" in said

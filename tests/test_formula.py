@@ -7,13 +7,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sysid import effect, pipeline
-from sysid.effect import describe
+from sysid import pipeline, vocabulary
 from sysid.errors import ConfigError
 from sysid.formula import FUNCTIONS, Formula, parse
 from sysid.model import found
 from sysid.specs import EffectSpec
 from sysid.trusted import trust
+from sysid.vocabulary import describe
 from tests.test_effects import moving, small_piece
 
 REFUSED = {
@@ -572,4 +572,4 @@ def test_an_own_effect_may_build_on_another(experiment):
     text = "from sysid.effects.stribeck import Stribeck\nfrom sysid.effect import Linear\nclass More(Stribeck):\n    name = 'more'\n    x = Linear('N m', says='x')\n    def columns(self, motion, joint, vs):\n        import numpy as np\n        return np.concatenate([super().columns(motion, joint, vs), motion.qd[None, :, joint]])\n"
     _, model, _ = pipeline.build(pipeline.load(own(experiment, {"mine.py:More": {"joints": ["elbow"]}}, text=text)))
     assert [c.name for c in model.coefficients] == ["more.elbow.dF", "more.elbow.x"]
-    assert [c.name for c in effect.find("stribeck").coefficients()] == ["dF"]
+    assert [c.name for c in vocabulary.find("stribeck").coefficients()] == ["dF"]

@@ -9,13 +9,13 @@ import polars as pl
 import pytest
 
 from sysid import config, pipeline
-from sysid.effect import find, vocabulary
 from sysid.errors import ConfigError, SysidError
 from sysid.groups import names
 from sysid.model import build
 from sysid.notices import noticed
 from sysid.per_level import at_level
 from sysid.specs import LogSpec
+from sysid.vocabulary import find, vocabulary
 from tests.conftest import dump, put
 from tests.grouped import MASS, experiment, tree
 from tests.test_effects import middle, moving

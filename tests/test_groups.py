@@ -8,9 +8,9 @@ import pytest
 
 import sysid
 from sysid import config, experiment_logs, pipeline, regressor
-from sysid.effect import find
 from sysid.errors import SysidError
 from sysid.inertia import DIVERGENCES
+from sysid.vocabulary import find
 from tests.grouped import JOINTS, MASS, NOISE, ROUGH, experiment, tree, waved
 
 

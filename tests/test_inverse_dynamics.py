@@ -7,7 +7,7 @@ import pinocchio as pin
 import pytest
 
 import sysid
-from sysid import config, effect, inverse_dynamics, own_effects, robot
+from sysid import config, inverse_dynamics, own_effects, robot, vocabulary
 from sysid.errors import SysidError
 from sysid.model import ROBOT, Model
 from sysid.model import build as build_model
@@ -56,7 +56,7 @@ def grown(machine, piece, names) -> tuple[Model, np.ndarray]:
     rng = np.random.default_rng(7)
     terms, values = [], []
     for name in names:
-        found = effect.find(name).given(**GIVEN.get(name, {}))
+        found = vocabulary.find(name).given(**GIVEN.get(name, {}))
         joints = (
             (ROBOT,)
             if found.scope == "robot"
@@ -93,7 +93,7 @@ def agree(found, expected):
     np.testing.assert_allclose(found / size, expected / size, rtol=0, atol=1e-9)
 
 
-@pytest.mark.parametrize("name", effect.vocabulary())
+@pytest.mark.parametrize("name", vocabulary.vocabulary())
 def test_every_effect_as_over_a_log(name):
     for machine, piece in (moving(), arm()):
         model, x = grown(machine, piece, [name])
@@ -107,10 +107,10 @@ def test_every_effect_as_over_a_log(name):
         assert torque.omitted == (named if name in PAST else ())
 
 
-@pytest.mark.parametrize("name", effect.vocabulary())
+@pytest.mark.parametrize("name", vocabulary.vocabulary())
 def test_what_is_said_to_look_at_one_instant_does(name):
     machine, piece = arm()
-    found = effect.find(name).given(**GIVEN.get(name, {})).bound(machine, 1)
+    found = vocabulary.find(name).given(**GIVEN.get(name, {})).bound(machine, 1)
     joint = ROBOT if found.scope == "robot" else 1
     assert (
         own_effects.instantaneous(found, machine, joint, middle(found, machine, piece, 1))
@@ -120,7 +120,7 @@ def test_what_is_said_to_look_at_one_instant_does(name):
 
 def test_all_effects_at_once():
     machine, piece = arm()
-    model, x = grown(machine, piece, effect.vocabulary())
+    model, x = grown(machine, piece, vocabulary.vocabulary())
     torque = inverse_dynamics.inverse_dynamics(model, x)
     agree(torque(piece.q, piece.qd, piece.qdd), slowly(model, piece, x))
     assert {name.partition(".")[0] for name in torque.omitted} == PAST

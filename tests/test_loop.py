@@ -9,9 +9,9 @@ import pytest
 from sysid import config, loop, pipeline
 from sysid.addition import grown, spelled
 from sysid.candidates import candidates
-from sysid.effect import find
 from sysid.errors import ConfigError, LogError
 from sysid.loop import with_effect
+from sysid.vocabulary import find
 
 FILE = """\
 # the leg of a robot

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import sysid
-from sysid import effect
+from sysid import effect, vocabulary
 from tests.problems import arm
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -20,7 +20,8 @@ ROOT = Path(__file__).resolve().parent.parent
 ORDER = [
     "errors", "mistyped", "bounded", "unfinished", "state", "trusted", "progress", "units", "picture", "threads", "silence", "callable_module", "workers", "inertia", "urdf", "readers", "datasets", "specs", "groups", "prior", "robot", "regressor", "outliers", "knocks", "jumps", "repeats",
     "frequencies", "clock", "segment", "spans", "events", "motor_side", "recording", "log", "even_clock", "long_log", "masks", "gaussian", "smoother",
-    "motion", "extent", "preprocess", "long_motion", "blocks", "two_masses", "lowpass", "flexible", "effect", "formula", "effects", "own_effects",
+    "motion", "extent", "preprocess", "long_motion", "blocks", "two_masses", "lowpass", "flexible", "effect_parameters", "effect_options", "effect", "deflection",
+    "vocabulary", "formula", "effects", "own_effects",
     "per_level", "config", "addition", "model", "drives", "inverse_dynamics", "rows", "objective", "projection", "landscape", "multistart", "source",
     "reduction", "triangles", "linearised", "compress", "interior", "nearby", "certificate", "solve", "prior_weight", "uncertainty", "differences", "prediction", "posed_problem", "given_shapes", "estimate",
     "long_prediction", "base_parameters", "held_apart", "masses", "plausible", "shape_search", "shape", "bumps", "filters", "results", "shape_refinement", "notices", "experiment_logs",
@@ -30,7 +31,7 @@ ORDER = [
 ]  # fmt: skip
 # Late imports that close a loop on purpose: a path that names a data set, a prior that is a previous run, the effects
 # that an effect's contract finds.
-LATE = {("urdf", "datasets"), ("pipeline", "results"), ("results", "urdf_export"), ("effect", "effects"), ("estimate", "results"), ("shown", "statement")}
+LATE = {("urdf", "datasets"), ("pipeline", "results"), ("results", "urdf_export"), ("vocabulary", "effects"), ("estimate", "results"), ("shown", "statement")}
 
 
 def modules():
@@ -184,13 +185,13 @@ def test_public_things_have_docstrings():
                 assert ast.get_docstring(node), f"{'.'.join(parts)}.{node.name}"
 
 
-@pytest.mark.parametrize("name", effect.vocabulary())
+@pytest.mark.parametrize("name", vocabulary.vocabulary())
 def test_every_effect_keeps_its_contract(name):
     from tests.test_effects import applied, middle, moving
 
-    found = effect.find(name)
+    found = vocabulary.find(name)
     assert found.name == name and isinstance(found, effect.KINDS)
-    said = effect.describe(found)
+    said = vocabulary.describe(found)
     assert all(said[key] for key in ("summary", "equation", "looks_like", "separate_by", "source"))
     assert said["parameters"] or said["options"]
     for value in said["parameters"]:
@@ -223,7 +224,7 @@ def test_every_effect_keeps_its_contract(name):
         assert coefficient.lower in (0, None) and coefficient.says and coefficient.unit and coefficient.name
 
 
-TORQUE_EFFECTS = [name for name in effect.vocabulary() if isinstance(effect.find(name), effect.TorqueEffect)]
+TORQUE_EFFECTS = [name for name in vocabulary.vocabulary() if isinstance(vocabulary.find(name), effect.TorqueEffect)]
 
 
 @pytest.mark.parametrize("name", TORQUE_EFFECTS)
@@ -242,7 +243,7 @@ def test_every_effect_is_recovered_where_excited_and_not_where_not(name):
     experiment, structure, _, _, prior = arm()
     robot = structure.robot
     hidden, elsewhere = 2, 4
-    found = effect.find(name).bound(robot, hidden)
+    found = vocabulary.find(name).bound(robot, hidden)
     log = arm_log(robot, np.random.default_rng(9), viscous=0.0, coulomb=0.0, noise=0.05)
     clean = prepare([log], experiment.preprocess, robot.joints)
     (piece,) = clean.pieces

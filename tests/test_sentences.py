@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from sysid import effect
+from sysid import vocabulary
 from sysid.statement import text
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -51,7 +51,7 @@ def test_a_number_without_unit_has_none():
 
 
 def test_effects_speak_of_any_joint():
-    assert "joint's motor" in effect.describe(effect.find("joint_coupling"))["summary"]
+    assert "joint's motor" in vocabulary.describe(vocabulary.find("joint_coupling"))["summary"]
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")

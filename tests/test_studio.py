@@ -18,7 +18,6 @@ import pytest
 
 from sysid import loop
 from sysid.diagnose.diagnosis import diagnose
-from sysid.effect import vocabulary
 from sysid.errors import SysidError
 from sysid.statement.document import document
 from sysid.studio import cache, history, page, security
@@ -30,6 +29,7 @@ from sysid.studio.jobs import Cancelled, Job, Worker
 from sysid.studio.serve import serve
 from sysid.studio.session import Session
 from sysid.studio.workspace import Workspace
+from sysid.vocabulary import vocabulary
 from tests.test_report import EVIL, Elements, parse_errors, written
 
 PORT, CSRF = 8765, "of-this-start"

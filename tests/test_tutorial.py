@@ -111,7 +111,7 @@ def test_what_is_shown_can_be_wrong():
 
 
 def test_effects_and_files_of_the_text_exist():
-    from sysid.effect import vocabulary
+    from sysid.vocabulary import vocabulary
 
     text = PAGE.read_text(encoding="utf-8")
     for target in re.findall(r"\]\(([^)#]+)\)", text):

@@ -74,7 +74,7 @@ def test_an_effect_tied_to_a_body_is_not_claimed_by_the_data():
     from dataclasses import replace
 
     experiment, structure, motion, _, prior = arm()
-    from sysid.effect import find
+    from sysid.vocabulary import find
 
     model = structure.with_effect(find("armature"), (0,))
     fit = estimate.identify(experiment, model, motion, compress(model, motion), prior)

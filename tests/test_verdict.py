@@ -17,7 +17,8 @@ from sysid.diagnose.detectable import detectable
 from sysid.diagnose.diagnosis import diagnose
 from sysid.diagnose.select import WORTH, search
 from sysid.diagnose.verdict import _UNKNOWN, predictable, verdicts
-from sysid.effect import Linear, TorqueEffect
+from sysid.effect import TorqueEffect
+from sysid.effect_parameters import Linear
 from sysid.flexible import Agreement, Unknown
 from sysid.noise import NoiseFloor
 from sysid.simulate import simulate, write

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..blocks import jackknife
-from ..effect import find
 from ..inertia import DIVERGENCES, PARAMETERIZATIONS, pseudo
 from ..model import ROBOT, Model
 from ..objective import Objective
 from ..projection import inverted, root
 from ..solve import Coordinates, solve
+from ..vocabulary import find
 from .halves import Key, Question, least_squares
 
 _WEAK = 1e-2  # of the noise's square: the weight of the payload's prior, a ball of a kilogram

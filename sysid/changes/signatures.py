@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from .. import rows
-from ..effect import MotionEffect, find
+from ..effect import MotionEffect
 from ..model import ROBOT, Model
+from ..vocabulary import find
 
 _PER_JOINT = ("coulomb", "viscous", "torque_bias")
 

@@ -14,7 +14,8 @@ from types import MappingProxyType, SimpleNamespace
 import numpy as np
 
 from ..candidates import Candidate, bounds_of, columns_of, tried
-from ..effect import SensorEffect, Shape
+from ..effect import SensorEffect
+from ..effect_parameters import Shape
 from ..estimate import Fit
 from ..model import ROBOT, Model
 from ..motion import Motion

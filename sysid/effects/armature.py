@@ -1,6 +1,7 @@
 """Armature: the motor's inertia, seen through its gear, as one number."""
 
-from ..effect import Linear, TorqueEffect
+from ..effect import TorqueEffect
+from ..effect_parameters import Linear
 
 
 class Armature(TorqueEffect):

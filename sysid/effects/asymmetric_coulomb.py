@@ -1,6 +1,7 @@
 """Coulomb friction that differs between the two directions."""
 
-from ..effect import Linear, TorqueEffect
+from ..effect import TorqueEffect
+from ..effect_parameters import Linear
 
 
 class AsymmetricCoulomb(TorqueEffect):

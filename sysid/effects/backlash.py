@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from ..effect import Deflection, Shape
+from ..deflection import Deflection
+from ..effect_parameters import Shape
 from ..two_masses import flown, played
 
 _MANY = 16  # links from which on a step of all at once is faster than one after another

@@ -2,7 +2,9 @@
 
 import numpy as np
 
-from ..effect import Linear, Shape, TorqueEffect, called, whole
+from ..effect import TorqueEffect
+from ..effect_options import whole
+from ..effect_parameters import Linear, Shape, called
 
 
 class Cogging(TorqueEffect):

@@ -1,6 +1,7 @@
 """Coulomb friction."""
 
-from ..effect import Linear, TorqueEffect
+from ..effect import TorqueEffect
+from ..effect_parameters import Linear
 
 
 class Coulomb(TorqueEffect):

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from ..effect import SensorEffect, Shape
+from ..effect import SensorEffect
+from ..effect_parameters import Shape
 
 
 class CurrentLag(SensorEffect):

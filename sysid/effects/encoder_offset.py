@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..effect import MotionEffect, Shape
+from ..effect import MotionEffect
+from ..effect_parameters import Shape
 
 
 class EncoderOffset(MotionEffect):

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from ..effect import Linear, LinkEffect, called
+from ..effect import LinkEffect
+from ..effect_parameters import Linear, called
 from ..errors import ConfigError
 from ..regressor import columns as regressor_columns
 

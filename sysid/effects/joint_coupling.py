@@ -2,7 +2,9 @@
 
 import numpy as np
 
-from ..effect import Linear, TorqueEffect, one_of
+from ..effect import TorqueEffect
+from ..effect_options import one_of
+from ..effect_parameters import Linear
 from ..errors import ConfigError
 
 

@@ -2,7 +2,9 @@
 
 import numpy as np
 
-from ..effect import Linear, LinkEffect, called, texts
+from ..effect import LinkEffect
+from ..effect_options import texts
+from ..effect_parameters import Linear, called
 from ..inertia import PARAMETERS, UNITS
 from ..regressor import body_motions, wrench_columns
 

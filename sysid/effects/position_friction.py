@@ -2,7 +2,9 @@
 
 import numpy as np
 
-from ..effect import Linear, TorqueEffect, called, one_of, whole
+from ..effect import TorqueEffect
+from ..effect_options import one_of, whole
+from ..effect_parameters import Linear, called
 
 
 class PositionFriction(TorqueEffect):

@@ -1,6 +1,7 @@
 """A wrong torque constant."""
 
-from ..effect import SensorEffect, Shape
+from ..effect import SensorEffect
+from ..effect_parameters import Shape
 
 
 class TorqueGain(SensorEffect):

@@ -1,6 +1,7 @@
 """Viscous friction."""
 
-from ..effect import Linear, TorqueEffect
+from ..effect import TorqueEffect
+from ..effect_parameters import Linear
 
 
 class Viscous(TorqueEffect):

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from ..effect import Linear, Shape, TorqueEffect, called
+from ..effect import TorqueEffect
+from ..effect_parameters import Linear, Shape, called
 from ..errors import ConfigError
 
 

@@ -7,8 +7,10 @@ import re
 
 import numpy as np
 
-from ..effect import Linear, NotFinite, Shape, TorqueEffect, called, vocabulary
+from ..effect import NotFinite, TorqueEffect
+from ..effect_parameters import Linear, Shape, called
 from ..motion import Piece
+from ..vocabulary import vocabulary
 from .ranges import ranges
 from .search_range import Range
 from .text import OTHER, parse, refused

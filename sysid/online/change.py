@@ -8,9 +8,9 @@ import numpy as np
 
 from .. import units
 from ..changes.fitted import possible
-from ..effect import find
 from ..inertia import PARAMETERS, UNITS
 from ..robot import Robot
+from ..vocabulary import find
 from .monitor import PAYLOAD, PER_JOINT, Ticks
 
 

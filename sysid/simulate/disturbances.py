@@ -13,7 +13,7 @@ import pinocchio as pin
 
 from ..robot import Robot
 from .hidden import Scales
-from .parts import Part
+from .part import Part
 
 _REST, _EARLY = 0.3, 0.1  # s from rest to a closed brake; s that it opens before the joint moves
 _HOLD = 20.0  # times a joint's peak torque that its brake holds

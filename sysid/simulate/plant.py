@@ -24,7 +24,7 @@ import pinocchio as pin
 from scipy.linalg.lapack import dposv
 
 from ..robot import Robot
-from .parts import Part
+from .part import Part
 
 FINE = 4  # steps in half a control period where friction changes, and always where a part asks for it
 _SWEEPS, _CONVERGED = 60, 1e-11  # Gauss-Seidel passes; change of friction, as a share of its level

@@ -10,8 +10,8 @@ from ..addition import spelled
 from ..diagnose.claims import Claim
 from ..diagnose.diagnosis import Diagnosis
 from ..diagnose.findings import Finding
-from ..effect import describe
 from ..results import number
+from ..vocabulary import describe
 
 
 def claims(found: Diagnosis) -> Iterator[dict]:

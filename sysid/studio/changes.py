@@ -8,8 +8,8 @@ from functools import partial
 from pathlib import Path
 
 from .. import config, loop, yaml_edit
-from ..effect import find, vocabulary
 from ..errors import SysidError
+from ..vocabulary import find, vocabulary
 from .diagnosed import Diagnosed
 from .workspace import Workspace
 

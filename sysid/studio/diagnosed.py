@@ -5,11 +5,11 @@ from __future__ import annotations
 import json
 from functools import cache
 
-from ..effect import describe, find, vocabulary
 from ..estimate import Fit
 from ..report.sections import sections
 from ..report.steps import steps
 from ..report.words import units
+from ..vocabulary import describe, find, vocabulary
 from .workspace import Workspace
 
 ORDER = ("verdict", "workspace", "steps", "suspects", "torque", "failures", "detectable", "parameters", "bodies", "provenance")
