@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Annotated, Optional
 
 import typer
+import typer.core
 
 from .errors import SysidError
 
@@ -18,7 +19,32 @@ from .errors import SysidError
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 _CORES = os.cpu_count() or 1
-app = typer.Typer(add_completion=False, invoke_without_command=True, pretty_exceptions_enable=False, rich_markup_mode=None, help="Identify what a robot is made of, and name the physics its model lacks.")
+#: in the order of the work, each in a line that 80 columns hold
+_SHORT = {
+    "init": "Begin: an experiment from a robot and its logs.", "check": "What is wrong with the logs, before any fit.",
+    "fit": "Identify links, rotors and friction.", "diagnose": "Which effect is missing, on which joint.",
+    "add": "Add an effect; the error before and after.", "discover": "Diagnose and add until nothing is missing.",
+    "report": "One HTML file with everything.", "studio": "The same page alive in the browser.", "history": "The steps and the error falling.",
+    "compare": "Models against each other on held-out data.", "design": "The next motion to log.", "simulate": "Logs of a simulated robot, effects hidden.",
+    "export": "The fitted model for a simulator.", "fleet": "Many robots or days: which one is odd.", "effects": "The catalogue of physical effects.",
+    "fetch": "Public logs to try it on.", "study": "The paper's two studies.",
+}  # fmt: skip
+
+
+class _InOrder(typer.core.TyperGroup):
+    """Commands in the order in which they are used, with lines that are never cut."""
+
+    def list_commands(self, ctx):
+        there = super().list_commands(ctx)
+        return [*(name for name in _SHORT if name in there), *(name for name in there if name not in _SHORT)]
+
+    def format_commands(self, ctx, formatter):
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, _SHORT.get(name, "")) for name in self.list_commands(ctx)])
+
+
+_HELP = "Identify what a robot is made of, and name the physics its model lacks. Begin with a folder that holds a URDF and logs: `sysid init FOLDER`; every command ends with the next one."
+app = typer.Typer(cls=_InOrder, add_completion=False, invoke_without_command=True, pretty_exceptions_enable=False, rich_markup_mode=None, help=_HELP)
 
 Json = Annotated[bool, typer.Option("--json", help="One JSON document on standard output, nothing else there.")]
 Out = Annotated[Optional[Path], typer.Option("--out", help="Run folder (default runs/<experiment name>).")]  # noqa: UP045 - typer reads it
@@ -119,7 +145,7 @@ def check(experiment: ExperimentPath, trust: Trust = False, as_json: Json = Fals
     elif not quiet:
         from .terminal import show_check
 
-        show_check(document)
+        show_check(document, spec)
     if not document["ok"]:
         raise typer.Exit(1)
 
@@ -162,25 +188,27 @@ def _suspect(text: str) -> tuple[str, str]:
 
 @app.command()
 def compare(
-    experiments: Annotated[list[Path], typer.Argument(metavar="EXPERIMENT...", help="One or more experiments with the same test logs.")],
+    experiments: Annotated[list[Path], typer.Argument(metavar="EXPERIMENT...", help="One or more experiments with the same test logs; a run folder or a step's stands for its own.")],
     trust: Trust = False, as_json: Json = False, out: Out = None, quiet: Quiet = False,
 ) -> None:  # fmt: skip
     """Model against measurement on held-out data, and models against each other with standard errors."""
     from . import pipeline, results
     from .comparison import document
 
-    specs = [pipeline.load(path) for path in experiments]
+    # a run folder stands for the experiment that gives the same fit
+    specs = [pipeline.load(path / "experiment.yaml" if (path / "fit.json").is_file() else path) for path in experiments]
     run = results.folder(out or Path("runs") / "-".join(["compare", *(spec.name for spec in specs)]))
     with _progress(quiet or as_json, len(specs)) as progress:
         fits = [pipeline.fit(spec, progress=progress) for spec in specs]
-    found = document(fits, _told_apart(specs))
+    names = [path.name if (path / "fit.json").is_file() else spec.name for path, spec in zip(experiments, specs)]
+    found = document(fits, _told_apart(specs, names))
     results.write_json(run / "compare.json", found)
     if as_json:
         print(json.dumps(found, allow_nan=False))
     elif not quiet:
         from .terminal import show_comparison
 
-        show_comparison(found)
+        show_comparison(found, specs)
     if not all(found.solution.converged for found in fits):
         raise typer.Exit(1)
 
@@ -298,6 +326,9 @@ def simulate(
         for notice in notices:
             print(f"note {notice}")
         print(f"folder: {folder}")
+        from .terminal import next_step
+
+        next_step("diagnose", folder)
 
 
 @app.command()
@@ -332,7 +363,7 @@ def diagnose(
     elif not quiet:
         from .terminal import show_diagnosis
 
-        show_diagnosis(found, said)
+        show_diagnosis(found, said, spec)
     if not found.fit.solution.converged:
         raise typer.Exit(1)
 
@@ -381,6 +412,10 @@ def report(
         print(json.dumps({"report": str(path), "bytes": path.stat().st_size, "verdict": said["verdict"], "diagnosed": said["made"], "run": str(run)}, allow_nan=False))
     elif not quiet:
         print(path)
+        if not opened:
+            from .terminal import next_step
+
+            next_step("report", experiment, "--open")
     if opened:
         import webbrowser
 
@@ -446,6 +481,7 @@ def add(
     """
     from . import loop
 
+    effect, joint = _on_joint(effect, joint)
     with _progress(quiet or as_json, 3) as progress:
         own = {**loop.options(option or []), **({"per": per} if per else {}), **({"except": list(spared)} if spared else {})}
         found = loop.add(experiment, effect, list(joint) if joint else None, own, force=force, progress=progress, out=out)
@@ -460,6 +496,14 @@ def add(
         print(f"sysid: {found.says}", file=sys.stderr)
     if found.refused or not found.after.solution.converged:
         raise typer.Exit(1)
+
+
+def _on_joint(effect: str, joints: list[str] | None) -> tuple[str, list[str] | None]:
+    """stribeck:hip, as `--hide` and `--separate` have it, in two."""
+    from .effect import vocabulary
+
+    name, colon, joint = effect.partition(":")
+    return (name, [joint]) if colon and joint and name in vocabulary() and not joints else (effect, joints)
 
 
 @app.command()
@@ -483,7 +527,7 @@ def discover(
     elif not quiet:
         from .terminal import show_discovery
 
-        show_discovery(said, found.diagnosis, found.said)
+        show_discovery({**said, "commands": found.commands}, found.diagnosis, found.said, spec)
 
 
 @app.command()
@@ -501,7 +545,7 @@ def history(experiment: ExperimentPath, as_json: Json = False, out: Out = None, 
     elif not quiet:
         from .terminal import show_history
 
-        show_history(steps)
+        show_history(steps, spec)
 
 
 @app.command()
@@ -635,9 +679,8 @@ def study_prior(experiment: ExperimentPath, jobs: Jobs = 1, trust: Trust = False
     _finish(found, as_json, quiet, "show_prior", run)
 
 
-def _told_apart(specs) -> list[str]:
-    """Experiments' names, with their folder where two share one, and a number where that does not help."""
-    names = [spec.name for spec in specs]
+def _told_apart(specs, names: list[str]) -> list[str]:
+    """Experiments' names, and those of run folders, with their folder where two share one, and a number where that does not help."""
     names = [f"{spec.folder.resolve().name}/{name}" if names.count(name) > 1 else name for spec, name in zip(specs, names)]
     return [f"{name} ({names[:k].count(name) + 1})" if names.count(name) > 1 else name for k, name in enumerate(names)]
 

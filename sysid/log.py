@@ -175,11 +175,10 @@ def _convert(signals, data: DataSpec, joints, prismatic, where: str, drives) -> 
         signals["tau"] *= np.array([constants[j] if j in logged else 1.0 for j in joints])
     if unit == "rad":
         largest = np.abs(signals["q"]).max(axis=0)
-        for joint, value, slides in zip(joints, largest, prismatic):
-            if not slides and value > DEGREES:
-                warnings.warn(
-                    SysidWarning(f"{where}: joint {joint!r} reaches {value:.4g} rad; if that is degrees, set data.units.position: deg"), stacklevel=3
-                )
+        far = [f"{joint} {value:.4g}" for joint, value, slides in zip(joints, largest, prismatic) if not slides and value > DEGREES]
+        if far:
+            said = f"{where}: angles reach {', '.join(far)} rad; if that is degrees, set data.units.position: deg"
+            warnings.warn(SysidWarning(said), stacklevel=3)
 
 
 def _segments(t, signals, where: str, breaks: Iterable[int] = ()):

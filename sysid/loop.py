@@ -222,7 +222,7 @@ def _forget(run: Path, steps: list[dict]) -> None:
 @dataclass(frozen=True)
 class Discovery:
     """The steps that held-out data support, as the history has them; the fits; the last diagnosis, and its document as `said`;
-    what the search found and was not claimed, with why."""
+    what the search found and was not claimed, with why; what is typed to write what was found into the experiment file."""
 
     steps: list[dict]
     experiment: Experiment
@@ -230,6 +230,7 @@ class Discovery:
     diagnosis: Diagnosis
     said: dict
     refused: list[dict]
+    commands: list[str]
 
 
 def discover(experiment: Experiment, run: Path, *, most: int = 10, progress=None, each: Callable[[dict], None] | None = None) -> Discovery:
@@ -246,9 +247,10 @@ def discover(experiment: Experiment, run: Path, *, most: int = 10, progress=None
     refused = {(r.effect, r.joint): r for r in found.refused}
     for step in steps:
         tell(step)
-    most += len(steps)
+    most, commands = most + len(steps), []
     while found.claims and len(steps) < most:
         for claim in found.claims[: most - len(steps)]:
+            commands.append(claim.head.command)
             fits.append(claim.after)
             with state.locked(run):  # a search that is interrupted keeps the steps that it made
                 steps.append(_record(run, len(steps), claim.after, spelled(claim.head.candidate, claim.head.joint)[0], claim.head.joint))
@@ -265,7 +267,7 @@ def discover(experiment: Experiment, run: Path, *, most: int = 10, progress=None
     with state.locked(run):
         _write_history(run, steps, verdict=said["verdict"], refused=left)
         _forget(run, steps)
-    return Discovery(steps, fits[-1].experiment, fits, found, said, left)
+    return Discovery(steps, fits[-1].experiment, fits, found, said, left, commands)
 
 
 # ---- what the commands say

@@ -1,11 +1,14 @@
 """What the commands print for a person: tables, notices, a progress bar. Computes nothing."""
 
+import json
+import math
 import shlex
 import shutil
 import sys
 import threading
 import time
 from contextlib import contextmanager, suppress
+from pathlib import Path
 
 from rich.console import Console
 from rich.markup import escape
@@ -99,10 +102,10 @@ def show_init(found, file) -> None:
     for look in [*doubts, *found.notes]:
         print("\n".join(text.wrapped(f"LOOK {look}", _width(), "     ")))
     said = f"correct {file} where this is wrong" if doubts or found.notes else ""
-    _next("check", file.parent, first=said)
+    next_step("check", file.parent, first=said)
 
 
-def _next(command: str, *words, first: str = "") -> None:
+def next_step(command: str, *words, first: str = "") -> None:
     """The last line of a command: what is typed next, and what comes before it."""
     if first:
         print("\n".join(text.wrapped(f"{first}; then", _width(), "  ")))
@@ -117,7 +120,9 @@ def show_fit(fit: Fit, document: dict) -> None:
         for joint, slides in zip(fit.joints, robot.prismatic)
     ]  # fmt: skip
     _table(f"{fit.experiment.name}: residual by joint", ["joint", "", "RMS train", "RMS test", "relative test", "R2 test"], rows)
-    print(f"RMS over the rows that count, {document['band']}")
+    print(f"RMS over the rows that count, {document['band']}; relative to the RMS of the joint's own torque")
+    if fit.experiment.data.unused:
+        print(f"of {', '.join(fit.experiment.data.unused)} no torque is used (data.unused)")
     _show_groups(document.get("groups", {}))
     certificate = document["certificate"]
     for own in document["drives"]:
@@ -134,8 +139,7 @@ def show_fit(fit: Fit, document: dict) -> None:
     print(f"global optimum: {'proven' if certificate['globally_optimal'] else 'not proven'}{f' {given}' if given else ''} ({gap})")
     for said in said_of_shapes(fit):
         print(f"  {said}")
-    for name, slope in certificate["at_zero"].items():
-        print(f"  {name} went to zero and is held there (gradient {slope:+.3g})")
+    _show_held(certificate["at_zero"])
     print(f"every body physically possible: {'yes' if document['physically_consistent'] else 'NO'}")
     weak = sum(entry["from_data"] < _LOW for entry in document["parameters"])
     by = "given by the prior rather than the data" if fit.experiment.prior.weight > 0 else "not determined by the data"
@@ -144,6 +148,38 @@ def show_fit(fit: Fit, document: dict) -> None:
     print(document["prior"]["says"])
     _show_notices(document)
     print(f"run folder: {document['run']}")
+    next_step("check" if _doubtful(document, fit.experiment) else "diagnose", _typed(fit.experiment))
+
+
+def _typed(experiment) -> Path:
+    """An experiment as it is typed: its folder, or its file where that has a name of its own."""
+    return experiment.path.parent if experiment.path.name == "config.yaml" else experiment.path
+
+
+def _implausible(document: dict) -> list[str]:
+    return [notice for notice in document["notices"] if notice.startswith("implausible")]
+
+
+def _doubtful(document: dict, experiment) -> bool:
+    """Whether the logs are to be checked first: what came of them cannot be meant, and no check since the experiment file
+    was written found them in order."""
+    said = Path(document["run"]) / "check.json"
+    with suppress(OSError, ValueError, KeyError):
+        if said.stat().st_mtime >= experiment.path.stat().st_mtime and json.loads(said.read_text())["ok"]:
+            return False
+    return bool(_implausible(document))
+
+
+def _show_held(at_zero: dict[str, float]) -> None:
+    """The coefficients that a fit holds at zero, by effect: those of one kind are one line."""
+    joints: dict[str, list[str]] = {}
+    for name in at_zero:
+        effect, _, rest = name.partition(".")
+        joint, _, parameter = rest.rpartition(".")
+        joints.setdefault(f"{effect} {parameter}", []).append(joint)
+    for kind, own in joints.items():
+        words = f"  {kind} went to zero and is held there, below which it cannot be, on {', '.join(own)}"
+        print("\n".join(text.wrapped(words, _width(), "    ")))
 
 
 def _show_groups(groups: dict) -> None:
@@ -171,13 +207,18 @@ def _show_filter(chosen: dict) -> None:
     if not chosen["held_out"]:
         print(f"filter: {chosen['filter']}")
         return
-    shown = ", ".join(f"{entry[key]:g} {unit}: {100 * entry['relative_error']:.2f} %" for entry in chosen["held_out"])
-    print(f"filter: {chosen['filter']}, {key} {chosen[key]:g} {unit} ({chosen['chosen']}); held-out error within the training logs, {shown}")
+    values = [entry[key] for entry in chosen["held_out"]]
+    at = values.index(chosen[key]) if chosen[key] in values else None
+    near = chosen["held_out"] if at is None else chosen["held_out"][max(at - 1, 0) : at + 2]  # the others are in fit.json
+    shown = ", ".join(f"{entry[key]:g} {unit}: {100 * entry['relative_error']:.2f} %" for entry in near)
+    words = f"filter: {chosen['filter']}, {key} {chosen[key]:g} {unit} ({chosen['chosen']}); held-out error within the training logs, {shown}"
+    print("\n".join(text.wrapped(words, _width(), "  ")))
 
 
-def show_check(document: dict) -> None:
+def show_check(document: dict, experiment) -> None:
     """Every fault of the logs with its cure, the gravest first."""
     print("\n".join(faults.lines(document, _width())))
+    next_step("fit" if document["ok"] else "check", _typed(experiment), first="" if document["ok"] else f"correct {experiment.path} or the logs")
 
 
 _NEVER = 0.05  # probability below which a motion is no answer
@@ -213,7 +254,7 @@ def show_design(document: dict) -> None:
     print(f"folder: {document['run']}")
 
 
-def show_comparison(document: dict) -> None:
+def show_comparison(document: dict, experiments) -> None:
     """RMS of every experiment and the differences with their standard errors."""
     joints = list(dict.fromkeys(joint for entry in document["experiments"] for joint in entry["rms_test"]))
     rows = [
@@ -225,6 +266,11 @@ def show_comparison(document: dict) -> None:
         se = "unknown: too few blocks" if entry["se"] is None else f"{entry['se']:.2g}"
         print(f"{entry['joint']}: {entry['from']} -> {entry['to']} {entry['delta_rms']:+.4g} (standard error {se})")
     _show_notices(document)
+    errors = [entry["relative_error"]["*"] for entry in document["experiments"]]
+    own = [k for k, one in enumerate(experiments) if not (one.folder / "fit.json").is_file()]  # not what is a run's
+    if own:
+        best = min(own, key=lambda k: float("inf") if errors[k] is None else errors[k])
+        next_step("diagnose", _typed(experiments[best]))
 
 
 def _table(title: str, heads: list[str], rows: list[list[str]]) -> None:
@@ -244,17 +290,39 @@ def _four(value: float | None) -> str:
     return "-" if value is None else f"{value:.4f}"
 
 
-def show_diagnosis(found, document: dict) -> None:
+def show_diagnosis(found, document: dict, experiment=None) -> None:
     """The verdict in words, then what it rests on."""
     of, width = text.told(found, document), _width()
+    _show_warnings(document)
     _show_verdict(of, width)
     parts = [tables.errors(of, width), tables.suspects(document, width), tables.events(document, width), tables.fails(document, width)]
-    for lines in [*parts, tables.shown(document, found.fit.joints, width)]:
+    for lines in [*parts, tables.sizes(document, found.fit.joints, width)]:
         if lines:
             print("\n" + "\n".join(lines))
     print()
-    _show_notices(document)
+    _show_notices({"notices": [n for n in document["notices"] if n not in _implausible(document)]})
     print(f"run folder: {document['run']}")
+    if experiment is not None:
+        _after_diagnosis(document, experiment)
+
+
+def _show_warnings(document: dict) -> None:
+    """First what makes all the rest doubtful."""
+    if _implausible(document):
+        _show_notices({"notices": _implausible(document)})
+        print()
+
+
+def _after_diagnosis(document: dict, experiment) -> None:
+    """What is typed next: what checks logs that cannot be meant, the first addition, or the page with all of it."""
+    commands = [c for v in document["verdict"] for c in v.get("commands", ())]
+    first = min((f for f in document["findings"] if f["command"] in commands and f["joins_as_step"]), key=lambda f: f["joins_as_step"], default=None)
+    if _doubtful(document, experiment):
+        next_step("check", _typed(experiment))
+    elif first is not None:
+        print(f"next: {first['command']}")
+    else:
+        next_step("report", _typed(experiment), "--open")
 
 
 def _width() -> int:
@@ -325,7 +393,7 @@ def show_added(document: dict) -> None:
     """The held-out error before and after an effect."""
     before, after = document["rms_test_before"], document["rms_test_after"]
     rows = [
-        [d["joint"], _level(before[d["joint"]]), _level(after[d["joint"]]), f"{d['delta_rms']:+.4g}", "-" if d["se"] is None else f"{d['se']:.2g}"]
+        [d["joint"], _level(before[d["joint"]]), _level(after[d["joint"]]), f"{d['delta_rms']:+.{_decimals(before[d['joint']])}f}", "-" if d["se"] is None else f"{d['se']:.2g}"]
         for d in document["differences"]
     ]  # fmt: skip
     _table(f"held-out RMS without and with {document['added']}", ["joint", "before", "after", "change", "standard error"], rows)
@@ -336,6 +404,13 @@ def show_added(document: dict) -> None:
     if not document["refused"]:
         print(f"written into {document['experiment']}")
     _show_notices(document)
+    file = Path(document["experiment"])
+    next_step("diagnose", file.parent if file.name == "config.yaml" else file)
+
+
+def _decimals(level: float | None) -> int:
+    """How many decimals four digits of an error have."""
+    return 4 if not level else max(0, 3 - math.floor(math.log10(level)))
 
 
 def show_step(step: dict) -> None:
@@ -345,18 +420,27 @@ def show_step(step: dict) -> None:
     Console().print(f"{escape(what)}: held-out RMS {escape(rms)}", soft_wrap=True, highlight=False)
 
 
-def show_discovery(said: dict, found, document: dict) -> None:
+def show_discovery(said: dict, found, document: dict, experiment=None) -> None:
     """Where a discovery ended."""
     for entry in said["refused"]:
         print(f"not claimed: {entry['effect']} on {entry['joint']}: {entry['why']}")
     _show_verdict(text.told(found, document), _width())
     print(f"steps and experiment files: {said['run']}/steps")
+    if experiment is None:
+        return
+    if not said["commands"]:
+        next_step("report", _typed(experiment), "--open")
+        return
+    print(f"{experiment.path} is as it was; what was found is written into it by")
+    for command in said["commands"][1:]:
+        print(f"  {command}")
+    print(f"next: {said['commands'][0]}")
 
 
 _LONGEST_BAR = 20  # twice the error of the start, or more
 
 
-def show_history(steps: list[dict]) -> None:
+def show_history(steps: list[dict], experiment) -> None:
     """The steps, one a line, and the error of each joint as a falling row of bars."""
     joints, first = list(steps[0]["rms_test"]), steps[0]["rms_test"]
 
@@ -370,6 +454,7 @@ def show_history(steps: list[dict]) -> None:
         for number, step in enumerate(steps)
     ]  # fmt: skip
     _table("held-out RMS [N m, or N on a prismatic joint]", ["step", *joints], rows)
+    next_step("diagnose", _typed(experiment))
 
 
 def show_export(found) -> None:
@@ -380,7 +465,14 @@ def show_export(found) -> None:
 
 
 def show_effects(found: list[dict]) -> None:
-    """The catalogue, one block an effect."""
+    """The catalogue, a line an effect; of one alone all that is known."""
+    if len(found) > 1:
+        left = max(len(effect["name"]) for effect in found)
+        for effect in found:
+            words = f"{effect['name']:<{left}}  {effect['summary'].partition('. ')[0].rstrip('.')}"
+            print("\n".join(text.wrapped(words, _width(), " " * (left + 2))))
+        print("next: sysid effects NAME")
+        return
     for effect in found:
         print(f"{effect['name']}: {effect['summary']}")
         print(f"  kind         {effect['kind']}, of {'the whole robot' if effect['scope'] == 'robot' else 'a joint'}")
@@ -449,4 +541,5 @@ def show_prior(document: dict, run) -> None:
 def _show_notices(document: dict) -> None:
     console = Console()
     for notice in document["notices"]:
-        console.print(f"[yellow]note[/yellow] {escape(notice)}", soft_wrap=True, highlight=False)
+        lines = escape("\n".join(text.wrapped(f"note {notice}", _width(), "  "))).removeprefix("note")
+        console.print(f"[yellow]note[/yellow]{lines}", soft_wrap=True, highlight=False)

@@ -102,11 +102,25 @@ def fails(document: dict, width: int) -> list[str]:
     status = {v["joint"]: v["status"] for v in document["verdict"]}
     out = []
     for entry in document["fails_where"]:
-        if entry["words"] and status[entry["joint"]] not in ("complete", "explained"):
-            out += wrapped(
-                f"where {entry['joint']} fails: {'; '.join(entry['words'])}", width, "  "
-            )
+        # what is named elsewhere, or named, is better told by its effect; the first is the sharpest
+        if entry["words"] and status[entry["joint"]] in ("unresolved", "unknown"):
+            out += wrapped(f"where {entry['joint']} fails: {entry['words'][0]}", width, "  ")
     return out
+
+
+_SCREEN = 24  # lines of a terminal: a longer table drives the verdict off it
+
+
+def sizes(document: dict, joints: Sequence[str], width: int) -> list[str]:
+    """The smallest sizes that would have been named, where they fit on a screen; else where they
+    stand."""
+    lines = shown(document, joints, width)
+    if len(lines) <= _SCREEN:
+        return lines
+    effects = len({d["effect"] for d in document["detectable"]})
+    words = f"what these logs could have shown, the smallest size of {effects} effects on "
+    words += f"{len(joints)} joints: a table of the report, and `detectable` in diagnosis.json"
+    return wrapped(words, width, "  ")
 
 
 def shown(document: dict, joints: Sequence[str], width: int) -> list[str]:
@@ -137,8 +151,12 @@ def shown(document: dict, joints: Sequence[str], width: int) -> list[str]:
         words = f"  {', '.join(shaped)}: at the values of their shape that show them best"
         out += wrapped(words, width, "    ")
     somewhere = {effect for effect, *_ in sizes}
-    if never := [e for e in dict.fromkeys(e for e, _ in absorbed) if e not in somewhere]:
-        out += wrapped(f"  at no size on any joint: {', '.join(never)}", width, "    ")
+    named = {f["effect"] for f in document["findings"] if f["joins_as_step"]}
+    for other in (False, True):
+        every = dict.fromkeys(e for e, _ in absorbed if (e in named) is other)
+        if never := [e for e in every if e not in somewhere]:
+            where = "another joint than named" if other else "any joint"
+            out += wrapped(f"  at no size on {where}: {', '.join(never)}", width, "    ")
     return out
 
 
