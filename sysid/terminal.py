@@ -20,7 +20,7 @@ from .estimate import Fit
 from .export import exported
 from .given_shapes import given_shapes, said_of_shapes
 from .init.text import flow
-from .statement import faults, tables, text
+from .statement import faults, sizes, tables, text
 
 _LOW = 0.1  # below this share the prior, not the data, gave a parameter
 
@@ -296,7 +296,7 @@ def show_diagnosis(found, document: dict, experiment=None) -> None:
     _show_warnings(document)
     _show_verdict(of, width)
     parts = [tables.errors(of, width), tables.suspects(document, width), tables.events(document, width), tables.fails(document, width)]
-    for lines in [*parts, tables.sizes(document, found.fit.joints, width)]:
+    for lines in [*parts, sizes.fitting(document, found.fit.joints, width)]:
         if lines:
             print("\n" + "\n".join(lines))
     print()

@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 
-from sysid import check, config, pipeline
+from sysid import check, config, pipeline, terminal
+from sysid import cli as commands
 from sysid.check.faults import masses
 from sysid.check.look import looked
 from sysid.errors import meant
-from sysid.statement import faults
+from sysid.statement import faults, sizes
 from tests.conftest import JOINTS, csv
 
 BOTH = ("shoulder", "elbow")
@@ -157,6 +158,80 @@ def test_what_is_no_yaml_has_a_cure(text, told, tmp_path):
 def test_a_command_line_that_lacks_something_says_what_to_type(experiment, cli, words, told):
     experiment()
     cli(*words).complains(*told)
+
+
+# ---- the last line
+
+
+def last(cli, *words, out=None):
+    said = cli(*words, out=out)
+    assert said.status in (0, 1), said.err
+    return said.out.splitlines()[-1]
+
+
+def test_every_command_ends_with_the_next_one(experiment, cli, tmp_path):
+    folder, run = experiment(), tmp_path / "run"
+    assert last(cli, "check", folder) == f"next: sysid fit {folder}"
+    assert last(cli, "fit", folder) == f"next: sysid diagnose {folder}"
+    assert last(cli, "add", folder, "torque_bias:elbow", "--force") == f"next: sysid diagnose {folder}"
+    assert "torque_bias: {joints: [elbow]}" in (folder / "config.yaml").read_text()
+    assert last(cli, "history", folder) == f"next: sysid diagnose {folder}"
+    assert last(cli, "compare", folder, run / "steps/00-start", out=tmp_path / "two") == f"next: sysid diagnose {folder}"
+    assert last(cli, "simulate", folder, "--duration", "4", "--rate", "250", out=tmp_path / "sim") == f"next: sysid diagnose {tmp_path / 'sim'}"
+    assert last(cli, "effects") == "next: sysid effects NAME"
+
+
+def test_a_run_folder_stands_for_its_experiment_in_a_comparison(experiment, cli, tmp_path):
+    folder = experiment()
+    cli("add", folder, "torque_bias", "--joint", "elbow", "--force")
+    said = cli("compare", tmp_path / "run/steps/00-start", folder, out=tmp_path / "two")
+    assert said.status == 0 and "00-start -> experiment" in said.out
+    cli("fit", tmp_path / "run", out=tmp_path / "other").complains("a run folder, and no experiment", "experiment.yaml")
+
+
+def test_logs_that_cannot_be_meant_are_checked_next_and_that_only_once(experiment, cli):
+    """A check that finds the logs in order is not asked for again."""
+    folder = experiment(test=lambda c: c | {f"tau_{j}": -c[f"tau_{j}"] for j in JOINTS})
+    assert last(cli, "fit", folder) == f"next: sysid check {folder}"
+    assert last(cli, "check", folder) in (f"next: sysid fit {folder}", f"next: sysid check {folder}")
+    (folder.parent / "run/check.json").write_text('{"ok": true, "faults": []}')
+    assert last(cli, "fit", folder) == f"next: sysid diagnose {folder}"
+
+
+def test_what_is_held_at_zero_is_a_line_an_effect(capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "200")
+    terminal._show_held({f"viscous.j{k}.Fv": 1.0 for k in range(7)} | {"armature.arm.left.Ia": 2.0})
+    lines = capsys.readouterr().out.splitlines()
+    assert len(lines) == 2 and lines[0].endswith("on j0, j1, j2, j3, j4, j5, j6") and lines[1].endswith("on arm.left")
+
+
+def test_a_wide_table_of_sizes_is_named_and_not_printed():
+    said = {"detectable": [], "absorbed": [], "findings": []}
+    for joint in (own := [f"a_joint_with_a_name_{k}" for k in range(6)]):
+        said["detectable"].append({"effect": "spring", "joint": joint, "parameter": "k", "unit": "N m/rad", "size": 1.0, "at": {}})
+    assert "1 effects on 6 joints: a table of the report" in " ".join(" ".join(sizes.fitting(said, own, 80)).split())
+    assert sizes.fitting(said, own, 300) == sizes.shown(said, own, 300)
+
+
+def test_an_effect_that_is_named_is_not_said_to_be_at_no_size_on_any_joint():
+    said = {
+        "detectable": [{"effect": "spring", "joint": "a", "parameter": "k", "unit": "", "size": 1.0, "at": {}}],
+        "absorbed": [{"effect": effect, "joint": "a"} for effect in ("delay", "payload")],
+        "findings": [{"effect": "delay", "joint": "b", "joins_as_step": 1}],
+    }
+    lines = sizes.shown(said, ["a", "b"], 100)
+    assert "  at no size on any joint: payload" in lines and "  at no size on another joint than named: delay" in lines
+
+
+def test_no_help_is_cut(cli, capfd, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    monkeypatch.setattr("sys.argv", ["sysid", "--help"])
+    with pytest.raises(SystemExit):
+        commands.main()
+    said = capfd.readouterr().out
+    assert "..." not in said.partition("Commands:")[2] and max(map(len, said.splitlines())) <= 80 and "sysid init FOLDER" in said
+    assert said.index("  init ") < said.index("  check ") < said.index("  fit ") < said.index("  diagnose ") < said.index("  add ")
+    assert set(commands._SHORT) == {c.name or c.callback.__name__ for c in commands.app.registered_commands} | {"study"}
 
 
 # ---- masses that the log cannot show

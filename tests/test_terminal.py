@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from sysid.statement import tables, text
+from sysid.statement import sizes, tables, text
 from sysid.terminal import show_diagnosis, show_discovery
 
 JOINTS = ("shoulder_pan_joint_of_the_left_arm", "rail", "j3", "j4", "j5")
@@ -165,14 +165,14 @@ def test_no_name_is_cut_and_commands_are_whole(monkeypatch, capsys, columns):
         COMMAND,
         *tables.errors(of(said), columns),
         *tables.suspects(said, columns),
-        *tables.shown(said, JOINTS, columns),
+        *sizes.shown(said, JOINTS, columns),
     }
     wide |= {line for line in out.splitlines() if line.startswith("sysid design ")}
     assert any("--separate" in line for line in wide)
     assert not [line for line in out.splitlines() if len(line) > columns and line not in wide]
     for entry in said["verdict"]:
         assert f"{entry['joint']}: {entry['status']}" in " ".join(out.split())
-    for block in (tables.errors(of(said), columns), tables.shown(said, JOINTS, columns)):
+    for block in (tables.errors(of(said), columns), sizes.shown(said, JOINTS, columns)):
         assert all(any(name in line for line in block) for name in JOINTS)
 
 
@@ -228,16 +228,16 @@ def test_tables_say_what_is_not_known():
     (rail,) = [line.split() for line in errors if line.startswith("  rail ")]
     assert rail == ["rail", "N", "0.3", "0.4", "0.11", "not", "known"]
     assert "  noise floor of rail: not determined: 2 s are too short" in errors
-    sizes = tables.shown(said, JOINTS, 80)
-    rows = [line for line in sizes if line.startswith("  spring k [N m/rad]")]
+    shown = sizes.shown(said, JOINTS, 80)
+    rows = [line for line in shown if line.startswith("  spring k [N m/rad]")]
     # in parts, each with the effect's name
     assert [row.removeprefix("  spring k [N m/rad]").split() for row in rows] == [
         ["0.012", "0.12", "1.2", "12"],
         ["120"],
     ]
     assert (
-        "  of the whole robot: gravity_tilt roll [rad] 0.011" in sizes
-        and "  at no size on any joint: elasticity" in sizes
+        "  of the whole robot: gravity_tilt roll [rad] 0.011" in shown
+        and "  at no size on any joint: elasticity" in shown
     )
     events = tables.events(said, 80)
     assert (

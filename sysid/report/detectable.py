@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..estimate import Fit
-from ..statement.tables import size
+from ..statement.sizes import size
 from ..statement.words import followed
 from .section import Section
 from .verdict import left_words

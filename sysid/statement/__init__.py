@@ -3,6 +3,7 @@
 document.py  the JSON document
 text.py      the verdict on each joint, in lines
 tables.py    what it rests on, in tables
+sizes.py     what logs could have shown, as a table
 faults.py    what `sysid check` found, in lines
 changes.py   the JSON document of what changed on a new log
 """

@@ -1,4 +1,4 @@
-"""What a verdict rests on, as tables of plain text: errors, suspects, events, detectable sizes.
+"""What a verdict rests on, as tables of plain text: errors, suspects, events.
 
 A table is as wide as what stands in it: no name is ever cut.
 """
@@ -106,79 +106,6 @@ def fails(document: dict, width: int) -> list[str]:
         if entry["words"] and status[entry["joint"]] in ("unresolved", "unknown"):
             out += wrapped(f"where {entry['joint']} fails: {entry['words'][0]}", width, "  ")
     return out
-
-
-_SCREEN = 24  # lines of a terminal: a longer table drives the verdict off it
-
-
-def sizes(document: dict, joints: Sequence[str], width: int) -> list[str]:
-    """The smallest sizes that would have been named, where they fit on a screen; else where they
-    stand."""
-    lines = shown(document, joints, width)
-    if len(lines) <= _SCREEN:
-        return lines
-    effects = len({d["effect"] for d in document["detectable"]})
-    words = f"what these logs could have shown, the smallest size of {effects} effects on "
-    words += f"{len(joints)} joints: a table of the report, and `detectable` in diagnosis.json"
-    return wrapped(words, width, "  ")
-
-
-def shown(document: dict, joints: Sequence[str], width: int) -> list[str]:
-    """The smallest sizes that the logs would have named, effects down and joints across."""
-    sizes: dict[tuple[str, str, str], dict[str, str]] = {}
-    for d in document["detectable"]:
-        sizes.setdefault((d["effect"], d["parameter"], d["unit"]), {})[d["joint"]] = size(d["size"])
-    absorbed = {(a["effect"], a["joint"]): "-" for a in document["absorbed"]}
-    if not sizes and not absorbed:
-        return []
-    out = ["what these logs could have shown: the smallest size named nine times in ten"]
-    own = {
-        # no cell: the effect is in the model already
-        _label(key): [cells.get(j, absorbed.get((key[0], j), "")) for j in joints]
-        for key, cells in sizes.items()
-        if set(cells) != {"*"}
-    }
-    for some in _parts(own, joints, width):
-        rows = [[effect, *(cells[k] for k in some)] for effect, cells in own.items()]
-        out += columns(["", *(joints[k] for k in some)], [r for r in rows if any(r[1:])], 1)
-    if whole := [f"{_label(key)} {cells['*']}" for key, cells in sizes.items() if "*" in cells]:
-        out += wrapped(f"  of the whole robot: {'; '.join(whole)}", width, "    ")
-    if any("-" in cells for cells in own.values()):
-        words = "-: at no size, as other parameters take its place; "
-        words += "`sysid effects NAME` says what shows it"
-        out += wrapped(f"  {words}", width, "    ")
-    if shaped := dict.fromkeys(d["effect"] for d in document["detectable"] if d["at"]):
-        words = f"  {', '.join(shaped)}: at the values of their shape that show them best"
-        out += wrapped(words, width, "    ")
-    somewhere = {effect for effect, *_ in sizes}
-    named = {f["effect"] for f in document["findings"] if f["joins_as_step"]}
-    for other in (False, True):
-        every = dict.fromkeys(e for e, _ in absorbed if (e in named) is other)
-        if never := [e for e in every if e not in somewhere]:
-            where = "another joint than named" if other else "any joint"
-            out += wrapped(f"  at no size on {where}: {', '.join(never)}", width, "    ")
-    return out
-
-
-def _label(key: tuple[str, str, str]) -> str:
-    effect, parameter, unit = key
-    return f"{effect} {parameter}" + ("" if unit in ("", "1") else f" [{unit}]")
-
-
-def _parts(rows: dict, joints: Sequence[str], width: int) -> list[list[int]]:
-    """Places of joints, as many together as stand in the width beside the names of the rows."""
-    first = 2 + max(map(len, rows), default=0)
-    parts: list[list[int]] = [[]] if rows else []
-    for k in range(len(joints) if rows else 0):
-        if parts[-1] and first + sum(2 + max(len(joints[i]), 6) for i in [*parts[-1], k]) > width:
-            parts.append([])
-        parts[-1].append(k)
-    return parts
-
-
-def size(value: float) -> str:
-    """Two digits, without an exponent where that is short."""
-    return f"{value:.2g}" if not 10 <= abs(value) < 1e5 else f"{float(f'{value:.2g}'):.0f}"
 
 
 def level(value: float | None) -> str:
