@@ -541,7 +541,7 @@ def jittered(columns):
 
 
 NOTICES = {
-    "degrees under rad": (degrees, ["joint 'shoulder' reaches", "joint 'elbow' reaches", "data.units.position: deg"]),
+    "degrees under rad": (degrees, ["angles reach shoulder ", ", elbow ", "data.units.position: deg"]),
     "truncated last row": (lambda c: csv(c)[:-30], ["the last row is truncated and was dropped"]),
     "last cell broken off": (lambda c: csv(c).rsplit(",", 1)[0] + ",-", ["the last row is truncated and was dropped"]),
     "irregular sampling": (jittered, ["were resampled to a uniform 0.005"]),

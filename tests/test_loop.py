@@ -406,7 +406,7 @@ def discoveries(monkeypatch, arm_model, claims=(("joint_coupling", "torque_bias"
         found, last = [], fit or fake_fit(spec)
         for word in rounds.pop(0) if rounds else ():
             last = fake_fit(grown(last.experiment, *spelled(words[word], "elbow")))
-            found.append(SimpleNamespace(head=SimpleNamespace(candidate=words[word], joint="elbow"), after=last))
+            found.append(SimpleNamespace(head=SimpleNamespace(candidate=words[word], joint="elbow", command=f"sysid add arm {word} --joint elbow"), after=last))
         return SimpleNamespace(fit=fit or fake_fit(spec), claims=tuple(found), refused=tuple(refused))
 
     monkeypatch.setattr(loop, "diagnose", fake_diagnose)
