@@ -500,7 +500,7 @@ def add(
 
 def _on_joint(effect: str, joints: list[str] | None) -> tuple[str, list[str] | None]:
     """stribeck:hip, as `--hide` and `--separate` have it, in two."""
-    from .effect import vocabulary
+    from .vocabulary import vocabulary
 
     name, colon, joint = effect.partition(":")
     return (name, [joint]) if colon and joint and name in vocabulary() and not joints else (effect, joints)
