@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .blocks import jackknife, numbered, summed
+from .blocks import Numbering, extents, jackknife, summed
 from .errors import SysidError
 from .estimate import Fit
 from .prediction import Prediction
@@ -125,14 +125,20 @@ def _block_sums(predictions: list[Prediction], columns) -> list[tuple[np.ndarray
     Blocks are of all rows together: a filter that leaves out more at the ends of a log must not
     shift them.
     """
-    t, log = (np.concatenate([getattr(p, name) for p in predictions]) for name in ("t", "log"))
-    number = numbered(t, log, fewest=1)
-    size, out = int(number.max()) + 1, []
-    numbers = np.split(number, [len(predictions[0].t)])
-    for prediction, index, own in zip(predictions, numbers, columns):
-        residual = prediction.residual[:, own]
-        use = np.ones(residual.shape) if prediction.use is None else prediction.use[:, own]
-        out.append((summed(index, residual**2, size), summed(index, use, size)))
+    ends: dict[int, tuple[float, float]] = {}
+    for part in (part for prediction in predictions for part in prediction.parts()):
+        for log, (first, last) in extents(part.t, part.log).items():
+            before = ends.get(log, (first, last))
+            ends[log] = min(first, before[0]), max(last, before[1])
+    known, out = Numbering.of(dict(sorted(ends.items())), fewest=1), []
+    for prediction, own in zip(predictions, columns):
+        squares = counts = np.zeros((known.size, len(own)))
+        for part in prediction.parts():
+            number, residual = known.numbered(part.t, part.log), part.residual[:, own]
+            use = np.ones(residual.shape) if part.use is None else part.use[:, own]
+            squares = squares + summed(number, residual**2, known.size)
+            counts = counts + summed(number, use, known.size)
+        out.append((squares, counts))
     return out
 
 

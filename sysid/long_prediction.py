@@ -61,6 +61,17 @@ class LongPrediction(Prediction):
         object.__setattr__(self, "_greatest", -np.sort(-greatest, axis=0)[:_GREATEST])
         object.__setattr__(self, "_samples", self._samples + part.samples)
 
+    def parts(self):
+        """As of `Prediction`."""
+        import polars as pl
+
+        for path in self.files:
+            table = pl.read_parquet(path)
+            taken = lambda word, own=table: own.select([f"{word}_{j}" for j in self.joints]).to_numpy()  # noqa: E731
+            use = taken("used") if self.masked else None
+            times = table["log"].to_numpy(), table["t"].to_numpy()
+            yield Prediction(*times, taken("measured"), taken("predicted"), use, self.joints, self.units)
+
     def lazy(self):
         """As of `Prediction`."""
         import polars as pl

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -65,6 +65,10 @@ class Prediction:
             columns |= {f"measured_{joint}": self.measured[:, k], f"predicted_{joint}": self.predicted[:, k]}
             columns |= {} if self.use is None else {f"used_{joint}": self.use[:, k]}
         return polars.DataFrame(columns)
+
+    def parts(self) -> Iterator[Prediction]:
+        """The prediction in parts that fit in memory, in order."""
+        yield self
 
     def lazy(self):
         """`to_dataframe` as polars' lazy frame: of what is in files nothing is read."""

@@ -13,6 +13,7 @@ from sysid import (
     experiment_logs,
     long_log,
     long_motion,
+    long_prediction,
     outliers,
     pipeline,
     preprocess,
@@ -230,3 +231,18 @@ def test_a_false_event_is_as_seldom_in_all_spans_as_in_one_log():
             hit.append(any(outliers.spikes(struck, among=among)))
         found.append(size[np.argmax(hit)])
     assert size[0] < found[0] < found[1] < size[-1]
+
+
+def test_models_are_compared_on_logs_in_spans_as_on_logs_as_one(monkeypatch):
+    """And no prediction is read into memory whole."""
+    spec = experiment(preprocess=EVERY_ROW)
+    less = spec.model.model_copy(update={"effects": spec.model.effects[:1]})
+    specs = spec.model_copy(update={"model": less}), spec
+    whole = sysid.compare(*(sysid.fit(one, filters={}) for one in specs), ("less", "more"))
+    monkeypatch.setattr(spans, "SPAN", 1100)
+    found = [sysid.fit(one, filters={}) for one in specs]
+    assert len(found[0].predictions["test"].files) > 2
+    monkeypatch.delattr(long_prediction.LongPrediction, "__getattr__")
+    for one, other in zip(whole, sysid.compare(*found, ("less", "more")), strict=True):
+        assert other.delta_rms == pytest.approx(one.delta_rms, rel=1e-9) and one.se > 0.0
+        assert other.se == pytest.approx(one.se, rel=1e-9)

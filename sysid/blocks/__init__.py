@@ -19,13 +19,25 @@ from .deviations import (
     standard_error,
     z_score,
 )
-from .numbering import FEWEST, MOST, SHORTEST, divided, folds, memory, numbered, summed
+from .numbering import (
+    FEWEST,
+    MOST,
+    SHORTEST,
+    Numbering,
+    divided,
+    extents,
+    folds,
+    memory,
+    numbered,
+    summed,
+)
 from .parameters import covariance, widening
 from .rivals import SAME, chances, confidence_set, within_one_error
 
 __all__ = [
     "FEWEST",
     "MOST",
+    "Numbering",
     "SAME",
     "SHORTEST",
     "chances",
@@ -33,6 +45,7 @@ __all__ = [
     "covariance",
     "divided",
     "even",
+    "extents",
     "folds",
     "jackknife",
     "memory",

@@ -3,6 +3,9 @@ remembers."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass
+
 import numpy as np
 
 # s: several times the memory of the filters in use (0.05 to 0.1 s) and of a joint's friction loop
@@ -36,15 +39,49 @@ def numbered(
         t: (n,) [s]. piece: (n,) number of the contiguous piece of each row.
         memory, shortest, fewest: as of `divided`, in seconds.
     """
-    out, first = np.zeros(len(t), dtype=int), 0
-    pieces = [np.flatnonzero(piece == number) for number in np.unique(piece)]
-    spans = [np.ptp(t[own]) for own in pieces]
-    counts = divided(spans, memory=memory, shortest=shortest, fewest=fewest)
-    for own, span, count in zip(pieces, spans, counts):
-        where = ((t[own] - t[own].min()) * (count / max(span, 1e-9))).astype(int)
-        out[own] = first + np.minimum(where, count - 1)
-        first += count
-    return out
+    known = Numbering.of(extents(t, piece), memory=memory, shortest=shortest, fewest=fewest)
+    return known.numbered(t, piece)
+
+
+def extents(t, piece) -> dict[int, tuple[float, float]]:
+    """{number: (first, last time [s])} of each contiguous piece (n,) among rows at t (n,)."""
+    own = {int(number): t[piece == number] for number in np.unique(piece)}
+    return {number: (float(at.min()), float(at.max())) for number, at in own.items()}
+
+
+@dataclass(frozen=True)
+class Numbering:
+    """The blocks of rows that need not be at hand together: of each piece, the number of its first
+    block, when it begins [s], how long it is, and how many blocks it has."""
+
+    pieces: dict[int, tuple[int, float, float, int]]
+
+    @staticmethod
+    def of(extents: Mapping[int, tuple[float, float]], **how) -> Numbering:
+        """Of pieces' extents, as `extents` tells them.
+
+        Args:
+            how: as of `divided`.
+        """
+        spans = [last - first for first, last in extents.values()]
+        counts = divided(spans, **how)
+        firsts = np.cumsum([0, *counts]).tolist()
+        known = zip(extents.items(), firsts, spans, counts)
+        return Numbering({k: (first, t, span, n) for (k, (t, _)), first, span, n in known})
+
+    @property
+    def size(self) -> int:
+        """How many blocks there are."""
+        return sum(count for *_, count in self.pieces.values())
+
+    def numbered(self, t, piece) -> np.ndarray:
+        """The block (n,) of some rows: t (n,) [s], and the piece (n,) that each is of."""
+        out = np.zeros(len(t), dtype=int)
+        for number in np.unique(piece).tolist():
+            own, (first, begin, span, count) = piece == number, self.pieces[number]
+            where = ((t[own] - begin) * (count / max(span, 1e-9))).astype(int)
+            out[own] = first + np.minimum(where, count - 1)
+        return out
 
 
 def memory(values, use, piece, step: float) -> float:
