@@ -123,8 +123,6 @@ def main() -> None:
     parser.add_argument("--json", action="store_true")
     options = parser.parse_args()
     sys.path.insert(0, str(ROOT))
-    from scripts.scale_parts import workers
-
     found = {}
     wanted = [options.only] if options.only else PARTS
     if "time" in wanted:
@@ -134,6 +132,8 @@ def main() -> None:
     if "long" in wanted:
         found["long"] = long(options.samples)
     if "workers" in wanted:
+        from scripts.scale_parts import workers
+
         found["workers"] = workers.measured(options.files, options.each, min(options.repeats, 3))
     if "diagnose" in wanted:
         found["diagnose_over_fit"] = diagnose_over_fit(min(options.repeats, 3))
