@@ -19,6 +19,8 @@ long    A seven-joint arm with friction at 1 kHz, 0.7 million samples and four t
 workers  10 million samples of that arm in 20 files (--files, --each): wall time of `sysid fit` in one process over that of
         `sysid fit --workers 2`, in turns (3 times); and of one of which a worker is killed half-way. At least 1.7 is the aim, equal
         to 1e-10. Needs the extra dask and 2 GB of disk; it says the load that the machine had.
+robots  A robot of a fleet with a long log of that arm, 0.3 and 0.9 million samples: processor time a sample, peak memory, what
+        comes back of it; and the comparison of a thousand robots. What docs/scale.md counts a large fleet's cost by.
 diagnose  The whole `sysid diagnose configs/cheetah3.yaml` process, the whole catalogue on every joint, over `sysid fit` on
         the same experiment, in turns. At most 10 is the aim.
 torque  `torque(q, qd, qdd)` of a seven-joint arm with viscous and Coulomb friction beside a bare `pin.rnea` of its bodies, one
@@ -44,7 +46,7 @@ ROOT = Path(__file__).resolve().parent.parent
 CONFIG = ROOT / "configs" / "cheetah3.yaml"
 LOG = ROOT / "data" / "cheetah3" / "train.parquet"
 TIMES = 50
-PARTS = ["time", "memory", "long", "workers", "diagnose", "torque", "cpu", "solve"]
+PARTS = ["time", "memory", "long", "workers", "robots", "diagnose", "torque", "cpu", "solve"]
 PANDA = "example-robot-data://panda_description/urdf/panda.urdf"
 
 FLOOR = '''
@@ -135,6 +137,10 @@ def main() -> None:
         from scripts.scale_parts import workers
 
         found["workers"] = workers.measured(options.files, options.each, min(options.repeats, 3))
+    if "robots" in wanted:
+        from scripts.scale_parts import robots
+
+        found["robots"] = robots.measured()
     if "diagnose" in wanted:
         found["diagnose_over_fit"] = diagnose_over_fit(min(options.repeats, 3))
     if "torque" in wanted:
@@ -164,6 +170,8 @@ def main() -> None:
         )
     if "workers" in found:
         print(workers.told(found["workers"]))
+    if "robots" in found:
+        print(robots.told(found["robots"]))
     if "diagnose_over_fit" in found:
         entry = found["diagnose_over_fit"]
         print(f"sysid diagnose {entry['diagnose_seconds']:.1f} s / sysid fit {entry['fit_seconds']:.2f} s = {entry['ratio']:.1f} (medians of {entry['runs']})")
@@ -185,7 +193,7 @@ def main() -> None:
         )
 
 
-def _run(command: list[str], told: list[str] | None = None) -> tuple[float, int, float]:
+def run(command: list[str], told: list[str] | None = None) -> tuple[float, int, float]:
     """Wall time [s], peak memory [bytes] and processor time [s] of a process; what it said on standard error is appended to `told`."""
     start = time.perf_counter()
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, env=environment())
@@ -212,8 +220,8 @@ def fit_over_floor(repeats: int) -> dict:
         floor = [sys.executable, "-c", FLOOR, str(ROOT / "data" / "cheetah3" / "leg.urdf"), str(LOG)]
         times: dict[str, list[float]] = {"fit": [], "floor": []}
         for _ in range(repeats + 1):
-            times["floor"].append(_run(floor)[0])
-            times["fit"].append(_run(fit)[0])
+            times["floor"].append(run(floor)[0])
+            times["fit"].append(run(fit)[0])
     medians = {name: statistics.median(values[1:]) for name, values in times.items()}
     return {"ratio": medians["fit"] / medians["floor"], "fit_seconds": medians["fit"], "floor_seconds": medians["floor"]}
 
@@ -225,7 +233,7 @@ def diagnose_over_fit(runs: int) -> dict:
         times: dict[str, list[float]] = {"fit": [], "diagnose": []}
         for _ in range(runs + 1):
             for word, spent in times.items():
-                spent.append(_run(command(word))[0])
+                spent.append(run(command(word))[0])
     medians = {name: statistics.median(values[1:]) for name, values in times.items()}
     return {"ratio": medians["diagnose"] / medians["fit"], "diagnose_seconds": medians["diagnose"], "fit_seconds": medians["fit"], "runs": runs}
 
@@ -271,7 +279,7 @@ def cpu(repeats: int) -> dict:
         times: dict[str, list[float]] = {name: [] for name in commands}
         for _ in range(repeats + 1):
             for name, command in commands.items():
-                times[name].append(_run(command)[2])
+                times[name].append(run(command)[2])
     medians = {name: statistics.median(values[1:]) for name, values in times.items()}
     return {"ratio": medians["python"] / medians["command"], "python_seconds": medians["python"], "command_seconds": medians["command"]}
 
@@ -292,7 +300,7 @@ def memory() -> dict:
             long.write_parquet(path / "train.parquet")
             (path / "long.yaml").write_text(text.replace(f"{ROOT}/data/cheetah3/train.parquet", "train.parquet"))
             samples.append(long.height)
-            peaks.append(_run([sys.executable, "-m", "sysid", "fit", str(path / "long.yaml"), "--quiet", "--out", str(path / "run")])[1])
+            peaks.append(run([sys.executable, "-m", "sysid", "fit", str(path / "long.yaml"), "--quiet", "--out", str(path / "run")])[1])
     growth = (peaks[1] - peaks[0]) / (3 * (samples[1] - samples[0]))
     return {"bytes_per_joint_sample": growth, "samples": samples, "megabytes": [peak / 1e6 for peak in peaks]}
 
@@ -347,9 +355,9 @@ def long(samples: int) -> dict:
                 f"data: {{train: [{count}.parquet], test: [test.parquet], columns: {{time: t, position: 'q_{{joint}}', torque: 'tau_{{joint}}'}}}}\n"
                 "model: {effects: [viscous, coulomb]}\n"
             )
-            runs.append(_run([sys.executable, "-m", "sysid", "fit", str(path / f"{count}.yaml"), "--quiet", "--out", str(path / "run")]))
+            runs.append(run([sys.executable, "-m", "sysid", "fit", str(path / f"{count}.yaml"), "--quiet", "--out", str(path / "run")]))
         said: list[str] = []
-        loop = _run([sys.executable, "-c", LOOP, str(urdf.locate(PANDA, path)), str(path / f"{samples}.parquet")], said)
+        loop = run([sys.executable, "-c", LOOP, str(urdf.locate(PANDA, path)), str(path / f"{samples}.parquet")], said)
     peaks = [1e-6 * run[1] for run in runs]
     return {
         "ratio": runs[1][2] / loop[2], "fit_microseconds": 1e6 * runs[1][2] / samples, "loop_microseconds": 1e6 * loop[2] / samples,

@@ -84,11 +84,18 @@ class Read:
     notices: tuple[str, ...]
 
 
-def read_all(experiment: Experiment) -> Read:
-    """The training and the test logs of an experiment. Raises SysidError."""
+def read_all(experiment: Experiment, *, structure: Model | None = None) -> Read:
+    """The training and the test logs of an experiment.
+
+    Args:
+        structure: as of `read`.
+
+    Raises:
+        SysidError: as `read`.
+    """
     machine = robot.load(experiment.robot, experiment.folder)
     with noticed() as notices:
-        parts = [read(experiment, machine, part) for part in (experiment.data.train, experiment.data.test)]
+        parts = [read(experiment, machine, part, structure=structure) for part in (experiment.data.train, experiment.data.test)]
     return Read(*parts, tuple(notices))
 
 

@@ -63,14 +63,26 @@ class LongPrediction(Prediction):
 
     def parts(self):
         """As of `Prediction`."""
+        return (self._read([path]) for path in self.files)
+
+    def _read(self, paths: list[Path]) -> Prediction:
         import polars as pl
 
-        for path in self.files:
-            table = pl.read_parquet(path)
-            taken = lambda word, own=table: own.select([f"{word}_{j}" for j in self.joints]).to_numpy()  # noqa: E731
-            use = taken("used") if self.masked else None
-            times = table["log"].to_numpy(), table["t"].to_numpy()
-            yield Prediction(*times, taken("measured"), taken("predicted"), use, self.joints, self.units)
+        table = pl.read_parquet(paths)
+        own = lambda word: [f"{word}_{joint}" for joint in self.joints]  # noqa: E731
+        taken = lambda word: table.select(own(word)).to_numpy()  # noqa: E731
+        use = taken("used") if self.masked else None
+        times = table["log"].to_numpy(), table["t"].to_numpy()
+        return Prediction(
+            *times, taken("measured"), taken("predicted"), use, self.joints, self.units, self.states
+        )
+
+    def thinned(self, most: int) -> Prediction:
+        """As of `Prediction`."""
+        many = len(self.files)
+        count = min(max(2, most * many // max(self._samples, 1)), many)
+        chosen = [k * (many - 1) // max(count - 1, 1) for k in range(count)]
+        return self._read([self.files[k] for k in dict.fromkeys(chosen)])
 
     def lazy(self):
         """As of `Prediction`."""

@@ -18,6 +18,7 @@ from itertools import pairwise
 from .segment import Segment
 
 SPAN = 2**18  # rows; at 1 kHz four minutes
+_PARTS = 8  # of a span, where a log is looked at in parts: half a minute
 
 #: (first, last) -> those rows of a stretch without a gap
 Rows = Callable[[int, int], Segment]
@@ -57,6 +58,18 @@ class Spans(Sequence):
         rows, _, _, n = max(self._spans, key=lambda span: span[3])
         return rows(max((n - most) // 2, 0), min((n + most) // 2, n))
 
+    def spread(self, most: int) -> tuple[Segment, ...]:
+        """All rows, a segment for each stretch without a gap; or, where there are more than `most`,
+        about so many in evenly spaced parts, the first and the last among them."""
+        whole = {id(rows): (rows, n) for rows, _, _, n in self._spans}.values()
+        if self.samples <= most:
+            return tuple(rows(0, n) for rows, n in whole)
+        size = SPAN // _PARTS
+        parts = [(rows, own) for rows, n in whole for own in pairwise(edges(n, size))]
+        count = min(max(2, most // size), len(parts))
+        chosen = [k * (len(parts) - 1) // (count - 1) for k in range(count)]
+        return tuple(rows(*own) for rows, own in (parts[k] for k in dict.fromkeys(chosen)))
+
     def step(self, number: int) -> float:
         """Seconds between a span's rows."""
         rows, first, *_ = self._spans[number]
@@ -76,10 +89,10 @@ class Spans(Sequence):
         return replace(rows(begin, end), core=slice(first - begin, last - begin))
 
 
-def edges(n: int) -> list[int]:
-    """Where the spans of n rows begin, and the end: as few as hold `SPAN` rows at most, of equal
-    length."""
-    count = -(-n // SPAN)
+def edges(n: int, most: int | None = None) -> list[int]:
+    """Where the spans of n rows begin, and the end: as few as hold `most` rows at most (`SPAN`), of
+    equal length."""
+    count = -(-n // (most or SPAN))
     return [n * k // count for k in range(count + 1)]
 
 
@@ -99,8 +112,8 @@ def released() -> None:
 
 
 def carried(segments: Sequence[Segment], number: int, margin: int) -> tuple[Sequence[Segment], int]:
-    """Of any log, segments for another process and the number there of one of them, with its margins
-    where it is a span."""
+    """Of any log, segments for another process and the number there of one of them, with its
+    margins where it is a span."""
     if isinstance(segments, Spans):
         return segments.carried(number, margin)
     return (segments[number],), 0

@@ -9,6 +9,7 @@ import numpy as np
 from . import blocks
 from .estimate import Fit
 from .prediction import Prediction
+from .thinning import MOST
 
 _CLEAR = 3.0  # standard errors: one in some hundred joints would be told by chance
 _WORTH = 0.1  # of the training error: what a noise floor may be in doubt by
@@ -53,7 +54,7 @@ def transfers(fit: Fit) -> list[Transfer]:
     Residuals of a log are alike over time: both means are judged over blocks of it, several times as long as their memory,
     by leaving one out (jackknife).
     """
-    train, test = (fit.predictions[part] for part in ("train", "test"))
+    train, test = (fit.predictions[part].thinned(MOST) for part in ("train", "test"))
     spans = tuple(float(np.ptp(train.t[train.log == number])) for number in np.unique(train.log))
     out = []
     for j, joint in enumerate(fit.joints):

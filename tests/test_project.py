@@ -24,7 +24,7 @@ ORDER = [
     "vocabulary", "formula", "effects", "own_effects",
     "per_level", "config", "addition", "model", "drives", "inverse_dynamics", "rows", "objective", "projection", "landscape", "multistart", "source",
     "reduction", "triangles", "linearised", "compress", "interior", "nearby", "certificate", "solve", "prior_weight", "uncertainty", "differences", "prediction", "posed_problem", "given_shapes", "estimate",
-    "long_prediction", "base_parameters", "held_apart", "masses", "plausible", "shape_search", "shape", "bumps", "filters", "results", "shape_refinement", "notices", "experiment_logs",
+    "long_prediction", "base_parameters", "held_apart", "masses", "plausible", "shape_search", "shape", "bumps", "filters", "results", "shape_refinement", "notices", "experiment_logs", "thinning",
     "experiment_file", "yaml_edit", "urdf_export", "gains", "simulate", "rollout", "pipeline", "run", "export", "check", "init", "comparison",
     "transfer", "noise", "candidates", "design", "view", "failures", "unexplained", "shown", "diagnose", "changes", "online", "fleet", "statement", "loop", "report",
     "studies", "studio", "terminal", "cli", "__main__",

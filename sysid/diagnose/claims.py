@@ -11,9 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .. import comparison, experiment_logs, pipeline
+from .. import comparison, pipeline
 from ..addition import grown, spelled
 from ..estimate import Fit
+from ..experiment_logs import Read
 from .findings import Finding, finding, judged_by, nought, parameters, where
 from .refits import Member
 from .steps import Step
@@ -59,12 +60,12 @@ class Refused:
 
 
 def claimed(
-    steps: list[Step], fit: Fit, measured: experiment_logs.Read, tell: Callable[[str, float], None]
+    steps: list[Step], fit: Fit, measured: Read | None, tell: Callable[[str, float], None]
 ) -> tuple[list[Claim], list[Refused]]:
     """Fit each step's head, and the best of what is tied with it, on top of what stands before it.
 
     Args:
-        fit: of the experiment as it is. measured: its logs.
+        fit: of the experiment as it is. measured: its logs; None: read anew.
     """
 
     def with_(last: Fit, member: Member) -> tuple[Fit, Fit]:  # and under the last one's prior

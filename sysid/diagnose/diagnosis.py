@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .. import experiment_logs, pipeline
+from .. import pipeline, thinning
 from ..candidates import candidates, own_effects
 from ..estimate import Fit
 from ..failures import Failure, HeldOut, failures
@@ -77,12 +77,12 @@ def diagnose(
     """
     tell = progress or (lambda stage, share: None)
     experiment = fit.experiment if fit else pipeline.started(experiment)
-    measured, extra = experiment_logs.read_all(experiment), own_effects(experiment)
-    fit = fit or pipeline.fit(experiment, progress=progress, measured=measured)
+    (measured, whole), extra = thinning.read(experiment), own_effects(experiment)
+    fit = fit or pipeline.fit(experiment, progress=progress, measured=whole)
     with noticed():
         view = first_view(fit.experiment, fit, measured.train)
         steps, asked, then_asked, undecided = select.search(view, extra, level=level, tell=tell)
-        claims, refused = claiming.claimed(steps, fit, measured, tell)
+        claims, refused = claiming.claimed(steps, fit, whole, tell)
         refused += [claiming.undecided(choice, fit) for choice in undecided[-1:]]
         after, last = (claims[-1].step.after, claims[-1].after) if claims else (view, fit)
         if (test := lowpassed(measured.test, fit.joints, view.cutoff)) is None:
@@ -95,9 +95,10 @@ def diagnose(
         said = verdicts(fit, claims, after.unknown, found, *more)
         errors = last.rms("test").values()
         levels = np.array([e if f.rms is None else f.rms for f, e in zip(found, errors)])
-        where = failures(first, fit.predictions["test"], levels)
+        where = failures(first, fit.predictions["test"].thinned(thinning.MOST), levels)
         could = detectable(view, asked, candidates(view.model, extra))
-        events, notices = (*view.motion.events, *test.events), tuple(_notices(claims, refused))
+        part = () if whole else measured.notices
+        events, notices = (*view.motion.events, *test.events), (*part, *_notices(claims, refused))
         told = tuple(claims), tuple(said), tuple(could), tuple(where), events, view, first, then
         return Diagnosis(fit, dict(zip(fit.joints, found)), *told, tuple(refused), notices)
 

@@ -88,7 +88,8 @@ def member(experiment: Experiment, name: str, kind: Kind) -> Member:
 
 def _fitted(experiment: Experiment, filters: dict | None) -> tuple[Fit, Motion, Motion]:
     """An experiment's fit, and its training and its test motion."""
-    read = experiment_logs.read_all(experiment)
+    _, structure, _ = pipeline.build(pipeline.started(experiment))
+    read = experiment_logs.read_all(experiment, structure=structure)
     fit = pipeline.fit(experiment, filters=filters, measured=read)
     preprocess = settled(fit.experiment.preprocess, fit.filters)
     return fit, *(prepare(logs, preprocess, fit.joints) for logs in (read.train, read.test))
