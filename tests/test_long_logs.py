@@ -5,9 +5,11 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 import pytest
+from typer.testing import CliRunner
 
 import sysid
 from sysid import (
+    cli,
     config,
     events,
     experiment_logs,
@@ -19,10 +21,12 @@ from sysid import (
     preprocess,
     results,
     spans,
+    thinning,
 )  # fmt: skip
 from sysid import log as logs
 from sysid.events import Event
 from sysid.motion import Pieces
+from sysid.segment import Segment
 
 LEG = Path(__file__).resolve().parent.parent / "configs" / "cheetah3.yaml"
 
@@ -246,3 +250,34 @@ def test_models_are_compared_on_logs_in_spans_as_on_logs_as_one(monkeypatch):
     for one, other in zip(whole, sysid.compare(*found, ("less", "more")), strict=True):
         assert other.delta_rms == pytest.approx(one.delta_rms, rel=1e-9) and one.se > 0.0
         assert other.se == pytest.approx(one.se, rel=1e-9)
+
+
+def test_of_long_logs_stretches_spread_over_them_are_kept(monkeypatch):
+    rows = np.arange(5000.0)[:, None]
+    segment = Segment(1e-3 * np.arange(5000), 1e-3, rows, rows, None, None, {})
+    monkeypatch.setattr(spans, "SPAN", 1000)
+    log = spans.Spans([spans.of_segment(segment)])
+    (whole,) = log.spread(5000)
+    np.testing.assert_array_equal(whole.q, rows)
+    few = log.spread(1000)
+    assert len(few) == 8 and sum(len(one.t) for one in few) == 1000
+    assert few[0].t[0] == 0.0 and few[-1].t[-1] == segment.t[-1]
+    apart = np.diff([one.t[0] for one in few])
+    assert apart.max() < 1.3 * apart.min() and apart.min() > 0.5
+
+
+def test_a_diagnosis_of_a_part_of_the_logs_finds_what_is_missing(tmp_path, monkeypatch):
+    """A long log of which a half is looked at; its claim is fitted on all of it."""
+    hidden = ["--hide", "stribeck:knee:size=2", "--duration", "40", "--out", str(tmp_path)]
+    ran = CliRunner().invoke(cli.app, ["simulate", str(LEG), *hidden])
+    assert ran.exit_code == 0, ran.output
+    for part in ("train", "test"):
+        pl.read_csv(tmp_path / f"{part}.csv").write_parquet(tmp_path / f"{part}.parquet")
+    text = (tmp_path / "config.yaml").read_text()
+    (tmp_path / "config.yaml").write_text(text.replace(".csv", ".parquet"))
+    monkeypatch.setattr(spans, "SPAN", 16_000)
+    monkeypatch.setattr(thinning, "MOST", 20_000)
+    found = sysid.diagnose(sysid.load(tmp_path))
+    assert [(claim.head.effect, claim.head.joint) for claim in found.claims] == [("stribeck", "knee")]
+    assert found.claims[0].after.samples == found.fit.samples
+    assert "was asked of" in found.notices[0]
