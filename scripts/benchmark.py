@@ -21,6 +21,7 @@ workers  10 million samples of that arm in 20 files (--files, --each): wall time
         to 1e-10. Needs the extra dask and 2 GB of disk; it says the load that the machine had.
 robots  A robot of a fleet with a long log of that arm, 0.3 and 0.9 million samples: processor time a sample, peak memory, what
         comes back of it; and the comparison of a thousand robots. What docs/scale.md counts a large fleet's cost by.
+peaks   Peak memory of `fit`, `compare`, `diagnose` and `check` on 0.7 million samples of that arm and on --samples.
 diagnose  The whole `sysid diagnose configs/cheetah3.yaml` process, the whole catalogue on every joint, over `sysid fit` on
         the same experiment, in turns. At most 10 is the aim.
 torque  `torque(q, qd, qdd)` of a seven-joint arm with viscous and Coulomb friction beside a bare `pin.rnea` of its bodies, one
@@ -46,7 +47,7 @@ ROOT = Path(__file__).resolve().parent.parent
 CONFIG = ROOT / "configs" / "cheetah3.yaml"
 LOG = ROOT / "data" / "cheetah3" / "train.parquet"
 TIMES = 50
-PARTS = ["time", "memory", "long", "workers", "robots", "diagnose", "torque", "cpu", "solve"]
+PARTS = ["time", "memory", "long", "workers", "robots", "peaks", "diagnose", "torque", "cpu", "solve"]
 PANDA = "example-robot-data://panda_description/urdf/panda.urdf"
 
 FLOOR = '''
@@ -119,7 +120,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--repeats", type=int, default=7, help="runs of each process; the median counts")
     parser.add_argument("--only", choices=PARTS)
-    parser.add_argument("--samples", type=int, default=2_800_000, help="of the longer log of `long`")
+    parser.add_argument("--samples", type=int, default=2_800_000, help="of the longer log of `long` and `peaks`")
     parser.add_argument("--files", type=int, default=20, help="of `workers`")
     parser.add_argument("--each", type=int, default=500_000, help="samples of each file of `workers`")
     parser.add_argument("--json", action="store_true")
@@ -141,6 +142,10 @@ def main() -> None:
         from scripts.scale_parts import robots
 
         found["robots"] = robots.measured()
+    if "peaks" in wanted:
+        from scripts.scale_parts import memory as peaks
+
+        found["peaks"] = peaks.measured((700_000, options.samples))
     if "diagnose" in wanted:
         found["diagnose_over_fit"] = diagnose_over_fit(min(options.repeats, 3))
     if "torque" in wanted:
@@ -172,6 +177,8 @@ def main() -> None:
         print(workers.told(found["workers"]))
     if "robots" in found:
         print(robots.told(found["robots"]))
+    if "peaks" in found:
+        print(peaks.told(found["peaks"]))
     if "diagnose_over_fit" in found:
         entry = found["diagnose_over_fit"]
         print(f"sysid diagnose {entry['diagnose_seconds']:.1f} s / sysid fit {entry['fit_seconds']:.2f} s = {entry['ratio']:.1f} (medians of {entry['runs']})")
