@@ -25,6 +25,7 @@ from sysid import (
 )  # fmt: skip
 from sysid import log as logs
 from sysid.events import Event
+from sysid.fleet import members
 from sysid.motion import Pieces
 from sysid.segment import Segment
 
@@ -281,3 +282,17 @@ def test_a_diagnosis_of_a_part_of_the_logs_finds_what_is_missing(tmp_path, monke
     assert [(claim.head.effect, claim.head.joint) for claim in found.claims] == [("stribeck", "knee")]
     assert found.claims[0].after.samples == found.fit.samples
     assert "was asked of" in found.notices[0]
+
+
+def test_a_robot_of_a_fleet_says_the_same_of_logs_in_spans(monkeypatch):
+    spec = experiment(preprocess=EVERY_ROW)
+    kind = members.first(spec)
+    whole = members.member(spec, "r", kind)
+    monkeypatch.setattr(spans, "SPAN", 1100)
+    found = members.member(spec, "r", kind)
+    for one, other in ((whole.train, found.train), (whole.test, found.test)):
+        told = np.isfinite(one.values)
+        std = np.sqrt(one.variance[told])
+        assert told.any() and np.array_equal(told, np.isfinite(other.values))
+        assert np.max(np.abs(other.values - one.values)[told] / std) < 1e-6
+        np.testing.assert_allclose(other.variance[told], one.variance[told], rtol=1e-6)
