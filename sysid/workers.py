@@ -24,6 +24,15 @@ _AHEAD = 4  # pieces of work for each thread of the workers that wait: none of t
 # M_TRIM_THRESHOLD and M_MMAP_THRESHOLD of glibc's malloc.h [bytes]: where its own adjustment ends
 # (man mallopt)
 _MALLOC = {-1: 2**26, -3: 2**25}
+# Of processes that this one starts: one thread each; memory from one heap, which grows and stays,
+# where each thread's own would be given back and taken again; no sampling of where they are.
+_OURS = {
+    "distributed.nanny.pre-spawn-environ": {
+        **dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), 1),
+        "MALLOC_ARENA_MAX": 1,
+    },
+    "distributed.worker.profile.enabled": False,
+}
 _UNKNOWN = 64  # pieces of work that wait where no worker is there yet
 
 Mapped = Callable[[Callable, Iterable[tuple]], Iterator]
@@ -71,7 +80,7 @@ def _joined(workers: int, scheduler: str | None):
             "more than one process needs Dask, which is not installed",
             do="pip install 'sysid[dask]'",
         ) from None
-    dask.config.set({"distributed.scheduler.allowed-failures": _DEATHS})
+    dask.config.set({"distributed.scheduler.allowed-failures": _DEATHS, **_OURS})
     if scheduler is not None:
         try:
             return Client(scheduler, timeout=_PATIENCE), None
