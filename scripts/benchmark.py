@@ -348,7 +348,7 @@ def write_arm_log(path: Path, samples: int, seed: int) -> None:
 def long(samples: int) -> dict:
     """`sysid fit` and the plain loop on the longer log, once each, and `sysid fit` on 0.7 million samples."""
     sys.path.insert(0, str(ROOT))
-    from sysid import urdf
+    from sysid import urdf_files
 
     counts, joints = [700_000, samples], ", ".join(f"panda_joint{k}" for k in range(1, 8))
     with tempfile.TemporaryDirectory() as folder:
@@ -364,7 +364,7 @@ def long(samples: int) -> dict:
             )
             runs.append(run([sys.executable, "-m", "sysid", "fit", str(path / f"{count}.yaml"), "--quiet", "--out", str(path / "run")]))
         said: list[str] = []
-        loop = run([sys.executable, "-c", LOOP, str(urdf.locate(PANDA, path)), str(path / f"{samples}.parquet")], said)
+        loop = run([sys.executable, "-c", LOOP, str(urdf_files.locate(PANDA, path)), str(path / f"{samples}.parquet")], said)
     peaks = [1e-6 * run[1] for run in runs]
     return {
         "ratio": runs[1][2] / loop[2], "fit_microseconds": 1e6 * runs[1][2] / samples, "loop_microseconds": 1e6 * loop[2] / samples,

@@ -53,7 +53,7 @@ from benchmark_parts.new_laws import NEW  # noqa: E402
 from benchmark_parts.old_laws import OLD  # noqa: E402
 from benchmark_parts.third_laws import THIRD  # noqa: E402
 
-from sysid import addition, config, loop, pipeline, results, terminal  # noqa: E402
+from sysid import addition, config, fit_document, loop, pipeline, terminal, whole_files  # noqa: E402
 from sysid.errors import SysidError  # noqa: E402
 from sysid.studies.journal import Journal, run  # noqa: E402
 
@@ -673,7 +673,7 @@ def figures(found: dict, records: list[dict], out: Path, name: str = "blind_benc
         paths = []
         for part, figure in drawn.items():
             path = out / f"{name}_{part}.png"
-            results.write_atomically(path, lambda p, f=figure: f.savefig(p, format="png"))
+            whole_files.write_atomically(path, lambda p, f=figure: f.savefig(p, format="png"))
             plt.close(figure)
             paths.append(path)
     return paths
@@ -956,12 +956,12 @@ def finish(records: list[dict], settings: dict, out: Path, publish: bool) -> dic
     """Write results.json, the figures and the page; into docs/ too where they are to be published."""
     under = settings.get("conditions", "clean")
     found, name = summary(records, under), _name(under)
-    results.write_json(out / "results.json", _plain({"settings": settings, "summary": found, "records": records}))
+    whole_files.write_json(out / "results.json", _plain({"settings": settings, "summary": found, "records": records}))
     notes = ROOT / "docs" / f"{name}_notes.md"
     text = page(found, records, settings, notes.read_text(encoding="utf-8") if notes.exists() else "")
     for folder in [out, *([ROOT / "docs"] if publish else [])]:
         figures(found, records, folder / "figures", name)
-        results.write_atomically(folder / f"{name}.md", lambda p: p.write_text(text, encoding="utf-8"))
+        whole_files.write_atomically(folder / f"{name}.md", lambda p: p.write_text(text, encoding="utf-8"))
     return found
 
 
@@ -971,7 +971,7 @@ def _plain(value):
         return {k: _plain(v) for k, v in value.items()}
     if isinstance(value, (list, tuple)):
         return [_plain(v) for v in value]
-    return results.number(value) if isinstance(value, float) else value
+    return fit_document.number(value) if isinstance(value, float) else value
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -1008,9 +1008,9 @@ def main(arguments: list[str] | None = None) -> None:
             shutil.rmtree(folder, ignore_errors=True)
             tell(json.loads(json.dumps(one(asdict(case), str(folder)))), folder)
         return
-    out = results.folder(options.out)
+    out = whole_files.folder(options.out)
     state = source()
-    settings = {"seed": options.seed, "conditions": options.conditions, "duration": SECONDS, "rate": RATE, "most": MOST_STEPS, "source": state, "versions": results.versions()}
+    settings = {"seed": options.seed, "conditions": options.conditions, "duration": SECONDS, "rate": RATE, "most": MOST_STEPS, "source": state, "versions": fit_document.versions()}
     journal = Journal(out / f"journal-{conditions.MARKS[options.conditions]}{options.seed}-{state}.jsonl", settings)
     with terminal.progress_bar() as progress:
         done = run(journal, [(case.key, (asdict(case),)) for case in chosen], one, jobs=options.jobs, progress=lambda s: progress(f"{len(chosen)} cases", s))

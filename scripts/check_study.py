@@ -28,7 +28,7 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
 from scripts.blind_benchmark import RATE, SECONDS, experiment_of  # noqa: E402
-from sysid import pipeline, results  # noqa: E402
+from sysid import pipeline, whole_files  # noqa: E402
 from sysid.check import ERROR, FAULTS, check  # noqa: E402
 from sysid.simulate import simulate, write  # noqa: E402
 
@@ -282,7 +282,7 @@ def main() -> None:
             print("  ", record["robot"], entry)
     planted = [r for r in records if r["fault"]]
     print(json.dumps({"planted": len(planted), "found": sum(r["found"] for r in planted)}))
-    results.write_json(results.folder(options.out) / "check_study.json", {"records": records})
+    whole_files.write_json(whole_files.folder(options.out) / "check_study.json", {"records": records})
 
 
 if __name__ == "__main__":

@@ -35,7 +35,7 @@ os.environ["PYTHONPATH"] = os.pathsep.join(
 import numpy as np  # noqa: E402
 from blind_benchmark import RATE, SECONDS, experiment_of, source, wilson  # noqa: E402
 
-from sysid import pipeline, results, terminal  # noqa: E402
+from sysid import fit_document, pipeline, terminal, whole_files  # noqa: E402
 from sysid.studies.journal import Journal, run  # noqa: E402
 
 DETERMINED = 0.9  # `from_data` above which a parameter is the data's
@@ -176,9 +176,9 @@ def main() -> None:
     parser.add_argument("--colour", type=float, help="s, time constant of half of the torque noise's variance")
     parser.add_argument("--out", type=Path, default=Path("runs/coverage"))
     options = parser.parse_args()
-    out = results.folder(options.out)
+    out = whole_files.folder(options.out)
     shade = "" if options.colour is None else f"-{options.colour:g}"
-    settings = {"seed": options.seed, "colour": options.colour, "source": source(), "versions": results.versions()}
+    settings = {"seed": options.seed, "colour": options.colour, "source": source(), "versions": fit_document.versions()}
     journal = Journal(out / f"journal-{options.seed}{shade}-{source()}.jsonl", settings)
     tasks = []
     for robot in options.robots.split(","):
@@ -189,7 +189,7 @@ def main() -> None:
     with terminal.progress_bar() as progress:
         done = run(journal, tasks, one, jobs=options.jobs, progress=lambda s: progress(f"{len(tasks)} robots", s))
     found = summary(list(done.values()))
-    results.write_json(out / "coverage.json", {"settings": settings, "summary": found, "records": done})
+    whole_files.write_json(out / "coverage.json", {"settings": settings, "summary": found, "records": done})
     print(table(found))
     print(f"results: {out}/coverage.json")
 

@@ -41,7 +41,7 @@ def main(arguments: list[str] | None = None) -> None:
     """Run a study, print its table."""
     import importlib
 
-    from sysid import results
+    from sysid import fit_document
     from sysid.studies.journal import Journal, run
 
     parser = argparse.ArgumentParser(
@@ -58,7 +58,7 @@ def main(arguments: list[str] | None = None) -> None:
     part = importlib.import_module(f"scripts.design_parts.{options.study}")
     robots = tuple(options.robots.split(",")) if options.robots else part.ROBOTS
     options.out.mkdir(parents=True, exist_ok=True)
-    settings = {"seed": options.seed, "source": results.program()[:8], "robots": robots}
+    settings = {"seed": options.seed, "source": fit_document.program()[:8], "robots": robots}
     path = (
         options.out
         / f"{options.study}_{options.seed}_{'_'.join(robots)}_{settings['source']}.jsonl"

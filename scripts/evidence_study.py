@@ -39,7 +39,7 @@ import numpy as np  # noqa: E402
 
 from scripts import blind_benchmark as benchmark  # noqa: E402
 from scripts.blind_benchmark import JOINTS, RATE, SECONDS, experiment_of  # noqa: E402
-from sysid import pipeline, results, terminal  # noqa: E402
+from sysid import fit_document, pipeline, terminal, whole_files  # noqa: E402
 from sysid.studies.journal import Journal, run  # noqa: E402
 
 ROBOTS = ("planar", "planar", "leg")
@@ -225,8 +225,8 @@ def main() -> None:
 
     level = options.level if options.level is not None else 0.05 if options.study == "size" else LEVEL
     worth = options.worth if options.worth is not None else 0.0 if options.study == "size" else WORTH
-    digest = results.program()[:10]
-    out = results.folder(options.out)
+    digest = fit_document.program()[:10]
+    out = whole_files.folder(options.out)
     settings = {"study": options.study, "seed": options.seed, "level": level, "worth": worth, "source": digest}
     journal = Journal(out / f"{options.study}-{options.seed}-{level:g}-{worth:g}-{digest}.jsonl", settings)
     draw = {"soft": lambda s, k: drawn(s, k, SOFT), "others": lambda s, k: drawn(s, k, OTHERS)}.get(options.study, conditions)
@@ -234,7 +234,7 @@ def main() -> None:
     with terminal.progress_bar() as progress:
         done = run(journal, tasks, {"size": size, "power": power, "soft": soft, "others": soft}[options.study], jobs=options.jobs, progress=lambda s: progress(options.study, s))
     found = told(options.study, list(done.values()))
-    results.write_json(out / f"{options.study}.json", {"settings": settings, **found, "records": list(done.values())})
+    whole_files.write_json(out / f"{options.study}.json", {"settings": settings, **found, "records": list(done.values())})
     print(json.dumps(found, indent=1))
 
 

@@ -34,7 +34,7 @@ def main(arguments: list[str] | None = None) -> None:
     """Run a study, print its table."""
     import importlib
 
-    from sysid import results
+    from sysid import fit_document
     from sysid.studies.journal import Journal, run
 
     parser = argparse.ArgumentParser(
@@ -48,7 +48,7 @@ def main(arguments: list[str] | None = None) -> None:
     given = parser.parse_args(arguments)
     part = importlib.import_module(f"scripts.fleet_parts.{given.study}")
     given.out.mkdir(parents=True, exist_ok=True)
-    path = given.out / f"{given.study}-{given.seed}-{results.program()[:8]}.jsonl"
+    path = given.out / f"{given.study}-{given.seed}-{fit_document.program()[:8]}.jsonl"
     cases = [part.case(given.seed, k) for k in range(given.number)]
     tasks = [(str(k), (case,)) for k, case in enumerate(cases)]
     journal = Journal(path, {"study": given.study, "seed": given.seed})

@@ -20,7 +20,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
-from sysid import comparison, pipeline, results  # noqa: E402
+from sysid import comparison, pipeline, whole_files  # noqa: E402
 from sysid.addition import grown  # noqa: E402
 from sysid.diagnose.diagnosis import diagnose  # noqa: E402
 from sysid.statement.document import document  # noqa: E402
@@ -152,8 +152,8 @@ def main() -> None:
         "these logs.\nRMS in N m (EMPS: N). What is left out as disturbed, or about reversals and standstill, counts neither in the fit nor in the error."
     )
     page = "\n\n".join([head, *parts]) + "\n"
-    for folder in [results.folder(options.out), *([ROOT / "docs"] if options.publish else [])]:
-        results.write_atomically(folder / "real_logs.md", lambda p: p.write_text(page, encoding="utf-8"))
+    for folder in [whole_files.folder(options.out), *([ROOT / "docs"] if options.publish else [])]:
+        whole_files.write_atomically(folder / "real_logs.md", lambda p: p.write_text(page, encoding="utf-8"))
 
 
 if __name__ == "__main__":

@@ -89,10 +89,10 @@ def fit(
     trust: Trust = False, as_json: Json = False, out: Out = None, quiet: Quiet = False,
 ) -> None:  # fmt: skip
     """Identify an experiment and write its run folder."""
-    from . import pipeline, results
+    from . import pipeline, results, whole_files
 
     spec = pipeline.load(experiment)
-    run = results.folder(out or Path("runs") / spec.name)
+    run = whole_files.folder(out or Path("runs") / spec.name)
     with _progress(quiet or as_json) as progress:
         found = pipeline.fit(spec, progress=progress, workers=workers, scheduler=scheduler)
     document = results.write(found, run)
@@ -135,11 +135,11 @@ def init(
 def check(experiment: ExperimentPath, trust: Trust = False, as_json: Json = False, out: Out = None, quiet: Quiet = False) -> None:
     """What is wrong with an experiment's logs, before any fit. Exit status 1 where a fit of them would be wrong."""
     from . import check as doctor
-    from . import pipeline, results
+    from . import pipeline, whole_files
 
     spec = pipeline.load(experiment)
     document = doctor.document(doctor.check(spec))
-    results.write_json(results.folder(out or Path("runs") / spec.name) / "check.json", document)
+    whole_files.write_json(whole_files.folder(out or Path("runs") / spec.name) / "check.json", document)
     if as_json:
         print(json.dumps(document, allow_nan=False))
     elif not quiet:
@@ -163,9 +163,9 @@ def design(
 ) -> None:  # fmt: skip
     """The next motion to log: the most informative within the limits, or the one that separates suspects."""
     from . import design as designing
-    from . import pipeline, results
+    from . import pipeline, whole_files
 
-    spec, folder = pipeline.load(experiment), results.folder(out)
+    spec, folder = pipeline.load(experiment), whole_files.folder(out)
     suspects = [_suspect(text) for text in separate.split(",")] if separate else []
     bounds = designing.read_limits(limits) if limits else None
     with _progress(quiet or as_json, asks=True) as progress:
@@ -192,17 +192,17 @@ def compare(
     trust: Trust = False, as_json: Json = False, out: Out = None, quiet: Quiet = False,
 ) -> None:  # fmt: skip
     """Model against measurement on held-out data, and models against each other with standard errors."""
-    from . import pipeline, results
+    from . import pipeline, whole_files
     from .comparison import document
 
     # a run folder stands for the experiment that gives the same fit
     specs = [pipeline.load(path / "experiment.yaml" if (path / "fit.json").is_file() else path) for path in experiments]
-    run = results.folder(out or Path("runs") / "-".join(["compare", *(spec.name for spec in specs)]))
+    run = whole_files.folder(out or Path("runs") / "-".join(["compare", *(spec.name for spec in specs)]))
     with _progress(quiet or as_json, len(specs)) as progress:
         fits = [pipeline.fit(spec, progress=progress) for spec in specs]
     names = [path.name if (path / "fit.json").is_file() else spec.name for path, spec in zip(experiments, specs)]
     found = document(fits, _told_apart(specs, names))
-    results.write_json(run / "compare.json", found)
+    whole_files.write_json(run / "compare.json", found)
     if as_json:
         print(json.dumps(found, allow_nan=False))
     elif not quiet:
@@ -230,11 +230,11 @@ def fleet(
 
     With --against RUN: what changed on each of many logs, while the model of a run folder is held.
     """
-    from . import results, terminal
+    from . import terminal, whole_files
 
     if not 0.0 < rate < 1.0:
         raise SysidError(f"--rate {rate:g}", allowed="a probability above 0, below 1")
-    run = results.folder(out or Path("runs") / "fleet")
+    run = whole_files.folder(out or Path("runs") / "fleet")
     if against is not None:
         said, page = _against(against, experiments, _levels(level), rate, jobs, run, quiet or as_json), None
     else:
@@ -254,18 +254,18 @@ def fleet(
 
 def _fleet(experiments: list[str], rate: float, seed: int, workers: int, scheduler: str | None, run: Path, silent: bool) -> tuple[dict, Path]:
     from . import fleet as fleets
-    from . import results
+    from . import whole_files
     from .report.fleet import write
 
     with _progress(silent) as progress:
         found = fleets.fleet(experiments, rate=rate, seed=seed, workers=workers, scheduler=scheduler, progress=progress)
     said = fleets.document(found, run)
-    results.write_json(run / "fleet.json", said)
+    whole_files.write_json(run / "fleet.json", said)
     return said, write(said, run / "fleet.html")
 
 
 def _against(model: Path, logs: list[str], levels: dict[str, str], rate: float, jobs: int, run: Path, silent: bool) -> dict:
-    from . import results
+    from . import whole_files
     from .changes import many
     from .statement.changes import many_document
 
@@ -273,7 +273,7 @@ def _against(model: Path, logs: list[str], levels: dict[str, str], rate: float, 
         tell = None if progress is None else lambda share: progress("asking the logs", share)
         found, failed = many(model, logs, levels, rate=rate, jobs=jobs, progress=tell)
     said = many_document(found, failed, model, run)
-    results.write_json(run / "against.json", said)
+    whole_files.write_json(run / "against.json", said)
     return said
 
 
@@ -340,7 +340,7 @@ def diagnose(
     trust: Trust = False, as_json: Json = False, out: Out = None, quiet: Quiet = False,
 ) -> None:  # fmt: skip
     """Where the model fails and which effect is missing; with --model, what changed on a new log."""
-    from . import pipeline
+    from . import pipeline, whole_files
 
     spec = pipeline.load(experiment)
     if (model is None) != (not log):
@@ -350,11 +350,10 @@ def diagnose(
         return
     if level:
         raise SysidError("--level goes with --model: a diagnosis asks all logs together", do="leave it out")
-    from . import results
     from .diagnose.diagnosis import diagnose as work
     from .statement import kept
 
-    run = results.folder(out or Path("runs") / spec.name)
+    run = whole_files.folder(out or Path("runs") / spec.name)
     with _progress(quiet or as_json, asks=True) as progress:
         found = work(spec, progress=progress)
     said = kept.written(spec, found, run)
@@ -377,13 +376,13 @@ def _levels(texts: list[str] | None) -> dict[str, str]:
 
 
 def _changed(spec, model: Path, logs: list[str], levels: dict[str, str], as_json: bool, out: Path | None, quiet: bool) -> None:
-    from . import results
+    from . import whole_files
     from .changes import changed
     from .statement.changes import document
 
-    run = results.folder(out or Path("runs") / f"{spec.name}-changed")
+    run = whole_files.folder(out or Path("runs") / f"{spec.name}-changed")
     said = document(changed(spec, model, logs, levels), run)
-    results.write_json(run / "changed.json", said)
+    whole_files.write_json(run / "changed.json", said)
     if as_json:
         print(json.dumps(said, allow_nan=False))
     elif not quiet:
@@ -399,12 +398,12 @@ def report(
     trust: Trust = False, as_json: Json = False, out: Out = None, quiet: Quiet = False,
 ) -> None:  # fmt: skip
     """Write one self-contained HTML file that opens anywhere, of the diagnosis that the run folder holds where nothing changed since, else of a new one."""
-    from . import loop, pipeline, results
+    from . import loop, pipeline, whole_files
     from .report import page
     from .statement import kept
 
     spec = pipeline.load(experiment)
-    run = results.folder(out or Path("runs") / spec.name)
+    run = whole_files.folder(out or Path("runs") / spec.name)
     with _progress(quiet or as_json, asks=True) as progress:
         fit, said = kept.diagnosed(spec, run, progress=progress)
     path = page.write(fit, said, loop.read_history(run), run / "report.html")
@@ -513,11 +512,11 @@ def discover(
     trust: Trust = False, as_json: Json = False, out: Out = None, quiet: Quiet = False,
 ) -> None:  # fmt: skip
     """Diagnose, add, refit, until nothing is missing; a step folder each. The experiment file stays as it is."""
-    from . import loop, pipeline, results
+    from . import loop, pipeline, whole_files
     from .terminal import show_step
 
     spec = pipeline.load(experiment)
-    run = results.folder(out or Path("runs") / spec.name)
+    run = whole_files.folder(out or Path("runs") / spec.name)
     said_each = None if as_json or quiet else show_step
     with _progress(quiet or as_json, asks=True) as progress:
         found = loop.discover(spec, run, most=most, progress=progress, each=said_each)
@@ -574,13 +573,13 @@ def export(
 @app.command()
 def effects(name: Annotated[Optional[str], typer.Argument(help="One effect; without it, all.")] = None, as_json: Json = False, out: Out = None, quiet: Quiet = False) -> None:  # noqa: UP045
     """The catalogue of physical effects: equation, parameters, units, what it looks like, what it is confused with."""
+    from . import whole_files
     from .vocabulary import describe, find, vocabulary
 
     found = [describe(find(word)) for word in ([name] if name else vocabulary())]
     if out:
-        from . import results
 
-        results.write_json(results.folder(out) / "effects.json", {"effects": found})
+        whole_files.write_json(whole_files.folder(out) / "effects.json", {"effects": found})
     if as_json:
         print(json.dumps({"effects": found}))
     elif not quiet:
@@ -624,7 +623,7 @@ def study_bodies(
     as_json: Json = False, out: Out = None, quiet: Quiet = False,
 ) -> None:  # fmt: skip
     """Section VI: random bodies, linear least squares and three parameterizations."""
-    from . import results
+    from . import whole_files
     from .studies.bodies import Reading
     from .studies.commands import study_bodies as work
 
@@ -632,7 +631,7 @@ def study_bodies(
         (about, "--about", ("com", "origin")), (wrench, "--wrench", ("moment and force", "force only")),
         (jacobian, "--jacobian", ("analytic", "differences")),
     )), series=series)  # fmt: skip
-    run = results.folder(out or Path("runs") / "study-bodies")
+    run = whole_files.folder(out or Path("runs") / "study-bodies")
     with _progress(quiet or as_json) as progress:
         found = work(run, count=count, seed=seed, jobs=jobs, reading=reading, progress=progress or _silent)
     _finish(found, as_json, quiet, "show_bodies", run)
@@ -648,7 +647,7 @@ def study_restarts(
     trust: Trust = False, as_json: Json = False, out: Out = None, quiet: Quiet = False,
 ) -> None:  # fmt: skip
     """Section VII: random starts of one experiment, each certified."""
-    from . import pipeline, results
+    from . import pipeline, whole_files
     from .inertia import PARAMETERIZATIONS
     from .studies.commands import study_restarts as work
 
@@ -658,7 +657,7 @@ def study_restarts(
         spec = spec.model_copy(update={"model": spec.model.model_copy(update={"inertia": kind})})
     if newton_alone:
         spec = spec.model_copy(update={"solver": spec.solver.model_copy(update={"handover": 0.0, "max_iterations": 3000})})
-    run = results.folder(out or Path("runs") / f"{spec.name}-restarts")
+    run = whole_files.folder(out or Path("runs") / f"{spec.name}-restarts")
     with _progress(quiet or as_json) as progress:
         found = work(spec, run, count=count, seed=seed, jobs=jobs, progress=progress or _silent)
     _finish(found, as_json, quiet, "show_restarts", run)
@@ -669,11 +668,11 @@ def study_restarts(
 @study.command("prior")
 def study_prior(experiment: ExperimentPath, jobs: Jobs = 1, trust: Trust = False, as_json: Json = False, out: Out = None, quiet: Quiet = False) -> None:
     """The prior's weight by cross-validation within the training logs."""
-    from . import pipeline, results
+    from . import pipeline, whole_files
     from .studies.commands import study_prior as work
 
     spec = pipeline.load(experiment)
-    run = results.folder(out or Path("runs") / f"{spec.name}-prior")
+    run = whole_files.folder(out or Path("runs") / f"{spec.name}-prior")
     with _progress(quiet or as_json) as progress:
         found = work(spec, run, jobs=jobs, progress=progress or _silent)
     _finish(found, as_json, quiet, "show_prior", run)

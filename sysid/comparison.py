@@ -12,8 +12,8 @@ import numpy as np
 from .blocks import Numbering, extents, jackknife, summed
 from .errors import SysidError
 from .estimate import Fit
+from .fit_document import number
 from .prediction import Prediction
-from .results import number
 
 _ROUNDING = 1e-9  # of an error: two fits of one model differ by 1e-16 of it, with a standard error as small
 

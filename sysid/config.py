@@ -9,21 +9,21 @@ from __future__ import annotations
 import difflib
 import shlex
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
-from pydantic import BaseModel, ValidationError
+from pydantic import ValidationError
 
 from . import bounded, datasets, groups
+from .config_errors import keys_of, named, refused, unknown_key
 from .errors import ConfigError
 from .formula import parse
 from .mistyped import FEW, standing
 from .readers import is_log_folder, listed
 from .specs import ENTRY, EffectSpec, Experiment, LogSpec, is_own
 from .vocabulary import find, vocabulary
+from .yaml_text import parse_yaml, plain
 
 _LARGEST_FILE = 1_000_000  # bytes
-_MOST_ALIASED_NODES = 10_000
-_DEEPEST = 50
 
 
 def file_of(path: str | Path) -> Path:
@@ -89,10 +89,10 @@ def loads(text: str, path: Path) -> Experiment:
     if tree is None:
         tree = {}
     if not isinstance(tree, dict):
-        raise ConfigError("the file holds no mapping", where=str(path), allowed=", ".join(_keys(Experiment)))
+        raise ConfigError("the file holds no mapping", where=str(path), allowed=", ".join(keys_of(Experiment)))
     told = plain(tree)
     if "path" in told:
-        raise _unknown_key(tree, ("path",), path)
+        raise unknown_key(tree, ("path",), path)
     return experiment(told, path, tree)
 
 
@@ -115,7 +115,7 @@ def experiment(given: dict, path: Path = Path("experiment.yaml"), tree=None) -> 
     try:
         return _listed(Experiment.model_validate({**given, "path": path}), lines)
     except ValidationError as error:
-        raise _named(error, lines, path) from None
+        raise named(error, lines, path) from None
 
 
 def _listed(experiment: Experiment, lines) -> Experiment:
@@ -125,12 +125,12 @@ def _listed(experiment: Experiment, lines) -> Experiment:
     data = experiment.data.model_copy(update=parts)
     if wrong := groups.mistake(data, experiment.model):
         location, said = wrong
-        raise _refused(location, said, (), lines, experiment.path)
+        raise refused(location, said, (), lines, experiment.path)
     names = [log.name for log in (*data.train, *data.test)]
     for k, mask in enumerate(experiment.preprocess.mask):
         if mask.log not in names:
             near = difflib.get_close_matches(mask.log, names, 3, 0.3) or names[:3]
-            raise _refused(("preprocess", "mask", k, "log"), f"no such log in data.train or data.test; near: {', '.join(near)}", mask.log, lines, experiment.path)
+            raise refused(("preprocess", "mask", k, "log"), f"no such log in data.train or data.test; near: {', '.join(near)}", mask.log, lines, experiment.path)
     data = groups.resolved(data)
     return experiment.model_copy(update={"data": data})
 
@@ -151,7 +151,7 @@ def _effect(entry: Any, location: tuple, tree, path: Path) -> Any:
         return entry if isinstance(entry, EffectSpec) else _spelled_out(entry)
     except (ValueError, ConfigError) as error:
         said = str(error).removeprefix("model.effects: ")
-        raise _refused(location, said, entry, tree, path) from None
+        raise refused(location, said, entry, tree, path) from None
 
 
 def _spelled_out(entry: Any) -> dict:
@@ -202,184 +202,3 @@ def _formula(value: Any) -> dict:
             raise ValueError(f"unknown key {key!r}: the formula has no such value inside; allowed: {', '.join(close)}")
     own = {key: given for key, given in value.items() if key in keys}
     return {**{key: given for key, given in value.items() if key not in own}, "name": "formula", "options": own}
-
-
-def parse_yaml(text: str, *, where: str):
-    """A YAML document with line numbers and comments kept; no tags, no multiplying aliases."""
-    from ruamel.yaml import YAML
-    from ruamel.yaml.error import MarkedYAMLError, YAMLError
-
-    try:
-        _check_events(YAML(typ="rt", pure=True).parse(text), where)
-        return YAML(typ="rt", pure=True).load(text)
-    except ConfigError:
-        raise
-    except MarkedYAMLError as error:
-        mark = error.problem_mark or error.context_mark
-        line = f" line {mark.line + 1}" if mark else ""
-        said = str(error.problem or error.context)
-        raise ConfigError(f"not YAML ({said})", where=f"{where}{line}", do=_cure(said)) from None
-    except (YAMLError, ValueError, RecursionError) as error:
-        raise ConfigError(f"not YAML ({str(error).splitlines()[0]})", where=where) from None
-
-
-def _cure(said: str) -> str:
-    """What to do about what a reader of YAML says, which speaks of its own parts."""
-    if "'\\t'" in said:
-        return "put spaces in the place of the tab"
-    if "<block" in said or "mapping values" in said:
-        return "bring the line to the column of its neighbours: keys of one mapping begin at the same one"
-    if "',' or" in said:
-        return "close the bracket, or part its entries with commas"
-    return "correct the line"
-
-
-def _check_events(events, where: str) -> None:
-    """Refuse tags, and aliases whose expansion would be large."""
-    from ruamel.yaml.events import AliasEvent, CollectionEndEvent, CollectionStartEvent, NodeEvent, ScalarEvent
-
-    sizes: dict[str, int] = {}
-    open_anchors: list[tuple[str | None, int]] = []
-    total = 0
-    for event in events:
-        if isinstance(event, CollectionEndEvent):
-            anchor, before = open_anchors.pop()
-            if anchor:
-                sizes[anchor] = total - before
-            continue
-        if not isinstance(event, NodeEvent):
-            continue
-        tag = getattr(event, "tag", None)
-        if tag:
-            raise ConfigError(f"the YAML tag {tag}", where=f"{where} line {event.start_mark.line + 1}", allowed="plain values", do="remove the tag")
-        if isinstance(event, AliasEvent):
-            if event.anchor not in sizes:
-                raise ConfigError(f"the alias *{event.anchor} refers to itself or to nothing", where=f"{where} line {event.start_mark.line + 1}")
-            total += sizes[event.anchor]
-        else:
-            total += 1
-            if isinstance(event, CollectionStartEvent):
-                open_anchors.append((event.anchor, total))
-                if len(open_anchors) > _DEEPEST:
-                    raise ConfigError(
-                        f"lists and mappings more than {_DEEPEST} deep", where=f"{where} line {event.start_mark.line + 1}", do="write an experiment"
-                    )
-            elif isinstance(event, ScalarEvent) and event.anchor:
-                sizes[event.anchor] = 1
-        if total > _MOST_ALIASED_NODES:
-            raise ConfigError(
-                f"more than {_MOST_ALIASED_NODES} values, aliases counted",
-                where=f"{where} line {event.start_mark.line + 1}",
-                do="write the values out",
-            )
-
-
-def plain(node):
-    """ruamel's round-trip nodes as plain Python values."""
-    if isinstance(node, dict):
-        return {plain(key): plain(value) for key, value in node.items()}
-    if isinstance(node, list):
-        return [plain(item) for item in node]
-    if isinstance(node, bool) or node is None:
-        return node
-    for kind in (int, float, str):
-        if isinstance(node, kind):
-            return kind(node)
-    return node
-
-
-def _line(tree, location: tuple) -> int | None:
-    """The line (from 1) of the deepest part of a location that the file itself holds."""
-    line, node = None, tree
-    for step in location:
-        try:
-            if isinstance(node, dict) and step not in node:
-                if same := [key for key in node if str(plain(key)) == str(step)]:
-                    step = same[0]  # pydantic shows a key that is no text as text
-                else:
-                    (node,) = node.values()  # an effect's options stand under its name
-            line = (node.lc.key(step) if isinstance(node, dict) else node.lc.item(step))[0] + 1
-            node = node[step]
-        except (AttributeError, KeyError, IndexError, TypeError, ValueError):
-            break
-    return line
-
-
-def _keys(model) -> list[str]:
-    return [field.alias or name for name, field in model.model_fields.items() if (model, name) not in ((Experiment, "path"), (EffectSpec, "name"), (EffectSpec, "options"))]
-
-
-def _model_at(location: tuple):
-    """The model whose keys are allowed at the parent of a location."""
-    model: Any = Experiment
-    for step in location[:-1]:
-        if isinstance(step, int) or not isinstance(model, type):
-            continue
-        field = model.model_fields.get(step)
-        if field is None:
-            continue
-        found = _inner_model(field.annotation)
-        model = found or model
-    return model
-
-
-def _inner_model(annotation):
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return annotation
-    for argument in get_args(annotation):
-        if (found := _inner_model(argument)) is not None:
-            return found
-    return None
-
-
-def _spelled(location: tuple) -> str:
-    return "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in location).lstrip(".")
-
-
-def _unknown_key(tree, location: tuple, path: Path) -> ConfigError:
-    key, parent = str(location[-1]), _spelled(location[:-1])
-    keys = _keys(_model_at(location))
-    close = difflib.get_close_matches(key, keys, n=3, cutoff=0.4) or keys
-    line = _line(tree, location)
-    return ConfigError(
-        f"unknown key {key!r}" + (f" in {parent}" if parent else ""),
-        where=f"{path} line {line}" if line else str(path),
-        allowed=", ".join(close),
-        do="correct or remove the key",
-    )
-
-
-_SAID = {
-    "model_type": "must be a mapping of keys to values", "dict_type": "must be a mapping of names to values", "list_type": "must be a list",
-    "float_type": "must be a number", "int_type": "must be a whole number", "string_type": "must be text", "missing": "is missing",
-    "finite_number": "must be a finite number", "invalid_key": "a key must be text",
-}  # fmt: skip
-
-
-def _named(error: ValidationError, tree, path: Path) -> ConfigError:
-    """The first mistake of pydantic's list, as one line with the file's line number."""
-    found = sorted(error.errors(), key=lambda e: (e["type"] != "extra_forbidden", _line(tree, e["loc"]) or 0))[0]
-    location, kind, context = found["loc"], found["type"], found.get("ctx", {})
-    if location[-1:] == ("name",) and location[:2] == ("model", "effects"):
-        location = location[:-1]  # an effect's name is its place in the list
-    if kind == "extra_forbidden":
-        return _unknown_key(tree, location, path)
-    if kind in ("too_short", "too_long"):
-        needed = context.get("min_length") if kind == "too_short" else context.get("max_length")
-        bound, entries = "at least" if kind == "too_short" else "at most", "entry" if needed == 1 else "entries"
-        said = f"must have {bound} {needed} {entries}, not {context.get('actual_length')}"
-    else:
-        said = _SAID.get(kind, found["msg"].removeprefix("Value error, ").replace("Input should be", "must be"))
-    return _refused(location, said, found.get("input"), tree, path)
-
-
-def _refused(location: tuple, said: str, given, tree, path: Path) -> ConfigError:
-    shown = (
-        f" (given: {str(given)[:60]!r})"
-        if isinstance(given, str)
-        else f" (given: {str(given)[:60]})"
-        if isinstance(given, (int, float, type(None)))
-        else ""
-    )
-    line = _line(tree, location)
-    return ConfigError(f"{_spelled(location)}: {said}{shown}", where=f"{path} line {line}" if line else str(path))

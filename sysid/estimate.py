@@ -73,7 +73,7 @@ class Fit(WithTorque):
         """The parameters as a polars data frame: name, value, unit, std, from_data."""
         import polars
 
-        from .results import document
+        from .fit_document import document
 
         return polars.DataFrame([{key: p[key] for key in ("name", "value", "unit", "std", "from_data")} for p in document(self)["parameters"]])
 

@@ -10,7 +10,7 @@ import os
 from difflib import SequenceMatcher
 from pathlib import Path
 
-from . import bounded, results
+from . import bounded, whole_files
 from .errors import ConfigError, SysidError
 
 _MARK = "\ufeff"
@@ -91,4 +91,4 @@ def replace(path: Path, before: bytes, after: bytes) -> None:
     if read(path) != before:
         raise Changed("the experiment file changed meanwhile, and nothing was written into it", where=str(path), do="run the command again")
     # through a symbolic link: the link stays, what it names is replaced
-    results.write_atomically(Path(os.path.realpath(path)), lambda p: p.write_bytes(after))
+    whole_files.write_atomically(Path(os.path.realpath(path)), lambda p: p.write_bytes(after))

@@ -14,7 +14,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from . import bounded, comparison, config, experiment_file, pipeline, results, state, yaml_edit
+from . import bounded, comparison, config, experiment_file, fit_document, pipeline, results, state, whole_files, yaml_edit, yaml_text
 from .addition import remaining, spelled
 from .diagnose.diagnosis import Diagnosis, diagnose
 from .errors import ConfigError, SysidError
@@ -143,7 +143,7 @@ def add(
         SysidError: bad input.
     """
     experiment = pipeline.load(path)
-    run = results.folder(out or Path("runs") / experiment.name)
+    run = whole_files.folder(out or Path("runs") / experiment.name)
     file = experiment.path
     joints = None if joints == ["*"] else joints  # every joint, or the whole robot
     read = experiment_file.read(file)
@@ -205,7 +205,7 @@ def read_history(run: Path) -> list[dict]:
 
 
 def _write_history(run: Path, steps: list[dict], **more) -> None:
-    results.write_json(run / _HISTORY, {"steps": steps, **more})
+    whole_files.write_json(run / _HISTORY, {"steps": steps, **more})
 
 
 def _forget(run: Path, steps: list[dict]) -> None:
@@ -262,7 +262,7 @@ def discover(experiment: Experiment, run: Path, *, most: int = 10, progress=None
     from .statement.document import document
 
     said = document(found, run)
-    results.write_json(run / "diagnosis.json", said)
+    whole_files.write_json(run / "diagnosis.json", said)
     left = [{"effect": r.effect, "joint": r.joint, "why": r.why} for r in refused.values()]
     with state.locked(run):
         _write_history(run, steps, verdict=said["verdict"], refused=left)
@@ -280,7 +280,7 @@ def options(texts: list[str]) -> dict:
         name, equals, value = text.partition("=")
         if not equals or not name.strip():
             raise ConfigError(f"--option {text!r}", allowed="NAME=VALUE", do="correct it")
-        out[name.strip()] = config.parse_yaml(value, where="--option")
+        out[name.strip()] = yaml_text.parse_yaml(value, where="--option")
     return out
 
 
@@ -289,10 +289,10 @@ def document(added: Added) -> dict:
     name = added.experiment.model.effects[-1].name
     model = added.before.model
     before = {*model.names, *(value.name for value in model.shape_values)}
-    found = results.document(added.after)
+    found = fit_document.document(added.after)
     return {
         "added": name, "experiment": str(added.experiment.path), "rms_test_before": added.before.rms("test"), "rms_test_after": added.after.rms("test"),
         "refused": added.refused, "says": added.says,
-        "differences": [{"joint": d.joint, "delta_rms": d.delta_rms, "se": results.number(d.se)} for d in added.differences],
+        "differences": [{"joint": d.joint, "delta_rms": d.delta_rms, "se": fit_document.number(d.se)} for d in added.differences],
         "parameters": [p for p in found["parameters"] if p["name"] not in before], "converged": found["converged"], "notices": found["notices"],
     }  # fmt: skip

@@ -22,6 +22,7 @@ from . import filters as filtering
 from . import log as logs
 from .compress import compress
 from .drives import scale_is_told, with_drives
+from .earlier_fit import read_inertias
 from .errors import SysidWarning
 from .estimate import Fit, identify
 from .experiment_logs import Read, read
@@ -190,8 +191,6 @@ def _prior(experiment: Experiment, structure: Model) -> np.ndarray:
     source = experiment.prior.source
     if source == "urdf":
         return np.array(structure.robot.prior)
-    from .results import read_inertias
-
     return read_inertias((experiment.folder / source).resolve(), structure)
 
 

@@ -15,7 +15,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pinocchio as pin
 
-from . import prior, urdf
+from . import prior, urdf, urdf_files
 from .errors import RobotError, SysidWarning
 from .inertia import pseudo
 from .inertia.consistency import is_consistent
@@ -90,7 +90,7 @@ def load(spec: RobotSpec, folder: Path = Path()) -> Robot:
     Raises:
         RobotError: see `urdf.read`; a joint that is not there or not supported; a rotor that cannot be.
     """
-    source = urdf.read(urdf.locate(spec.urdf, folder))
+    source = urdf.read(urdf_files.locate(spec.urdf, folder))
     model = _pinocchio_model(source)
     moving = [name for name in model.names[1:]]
     joints = tuple(_chosen(spec, source, moving))

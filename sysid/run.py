@@ -14,12 +14,12 @@ from pathlib import Path
 import numpy as np
 
 from . import bounded, config, pipeline
+from .earlier_fit import read_fit
 from .errors import ConfigError, SysidWarning
 from .inertia import PARAMETERS
 from .inverse_dynamics import WithTorque
 from .model import Model
 from .prediction import Prediction, units
-from .results import read_fit
 from .specs import Experiment
 
 

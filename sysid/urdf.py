@@ -5,7 +5,6 @@ never opened. What Pinocchio would report as a C++ exception is found here first
 """
 
 import math
-import os
 from dataclasses import dataclass
 from pathlib import Path
 from xml.etree import ElementTree
@@ -16,15 +15,11 @@ import numpy as np
 from . import bounded
 from .errors import RobotError
 from .inertia import pseudo
+from .urdf_checks import LARGEST, check_mimics, check_rest, check_tree, check_whole, numbers
 
 MOVING = ("revolute", "continuous", "prismatic")
 TYPES = MOVING + ("fixed", "floating", "planar")
-# nothing of a robot is larger in SI units, and its square is still a number; a limit beyond it is none
-_LARGEST = 1e12
-_UNLIMITED = ("limit", "safety_controller")
 _DEEPEST = 50  # elements in elements; a URDF has six
-_ELSEWHERE = ("xacro", "xinclude")  # in the name spaces of elements that stand for others
-_EXAMPLES, _PACKAGE = "example-robot-data://", "package://"
 
 
 @dataclass(frozen=True)
@@ -69,60 +64,6 @@ class Urdf:
         return next(name for name in self.links if name not in children)
 
 
-def locate(reference: str, folder: Path) -> Path:
-    """The file that `robot.urdf` names: a path relative to `folder`, package://, example-robot-data://, or a dataset's file.
-
-    A package is looked for where ROS does (ROS_PACKAGE_PATH, AMENT_PREFIX_PATH) and in example-robot-data.
-    """
-    from . import datasets
-
-    if reference.startswith(_EXAMPLES):
-        return example_root() / reference.removeprefix(_EXAMPLES)
-    if reference.startswith(_PACKAGE):
-        return _in_package(reference.removeprefix(_PACKAGE))
-    if (dataset := datasets.reference(reference)) is not None:
-        return dataset.locate()
-    return (folder / reference).resolve()
-
-
-def package_folders() -> list[Path]:
-    """The folders that packages are looked for in: where ROS does, and example-robot-data's. Raises RobotError."""
-    return [*_listed("ROS_PACKAGE_PATH"), *(folder / "share" for folder in _listed("AMENT_PREFIX_PATH")), example_root()]
-
-
-def _listed(variable: str) -> list[Path]:
-    return [Path(folder) for folder in os.environ.get(variable, "").split(os.pathsep) if folder]
-
-
-def _in_package(reference: str) -> Path:
-    package, _, inner = reference.partition("/")
-    places, ros = package_folders(), _listed("ROS_PACKAGE_PATH")
-    candidates = [folder / reference for folder in places] + [folder / inner for folder in ros if folder.name == package]
-    for candidate in candidates:
-        if candidate.is_file():
-            return candidate
-    raise RobotError(
-        f"{_PACKAGE}{reference} is in no package folder", where="robot.urdf", allowed=", ".join(map(str, places)),
-        do="set ROS_PACKAGE_PATH or AMENT_PREFIX_PATH, or give the path of the file",
-    )  # fmt: skip
-
-
-def example_root() -> Path:
-    """The folder of example-robot-data's robots. Raises RobotError: it is not installed."""
-    # the package installs its models beside Pinocchio's, under the same cmeel prefix
-    from importlib.metadata import PackageNotFoundError, files
-
-    try:
-        listed = files("example_robot_data") or []
-    except PackageNotFoundError:
-        raise RobotError("example-robot-data is not installed", do="pip install example-robot-data") from None
-    for file in listed:
-        parts = file.parts
-        if "robots" in parts and file.suffix == ".urdf":
-            return Path(str(file.locate())).parents[len(parts) - parts.index("robots") - 2]
-    raise RobotError("example-robot-data holds no robots", do="reinstall example-robot-data")
-
-
 def read(path: Path) -> Urdf:
     """Read and check a URDF.
 
@@ -141,7 +82,7 @@ def parse(data: bytes, path: Path) -> Urdf:
     root = root_of(data, path)
     if root.tag != "robot":
         raise RobotError(f"the root element is <{root.tag}>", where=str(path), allowed="<robot>", do="give a URDF, not a xacro or SDF")
-    _check_whole(root, path)
+    check_whole(root, path)
     links: dict[str, Link] = {}
     for element in root.findall("link"):
         link = _link(element, path)
@@ -154,9 +95,9 @@ def parse(data: bytes, path: Path) -> Urdf:
         if joint.name in joints:
             raise RobotError(f"joint {joint.name!r} appears twice", where=str(path), do="rename one")
         joints[joint.name] = joint
-    _check_rest(root, path)
-    _check_mimics(root, joints, path)
-    _check_tree(links, joints, path)
+    check_rest(root, path)
+    check_mimics(root, joints, path)
+    check_tree(links, joints, path)
     root.set("name", root.get("name") or "robot")
     return Urdf(path=path, text=ElementTree.tostring(root, encoding="unicode"), links=links, joints=joints)
 
@@ -192,25 +133,6 @@ def root_of(data: bytes, path: Path) -> ElementTree.Element:
         raise RobotError(f"not XML ({error})", where=str(path), do="give a URDF file") from None
 
 
-def _numbers(element, attribute: str, count: int, default: str, path: Path, owner: str) -> np.ndarray:
-    text = element.get(attribute, default) if element is not None else default
-    try:
-        values = np.array([float(word) for word in text.split()])
-    except ValueError:
-        values = np.array([])
-    most = math.inf if (element is not None and element.tag in _UNLIMITED) else _LARGEST
-    if values.shape != (count,) or not (np.abs(values) <= most).all():
-        tag = element.tag if element is not None else attribute
-        what = "a finite number" if count == 1 else f"{count} finite numbers"
-        raise RobotError(
-            f"{owner}: <{tag} {attribute}={text[:60]!r}>",
-            where=str(path),
-            allowed=what + ("" if most == math.inf else f", at most {_LARGEST:g} in size"),
-            do="correct it",
-        )
-    return values
-
-
 def rotation_rpy(rpy) -> np.ndarray:
     """Rotation matrix of URDF's fixed-axis roll, pitch, yaw [rad]."""
     (sr, cr), (sp, cp), (sy, cy) = ((math.sin(a), math.cos(a)) for a in rpy)
@@ -232,8 +154,8 @@ def rpy_of(turn) -> tuple[float, float, float]:
 
 def _pose(element, path: Path, owner: str):
     origin = element.find("origin")
-    xyz = _numbers(origin, "xyz", 3, "0 0 0", path, owner)
-    return rotation_rpy(_numbers(origin, "rpy", 3, "0 0 0", path, owner)), xyz
+    xyz = numbers(origin, "xyz", 3, "0 0 0", path, owner)
+    return rotation_rpy(numbers(origin, "rpy", 3, "0 0 0", path, owner)), xyz
 
 
 def _link(element, path: Path) -> Link:
@@ -244,8 +166,8 @@ def _link(element, path: Path) -> Link:
     inertial = None
     if (stated := element.find("inertial")) is not None:
         turn, com = _pose(stated, path, owner)
-        mass = _numbers(stated.find("mass"), "value", 1, "0", path, owner)[0]
-        xx, xy, xz, yy, yz, zz = (_numbers(stated.find("inertia"), key, 1, "0", path, owner)[0] for key in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"))
+        mass = numbers(stated.find("mass"), "value", 1, "0", path, owner)[0]
+        xx, xy, xz, yy, yz, zz = (numbers(stated.find("inertia"), key, 1, "0", path, owner)[0] for key in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"))
         central = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
         inertial = pseudo.from_central(mass, com, turn @ central @ turn.T)
     seen, touched = ([_solid(shape, path, owner) for shape in element.findall(kind)] for kind in ("visual", "collision"))
@@ -261,13 +183,13 @@ def _solid(shape, path: Path, owner: str) -> np.ndarray | None:
         return None
     origin = np.zeros(3)
     if (box := geometry.find("box")) is not None:
-        edges = np.abs(_numbers(box, "size", 3, "", path, owner))
+        edges = np.abs(numbers(box, "size", 3, "", path, owner))
         solid = pseudo.box(1000.0 * edges.prod(), origin, edges)
     elif (cylinder := geometry.find("cylinder")) is not None:
-        radius, length = (abs(_numbers(cylinder, key, 1, "", path, owner)[0]) for key in ("radius", "length"))
+        radius, length = (abs(numbers(cylinder, key, 1, "", path, owner)[0]) for key in ("radius", "length"))
         solid = pseudo.cylinder(1000.0 * math.pi * radius**2 * length, origin, radius, length)
     elif (sphere := geometry.find("sphere")) is not None:
-        radius = abs(_numbers(sphere, "radius", 1, "", path, owner)[0])
+        radius = abs(numbers(sphere, "radius", 1, "", path, owner)[0])
         solid = pseudo.sphere(1000.0 * 4.0 / 3.0 * math.pi * radius**3, origin, radius)
     else:
         return None
@@ -287,98 +209,20 @@ def _joint(element, path: Path) -> Joint:
             raise RobotError(f"joint {name!r} names no {end} link", where=str(path), allowed=f'<{end} link="…"/>', do="name it")
         ends.append(found.get("link"))
     dynamics = element.find("dynamics")
-    damping, friction = (_numbers(dynamics, key, 1, "0", path, f"joint {name!r}")[0] for key in ("damping", "friction"))
+    damping, friction = (numbers(dynamics, key, 1, "0", path, f"joint {name!r}")[0] for key in ("damping", "friction"))
     # `lower` and `upper` are 0 where a limit leaves them out
     lower, upper = (
-        (_numbers(limit, key, 1, "0", path, f"joint {name!r}")[0] for key in ("lower", "upper"))
+        (numbers(limit, key, 1, "0", path, f"joint {name!r}")[0] for key in ("lower", "upper"))
         if (limit := element.find("limit")) is not None
         else (-math.inf, math.inf)
     )
     _pose(element, path, f"joint {name!r}")
     if kind in MOVING:
-        axis = _numbers(element.find("axis"), "xyz", 3, "1 0 0", path, f"joint {name!r}")
+        axis = numbers(element.find("axis"), "xyz", 3, "1 0 0", path, f"joint {name!r}")
         if not np.linalg.norm(axis) > 0:
             raise RobotError(f"joint {name!r} has the axis 0 0 0", where=str(path), allowed="a direction")
     # zero is what exporters write where nobody knows
-    most = [(_numbers(limit, key, 1, "0", path, f"joint {name!r}")[0] if limit is not None else 0.0) or math.inf for key in ("velocity", "effort")]
-    lower, upper, *most = (math.copysign(math.inf, value) if abs(value) > _LARGEST else value for value in (lower, upper, *most))
+    most = [(numbers(limit, key, 1, "0", path, f"joint {name!r}")[0] if limit is not None else 0.0) or math.inf for key in ("velocity", "effort")]
+    lower, upper, *most = (math.copysign(math.inf, value) if abs(value) > LARGEST else value for value in (lower, upper, *most))
     bounds = (lower, upper) if kind != "continuous" else (-math.inf, math.inf)
     return Joint(name, kind, ends[0], ends[1], damping, friction, bounds, *most)
-
-
-# What identification does not use, but the identified URDF repeats: {element: {attribute: how many numbers}}.
-_REPEATED = {
-    "color": {"rgba": 4}, "mesh": {"scale": 3}, "limit": {"effort": 1, "velocity": 1}, "mimic": {"multiplier": 1, "offset": 1},
-    "calibration": {"rising": 1, "falling": 1}, "safety_controller": {"soft_lower_limit": 1, "soft_upper_limit": 1, "k_position": 1, "k_velocity": 1},
-}  # fmt: skip
-_REFERS = {"mesh": "filename", "texture": "filename", "mimic": "joint"}
-
-
-def _check_whole(root, path: Path) -> None:
-    """Refuse what stands for something else: the robot is not all there."""
-    for element in root.iter():
-        space, _, tag = str(element.tag).rpartition("}")
-        if any(word in space.lower() for word in _ELSEWHERE):
-            raise RobotError(f"the element <{space.rpartition('/')[2]}:{tag}> stands for others, which are not in the file", where=str(path), do="expand it first: xacro FILE > robot.urdf")
-    for element in [*root.findall("link"), *root.findall("joint")]:
-        for one in (element, *element.findall("parent"), *element.findall("child")):
-            if word := next((value for value in one.attrib.values() if "${" in value or "$(" in value), None):
-                raise RobotError(f"{word[:60]!r} in <{one.tag}> is an expression of xacro", where=str(path), do="expand it first: xacro FILE > robot.urdf")
-
-
-def _check_mimics(root, joints, path: Path) -> None:
-    for element in root.findall("joint"):
-        mimic = element.find("mimic")
-        if mimic is not None and mimic.get("joint") not in joints:
-            raise RobotError(f"joint {element.get('name')!r} mimics {mimic.get('joint')!r}, which is missing", where=str(path), allowed=_some(joints), do="correct or remove <mimic>")
-
-
-def _check_rest(root, path: Path) -> None:
-    for owner in [*root.findall("link"), *root.findall("joint"), *root.findall("material")]:
-        for element in owner.iter():
-            for attribute, count in _REPEATED.get(element.tag, {}).items():
-                _numbers(element, attribute, count, " ".join("0" * count), path, f"{owner.tag} {owner.get('name')!r}")
-            if (key := _REFERS.get(element.tag)) and not element.get(key):
-                raise RobotError(f"{owner.tag} {owner.get('name')!r} has a <{element.tag}> without {key}", where=str(path), do="name it or remove it")
-            if element.tag == "geometry" and not len(element):
-                raise RobotError(
-                    f"link {owner.get('name')!r} has an empty <geometry>", where=str(path), allowed="box, cylinder, sphere, mesh", do="remove it"
-                )
-
-
-def _check_tree(links, joints, path: Path) -> None:
-    if not links:
-        raise RobotError("there is no link in it", where=str(path), do="give a URDF of a robot")
-    parent_joint: dict[str, Joint] = {}
-    for joint in joints.values():
-        for end, link in (("parent", joint.parent), ("child", joint.child)):
-            if link not in links:
-                raise RobotError(
-                    f"joint {joint.name!r} has the {end} link {link!r}, which is missing",
-                    where=str(path),
-                    allowed=_some(links),
-                    do="add the link or correct the name",
-                )
-        if joint.child in parent_joint:
-            raise RobotError(
-                f"link {joint.child!r} hangs on two joints, {parent_joint[joint.child].name!r} and {joint.name!r} (a loop)",
-                where=str(path),
-                allowed="a tree",
-                do="cut the loop at one joint",
-            )
-        parent_joint[joint.child] = joint
-    roots = [name for name in links if name not in parent_joint]
-    for name in links:
-        seen, here = set(), name
-        while here in parent_joint:
-            if here in seen:
-                raise RobotError(f"link {name!r} is part of a loop", where=str(path), allowed="a tree", do="cut the loop at one joint")
-            seen.add(here)
-            here = parent_joint[here].parent
-    if len(roots) != 1:
-        raise RobotError(f"the links {_some(roots)} hang on nothing", where=str(path), allowed="one root", do="connect them")
-
-
-def _some(names, most: int = 12) -> str:
-    names = list(names)
-    return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")

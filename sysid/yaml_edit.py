@@ -7,7 +7,7 @@ from __future__ import annotations
 import io
 from collections.abc import Callable
 
-from . import config, experiment_file
+from . import experiment_file, yaml_text
 from .errors import ConfigError
 
 
@@ -26,7 +26,7 @@ def edited(text: str, edit: Callable[[dict], None], *, where: str = "") -> str:
     writer = YAML()
     writer.preserve_quotes, writer.width = True, 4096
     # checked as every experiment file is, then read once more as it is written
-    only_comments = config.parse_yaml(text, where=where) is None
+    only_comments = yaml_text.parse_yaml(text, where=where) is None
     tree = CommentedMap() if only_comments else writer.load(text)
     edit(tree)
     changed = _dumped(writer, tree)
@@ -55,7 +55,7 @@ def flow(own: dict):
 
 
 def _tree(text: str, where: str):
-    return config.plain(config.parse_yaml(text, where=where))
+    return yaml_text.plain(yaml_text.parse_yaml(text, where=where))
 
 
 def _dumped(writer, tree) -> str:

@@ -664,9 +664,9 @@ def test_urdf_of_a_package(experiment, cli, tmp_path, monkeypatch, variable, pla
 
 @pytest.mark.parametrize("scheme", ["package", "example-robot-data"])
 def test_urdf_of_an_example(scheme):
-    from sysid import urdf
+    from sysid import urdf, urdf_files
 
-    assert len(urdf.read(urdf.locate(f"{scheme}://ur_description/urdf/ur5_robot.urdf", Path())).joints) > 6
+    assert len(urdf.read(urdf_files.locate(f"{scheme}://ur_description/urdf/ur5_robot.urdf", Path())).joints) > 6
 
 
 def test_notices_come_once_and_good_input_has_none(experiment, cli):

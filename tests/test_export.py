@@ -419,9 +419,9 @@ def test_a_dc_motor_is_driven_by_its_voltage(leg_run, tmp_path):
 @pytest.mark.study
 def test_every_example_robot_comes_back(tmp_path):
     """All robots of example-robot-data that have at most 40 joints and a base that stands."""
-    from sysid import robot, urdf
+    from sysid import robot, urdf_files
 
-    root, count = urdf._example_root(), 0
+    root, count = urdf_files.example_root(), 0
     for path in sorted(root.rglob("*.urdf")):
         try:
             with noticed():

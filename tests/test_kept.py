@@ -8,7 +8,7 @@ import warnings
 
 import pytest
 
-from sysid import experiment_file, loop, pipeline, results, simulate, state
+from sysid import experiment_file, loop, pipeline, simulate, state, whole_files
 from sysid.errors import SysidError
 from tests.conftest import URDF
 
@@ -180,7 +180,7 @@ def test_files_that_belong_together_come_together_or_not_at_all(tmp_path):
         raise OSError(28, "No space left on device")
 
     with pytest.raises(SysidError, match="No space left"):
-        results.write_together({one: lambda p: p.write_text("new"), two: full})
+        whole_files.write_together({one: lambda p: p.write_text("new"), two: full})
     assert one.read_text() == "old" and [p.name for p in tmp_path.iterdir()] == ["one"]
 
 
@@ -188,7 +188,7 @@ def test_files_that_belong_together_come_together_or_not_at_all(tmp_path):
 def test_a_full_disk_under_parquet_is_said_in_one_line(tmp_path):
     import polars
 
-    write = results.parquet(polars.DataFrame({"a": list(range(5000))}))
+    write = whole_files.parquet(polars.DataFrame({"a": list(range(5000))}))
     with pytest.raises(OSError, match="No space left"):
         write("/dev/full")
 
@@ -326,11 +326,11 @@ STYLES = {
 @pytest.mark.parametrize("style", STYLES)
 @pytest.mark.parametrize(("effect", "joints"), [("torque_bias", None), ("cogging", ["elbow"]), ("stribeck", ["shoulder"])])
 def test_lines_that_do_not_change_stay_as_they_were(style, effect, joints):
-    from sysid import config
+    from sysid import yaml_text
 
     text = STYLES[style]
     changed = loop.with_effect(text, effect, joints, {})
-    before, after = (config.plain(config.parse_yaml(t, where="")) for t in (text, changed))
+    before, after = (yaml_text.plain(yaml_text.parse_yaml(t, where="")) for t in (text, changed))
     assert {k: v for k, v in after.items() if k != "model"} == {k: v for k, v in before.items() if k != "model"}
     entries = [e if isinstance(e, str) else next(iter(e)) for e in after["model"]["effects"]]
     assert effect in entries and "viscous" in entries

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import yaml
 
-from sysid import config, experiment_logs, pipeline, results
+from sysid import config, experiment_logs, pipeline, results, yaml_text
 from sysid.errors import ConfigError, SysidWarning
 from tests.test_report import EVIL, LOG, written
 
@@ -15,7 +15,7 @@ def arm(tmp_path_factory):
 
 
 def with_mask(folder, *masks, **more):
-    found = config.plain(config.parse_yaml((folder / "config.yaml").read_text(), where=""))
+    found = yaml_text.plain(yaml_text.parse_yaml((folder / "config.yaml").read_text(), where=""))
     found["preprocess"] = {**found.get("preprocess", {}), "mask": list(masks), **more}
     return config.experiment(found, folder / "config.yaml")
 

@@ -18,20 +18,20 @@ ROOT = Path(__file__).resolve().parent.parent
 
 # The order of the method: a module imports only from modules above it.
 ORDER = [
-    "errors", "mistyped", "bounded", "unfinished", "state", "trusted", "progress", "units", "picture", "threads", "silence", "callable_module", "workers", "inertia", "urdf", "readers", "datasets", "specs", "groups", "prior", "robot", "regressor", "outliers", "knocks", "jumps", "repeats",
+    "errors", "mistyped", "bounded", "unfinished", "whole_files", "yaml_text", "state", "trusted", "progress", "units", "picture", "threads", "silence", "callable_module", "workers", "inertia", "urdf_checks", "urdf_files", "urdf", "readers", "datasets", "specs", "groups", "prior", "robot", "regressor", "outliers", "knocks", "jumps", "repeats",
     "frequencies", "clock", "segment", "spans", "events", "motor_side", "recording", "log", "even_clock", "long_log", "masks", "gaussian", "smoother",
     "motion", "extent", "preprocess", "long_motion", "blocks", "two_masses", "lowpass", "flexible", "effect_parameters", "effect_options", "effect", "deflection",
     "vocabulary", "formula", "effects", "own_effects",
-    "per_level", "config", "addition", "model", "drives", "inverse_dynamics", "rows", "objective", "projection", "landscape", "multistart", "source",
+    "per_level", "config_errors", "config", "addition", "model", "drives", "inverse_dynamics", "rows", "objective", "projection", "landscape", "multistart", "source",
     "reduction", "triangles", "linearised", "compress", "interior", "nearby", "certificate", "solve", "prior_weight", "uncertainty", "differences", "prediction", "posed_problem", "given_shapes", "estimate",
-    "long_prediction", "base_parameters", "held_apart", "masses", "plausible", "shape_search", "shape", "bumps", "filters", "results", "shape_refinement", "notices", "experiment_logs", "thinning",
+    "long_prediction", "base_parameters", "held_apart", "masses", "plausible", "shape_search", "shape", "bumps", "filters", "fit_document", "results", "earlier_fit", "shape_refinement", "notices", "experiment_logs", "thinning",
     "experiment_file", "yaml_edit", "urdf_export", "gains", "simulate", "rollout", "pipeline", "run", "export", "check", "init", "comparison",
     "transfer", "noise", "candidates", "design", "view", "failures", "unexplained", "shown", "diagnose", "changes", "online", "fleet", "statement", "loop", "report",
     "studies", "studio", "terminal", "cli", "__main__",
 ]  # fmt: skip
 # Late imports that close a loop on purpose: a path that names a data set, a prior that is a previous run, the effects
 # that an effect's contract finds.
-LATE = {("urdf", "datasets"), ("pipeline", "results"), ("results", "urdf_export"), ("vocabulary", "effects"), ("estimate", "results"), ("shown", "statement")}
+LATE = {("urdf_files", "datasets"), ("results", "urdf_export"), ("vocabulary", "effects"), ("estimate", "fit_document"), ("shown", "statement")}
 
 
 def modules():
@@ -107,7 +107,7 @@ PAGE = {
     "CSS": re.compile(r"\{\s*[a-z-]+\s*:[^{}]*;|(?<![.\w-])(?:color|margin|padding|display|font|background|width|height|border)\s*:[^;{}]+[;}]"),
     "JavaScript": re.compile(r"\bfunction\s*\w*\([\w, ]*\)\s*\{|=>|\b(?:document|window)\.\w|\b(?:const|let|var) \w+ ?=|addEventListener"),
 }  # fmt: skip
-XML = ("export", "urdf", "urdf_export")  # write and read the XML of robots
+XML = ("export", "urdf", "urdf_checks", "urdf_export")  # write and read the XML of robots
 
 
 def texts(tree):
@@ -286,7 +286,7 @@ def test_readme_s_table_of_keys_is_complete():
     """Every key of the experiment file stands in the README's listing."""
     from pydantic import BaseModel
 
-    from sysid import config, specs
+    from sysid import config_errors, specs
 
     listing = (ROOT / "README.md").read_text()
     listing = listing[listing.index("## The experiment file") : listing.index("## Commands")]
@@ -297,7 +297,7 @@ def test_readme_s_table_of_keys_is_complete():
             if name == "path" or (model is specs.EffectSpec and name in ("name", "options")):
                 continue
             assert re.search(rf"\b{field.alias or name}\b", listing), f"{model.__name__}.{name}"
-            inner = config._inner_model(field.annotation)
+            inner = config_errors.inner_model(field.annotation)
             if inner is not None and issubclass(inner, BaseModel) and inner not in seen:
                 seen.add(inner)
                 walk(inner)

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import pytest
 
-from sysid import pipeline, urdf
+from sysid import pipeline, urdf_files
 from sysid.cli import main
 from sysid.diagnose.diagnosis import diagnose
 from sysid.statement import kept
@@ -141,7 +141,7 @@ def test_files_beside_the_logs_count(arm, tmp_path):
     prior = found.prior.model_copy(update={"source": "before"})
     experiment = found.model_copy(update={"model": model, "prior": prior})
     assert text and {p.name for p in kept.files(experiment)} == {"robot.urdf", "own.py", "fit.json"}
-    assert urdf.locate("robot.urdf", folder) in kept.files(experiment)
+    assert urdf_files.locate("robot.urdf", folder) in kept.files(experiment)
     states = {kept.of(experiment)}
     for name in ("own.py", "before/fit.json"):
         (folder / name).write_text("# other\n")

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from ruamel.yaml import YAML
 
-from sysid import loop, pipeline, results, simulate
+from sysid import fit_document, loop, pipeline, results, simulate
 from sysid.addition import command, grown, spelled
 from sysid.diagnose.diagnosis import diagnose
 from sysid.diagnose.select import LEVEL, WORTH, search
@@ -259,7 +259,7 @@ def test_a_formula_takes_part_and_survives_its_discovery(simulated, tmp_path):
     assert step.model.effects[-1].options == {"formula": "a*q*q_shoulder", "name": "product"} and step.model.effects[-1].joints == ["elbow"]
     again = pipeline.fit(step)
     assert again.rms("test") == pytest.approx(found.steps[1]["rms_test"], rel=1e-9)
-    value = next(p for p in results.document(again)["parameters"] if p["name"] == "product.elbow.a")
+    value = next(p for p in fit_document.document(again)["parameters"] if p["name"] == "product.elbow.a")
     assert value["value"] == pytest.approx(3.0, rel=0.1)
 
 

@@ -143,7 +143,7 @@ def _stated(machine):
 def _shapes(machine):
     """The whole URDF's model and collision shapes, each mesh as the points of its hull; None where it
     has no meshes."""
-    from sysid.urdf import example_root, package_folders
+    from sysid.urdf_files import example_root, package_folders
 
     folders = [
         str(p) for p in (*package_folders(), example_root().parents[1], *machine.path.parents)

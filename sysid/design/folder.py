@@ -7,7 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ..results import folder, number, versions, write_atomically, write_json
+from ..fit_document import number, versions
+from ..whole_files import folder, write_atomically, write_json
 from .result import Design
 
 _POINTS = 20.0  # Hz of the ROS trajectory's points, between which a controller interpolates

@@ -10,11 +10,11 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from .. import bounded
-from ..config import parse_yaml, plain
 from ..errors import ConfigError
 from ..robot import Robot
 from ..simulate.motion import room, top_speeds
 from ..specs import Number, Positive
+from ..yaml_text import parse_yaml, plain
 
 _MARGIN = 0.05  # of a range is kept free: what a controller overshoots by
 _CLEARANCE = (

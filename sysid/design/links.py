@@ -18,7 +18,7 @@ import pinocchio as pin
 from ..errors import SysidWarning
 from ..inertia import pseudo
 from ..robot import Robot, reduced
-from ..urdf import example_root, package_folders
+from ..urdf_files import example_root, package_folders
 from .collision import Geometry
 
 _THINNEST = 0.02  # m: of a capsule

@@ -20,13 +20,14 @@ from ..callable_module import callable_module
 from ..errors import SysidError, SysidWarning
 from ..estimate import Fit
 from ..filters import settled
+from ..fit_document import number
 from ..groups import levels_of
 from ..inertia.consistency import is_consistent
 from ..motion import Motion
 from ..notices import noticed
 from ..preprocess import prepare
-from ..results import folder, number, write_atomically
 from ..run import Run, read_run
+from ..whole_files import folder, write_atomically
 from .cost import Cost, costs, sampled
 from .document import comment, felt, line
 from .motors import joint_side, motors

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..results import number, versions
+from ..fit_document import number, versions
 from .analysis import Fleet
 from .drift import YEAR
 from .oddity import weights_of

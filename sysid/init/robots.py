@@ -8,7 +8,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from .. import bounded, urdf
+from .. import bounded, urdf, urdf_files
 from ..errors import RobotError
 from ..silence import silenced
 from .guess import Guess
@@ -44,7 +44,7 @@ def read(reference: str) -> Machine:
         RobotError: no robot, one that has no URDF (a floating base, a ball joint), or a package is
         missing.
     """
-    path = urdf.locate(reference, Path())
+    path = urdf_files.locate(reference, Path())
     if not path.is_file():
         raise RobotError(
             "there is no such file", where=str(path), do="give a URDF, a xacro or an MJCF file"

@@ -31,7 +31,7 @@ def _pyplot():
 
 
 def _save(figure, out: Path, name: str, kinds: tuple[str, ...] = ("png", "svg")) -> list[Path]:
-    from ..results import write_atomically
+    from ..whole_files import write_atomically
 
     paths = []
     for kind in kinds:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from .. import results
+from .. import whole_files
 from . import charts, page
 from .section import Section
 from .words import SPACE, level, number, percentage, plus_minus, unit_of
@@ -29,7 +29,7 @@ def write(document: dict, path: Path) -> Path:
     }
     name = f"Fleet of {len(document['robots'])}"
     text = page.page(name, plain, template="fleet", short=_SHORT)
-    results.write_atomically(path, lambda p: p.write_text(text, encoding="utf-8"))
+    whole_files.write_atomically(path, lambda p: p.write_text(text, encoding="utf-8"))
     return path
 
 

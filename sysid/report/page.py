@@ -15,7 +15,7 @@ from pathlib import Path
 from jinja2.utils import htmlsafe_json_dumps
 from markupsafe import Markup
 
-from .. import results
+from .. import fit_document, whole_files
 from ..estimate import Fit
 from . import rendering
 from . import sections as parts
@@ -34,7 +34,7 @@ def write(fit: Fit, document: dict, history: list[dict], path: Path) -> Path:
         SysidError: the file cannot be written.
     """
     text = page(fit.experiment.name, parts.sections(fit, document, history))
-    results.write_atomically(path, lambda p: p.write_text(text, encoding="utf-8"))
+    whole_files.write_atomically(path, lambda p: p.write_text(text, encoding="utf-8"))
     return path
 
 
@@ -59,7 +59,7 @@ def page(
     return rendering.environment("report").get_template(f"report/{template}.html").render(
         name=name, sections=made, short=_SHORT if short is None else short, policy=policy,
         embedded=embedded,
-        version=results.versions()["sysid"], style=rendering.style(), script=script,
+        version=fit_document.versions()["sysid"], style=rendering.style(), script=script,
         engine=Markup(engine),
     )  # fmt: skip
 

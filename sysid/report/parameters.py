@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .. import results
+from .. import fit_document
 from ..estimate import Fit
 from ..inertia import PARAMETERS, UNITS
 from ..model import ROBOT
@@ -16,7 +16,7 @@ _SPANS = (("mass", 0, 1), ("first moment", 1, 4), ("second moment", 4, 10))
 
 def parameters(fit: Fit) -> Section:
     """Parameters with uncertainty, the prior, and how much the data say."""
-    document = results.document(fit)
+    document = fit_document.document(fit)
     known = document["parameters"]
     bodies = fit.model.robot.bodies
     others = known[10 * fit.model.bodies :]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..changes import Change, Changed
-from ..results import number
+from ..fit_document import number
 
 
 def document(found: Changed, run="") -> dict:

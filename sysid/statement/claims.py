@@ -10,7 +10,7 @@ from ..addition import spelled
 from ..diagnose.claims import Claim
 from ..diagnose.diagnosis import Diagnosis
 from ..diagnose.findings import Finding
-from ..results import number
+from ..fit_document import number
 from ..vocabulary import describe
 
 

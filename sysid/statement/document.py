@@ -7,9 +7,9 @@ import numpy as np
 from ..diagnose.diagnosis import Diagnosis
 from ..diagnose.verdict import Verdict
 from ..filters import settled, torque_band
+from ..fit_document import number, versions
 from ..flexible import Unknown
 from ..model import ROBOT
-from ..results import number, versions
 from .claims import chances, claims, finding
 
 

@@ -16,7 +16,7 @@ from collections.abc import Iterator
 from datetime import UTC, datetime
 from pathlib import Path
 
-from .. import bounded, pipeline, results, urdf
+from .. import bounded, fit_document, pipeline, results, urdf_files, whole_files
 from ..diagnose.diagnosis import Diagnosis, diagnose
 from ..errors import SysidError
 from ..estimate import Fit
@@ -65,7 +65,7 @@ def written(experiment: Experiment, made: Diagnosis, run: Path) -> dict:
     said = json.loads(json.dumps(document(made, run), allow_nan=False))
     said |= {"made": now, "of": of(experiment)}
     said["seal"] = _seal(said)
-    results.write_json(run / FILE, said)
+    whole_files.write_json(run / FILE, said)
     return said
 
 
@@ -92,15 +92,15 @@ def of(experiment: Experiment) -> str:
             state.update(hashlib.sha256(bounded.read_bytes(path)).digest())
         except OSError:
             state.update(b"not there")
-    state.update(json.dumps(results.versions(), sort_keys=True).encode())
-    state.update(results.program().encode())
+    state.update(json.dumps(fit_document.versions(), sort_keys=True).encode())
+    state.update(fit_document.program().encode())
     return state.hexdigest()
 
 
 def files(experiment: Experiment) -> Iterator[Path]:
     """What an experiment names beside logs: the URDF, the run that is its prior, own effects."""
     try:
-        yield urdf.locate(experiment.robot.urdf, experiment.folder)
+        yield urdf_files.locate(experiment.robot.urdf, experiment.folder)
     except SysidError:
         pass  # who reads it says so
     if experiment.prior.source != "urdf":

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
 
-from .. import results
+from .. import fit_document, whole_files
 from ..inertia import PARAMETERS as _NAMES
 from ..report import figures
 from ..specs import Experiment
@@ -20,7 +20,7 @@ def study_bodies(out: Path, *, count: int, seed: int, jobs: int, reading: bodies
     """Section VI; writes study.json, bodies.parquet and the figures into `out`."""
     import polars as pl
 
-    settings = {"study": "bodies", "seed": seed, "reading": asdict(reading), "versions": results.versions()}
+    settings = {"study": "bodies", "seed": seed, "reading": asdict(reading), "versions": fit_document.versions()}
     journal = Journal(out / "journal.jsonl", settings)
     tasks = [(str(first), (seed, first, min(_BATCH, count - first), reading)) for first in range(0, count, _BATCH)]
     if count % _BATCH:  # a batch cut short must not be taken for a whole one by a longer study
@@ -33,10 +33,10 @@ def study_bodies(out: Path, *, count: int, seed: int, jobs: int, reading: bodies
          **{f"{key}_{name}": r["runs"][name][key] for name in bodies.NONLINEAR for key in ("iterations", "converged", "cost")}}
         for k, r in enumerate(found)
     ]  # fmt: skip
-    results.write_atomically(out / "bodies.parquet", results.parquet(pl.DataFrame(rows)))
+    whole_files.write_atomically(out / "bodies.parquet", whole_files.parquet(pl.DataFrame(rows)))
     figures.bodies(document, out)
     figures.sweep(document["sweep"], out)
-    results.write_json(out / "study.json", document)
+    whole_files.write_json(out / "study.json", document)
     return document
 
 
@@ -49,7 +49,7 @@ def study_restarts(experiment: Experiment, out: Path, *, count: int, seed: int, 
     import polars as pl
 
     shared = restarts.share(experiment)
-    settings = {"study": "restarts", "seed": seed, "experiment": experiment.model_dump(mode="json"), "data": _fingerprint(shared), "versions": results.versions()}
+    settings = {"study": "restarts", "seed": seed, "experiment": experiment.model_dump(mode="json"), "data": _fingerprint(shared), "versions": fit_document.versions()}
     journal = Journal(out / "journal.jsonl", settings)
     tasks = [(str(index), (shared, seed, index)) for index in range(count)]
     done = run(journal, tasks, restarts.one, jobs=jobs, progress=lambda share: progress("restarts", share))
@@ -59,9 +59,9 @@ def study_restarts(experiment: Experiment, out: Path, *, count: int, seed: int, 
         pl.DataFrame({"start": k, "iteration": range(len(r["objective"])), "objective": r["objective"], "rms_train": r["rms_train"], "rms_test": r["rms_test"]})
         for k, r in enumerate(runs)
     ])  # fmt: skip
-    results.write_atomically(out / "restarts.parquet", results.parquet(table))
+    whole_files.write_atomically(out / "restarts.parquet", whole_files.parquet(table))
     figures.restarts(runs, out)
-    results.write_json(out / "study.json", document)
+    whole_files.write_json(out / "study.json", document)
     return document
 
 
@@ -70,13 +70,13 @@ def study_prior(experiment: Experiment, out: Path, *, jobs: int, progress: Tell)
     found = prepared(experiment)
     experiment = found.experiment
     weights = sorted({*prior.WEIGHTS, *([experiment.prior.weight] if experiment.prior.weight > 0 else [])})
-    settings = {"study": "prior", "errors": "by joint", "experiment": experiment.model_dump(mode="json"), "data": _triangle_hash(found.train), "versions": results.versions()}
+    settings = {"study": "prior", "errors": "by joint", "experiment": experiment.model_dump(mode="json"), "data": _triangle_hash(found.train), "versions": fit_document.versions()}
     journal = Journal(out / "journal.jsonl", settings)
     tasks = [(repr(weight), (experiment, found.model, found.train, found.prior, found.moving, weight)) for weight in weights]
     done = run(journal, tasks, prior.one, jobs=jobs, progress=lambda share: progress("weights", share))
     document = {**prior.summary([done[key] for key, _ in tasks], weights, experiment.prior.weight), "notices": list(found.notices)}
     figures.prior(document, out)
-    results.write_json(out / "study.json", document)
+    whole_files.write_json(out / "study.json", document)
     return document
 
 

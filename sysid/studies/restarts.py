@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..fit_document import number
 from ..posed_problem import Problem, noise_weights, pose
-from ..results import number
 from ..specs import Experiment
 from ..triangles import Compressed
 from .prepared import prepared

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from .. import config, loop, yaml_edit
+from .. import loop, yaml_edit, yaml_text
 from ..errors import SysidError
 from ..vocabulary import find, vocabulary
 from .diagnosed import Diagnosed
@@ -148,4 +148,4 @@ def _options(given) -> dict:
     if not isinstance(given, dict) or not all(isinstance(v, str) for v in given.values()):
         raise SysidError("options must be {name: text}")
     typed = {name: text for name, text in given.items() if text.strip()}
-    return {n: config.plain(config.parse_yaml(text, where=n)) for n, text in typed.items()}
+    return {n: yaml_text.plain(yaml_text.parse_yaml(text, where=n)) for n, text in typed.items()}

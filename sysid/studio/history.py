@@ -14,7 +14,7 @@ import threading
 from collections.abc import Callable
 from pathlib import Path
 
-from .. import bounded, config, experiment_file, loop, pipeline, results, state
+from .. import bounded, config, experiment_file, loop, pipeline, state, whole_files
 from ..errors import ConfigError, SysidError
 from ..experiment_file import Changed
 from ..specs import Experiment
@@ -35,8 +35,8 @@ class History:
         """Raises SysidError where the run folder cannot be written."""
         self.path = config.file_of(path)
         self.name = Experiment(path=self.path).name
-        self.run = results.folder(out or Path("runs") / self.name)
-        self._store = results.folder(self.run / "studio") / "undo.json"
+        self.run = whole_files.folder(out or Path("runs") / self.name)
+        self._store = whole_files.folder(self.run / "studio") / "undo.json"
         self._lock = threading.RLock()
         self._stamp = None
         self._items, self._at, self._measured, self._before = self._remembered()
@@ -168,7 +168,7 @@ class History:
     def _tell(self) -> None:
         """Write the steps for `sysid history`, where this page made any."""
         if any(item["added"] not in (None, _EDIT) for item in self._items):
-            results.write_json(self.run / "history.json", {"steps": [{k: v for k, v in step.items() if k != "sha"} for step in self.steps()]})
+            whole_files.write_json(self.run / "history.json", {"steps": [{k: v for k, v in step.items() if k != "sha"} for step in self.steps()]})
 
     def _append(self, text: str, added: str | None, joint: str | None) -> None:
         kept = self._items[: self._at + 1] if self._items else []
@@ -178,7 +178,7 @@ class History:
         self._at = len(self._items) - 1
 
     def _save(self) -> None:
-        results.write_json(self._store, {"file": str(self.path.resolve()), "items": self._items, "at": self._at, "measured": self._measured, "before": self._before})
+        whole_files.write_json(self._store, {"file": str(self.path.resolve()), "items": self._items, "at": self._at, "measured": self._measured, "before": self._before})
         self._stamp = self._stamped()
 
     def _stamped(self) -> tuple | None:

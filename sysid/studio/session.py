@@ -7,7 +7,7 @@ import threading
 from collections.abc import Callable
 from pathlib import Path
 
-from .. import comparison, loop, pipeline, results
+from .. import comparison, fit_document, loop, pipeline, results
 from ..diagnose.diagnosis import diagnose
 from ..errors import SysidError
 from ..estimate import Fit
@@ -264,7 +264,7 @@ class Session:
         if first is not None and second is not None:
             names = ("from", "to")
             errors = comparison.compare(first.fit, second.fit, names)
-            errors = {d.joint: results.number(d.se) for d in errors}
+            errors = {d.joint: fit_document.number(d.se) for d in errors}
             for entry in found["joints"]:
                 entry["se"] = errors.get(entry["joint"])
         return found
