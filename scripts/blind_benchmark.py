@@ -53,9 +53,10 @@ from benchmark_parts.new_laws import NEW  # noqa: E402
 from benchmark_parts.old_laws import OLD  # noqa: E402
 from benchmark_parts.third_laws import THIRD  # noqa: E402
 
-from sysid import addition, config, fit_document, loop, pipeline, terminal, whole_files  # noqa: E402
+from sysid import addition, config, fit_document, loop, pipeline, whole_files  # noqa: E402
 from sysid.errors import SysidError  # noqa: E402
 from sysid.studies.journal import Journal, run  # noqa: E402
+from sysid.terminal import watched  # noqa: E402
 
 # ---- the robots
 
@@ -1012,7 +1013,7 @@ def main(arguments: list[str] | None = None) -> None:
     state = source()
     settings = {"seed": options.seed, "conditions": options.conditions, "duration": SECONDS, "rate": RATE, "most": MOST_STEPS, "source": state, "versions": fit_document.versions()}
     journal = Journal(out / f"journal-{conditions.MARKS[options.conditions]}{options.seed}-{state}.jsonl", settings)
-    with terminal.progress_bar() as progress:
+    with watched.progress_bar() as progress:
         done = run(journal, [(case.key, (asdict(case),)) for case in chosen], one, jobs=options.jobs, progress=lambda s: progress(f"{len(chosen)} cases", s))
     records = sorted(done.values(), key=lambda r: r["key"])
     settings |= {"cases": options.cases, "only": options.only, "limit": options.limit}

@@ -35,8 +35,9 @@ os.environ["PYTHONPATH"] = os.pathsep.join(
 import numpy as np  # noqa: E402
 from blind_benchmark import RATE, SECONDS, experiment_of, source, wilson  # noqa: E402
 
-from sysid import fit_document, pipeline, terminal, whole_files  # noqa: E402
+from sysid import fit_document, pipeline, whole_files  # noqa: E402
 from sysid.studies.journal import Journal, run  # noqa: E402
+from sysid.terminal import watched  # noqa: E402
 
 DETERMINED = 0.9  # `from_data` above which a parameter is the data's
 KINDS = ("viscous", "coulomb", "friction", "inertial", "combination")
@@ -186,7 +187,7 @@ def main() -> None:
             drawn = int(np.random.default_rng([options.seed, number]).integers(2**31))
             place = out / "robots" / f"{robot}-{options.seed}-{number}{shade}" / "case"
             tasks.append((f"{robot}/{number}", (robot, drawn, options.colour, str(place))))
-    with terminal.progress_bar() as progress:
+    with watched.progress_bar() as progress:
         done = run(journal, tasks, one, jobs=options.jobs, progress=lambda s: progress(f"{len(tasks)} robots", s))
     found = summary(list(done.values()))
     whole_files.write_json(out / "coverage.json", {"settings": settings, "summary": found, "records": done})

@@ -39,8 +39,9 @@ import numpy as np  # noqa: E402
 
 from scripts import blind_benchmark as benchmark  # noqa: E402
 from scripts.blind_benchmark import JOINTS, RATE, SECONDS, experiment_of  # noqa: E402
-from sysid import fit_document, pipeline, terminal, whole_files  # noqa: E402
+from sysid import fit_document, pipeline, whole_files  # noqa: E402
 from sysid.studies.journal import Journal, run  # noqa: E402
+from sysid.terminal import watched  # noqa: E402
 
 ROBOTS = ("planar", "planar", "leg")
 #: effects that `simulate` hides by the same parameter that `detectable` states, and that other effects of it are left to chance
@@ -231,7 +232,7 @@ def main() -> None:
     journal = Journal(out / f"{options.study}-{options.seed}-{level:g}-{worth:g}-{digest}.jsonl", settings)
     draw = {"soft": lambda s, k: drawn(s, k, SOFT), "others": lambda s, k: drawn(s, k, OTHERS)}.get(options.study, conditions)
     tasks = [(str(k), (draw(options.seed, k), level, worth)) for k in range(options.logs)]
-    with terminal.progress_bar() as progress:
+    with watched.progress_bar() as progress:
         done = run(journal, tasks, {"size": size, "power": power, "soft": soft, "others": soft}[options.study], jobs=options.jobs, progress=lambda s: progress(options.study, s))
     found = told(options.study, list(done.values()))
     whole_files.write_json(out / f"{options.study}.json", {"settings": settings, **found, "records": list(done.values())})

@@ -417,7 +417,7 @@ def test_signals_and_neighbours_that_are_not_there(tmp_path):
 
 
 def test_every_effect_is_shown(capsys):
-    from sysid.terminal import show_effects
+    from sysid.terminal.effects import show_effects
 
     show_effects([vocabulary.describe(vocabulary.find(name)) for name in vocabulary.vocabulary()])
     said = capsys.readouterr().out

@@ -5,8 +5,9 @@ import time
 
 import pytest
 
-from sysid import progress, terminal
+from sysid import progress
 from sysid.progress import Course
+from sysid.terminal import watched
 from tests.conftest import CONFIG, JOINTS, csv, dump, put
 
 LONG = {"shoulder": "left_shoulder_lateral_rotation", "elbow": "left_elbow_flexion_and_extensio"}
@@ -109,9 +110,9 @@ def test_times_are_spoken():
 
 
 def test_a_log_tells_stage_and_time_left(monkeypatch, capfd):
-    monkeypatch.setattr(terminal, "_QUIET", 0.0)
-    monkeypatch.setattr(terminal, "_EVERY", 0.1)
-    with terminal.progress_lines(Course()) as report:
+    monkeypatch.setattr(watched, "_QUIET", 0.0)
+    monkeypatch.setattr(watched, "_EVERY", 0.1)
+    with watched.progress_lines(Course()) as report:
         report("filters", 0.5)
         time.sleep(1.2)
         report("compress", 0.5)

@@ -3,12 +3,14 @@
 import numpy as np
 import pytest
 
-from sysid import check, config, pipeline, terminal
+from sysid import check, config, pipeline
 from sysid import cli as commands
 from sysid.check.faults import masses
 from sysid.check.look import looked
+from sysid.cli import command_line
 from sysid.errors import meant
 from sysid.statement import faults, sizes
+from sysid.terminal import fitted
 from tests.conftest import JOINTS, csv
 
 BOTH = ("shoulder", "elbow")
@@ -200,7 +202,7 @@ def test_logs_that_cannot_be_meant_are_checked_next_and_that_only_once(experimen
 
 def test_what_is_held_at_zero_is_a_line_an_effect(capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", "200")
-    terminal._show_held({f"viscous.j{k}.Fv": 1.0 for k in range(7)} | {"armature.arm.left.Ia": 2.0})
+    fitted._show_held({f"viscous.j{k}.Fv": 1.0 for k in range(7)} | {"armature.arm.left.Ia": 2.0})
     lines = capsys.readouterr().out.splitlines()
     assert len(lines) == 2 and lines[0].endswith("on j0, j1, j2, j3, j4, j5, j6") and lines[1].endswith("on arm.left")
 
@@ -231,7 +233,7 @@ def test_no_help_is_cut(cli, capfd, monkeypatch):
     said = capfd.readouterr().out
     assert "..." not in said.partition("Commands:")[2] and max(map(len, said.splitlines())) <= 80 and "sysid init FOLDER" in said
     assert said.index("  init ") < said.index("  check ") < said.index("  fit ") < said.index("  diagnose ") < said.index("  add ")
-    assert set(commands._SHORT) == {c.name or c.callback.__name__ for c in commands.app.registered_commands} | {"study"}
+    assert set(command_line._SHORT) == {c.name or c.callback.__name__ for c in command_line.app.registered_commands} | {"study"}
 
 
 # ---- masses that the log cannot show

@@ -104,7 +104,7 @@ def test_another_machine_sends_what_it_predicts(monkeypatch, tmp_path):
 def test_the_command_takes_workers(tmp_path):
     from typer.testing import CliRunner
 
-    from sysid.cli import app
+    from sysid.cli.command_line import app
 
     pytest.importorskip("distributed")
     command = ["fit", str(LEG), "--workers", "2", "--out", str(tmp_path)]

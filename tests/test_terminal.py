@@ -5,7 +5,8 @@ from types import SimpleNamespace
 import pytest
 
 from sysid.statement import sizes, tables, text
-from sysid.terminal import show_diagnosis, show_discovery
+from sysid.terminal.diagnosis import show_diagnosis
+from sysid.terminal.steps import show_discovery
 
 JOINTS = ("shoulder_pan_joint_of_the_left_arm", "rail", "j3", "j4", "j5")
 FIRST, RAIL = JOINTS[:2]

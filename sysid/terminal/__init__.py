@@ -1,0 +1,1 @@
+"""What the commands print for a person: tables, notices, progress. Computes nothing."""

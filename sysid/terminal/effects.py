@@ -1,0 +1,41 @@
+"""The vocabulary: every effect with its parameters."""
+
+from ..statement import text
+from .tables import terminal_width
+
+
+def show_effects(found: list[dict]) -> None:
+    """The catalogue, a line an effect; of one alone all that is known."""
+    if len(found) > 1:
+        left = max(len(effect["name"]) for effect in found)
+        for effect in found:
+            words = f"{effect['name']:<{left}}  {effect['summary'].partition('. ')[0].rstrip('.')}"
+            print("\n".join(text.wrapped(words, terminal_width(), " " * (left + 2))))
+        print("next: sysid effects NAME")
+        return
+    for effect in found:
+        print(f"{effect['name']}: {effect['summary']}")
+        print(f"  kind         {effect['kind']}, of {'the whole robot' if effect['scope'] == 'robot' else 'a joint'}")
+        print(f"  equation     {effect['equation']}")
+        for parameter in effect["parameters"]:
+            unit = "" if parameter["unit"] == "1" else f" {parameter['unit']}"
+            print(f"  {parameter['name']:<12}{unit}{_bounds(parameter)}: {parameter['says']}")
+        for option, says in effect["options"].items():
+            print(f"  {option + ':':<12} {says}")
+        print(f"  looks like   {effect['looks_like']}")
+        print(f"  tied with    {', '.join(effect['tied_with']) or 'nothing known'}")
+        print(f"  separate by  {effect['separate_by']}")
+        if effect.get("maneuvers"):
+            print(f"  maneuvers    {', '.join(effect['maneuvers'])}: `sysid design --separate` tries them")
+        print(f"  source       {effect['source']}")
+
+
+_SHARES = {"speed": "times the joint's top speed", "torque": "times its greatest torque", "angle": "times the angle it travels", "softness": "times the angle it travels over its greatest torque", "duration": "times the longest log"}
+
+
+def _bounds(parameter: dict) -> str:
+    """What a parameter may be, in words."""
+    if "upper" not in parameter:
+        return ", not negative" if parameter["lower"] == 0 else ""
+    share = _SHARES.get(parameter["share_of"])
+    return f", {parameter['lower']:g} to {parameter['upper']:g}" + (f" {share}" if share else "")

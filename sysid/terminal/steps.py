@@ -1,0 +1,80 @@
+"""What additions changed: before and after, step by step."""
+
+import math
+from pathlib import Path
+
+from rich.console import Console
+from rich.markup import escape
+
+from ..statement import text
+from .diagnosis import show_verdict
+from .next_steps import next_step, typed
+from .tables import number, show_notices, table, terminal_width
+
+
+def show_added(document: dict) -> None:
+    """The held-out error before and after an effect."""
+    before, after = document["rms_test_before"], document["rms_test_after"]
+    rows = [
+        [d["joint"], number(before[d["joint"]]), number(after[d["joint"]]), f"{d['delta_rms']:+.{_decimals(before[d['joint']])}f}", "-" if d["se"] is None else f"{d['se']:.2g}"]
+        for d in document["differences"]
+    ]  # fmt: skip
+    table(f"held-out RMS without and with {document['added']}", ["joint", "before", "after", "change", "standard error"], rows)
+    for parameter in document["parameters"]:
+        print(text.valued(parameter["name"], parameter))
+    if document["says"]:
+        Console().print(escape(document["says"]), soft_wrap=True, highlight=False)
+    if not document["refused"]:
+        print(f"written into {document['experiment']}")
+    show_notices(document)
+    file = Path(document["experiment"])
+    next_step("diagnose", file.parent if file.name == "config.yaml" else file)
+
+
+def _decimals(level: float | None) -> int:
+    """How many decimals four digits of an error have."""
+    return 4 if not level else max(0, 3 - math.floor(math.log10(level)))
+
+
+def show_step(step: dict) -> None:
+    """One step of a discovery, as it is made."""
+    what = "start" if step["added"] is None else f"+ {step['added']} on {step['joint']}"
+    rms = ", ".join(f"{joint} {number(value)}" for joint, value in step["rms_test"].items())
+    Console().print(f"{escape(what)}: held-out RMS {escape(rms)}", soft_wrap=True, highlight=False)
+
+
+def show_discovery(said: dict, found, document: dict, experiment=None) -> None:
+    """Where a discovery ended."""
+    for entry in said["refused"]:
+        print(f"not claimed: {entry['effect']} on {entry['joint']}: {entry['why']}")
+    show_verdict(text.told(found, document), terminal_width())
+    print(f"steps and experiment files: {said['run']}/steps")
+    if experiment is None:
+        return
+    if not said["commands"]:
+        next_step("report", typed(experiment), "--open")
+        return
+    print(f"{experiment.path} is as it was; what was found is written into it by")
+    for command in said["commands"][1:]:
+        print(f"  {command}")
+    print(f"next: {said['commands'][0]}")
+
+
+_LONGEST_BAR = 20  # twice the error of the start, or more
+
+
+def show_history(steps: list[dict], experiment) -> None:
+    """The steps, one a line, and the error of each joint as a falling row of bars."""
+    joints, first = list(steps[0]["rms_test"]), steps[0]["rms_test"]
+
+    def cell(rms: dict, joint: str) -> str:
+        now, before = rms.get(joint), first.get(joint)
+        bar = "#" * min(max(1, round(10 * now / before)), _LONGEST_BAR) if now and before else ""
+        return f"{number(now)} {bar.ljust(10)}" if joint in rms else ""
+
+    rows = [
+        [f"{number} start" if step["added"] is None else f"{number} + {step['added']} on {step['joint']}", *(cell(step["rms_test"], j) for j in joints)]
+        for number, step in enumerate(steps)
+    ]  # fmt: skip
+    table("held-out RMS [N m, or N on a prismatic joint]", ["step", *joints], rows)
+    next_step("diagnose", typed(experiment))

@@ -1,0 +1,41 @@
+"""Tables and the numbers in them, as wide as the terminal."""
+
+import shutil
+
+from rich.console import Console
+from rich.markup import escape
+
+from ..statement import tables, text
+
+
+def table(title: str, heads: list[str], rows: list[list[str]]) -> None:
+    """A table in the width of the terminal, the names on its left whole."""
+    print("\n".join([title, *tables.fitted(heads, rows, 1, terminal_width())]))
+
+
+def percent(share: float | None) -> str:
+    """A share in per cent; a dash for none."""
+    return "-" if share is None else f"{100 * share:.2f} %"
+
+
+def number(value: float | None) -> str:
+    """A number with four digits; a dash for none."""
+    return "-" if value is None else f"{value:.4g}"
+
+
+def four(value: float | None) -> str:
+    """A number with four decimals; a dash for none."""
+    return "-" if value is None else f"{value:.4f}"
+
+
+def terminal_width() -> int:
+    """Columns of the terminal."""
+    return shutil.get_terminal_size().columns
+
+
+def show_notices(document: dict) -> None:
+    """What was decided for the user, each on a line."""
+    console = Console()
+    for notice in document["notices"]:
+        lines = escape("\n".join(text.wrapped(f"note {notice}", terminal_width(), "  "))).removeprefix("note")
+        console.print(f"[yellow]note[/yellow]{lines}", soft_wrap=True, highlight=False)
