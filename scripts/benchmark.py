@@ -251,11 +251,12 @@ def torque(repeats: int) -> dict:
     import numpy as np
     import pinocchio as pin
 
-    from sysid import inverse_dynamics, model, robot
-    from sysid.specs import EffectSpec, RobotSpec
+    from sysid import inverse_dynamics, listed_effects, robot
+    from sysid.robot_spec import RobotSpec
+    from sysid.specs import EffectSpec
 
     machine = robot.load(RobotSpec(urdf=PANDA, joints=[f"panda_joint{k}" for k in range(1, 8)]))
-    structure = model.build(machine, [EffectSpec(name="viscous"), EffectSpec(name="coulomb")])
+    structure = listed_effects.build(machine, [EffectSpec(name="viscous"), EffectSpec(name="coulomb")])
     ours = inverse_dynamics.inverse_dynamics(structure, np.concatenate([machine.prior.ravel(), np.ones(14)]))
     samples = np.random.default_rng(0).normal(size=(3, 1_000_000, machine.dof))
     one, data, calls = [np.array(x[0]) for x in samples], machine.model.createData(), 2000
@@ -319,7 +320,7 @@ def write_arm_log(path: Path, samples: int, seed: int) -> None:
     import polars as pl
 
     from sysid import regressor, robot
-    from sysid.specs import RobotSpec
+    from sysid.robot_spec import RobotSpec
 
     joints = [f"panda_joint{k}" for k in range(1, 8)]
     machine = robot.load(RobotSpec(urdf=PANDA, joints=joints))

@@ -24,7 +24,7 @@ import httpx
 import numpy as np
 import polars as pl
 
-from sysid import candidates, regressor, robot, specs
+from sysid import candidates, regressor, robot, robot_spec
 from sysid.diagnose import ask, diagnosis
 from sysid.studio.app import application
 from sysid.studio.serve import responsive
@@ -38,7 +38,7 @@ ASKED = ("stribeck", "asymmetric_coulomb", "torque_bias", "armature")
 
 def written(folder: Path, samples: int) -> Path:
     """An experiment with so many samples in all, a sixth of them held out."""
-    machine = robot.load(specs.RobotSpec(urdf=URDF))
+    machine = robot.load(robot_spec.RobotSpec(urdf=URDF))
     for name, count, seed in (("train", samples - samples // 6, 0), ("test", samples // 6, 1)):
         rng, t = np.random.default_rng(seed), np.arange(count) / 1000.0
         q, qd, qdd = (np.zeros((count, machine.dof)) for _ in range(3))

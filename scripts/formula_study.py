@@ -22,7 +22,7 @@ import numpy as np
 from ruamel.yaml import YAML
 from scipy.optimize import least_squares
 
-from sysid import experiment_logs, pipeline, regressor, robot, rows, specs
+from sysid import experiment_logs, pipeline, regressor, robot, robot_spec, rows
 from sysid.compress import compress
 from sysid.effect import NotFinite
 from sysid.model import moving_coefficients
@@ -131,7 +131,7 @@ def written(folder: Path, text: str, values: dict, motions: dict, rng, size: flo
     from sysid.motion import Piece
 
     (folder / "robot.urdf").write_text(URDF)
-    machine = robot.load(specs.RobotSpec(urdf=str(folder / "robot.urdf")))
+    machine = robot.load(robot_spec.RobotSpec(urdf=str(folder / "robot.urdf")))
     for name, (t, q, qd, qdd) in motions.items():
         tau = (
             regressor.torque(machine, 1.2 * machine.prior, q, qd, qdd)

@@ -166,8 +166,9 @@ def read(path: Path, kind: str) -> None:
     """Read a file as the commands do, and every column of it. Raises SysidError, or whatever is a finding."""
     from sysid import config, log, robot, urdf
     from sysid.errors import SysidError
+    from sysid.log_spec import DataSpec, LogSpec
     from sysid.readers import open_table
-    from sysid.specs import DataSpec, LogSpec, RobotSpec
+    from sysid.robot_spec import RobotSpec
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")

@@ -110,7 +110,7 @@ COMMANDS = {
 
 def made(root: Path) -> dict[str, Path]:
     """Folders to copy a trial from, by the kind of their logs; each has three arms."""
-    from sysid import robot, specs
+    from sysid import robot, robot_spec
     from tests import conftest
     from tests.conftest import CONFIG, ROTOR, URDF, csv, dump, logged, put
 
@@ -125,8 +125,8 @@ def made(root: Path) -> dict[str, Path]:
             data = {"data.train": ["train.csv" + packed], "data.test": ["test.csv" + packed]}
             text = "# mine\n" + dump(put(CONFIG, data)) + "# to the end\n"
             (folder / "config.yaml").write_text(text)
-            spec = specs.RobotSpec(
-                urdf=str(folder / "robot.urdf"), rotors=[specs.RotorSpec.model_validate(ROTOR)]
+            spec = robot_spec.RobotSpec(
+                urdf=str(folder / "robot.urdf"), rotors=[robot_spec.RotorSpec.model_validate(ROTOR)]
             )
             for part, seed in (("train", 2 * number), ("test", 2 * number + 1)):
                 text = csv(logged(robot.load(spec), seed))

@@ -12,9 +12,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from .events import Event
+from .listed_effects import build
 from .log import Log
 from .lowpass import band, lowpassed, stride_of, widest
-from .model import build
 from .motion import Motion
 from .outliers import BURST, CHANCE, bursts, ratio, surprise
 from .projection import inverted

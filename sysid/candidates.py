@@ -10,8 +10,9 @@ import numpy as np
 from . import rows as row
 from .deflection import Deflection
 from .effect import Effect, MotionEffect, SensorEffect, WrenchEffect
-from .model import ROBOT, Model
-from .model import found as found_effect
+from .listed_effects import found as found_effect
+from .model import Model
+from .model_parameters import ROBOT
 from .specs import Experiment, is_own
 from .vocabulary import find, vocabulary
 

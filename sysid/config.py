@@ -17,9 +17,10 @@ from . import bounded, datasets, groups
 from .config_errors import keys_of, named, refused, unknown_key
 from .errors import ConfigError
 from .formula import parse
+from .log_spec import LogSpec
 from .mistyped import FEW, standing
 from .readers import is_log_folder, listed
-from .specs import ENTRY, EffectSpec, Experiment, LogSpec, is_own
+from .specs import ENTRY, EffectSpec, Experiment, is_own
 from .vocabulary import find, vocabulary
 from .yaml_text import parse_yaml, plain
 

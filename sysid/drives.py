@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from . import motor_side
+from .drive_spec import FreeFactor
 from .effect import TorqueEffect
 from .effect_parameters import Linear, Shape, called
 from .effects.torque_gain import TorqueGain
@@ -19,7 +20,7 @@ from .errors import ConfigError
 from .inertia import DIVERGENCES
 from .model import Model
 from .robot import Robot
-from .specs import Experiment, FreeFactor
+from .specs import Experiment
 
 _SCALES = 7.0  # of the logarithm of a scale: three decades either way
 _WIDE = 10.0  # a free factor without bounds is sought within this many times its start, and this share of it

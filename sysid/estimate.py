@@ -11,7 +11,6 @@ from .certificate import Certificate
 from .differences import difference
 from .given_shapes import given_shapes
 from .inertia.consistency import is_consistent
-from .inverse_dynamics import WithTorque
 from .model import Model, moving_coefficients
 from .motion import Motion
 from .multistart import Searched
@@ -22,6 +21,7 @@ from .prior_weight import PriorWeight, number, with_weight
 from .solve import Solution
 from .specs import Experiment
 from .triangles import Compressed
+from .with_torque import WithTorque
 
 
 @dataclass(frozen=True)

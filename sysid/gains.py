@@ -16,13 +16,14 @@ from functools import cache
 
 import numpy as np
 
+from . import listed_effects, motor_side, rows
 from . import log as logs
-from . import model, motor_side, rows
+from .drive_spec import ActuatorSpec, FreeFactor
 from .lowpass import lowpassed, stride_of, widest
 from .motion import Motion
 from .robot import Robot
 from .segment import Segment
-from .specs import ActuatorSpec, EffectSpec, Experiment, FreeFactor
+from .specs import EffectSpec, Experiment
 
 _HAS = ("armature", "viscous", "coulomb", "torque_bias")  # what any joint has
 _LATEST = 0.1  # s: a command that acts later is no servo's
@@ -113,7 +114,7 @@ def _driven(machine: Robot, segment: Segment, drives: dict[str, ActuatorSpec]) -
 
 
 def _rows(machine: Robot, motion: Motion) -> rows.Rows:
-    structure = model.build(machine, [EffectSpec(name=name) for name in _HAS])
+    structure = listed_effects.build(machine, [EffectSpec(name=name) for name in _HAS])
     return rows.stack(structure, motion, stride_of(motion, motion.pieces[0].smoother.cutoff))
 
 

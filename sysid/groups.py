@@ -13,7 +13,8 @@ from functools import cache
 from glob import has_magic
 from posixpath import normpath
 
-from .specs import DataSpec, EffectSpec, LogSpec, ModelSpec
+from .log_spec import DataSpec, LogSpec
+from .specs import EffectSpec, ModelSpec
 
 Groups = Mapping[str, Mapping[str, Sequence[LogSpec]]]
 Mistake = tuple[tuple, str]  # where it stands, as keys and numbers; what is wrong

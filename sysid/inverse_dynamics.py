@@ -14,7 +14,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
 from types import MappingProxyType
 
 import numpy as np
@@ -24,11 +23,12 @@ from . import own_effects, regressor
 from .drives import DRIVE_EFFECTS
 from .effect import Effect, MotionEffect, SensorEffect, WrenchEffect
 from .errors import SysidError
-from .model import ROBOT, Model
-from .motion import Piece
+from .instants import Instants, at_no_time
+from .model import Model
+from .model_parameters import ROBOT
 from .robot import Robot
 
-_NOWHERE: Mapping[str, str] = MappingProxyType({})
+NOWHERE: Mapping[str, str] = MappingProxyType({})
 _CHUNK = 4096  # samples: the arrays of one body stay in cache
 # Up to so many samples calls one by one are faster than arrays over all of them, whose overhead is
 # about a millisecond.
@@ -174,7 +174,7 @@ class InverseDynamics:
     def _add_alike(self, out, q, qd, qdd, load, n: int = 1) -> None:
         """Add what elementwise effects make of n samples to out (n dof,), the joints being so many
         samples of one."""
-        part = _Instants(q, qd, qdd, load)
+        part = Instants(q, qd, qdd, load)
         for own in self._alike:
             coefficients, shapes = own.coefficients, own.shapes
             if n > 1:
@@ -190,33 +190,7 @@ def _refused(what: str, joints: tuple[str, ...]) -> SysidError:
     return SysidError(what, where="torque", allowed=allowed, do=do)
 
 
-class _Instants:
-    """What an elementwise effect may look at of samples (n, dof), as n dof samples of one joint: a
-    `Piece` takes longer to make than Pinocchio's inverse dynamics of an arm."""
-
-    __slots__ = ("load", "q", "qd", "qdd", "t")
-
-    def __init__(self, q, qd, qdd, load):
-        self.q, self.qd, self.qdd = q.reshape(-1, 1), qd.reshape(-1, 1), qdd.reshape(-1, 1)
-        self.load = None if load is None else load.reshape(-1, 1)
-        self.t = self.q  # as long as the samples; no effect of this kind looks at the clock
-
-    def direction(self, joint: int) -> np.ndarray:
-        """As `Piece.direction`, at no rounding of the speed."""
-        return np.sign(self.qd[:, joint])
-
-
-def at_no_time(q, qd, qdd, load=None) -> Piece:
-    """Samples (n, dof) as effects see them: at no time, with no signal beside them."""
-    n, dof = q.shape
-    zero, still = np.zeros(n), np.zeros(dof)
-    return Piece(
-        log=0, step=1.0, t=zero, q=q, qd=qd, qdd=qdd, tau=zero[:, None], measured=zero[:, None],
-        signals={}, use=None, smoother=None, core=slice(0, n), rest=still, noise=still, load=load,
-    )  # fmt: skip
-
-
-def inverse_dynamics(model: Model, x, levels: Mapping[str, str] = _NOWHERE) -> InverseDynamics:
+def inverse_dynamics(model: Model, x, levels: Mapping[str, str] = NOWHERE) -> InverseDynamics:
     """The inverse dynamics of a model at its parameters.
 
     Included is every effect whose torque follows from q, qd and qdd of one instant: friction and
@@ -300,55 +274,3 @@ def _alike(
         for name, at in own.items():
             values[name][joint] = at
     return _Alike(effect, tuple(c), values)
-
-
-class WithTorque:
-    """What has a model and its parameters x (size,) also has the torque that they need."""
-
-    model: Model
-    x: np.ndarray
-
-    @cached_property
-    def _made(self) -> dict[tuple, InverseDynamics]:
-        return {}
-
-    def inverse_dynamics_at(self, levels: Mapping[str, str]) -> InverseDynamics:
-        """What `torque` computes with at {group: level}; made when it is first used. Threads need
-        one each."""
-        key = tuple(sorted(levels.items()))
-        if key not in self._made:
-            self._made[key] = inverse_dynamics(self.model, self.x, levels)
-        return self._made[key]
-
-    @property
-    def inverse_dynamics(self) -> InverseDynamics:
-        """`inverse_dynamics_at` of a model without effects per group."""
-        return self.inverse_dynamics_at(_NOWHERE)
-
-    def torque(self, q, qd, qdd, *, levels: Mapping[str, str] = _NOWHERE) -> np.ndarray:
-        """Torque [N m or N] of one sample (dof,) or many (n, dof), bodies, rotors and every effect
-        that looks at one instant.
-
-        Args:
-            q, qd, qdd: positions [rad or m], velocities and accelerations, in the order of
-                `joints`.
-            levels: {group: level} of every group of logs that effects are per.
-
-        Effects that look back in time, at the clock or at logged signals (presliding, backlash,
-        elasticity, delay, current_lag, external_force, warmup) are left out; `omitted` names those
-        of this model.
-
-        Raises:
-            SysidError: shapes that are neither, or not alike; a level that is not said, or not
-                there.
-        """
-        return self.inverse_dynamics_at(levels)(q, qd, qdd)
-
-    @property
-    def omitted(self) -> tuple[str, ...]:
-        """The effects of the model that `torque` leaves out, as `effect.joint`."""
-        groups = self.model.groups
-        most = max(map(len, groups.values()), default=1)  # each level of each group once
-        every = [{g: own[min(k, len(own) - 1)] for g, own in groups.items()} for k in range(most)]
-        left = (name for own in every for name in self.inverse_dynamics_at(own).omitted)
-        return tuple(dict.fromkeys(left))

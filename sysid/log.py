@@ -14,13 +14,14 @@ import numpy as np
 
 from . import motor_side, units
 from .clock import corrected
+from .drive_spec import ActuatorSpec
 from .errors import LogError, SysidWarning
 from .events import Event
 from .groups import levels_of
+from .log_spec import DataSpec, LogSpec
 from .recording import Recording, recorded
 from .segment import Segment
 from .spans import Spans
-from .specs import ActuatorSpec, DataSpec, LogSpec
 
 # A step longer than this many median steps is a hole that interpolation would invent motion for.
 GAP_STEPS = 10.0

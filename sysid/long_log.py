@@ -17,14 +17,14 @@ from pathlib import Path
 import numpy as np
 
 from . import log as logs
-from . import recording, spans, units
+from . import recorded_columns, recording, spans, units
 from .errors import SysidWarning
 from .even_clock import EvenClock, Stretch
 from .groups import levels_of
 from .log import Log
+from .log_spec import DataSpec, LogSpec
 from .segment import Segment
 from .spans import Spans, edges, of_segment
-from .specs import DataSpec, LogSpec
 
 _DEGREES = re.compile(r"joint '.*' reaches")  # a notice whose number differs from span to span
 
@@ -161,7 +161,7 @@ class _Source:
 
     def _times(self) -> Iterator[tuple[int, np.ndarray]]:
         """The clock of the file in parts: first row, stamps (n,) [s]."""
-        name = recording.time_column(self._table, self._data.columns)
+        name = recorded_columns.time_column(self._table, self._data.columns)
         own = name == self._table.usual.get("time") and self._table.clock
         scale, begin = units.TIME[own or self._data.units.time], None
         for first, last in pairwise(edges(self._table.rows)):

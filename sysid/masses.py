@@ -21,7 +21,8 @@ from .compress import compress
 from .estimate import Fit
 from .held_apart import FEWEST, HeldApart, held_apart, judged, solved, strongest
 from .linearised import Linearised
-from .model import ROBOT, Coefficient, Model, moving_coefficients
+from .model import Model, moving_coefficients
+from .model_parameters import ROBOT, Coefficient
 from .motion import Motion
 from .posed_problem import pose
 from .prior_weight import PLAUSIBLE

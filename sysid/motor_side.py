@@ -19,8 +19,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .drive_spec import ActuatorSpec, FreeFactor
 from .errors import ConfigError
-from .specs import ActuatorSpec, DataSpec, FreeFactor
+from .log_spec import DataSpec
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from . import config, drives, gains, groups, masses, model, robot, rollout
+from . import config, drives, gains, groups, listed_effects, masses, robot, rollout
 from . import filters as filtering
 from . import log as logs
 from .compress import compress
@@ -28,6 +28,7 @@ from .estimate import Fit, identify
 from .experiment_logs import Read, read
 from .held_apart import prior_strength
 from .inertia.consistency import is_consistent
+from .log_spec import LogSpec
 from .long_motion import prepare
 from .long_prediction import predicted
 from .model import Model
@@ -38,7 +39,8 @@ from .prediction import Prediction, predict
 from .prior_weight import PriorWeight, with_weight
 from .robot import Robot
 from .shape_refinement import refined
-from .specs import AUTO, Experiment, LogSpec
+from .spec_values import AUTO
+from .specs import Experiment
 from .threads import single_threaded
 from .workers import Mapped, crew
 
@@ -59,7 +61,7 @@ def started(experiment: Experiment) -> Experiment:
 def build(experiment: Experiment) -> tuple[Robot, Model, np.ndarray]:
     """The robot, the model and the prior (bodies, 10) of an experiment. Raises RobotError, ConfigError."""
     machine = robot.load(experiment.robot, experiment.folder)
-    parts = model.build(machine, experiment.model.effects, experiment.folder, experiment.data.logged, experiment.data.groups)
+    parts = listed_effects.build(machine, experiment.model.effects, experiment.folder, experiment.data.logged, experiment.data.groups)
     structure = with_drives(parts, experiment)
     return machine, structure, _prior(experiment, structure)
 

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .specs import AUTO, Experiment
+from .spec_values import AUTO
+from .specs import Experiment
 
 #: Rucker & Wensing 2022, section VII: where nothing can be held apart, and to compare filters by
 USUAL = 1e-2

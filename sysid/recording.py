@@ -16,13 +16,13 @@ import numpy as np
 
 from . import datasets, motor_side, units
 from .errors import LogError, SysidWarning
+from .log_spec import DataSpec, LogSpec
 from .readers import open_table
 from .readers.table import Table
-from .specs import ColumnsSpec, DataSpec, LogSpec
+from .recorded_columns import check_headers, meant, names_of, single, time_of
 
 _EPOCH = 1e6  # s: a clock that reads more counts from 1970, not from the log's start
 EPISODE = "episode_index"  # the column in which LeRobot numbers episodes
-_DEFAULTS = ColumnsSpec()
 
 
 @dataclass(frozen=True)
@@ -128,12 +128,12 @@ def _load(table: Table, data: DataSpec, joints, episodes, drives):
         ("qd", "velocity"),
         ("qdd", "acceleration"),
     ):
-        if (pattern := _meant(table, spec, key)) is not None:
+        if (pattern := meant(table, spec, key)) is not None:
             own = needed.get(name, [True] * len(joints))
-            there = _names(table, pattern, joints, name, own) if any(own) else [None] * len(own)
+            there = names_of(table, pattern, joints, name, own) if any(own) else [None] * len(own)
             wanted[name] = there
     wanted |= _signals(table, data, joints, drives)
-    time = None if data.rate else _time(table, _meant(table, spec, "time"))
+    time = None if data.rate else time_of(table, meant(table, spec, "time"))
     counted = EPISODE if table.has(EPISODE) else None
     if episodes is not None and counted is None:
         raise LogError(
@@ -161,7 +161,7 @@ def _load(table: Table, data: DataSpec, joints, episodes, drives):
     unit = (
         table.clock if time and time == table.usual.get("time") and table.clock else data.units.time
     )
-    _check_headers(table, data, wanted, time)
+    check_headers(table, data, wanted, time)
     signals = {}
     for name, names in wanted.items():
         if len(names) == 1 and names[0]:
@@ -178,51 +178,20 @@ def _load(table: Table, data: DataSpec, joints, episodes, drives):
     return (columns[time][rows] if time else None), unit, signals, breaks
 
 
-_QUANTITIES = {"q": "position", "qd": "position", "qdd": "position", "tau": "torque"}
-
-
-def _check_headers(table: Table, data: DataSpec, wanted: dict, time: str | None) -> None:
-    """Refuse a unit that the header states and that nobody spoke of; where the experiment names
-    another, it stands, and is told.
-
-    Raises:
-        LogError: a column is in other units than it would be read in.
-    """
-    asked = [("time", time)] if time and not (table.clock and time == table.usual.get("time")) else []
-    asked += [
-        (quantity, name)
-        for key, quantity in _QUANTITIES.items()
-        for name in wanted.get(key, ())
-        if name
-    ]
-    for quantity, name in asked:
-        name = table.titled(name)
-        stated, taken = units.in_header(name, quantity), getattr(data.units, quantity)
-        if not stated or units.agree(stated, taken):
-            continue
-        said = f"the header {name!r} says {stated}, and data.units.{quantity} is {taken}"
-        if quantity not in data.units.model_fields_set:
-            raise LogError(
-                said, where=str(table.path),
-                do=f"write data.units.{quantity}: {stated}, or {taken} where the header is wrong",
-            )  # fmt: skip
-        warnings.warn(SysidWarning(f"{table.path}: {said}; read in {taken}"), stacklevel=5)
-
-
 def _signals(table: Table, data: DataSpec, joints, drives) -> dict[str, list[str]]:
     """The columns of other signals, as `signals.name`; of what only sums need, as `sums.name`."""
     named = {**data.columns.signals, **data.signals}
-    wanted = {f"signals.{n}": [_single(table, c, f"signal {n!r}")] for n, c in named.items()}
+    wanted = {f"signals.{n}": [single(table, c, f"signal {n!r}")] for n, c in named.items()}
     free = [n for entry in data.torque.values() for n in entry if n not in motor_side.told(entry)]
     for sums in (data.position, data.torque):
         for name in motor_side.signals_of(sums, joints):
             if name not in named:  # effects see it only where a factor of it is free
                 kind = "signals" if name in free else "sums"
-                wanted[f"{kind}.{name}"] = [_single(table, name, f"signal {name!r}")]
+                wanted[f"{kind}.{name}"] = [single(table, name, f"signal {name!r}")]
     for joint, drive in drives.items():
         column = named.get(drive.column, drive.column)
         name = f"signals.{motor_side.command_name(joint)}"
-        wanted[name] = [_single(table, column, f"actuator.{joint}")]
+        wanted[name] = [single(table, column, f"actuator.{joint}")]
     return wanted
 
 
@@ -235,24 +204,6 @@ def _sum(signals: dict, data: DataSpec, joints) -> None:
     signals["tau"][:, [joints.index(joint) for joint in data.unused]] = 0.0
     for name in [name for name in signals if name.startswith("sums.")]:
         del signals[name]
-
-
-def _meant(table: Table, spec: ColumnsSpec, key: str):
-    """What the experiment says of a signal; where it says nothing, what files of this format call
-    it. Velocity and acceleration are read where the experiment names them."""
-    own, default = getattr(spec, key), getattr(_DEFAULTS, key)
-    return table.usual.get(key, own) if own == default and own is not None else own
-
-
-def _time(table: Table, column) -> str:
-    if not isinstance(column, int) and not table.has(column):
-        raise LogError(
-            f"there is no column {column!r} for time",
-            where=str(table.path),
-            allowed=table.some_names(),
-            do="name it in data.columns.time, or give data.rate [Hz] where no time was logged",
-        )
-    return _single(table, column, "time")
 
 
 def _chosen(index, episodes, where: str):
@@ -271,50 +222,6 @@ def _chosen(index, episodes, where: str):
             )
         rows = np.flatnonzero(np.isin(index, sorted(episodes)))
     return rows, np.flatnonzero(np.diff(index[rows])) + 1
-
-
-def _names(table: Table, pattern, joints, signal: str, needed: list[bool]) -> list[str | None]:
-    """The column of each joint, None where it is not needed; or the one matrix of all."""
-    if isinstance(pattern, str) and "{joint}" not in pattern:
-        name = table.resolve(pattern)
-        if table.width(name) != len(joints):
-            raise LogError(
-                f"{signal}: column {name!r} is {table.width(name)} wide for {len(joints)} joints",
-                where=str(table.path),
-                allowed="a pattern with {joint}, a list of a column a joint, or a matrix that wide",
-                do="correct data.columns",
-            )
-        return [name]
-    if isinstance(pattern, str):
-        pattern = [pattern.replace("{joint}", joint) for joint in joints]
-        for joint, name, looked_at in zip(joints, pattern, needed):
-            if looked_at and not table.has(name):
-                raise LogError(
-                    f"joint {joint!r} has no column: {name!r} is not there",
-                    where=str(table.path),
-                    allowed=table.some_names(),
-                    do="correct data.columns or robot.joints",
-                )
-    if len(pattern) != len(joints):
-        raise LogError(
-            f"{signal}: {len(pattern)} columns for {len(joints)} joints",
-            where=str(table.path),
-            allowed=f"one for each of {', '.join(joints)}",
-            do="correct data.columns",
-        )
-    return [_single(table, c, signal) if own else None for c, own in zip(pattern, needed)]
-
-
-def _single(table: Table, column, signal: str) -> str:
-    name = table.resolve(column)
-    if (width := table.width(name)) > 1:
-        raise LogError(
-            f"{signal}: {name!r} is {width} columns",
-            where=str(table.path),
-            allowed=f"one of {name}[0] to {name}[{width - 1}]",
-            do="correct data.columns",
-        )
-    return name
 
 
 def _seconds(t, unit: str) -> np.ndarray:
@@ -337,11 +244,6 @@ def from_origin(t, start, scale: float) -> np.ndarray:
 
 def _whole(t) -> np.ndarray:
     return t.astype(np.int64, copy=False) if t.dtype.kind in "iu" else t
-
-
-def time_column(table: Table, spec: ColumnsSpec) -> str:
-    """The column of a table that is its clock. Raises LogError."""
-    return _time(table, _meant(table, spec, "time"))
 
 
 def _increasing(t, breaks, where: str) -> np.ndarray:

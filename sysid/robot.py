@@ -19,7 +19,7 @@ from . import prior, urdf, urdf_files
 from .errors import RobotError, SysidWarning
 from .inertia import pseudo
 from .inertia.consistency import is_consistent
-from .specs import InertiaSpec, RobotSpec
+from .robot_spec import InertiaSpec, RobotSpec
 
 # Before the names of links in the Pinocchio model of a URDF: a joint and a link may share a name, and Pinocchio keeps the
 # frames of both in one list.

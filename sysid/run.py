@@ -17,10 +17,10 @@ from . import bounded, config, pipeline
 from .earlier_fit import read_fit
 from .errors import ConfigError, SysidWarning
 from .inertia import PARAMETERS
-from .inverse_dynamics import WithTorque
 from .model import Model
 from .prediction import Prediction, units
 from .specs import Experiment
+from .with_torque import WithTorque
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 from ruamel.yaml import YAML
 
-from sysid import regressor, robot, specs
+from sysid import regressor, robot, robot_spec
 
 URDF = """<?xml version="1.0"?>
 <robot name="arm">
@@ -116,7 +116,7 @@ def arm_logs(tmp_path_factory) -> tuple[dict, dict]:
     """Columns of the training log and of the test log."""
     file = tmp_path_factory.mktemp("arm") / "robot.urdf"
     file.write_text(URDF)
-    machine = robot.load(specs.RobotSpec(urdf=str(file), rotors=[specs.RotorSpec.model_validate(ROTOR)]))
+    machine = robot.load(robot_spec.RobotSpec(urdf=str(file), rotors=[robot_spec.RotorSpec.model_validate(ROTOR)]))
     return logged(machine, 0), logged(machine, 1)
 
 
@@ -190,7 +190,7 @@ def cli(monkeypatch, capfd, tmp_path):
 @pytest.fixture(scope="session")
 def planar(tmp_path_factory) -> robot.Robot:
     """The planar arm of the blind benchmark: shoulder and elbow."""
-    return robot.load(specs.RobotSpec(urdf=str(_planar(tmp_path_factory))))
+    return robot.load(robot_spec.RobotSpec(urdf=str(_planar(tmp_path_factory))))
 
 
 def _planar(tmp_path_factory) -> Path:
@@ -216,7 +216,7 @@ def simulated(tmp_path_factory, planar):
             told = [simulate.hidden(h) if isinstance(h, str) else h for h in hide]
             found = simulate.simulate(planar, hide=told, seed=seed, duration=duration, rate=500.0, **more)
             made[name] = tmp_path_factory.mktemp("simulated") / name
-            spec = specs.RobotSpec(urdf=str(_planar(tmp_path_factory)))
+            spec = robot_spec.RobotSpec(urdf=str(_planar(tmp_path_factory)))
             simulate.write(found, specs.Experiment(robot=spec), made[name])
         return made[name]
 

@@ -7,8 +7,9 @@ import numpy as np
 
 from sysid import config, posed_problem, regressor, robot, specs
 from sysid.compress import compress
+from sysid.listed_effects import build
 from sysid.log import Log, Segment
-from sysid.model import build, moving_coefficients
+from sysid.model import moving_coefficients
 from sysid.preprocess import prepare
 from sysid.studies import prepared
 

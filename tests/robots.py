@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from sysid import robot, specs
+from sysid import robot, robot_spec
 
 AXES = "revolute", "continuous", "prismatic"
 
@@ -54,4 +54,4 @@ def load(path, text: str, **spec) -> robot.Robot:
     """Write the URDF below `path` and load it with the given robot section."""
     file = path / "robot.urdf"
     file.write_text(text)
-    return robot.load(specs.RobotSpec.model_validate({"urdf": str(file), **spec}))
+    return robot.load(robot_spec.RobotSpec.model_validate({"urdf": str(file), **spec}))

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sysid import model, regressor, robot
+from sysid import listed_effects, regressor, robot
 from sysid.compress import compress
 from sysid.config import experiment
 from sysid.filters import lowpassed
@@ -39,7 +39,7 @@ def log(machine) -> Log:
 
 
 def structure(machine):
-    return model.build(machine, [EffectSpec(name="coulomb")])
+    return listed_effects.build(machine, [EffectSpec(name="coulomb")])
 
 
 def true(machine) -> np.ndarray:

@@ -7,7 +7,7 @@ import pinocchio as pin
 import pytest
 
 from scripts.design_parts.limits import summed
-from sysid import config, pipeline, robot
+from sysid import config, listed_effects, pipeline, robot
 from sysid import model as models
 from sysid.design import basis, design, document, limits, links, problem, search, solve
 from sysid.design.collision import corners
@@ -16,8 +16,9 @@ from sysid.design.fourier import Fourier
 from sysid.design.information import Known, evidence, information, log_det, own_size
 from sysid.design.limits import LimitsSpec
 from sysid.errors import SysidWarning
+from sysid.robot_spec import RobotSpec
 from sysid.simulate import load, read_trajectory, simulate
-from sysid.specs import EffectSpec, RobotSpec
+from sysid.specs import EffectSpec
 from tests.conftest import URDF
 
 UR5 = "example-robot-data://ur_description/urdf/ur5_robot.urdf"
@@ -43,7 +44,7 @@ def arm(tmp_path_factory):
     file = tmp_path_factory.mktemp("design") / "robot.urdf"
     file.write_text(URDF)
     machine = robot.load(RobotSpec(urdf=str(file)))
-    model = models.build(machine, [EffectSpec(name="viscous"), EffectSpec(name="coulomb")])
+    model = listed_effects.build(machine, [EffectSpec(name="viscous"), EffectSpec(name="coulomb")])
     x = np.concatenate([machine.prior.ravel(), [0.3, 0.1, 0.2, 0.15]])
     torque = np.array([10.0, 3.0])
     return Known(model, x, np.array([0.05, 0.02]), own_size(model, machine.prior, x, torque))

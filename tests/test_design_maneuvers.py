@@ -12,7 +12,7 @@ from sysid.design.fourier import Fourier
 from sysid.design.information import Known
 from sysid.design.maneuvers import KINDS, Maneuver
 from sysid.errors import SysidWarning
-from sysid.specs import RobotSpec
+from sysid.robot_spec import RobotSpec
 from sysid.vocabulary import find, vocabulary
 from tests.conftest import URDF
 

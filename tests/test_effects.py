@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from sysid import effect, regressor, robot, specs, vocabulary
+from sysid import effect, regressor, robot, robot_spec, specs, vocabulary
 from sysid.errors import ConfigError
 from sysid.inertia import pseudo
 from sysid.motion import Piece
@@ -39,7 +39,7 @@ def moving() -> tuple:
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "slide.urdf"
         file.write_text(SLIDE)
-        machine = robot.load(specs.RobotSpec(urdf=str(file)))
+        machine = robot.load(robot_spec.RobotSpec(urdf=str(file)))
     t, q, qd, qdd = fourier_motion(np.random.default_rng(1), 2.0, 200.0, machine.dof)
     still = t < 0.25
     q[still], qd[still], qdd[still] = q[~still][0], 0.0, 0.0
@@ -49,7 +49,7 @@ def moving() -> tuple:
 @cache
 def arm_moving() -> tuple:
     """A six-joint arm and a motion of it."""
-    machine = robot.load(specs.RobotSpec(urdf=UR5))
+    machine = robot.load(robot_spec.RobotSpec(urdf=UR5))
     return machine, piece_of(machine, *fourier_motion(np.random.default_rng(2), 3.0, 200.0, machine.dof))
 
 
@@ -132,8 +132,10 @@ def test_start_changes_nothing(name, make):
 @pytest.mark.parametrize("name", [*MOVERS, *SENSORS, "presliding", "warmup", "joint_coupling"])
 @pytest.mark.parametrize("filtered", ["raw", "same"])
 def test_columns_of_a_stretch_are_those_of_the_whole(name, filtered):
-    from sysid.model import ROBOT, Model, chunks, initial
+    from sysid.model import Model, chunks
+    from sysid.model_parameters import ROBOT
     from sysid.preprocess import prepare
+    from sysid.terms import initial
     from tests.problems import arm_log
 
     machine, _ = arm_moving()
@@ -235,7 +237,7 @@ def test_a_soft_joint_parts_link_and_motor(tmp_path, encoder, name):
     file = tmp_path / "pendulum.urdf"
     file.write_text(PENDULUM)
     rotor = {"joint": "hinge", "ratio": 10.0, "on": "base", "axis": [0, 1, 0], "inertia": {"parameters": [1, 0, 0, 0, 0.006, 0.005, 0.006, 0, 0, 0]}}
-    machine = robot.load(specs.RobotSpec(urdf=str(file), rotors=[specs.RotorSpec.model_validate(rotor)]))
+    machine = robot.load(robot_spec.RobotSpec(urdf=str(file), rotors=[robot_spec.RotorSpec.model_validate(rotor)]))
     t = np.arange(2000) * 5e-4
     q, qd, qdd = (x[:, None] for x in (0.6 * np.sin(4 * t), 2.4 * np.cos(4 * t), -9.6 * np.sin(4 * t)))
     piece = piece_of(machine, t, q, qd, qdd)
@@ -410,7 +412,7 @@ def test_signals_and_neighbours_that_are_not_there(tmp_path):
         vocabulary.find("warmup").given(signal="cold").columns(small_piece(), 1)
     file = tmp_path / "pendulum.urdf"
     file.write_text(PENDULUM)
-    machine = robot.load(specs.RobotSpec(urdf=str(file)))
+    machine = robot.load(robot_spec.RobotSpec(urdf=str(file)))
     with pytest.raises(ConfigError, match="second joint"):
         vocabulary.find("joint_coupling").bound(machine, 0)
     assert vocabulary.find("joint_coupling").variants(machine, 0) == []

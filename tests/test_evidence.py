@@ -10,7 +10,7 @@ from scipy.stats import f as fisher
 from scipy.stats import norm
 from scipy.stats import t as student
 
-from sysid import blocks, config, model, regressor
+from sysid import blocks, config, listed_effects, regressor
 from sysid.candidates import candidates
 from sysid.diagnose import evidence, null, projected
 from sysid.log import Log, Segment
@@ -206,7 +206,7 @@ def view_of(planar, effects: list[str], seed: int, *, noise=None, seconds: float
     tau = regressor.torque(planar, planar.prior, q, qd, qdd) + 0.3 * qd
     tau += NOISE * rng.normal(size=q.shape) if noise is None else noise(rng, len(t))
     experiment = config.experiment({"robot": {"urdf": "planar.urdf"}, "model": {"effects": effects}})
-    structure = model.build(planar, experiment.model.effects)
+    structure = listed_effects.build(planar, experiment.model.effects)
     seen = q + ANGLE * rng.normal(size=q.shape)
     again = seen + ANGLE * rng.normal(size=q.shape)
     plain, rough = (

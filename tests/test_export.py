@@ -18,10 +18,12 @@ from sysid.export.motors import Motor
 from sysid.export.stated import stated
 from sysid.inertia import pseudo
 from sysid.inertia.consistency import is_consistent
-from sysid.model import ROBOT, Model
+from sysid.model import Model
+from sysid.model_parameters import ROBOT
 from sysid.notices import noticed
+from sysid.robot_spec import RobotSpec
 from sysid.run import Run
-from sysid.specs import Experiment, RobotSpec
+from sysid.specs import Experiment
 from tests import robots, servos
 from tests.test_inertia import random_bodies
 

@@ -151,7 +151,7 @@ def test_locked_joints_and_welded_links_are_exported_as_one_body(tmp_path):
         "robot": {"urdf": "example-robot-data://panda_description/urdf/panda.urdf", "joints": names, "lock": {"panda_finger_joint1": 0.03}},
     })  # fmt: skip
     from sysid.estimate import identify
-    from sysid.model import build
+    from sysid.listed_effects import build
 
     machine = robot.load(spec.robot)
     structure = build(machine, spec.model.effects)

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from sysid import pipeline, vocabulary
 from sysid.errors import ConfigError
 from sysid.formula import FUNCTIONS, Formula, parse
-from sysid.model import found
+from sysid.listed_effects import found
 from sysid.specs import EffectSpec
 from sysid.trusted import trust
 from sysid.vocabulary import describe

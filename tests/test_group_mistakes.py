@@ -11,10 +11,10 @@ import pytest
 from sysid import config, pipeline
 from sysid.errors import ConfigError, SysidError
 from sysid.groups import names
-from sysid.model import build
+from sysid.listed_effects import build
+from sysid.log_spec import LogSpec
 from sysid.notices import noticed
 from sysid.per_level import at_level
-from sysid.specs import LogSpec
 from sysid.vocabulary import find, vocabulary
 from tests.conftest import dump, put
 from tests.grouped import MASS, experiment, tree

@@ -251,7 +251,7 @@ def test_every_unit_of_time(unit, per, rate, start):
 def test_small_angles_in_degrees(experiment, cli):
     """Which no size tells: only in degrees do they go with the torques. Rad as small stay rad."""
     from sysid import regressor, robot
-    from sysid.specs import RobotSpec
+    from sysid.robot_spec import RobotSpec
     from tests.conftest import motion
 
     folder = experiment()
@@ -455,7 +455,7 @@ def test_mjcf(tmp_path, cli):
 
     from sysid import regressor
     from sysid.robot import load
-    from sysid.specs import RobotSpec
+    from sysid.robot_spec import RobotSpec
 
     (tmp_path / "arm.xml").write_text(MJCF)
     truth = pin.buildModelFromMJCF(str(tmp_path / "arm.xml"))

@@ -9,10 +9,11 @@ import pytest
 import sysid
 from sysid import config, inverse_dynamics, own_effects, robot, vocabulary
 from sysid.errors import SysidError
-from sysid.model import ROBOT, Model
-from sysid.model import build as build_model
+from sysid.listed_effects import build as build_model
+from sysid.model import Model
+from sysid.model_parameters import ROBOT
 from sysid.motion import Piece
-from sysid.specs import RobotSpec
+from sysid.robot_spec import RobotSpec
 from sysid.trusted import trust
 from tests import robots
 from tests.problems import UR5, fourier_motion

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sysid import experiment_logs, log, pipeline, regressor, specs
+from sysid import experiment_logs, log, log_spec, pipeline, regressor
 from sysid.errors import LogError, SysidWarning
 from sysid.readers import open_table
 from tests.conftest import JOINTS, csv, matrices, motion, write_mat5, write_mat73, write_table
@@ -20,8 +20,8 @@ EXACT = {"rtol": 0, "atol": 1e-12}
 
 def read(file: Path, *, start=None, stop=None, **data) -> log.Log:
     """The log in a file, of two turning joints."""
-    spec = specs.DataSpec.model_validate(data)
-    return log.read(specs.LogSpec(file=str(file), start=start, stop=stop), spec, JOINTS, (False, False))
+    spec = log_spec.DataSpec.model_validate(data)
+    return log.read(log_spec.LogSpec(file=str(file), start=start, stop=stop), spec, JOINTS, (False, False))
 
 
 def only(found: log.Log) -> log.Segment:
@@ -117,8 +117,8 @@ def test_units_of_speeds_and_of_sliding_joints(tmp_path):
     columns = {"t": np.arange(n) / 100, **{f"{signal}_{joint}": np.full(n, 90.0) for signal in ("q", "qd", "qdd", "tau") for joint in JOINTS}}
     file = write_table(tmp_path / "log.csv", columns)
     for unit, hinge, slide in (("deg", np.pi / 2, 90.0), ("mm", 90.0, 0.09), ("m", 90.0, 90.0)):
-        data = specs.DataSpec.model_validate({"columns": {"velocity": "qd_{joint}", "acceleration": "qdd_{joint}"}, "units": {"position": unit}})
-        segment = only(log.read(specs.LogSpec(file=str(file)), data, JOINTS, (False, True)))
+        data = log_spec.DataSpec.model_validate({"columns": {"velocity": "qd_{joint}", "acceleration": "qdd_{joint}"}, "units": {"position": unit}})
+        segment = only(log.read(log_spec.LogSpec(file=str(file)), data, JOINTS, (False, True)))
         for values in (segment.q, segment.qd, segment.qdd):
             np.testing.assert_allclose(values, np.tile([hinge, slide], (n, 1)), **EXACT)
         np.testing.assert_array_equal(segment.tau, 90.0)

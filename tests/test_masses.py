@@ -11,7 +11,8 @@ from sysid.check import check
 from sysid.errors import SysidWarning
 from sysid.estimate import identify
 from sysid.held_apart import chosen
-from sysid.model import build, moving_coefficients
+from sysid.listed_effects import build
+from sysid.model import moving_coefficients
 from sysid.prior_weight import with_weight
 from tests.conftest import JOINTS, URDF, motion
 from tests.problems import arm, fourier_motion

@@ -10,7 +10,7 @@ import pytest
 
 from sysid import config, multistart, pipeline, shape
 from sysid.landscape import Landscape, landscape
-from sysid.model import build
+from sysid.listed_effects import build
 from sysid.preprocess import prepare
 from tests.problems import UR5, arm_log
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sysid import pipeline, regressor, robot, specs
+from sysid import pipeline, regressor, robot, robot_spec
 from sysid.errors import SysidError
 from sysid.simulate import hidden, load, motion, motions, simulate
 from tests.conftest import URDF
@@ -19,7 +19,7 @@ RATE = 500.0
 def arm(tmp_path_factory):
     file = tmp_path_factory.mktemp("planar") / "robot.urdf"
     file.write_text(URDF)
-    return robot.load(specs.RobotSpec(urdf=str(file)))
+    return robot.load(robot_spec.RobotSpec(urdf=str(file)))
 
 
 @pytest.fixture(scope="module")

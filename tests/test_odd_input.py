@@ -16,7 +16,7 @@ from sysid import pipeline, units
 from sysid.errors import LogError, RobotError
 from sysid.readers import open_table
 from sysid.robot import load as robot_of
-from sysid.specs import RobotSpec
+from sysid.robot_spec import RobotSpec
 from tests.conftest import URDF, csv
 
 ROOT = Path(__file__).resolve().parent.parent

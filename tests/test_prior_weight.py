@@ -11,8 +11,9 @@ from sysid.compress import compress
 from sysid.estimate import identify
 from sysid.inertia import LogCholesky
 from sysid.linearised import Linearised
+from sysid.listed_effects import build
 from sysid.log import Log
-from sysid.model import build, moving_coefficients
+from sysid.model import moving_coefficients
 from sysid.preprocess import prepare
 from sysid.segment import Segment
 from tests.problems import ROOT, arm, fourier_motion, leg

@@ -8,7 +8,7 @@ import shutil
 import numpy as np
 import pytest
 
-from sysid import log, pipeline, specs
+from sysid import log, log_spec, pipeline
 from sysid.errors import LogError, SysidWarning
 from sysid.readers import listed, open_table
 from tests.conftest import JOINTS, csv, write_table
@@ -102,10 +102,10 @@ def read(
     file, *, joints=JOINTS, topic=None, episode=None, start=None, stop=None, **data
 ) -> log.Log:
     entry = {"files": [str(f) for f in file]} if isinstance(file, list) else {"file": str(file)}
-    spec = specs.LogSpec.model_validate(
+    spec = log_spec.LogSpec.model_validate(
         entry | {"topic": topic, "episode": episode, "start": start, "stop": stop}
     )
-    return log.read(spec, specs.DataSpec.model_validate(data), joints, [False] * len(joints))
+    return log.read(spec, log_spec.DataSpec.model_validate(data), joints, [False] * len(joints))
 
 
 # ---- bags

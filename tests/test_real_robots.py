@@ -123,7 +123,7 @@ def test_schunk_s_short_runs_do_not_carry_the_model_over():
 
 
 def log(name: str):
-    from sysid.specs import LogSpec
+    from sysid.log_spec import LogSpec
 
     return LogSpec(file=name)
 

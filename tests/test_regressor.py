@@ -7,7 +7,7 @@ import pytest
 from sysid import regressor
 from sysid.errors import RobotError
 from sysid.inertia import pseudo
-from sysid.specs import RobotSpec
+from sysid.robot_spec import RobotSpec
 from tests import robots
 from tests.test_inertia import random_bodies
 
@@ -173,10 +173,10 @@ def test_rotor_mistakes_are_named(tmp_path):
 
 
 def test_example_robot_data_and_package_paths():
-    from sysid import robot, specs
+    from sysid import robot, robot_spec
 
-    panda = robot.load(specs.RobotSpec(urdf="example-robot-data://panda_description/urdf/panda.urdf", lock={"panda_finger_joint1": 0.0, "panda_finger_joint2": 0.0}))
+    panda = robot.load(robot_spec.RobotSpec(urdf="example-robot-data://panda_description/urdf/panda.urdf", lock={"panda_finger_joint1": 0.0, "panda_finger_joint2": 0.0}))
     assert panda.dof == 7 and panda.bodies[6].name == "panda_link7"
     assert pseudo.to_pseudo(panda.prior).shape == (7, 4, 4)
     with pytest.raises(RobotError, match="package://"):
-        robot.load(specs.RobotSpec(urdf="package://nowhere/robot.urdf"))
+        robot.load(robot_spec.RobotSpec(urdf="package://nowhere/robot.urdf"))

@@ -16,7 +16,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from sysid import pipeline, regressor, results, robot, specs
+from sysid import pipeline, regressor, results, robot, robot_spec
 from sysid.diagnose.diagnosis import diagnose
 from sysid.report import charts, page, residual_charts, solids, torque_chart
 from sysid.report.decimate import broken, kept
@@ -36,7 +36,7 @@ def written(folder, hidden: float):
     folder.mkdir()
     (folder / "robot.urdf").write_text(URDF.replace('"shoulder"', f'"{html.escape(EVIL)}"'))
     rotor = {**CONFIG["robot"]["rotors"][0], "joint": EVIL}
-    machine = robot.load(specs.RobotSpec(urdf=str(folder / "robot.urdf"), rotors=[specs.RotorSpec.model_validate(rotor)]))
+    machine = robot.load(robot_spec.RobotSpec(urdf=str(folder / "robot.urdf"), rotors=[robot_spec.RotorSpec.model_validate(rotor)]))
     for name, seed in ((LOG, 0), ("test.csv", 1)):
         rng, t = np.random.default_rng(seed), np.arange(0, 8.0, 0.005)
         q, qd, qdd = motion(t, seed)

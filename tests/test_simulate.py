@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.signal import butter, sosfiltfilt
 
-from sysid import config, regressor, robot, specs
+from sysid import config, regressor, robot, robot_spec
 from sysid.errors import SysidError
 from sysid.inertia import pseudo
 from sysid.simulate import Hidden, Scales, defaults, hidden, simulate
@@ -29,8 +29,8 @@ def machines(tmp_path_factory):
     file.write_text(URDF)
     leg = config.load(ROOT / "configs/cheetah3.yaml")
     return {
-        "arm": robot.load(specs.RobotSpec(urdf=str(file))), "leg": robot.load(leg.robot, leg.folder),
-        "ur5": robot.load(specs.RobotSpec(urdf=UR5)),
+        "arm": robot.load(robot_spec.RobotSpec(urdf=str(file))), "leg": robot.load(leg.robot, leg.folder),
+        "ur5": robot.load(robot_spec.RobotSpec(urdf=UR5)),
     }  # fmt: skip
 
 

@@ -177,7 +177,7 @@ def test_coefficients_at_zero_beside_a_strong_prior(weight):
     """Frictionless and nearly without noise: what is left of the coefficients falls while the bodies stay at the prior's weight."""
     from sysid import config, robot
     from sysid.compress import compress
-    from sysid.model import build
+    from sysid.listed_effects import build
     from sysid.preprocess import prepare
     from tests.problems import UR5, arm_log
 

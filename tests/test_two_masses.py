@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from sysid import config, pipeline, regressor, robot, specs, two_masses
+from sysid import config, pipeline, regressor, robot, robot_spec, specs, two_masses
 from sysid.addition import grown
 from sysid.lowpass import Gaussian
 from sysid.simulate import hidden, simulate
@@ -103,7 +103,7 @@ def test_play_without_inertia_follows_the_load():
 def arm(tmp_path_factory):
     file = tmp_path_factory.mktemp("planar") / "robot.urdf"
     file.write_text(URDF)
-    return robot.load(specs.RobotSpec(urdf=str(file)))
+    return robot.load(robot_spec.RobotSpec(urdf=str(file)))
 
 
 @pytest.mark.parametrize("what", ["elasticity:elbow:K=60,D=0.3", "elasticity:elbow:K=200,D=1", "backlash:elbow:b=0.01", "backlash:elbow:b=0.004"])

@@ -7,8 +7,8 @@ from sysid import estimate, posed_problem, uncertainty
 from sysid.blocks import parameters
 from sysid.compress import compress
 from sysid.inertia import LogCholesky
+from sysid.listed_effects import build
 from sysid.log import Log, Segment
-from sysid.model import build
 from sysid.preprocess import prepare
 from sysid.reduction import triangle
 from sysid.regressor import torque

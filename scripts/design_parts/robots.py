@@ -13,8 +13,9 @@ from sysid import pipeline
 from sysid.design import designed, search
 from sysid.design.basis import basis
 from sysid.design.problem import Problem
+from sysid.log_spec import DataSpec
 from sysid.simulate import Played, simulate, write
-from sysid.specs import DataSpec, EffectSpec
+from sysid.specs import EffectSpec
 
 ROBOTS = ("planar", "leg", "ur5", "panda")
 RATE = {"planar": 500.0, "leg": 500.0, "ur5": 250.0, "panda": 250.0}  # Hz

@@ -13,7 +13,7 @@ import polars as pl
 
 from scripts.fleet_parts.robots import Type, drawn, logged, payload
 from sysid import Online, pipeline, robot
-from sysid.specs import RobotSpec
+from sysid.robot_spec import RobotSpec
 
 PANDA = "example-robot-data://panda_description/urdf/panda.urdf"
 JOINTS = [f"panda_joint{k}" for k in range(1, 8)]

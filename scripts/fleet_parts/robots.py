@@ -15,7 +15,7 @@ import polars as pl
 
 from sysid import regressor, robot
 from sysid.inertia import LogCholesky
-from sysid.specs import RobotSpec
+from sysid.robot_spec import RobotSpec
 
 UR5 = "example-robot-data://ur_description/urdf/ur5_robot.urdf"
 CONFIG = f"robot: {{urdf: '{UR5}'}}\nmodel: {{effects: [viscous, coulomb]}}\n"

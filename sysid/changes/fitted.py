@@ -9,7 +9,8 @@ import numpy as np
 
 from ..blocks import jackknife
 from ..inertia import DIVERGENCES, PARAMETERIZATIONS, pseudo
-from ..model import ROBOT, Model
+from ..model import Model
+from ..model_parameters import ROBOT
 from ..objective import Objective
 from ..projection import inverted, root
 from ..solve import Coordinates, solve

@@ -15,7 +15,7 @@ import numpy as np
 from scipy import stats
 
 from ..blocks import folds, z_score
-from ..model import ROBOT
+from ..model_parameters import ROBOT
 from ..projection import inverted
 
 BLOCKS, _MOST = 24, 12  # blocks, over the whole log; changes

@@ -11,11 +11,12 @@ import numpy as np
 from .. import datasets, experiment_logs, rows
 from ..blocks import numbered
 from ..errors import LogError
+from ..log_spec import LogSpec
 from ..lowpass import LEAST, lowpassed, stride_of
 from ..model import Model
 from ..noise import floors_of
 from ..notices import noticed
-from ..specs import Experiment, LogSpec
+from ..specs import Experiment
 from .fitted import Change, together
 from .halves import BLOCKS, support
 from .halves import question as asked_of

@@ -6,7 +6,8 @@ import numpy as np
 
 from .. import rows
 from ..effect import MotionEffect
-from ..model import ROBOT, Model
+from ..model import Model
+from ..model_parameters import ROBOT
 from ..vocabulary import find
 
 _PER_JOINT = ("coulomb", "viscous", "torque_bias")

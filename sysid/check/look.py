@@ -12,14 +12,16 @@ from .. import experiment_logs, pipeline, robot
 from .. import log as logs
 from ..errors import SysidError
 from ..estimate import Fit
+from ..listed_effects import build, found
+from ..log_spec import LogSpec
 from ..lowpass import lowpassed, stride_of, widest
-from ..model import Model, build, found
+from ..model import Model
 from ..motion import Motion
 from ..notices import noticed
 from ..recording import Recording
 from ..robot import Robot
 from ..rows import Rows, stack
-from ..specs import EffectSpec, Experiment, LogSpec
+from ..specs import EffectSpec, Experiment
 from ..trusted import Untrusted
 from .equations import FEWEST, Equations
 

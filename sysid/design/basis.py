@@ -15,7 +15,8 @@ from ..errors import ConfigError, LogError, SysidWarning
 from ..estimate import Fit
 from ..filters import settled
 from ..log import Log
-from ..model import ROBOT, Model
+from ..model import Model
+from ..model_parameters import ROBOT
 from ..motion import Motion
 from ..preprocess import prepare
 from ..projection import inverted

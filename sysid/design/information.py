@@ -24,7 +24,8 @@ from functools import cached_property
 import numpy as np
 
 from ..inertia import DIVERGENCES
-from ..model import ROBOT, Model
+from ..model import Model
+from ..model_parameters import ROBOT
 from .columns import columns
 from .suspects import Suspect, along
 

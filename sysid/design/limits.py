@@ -13,7 +13,7 @@ from .. import bounded
 from ..errors import ConfigError
 from ..robot import Robot
 from ..simulate.motion import room, top_speeds
-from ..specs import Number, Positive
+from ..spec_values import Number, Positive
 from ..yaml_text import parse_yaml, plain
 
 _MARGIN = 0.05  # of a range is kept free: what a controller overshoots by

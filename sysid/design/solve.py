@@ -15,7 +15,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.optimize import linprog
 
-from ..model import ROBOT
+from ..model_parameters import ROBOT
 from .collision import Near
 from .columns import with_changes
 from .fourier import Fourier

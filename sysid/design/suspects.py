@@ -17,7 +17,8 @@ from ..candidates import Candidate, bounds_of, columns_of, tried
 from ..effect import SensorEffect
 from ..effect_parameters import Shape
 from ..estimate import Fit
-from ..model import ROBOT, Model
+from ..model import Model
+from ..model_parameters import ROBOT
 from ..motion import Motion
 from ..rows import Rows, stack, starts
 from ..source import Source

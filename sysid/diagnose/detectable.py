@@ -14,7 +14,7 @@ import numpy as np
 from scipy.special import ndtri
 
 from ..candidates import Candidate, at_start
-from ..model import ROBOT
+from ..model_parameters import ROBOT
 from ..view import View
 from .ask import Asked
 from .evidence import Group

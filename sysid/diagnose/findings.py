@@ -10,7 +10,7 @@ import numpy as np
 from .. import comparison
 from ..addition import command, spelled
 from ..estimate import Fit
-from ..model import ROBOT
+from ..model_parameters import ROBOT
 from .refits import Member
 from .steps import Step
 

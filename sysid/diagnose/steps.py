@@ -9,7 +9,7 @@ import numpy as np
 
 from .. import blocks
 from ..candidates import Candidate
-from ..model import ROBOT
+from ..model_parameters import ROBOT
 from ..view import View
 from .projected import groups_at
 from .refits import joined, losses, taken, weighed

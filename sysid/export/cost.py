@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .. import regressor
-from ..model import ROBOT, Model
+from ..model import Model
+from ..model_parameters import ROBOT
 from ..motion import Motion
 from .stated import Stated, stated
 

@@ -13,7 +13,7 @@ import pinocchio as pin
 
 from .. import robot as robots
 from ..inertia import pseudo
-from ..specs import RobotSpec
+from ..robot_spec import RobotSpec
 from ..urdf_export import text, tree
 from .stated import Stated
 

@@ -27,8 +27,9 @@ import pinocchio as pin
 
 from ..inertia import pseudo
 from ..inertia.consistency import is_consistent
-from ..inverse_dynamics import at_no_time
-from ..model import ROBOT, Model
+from ..instants import at_no_time
+from ..model import Model
+from ..model_parameters import ROBOT
 from ..robot import Body, Robot
 from .motors import Motor
 

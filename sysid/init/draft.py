@@ -11,7 +11,7 @@ import numpy as np
 from .. import datasets
 from .. import robot as machines
 from ..notices import noticed
-from ..specs import RobotSpec
+from ..robot_spec import RobotSpec
 from . import joints, physics, robots, units
 from .guess import Draft, Guess
 from .logged import Logged, Signals, opened, read, signals

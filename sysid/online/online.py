@@ -11,9 +11,9 @@ import numpy as np
 from .. import experiment_logs, pipeline
 from ..errors import SysidError, SysidWarning
 from ..estimate import Fit
+from ..log_spec import LogSpec
 from ..prior_weight import number
 from ..run import Run, read_run
-from ..specs import LogSpec
 from .change import Change
 from .follow import Follower
 from .monitor import WINDOWS

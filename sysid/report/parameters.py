@@ -5,7 +5,7 @@ from __future__ import annotations
 from .. import fit_document
 from ..estimate import Fit
 from ..inertia import PARAMETERS, UNITS
-from ..model import ROBOT
+from ..model_parameters import ROBOT
 from . import charts
 from .section import Section
 from .whiskers import whiskers

@@ -19,7 +19,8 @@ from .. import bounded, config
 from ..errors import SysidError, SysidWarning
 from ..robot import Robot
 from ..robot import load as robot_of
-from ..specs import AUTO, Experiment, PreprocessSpec
+from ..spec_values import AUTO
+from ..specs import Experiment, PreprocessSpec
 from ..unfinished import beside
 from .run import SimulatedLog, Simulation
 

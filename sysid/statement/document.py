@@ -9,7 +9,7 @@ from ..diagnose.verdict import Verdict
 from ..filters import settled, torque_band
 from ..fit_document import number, versions
 from ..flexible import Unknown
-from ..model import ROBOT
+from ..model_parameters import ROBOT
 from .claims import chances, claims, finding
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ... import blocks
-from ...model import build
+from ...listed_effects import build
 from ...projection import inverted
 from ...robot import Robot
 from ...rows import stack
