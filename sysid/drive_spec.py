@@ -6,12 +6,7 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field, ValidationError
 
-from .spec_values import (
-    NonZero,
-    Spec,
-    column,
-    is_number,
-)
+from .spec_values import NonZero, Spec, checked_column, is_number
 
 
 class FreeFactor(Spec):
@@ -59,10 +54,10 @@ class ActuatorSpec(Spec):
     """What drives a joint whose torque was not logged: a position servo, tau = kp (command - q) - kd qd, or a DC motor,
     tau = k / R (voltage - k qd). `command` and `voltage` name logged columns; `delay` [s] is how late they act."""
 
-    command: Annotated[Any, BeforeValidator(column)] | None = None
+    command: Annotated[Any, BeforeValidator(checked_column)] | None = None
     kp: Factor = FreeFactor()
     kd: Annotated[Any, BeforeValidator(_free)] = 0.0
-    voltage: Annotated[Any, BeforeValidator(column)] | None = None
+    voltage: Annotated[Any, BeforeValidator(checked_column)] | None = None
     k: Factor = FreeFactor()
     R: Factor = FreeFactor()
     delay: Annotated[Any, BeforeValidator(_free)] = 0.0

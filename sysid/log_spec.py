@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, BeforeValidator, Field
 
 from .drive_spec import Sum
-from .spec_values import Columns, Day, Label, NonZero, Positive, Spec, Text, _finite, column
+from .spec_values import Columns, Day, Label, NonZero, Positive, Spec, Text, _finite, checked_column
 
 
 def _episodes(value: Any) -> Any:
@@ -79,12 +79,12 @@ Levels = Annotated[dict[Label, Logs], Field(min_length=1)]
 class ColumnsSpec(Spec):
     """Which column of a log holds what; `{joint}` stands for each joint's name."""
 
-    time: Annotated[Any, BeforeValidator(column)] = "t"
+    time: Annotated[Any, BeforeValidator(checked_column)] = "t"
     position: Columns = "q_{joint}"
     torque: Columns = "tau_{joint}"
     velocity: Columns | None = None
     acceleration: Columns | None = None
-    signals: dict[str, Annotated[Any, BeforeValidator(column)]] = {}
+    signals: dict[str, Annotated[Any, BeforeValidator(checked_column)]] = {}
 
 
 def _constants(value: Any) -> Any:
@@ -115,7 +115,7 @@ class DataSpec(Spec):
     test: Logs = Field(default_factory=lambda: [LogSpec(file="test.csv")])
     groups: dict[Label, Levels] = {}
     columns: ColumnsSpec = ColumnsSpec()
-    signals: dict[str, Annotated[Any, BeforeValidator(column)]] = {}
+    signals: dict[str, Annotated[Any, BeforeValidator(checked_column)]] = {}
     units: UnitsSpec = UnitsSpec()
     rate: Positive | None = None
     torque: dict[str, Sum] = {}

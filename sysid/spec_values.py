@@ -20,7 +20,7 @@ def _finite(value: float) -> float:
     return value
 
 
-def column(value: Any) -> Any:
+def checked_column(value: Any) -> Any:
     """A column's name, or its number from 0."""
     if isinstance(value, bool) or not isinstance(value, (str, int)):
         raise ValueError("must be a column's name or its number, counted from 0")
@@ -31,7 +31,7 @@ def _columns(value: Any) -> Any:
     if isinstance(value, str):
         return value
     if isinstance(value, list) and value:
-        return [column(item) for item in value]
+        return [checked_column(item) for item in value]
     raise ValueError('must be a pattern such as "q_{joint}", a list of names, or a list of numbers counted from 0')
 
 
@@ -49,7 +49,7 @@ def auto_or_positive(value: Any) -> Any:
     raise ValueError("must be a positive number or auto")
 
 
-def weight(value: Any) -> Any:
+def checked_weight(value: Any) -> Any:
     """`auto`, or a number from 0."""
     if value == AUTO:
         return value
@@ -60,7 +60,7 @@ def weight(value: Any) -> Any:
     return float(_finite(value))
 
 
-def standstill(value: Any) -> Any:
+def checked_standstill(value: Any) -> Any:
     """`auto`, `mask`, `keep`, or a speed."""
     if value in ("auto", "keep", "mask"):
         return value

@@ -11,17 +11,7 @@ from pydantic import AfterValidator, BeforeValidator, Field
 from .drive_spec import ActuatorSpec
 from .log_spec import DataSpec
 from .robot_spec import RobotSpec
-from .spec_values import (
-    AUTO,
-    Label,
-    Number,
-    Spec,
-    Text,
-    _finite,
-    auto_or_positive,
-    standstill,
-    weight,
-)
+from .spec_values import AUTO, Label, Number, Spec, Text, _finite, auto_or_positive, checked_standstill, checked_weight
 
 
 class MaskSpec(Spec):
@@ -45,7 +35,7 @@ class PreprocessSpec(Spec):
     window: Annotated[Any, BeforeValidator(auto_or_positive)] = 0.1
     cutoff: Annotated[Any, BeforeValidator(auto_or_positive)] = 10.0
     torque: Literal["raw", "same", "low-pass"] = "raw"
-    standstill: Annotated[Any, BeforeValidator(standstill)] = "auto"
+    standstill: Annotated[Any, BeforeValidator(checked_standstill)] = "auto"
     events: Literal["mask", "keep"] = "mask"
     mask: list[MaskSpec] = []
 
@@ -86,7 +76,7 @@ class PriorSpec(Spec):
     """What the bodies are believed to be before any data, and how strongly; `known` bodies are exactly that."""
 
     divergence: Literal["log-det", "pullback", "euclidean"] = "log-det"
-    weight: Annotated[Any, BeforeValidator(weight)] = AUTO
+    weight: Annotated[Any, BeforeValidator(checked_weight)] = AUTO
     source: Text = "urdf"
     known: list[str] = []
 

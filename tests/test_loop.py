@@ -411,7 +411,7 @@ def discoveries(monkeypatch, arm_model, claims=(("joint_coupling", "torque_bias"
 
     monkeypatch.setattr(loop, "diagnose", fake_diagnose)
     monkeypatch.setattr(loop.results, "write", lambda fit, folder: None)
-    monkeypatch.setattr(loop.results, "write_json", lambda *given: None)
+    monkeypatch.setattr(loop.whole_files, "write_json", lambda *given: None)
     monkeypatch.setattr("sysid.statement.document.document", lambda found, run: {"verdict": []})
     return asked
 
