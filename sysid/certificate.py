@@ -20,8 +20,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from .inertia.pseudo import to_pseudo
-from .interior import coordinates, packed, scaled_columns, scaled_gradient, scaling, unpacked
+from .interior import scaled_columns, scaled_gradient, scaling
 from .objective import Objective, add_blocks
+from .symmetric_matrices import coordinates, packed, unpacked
 
 # What counts as proven: the objective is within this share of the global minimum.
 _PROVEN = 1e-8

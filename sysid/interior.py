@@ -20,6 +20,7 @@ from scipy.linalg.lapack import dpotrf, dpotrs
 
 from .inertia.pseudo import from_pseudo, to_pseudo
 from .objective import Objective, add_blocks
+from .symmetric_matrices import BASIS, coordinates, packed, unpacked
 
 # Share of the way to the boundary that a step must leave; near the end less, or the end comes two digits at a time.
 _LEAVE, _LEAST, _PER_GAP = 1e-2, 1e-6, 1e4
@@ -27,17 +28,12 @@ _POOR = 0.5  # a step of less than this share of its length is tried again witho
 _NEARLY = 1e-9  # the same, where the next step breaks down
 _NOTHING = 1e-12  # share of the objective that complementarity may leave at a bound
 
-# orthonormal basis of symmetric 4 x 4 matrices: coordinates of a scaled change of a body
-_BASIS = np.zeros((10, 4, 4))
-for _k, (_i, _j) in enumerate(((0, 0), (1, 1), (2, 2), (3, 3), (0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3))):
-    _BASIS[_k, _i, _j] = _BASIS[_k, _j, _i] = 1.0 if _i == _j else np.sqrt(0.5)
-_ROWS = _BASIS.reshape(10, 16)
 _DIAGONAL = np.arange(4)
 
 
 def scaling(factors: np.ndarray) -> np.ndarray:
     """T (bodies, 10, 10): columns are the changes of pi for unit changes F B_k F' of each body."""
-    changes = factors[:, None] @ _BASIS @ np.swapaxes(factors, -1, -2)[:, None]
+    changes = factors[:, None] @ BASIS @ np.swapaxes(factors, -1, -2)[:, None]
     return np.swapaxes(from_pseudo(changes), -1, -2)
 
 
@@ -186,23 +182,6 @@ def _scale(state: _State, count: int, bound) -> _Scaled:
     c, dual = np.where(bound, state.x[count:], 1.0), np.where(bound, state.dual, 1.0)
     shrink = 1.0 / (root[:, :, None] * root[:, None, :])
     return _Scaled(factors, inverse, np.concatenate([shrink, shrink]), weights, np.sqrt(c / dual), np.sqrt(c * dual))
-
-
-def packed(diagonals) -> np.ndarray:
-    """Diagonal matrices (bodies, 4) in the basis, (10 bodies,)."""
-    out = np.zeros((len(diagonals), 10))
-    out[:, :4] = diagonals
-    return out.ravel()
-
-
-def unpacked(vector) -> np.ndarray:
-    """Symmetric matrices (bodies, 4, 4) of coordinates (10 bodies,)."""
-    return (vector.reshape(-1, 10) @ _ROWS).reshape(-1, 4, 4)
-
-
-def coordinates(matrices) -> np.ndarray:
-    """Symmetric matrices (..., 4, 4) in the orthonormal basis (..., 10)."""
-    return matrices.reshape(matrices.shape[:-2] + (16,)) @ _ROWS.T
 
 
 def _solver(system):

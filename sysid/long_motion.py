@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from . import preprocess
+from . import preprocess, standstill
 from .errors import LogError, SysidWarning
 from .extent import Extent, Reach, reach_of
 from .log import Log
@@ -26,7 +26,7 @@ from .specs import PreprocessSpec
 from .workers import Mapped
 
 _SLOW = np.concatenate(
-    [[0.0], np.geomspace(1e-9, preprocess.STANDSTILL_MOST, 4096)]
+    [[0.0], np.geomspace(1e-9, standstill.STANDSTILL_MOST, 4096)]
 )  # rad/s or m/s, edges of bins
 _NONE = np.zeros(0)
 
@@ -145,7 +145,7 @@ def _standstill(spec: PreprocessSpec, places, share: Mapped) -> np.ndarray | flo
     for own in share(_speeds, ((place,) for place in places)):
         if own is not None:
             squares, rows = squares + own[0], rows + own[1]
-    return preprocess.slow(squares / max(rows, 1))
+    return standstill.slow(squares / max(rows, 1))
 
 
 def _speeds(place: _Place) -> tuple[np.ndarray, int] | None:
@@ -229,7 +229,7 @@ class _Passed:
     def standing(self) -> np.ndarray:
         """Share (dof,) of the rows that count in which each joint stands still."""
         samples = sum(one.outline.samples for one in self.seen)
-        speed = preprocess.slow(sum(one.squares for one in self.seen) / max(samples, 1))
+        speed = standstill.slow(sum(one.squares for one in self.seen) / max(samples, 1))
         slow = [
             np.interp(s, _SLOW, np.concatenate([[0], np.cumsum(own)]))
             for s, own in zip(speed, self.slow)

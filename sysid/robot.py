@@ -15,15 +15,12 @@ from xml.etree import ElementTree
 import numpy as np
 import pinocchio as pin
 
-from . import prior, urdf, urdf_files
+from . import urdf, urdf_files
 from .errors import RobotError, SysidWarning
 from .inertia import pseudo
-from .inertia.consistency import is_consistent
-from .robot_spec import InertiaSpec, RobotSpec
-
-# Before the names of links in the Pinocchio model of a URDF: a joint and a link may share a name, and Pinocchio keeps the
-# frames of both in one list.
-_LINK = "link:"
+from .link_priors import LINK, link_priors
+from .robot_spec import RobotSpec
+from .rotors import rotors_of, with_rotors
 
 
 @dataclass(frozen=True)
@@ -98,11 +95,11 @@ def load(spec: RobotSpec, folder: Path = Path()) -> Robot:
     model, _ = reduced(model, locked)
     model.gravity.linear = np.array(spec.gravity)
     links = [Body(source.joints[name].child, "link", name, model.getJointId(name) - 1) for name in joints]
-    priors = _link_priors(source, model, links)
+    priors = link_priors(source, model, links)
     for body, pi in zip(links, priors):
         model.inertias[body.row + 1] = pin.Inertia.FromDynamicParameters(pseudo.to_pinocchio(pi))
-    rotors = _rotors(spec, source, model, joints)
-    model = _tree(model, rotors)
+    rotors = rotors_of(spec, source, model, joints)
+    model = with_rotors(model, rotors)
     at = lambda name: model.getJointId(name) - 1  # noqa: E731
     bodies = tuple(replace(body, row=at(body.joint)) for body in links)
     bodies += tuple(Body(f"{r.joint}_rotor", "rotor", r.joint, at(f"{r.joint}_rotor")) for r in rotors)
@@ -146,7 +143,7 @@ def _pinocchio_model(source: urdf.Urdf) -> pin.Model:
     # only what was checked: its parser writes to standard error what it thinks of the rest (colours, meshes, limits)
     tree = ElementTree.Element("robot", name=root.get("name") or "robot")
     for name in source.links:
-        ElementTree.SubElement(tree, "link", name=_LINK + name)
+        ElementTree.SubElement(tree, "link", name=LINK + name)
     for element in root.findall("joint"):
         joint = source.joints[element.get("name")]
         if joint.type in ("floating", "planar"):
@@ -158,7 +155,7 @@ def _pinocchio_model(source: urdf.Urdf) -> pin.Model:
         kept = ElementTree.SubElement(tree, "joint", name=joint.name, type="revolute" if joint.type == "continuous" else joint.type)
         kept.extend(child for child in element if child.tag in ("origin", "axis"))
         for end, link in (("parent", joint.parent), ("child", joint.child)):
-            ElementTree.SubElement(kept, end, link=_LINK + link)
+            ElementTree.SubElement(kept, end, link=LINK + link)
         if joint.type in urdf.MOVING:
             lower, upper = (repr(float(np.clip(limit, -1e9, 1e9))) for limit in joint.limits)
             ElementTree.SubElement(kept, "limit", lower=lower, upper=upper, effort="1e9", velocity="1e9")
@@ -201,96 +198,3 @@ def _mimics(source: urdf.Urdf) -> set[str | None]:
     """Names of the joints that mimic others."""
     root = ElementTree.fromstring(source.text.encode())
     return {element.get("name") for element in root.findall("joint") if element.find("mimic") is not None}
-
-
-def _link_priors(source: urdf.Urdf, model: pin.Model, bodies: list[Body]) -> np.ndarray:
-    stated, shapes = [], []
-    for body in bodies:
-        members = [f for f in model.frames if f.type == pin.FrameType.BODY and f.parentJoint == body.row + 1]
-        moved = lambda pi, f: pseudo.displaced(pi, f.placement.rotation, f.placement.translation)  # noqa: E731
-        links = [(source.links[f.name.removeprefix(_LINK)], f) for f in members if f.name.startswith(_LINK)]
-        inertials = [moved(link.inertial, f) for link, f in links if link.inertial is not None]
-        solids = [moved(link.geometry, f) for link, f in links if link.geometry is not None]
-        stated.append(np.sum(inertials, 0) if inertials else None)
-        shapes.append(np.sum(solids, 0) if solids else None)
-    masses = [pi[0] for pi in stated if pi is not None and is_consistent(pi)]
-    typical = float(np.median(masses)) if masses else None
-    out = []
-    for body, pi, solid in zip(bodies, stated, shapes):
-        children = [model.jointPlacements[i].translation for i in range(1, model.njoints) if model.parents[i] == body.row + 1]
-        reach = max(children, key=np.linalg.norm, default=np.zeros(3))
-        out.append(prior.usable(body.name, pi, solid, reach, typical))
-    return np.array(out)
-
-
-def body_from(inertia: InertiaSpec) -> np.ndarray:
-    """Parameters (10,) about the body's frame of an inertia written in an experiment file."""
-    if inertia.parameters is not None:
-        return np.array(inertia.parameters, dtype=float)
-    if inertia.box is not None:
-        return pseudo.box(inertia.mass, inertia.com, inertia.box)
-    return pseudo.cylinder(inertia.mass, inertia.com, inertia.cylinder.radius, inertia.cylinder.length)
-
-
-@dataclass(frozen=True)
-class _Rotor:
-    """A rotor placed in the tree of links: its joint, the joint id that carries it, pose, axis, inertia, row of G."""
-
-    joint: str
-    carrier: int
-    placement: pin.SE3
-    axis: np.ndarray
-    inertia: np.ndarray
-    speeds: np.ndarray
-
-
-def _rotors(spec: RobotSpec, source: urdf.Urdf, model: pin.Model, joints: tuple[str, ...]) -> list[_Rotor]:
-    for name in spec.transmission:
-        if name not in [rotor.joint for rotor in spec.rotors]:
-            raise RobotError(f"robot.transmission has a row for {name!r}, which has no rotor", allowed=", ".join(r.joint for r in spec.rotors) or "nothing: robot.rotors is empty", do="name the joint of a rotor")
-    out: list[_Rotor] = []
-    for rotor in spec.rotors:
-        where = f"robot.rotors: rotor of {rotor.joint!r}"
-        if rotor.joint not in joints:
-            raise RobotError("no such joint moves", where=where, allowed=", ".join(joints), do="correct robot.rotors")
-        if rotor.joint in [other.joint for other in out]:
-            raise RobotError("the joint has two rotors", where=where, allowed="one rotor a joint")
-        if rotor.on not in source.links:
-            raise RobotError(f"on: {rotor.on!r} is no link of the URDF", where=where, allowed=", ".join(source.links), do="name the link that carries the motor")
-        inertia = body_from(rotor.inertia)
-        if not (is_consistent(inertia) and prior.measurable(inertia)):
-            raise RobotError("its prior inertia is impossible", where=where, allowed=f"mass > {prior.LIGHTEST:g} kg and edges > 0")
-        if model.existJointName(f"{rotor.joint}_rotor"):
-            raise RobotError(f"the URDF has a joint {rotor.joint}_rotor of its own", where=where, do="rename it, or leave the rotor out")
-        row = np.zeros(len(joints))
-        for joint, ratio in (spec.transmission.get(rotor.joint) or {rotor.joint: rotor.ratio}).items():
-            if joint not in joints:
-                raise RobotError(f"robot.transmission names the joint {joint!r}", where=where, allowed=", ".join(joints))
-            row[joints.index(joint)] = ratio
-        frame = model.frames[model.getFrameId(_LINK + rotor.on, pin.FrameType.BODY)]
-        placement = frame.placement * pin.SE3(urdf.rotation_rpy(rotor.rpy), np.array(rotor.xyz))
-        axis = np.array(rotor.axis) / np.linalg.norm(rotor.axis)
-        out.append(_Rotor(rotor.joint, frame.parentJoint, placement, axis, inertia, row))
-    return out
-
-
-def _tree(model: pin.Model, rotors: list[_Rotor]) -> pin.Model:
-    """The model with each rotor a leaf right behind its carrier: Pinocchio's mass-matrix algorithms need every
-    subtree to be one run of joints, and appending at the end would break that without a word."""
-    tree = pin.Model()
-    tree.name, tree.gravity = model.name, model.gravity
-    identity = pin.SE3.Identity()
-
-    def mount(carrier: int, parent: int) -> None:
-        for rotor in rotors:
-            if rotor.carrier == carrier:
-                joint = tree.addJoint(parent, pin.JointModelRevoluteUnaligned(rotor.axis), rotor.placement, f"{rotor.joint}_rotor")
-                tree.appendBodyToJoint(joint, pin.Inertia.FromDynamicParameters(pseudo.to_pinocchio(rotor.inertia)), identity)
-
-    mount(0, 0)
-    for old in range(1, model.njoints):
-        parent = tree.getJointId(model.names[model.parents[old]]) if model.parents[old] else 0
-        joint = tree.addJoint(parent, model.joints[old], model.jointPlacements[old], model.names[old])
-        tree.appendBodyToJoint(joint, model.inertias[old], identity)
-        mount(old, joint)
-    return tree

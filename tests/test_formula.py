@@ -351,7 +351,7 @@ def test_add_takes_start_and_within(experiment, cli):
     from sysid.addition import command
 
     words = shlex.split(command(folder / "config.yaml", "formula", ["elbow"], entry.options))
-    from sysid.loop import options as read
+    from sysid.effect_entry import options as read
 
     given = read([word for before, word in zip(words, words[1:]) if before == "--option"])
     assert given == entry.options

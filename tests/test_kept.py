@@ -8,7 +8,7 @@ import warnings
 
 import pytest
 
-from sysid import experiment_file, loop, pipeline, simulate, state, whole_files
+from sysid import effect_entry, experiment_file, loop, pipeline, simulate, state, whole_files
 from sysid.errors import SysidError
 from tests.conftest import URDF
 
@@ -142,7 +142,7 @@ def test_the_studio_keeps_what_is_not_its_change(experiment, tmp_path):
     (folder / "config.yaml").symlink_to(real)
     history = History(folder, tmp_path / "run")
     seen = history.sync()
-    now = history.change(seen, lambda text: loop.with_effect(text, "cogging", ["elbow"], {}), "cogging", "elbow")
+    now = history.change(seen, lambda text: effect_entry.with_effect(text, "cogging", ["elbow"], {}), "cogging", "elbow")
     assert (folder / "config.yaml").is_symlink() and stat.S_IMODE(real.stat().st_mode) == 0o640
     lines = real.read_bytes().splitlines(keepends=True)
     assert lines[0].startswith(b"\xef\xbb\xbf") and all(line.endswith(b"\r\n") for line in lines) and len(lines) >= 4
@@ -329,7 +329,7 @@ def test_lines_that_do_not_change_stay_as_they_were(style, effect, joints):
     from sysid import yaml_text
 
     text = STYLES[style]
-    changed = loop.with_effect(text, effect, joints, {})
+    changed = effect_entry.with_effect(text, effect, joints, {})
     before, after = (yaml_text.plain(yaml_text.parse_yaml(t, where="")) for t in (text, changed))
     assert {k: v for k, v in after.items() if k != "model"} == {k: v for k, v in before.items() if k != "model"}
     entries = [e if isinstance(e, str) else next(iter(e)) for e in after["model"]["effects"]]

@@ -6,11 +6,11 @@ from types import SimpleNamespace
 
 import pytest
 
-from sysid import config, loop, pipeline
+from sysid import config, effect_entry, loop, pipeline
 from sysid.addition import grown, spelled
 from sysid.candidates import candidates
+from sysid.effect_entry import with_effect
 from sysid.errors import ConfigError, LogError
-from sysid.loop import with_effect
 from sysid.vocabulary import find
 
 FILE = """\
@@ -159,12 +159,12 @@ def test_formulas_stand_side_by_side():
 
 
 def test_options_are_yaml():
-    assert loop.options(["other=hip", "harmonics=3", " vs = 0.2", "logs=[a, b]", "formula=a*sin(3*q)", "x=", "y=1=2"]) == {
+    assert effect_entry.options(["other=hip", "harmonics=3", " vs = 0.2", "logs=[a, b]", "formula=a*sin(3*q)", "x=", "y=1=2"]) == {
         "other": "hip", "harmonics": 3, "vs": 0.2, "logs": ["a", "b"], "formula": "a*sin(3*q)", "x": None, "y": "1=2",
     }  # fmt: skip
     for text in ("other", "=3", " = 3"):
         with pytest.raises(ConfigError, match="NAME=VALUE"):
-            loop.options([text])
+            effect_entry.options([text])
 
 
 def test_a_candidate_is_spelled_as_the_file_would(arm_model):

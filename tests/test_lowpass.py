@@ -10,7 +10,7 @@ from sysid import regressor
 from sysid.events import Event
 from sysid.log import Log, Segment
 from sysid.lowpass import Gaussian, lowpassed, narrowed, stride_of, widest
-from sysid.preprocess import standstill_speed
+from sysid.standstill import standstill_speed
 
 STEP = 1e-3
 

@@ -119,10 +119,10 @@ def test_another_version_or_program_questions_anew(arm, tmp_path, monkeypatch):
     state = kept.of(experiment)
     assert kept.of(experiment) == state
     with monkeypatch.context() as patch:
-        patch.setattr(kept.results, "versions", lambda: {"sysid": "another"})
+        patch.setattr(kept.fit_document, "versions", lambda: {"sysid": "another"})
         assert kept.of(experiment) != state
     with monkeypatch.context() as patch:
-        patch.setattr(kept.results, "program", lambda: "another")
+        patch.setattr(kept.fit_document, "program", lambda: "another")
         assert kept.of(experiment) != state
     assert kept.of(experiment) == state
 

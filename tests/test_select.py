@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from ruamel.yaml import YAML
 
-from sysid import fit_document, loop, pipeline, results, simulate
+from sysid import effect_entry, fit_document, loop, pipeline, results, simulate
 from sysid.addition import command, grown, spelled
 from sysid.diagnose.diagnosis import diagnose
 from sysid.diagnose.select import LEVEL, WORTH, search
@@ -301,7 +301,7 @@ def test_an_option_survives_its_discovery(simulated, tmp_path):
     assert (name, joints, options) == ("position_friction", ["elbow"], {"times": "speed"})
     # the command that is printed says the same
     words = shlex.split(command(experiment.path, name, joints, options))
-    assert words[3:] == ["position_friction", "--joint", "elbow", "--option", "times=speed"] and loop.options(words[-1:]) == options
+    assert words[3:] == ["position_friction", "--joint", "elbow", "--option", "times=speed"] and effect_entry.options(words[-1:]) == options
     after = pipeline.fit(grown(experiment, name, joints, options))
     results.write(after, tmp_path / "step")
     again = pipeline.load(tmp_path / "step" / "experiment.yaml").model.effects[-1]

@@ -13,8 +13,9 @@ from sysid import config, regressor, robot, robot_spec
 from sysid.errors import SysidError
 from sysid.inertia import pseudo
 from sysid.simulate import Hidden, Scales, defaults, hidden, simulate
-from sysid.simulate.hidden import CATALOGUE, settled
+from sysid.simulate.hidden import settled
 from sysid.simulate.plant import Plant, Truth
+from sysid.simulate.usual_sizes import CATALOGUE
 from tests.conftest import URDF
 
 UR5 = "example-robot-data://ur_description/urdf/ur5_robot.urdf"

@@ -15,7 +15,7 @@ import pytest
 from sysid.config import load
 from sysid.datasets import DATASETS
 from sysid.inertia import is_consistent, pseudo
-from sysid.studies import bodies, commands
+from sysid.studies import bodies, body_motions, commands
 from sysid.studies.journal import Journal
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -36,12 +36,12 @@ def without_timings(value):
 def test_residual_wrench_is_the_paper_s_equation_12():
     rng = np.random.default_rng(0)
     for _ in range(20):
-        pi = bodies.draw(rng, "com")
+        pi = body_motions.draw(rng, "com")
         inertia = pin.Inertia.FromDynamicParameters(pseudo.to_pinocchio(pi))
         velocity, acceleration = rng.normal(size=(2, 6))
         v = pin.Motion(velocity[3:], velocity[:3])
         expected = inertia * pin.Motion(acceleration[3:], acceleration[:3]) + v.cross(inertia * v)
-        got = np.einsum("rkn,k->rn", bodies.columns(velocity[:, None], acceleration[:, None]), pi)[:, 0]
+        got = np.einsum("rkn,k->rn", body_motions.columns(velocity[:, None], acceleration[:, None]), pi)[:, 0]
         np.testing.assert_allclose(got, np.concatenate([expected.angular, expected.linear]), rtol=1e-11, atol=1e-12)
 
 
@@ -54,8 +54,8 @@ def test_simulated_body_obeys_the_discretized_equation():
 
     rng = np.random.default_rng(1)
     for kind in ("moment and force", "force only"):
-        pi = bodies.draw(rng, "com")
-        rows, target = bodies.measured(pi, Silent(), kind)
+        pi = body_motions.draw(rng, "com")
+        rows, target = body_motions.measured(pi, Silent(), kind)
         assert rows.shape == (6 * 62, 10)
         assert np.linalg.norm(rows @ pi - target) < 0.02 * np.linalg.norm(target)
 
@@ -63,7 +63,7 @@ def test_simulated_body_obeys_the_discretized_equation():
 @pytest.mark.parametrize("about", ["com", "origin"])
 def test_bodies_are_those_of_table_one(about):
     rng = np.random.default_rng(2)
-    drawn = np.array([bodies.draw(rng, about) for _ in range(300)])
+    drawn = np.array([body_motions.draw(rng, about) for _ in range(300)])
     assert is_consistent(drawn).all()
     mass, com, central = pseudo.to_central(drawn)
     assert 0.01 <= mass.min() and mass.max() <= 1.0 and np.abs(com).max() <= 0.5
@@ -78,7 +78,7 @@ def test_every_start_is_the_identity():
     from sysid.inertia import PARAMETERIZATIONS
 
     for name in bodies.NONLINEAR:
-        np.testing.assert_allclose(PARAMETERIZATIONS[name]().parameters(bodies.start(name)), bodies.IDENTITY, atol=1e-14)
+        np.testing.assert_allclose(PARAMETERIZATIONS[name]().parameters(bodies.start(name)), body_motions.IDENTITY, atol=1e-14)
 
 
 def test_study_of_bodies_is_what_the_paper_compares(tmp_path):

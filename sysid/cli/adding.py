@@ -38,11 +38,11 @@ def add(
     Where the held-out error of its joint (over all joints for an effect of the whole robot) rises by more than its standard
     error nothing is written, and the status is 1.
     """
-    from .. import loop
+    from .. import effect_entry, loop
 
     effect, joint = _on_joint(effect, joint)
     with progress_of(quiet or as_json, 3) as progress:
-        own = {**loop.options(option or []), **({"per": per} if per else {}), **({"except": list(spared)} if spared else {})}
+        own = {**effect_entry.options(option or []), **({"per": per} if per else {}), **({"except": list(spared)} if spared else {})}
         found = loop.add(experiment, effect, list(joint) if joint else None, own, force=force, progress=progress, out=out)
     said = loop.document(found)
     if as_json:

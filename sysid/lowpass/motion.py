@@ -12,16 +12,9 @@ from ..events import mended
 from ..gaussian import HIGHEST, Gaussian
 from ..log import Log
 from ..motion import Motion, Piece
-from ..preprocess import (
-    assembled,
-    share_left_out,
-    standstill_speed,
-    turns,
-    unused_of,
-    without_events,
-    without_standstill,
-)
+from ..preprocess import assembled, share_left_out, unused_of, without_events
 from ..smoother import differences
+from ..standstill import standstill_speed, turns, without_standstill
 from .angles import noise_of
 
 LEAST = 15.0  # Hz: where friction's laws and ripple still show, several times what an arm moves at

@@ -6,9 +6,11 @@
 """
 
 from .folder import load, prepare, write
-from .hidden import Hidden, Scales, defaults, hidden
-from .run import SimulatedLog, Simulation, simulate
+from .hidden import Hidden, defaults, hidden
+from .run import simulate
+from .simulated import SimulatedLog, Simulation
 from .trajectory import Played, read_trajectory
+from .usual_sizes import Scales
 
 __all__ = [
     "Hidden", "Played", "Scales", "SimulatedLog", "Simulation", "defaults", "hidden", "load", "prepare", "read_trajectory", "simulate",

@@ -12,8 +12,8 @@ import numpy as np
 import pinocchio as pin
 
 from ..robot import Robot
-from .hidden import Scales
 from .part import Part
+from .usual_sizes import Scales
 
 _REST, _EARLY = 0.3, 0.1  # s from rest to a closed brake; s that it opens before the joint moves
 _HOLD = 20.0  # times a joint's peak torque that its brake holds

@@ -22,7 +22,7 @@ from ..robot import load as robot_of
 from ..spec_values import AUTO
 from ..specs import Experiment, PreprocessSpec
 from ..unfinished import beside
-from .run import SimulatedLog, Simulation
+from .simulated import SimulatedLog, Simulation
 
 _LOG = re.compile(r"(train|train_[0-9]+|test)\.csv")
 

@@ -14,7 +14,7 @@ import numpy as np
 from ..errors import SysidError
 from . import motions
 from .disturbances import runs
-from .hidden import Scales
+from .usual_sizes import Scales
 
 _MOST_LOGS, _MOST_KNOCKS, _MOST_SPIKES = 1000, 100, 0.1  # spikes: of the samples
 _SPIKE = (5.0, 20.0)  # deviations of a joint's noise

@@ -16,63 +16,17 @@ from ..regressor import torque as inverse_dynamics
 from ..robot import Robot
 from . import control, disturbances, motions, nuisances, parts
 from . import truth as drawn
-from .hidden import CATALOGUE, Hidden, Scales, check, settled
+from .hidden import Hidden, check, settled
 from .nuisances import Nuisances
 from .plant import Plant, Truth
+from .simulated import Clean, SimulatedLog, Simulation
 from .trajectory import Played
+from .usual_sizes import CATALOGUE, Scales
 
 USUAL = 20.0  # s of the motion that says what a robot's joints are like, where its logs are poor or short
 LEAD = 1.0  # s before logging starts: a robot at rest has no friction law
 _PERIOD = 1e-3  # s of the controller, at most
 _SOFT_SPEED = 0.05  # of the top speed, where the friction that the controller expects changes sign
-
-
-@dataclass(frozen=True)
-class Clean:
-    """What no sensor saw, at the times of the log: q, qd (n, dof) of the motors, `read` what an encoder without rounding reads
-    of them, link_q, link_qd of the links, the torque tau that acted (asked for of the drives), logged torque without noise, and
-    which joints stick (n, dof)."""
-
-    q: np.ndarray
-    qd: np.ndarray
-    link_q: np.ndarray
-    link_qd: np.ndarray
-    tau: np.ndarray
-    sensed: np.ndarray
-    sticks: np.ndarray
-    read: np.ndarray
-
-
-@dataclass(frozen=True)
-class SimulatedLog:
-    """t (n,), q and tau (n, dof) as logged; `clean` as they were; `noise` (dof,) RMS of the noise, and of rounding, in the torque,
-    without `events`: knocks, spikes and closed brakes, {kind, start, stop, joints, ...}."""
-
-    t: np.ndarray
-    q: np.ndarray
-    tau: np.ndarray
-    clean: Clean
-    noise: np.ndarray
-    events: tuple[dict, ...] = ()
-
-
-@dataclass(frozen=True)
-class Simulation:
-    """Logs of different motions of one robot, and what is true of it. logs: by name, train or train_1, train_2, ..., then test."""
-
-    robot: Robot
-    logs: dict[str, SimulatedLog]
-    truth: dict
-
-    @property
-    def train(self) -> SimulatedLog:
-        """The first training log."""
-        return next(iter(self.logs.values()))
-
-    @property
-    def test(self) -> SimulatedLog:
-        """The log held out."""
-        return self.logs["test"]
 
 
 def simulate(

@@ -12,8 +12,9 @@ from ..inertia import PARAMETERS, LogCholesky
 from ..inertia import pseudo as bodies
 from ..robot import Robot
 from . import motion, parts
-from .hidden import Hidden, Scales
+from .hidden import Hidden
 from .plant import Truth
+from .usual_sizes import Scales
 
 _SPREAD = np.array([0.15, 0.15, 0.15, 0.15, 0.10, 0.10, 0.10, 0.01, 0.01, 0.01])  # of bodies in log-Cholesky coordinates; the last three [m]
 _FRICTION, _VISCOUS, _NOISE = (0.03, 0.08), (0.03, 0.08), (0.01, 0.02)  # of a joint's rms torque; viscous at its top speed

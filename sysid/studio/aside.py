@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 
-from .. import experiment_file, loop, pipeline
+from .. import effect_entry, experiment_file, pipeline
 from ..errors import SysidError
 from . import designs
 from .cache import key
@@ -45,7 +45,7 @@ class Aside:
         """Fit a change of the text with the hash `seen`, without writing it; returns the hash of
         the new text. Raises SysidError: the change cannot be meant."""
         before = self._history.as_seen(seen).encode("utf-8")
-        with loop.asked(self._history.path):
+        with effect_entry.asked(self._history.path):
             text = experiment_file.text(before)
             text = experiment_file.edited(before, change.make(text)).decode("utf-8")
             experiment = self._history.experiment(text)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from .. import loop, yaml_edit, yaml_text
+from .. import effect_entry, yaml_edit, yaml_text
 from ..errors import SysidError
 from ..vocabulary import find, vocabulary
 from .diagnosed import Diagnosed
@@ -67,7 +67,7 @@ def of_effects(parts: Sequence[Part], path: Path, where: str | None = None) -> C
 
     def make(text: str) -> str:
         for effect, joints, options in parts:
-            text = loop.with_effect(text, effect, joints, options, str(path))
+            text = effect_entry.with_effect(text, effect, joints, options, str(path))
         return text
 
     words = ", ".join(e if e != "formula" else options["formula"] for e, _, options in parts)

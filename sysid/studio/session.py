@@ -7,7 +7,7 @@ import threading
 from collections.abc import Callable
 from pathlib import Path
 
-from .. import comparison, fit_document, loop, pipeline, results
+from .. import comparison, effect_entry, fit_document, pipeline, results
 from ..diagnose.diagnosis import diagnose
 from ..errors import SysidError
 from ..estimate import Fit
@@ -183,7 +183,7 @@ class Session:
     def add(self, seen: str, body: dict) -> dict:
         """Make the change that a request asks for (`changes.meant`)."""
         change = self._meant(seen, body)
-        with loop.asked(self.history.path):
+        with effect_entry.asked(self.history.path):
             sha = self.history.change(seen, change.make, change.said, change.where)
         return self._moved(sha)
 
