@@ -307,6 +307,13 @@ def test_what_cannot_be_designed_is_said_in_one_line(poor, name):
     assert said in str(error.value) and "\n" not in str(error.value)
 
 
+@pytest.mark.parametrize("name", ["separate", "effect"])
+def test_a_suspect_that_is_not_there_is_told_before_any_log_is_read(poor, name, monkeypatch):
+    monkeypatch.setattr(basis.experiment_logs, "read_all", lambda _: pytest.fail("a log was read"))
+    with pytest.raises(config.ConfigError, match=WRONG[name][1]):
+        design(pipeline.load(poor[0]), **WRONG[name][0])
+
+
 def test_a_joint_whose_torque_is_unused_tells_nothing(poor):
     """Neither is its noise taken for none, nor do its rows count in what is promised."""
     folder, machine = poor

@@ -810,3 +810,20 @@ def test_the_history_refuses_a_run_folder_that_cannot_be(arm, tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(SysidError):
         History(arm[0], tmp_path / "file" / "run")
+
+
+def test_the_joint_of_the_last_addition_is_told_first():
+    """Then where the error moved most, up or down; a joint without an error is not told."""
+    from types import SimpleNamespace
+
+    from sysid.studio.beside import led
+
+    steps = [{"sha": "a", "added": None, "joint": None, "rms_test": {"hip": 1.0, "knee": 1.0, "abad": 1.0, "toe": 0.0}}]
+    fit = SimpleNamespace(
+        joints=("abad", "hip", "knee", "toe"), predictions={"test": SimpleNamespace(units=("N m",) * 4)},
+        rms=lambda part: {"abad": 1.3, "hip": 0.9, "knee": 0.5, "toe": 0.0},
+    )  # fmt: skip
+    of = lambda last: [f["joint"] for f in led(steps, "b", last, fit)["falls"]]  # noqa: E731
+    assert of("+ stribeck on hip") == ["hip", "knee", "abad"]
+    assert of("+ stribeck on abad, hip") == ["abad", "hip", "knee"]
+    assert of("+ gravity_tilt") == ["knee", "abad", "hip"]

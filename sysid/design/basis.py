@@ -63,6 +63,7 @@ def basis(
     """What an experiment knows of its robot at {group: level}. Raises SysidError."""
     machine, structure, prior = pipeline.build(experiment)
     levels = _levels(structure, levels)
+    _suspects(experiment, structure, separate)  # a suspect that is not there is told before any work
     fit, motion, logs = None, None, ()
     if _has_logs(experiment):
         read = experiment_logs.read_all(experiment)

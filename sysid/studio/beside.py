@@ -75,7 +75,7 @@ def run_named(run: Path, joints: tuple[str, ...], name: str) -> OtherRun:
 
 def led(steps: list[dict], sha: str, last: str, fit: Fit) -> dict:
     """The steps that led to a text, in words, itself the last; and what the last did to each
-    joint's held-out error.
+    joint's held-out error: first the joints that it was of, then where the error moved most.
 
     Args:
         steps: of the history. sha, last: the text's hash, and what its step is called where the
@@ -85,12 +85,15 @@ def led(steps: list[dict], sha: str, last: str, fit: Fit) -> dict:
     before = [s for s in steps if s.get("sha") != sha]
     if len(before) == len(steps):
         names.append(last)
+    own = names[-1].rpartition(" on ")[2].split(", ")  # joints that the last step changed
     was, now = before[-1]["rms_test"] if before else {}, fit.rms("test")
     falls = [
         {"joint": joint, "unit": unit, "from": was[joint], "to": now[joint]}
         for joint, unit in zip(fit.joints, fit.predictions["test"].units)
-        if was.get(joint)
+        if was.get(joint) and now[joint]
     ]
+    moved = lambda f: abs(f["to"] / f["from"] - 1.0)  # noqa: E731
+    falls.sort(key=lambda f: (f["joint"] not in own, -moved(f)))
     return {"steps": names, "falls": falls}
 
 

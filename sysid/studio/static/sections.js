@@ -29,9 +29,7 @@ function placed(name) {
 
 // ---- what the last change did
 function fell(found) {
-  const steps = found.steps.length - 1, falls = found.falls.filter(f => f.from && f.to);
-  const most = [...falls].sort((a, b) => Math.abs(b.to - b.from) / b.from
-    - Math.abs(a.to - a.from) / a.from);
+  const steps = found.steps.length - 1, most = found.falls;
   at("fall").hidden = !steps || !most.length;
   if (at("fall").hidden) return;
   const first = most[0], by = first.to <= first.from ? "falls" : "rises";
