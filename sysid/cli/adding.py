@@ -11,15 +11,7 @@ import typer
 import typer.core
 
 from ..errors import SysidError
-from .command_line import (
-    ExperimentPath,
-    Json,
-    Out,
-    Quiet,
-    Trust,
-    app,
-    progress_of,
-)
+from .command_line import ExperimentPath, Json, Out, Quiet, Trust, app, progress_of
 
 
 @app.command()

@@ -10,16 +10,7 @@ import typer
 import typer.core
 
 from ..errors import SysidError
-from .command_line import (
-    ExperimentPath,
-    Json,
-    Level,
-    Quiet,
-    Trust,
-    app,
-    levels_of,
-    progress_of,
-)
+from .command_line import ExperimentPath, Json, Level, Quiet, Trust, app, levels_of, progress_of
 
 
 @app.command()

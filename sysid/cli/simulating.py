@@ -9,13 +9,7 @@ from typing import Annotated, Optional
 import typer
 import typer.core
 
-from .command_line import (
-    ExperimentPath,
-    Json,
-    Quiet,
-    app,
-    progress_of,
-)
+from .command_line import ExperimentPath, Json, Quiet, app, progress_of
 
 
 @app.command()

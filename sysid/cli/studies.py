@@ -8,20 +8,7 @@ from typing import Annotated, Optional
 import typer
 import typer.core
 
-from .command_line import (
-    CORES,
-    ExperimentPath,
-    Jobs,
-    Json,
-    Out,
-    Quiet,
-    Seed,
-    Trust,
-    finish,
-    one_of,
-    progress_of,
-    silent,
-)
+from .command_line import CORES, ExperimentPath, Jobs, Json, Out, Quiet, Seed, Trust, finish, one_of, progress_of, silent
 
 study = typer.Typer(no_args_is_help=True, help="The paper's two studies, and the choice of the prior's weight. Interrupted studies go on where they were.")
 
