@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from . import model, robot
+from . import listed_effects, robot
 from .experiment_logs import Read
 from .experiment_logs import read as read_logs
 from .log import Log
@@ -29,7 +29,7 @@ def read(experiment: Experiment) -> tuple[Read, Read | None]:
         SysidError: as `experiment_logs.read`.
     """
     machine = robot.load(experiment.robot, experiment.folder)
-    each = model.build(machine, [], experiment.folder)  # looks at rows one by one
+    each = listed_effects.build(machine, [], experiment.folder)  # looks at rows one by one
     data = experiment.data
     with noticed() as notices:
         logs = [

@@ -8,7 +8,6 @@ import pytest
 
 from scripts.design_parts.limits import summed
 from sysid import config, listed_effects, pipeline, robot
-from sysid import model as models
 from sysid.design import basis, design, document, limits, links, problem, search, solve
 from sysid.design.collision import corners
 from sysid.design.columns import columns, of_the_instant
@@ -19,6 +18,7 @@ from sysid.errors import SysidWarning
 from sysid.robot_spec import RobotSpec
 from sysid.simulate import load, read_trajectory, simulate
 from sysid.specs import EffectSpec
+from sysid.vocabulary import find
 from tests.conftest import URDF
 
 UR5 = "example-robot-data://ur_description/urdf/ur5_robot.urdf"
@@ -112,7 +112,7 @@ def test_columns_of_a_design_are_the_fit_s(arm):
     truth = np.array([pin.rnea(machine.model, data, *row) for row in zip(q, qd, qdd)])
     truth += qd * [0.3, 0.1] + np.sign(qd) * [0.2, 0.15]
     np.testing.assert_allclose(found, truth, rtol=1e-9, atol=1e-9)
-    delayed = arm.model.with_effect(models.find("delay"), (0,))
+    delayed = arm.model.with_effect(find("delay"), (0,))
     assert of_the_instant(delayed).names == arm.model.names
 
 

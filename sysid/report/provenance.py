@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shlex
 
+from .. import fit_document
 from ..estimate import Fit
 from .section import Section
 from .words import SPACE, number
@@ -24,7 +25,7 @@ def provenance(fit: Fit, document: dict) -> Section:
             for entry in document["logs"]
         ],
         "versions": list(document["versions"].items()),
-        "seeds": [f"{k} {v}" for k, v in document["seeds"].items()],
+        "seeds": [f"{k} {v}" for k, v in fit_document.document(fit)["seeds"].items()],
         "iterations": fit.solution.iterations,
         "converged": fit.solution.converged,
         "objective": number(fit.objective, 8) + _squared(fit),
