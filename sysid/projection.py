@@ -8,6 +8,10 @@ import numpy as np
 
 from .objective import add_blocks
 
+_FLAT = 1e-6  # share of a column's square: what the model leaves of it beyond that is rounding
+_DATA = 0.5  # of a direction's square must stand in the data; the prior may not tell most of it
+_NOISE = 0.25  # of a direction's square: noise to half of its size, it says nothing about a law
+
 
 def prior_hessian(found) -> np.ndarray:
     """The prior's Hessian (size, size) where a model settled, zero for coefficients."""
@@ -109,3 +113,29 @@ def root(products: np.ndarray) -> np.ndarray:
     scale = np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
     values, vectors = np.linalg.eigh(products / np.outer(scale, scale))
     return scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
+
+
+def directions(plain, whole, squares, rough):
+    """Orthonormal directions (k0, k) of columns that a model leaves, that the data tell and that are
+    no noise, the squares (blocks, k, k) in them, and the norm (k0,) of what is left of each column;
+    None where there is none.
+
+    Args:
+        plain, whole: (k0, k0) squares of the columns, and of what the model leaves of them, prior
+            included. squares: (blocks, k0, k0) the same of the data alone. rough: (k0, k0) of what
+            noise adds.
+    """
+    size = np.sqrt(np.clip(np.diagonal(plain), 0.0, None))
+    if not np.all(np.isfinite(whole)) or not size.max() > 0:
+        return None
+    scale = np.where(size > 0, size, 1.0)
+    values, vectors = np.linalg.eigh(whole / np.outer(scale, scale))
+    kept = values > _FLAT
+    turn = vectors[:, kept] / np.sqrt(values[kept]) / scale[:, None]
+    for matrix, good in ((squares.sum(0), lambda v: v > _DATA), (rough, lambda v: v < _NOISE)):
+        values, vectors = np.linalg.eigh(turn.T @ matrix @ turn)
+        turn = turn @ vectors[:, good(values)]
+        if not turn.shape[1]:
+            return None
+    turned = np.einsum("ki,bkl,lj->bij", turn, squares, turn, optimize=True)
+    return turn, turned, np.sqrt(np.clip(np.diagonal(whole), 0.0, None))

@@ -6,6 +6,7 @@ import numpy as np
 
 from sysid.diagnose.projected import _made
 from sysid.view import Design, by_block, summed
+from sysid.view.stationary import spectra
 
 
 def posed(rng: np.random.Generator, *, n: int = 240, dof: int = 2, size: int = 5, blocks: int = 20, prior: float = 0.3):
@@ -24,7 +25,8 @@ def viewed(p):
     columns = p.a * p.weights[:, None, None]
     system = m.T @ m
     design = Design(columns, residual, system, np.linalg.inv(system), np.zeros(len(x)), 0.0 * columns, 0.0 * residual)
-    return SimpleNamespace(design=design, sums=summed(design, by_block(p.number)), blocks=p.number, weights=p.weights, x=x)
+    noise = spectra(residual, np.ones(residual.shape, bool), 0.01, 0.01)
+    return SimpleNamespace(design=design, sums=summed(design, by_block(p.number)), blocks=p.number, weights=p.weights, x=x, spectra=noise)
 
 
 def stacked(p, own, joints=(0, 1), keep=None):

@@ -275,3 +275,57 @@ def test_blocks_that_tell_each_other_are_half_as_sure():
         most = binom.ppf(0.999, draws, share) / draws
         assert 0.2 * share < np.mean(p <= share) <= most
     assert np.mean(surer <= 0.01) > 0.02  # as if they were told beforehand
+
+
+# ---- spreads that are foreseen
+
+
+def told(rng, sums: int, own, d0: float, scale: float = 1.7):
+    """Sums of variance scale f d0 / chi2(d0), and what blocks with `own` degrees of freedom tell of them."""
+    foreseen = np.exp(rng.uniform(-3.0, 3.0, sums))
+    true = scale * foreseen * (d0 / rng.chisquare(d0, sums) if np.isfinite(d0) else 1.0)
+    return true * rng.chisquare(own, sums) / own, foreseen, np.full(sums, float(own)), true
+
+
+@pytest.mark.parametrize("d0", [3.0, 10.0, 40.0])
+def test_how_far_what_is_foreseen_is_right_is_read_off_all_sums(d0):
+    rng = np.random.default_rng(3)
+    seen, foreseen, own, _ = told(rng, 20_000, 8, d0)
+    belief = blocks.believed(seen, foreseen, own)
+    assert belief.scale == pytest.approx(1.7, rel=0.05) and belief.freedom == pytest.approx(d0, rel=0.25)
+
+
+def test_noise_of_one_size_is_believed_as_far_as_anything():
+    belief = blocks.believed(*told(np.random.default_rng(4), 20_000, 8, np.inf)[:3])
+    assert belief.freedom > 50.0
+    assert blocks.believed(np.ones(5), np.ones(5), np.ones(5)) == blocks.Belief()  # five say nothing
+
+
+@pytest.mark.parametrize("own", [3, 6])
+def test_few_blocks_with_what_is_foreseen_hold_the_level_and_see_more(own):
+    """Of sums with nothing in them one in a hundred passes Student's t at 1 %, and of sums of four deviations more than blocks alone see."""
+    rng = np.random.default_rng(5)
+    seen, foreseen, own, true = told(rng, 40_000, own, 12.0)
+    belief = blocks.believed(seen, foreseen, own)
+    spread, freedom = belief.moderated(seen, foreseen, own)
+    passed = lambda c, v, d: np.mean(2.0 * student.sf(np.abs(c) / np.sqrt(v), d) < 0.01)  # noqa: E731
+    nothing = rng.normal(size=len(true)) * np.sqrt(true)
+    # a little less, as what blocks tell to be loud is believed
+    assert 0.004 < passed(nothing, spread, freedom) < 0.012
+    there = nothing + 4.0 * np.sqrt(true)
+    assert passed(there, spread, freedom) > passed(there, seen, own) + 0.1
+
+
+def test_where_noise_is_louder_blocks_speak_for_themselves():
+    rng = np.random.default_rng(6)
+    seen, foreseen, own, _ = told(rng, 2000, 8, 30.0)
+    seen[:100] *= 100.0
+    belief = blocks.believed(seen, foreseen, own)
+    spread, freedom = belief.moderated(seen, foreseen, own)
+    np.testing.assert_allclose(spread[:100], seen[:100], rtol=0.02)
+    np.testing.assert_allclose(freedom[:100], own[:100], rtol=0.02)
+    drawn = rng.chisquare(8, (50, 2000))  # draws keep what they weigh
+    again, same = belief.moderated(seen, foreseen, own, drawn)
+    np.testing.assert_allclose(same, freedom)
+    np.testing.assert_allclose(again[:, 0], drawn[:, 0], rtol=0.02)
+    assert blocks.Belief().moderated(seen, foreseen, own)[0] is seen

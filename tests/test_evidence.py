@@ -187,8 +187,8 @@ def test_what_rests_on_few_blocks_is_told_by_the_others():
 def test_normal_scores_are_normal_quantiles_of_f_ratios(d1, d2):
     for p in (0.2, 0.05, 0.01, 1e-3, 1e-4):
         ratio = fisher.isf(p, d1, d2)
-        assert null.normal_scores(ratio, d1, d2) == pytest.approx(norm.isf(p), rel=0.05), p
-    grid = null.normal_scores(np.linspace(0.0, 50.0, 500), d1, d2)
+        assert blocks.normal_scores(ratio, d1, d2) == pytest.approx(norm.isf(p), rel=0.05), p
+    grid = blocks.normal_scores(np.linspace(0.0, 50.0, 500), d1, d2)
     assert (np.diff(grid) > 0).all()
 
 

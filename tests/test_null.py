@@ -6,9 +6,9 @@ from scipy.signal import lfilter
 from scipy.stats import binom
 
 from sysid import blocks
+from sysid.blocks import normal_scores
 from sysid.diagnose import null
 from sysid.diagnose.detectable import _size
-from sysid.diagnose.null import normal_scores
 from tests.evidences import grouped, posed, viewed
 
 N, BLOCKS, DRAWS, LEVEL = 400, 40, 200, 0.05
@@ -150,7 +150,7 @@ def test_the_size_told_is_seen_nine_times_in_ten():
         p.tau = rng.normal(size=(N, 2))
         (group,) = grouped(viewed(p), one[2:3])
         threshold = np.quantile(null.maxima([group], rng, draws=400), 0.99)
-        size = _size(group, threshold, np.zeros(2))
+        size = _size(group, threshold, np.zeros(2), blocks.Belief())
         p.tau = rng.normal(size=(N, 2)) + size * one[2, :, :, 0].T  # another log
         (group,) = grouped(viewed(p), one[2:3])
         seen += null.statistics([group])[0] > threshold

@@ -45,8 +45,7 @@ def written(folder, hidden: float):
         tau += rng.normal(0.0, 0.05, q.shape)
         columns = {"t": t} | {f"q_{joint}": q[:, k] for k, joint in enumerate(NAMES)} | {f"tau_{joint}": tau[:, k] for k, joint in enumerate(NAMES)}
         (folder / name).write_text(csv(columns))
-    # the motion is prescribed, so friction bends no reversal of it: every row is good
-    (folder / "config.yaml").write_text("# </pre><script>alert(4)</script>\n" + dump(put(CONFIG, {"robot.rotors": [rotor], "data.train": [LOG], "preprocess.standstill": "keep"})))
+    (folder / "config.yaml").write_text("# </pre><script>alert(4)</script>\n" + dump(put(CONFIG, {"robot.rotors": [rotor], "data.train": [LOG]})))
     return folder
 
 

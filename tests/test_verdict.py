@@ -9,6 +9,7 @@ import pytest
 
 from scripts import blind_benchmark
 from sysid import pipeline
+from sysid.blocks import Belief
 from sysid.candidates import candidates
 from sysid.comparison import Difference
 from sysid.diagnose import claims
@@ -346,6 +347,6 @@ def test_an_effect_is_near_that_stands_at_five_per_cent_and_takes_half():
     maxima = np.linspace(0.0, 4.0, 401)
     group = lambda name: SimpleNamespace(candidate=SimpleNamespace(name=name))  # noqa: E731
     one = ([group("spring"), group("cable"), group("cogging")], np.array([3.9, 3.95, 3.0]), np.array([6.0, 4.0, 9.0]), maxima)
-    asked = Asked({0: one})
+    asked = Asked({0: one}, Belief())
     assert asked.near(0, 10.0) == "spring"  # cable takes less than half, cogging may be chance
     assert asked.near(0, 7.0) == "cable" and asked.near(0, 20.0) == "" and asked.near(1, 10.0) == ""

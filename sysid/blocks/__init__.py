@@ -5,8 +5,9 @@ Neighbouring rows of a filtered signal say the same thing twice. So rows are sum
 time that are long against every memory in them (the filter's, the noise's), and blocks are what is
 counted, left out and resampled.
 
-Which rows stand together (`numbering`), how sure a sum or an estimate is (`deviations`), how sure
-the parameters of a fit are together (`parameters`), and which model loses least (`rivals`).
+Which rows stand together (`numbering`), how sure a sum or an estimate is (`deviations`, `redrawn`,
+and `moderated` where blocks are few), how sure the parameters of a fit are together (`parameters`),
+and which model loses least (`rivals`).
 """
 
 from .deviations import (
@@ -19,6 +20,7 @@ from .deviations import (
     standard_error,
     z_score,
 )
+from .moderated import Belief, believed
 from .numbering import (
     FEWEST,
     MOST,
@@ -32,14 +34,17 @@ from .numbering import (
     summed,
 )
 from .parameters import covariance, widening
+from .redrawn import left_out, normal_scores, redrawn
 from .rivals import SAME, chances, confidence_set, within_one_error
 
 __all__ = [
+    "Belief",
     "FEWEST",
     "MOST",
     "Numbering",
     "SAME",
     "SHORTEST",
+    "believed",
     "chances",
     "confidence_set",
     "covariance",
@@ -48,8 +53,11 @@ __all__ = [
     "extents",
     "folds",
     "jackknife",
+    "left_out",
     "memory",
+    "normal_scores",
     "numbered",
+    "redrawn",
     "resting",
     "shared",
     "signs",

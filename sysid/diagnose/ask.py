@@ -7,10 +7,11 @@ from functools import cached_property
 
 import numpy as np
 
+from ..blocks import Belief
 from ..candidates import candidates
 from ..view import View
 from . import null
-from .evidence import Group, gain
+from .evidence import Group
 from .projected import groups
 
 _MAY_BE = 0.05  # family-wise: an effect that may be there, though it is not claimed
@@ -20,9 +21,10 @@ _HALF = 0.5  # of what functions of the motion predict: that much may be the eff
 @dataclass(frozen=True)
 class Asked:
     """The answer of all candidates under one model: {joint: (groups, statistics (groups,),
-    gains (groups,), null maxima (draws,))}."""
+    gains (groups,), null maxima (draws,))}; and how far foreseen spreads are believed."""
 
     by_joint: dict[int, tuple[list[Group], np.ndarray, np.ndarray, np.ndarray]]
+    belief: Belief
 
     @cached_property
     def groups(self) -> list[Group]:
@@ -68,16 +70,19 @@ def ask(view: View, extra=(), tell=lambda share: None, *, before=None, anew=()) 
         tell: is called with the share done. before: answers under the model that this one grew
             from. anew: the joints where it changed something: of all others the answers stand.
     """
-    asked, out = candidates(view.model, extra), {}
+    asked = candidates(view.model, extra)
     joints = sorted({c.joint for c in asked})
+    out = {j: before.by_joint[j] for j in joints if before is not None and j not in anew}
+    made = {joint: found for joint, (found, *_) in out.items()}
     for number, joint in enumerate(joints):  # whose columns stand in memory together
-        if before is not None and joint not in anew:
-            out[joint] = before.by_joint[joint]
-        else:
-            found = groups(view, [c for c in asked if c.joint == joint])
-            gains = np.array([gain(group).sum() for group in found])
-            # the same signs for all: draws of one residual
-            maxima = null.maxima(found, np.random.default_rng(0))
-            out[joint] = found, null.statistics(found), gains, maxima
+        if joint not in made:
+            made[joint] = groups(view, [c for c in asked if c.joint == joint])
         tell((number + 1) / len(joints))
-    return Asked(out)
+    belief = null.believed([group for own in made.values() for group in own])
+    for joint, own in made.items():
+        if joint not in out:
+            gains = np.array([group.taken for group in own])
+            # the same signs for all: draws of one residual
+            maxima = null.maxima(own, np.random.default_rng(0), belief)
+            out[joint] = own, null.statistics(own, belief), gains, maxima
+    return Asked(out, belief)

@@ -13,12 +13,12 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.special import ndtri
 
+from ..blocks import Belief, normal_scores
 from ..candidates import Candidate, at_start
 from ..model_parameters import ROBOT
 from ..view import View
 from .ask import Asked
 from .evidence import Group
-from .null import normal_scores
 from .select import LEVEL, WORTH
 
 POWER = 0.9
@@ -48,7 +48,7 @@ def detectable(view: View, asked: Asked, candidates) -> list[Detectable]:
         if candidate.parameters and not candidate.begins:
             best.setdefault(candidate.key, Detectable(candidate, *_leading(view, candidate)))
     for group in (g for g in asked.groups if not g.candidate.begins):
-        size = _size(group, threshold, loss)
+        size = _size(group, threshold, loss, asked.belief)
         if group.candidate.nonlinear and not at_start(group.candidate, group.shapes):
             # its torque is no multiple of another size's: this one is seen or it is not
             own = group.shapes[_leading(view, group.candidate)[0]]
@@ -70,15 +70,14 @@ def _leading(view: View, candidate: Candidate) -> tuple[str, str]:
     return first.shape.name, first.unit
 
 
-def _size(group: Group, threshold: float, loss: np.ndarray) -> float:
+def _size(group: Group, threshold: float, loss: np.ndarray, belief: Belief) -> float:
     """Of the first own coefficient, the others zero."""
     group = group.tested
     if not (group.sizes[0] > 0 and group.testable):
         return np.inf
-    directions, rest = group.freedom
-    spread = float(np.sum(group.moves**2))
+    directions, (spread, rest) = group.freedom[0], belief.moderated(*group.spreads)
     grid = np.geomspace(0.1, 1e4, 400)
-    passes = np.flatnonzero(normal_scores(grid, directions, directions * (rest - 1.0)) > threshold)
+    passes = np.flatnonzero(normal_scores(grid, directions, rest) > threshold)
     if not len(passes):
         return np.inf  # it rests on too few blocks to stand out, whatever its size
     needed = np.sqrt(grid[passes[0]] * spread)

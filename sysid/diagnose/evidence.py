@@ -37,7 +37,9 @@ class Group:
     """One candidate at shape values. scores (blocks, k), squares (blocks, k, k) of the orthonormal
     columns, `loud` and `loud_squares` the same of rows whose noise is as loud as before the model's
     fit, `kept` (k,) the prior's score; `back` (k0, k) turns coefficients of these into the
-    candidate's own; `sizes` (k0,) the weighted norm of what the model leaves of each own column."""
+    candidate's own; `sizes` (k0,) the weighted norm of what the model leaves of each own column;
+    `foreseen` (k, k) the scores' covariance, were the noise always the same; `loss` the squared
+    residual of its joints."""
 
     candidate: Candidate
     shapes: dict[str, float]
@@ -48,6 +50,8 @@ class Group:
     kept: np.ndarray
     back: np.ndarray
     sizes: np.ndarray
+    foreseen: np.ndarray
+    loss: float
 
     @cached_property
     def c(self) -> np.ndarray:
@@ -55,10 +59,24 @@ class Group:
         return self.scores.sum(0) + self.kept
 
     @cached_property
+    def taken(self) -> float:
+        """The gain of all folds."""
+        return float(gain(self).sum())
+
+    @cached_property
     def moves(self) -> np.ndarray:
         """(blocks, k) how far they move when a block is left out."""
         own = self.loud - self.loud_squares @ self.c
-        return np.einsum("bkl,bl->bk", left_out(self.squares), own)
+        return np.einsum("bkl,bl->bk", blocks.left_out(self.squares), own)
+
+    @cached_property
+    def spreads(self) -> tuple[float, float, float]:
+        """The moves' sum of squares, what it would be were the noise always the same (that of the
+        residual without what the group takes), and the first one's degrees of freedom."""
+        left = 1.0 - np.clip(self.taken / max(self.loss, 1e-300), 0.0, _LEVERAGE)
+        directions, rest = self.freedom
+        own = directions * max(rest - 1.0, 1.0)
+        return float(np.sum(self.moves**2)), float(np.trace(self.foreseen) * left), own
 
     @cached_property
     def freedom(self) -> tuple[float, float]:
@@ -96,6 +114,7 @@ class Group:
             return self
         w = weight[:, None]
         told = {"scores": w * group.scores, "loud": w * group.loud, "squares": squares}
+        told["foreseen"] = group.foreseen * np.sum(weight**2 * share) / share.sum()
         even = replace(group, **told, loud_squares=w[:, None] * group.loud_squares)
         return even._turned(vectors / np.sqrt(values))
 
@@ -110,6 +129,7 @@ class Group:
             loud=self.loud @ turn,
             loud_squares=turn.T @ self.loud_squares @ turn,
             kept=self.kept @ turn,
+            foreseen=turn.T @ self.foreseen @ turn,
             back=self.back @ turn,
             sizes=self.sizes * left / np.maximum(whole, 1e-300),
         )
@@ -123,11 +143,6 @@ class Group:
     def coefficients(self) -> np.ndarray:
         """(k0,) the candidate's own."""
         return self.back @ self.c
-
-
-def left_out(squares: np.ndarray) -> np.ndarray:
-    """(1 - G_b)^-1 (..., k, k)."""
-    return np.linalg.inv(np.eye(squares.shape[-1]) - squares)
 
 
 def gain(group: Group) -> np.ndarray:

@@ -16,19 +16,39 @@ from collections.abc import Sequence
 import numpy as np
 
 from .. import blocks
-from .evidence import Group, left_out
+from .evidence import Group
+
+NONE = blocks.Belief()
 
 
-def statistics(groups: Sequence[Group]) -> np.ndarray:
+def believed(groups: Sequence[Group]) -> blocks.Belief:
+    """How far the spread that noise of one spectrum foresees is right, over all groups."""
+    groups = [g.tested for g in groups if g.tested.testable]
+    most = max((len(g.scores) for g in groups), default=1)
+    return blocks.believed(*_spreads(groups), most)
+
+
+def _spreads(groups: Sequence[Group]) -> np.ndarray:
+    """(3, groups)."""
+    return np.array([g.spreads for g in groups]).reshape(-1, 3).T
+
+
+def statistics(groups: Sequence[Group], belief: blocks.Belief = NONE) -> np.ndarray:
     """(groups,) T of each, on the scale of a normal variable; NaN where it cannot be tested."""
     groups = [g.tested for g in groups]
-    ratio = np.array([g.c @ g.c / max(np.sum(g.moves**2), 1e-300) for g in groups])
-    directions, rest = np.array([g.freedom for g in groups]).T if groups else np.zeros((2, 0))
-    found = normal_scores(ratio, directions, directions * np.maximum(rest - 1.0, 1.0))
+    spread, rest = belief.moderated(*_spreads(groups))
+    ratio = np.array([g.c @ g.c for g in groups]) / np.maximum(spread, 1e-300)
+    found = blocks.normal_scores(ratio, np.array([g.freedom[0] for g in groups]), rest)
     return np.where([g.testable for g in groups], found, np.nan)
 
 
-def maxima(groups: Sequence[Group], rng: np.random.Generator, *, draws: int = 1000) -> np.ndarray:
+def maxima(
+    groups: Sequence[Group],
+    rng: np.random.Generator,
+    belief: blocks.Belief = NONE,
+    *,
+    draws: int = 1000,
+) -> np.ndarray:
     """(draws,) the greatest statistic over all groups where nothing is there; minus infinity where
     there are none."""
     out = np.full(draws, -np.inf)
@@ -40,39 +60,13 @@ def maxima(groups: Sequence[Group], rng: np.random.Generator, *, draws: int = 10
     for group in groups:
         by_size.setdefault(group.scores.shape[1], []).append(group)
     for own in by_size.values():
-        out = np.maximum(out, _greatest(own, sign))
+        out = np.maximum(out, _greatest(own, sign, belief))
     return out
 
 
-def _greatest(groups: list[Group], sign: np.ndarray) -> np.ndarray:
-    squares = np.stack([g.squares for g in groups])  # (groups, blocks, k, k)
-    moves = np.stack([g.moves for g in groups])
-    directions, rest = np.array([g.freedom for g in groups]).T
-    out = left_out(squares)
-    # what a draw's own scores move by, before its refit
-    again = np.einsum("gbkl,gbl->gbk", out, moves)
-    pulled = out @ squares
-    after = np.einsum("gbkl,gbl->gbk", pulled, again)
-    twice = np.einsum("gbkl,gblm->gkm", pulled, pulled, optimize=True)
-    norms = np.sum(again**2, axis=2)
-    count, b, k = moves.shape
-    flat = lambda a: np.moveaxis(a, 1, 0).reshape(b, count * k)  # noqa: E731
-    c = (sign @ flat(moves)).reshape(-1, count, k)
-    u = (sign @ flat(after)).reshape(-1, count, k)
-    top = np.sum(c * c, axis=2)
-    size = sign**2 @ norms.T
-    bottom = (
-        size
-        - 2.0 * np.sum(c * u, axis=2)
-        + np.einsum("dgk,gkl,dgl->dg", c, twice, c, optimize=True)
-    )
-    ratio = top / np.maximum(bottom, 1e-9 * size)
-    return np.max(normal_scores(ratio, directions, directions * (rest - 1.0)), axis=1)
-
-
-def normal_scores(statistic, directions, rest) -> np.ndarray:
-    """F ratios with `directions` and `rest` degrees of freedom on the scale of a normal variable
-    (Wilson & Hilferty 1931)."""
-    one, two = 2.0 / (9.0 * directions), 2.0 / (9.0 * rest)
-    root = np.cbrt(statistic)
-    return ((1.0 - two) * root - (1.0 - one)) / np.sqrt(two * root**2 + one)
+def _greatest(groups: list[Group], sign: np.ndarray, belief: blocks.Belief) -> np.ndarray:
+    squares, moves = (np.stack([getattr(g, word) for g in groups]) for word in ("squares", "moves"))
+    top, spread = blocks.redrawn(squares, moves, sign)
+    spread, rest = belief.moderated(*_spreads(groups), drawn=spread)
+    directions = np.array([g.freedom[0] for g in groups])
+    return np.max(blocks.normal_scores(top / spread, directions, rest), axis=1)

@@ -8,12 +8,11 @@ from itertools import groupby
 import numpy as np
 
 from ..candidates import Candidate, columns_of, tried
+from ..projection import directions
 from ..view import View, by_block
+from ..view.stationary import covariance
 from .evidence import Group
 
-_FLAT = 1e-6  # share of a column's square: what the model leaves of it beyond that is rounding
-_DATA = 0.5  # of a direction's square must stand in the data; the prior may not tell most of it
-_NOISE = 0.25  # of a direction's square: noise to half of its size, it says nothing about a law
 _BATCH = 256  # columns' sets that stand in memory at once
 
 Asked = tuple[Candidate, dict[str, float]]  # a candidate at shape values
@@ -71,6 +70,12 @@ def _made(
             own[b] += square(values[rows].reshape(-1, count, k))
     total = cross.sum(0)
     absorbed = design.inverse @ total
+    foreseen = np.zeros((count, k, k))
+    for i, j in enumerate(joints):
+        left = view.weights[j] * np.moveaxis(plain[:, i], 1, 0)
+        left = left - (design.columns[j] @ absorbed).reshape(n, count, k)
+        foreseen += covariance(left, view.spectra[j])
+    loss = float(np.sum(design.residual[:, joints] ** 2))
     score = (score - (sums.scores - sums.rough_scores) @ absorbed).reshape(len(spans), count, k)
     prior = (sums.scores.sum(0) @ absorbed).reshape(count, k)
     # what stands across a candidate's columns and the model's, in each block and in the noise
@@ -87,30 +92,11 @@ def _made(
     whole = own.sum(0) - pair(by, split(total))
     out = []
     for s in range(count):
-        found = _turned(own[:, s].sum(0), whole[s], squares[:, s], rough_square[s])
+        found = directions(own[:, s].sum(0), whole[s], squares[:, s], rough_square[s])
         if found is None:
             continue
         (candidate, shapes), (turn, turned, sizes) = asked[s], found
         told = score[:, s] @ turn, turned, loud[:, s] @ turn, turned + turn.T @ more[:, s] @ turn
-        out.append(Group(candidate, dict(shapes), *told, prior[s] @ turn, turn, sizes))
+        rest = prior[s] @ turn, turn, sizes, turn.T @ foreseen[s] @ turn, loss
+        out.append(Group(candidate, dict(shapes), *told, *rest))
     return out
-
-
-def _turned(plain, whole, squares, rough):
-    """Orthonormal directions (k0, k) that the model leaves, that the data tell and that are no
-    noise, the squares (blocks, k, k) in them, and the norm of what is left of each own column; None
-    where there is none."""
-    size = np.sqrt(np.clip(np.diagonal(plain), 0.0, None))
-    if not np.all(np.isfinite(whole)) or not size.max() > 0:
-        return None
-    scale = np.where(size > 0, size, 1.0)
-    values, vectors = np.linalg.eigh(whole / np.outer(scale, scale))
-    kept = values > _FLAT
-    turn = vectors[:, kept] / np.sqrt(values[kept]) / scale[:, None]
-    for matrix, good in ((squares.sum(0), lambda v: v > _DATA), (rough, lambda v: v < _NOISE)):
-        values, vectors = np.linalg.eigh(turn.T @ matrix @ turn)
-        turn = turn @ vectors[:, good(values)]
-        if not turn.shape[1]:
-            return None
-    turned = np.einsum("ki,bkl,lj->bij", turn, squares, turn, optimize=True)
-    return turn, turned, np.sqrt(np.clip(np.diagonal(whole), 0.0, None))

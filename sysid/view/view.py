@@ -22,6 +22,7 @@ from ..shape import Settled, settle
 from ..source import Source
 from ..specs import Experiment
 from .design import Design, Sums, by_block, designed, freed, instrumented, summed
+from .stationary import spectra
 
 _FOLDS = 10
 
@@ -112,7 +113,9 @@ class View:
         loud, scores = residual.copy(), []
         for own in by_block(number):
             a = columns[:, own]
-            (back,) = freed(self.design.inverse, np.einsum("jnk,jnl->kl", a, a, optimize=True)[None])
+            (back,) = freed(
+                self.design.inverse, np.einsum("jnk,jnl->kl", a, a, optimize=True)[None]
+            )
             loud[own] += np.einsum("jnk,k->nj", a, back @ np.einsum("jnk,nj->k", a, residual[own]))
             scores.append(np.einsum("jnk,nj->k", z[:, own], loud[own]))
         return number, loud, np.stack(scores)
@@ -136,6 +139,15 @@ class View:
         left = self.design.residual - np.stack([found.told for found in self.unknown], axis=1)
         memory = blocks.memory(left, rows.use, rows.piece, self.step)
         return blocks.numbered(rows.t, rows.piece, memory=memory)
+
+    @cached_property
+    def spectra(self) -> np.ndarray:
+        """(dof, frequencies) of what no function of the motion predicts, as noise that is always
+        the same has it."""
+        rows = self.rows
+        left = self.design.residual - np.stack([found.told for found in self.unknown], axis=1)
+        memory = blocks.memory(left, rows.use, rows.piece, self.step)
+        return spectra(left, rows.use, memory, self.step)
 
     @cached_property
     def source(self) -> Source:

@@ -1,0 +1,43 @@
+"""What noise of one spectrum, the same all the time, would make of columns' scores."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.fft import next_fast_len, rfft
+
+_MEMORIES = 8.0  # of the noise: beyond these its correlation counts as none
+
+
+def spectra(values, use, memory: float, step: float) -> np.ndarray:
+    """Power spectra (k, frequencies) of values (n, k), as the transform of their correlation up to
+    eight memories (Blackman & Tukey 1958, Bartlett's window).
+
+    Args:
+        use: (n, k) bool, rows that count. memory: [s]. step: from row to row [s].
+    """
+    n = len(values)
+    lags = min(n - 1, max(1, int(_MEMORIES * memory / step)))
+    size = next_fast_len(n + lags, real=True)
+    size += size % 2
+    kept = np.where(use, values, 0.0)
+    square = lambda x: np.abs(np.fft.rfft(x, size, axis=0)) ** 2  # noqa: E731
+    power = lambda x: np.fft.irfft(square(x), size, axis=0)  # noqa: E731
+    pairs = power(use.astype(float))
+    alike = np.where(pairs > 0.5, power(kept) / np.maximum(pairs, 0.5), 0.0)
+    lag = np.minimum(np.arange(size), size - np.arange(size))
+    window = np.clip(1.0 - lag / (lags + 1.0), 0.0, None)[:, None]
+    return np.clip(np.fft.rfft(alike * window, axis=0).real, 0.0, None).T
+
+
+def covariance(columns, spectrum) -> np.ndarray:
+    """Covariance (..., k, k) of the scores of columns (n, ..., k), zero where rows do not count.
+
+    In single precision: it says how sure something is."""
+    size, columns = 2 * (len(spectrum) - 1), np.asarray(columns)
+    most = np.maximum(np.abs(columns).max(axis=0), 1e-300)
+    columns = (columns / most).astype(np.float32)
+    turned = np.moveaxis(rfft(columns, size, axis=0), 0, -1)
+    weight = spectrum / size * np.where(np.arange(len(spectrum)) % (size // 2), 2.0, 1.0)
+    turned = turned * np.sqrt(weight).astype(np.float32)
+    both = np.concatenate([turned.real, turned.imag], axis=-1)
+    return (both @ np.swapaxes(both, -1, -2)).astype(float) * most[..., None, :] * most[..., None]

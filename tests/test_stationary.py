@@ -1,0 +1,65 @@
+"""What noise of one spectrum makes of columns' scores: against dense covariances, and against noise that is drawn."""
+
+import numpy as np
+import pytest
+from scipy.linalg import toeplitz
+from scipy.signal import lfilter
+
+from sysid.view.stationary import covariance, spectra
+
+
+def coloured(rng, shape, keep: float):
+    """First-order noise of unit variance along the first axis."""
+    start = 200
+    out = lfilter([np.sqrt(1.0 - keep**2)], [1.0, -keep], rng.normal(size=(shape[0] + start, *shape[1:])), axis=0)
+    return out[start:]
+
+
+def test_spectrum_is_that_of_the_correlation():
+    rng = np.random.default_rng(0)
+    n, keep, step = 20_000, 0.8, 0.01
+    values = coloured(rng, (n, 2), keep) * np.array([1.0, 3.0])
+    use = rng.random((n, 2)) < 0.8
+    found = spectra(values, use, step / (1.0 - keep), step)
+    alike = np.fft.irfft(found, axis=1)[:, :10]
+    lags = 8 / (1.0 - keep)
+    wanted = keep ** np.arange(10) * (1.0 - np.arange(10) / (lags + 1.0))  # Bartlett's window
+    np.testing.assert_allclose(alike[0], wanted, atol=0.06)
+    np.testing.assert_allclose(alike[1], 9.0 * wanted, atol=0.5)
+    assert (found >= 0.0).all()
+
+
+@pytest.mark.parametrize("scale", [1.0, 1e30])
+def test_covariance_is_the_dense_one(scale):
+    rng = np.random.default_rng(1)
+    n, lags = 300, 40
+    values = coloured(rng, (n, 1), 0.7)
+    (spectrum,) = spectra(values, np.ones((n, 1), bool), 0.05, 0.01)
+    correlation = np.fft.irfft(spectrum)
+    assert np.abs(correlation[lags + 1 : -lags]).max() < 1e-2 * correlation[0]
+    columns = rng.normal(size=(n, 4, 2)).cumsum(axis=0)
+    columns[50:90] = 0.0  # rows that do not count
+    found = covariance(scale * columns, spectrum)
+    dense = toeplitz(correlation[:n])
+    wanted = np.einsum("nsk,nm,msl->skl", columns, dense, columns)
+    np.testing.assert_allclose(found / scale**2, wanted, rtol=1e-4, atol=1e-4 * np.abs(wanted).max())
+
+
+def test_covariance_is_that_of_scores_of_noise_that_is_drawn():
+    rng = np.random.default_rng(2)
+    n = 1000
+    t = np.arange(n) / 100.0
+    columns = np.stack([np.sin(t), np.sign(np.sin(3.0 * t)), (t < 1.0) * 1.0], axis=1)[:, None]
+    drawn = coloured(rng, (n, 4000), 0.9)
+    scores = columns[:, 0].T @ drawn
+    size = 2 * n
+    lag = np.minimum(np.arange(size), size - np.arange(size))
+    spectrum = np.fft.rfft(0.9**lag).real
+    np.testing.assert_allclose(np.diag(covariance(columns, spectrum)[0]), np.mean(scores**2, axis=1), rtol=0.08)
+    # as read off another stretch of the noise: Bartlett's window over eight memories takes a tenth of the slowest
+    (read,) = spectra(coloured(rng, (100_000, 1), 0.9)[: 60 * n], np.ones((60 * n, 1), bool), 0.1, 0.01)
+    alike = np.fft.irfft(read)
+    long = np.zeros(size)
+    long[: n // 2], long[-n // 2 :] = alike[: n // 2], alike[-n // 2 :]
+    found = covariance(columns, np.clip(np.fft.rfft(long).real, 0.0, None))
+    np.testing.assert_allclose(np.diag(found[0]), np.mean(scores**2, axis=1), rtol=0.2)
