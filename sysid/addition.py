@@ -71,3 +71,9 @@ def designs(added: str, head: tuple[str, str], others) -> str:
     suspects = ",".join(apart(head, others))
     target = shlex.split(added)[2]
     return shlex.join(["sysid", "design", target, "--separate", suspects, "--out", "next"])
+
+
+def another_log(path) -> str:
+    """What is typed for the motion that tells most of what the logs of an experiment's file leave open."""
+    target = path.parent if path.name == "config.yaml" else path
+    return shlex.join(["sysid", "design", str(target), "--out", "next"])

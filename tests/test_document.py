@@ -1,12 +1,15 @@
 """The document of `sysid diagnose` keeps the shape that is promised, whatever is found."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from sysid.failures import regions
 from sysid.lowpass import LEAST
+from sysid.report.sections import sections
+from sysid.statement import text
 from sysid.statement.document import document
 from tests.test_select import BIAS, PRODUCT, TWO
 
@@ -133,3 +136,17 @@ def test_no_number_is_left_out_where_it_is_not_known(diagnosed):
     assert {entry["noise_floor"] for entry in said["joints"].values()} == {None} == {e["noise_floor_se"] for e in said["joints"].values()}
     json.dumps(said, allow_nan=False)
     assert np.isfinite(made.fit.rms("test")["elbow"])
+
+
+def test_what_is_unresolved_needs_another_log(found):
+    """The command that designs it is told where a joint is unresolved, and only there; in words, on a line of its own, whole."""
+    target = found.fit.experiment.path.parent
+    for status, command in (("unresolved", f"sysid design {target} --out next"), ("complete", None)):
+        verdict = tuple(replace(v, status=status, claims=(), says="why", left=None) for v in found.verdict)
+        other = replace(found, verdict=verdict)
+        said = document(other, "runs/x")
+        assert said["next_log"] == command
+        lines = [line for _, own in text.verdict(text.told(other, said), 60) for line in own]
+        assert [line for line in lines if "sysid design" in line] == ([command] if command else [])
+        card = sections(found.fit, said, [])["verdict"]["html"]
+        assert ("needs another log" in card) is ("sysid design" in card) is (command is not None)

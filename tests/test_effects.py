@@ -421,7 +421,8 @@ def test_signals_and_neighbours_that_are_not_there(tmp_path):
 def test_every_effect_is_shown(capsys):
     from sysid.terminal.effects import show_effects
 
-    show_effects([vocabulary.describe(vocabulary.find(name)) for name in vocabulary.vocabulary()])
+    for name in vocabulary.vocabulary():
+        show_effects([vocabulary.describe(vocabulary.find(name))])
     said = capsys.readouterr().out
     assert "  k            1/rad, 1 to 120: " in said and "  vs           rad/s, 0.003 to 0.7 times the joint's top speed: " in said
     assert "  Fc           N m, not negative: " in said and "  encoder:     motor where" in said

@@ -5,6 +5,7 @@ from __future__ import annotations
 from ..addition import apart, designs
 from ..estimate import Fit
 from ..given_shapes import given_shapes, said_of_shapes
+from ..statement.text import ANOTHER
 from ..statement.words import followed, percent
 from .section import Section
 from .words import (
@@ -52,6 +53,8 @@ def verdict(fit: Fit, document: dict) -> Section:
         "consistent": fit.physically_consistent,
         "notices": document["notices"],
         "made": document.get("made", ""),
+        "next_log": document.get("next_log"),
+        "another": ANOTHER,
         "band": band(fit),
     }
     return Section("Verdict", "verdict", values)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..addition import another_log
 from ..diagnose.diagnosis import Diagnosis
 from ..diagnose.verdict import Verdict
 from ..filters import settled, torque_band
@@ -89,6 +90,7 @@ def document(found: Diagnosis, run="") -> dict:
             "rms_test_before": dict(zip(joints, found.first.rms().tolist())),
             "rms_test_after": dict(zip(joints, found.last.rms().tolist())),
         },
+        "next_log": _next_log(found),
         "not_claimed": [
             {"effect": r.effect, "joint": r.joint, "why": r.why} for r in found.refused
         ],
@@ -97,6 +99,12 @@ def document(found: Diagnosis, run="") -> dict:
         "versions": versions(),
         "run": str(run),
     }
+
+
+def _next_log(found) -> str | None:
+    """The command that designs the log to take next, where these do not say why an error stands."""
+    blind = any(v.status == "unresolved" for v in found.verdict)
+    return another_log(found.fit.experiment.path) if blind else None
 
 
 def _joint(candidate, joints) -> str:

@@ -11,6 +11,7 @@ from .words import followed, listed, percent, placed, quantity, valued, wrapped
 if TYPE_CHECKING:
     from ..diagnose.diagnosis import Diagnosis
 
+ANOTHER = "a motion that tells most of what these logs leave open"
 _TOGETHER = "several variables together"
 
 
@@ -43,9 +44,13 @@ def told(found: Diagnosis, document: dict) -> Told:
 def verdict(of: Told, width: int) -> list[tuple[str, list[str]]]:
     """What is said of each joint: [(joint and status, lines that begin with these)]."""
     said: dict[str, str] = {}  # under which joint a command stands already
-    return [
+    out = [
         (f"{v['joint']}: {v['status']}", _joint(v, of, width, said)) for v in of.document["verdict"]
     ]
+    if of.document.get("next_log"):
+        words = f"what is unresolved needs another log: {ANOTHER} is that of"
+        out.append(("", [*wrapped(words, width, "  "), of.document["next_log"]]))
+    return out
 
 
 def _joint(v: dict, of: Told, width: int, said: dict[str, str]) -> list[str]:
