@@ -79,7 +79,7 @@ def sunk(table) -> Callable[[Path], None]:
 
     def write(path: Path) -> None:
         try:
-            table.sink_parquet(path)
+            table.sink_parquet(path, compression_level=1)  # of zstd: noise is no smaller at a higher one
         except pl.exceptions.PolarsError as error:
             raise OSError(str(error)) from None
 
