@@ -27,6 +27,7 @@ WAIT = 180_000  # ms, for a refit on a busy machine
 @pytest.fixture(scope="session")
 def browser():
     api = pytest.importorskip("playwright.sync_api", reason="Playwright is not installed")
+    api.expect.set_options(timeout=30_000)  # a page is drawn late on a busy machine
     path = os.environ.get("SYSID_BROWSER") or shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
     if path is None:
         pytest.skip("there is no chromium here (apt-get install chromium, or name one in SYSID_BROWSER)")
