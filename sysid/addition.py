@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Sequence
+from pathlib import Path
 
 from .specs import EffectSpec, Experiment
 
@@ -48,10 +49,14 @@ def remaining(there: Sequence[str], had: dict, joints: Sequence[str] | None, opt
     return [joint for joint in there if joint not in joints]
 
 
+def typed(path: Path) -> Path:
+    """An experiment's file as it is typed: its folder, or the file where it has a name of its own."""
+    return path.parent if path.name == "config.yaml" else path
+
+
 def command(path, effect: str, joints: list[str] | None, options: dict) -> str:
     """What is typed to add an effect to the experiment in a file."""
-    target = path.parent if path.name == "config.yaml" else path
-    words = ["sysid", "add", str(target), effect]
+    words = ["sysid", "add", str(typed(path)), effect]
     for joint in joints or []:
         words += ["--joint", joint]
     for name, value in options.items():
@@ -75,5 +80,4 @@ def designs(added: str, head: tuple[str, str], others) -> str:
 
 def another_log(path) -> str:
     """What is typed for the motion that tells most of what the logs of an experiment's file leave open."""
-    target = path.parent if path.name == "config.yaml" else path
-    return shlex.join(["sysid", "design", str(target), "--out", "next"])
+    return shlex.join(["sysid", "design", str(typed(path)), "--out", "next"])

@@ -38,22 +38,19 @@ def read(
     actuators=logs.NO_ACTUATORS,
 ) -> Log:
     """As `log.read`; the segments of a long log are spans of it. Raises LogError."""
-    source = None if actuators else _source(log, data, joints, prismatic, folder)
+    source = _source(log, data, joints, prismatic, folder, actuators)
     if source is not None and (found := source.log()) is not None:
         return found
     return spanned(logs.read(log, data, joints, prismatic, folder, actuators))
 
 
-def in_parts(
-    log: LogSpec,
-    data: DataSpec,
-    joints: tuple[str, ...],
-    prismatic,
-    folder: Path = Path(),
-    actuators=logs.NO_ACTUATORS,
-) -> bool:
-    """Whether a log's file is long, and can be read in parts."""
-    return not actuators and _source(log, data, joints, prismatic, folder) is not None
+def in_parts(log: LogSpec, *how) -> bool:
+    """Whether a log's file is long, and can be read in parts.
+
+    Args:
+        how: what else `read` is given.
+    """
+    return _source(log, *how) is not None
 
 
 def spanned(log: Log) -> Log:
@@ -65,9 +62,11 @@ def spanned(log: Log) -> Log:
     return replace(log, segments=Spans([of_segment(segment) for segment in log.segments]))
 
 
-def _source(log: LogSpec, data: DataSpec, joints, prismatic, folder: Path) -> _Source | None:
+def _source(
+    log: LogSpec, data: DataSpec, joints, prismatic, folder: Path, actuators
+) -> _Source | None:
     """What reads a file span by span; None where it cannot be, or is short."""
-    if len(log.names) > 1:
+    if actuators or len(log.names) > 1:
         return None
     table = recording.table_of(log.names[0], log, folder)
     if table.rows is None or table.rows <= spans.SPAN or table.has(recording.EPISODE):

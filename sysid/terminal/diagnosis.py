@@ -3,8 +3,9 @@
 from rich.console import Console
 from rich.text import Text
 
+from ..addition import typed
 from ..statement import sizes, tables, text
-from .next_steps import doubtful, implausible, next_step, typed
+from .next_steps import doubtful, implausible, next_step
 from .tables import number, show_notices, table, terminal_width
 
 
@@ -36,11 +37,11 @@ def _after_diagnosis(document: dict, experiment) -> None:
     commands = [c for v in document["verdict"] for c in v.get("commands", ())]
     first = min((f for f in document["findings"] if f["command"] in commands and f["joins_as_step"]), key=lambda f: f["joins_as_step"], default=None)
     if doubtful(document, experiment):
-        next_step("check", typed(experiment))
+        next_step("check", typed(experiment.path))
     elif first is not None:
         print(f"next: {first['command']}")
     else:
-        next_step("report", typed(experiment), "--open")
+        next_step("report", typed(experiment.path), "--open")
 
 
 def show_verdict(of, width: int) -> None:

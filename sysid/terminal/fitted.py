@@ -2,13 +2,14 @@
 
 import shutil
 
+from ..addition import typed
 from ..differences import give_or_take
 from ..estimate import Fit
 from ..export import exported
 from ..given_shapes import given_shapes, said_of_shapes
 from ..init.text import flow
 from ..statement import faults, text
-from .next_steps import doubtful, next_step, typed
+from .next_steps import doubtful, next_step
 from .tables import four, number, percent, show_notices, table, terminal_width
 
 _LOW = 0.1  # below this share the prior, not the data, gave a parameter
@@ -63,7 +64,7 @@ def show_fit(fit: Fit, document: dict) -> None:
     print(document["prior"]["says"])
     show_notices(document)
     print(f"run folder: {document['run']}")
-    next_step("check" if doubtful(document, fit.experiment) else "diagnose", typed(fit.experiment))
+    next_step("check" if doubtful(document, fit.experiment) else "diagnose", typed(fit.experiment.path))
 
 
 def _show_held(at_zero: dict[str, float]) -> None:
@@ -114,7 +115,7 @@ def _show_filter(chosen: dict) -> None:
 def show_check(document: dict, experiment) -> None:
     """Every fault of the logs with its cure, the gravest first."""
     print("\n".join(faults.lines(document, terminal_width())))
-    next_step("fit" if document["ok"] else "check", typed(experiment), first="" if document["ok"] else f"correct {experiment.path} or the logs")
+    next_step("fit" if document["ok"] else "check", typed(experiment.path), first="" if document["ok"] else f"correct {experiment.path} or the logs")
 
 
 def show_comparison(document: dict, experiments) -> None:
@@ -133,7 +134,7 @@ def show_comparison(document: dict, experiments) -> None:
     own = [k for k, one in enumerate(experiments) if not (one.folder / "fit.json").is_file()]  # not what is a run's
     if own:
         best = min(own, key=lambda k: float("inf") if errors[k] is None else errors[k])
-        next_step("diagnose", typed(experiments[best]))
+        next_step("diagnose", typed(experiments[best].path))
 
 
 def show_export(found) -> None:

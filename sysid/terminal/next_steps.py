@@ -16,11 +16,6 @@ def next_step(command: str, *words, first: str = "") -> None:
     print(f"next: {shlex.join(['sysid', command, *map(str, words)])}")
 
 
-def typed(experiment) -> Path:
-    """An experiment as it is typed: its folder, or its file where that has a name of its own."""
-    return experiment.path.parent if experiment.path.name == "config.yaml" else experiment.path
-
-
 def implausible(document: dict) -> list[str]:
     """The notices that make all the rest doubtful."""
     return [notice for notice in document["notices"] if notice.startswith("implausible")]

@@ -6,9 +6,10 @@ from pathlib import Path
 from rich.console import Console
 from rich.markup import escape
 
+from ..addition import typed
 from ..statement import text
 from .diagnosis import show_verdict
-from .next_steps import next_step, typed
+from .next_steps import next_step
 from .tables import number, show_notices, table, terminal_width
 
 
@@ -28,7 +29,7 @@ def show_added(document: dict) -> None:
         print(f"written into {document['experiment']}")
     show_notices(document)
     file = Path(document["experiment"])
-    next_step("diagnose", file.parent if file.name == "config.yaml" else file)
+    next_step("diagnose", typed(file))
 
 
 def _decimals(level: float | None) -> int:
@@ -52,7 +53,7 @@ def show_discovery(said: dict, found, document: dict, experiment=None) -> None:
     if experiment is None:
         return
     if not said["commands"]:
-        next_step("report", typed(experiment), "--open")
+        next_step("report", typed(experiment.path), "--open")
         return
     print(f"{experiment.path} is as it was; what was found is written into it by")
     for command in said["commands"][1:]:
@@ -77,4 +78,4 @@ def show_history(steps: list[dict], experiment) -> None:
         for number, step in enumerate(steps)
     ]  # fmt: skip
     table("held-out RMS [N m, or N on a prismatic joint]", ["step", *joints], rows)
-    next_step("diagnose", typed(experiment))
+    next_step("diagnose", typed(experiment.path))

@@ -135,19 +135,21 @@ class View:
         predicts."""
         if self.inherited is not None:
             return self.inherited
+        return blocks.numbered(self.rows.t, self.rows.piece, memory=self._left[1])
+
+    @cached_property
+    def _left(self) -> tuple[np.ndarray, float]:
+        """What no function of the motion predicts (n, dof), and its memory [s]."""
         rows = self.rows
         left = self.design.residual - np.stack([found.told for found in self.unknown], axis=1)
-        memory = blocks.memory(left, rows.use, rows.piece, self.step)
-        return blocks.numbered(rows.t, rows.piece, memory=memory)
+        return left, blocks.memory(left, rows.use, rows.piece, self.step)
 
     @cached_property
     def spectra(self) -> np.ndarray:
         """(dof, frequencies) of what no function of the motion predicts, as noise that is always
         the same has it."""
-        rows = self.rows
-        left = self.design.residual - np.stack([found.told for found in self.unknown], axis=1)
-        memory = blocks.memory(left, rows.use, rows.piece, self.step)
-        return spectra(left, rows.use, memory, self.step)
+        left, memory = self._left
+        return spectra(left, self.rows.use, memory, self.step)
 
     @cached_property
     def source(self) -> Source:

@@ -107,7 +107,8 @@ def weighed(seen: Seen) -> Weights:
     for _ in range(_PASSES):
         system = np.einsum("jnk,jnl,j->kl", a, a, w**2, optimize=True)
         inverse = inverted(system)
-        x = inverse @ np.einsum("jnk,nj,j->k", a, rows.tau * rows.use, w**2, optimize=True)
+        asked = np.einsum("jnk,nj,j->k", a, rows.tau * rows.use, w**2, optimize=True)
+        x = inverse @ asked
         left = rows.tau - np.einsum("jnk,k->nj", a, x)
         w = 1.0 / np.sqrt((left**2).sum(0) / count + 1e-300)
     number = blocks.numbered(
@@ -118,7 +119,6 @@ def weighed(seen: Seen) -> Weights:
     plausible = _plausible(robot, np.sqrt((weight**2).sum(1) / count[:, None]))
     bounds = np.full((2, len(x)), [[-np.inf], [np.inf]])
     bounds[:, :bodies] = plausible
-    asked = np.einsum("jnk,nj,j->k", a, rows.tau * rows.use, w**2, optimize=True)
     other = np.einsum("jnk,k->nj", a, x - _bounded(system, asked, bounds))
     misfit = np.sqrt((other**2).sum(0) / np.maximum((left**2).sum(0), 1e-300)).max()
     return Weights(x[:bodies], error[:bodies], plausible, float(misfit))
