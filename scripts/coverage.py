@@ -27,14 +27,16 @@ import warnings
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-sys.path.insert(0, str(ROOT))  # the script's own folder stands there already
+sys.path.insert(0, str(ROOT))
 os.environ["PYTHONPATH"] = os.pathsep.join(
-    [str(ROOT), str(ROOT / "scripts"), *filter(None, [os.environ.get("PYTHONPATH")])]
+    [str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])]
 )  # of the processes that --jobs starts
 
 import numpy as np  # noqa: E402
-from blind_benchmark import RATE, SECONDS, experiment_of, source, wilson  # noqa: E402
 
+from scripts.blind_benchmark import source  # noqa: E402
+from scripts.blind_parts.robots import RATE, SECONDS, experiment_of  # noqa: E402
+from scripts.blind_parts.scoring import wilson  # noqa: E402
 from sysid import fit_document, pipeline, whole_files  # noqa: E402
 from sysid.studies.journal import Journal, run  # noqa: E402
 from sysid.terminal import watched  # noqa: E402

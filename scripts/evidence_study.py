@@ -37,8 +37,9 @@ os.environ["PYTHONPATH"] = os.pathsep.join([str(ROOT), *filter(None, [os.environ
 
 import numpy as np  # noqa: E402
 
-from scripts import blind_benchmark as benchmark  # noqa: E402
-from scripts.blind_benchmark import JOINTS, RATE, SECONDS, experiment_of  # noqa: E402
+from scripts.blind_parts import cases  # noqa: E402
+from scripts.blind_parts.robots import JOINTS, RATE, SECONDS, experiment_of  # noqa: E402
+from scripts.blind_parts.trial import simulated  # noqa: E402
 from sysid import fit_document, pipeline, whole_files  # noqa: E402
 from sysid.studies.journal import Journal, run  # noqa: E402
 from sysid.terminal import watched  # noqa: E402
@@ -134,10 +135,10 @@ def drawn(seed: int, number: int, effects: tuple[str, ...]) -> dict:
     effect, place = effects[number % len(effects)], number // len(effects)
     robot = ARMS[(place + number) % len(ARMS)]
     if effect == "control":
-        case = benchmark._control(seed, robot, number, "s")
+        case = cases.control(seed, robot, number, "s")
     else:
         # a stiff joint's elasticity never matters by a tenth: of the sizes the larger half
-        case = benchmark._single(seed, robot, effect, 2 * place + 1 if effect == "elasticity" else place, "s")
+        case = cases.single(seed, robot, effect, 2 * place + 1 if effect == "elasticity" else place, "s")
     return {"robot": robot, "seed": case.seed, "colour": case.colour, "encoder": case.encoder, "pace": case.pace, "hidden": list(case.hidden)}
 
 
@@ -156,13 +157,13 @@ def soft(case: dict, level: float, worth: float) -> dict:
         experiment, machine = experiment_of(case["robot"], folder)
         options = {"seed": case["seed"], "duration": SECONDS[case["robot"]], "rate": RATE[case["robot"]], "colour": case["colour"], "encoder": case["encoder"]}
         options["speed"] = None if case["pace"] is None else case["pace"] * float(motion.top_speeds(machine).max())
-        simulation, softer = benchmark._simulate(machine, case["hidden"], options)
+        simulation, softer = simulated(machine, case["hidden"], options)
         fit = fitted(simulation, "case")
         case = {**case, "softer": softer, "error": fit.rms("test")}
         (hidden,) = case["hidden"] or [None]
         asked = hidden is None or hidden["effect"] not in SOFT
         if not asked:
-            case["plain"] = fitted(benchmark._simulate(machine, [], options)[0], "plain").rms("test")
+            case["plain"] = fitted(simulated(machine, [], options)[0], "plain").rms("test")
             case["matters"] = any(case["plain"][joint] <= _MATTERS * error for joint, error in case["error"].items())
         if asked or case["matters"]:
             found = diagnose(fit.experiment, fit=fit)

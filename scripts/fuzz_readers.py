@@ -12,29 +12,27 @@ from __future__ import annotations
 import argparse
 import bz2
 import gzip
-import io
 import lzma
 import os
 import random
 import resource
 import shutil
 import signal
-import struct
 import subprocess
 import sys
 import tempfile
 import time
 import warnings
-import zipfile
-import zlib
 from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT))
+
+from scripts.fuzz_parts.breaking import broken  # noqa: E402
+
 LONGEST, LARGEST = 20.0, 10**9  # s, bytes
-NUMBERS = (b"1e308", b"-1e308", b"nan", b"inf", b"1e-320", b"9" * 40, b"0", b"-1", b"", b"0x10", b"1,5", b"1e999999999", "٣".encode())
-WORDS = (0, 1, 2, 0x7F, 0x80, 0xFF, 0x7FFF, 0xFFFF, 0x7FFFFFFF, 0xFFFFFFFF, 2**63 - 1, 2**64 - 1, 2**31, 2**40)
 
 
 @dataclass(frozen=True)
@@ -59,9 +57,23 @@ def sound(folder: Path) -> None:
 
     t = np.arange(60) * 0.005
     rng = np.random.default_rng(0)
-    columns = {"t": t} | {f"{s}_{j}": np.sin(3 * t + k) + 1e-3 * rng.normal(size=len(t)) for k, (s, j) in enumerate((s, j) for s in ("q", "tau") for j in conftest.JOINTS)}
-    texts = {"comma.csv": csv(columns), "semicolon.csv": csv(columns, separator=";"), "bare.csv": csv(columns, header=False), "tab.tsv": csv(columns, separator="\t")}
-    texts["aligned.txt"] = "\n".join("  ".join(f"{cell:>24}" for cell in line.split(",")) for line in csv(columns).splitlines()) + "\n"
+    columns = {"t": t} | {
+        f"{s}_{j}": np.sin(3 * t + k) + 1e-3 * rng.normal(size=len(t))
+        for k, (s, j) in enumerate((s, j) for s in ("q", "tau") for j in conftest.JOINTS)
+    }
+    texts = {
+        "comma.csv": csv(columns),
+        "semicolon.csv": csv(columns, separator=";"),
+        "bare.csv": csv(columns, header=False),
+        "tab.tsv": csv(columns, separator="\t"),
+    }
+    texts["aligned.txt"] = (
+        "\n".join(
+            "  ".join(f"{cell:>24}" for cell in line.split(","))
+            for line in csv(columns).splitlines()
+        )
+        + "\n"
+    )
     texts["quoted.csv"] = csv(columns).replace("t,", '"t","a, b",', 1).replace("\n", "\n1,", 1)
     texts |= {"robot.urdf": URDF, "config.yaml": dump(CONFIG)}
     for name, text in texts.items():
@@ -69,12 +81,24 @@ def sound(folder: Path) -> None:
     frame = pl.DataFrame(columns)
     for kind in ("zstd", "snappy", "uncompressed", "gzip"):
         frame.write_parquet(folder / f"{kind}.parquet", compression=kind)
-    pl.DataFrame({"q": pl.Series([[1.0, 2.0]] * 60), "n": pl.Series(range(60), dtype=pl.Int128), "s": ["a"] * 60}).write_parquet(folder / "lists.parquet")
+    pl.DataFrame(
+        {
+            "q": pl.Series([[1.0, 2.0]] * 60),
+            "n": pl.Series(range(60), dtype=pl.Int128),
+            "s": ["a"] * 60,
+        }
+    ).write_parquet(folder / "lists.parquet")
     np.savez(folder / "plain.npz", **columns)
     np.savez_compressed(folder / "packed.npz", **matrices(columns))
     write_mat5(folder / "v5.mat", columns)
-    write_mat5(folder / "bare5.mat", {"log": {"q": [columns["q_elbow"][:3]] * 20, "t": t}}, compressed=False)
-    write_mat73(folder / "v73.mat", {"a": columns["t"], "log": {"q": [columns["q_elbow"][:3]] * 20}})
+    write_mat5(
+        folder / "bare5.mat",
+        {"log": {"q": [columns["q_elbow"][:3]] * 20, "t": t}},
+        compressed=False,
+    )
+    write_mat73(
+        folder / "v73.mat", {"a": columns["t"], "log": {"q": [columns["q_elbow"][:3]] * 20}}
+    )
     log_formats.write_aloha(folder / "aloha.hdf5", columns)
     log_formats.write_droid(folder / "droid.h5", columns)
     log_formats.write_bag1(folder / "ros1.bag", columns)
@@ -83,80 +107,6 @@ def sound(folder: Path) -> None:
     log_formats.write_lerobot(folder / "lerobot", [columns, columns], names=list(conftest.JOINTS))
     for ending, pack in ((".gz", gzip.compress), (".bz2", bz2.compress), (".xz", lzma.compress)):
         (folder / f"packed.csv{ending}").write_bytes(pack(texts["comma.csv"].encode()))
-
-
-# ---- breaking
-
-
-def broken(data: bytes, name: str, rng: random.Random) -> bytes:
-    """The bytes of a file, broken."""
-    if rng.random() < 0.35 and (inside := _inside(data, name, rng)) is not None:
-        return inside
-    out = bytearray(data)
-    for _ in range(rng.choice((1, 1, 1, 2, 3, 8, 40))):
-        out = _once(out, rng)
-    return bytes(out)
-
-
-def _inside(data: bytes, name: str, rng: random.Random) -> bytes | None:
-    """Broken below the packing: the checksum of what is packed is right, what is packed is not."""
-    kinds = {".gz": (gzip.decompress, gzip.compress), ".bz2": (bz2.decompress, bz2.compress), ".xz": (lzma.decompress, lzma.compress)}
-    ending = Path(name).suffix
-    if ending in kinds:
-        unpack, pack = kinds[ending]
-        return pack(broken(unpack(data), Path(name).stem, rng))
-    if ending == ".npz":
-        source, out = zipfile.ZipFile(io.BytesIO(data)), io.BytesIO()
-        with zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED) as target:
-            for entry in source.namelist():
-                inner = source.read(entry)
-                if rng.random() < 0.5:
-                    head, rest = bytearray(inner[:128]), inner[128:]
-                    inner = bytes(_once(head, rng)) + rest if rng.random() < 0.6 else broken(inner, "", rng)
-                target.writestr(entry if rng.random() < 0.95 else "../" + entry, inner)
-        return out.getvalue()
-    if name == "v5.mat":
-        at, out = 128, bytearray(data[:128])
-        while at + 8 <= len(data):
-            kind, size = struct.unpack_from("<II", data, at)
-            body = zlib.compress(bytes(_once(bytearray(zlib.decompress(data[at + 8 : at + 8 + size])), rng)))
-            out += struct.pack("<II", kind, len(body)) + body
-            at += 8 + size
-        return bytes(out)
-    return None
-
-
-def _once(data: bytearray, rng: random.Random) -> bytearray:
-    if not data:
-        return data
-    at, size = rng.randrange(len(data)), rng.choice((1, 1, 2, 4, 8, 16, 200, 5000))
-    part = data[at : at + size]
-    match rng.randrange(9):
-        case 0:
-            data[at] ^= 1 << rng.randrange(8)
-        case 1:
-            data[at : at + size] = rng.randbytes(len(part))
-        case 2:
-            return data[:at]
-        case 3:
-            del data[at : at + size]
-        case 4:
-            other = rng.randrange(len(data))
-            data[other:other] = part * rng.choice((1, 1, 3))
-        case 5:
-            width = rng.choice((2, 4, 8))
-            value = (rng.choice(WORDS) % 256**width).to_bytes(width, rng.choice(("little", "big")))
-            data[at : at + width] = value
-        case 6:
-            data[at : at + size] = bytes(len(part))
-        case 7:  # a number of a text
-            places = [k for k in range(at, min(at + 300, len(data))) if chr(data[k]).isdigit()]
-            start = places[0] if places else at
-            stop = next((k for k in range(start, min(start + 40, len(data))) if chr(data[k]) not in "0123456789.eE+-"), start + 1)
-            data[start:stop] = rng.choice(NUMBERS)
-        case _:
-            data[at:at] = rng.choice((b"\n", b'"', b",", b"\0", b"\r", b"\xff\xfe", b"  ", b"<", b"&a;", b"- ", b"{", b"*a", b"'"))
-    return data
 
 
 # ---- reading
@@ -212,9 +162,16 @@ def tried(path: Path, kind: str) -> Found | None:
             import traceback
 
             where = traceback.extract_tb(error.__traceback__)
-            own = [f"{Path(f.filename).name}:{f.lineno}" for f in where if "sysid" in f.filename][-2:]
+            own = [f"{Path(f.filename).name}:{f.lineno}" for f in where if "sysid" in f.filename][
+                -2:
+            ]
             status = 3
-            os.write(tell, f"{type(error).__name__}: {str(error)[:200]} at {', '.join(own)}".encode(errors="replace"))
+            os.write(
+                tell,
+                f"{type(error).__name__}: {str(error)[:200]} at {', '.join(own)}".encode(
+                    errors="replace"
+                ),
+            )
         os._exit(status)
     os.close(tell)
     until, done = time.monotonic() + LONGEST, 0
@@ -272,22 +229,31 @@ def fuzz(files: int, seed: int, keep: Path, progress=None) -> tuple[Counter, lis
 
 def main() -> None:
     """Parse, fuzz, print."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--files", type=int, default=5000)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--keep", type=Path, default=Path("fuzz"), help="the folder that holds what was found")
+    parser.add_argument(
+        "--keep", type=Path, default=Path("fuzz"), help="the folder that holds what was found"
+    )
     given = parser.parse_args()
-    sys.path.insert(0, str(ROOT))
     begun = time.monotonic()
 
     def progress(number: int, found: list[Found]) -> None:
         if number % 500 == 0:
-            print(f"{number} of {given.files}, {len(found)} found, {time.monotonic() - begun:.0f} s", file=sys.stderr, flush=True)
+            print(
+                f"{number} of {given.files}, {len(found)} found, {time.monotonic() - begun:.0f} s",
+                file=sys.stderr,
+                flush=True,
+            )
 
     count, found = fuzz(given.files, given.seed, given.keep, progress)
     for one in found:
         print(f"{one.kind}: {one.path.name}: {one.said}")
-    print(f"{sum(count.values())} files of {len(count)} kinds, seed {given.seed}: {len(found)} findings, {time.monotonic() - begun:.0f} s")
+    print(
+        f"{sum(count.values())} files of {len(count)} kinds, seed {given.seed}: {len(found)} findings, {time.monotonic() - begun:.0f} s"
+    )
     sys.exit(1 if found else 0)
 
 

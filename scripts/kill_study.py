@@ -28,10 +28,13 @@ import tempfile
 import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT))
+
+from scripts.kill_parts.commands import CLICKS, COMMANDS, Command  # noqa: E402
+
 _PATIENCE = 180.0  # s for one run
 #: keys of the JSON documents that may differ from run to run
 VOLATILE = {"seconds", "run", "made", "of", "seal", "versions", "files"}
@@ -54,55 +57,6 @@ sys.addaudithook(watch)
 if at < 0:
     atexit.register(lambda: (n := count) is None or open(os.environ["KILL_COUNT"], "w").write(str(n)))
 """
-_PLAIN = "from sysid.cli import main; main()"
-_SHORT_SPANS = "from sysid import spans; spans.SPAN = 1100; " + _PLAIN
-# what clicks do: a stretch masked, an effect added, and taken back
-_CLICKS = """
-import sys
-from pathlib import Path
-from tests.test_studio import studio
-page = studio(Path(sys.argv[1]), Path(sys.argv[sys.argv.index("--out") + 1]))
-mask = {"part": "train", "from": 0.5, "to": 0.9, "joint": None}
-bias = {"effect": "torque_bias", "joint": "elbow"}
-for what, body in (("add", {"mask": mask}), ("add", bias), ("undo", {})):
-    said = page.post("/api/" + what, sha=page.sha, **body)
-    if said.status_code != 200:
-        sys.exit(said.text)
-    page.wait()
-"""
-
-
-@dataclass(frozen=True)
-class Command:
-    """Words of the command line, {0} being the trial's folder; `code` runs them. `kept` experiments
-    stay as they are; `logs` is the kind that stands there."""
-
-    words: tuple[str, ...]
-    code: str = _PLAIN
-    kept: bool = True
-    logs: str = "short"
-
-
-COMMANDS = {
-    "fit": Command(("fit", "{0}/arm", "--out", "{0}/run")),
-    "fit_long": Command(("fit", "{0}/arm", "--out", "{0}/run"), _SHORT_SPANS, logs="long"),
-    "add": Command(("add", "{0}/arm", "torque_bias", "--force", "--out", "{0}/run"), kept=False),
-    "discover": Command(("discover", "{0}/arm", "--max-steps", "1", "--out", "{0}/run")),
-    "diagnose": Command(("diagnose", "{0}/arm", "--out", "{0}/run")),
-    "report": Command(("report", "{0}/arm", "--out", "{0}/run")),
-    "bodies": Command(("study", "bodies", "--bodies", "40", "--jobs", "1", "--out", "{0}/run")),
-    "restarts": Command(("study", "restarts", "{0}/arm", "--restarts", "3", "--out", "{0}/run")),
-    "design": Command(
-        ("design", "{0}/arm", "--duration", "4", "--processes", "1", "--out", "{0}/motion")
-    ),
-    "fleet": Command(("fleet", "{0}/arm", "{0}/arm2", "{0}/arm3", "--out", "{0}/fleet")),
-    "init": Command(
-        ("init", "{0}/arm/robot.urdf", "{0}/arm/train.csv", "{0}/arm/test.csv", "--out", "{0}/new")
-    ),
-    "export": Command(("export", "{0}/run", "--to", "mjcf", "--out", "{0}/mjcf"), logs="fitted"),
-    "simulate": Command(("simulate", "{0}/arm", "--duration", "2", "--force", "--out", "{0}/sim")),
-    "studio": Command(("{0}/arm", "--out", "{0}/run"), _CLICKS, kept=False),
-}
 
 
 # ---- one trial
@@ -158,7 +112,7 @@ def started(command: Command, trial: Path, **more: str) -> subprocess.Popen:
         "MPLCONFIGDIR": tempfile.gettempdir(),
     }  # fmt: skip
     words = [word.format(trial) for word in command.words]
-    quiet = [] if command.code == _CLICKS else ["--quiet"]
+    quiet = [] if command.code == CLICKS else ["--quiet"]
     code = (_WATCHED if more else "") + command.code
     return subprocess.Popen(
         [sys.executable, "-c", code, *words, *quiet], cwd=trial, env={**os.environ, **own, **more},
@@ -227,7 +181,7 @@ def after(command: Command, trial: Path, reference: Path) -> Iterator[str]:
     shutil.rmtree(trial / ".old")
     if (
         config.read_bytes() not in ((old,) if command.kept else (old, new))
-        and command.code != _CLICKS
+        and command.code != CLICKS
     ):
         yield "the experiment file is neither the old nor the new"
     if not config.read_text().startswith("# mine\n") or "# to the end" not in config.read_text():
@@ -335,5 +289,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    sys.path.insert(0, str(ROOT))
     main()

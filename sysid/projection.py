@@ -95,23 +95,34 @@ class Projection:
         return c, change, absorbed, gain, visible
 
 
-def inverted(system: np.ndarray) -> np.ndarray:
-    """Inverse of a positive semidefinite matrix on its range."""
+def spectrum(system: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The scale (k,) of each row of a positive semidefinite matrix, whatever its units, and the
+    eigenvalues (k,), ascending, and eigenvectors (k, k) of the matrix without them: its diagonal
+    is one, or zero where nothing stands.
+    """
     diagonal = np.diagonal(system)
     there = diagonal > 1e-100
     scale = np.sqrt(np.where(there, diagonal, 1.0))
-    values, vectors = np.linalg.eigh(
-        np.where(np.outer(there, there), system, 0.0) / np.outer(scale, scale)
-    )
+    kept = np.where(np.outer(there, there), system, 0.0)
+    return scale, *np.linalg.eigh(kept / np.outer(scale, scale))
+
+
+def spanned(system: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The spectrum on the range of the matrix alone: scale (k,), values (r,), vectors (k, r)."""
+    scale, values, vectors = spectrum(system)
     keep = values > max(1e-11 * values[-1], 1e-100)
-    return (vectors[:, keep] / values[keep]) @ vectors[:, keep].T / np.outer(scale, scale)
+    return scale, values[keep], vectors[:, keep]
+
+
+def inverted(system: np.ndarray) -> np.ndarray:
+    """Inverse of a positive semidefinite matrix on its range."""
+    scale, values, vectors = spanned(system)
+    return (vectors / values) @ vectors.T / np.outer(scale, scale)
 
 
 def root(products: np.ndarray) -> np.ndarray:
     """R (k, k) with R R' = a positive semidefinite matrix, whatever the units of its rows."""
-    diagonal = np.diagonal(products)
-    scale = np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
-    values, vectors = np.linalg.eigh(products / np.outer(scale, scale))
+    scale, values, vectors = spectrum(products)
     return scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
 
 

@@ -194,7 +194,7 @@ def planar(tmp_path_factory) -> robot.Robot:
 
 
 def _planar(tmp_path_factory) -> Path:
-    from scripts.blind_benchmark import PLANAR
+    from scripts.blind_parts.robots import PLANAR
 
     file = tmp_path_factory.getbasetemp() / "planar.urdf"
     file.write_text(PLANAR)

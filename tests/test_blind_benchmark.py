@@ -1,28 +1,15 @@
 """The blind benchmark's bookkeeping: what counts as named, its intervals, its cases, and a run that was killed."""
 
-import importlib.util
 import json
 import math
-import sys
 from collections import Counter
 from dataclasses import asdict
-from pathlib import Path
 
 import pytest
 from scipy.stats import binomtest
 
-ROOT = Path(__file__).resolve().parent.parent
-
-
-@pytest.fixture(scope="module")
-def blind():
-    spec = importlib.util.spec_from_file_location("blind_benchmark", ROOT / "scripts" / "blind_benchmark.py")
-    module = sys.modules["blind_benchmark"] = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    yield module
-    for name in [n for n in sys.modules if n.split(".")[0] in ("blind_benchmark", "benchmark_parts")]:
-        del sys.modules[name]
-    sys.path.remove(str(ROOT / "scripts"))
+from scripts import blind_benchmark
+from scripts.blind_parts import cases, hidden, new_laws, old_laws, page, robots, scoring, summary, third_laws, trial
 
 
 def verdict(joint, said=None, tied=(), also=(), left=False):
@@ -65,50 +52,50 @@ CRASH = record(("delay", "knee"), error={"stage": "discover", "message": "LinAlg
         (WRONG, "wrong", "stribeck"), (ELSEWHERE, "missed", "complete"), (UNKNOWN, "unknown", "unknown"), (CRASH, "error", "error"),
     ],
 )  # fmt: skip
-def test_what_became_of_an_effect(blind, made, category, named):
-    (row,) = blind.score(made)
+def test_what_became_of_an_effect(made, category, named):
+    (row,) = scoring.score(made)
     assert (row["category"], row["named"], row["visible"]) == (category, named, True)
     assert row.get("innocent", []) == (["hip"] if made is ELSEWHERE else [])
 
 
-def test_visible_is_a_tenth_of_the_held_out_rms_of_the_joint(blind):
-    seen = lambda **rms: blind.score(record(("stribeck", "knee"), **rms))[0]["visible"]  # noqa: E731
+def test_visible_is_a_tenth_of_the_held_out_rms_of_the_joint():
+    seen = lambda **rms: scoring.score(record(("stribeck", "knee"), **rms))[0]["visible"]  # noqa: E731
     assert seen(before=1.0, true=0.9) and not seen(before=1.0, true=0.91)
     assert not seen(before={"hip": 2.0, "knee": 1.0}, true={"hip": 1.0, "knee": 1.0})
 
 
-def test_within_is_one_sided_and_five_percent(blind):
-    within = lambda after: blind.score(record(("stribeck", "knee"), after=after))[0]["within"]  # noqa: E731
+def test_within_is_one_sided_and_five_percent():
+    within = lambda after: scoring.score(record(("stribeck", "knee"), after=after))[0]["within"]  # noqa: E731
     assert within(0.5) and within(1.05) and not within(1.051)
 
 
-def test_an_effect_of_the_robot_may_be_named_on_any_joint(blind):
+def test_an_effect_of_the_robot_may_be_named_on_any_joint():
     made = record(
         ("gravity_tilt", "*"), hip=verdict("hip", "gravity_tilt"), knee=verdict("knee", "torque_bias"), true={"hip": 1.5, "knee": 1.0},
         findings=[finding("gravity_tilt", "*", 1), finding("torque_bias", "knee", 2)],
     )  # fmt: skip
-    (row,) = blind.score(made)
+    (row,) = scoring.score(made)
     assert (row["category"], row["joint"], row["extra"]) == ("alone", "knee", ["torque_bias"])
     made["verdict"] = [verdict("hip"), verdict("knee", "torque_bias")]
-    assert blind.score(made)[0]["category"] == "wrong"
+    assert scoring.score(made)[0]["category"] == "wrong"
 
 
-def test_two_effects_on_a_joint_each_by_its_own_step(blind):
+def test_two_effects_on_a_joint_each_by_its_own_step():
     both = (("stribeck", "knee"), ("delay", "knee"))
     steps = [finding("delay", "knee", 1, ["current_lag"]), finding("stribeck", "knee", 2)]
     made = record(*both, kind="two", knee=verdict("knee", "delay", ["current_lag"], ["stribeck"]), findings=steps, without=[1.05, 2.0])
-    rows = blind.score(made)
+    rows = scoring.score(made)
     assert [r["category"] for r in rows] == ["alone", "head of family"] and [r["visible"] for r in rows] == [False, True]
     assert rows[0]["extra"] == rows[1]["extra"] == []
     one_wrong = record(*both, kind="two", knee=verdict("knee", "spring", [], ["stribeck"]), findings=[finding("spring", "knee", 1), finding("stribeck", "knee", 2)], without=[2.0, 2.0])
-    assert [r["category"] for r in blind.score(one_wrong)] == ["named among also", "wrong"]
+    assert [r["category"] for r in scoring.score(one_wrong)] == ["named among also", "wrong"]
     only_one = record(*both, kind="two", knee=verdict("knee", "delay", ["current_lag"]), findings=steps[:1], without=[2.0, 2.0])
-    assert [r["category"] for r in blind.score(only_one)] == ["missed", "head of family"]
+    assert [r["category"] for r in scoring.score(only_one)] == ["missed", "head of family"]
 
 
-def test_outside_the_catalogue_unknown_or_explained(blind):
+def test_outside_the_catalogue_unknown_or_explained():
     def became(knee, after, **more):
-        (row,) = blind.score(record(("creep", "knee"), kind="outside", knee=knee, after=after, findings=[finding("presliding", "knee", 1)], **more))
+        (row,) = scoring.score(record(("creep", "knee"), kind="outside", knee=knee, after=after, findings=[finding("presliding", "knee", 1)], **more))
         return row["category"], row["removed"]
 
     # before 2, true 1: a misfit of 3, of which 0.8 is gone at sqrt(1.6)
@@ -118,7 +105,7 @@ def test_outside_the_catalogue_unknown_or_explained(blind):
     assert became(verdict("knee"), 2.0) == ("missed", 0.0)
 
 
-def test_summary_holds_the_bars_of_the_issue(blind):
+def test_summary_holds_the_bars_of_the_issue():
     control = lambda n, **said: record(kind="control", key=f"leg/control/{n}", **said)  # noqa: E731
     records = [
         ALONE, HEAD, FAMILY, ALSO, WRONG, ELSEWHERE, UNKNOWN, CRASH, record(("payload", "*"), knee=verdict("knee", "spring")),
@@ -126,7 +113,7 @@ def test_summary_holds_the_bars_of_the_issue(blind):
         record(("heat", "knee"), kind="outside"), record(("swept_grease", "knee"), kind="outside", knee=verdict("knee", "unknown")),
         control(0), control(1, knee=verdict("knee", "unknown")), control(2, knee=verdict("knee", "spring")),
     ]  # fmt: skip
-    found = blind.summary(records)
+    found = summary.summary(records)
     bars = {bar["name"]: bar for bar in found["bars"]}
     counted = lambda name: (bars[name]["reached"]["count"], bars[name]["reached"]["of"])  # noqa: E731
     assert counted("named") == (2, 8) and counted("alone") == (1, 8) and counted("after discover") == (2, 2)
@@ -138,58 +125,58 @@ def test_summary_holds_the_bars_of_the_issue(blind):
     at = lambda hidden, named: table["counts"][table["hidden"].index(hidden)][table["named"].index(named)]  # noqa: E731
     assert (at("stribeck", "stribeck"), at("delay", "stribeck"), at("delay", "complete"), at("nothing", "spring"), at("nothing", "complete")) == (2, 2, 1, 1, 4)
     settings = {"cases": "full", "seed": 7, "only": [], "limit": 0, "source": "x", "versions": {"python": "3"}}
-    text = blind.page(found, records, settings, "## Causes\n\nBy hand.")
+    text = page.page(found, records, settings, "## Causes\n\nBy hand.")
     assert "--seed 7" in text and text.endswith("By hand.\n") and "LinAlgError" in text and "**no**" in text
-    json.dumps(blind._plain(found), allow_nan=False)
+    json.dumps(blind_benchmark._plain(found), allow_nan=False)
 
 
 @pytest.mark.parametrize("successes, count", [(8, 10), (0, 7), (7, 7), (284, 300)])
-def test_wilson_interval(blind, successes, count):
+def test_wilson_interval(successes, count):
     known = binomtest(successes, count).proportion_ci(method="wilson")
-    assert blind.wilson(successes, count) == pytest.approx((known.low, known.high), abs=1e-12)
-    assert blind.wilson(8, 10) == pytest.approx((0.4902, 0.9433), abs=1e-4)
-    assert blind.wilson(0, 0) == (0.0, 1.0)
+    assert scoring.wilson(successes, count) == pytest.approx((known.low, known.high), abs=1e-12)
+    assert scoring.wilson(8, 10) == pytest.approx((0.4902, 0.9433), abs=1e-4)
+    assert scoring.wilson(0, 0) == (0.0, 1.0)
 
 
-def test_cases_are_as_promised(blind):
-    full = blind.cases(5)
-    assert full == blind.cases(5) and len({c.key for c in full}) == len({c.seed for c in full}) == len(full)
-    other = blind.cases(6)
+def test_cases_are_as_promised():
+    full = cases.cases(5)
+    assert full == cases.cases(5) and len({c.key for c in full}) == len({c.seed for c in full}) == len(full)
+    other = cases.cases(6)
     assert {c.key for c in other} == {c.key for c in full} and not {c.seed for c in other} & {c.seed for c in full}
-    kinds, robots = Counter(c.kind for c in full), Counter(c.robot for c in full)
+    kinds, own = Counter(c.kind for c in full), Counter(c.robot for c in full)
     assert len(full) >= 300 and len(full) - kinds["control"] >= 200 and kinds["control"] >= 100 and kinds["two"] >= 30 and kinds["outside"] >= 40
-    assert len(robots) == 4 and min(robots.values()) >= 20
+    assert len(own) == 4 and min(own.values()) >= 20
     effects = Counter(h["effect"] for c in full if c.kind == "one" for h in c.hidden)
     from sysid.vocabulary import vocabulary
 
-    assert set(effects) == set(vocabulary()) - set(blind.BASELINE) and min(effects[e] for e in blind.EFFECTS) >= 6
+    assert set(effects) == set(vocabulary()) - set(hidden.BASELINE) and min(effects[e] for e in hidden.EFFECTS) >= 6
     assert len({c.hidden[0]["effect"] for c in full if c.kind == "outside"}) >= 6
     for case in full:
         sizes = [h["size"] for h in case.hidden]
-        assert all(blind.SIZES[0] <= size <= blind.SIZES[1] for size in sizes)
-        assert all(h["joint"] in (*blind.JOINTS[case.robot], "*") for h in case.hidden) and not (case.kind == "control" and case.hidden)
+        assert all(hidden.SIZES[0] <= size <= hidden.SIZES[1] for size in sizes)
+        assert all(h["joint"] in (*robots.JOINTS[case.robot], "*") for h in case.hidden) and not (case.kind == "control" and case.hidden)
     stribeck = [c.hidden[0]["size"] for c in full if c.kind == "one" and c.hidden[0]["effect"] == "stribeck"]
     assert min(stribeck) < 0.95 < max(stribeck)
-    small = blind.cases(5, "small")
+    small = cases.cases(5, "small")
     assert set(c.key for c in small) < set(c.key for c in full) and all(c in full for c in small) and 30 <= len(small) <= 65
 
 
-def test_cases_of_old_keys_are_what_they_were(blind):
+def test_cases_of_old_keys_are_what_they_were():
     """More laws came later; the published cases are the same."""
-    full = {c.key: c for c in blind.cases(5)}
+    full = {c.key: c for c in cases.cases(5)}
     seeds = {"planar/stribeck/0": 822517970, "leg/hum/1": 35762149, "ur5/two/24": 354153470}
     assert {key: full[key].seed for key in seeds} == seeds
     assert full["leg/hum/1"].hidden == ({"effect": "hum", "joint": "knee", "size": 1.1457, "other": "hip"},)
     drawn = Counter(c.hidden[0]["effect"] for c in full.values() if c.kind == "outside")
-    sets = (blind.OLD, blind.NEW, blind.THIRD)
+    sets = (old_laws.OLD, new_laws.NEW, third_laws.THIRD)
     assert set(drawn) == set().union(*sets) and [len(own) for own in sets] == [8, 8, 8] and len(drawn) == 24 and set(drawn.values()) == {5}
 
 
 @pytest.mark.parametrize("law", ["seal_carried_along", "heat", "ageing_contact", "loose_load", "bumper", "gas_strut"])
-def test_new_laws_in_closed_form(blind, law):
+def test_new_laws_in_closed_form(law):
     """At constant speeds, or at rest, each is what its equation says."""
     scales = {"torque": 5.0, "inertia": 2.0, "speed": 1.5, "coulomb": 0.4, "low": -1.0, "high": 1.0}
-    own, memory = blind.NEW[law][1](1.0, 0, 1, scales), {}
+    own, memory = new_laws.NEW[law][1](1.0, 0, 1, scales), {}
 
     def after(seconds, q, qd):
         for k in range(round(1e3 * seconds)):
@@ -214,10 +201,10 @@ def test_new_laws_in_closed_form(blind, law):
 
 
 @pytest.mark.parametrize("law", ["clutched_spring", "one_way_pawl", "shared_pump", "stroke_cushion", "swept_grease", "current_foldback", "reflex_twitch", "rolling_ballast"])
-def test_third_laws_in_closed_form(blind, law):
+def test_third_laws_in_closed_form(law):
     """At constant speeds, or at rest, each is what its equation says."""
     scales = {"torque": 5.0, "inertia": 2.0, "speed": 1.5, "coulomb": 0.4, "low": -1.0, "high": 1.0}
-    own, memory, clock = blind.THIRD[law][1](1.0, 0, 1, scales), {}, [0.0]
+    own, memory, clock = third_laws.THIRD[law][1](1.0, 0, 1, scales), {}, [0.0]
 
     def after(seconds, q, qd, load=(0.0, 0.0)):
         for _ in range(round(1e3 * seconds)):
@@ -252,14 +239,14 @@ def test_third_laws_in_closed_form(blind, law):
         assert after(0.3, [0.2, 0.6], [0, 0]) == pytest.approx(math.cos(0.5)) and after(0.1, [0.2, 0.1], [0, 0]) == pytest.approx(1.0)
 
 
-def test_keys_are_matched_by_their_parts(blind):
-    match = lambda wanted: blind.matches("leg/stribeck/2", wanted)  # noqa: E731
+def test_keys_are_matched_by_their_parts():
+    match = lambda wanted: cases.matches("leg/stribeck/2", wanted)  # noqa: E731
     assert all(map(match, ("leg", "stribeck", "leg/stribeck", "leg/stribeck/2", "/stribeck", "leg//2")))
     assert not any(map(match, ("ur5", "delay", "leg/stribeck/1", "stri")))
 
 
-def test_a_killed_run_ends_in_the_same_journal(blind, tmp_path, monkeypatch):
-    keys = [c.key for c in blind.cases(3) if all(h["joint"] != "*" for h in c.hidden)][:4]
+def test_a_killed_run_ends_in_the_same_journal(tmp_path, monkeypatch):
+    keys = [c.key for c in cases.cases(3) if all(h["joint"] != "*" for h in c.hidden)][:4]
     calls = []
 
     def fake(case, keep=None, killed=None):
@@ -267,16 +254,16 @@ def test_a_killed_run_ends_in_the_same_journal(blind, tmp_path, monkeypatch):
         if killed is not None and len(calls) > killed:
             raise KeyboardInterrupt
         made = record(*[(h["effect"], h["joint"]) for h in case["hidden"]], kind=case["kind"], key=case["key"])
-        for joint in blind.JOINTS[case["robot"]]:
+        for joint in robots.JOINTS[case["robot"]]:
             for rms in made["rms"].values():
                 rms[joint] = case["seed"] / 3.0
             made["noise"][joint] = 1.0
-        made["verdict"] = [verdict(joint) for joint in blind.JOINTS[case["robot"]]]
+        made["verdict"] = [verdict(joint) for joint in robots.JOINTS[case["robot"]]]
         return made | {"robot": case["robot"]}
 
     def ran(folder, killed=None):
-        monkeypatch.setattr(blind, "one", lambda case: fake(case, killed=killed))
-        blind.main(["--seed", "3", "--out", str(folder), *[word for key in keys for word in ("--only", key)]])
+        monkeypatch.setattr(blind_benchmark, "one", lambda case: fake(case, killed=killed))
+        blind_benchmark.main(["--seed", "3", "--out", str(folder), *[word for key in keys for word in ("--only", key)]])
         (journal,) = folder.glob("journal-3-*.jsonl")
         return journal
 
@@ -295,12 +282,12 @@ def test_a_killed_run_ends_in_the_same_journal(blind, tmp_path, monkeypatch):
         assert (tmp_path / "killed" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
 
 
-def test_one_case_from_end_to_end(blind, monkeypatch):
-    monkeypatch.setitem(blind.SECONDS, "planar", 4.0)
-    case = asdict(next(c for c in blind.cases(1) if blind.matches(c.key, "planar/torque_bias"))) | {"hidden": [{"effect": "torque_bias", "joint": "elbow", "size": 3.0}]}
-    found = blind.one(case)
+def test_one_case_from_end_to_end(monkeypatch):
+    monkeypatch.setitem(robots.SECONDS, "planar", 4.0)
+    case = asdict(next(c for c in cases.cases(1) if cases.matches(c.key, "planar/torque_bias"))) | {"hidden": [{"effect": "torque_bias", "joint": "elbow", "size": 3.0}]}
+    found = trial.one(case)
     assert found["error"] is None, found["error"]
-    (row,) = blind.score(json.loads(json.dumps(found)))
-    assert set(found["rms"]) == {"before", "after", "true", "plain"} and set(found["floors"]) == set(blind.JOINTS["planar"]) and row["visible"]
-    strange = blind.one(case | {"hidden": [{"effect": "torque_bias", "joint": "nose", "size": 1.0}]})
+    (row,) = scoring.score(json.loads(json.dumps(found)))
+    assert set(found["rms"]) == {"before", "after", "true", "plain"} and set(found["floors"]) == set(robots.JOINTS["planar"]) and row["visible"]
+    strange = trial.one(case | {"hidden": [{"effect": "torque_bias", "joint": "nose", "size": 1.0}]})
     assert strange["error"]["stage"] == "simulate" and "nose" in strange["error"]["message"]

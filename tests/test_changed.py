@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from scripts.blind_benchmark import PLANAR
+from scripts.blind_parts.robots import PLANAR
 from sysid import pipeline, regressor, results
 from sysid.changes import changed, many
 from sysid.errors import ConfigError, LogError, SysidError

@@ -6,8 +6,8 @@ import shutil
 import numpy as np
 import pytest
 
-from scripts import check_study
-from scripts.blind_benchmark import experiment_of
+from scripts.blind_parts.robots import experiment_of
+from scripts.check_parts import faults
 from sysid import check, pipeline
 from sysid.check import FAULTS
 from sysid.check.equations import Reading
@@ -38,17 +38,17 @@ def made(tmp_path_factory):
 def planted(fault: str, folder, tmp_path, seed: int):
     """A copy of a folder with a fault in it, and the joints on which it may be named."""
     logs = shutil.copytree(folder, tmp_path / "logs")
-    spoiled = check_study.Planted(logs, ("shoulder", "elbow"), np.random.default_rng(seed))
+    spoiled = faults.Planted(logs, ("shoulder", "elbow"), np.random.default_rng(seed))
     spoiled.step = 1.0 / RATE
-    getattr(check_study, fault)(spoiled)
+    getattr(faults, fault)(spoiled)
     spoiled.save()
     return logs, {spoiled.joint} if isinstance(spoiled.joint, str) else set(spoiled.joint)
 
 
 @pytest.mark.parametrize("fault", FAULTS)
 def test_every_fault_is_found_where_it_is(fault, made, tmp_path):
-    if fault in check_study.MADE:
-        logs, joints = made(**check_study.MADE[fault]), {"shoulder", "elbow", ""}
+    if fault in faults.MADE:
+        logs, joints = made(**faults.MADE[fault]), {"shoulder", "elbow", ""}
     else:
         logs, joints = planted(fault, made(), tmp_path, seed=3)
     found = check.check(pipeline.load(logs))
@@ -72,8 +72,8 @@ def test_a_wrong_unit_is_said_once_and_nothing_that_follows_from_it(what, made, 
         integers = staticmethod(lambda *_: 0)
 
     logs = shutil.copytree(made(), tmp_path / "logs")
-    spoiled = check_study.Planted(logs, ("shoulder", "elbow"), Drawn())
-    check_study.wrong_unit(spoiled)
+    spoiled = faults.Planted(logs, ("shoulder", "elbow"), Drawn())
+    faults.wrong_unit(spoiled)
     spoiled.save()
     found = check.check(pipeline.load(logs))
     assert {f.fault for f in found if f.severity == "error"} == {"wrong_unit"}
@@ -84,7 +84,7 @@ def test_another_reading_is_scored_as_the_log_that_it_makes(made, tmp_path):
     """Exchanged columns read exchanged leave what the right ones leave."""
     right = looked(pipeline.load(made())).equations
     logs = shutil.copytree(made(), tmp_path / "logs")
-    spoiled = check_study.Planted(logs, ("shoulder", "elbow"), np.random.default_rng(0))
+    spoiled = faults.Planted(logs, ("shoulder", "elbow"), np.random.default_rng(0))
     names = {"tau_shoulder": "tau_elbow", "tau_elbow": "tau_shoulder", "q_elbow": "q_elbow"}
     spoiled.tables = {file: table.rename(names).select(table.columns) for file, table in spoiled.tables.items()}
     spoiled.save()

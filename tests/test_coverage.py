@@ -1,37 +1,20 @@
 """What scripts/coverage.py counts, and that friction is where the fit says it is."""
 
-import importlib.util
 import json
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.stats import chi2
 
+from scripts import coverage
 from sysid import pipeline
-
-ROOT = Path(__file__).resolve().parent.parent
-
-
-@pytest.fixture(scope="module")
-def coverage():
-    loaded = []
-    for name in ("blind_benchmark", "coverage_script"):  # not `coverage`, which is a package
-        spec = importlib.util.spec_from_file_location(name, ROOT / "scripts" / f"{name.removesuffix('_script')}.py")
-        module = sys.modules[name] = importlib.util.module_from_spec(spec)
-        loaded.append(name)
-        spec.loader.exec_module(module)
-    yield module
-    for name in loaded:
-        del sys.modules[name]
 
 
 def record(robot: str, **z) -> dict:
     return {"robot": robot, "rows": [{"kind": kind, "name": kind, "z": value} for kind, values in z.items() for value in values]}
 
 
-def test_shares_are_counted_by_robot_and_kind(coverage):
+def test_shares_are_counted_by_robot_and_kind():
     records = [record("leg", viscous=[0.1, -1.9], coulomb=[2.1]), record("leg", viscous=[-3.0], coulomb=[0.0], combination=[1.0]), record("ur5", inertial=[5.0])]
     found = {(e["robot"], e["kind"]): e for e in coverage.summary(records)}
     assert found["leg", "viscous"]["within"] == 2 / 3 and found["leg", "friction"]["within"] == 3 / 5 and found["leg", "friction"]["count"] == 5
@@ -44,7 +27,7 @@ def test_shares_are_counted_by_robot_and_kind(coverage):
     assert "outside 92 to 98 %" in coverage.table(list(found.values()))
 
 
-def test_friction_is_within_what_is_stated_and_is_not_with_every_row(coverage, tmp_path, monkeypatch):
+def test_friction_is_within_what_is_stated_and_is_not_with_every_row(tmp_path, monkeypatch):
     """A leg with nothing hidden: the filter's smear at reversals put friction many deviations away."""
     monkeypatch.setitem(coverage.SECONDS, "leg", 10.0)
     place = tmp_path / "leg"

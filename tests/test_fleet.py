@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import sysid
-from scripts.blind_benchmark import PLANAR
+from scripts.blind_parts.robots import PLANAR
 from sysid import config, fleet, regressor
 from sysid.errors import SysidError
 from sysid.fleet import calibration, listing

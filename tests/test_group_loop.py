@@ -6,7 +6,7 @@ import polars as pl
 import pytest
 
 import sysid
-from scripts.blind_benchmark import PLANAR
+from scripts.blind_parts.robots import PLANAR
 from sysid import config
 from sysid.differences import parameters_per_group
 from sysid.report.parameters import parameters

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import sysid
-from scripts.blind_benchmark import PLANAR
+from scripts.blind_parts.robots import PLANAR
 from sysid import config, pipeline, regressor, results
 from sysid.errors import SysidError
 from sysid.inertia.consistency import is_consistent

@@ -66,9 +66,10 @@ def test_no_module_is_a_drawer():
 
 def test_a_module_can_be_read():
     """No module over 300 lines, where a line of more than 100 columns counts as the lines that it would fill."""
-    lines = {path: path.read_text().splitlines() for path in (ROOT / "sysid").rglob("*.py")}
+    places = [path for room in ("sysid", "scripts") for path in (ROOT / room).rglob("*.py")]
+    lines = {path: path.read_text().splitlines() for path in places}
     sizes = {str(path.relative_to(ROOT)): sum(max(1, -(-len(line) // 100)) for line in own) for path, own in lines.items()}
-    assert len(sizes) > 300 and not {name: size for name, size in sizes.items() if size > 300}
+    assert len(sizes) > 350 and not {name: size for name, size in sizes.items() if size > 300}
 
 
 def test_the_diagnosis_can_be_read():

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from scripts import blind_benchmark
+from scripts.blind_parts import cases, robots
 from sysid import pipeline
 from sysid.blocks import Belief
 from sysid.candidates import candidates
@@ -180,8 +180,8 @@ def test_what_only_the_weights_of_the_joints_leave_is_said_to_be_theirs(weighed,
 
 def test_the_weights_do_what_the_verdict_says_of_them(tmp_path):
     """An elbow six times as quiet as the shoulder, in slow noise: what is said of its error holds when it is done."""
-    experiment, machine = blind_benchmark.experiment_of("planar", tmp_path)
-    case = next(c for c in blind_benchmark.cases(53912, "full", "clean") if c.key == "planar/control/12")
+    experiment, machine = robots.experiment_of("planar", tmp_path)
+    case = next(c for c in cases.cases(53912, "full", "clean") if c.key == "planar/control/12")
     options = {"seed": case.seed, "duration": 20.0, "rate": 500.0, "colour": case.colour, "encoder": case.encoder}
     write(simulate(machine, **options), experiment, tmp_path / "logs")
     experiment = pipeline.load(tmp_path / "logs")

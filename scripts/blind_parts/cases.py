@@ -66,14 +66,14 @@ def _clean(seed: int) -> tuple[list[Case], list[Case]]:
     one, few = [], []
     for n, effect in enumerate(EFFECTS):
         own = [
-            _single(seed, robot if isinstance(robot, str) else robot[n % 2], effect, number)
+            single(seed, robot if isinstance(robot, str) else robot[n % 2], effect, number)
             for number, robot in enumerate(SINGLES)
         ]
         one += own
         few.append(own[n % len(own)])
     for effect in ABSORBED:
         own = [
-            _single(seed, robot, effect, number) for number, robot in enumerate(("planar", "leg"))
+            single(seed, robot, effect, number) for number, robot in enumerate(("planar", "leg"))
         ]
         one += own
         few.append(own[0])
@@ -81,11 +81,11 @@ def _clean(seed: int) -> tuple[list[Case], list[Case]]:
         own = []
         for number, robot in enumerate(_OUTSIDE):
             own.append(
-                _outside(seed, robot if isinstance(robot, str) else robot[n % 2], kind, number)
+                outside(seed, robot if isinstance(robot, str) else robot[n % 2], kind, number)
             )
         one += own
         few.append(own[n % len(own)])
-    for counts, make, most in ((_PAIRS, _pair, 4), (_CONTROLS, _control, 8)):
+    for counts, make, most in ((_PAIRS, pair, 4), (_CONTROLS, control, 8)):
         robots = [robot for robot, count in counts.items() for _ in range(count)]
         own = [make(seed, robot, number) for number, robot in enumerate(robots)]
         one += own
@@ -97,18 +97,18 @@ def _bothered(seed: int) -> tuple[list[Case], list[Case]]:
     """About 200 cases of all kinds whose logs have nuisances."""
     mark = conditions.MARKS["nuisances"]
     own = [
-        _single(seed, robot if isinstance(robot, str) else robot[n % 2], effect, number, mark)
+        single(seed, robot if isinstance(robot, str) else robot[n % 2], effect, number, mark)
         for n, effect in enumerate(EFFECTS)
         for number, robot in enumerate(("planar", "leg", ("planar", "leg"), ("ur5", "panda")))
     ]
     for n, law in enumerate(OUTSIDE):
         own += [
-            _outside(seed, robot, law, number, mark)
+            outside(seed, robot, law, number, mark)
             for number, robot in enumerate(("planar", ("leg", "ur5", "leg", "panda")[n % 4]))
         ]
     for counts, make in (
-        ({"planar": 10, "leg": 8, "ur5": 4, "panda": 2}, _pair),
-        ({"planar": 20, "leg": 18, "ur5": 7, "panda": 5}, _control),
+        ({"planar": 10, "leg": 8, "ur5": 4, "panda": 2}, pair),
+        ({"planar": 20, "leg": 18, "ur5": 7, "panda": 5}, control),
     ):
         robots = [robot for robot, count in counts.items() for _ in range(count)]
         own += [make(seed, robot, number, mark) for number, robot in enumerate(robots)]
@@ -129,7 +129,7 @@ def _sines(seed: int) -> tuple[list[Case], list[Case]]:
     places = [(effect, robot) for robot in ("planar", "leg") for effect in EFFECTS]
     places += [(effect, ("ur5", "panda")[n % 2]) for n, effect in enumerate(EFFECTS[::2])]
     # an odd number: the larger half of the sizes
-    own = [_single(seed, robot, effect, 1, conditions.MARKS["sines"]) for effect, robot in places]
+    own = [single(seed, robot, effect, 1, conditions.MARKS["sines"]) for effect, robot in places]
     own = [replace(case, nuisances={"motion": "sines"}) for case in own]
     return own, own[::4]
 
@@ -159,7 +159,7 @@ def _joint(rng, robot: str, effect: str) -> str:
     return "*" if effect in ROBOT_WIDE else joint
 
 
-def _single(seed: int, robot: str, effect: str, number: int, mark: str = "") -> Case:
+def single(seed: int, robot: str, effect: str, number: int, mark: str = "") -> Case:
     key = f"{robot}/{effect}/{mark}{number}"
     rng = _rng(seed, key)
     return Case(
@@ -177,7 +177,7 @@ def _single(seed: int, robot: str, effect: str, number: int, mark: str = "") -> 
     )
 
 
-def _outside(seed: int, robot: str, kind: str, number: int, mark: str = "") -> Case:
+def outside(seed: int, robot: str, kind: str, number: int, mark: str = "") -> Case:
     key = f"{robot}/{kind}/{mark}{number}"
     rng = _rng(seed, key)
     joint = _joint(rng, robot, kind)
@@ -194,7 +194,7 @@ def _outside(seed: int, robot: str, kind: str, number: int, mark: str = "") -> C
     )
 
 
-def _pair(seed: int, robot: str, number: int, mark: str = "") -> Case:
+def pair(seed: int, robot: str, number: int, mark: str = "") -> Case:
     key = f"{robot}/two/{mark}{number}"
     rng = _rng(seed, key)
     together = number % 2 == 0  # on one joint
@@ -214,7 +214,7 @@ def _pair(seed: int, robot: str, number: int, mark: str = "") -> Case:
     return Case(key, robot, "two", tuple(hidden), **_simulated(rng))
 
 
-def _control(seed: int, robot: str, number: int, mark: str = "") -> Case:
+def control(seed: int, robot: str, number: int, mark: str = "") -> Case:
     key = f"{robot}/control/{mark}{number}"
     rng = _rng(seed, key)
     bits = (

@@ -109,8 +109,8 @@ def _one(case: Case, folder: Path, found: dict, stage: list[str]) -> None:
     options |= case.nuisances or {}
     plain = None
     if case.kind in ("one", "outside"):  # the same logs without it
-        plain = timed("simulate", lambda: _simulate(machine, [], options)[0])
-    simulation, softer = timed("simulate", lambda: _simulate(machine, case.hidden, options, plain))
+        plain = timed("simulate", lambda: simulated(machine, [], options)[0])
+    simulation, softer = timed("simulate", lambda: simulated(machine, case.hidden, options, plain))
     for entry, told in zip(found["hidden"], simulation.truth["hidden"]):
         entry["size"] = round(entry["size"] * softer, 4)
         entry["values"] = told.get("values", {})
@@ -171,7 +171,7 @@ def _one(case: Case, folder: Path, found: dict, stage: list[str]) -> None:
     found["last"] = [{"joint": v.joint, "status": v.status} for v in discovery.diagnosis.verdict]
 
 
-def _simulate(machine, hidden, options: dict, plain=None):
+def simulated(machine, hidden, options: dict, plain=None):
     """The simulation, and what its sizes had to be multiplied by until the robot followed its reference."""
     from sysid.simulate import Hidden, simulate
 

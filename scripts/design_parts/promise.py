@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from scipy.stats import chi2
 
-from scripts.blind_benchmark import experiment_of
+from scripts.blind_parts.robots import experiment_of
 from scripts.design_parts.robots import FIRST, RATE, experiment_with
 
 ROBOTS = ("planar", "leg", "ur5")

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from scripts.blind_benchmark import JOINTS, ROOT, experiment_of
+from scripts.blind_parts.robots import JOINTS, ROOT, experiment_of
 from sysid import pipeline
 from sysid.design import designed, search
 from sysid.design.basis import basis

@@ -6,7 +6,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from scripts import benchmark
+from scripts.scale_parts.processes import run
 from scripts.scale_parts.workers import experiment
 
 COMMANDS = ("fit", "compare", "diagnose", "check")
@@ -25,7 +25,7 @@ def measured(lengths: tuple[int, int], commands: tuple[str, ...] = COMMANDS) -> 
             for word in commands:
                 given = [str(path), *([str(less)] if word == "compare" else [])]
                 how = ["--quiet", "--out", str(folder / "run")]
-                spent = benchmark.run([sys.executable, "-m", "sysid", word, *given, *how])
+                spent = run([sys.executable, "-m", "sysid", word, *given, *how])
                 found[word].append({"megabytes": 1e-6 * spent[1], "seconds": spent[2]})
     return {"samples": lengths, "commands": found}
 

@@ -20,7 +20,7 @@ from pathlib import Path
 
 import numpy as np
 
-from scripts import benchmark
+from scripts.scale_parts.processes import run
 from scripts.scale_parts.workers import experiment
 from sysid import pipeline
 from sysid.fleet.analysis import analysed
@@ -38,7 +38,7 @@ def measured(lengths: tuple[int, int] = (300_000, 900_000), robots: int = 1000) 
             folder.mkdir()
             experiment(folder, 1, samples)
             command = [sys.executable, "-m", "scripts.scale_parts.robots", str(folder)]
-            spent = benchmark.run(command)
+            spent = run(command)
             found.append(json.loads((folder / "found.json").read_text()) | {"bytes": spent[1]})
         kind, one = pickle.loads((folder / "robot.pickle").read_bytes())
     members = [_another(one, k) for k in range(robots)]

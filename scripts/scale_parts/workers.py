@@ -16,7 +16,8 @@ from pathlib import Path
 import numpy as np
 import psutil
 
-from scripts import benchmark
+from scripts.scale_parts.arm import PANDA, write_arm_log
+from scripts.scale_parts.processes import environment
 
 BUSY = 4.0  # s: no worker that works was less long at it
 
@@ -26,11 +27,11 @@ def experiment(folder: Path, files: int, samples: int) -> Path:
     joints = ", ".join(f"panda_joint{k}" for k in range(1, 8))
     names = [f"{k:03}.parquet" for k in range(files)]
     for k, name in enumerate(names):
-        benchmark.write_arm_log(folder / name, samples, k)
-    benchmark.write_arm_log(folder / "test.parquet", 20_000, files)
+        write_arm_log(folder / name, samples, k)
+    write_arm_log(folder / "test.parquet", 20_000, files)
     path = folder / "config.yaml"
     path.write_text(
-        f"robot: {{urdf: '{benchmark.PANDA}', joints: [{joints}]}}\n"
+        f"robot: {{urdf: '{PANDA}', joints: [{joints}]}}\n"
         f"data: {{train: [{', '.join(names)}], test: [test.parquet], "
         "columns: {time: t, position: 'q_{joint}', torque: 'tau_{joint}'}}\n"
         "model: {effects: [viscous, coulomb]}\n"
@@ -50,7 +51,7 @@ def fitted(config: Path, run: Path, workers: int, kill: float | None = None) -> 
     command = [sys.executable, "-m", "sysid", "fit", str(config), "--quiet", "--out", str(run)]
     begun = time.perf_counter()
     process = subprocess.Popen(
-        [*command, "--workers", str(workers)], env=benchmark.environment(), stderr=subprocess.PIPE
+        [*command, "--workers", str(workers)], env=environment(), stderr=subprocess.PIPE
     )
     main, spent = psutil.Process(process.pid), {}
     while process.poll() is None:

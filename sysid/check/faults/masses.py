@@ -9,7 +9,7 @@ import numpy as np
 
 from ... import blocks
 from ...listed_effects import build
-from ...projection import inverted
+from ...projection import inverted, spanned
 from ...robot import Robot
 from ...rows import stack
 from ..fault import WARNING, Fault
@@ -145,9 +145,7 @@ def _bounded(system, asked, bounds) -> np.ndarray:
     """Least squares within bounds (2, k), from products (k, k) and (k,)."""
     from scipy.optimize import lsq_linear
 
-    size = np.sqrt(np.maximum(np.diag(system), 1e-300))
-    values, vectors = np.linalg.eigh(system / np.outer(size, size))
-    keep = values > 1e-11 * values[-1]
-    a = np.sqrt(values[keep])[:, None] * vectors[:, keep].T
-    b = vectors[:, keep].T @ (asked / size) / np.sqrt(values[keep])
+    size, values, vectors = spanned(system)
+    a = np.sqrt(values)[:, None] * vectors.T
+    b = vectors.T @ (asked / size) / np.sqrt(values)
     return lsq_linear(a, b, bounds * size, method="bvls").x / size

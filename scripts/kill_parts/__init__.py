@@ -1,0 +1,1 @@
+"""Parts of scripts/kill_study.py."""
