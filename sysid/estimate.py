@@ -96,6 +96,14 @@ class Fit(WithTorque):
         """Joint names."""
         return self.model.robot.joints
 
+    def parameters_of(self, effect: str, joint: int) -> dict[str, tuple[float, float, str]]:
+        """{name: (value, std or NaN, unit)} of an effect's parameters on a joint's number, -1 where its scope is the robot."""
+        own, model = (effect, joint), self.model
+        linear = zip(model.coefficients, self.coefficients, self.uncertainty.std[10 * model.bodies :])
+        out = {c.name: (float(at), float(std), c.unit) for c, at, std in linear if (c.effect, c.joint) == own}
+        shaped = zip(model.shape_values, model.shapes, self.shape_std)
+        return out | {v.name: (float(at), float(std), v.unit) for v, at, std in shaped if (model.terms[v.term][0].name, v.joint) == own}
+
     def difference(self, parameter: str, a: str, b: str) -> tuple[float, float]:
         """Value of a parameter that is per group of logs at level b less that at level a, and its standard deviation.
 

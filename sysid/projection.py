@@ -148,5 +148,5 @@ def directions(plain, whole, squares, rough):
         turn = turn @ vectors[:, good(values)]
         if not turn.shape[1]:
             return None
-    turned = np.einsum("ki,bkl,lj->bij", turn, squares, turn, optimize=True)
+    turned = turn.T @ squares @ turn
     return turn, turned, np.sqrt(np.clip(np.diagonal(whole), 0.0, None))

@@ -1,6 +1,11 @@
-"""Why error that stands above a noise floor is left without a name, in words."""
+"""Why error that stands above a noise floor is left without a name, and a name without a size, in
+words."""
 
 from __future__ import annotations
+
+import numpy as np
+
+_CLEAR = 2.0  # standard deviations
 
 
 def unexplained(error: float, floor, looks: str, weighed: float | None, carries: bool) -> str:
@@ -38,4 +43,25 @@ def unexplained(error: float, floor, looks: str, weighed: float | None, carries:
     return (
         f"its error is {times:.2g} times the noise floor, and nothing in the motion of these logs "
         "predicts the rest"
+    )
+
+
+def nought(numbers: dict[str, tuple[float, float, str]]) -> bool:
+    """Whether all of an effect's parameters {name: (value, std, unit)} that are determined are
+    nothing beside their standard deviations, or none is determined."""
+    return all(abs(at) <= _CLEAR * std for at, std, _ in numbers.values() if np.isfinite(std))
+
+
+def hidden_by_weights(effect: str, joint: str, numbers, weights) -> str | None:
+    """What to know where a fit in which all joints count alike (`weights` None) does not tell the
+    size of an effect that is there.
+
+    Args:
+        numbers: its parameters, as of `nought`.
+    """
+    if weights is not None or not nought(numbers):
+        return None
+    return (
+        f"{effect} on {joint} is there, but this fit tells its size badly: joints with more noise "
+        "count as much as quiet ones; solver.weighting: noise tells it better"
     )

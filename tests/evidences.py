@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from sysid.diagnose.projected import _made
+from sysid.diagnose.projected import made
 from sysid.view import Design, by_block, summed
 from sysid.view.stationary import spectra
 
@@ -44,4 +44,4 @@ def stacked(p, own, joints=(0, 1), keep=None):
 def grouped(view, sets, joints=(0, 1), blows=False):
     """The groups of sets of columns (sets, joints, n, k)."""
     candidate = SimpleNamespace(name="made", joint=-1 if len(joints) > 1 else joints[0], blows=blows)
-    return _made(view, [(candidate, {"at": float(s)}) for s in range(len(sets))], list(joints), sets, sets)
+    return made(view, [(candidate, {"at": float(s)}) for s in range(len(sets))], list(joints), sets, sets)

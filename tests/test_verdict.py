@@ -17,10 +17,11 @@ from sysid.diagnose.ask import Asked, ask
 from sysid.diagnose.detectable import detectable
 from sysid.diagnose.diagnosis import diagnose
 from sysid.diagnose.select import WORTH, search
-from sysid.diagnose.verdict import _UNKNOWN, predictable, verdicts
+from sysid.diagnose.verdict import verdicts
 from sysid.effect import TorqueEffect
 from sysid.effect_parameters import Linear
-from sysid.flexible import Agreement, Unknown
+from sysid.flexible import Law, Unknown
+from sysid.flexible.unknown import LEVEL
 from sysid.noise import NoiseFloor
 from sysid.simulate import simulate, write
 from sysid.statement.document import _verdict, dependences
@@ -73,9 +74,10 @@ def test_what_is_nothing_in_size_and_error_is_not_claimed(monkeypatch, fall, siz
     """Errors are told to 0.01, the size to 0.1; one that is not determined says nothing. Nor what the other joints pay for."""
     monkeypatch.setattr(claims.comparison, "compare", lambda *_: [Difference("", "", "elbow", -fall, 0.01)])
     monkeypatch.setattr(claims.comparison, "together", lambda *_, **__: Difference("", "", "*", all_, 0.01))
-    monkeypatch.setattr(claims, "parameters", lambda *_: {"T": (size, 0.1, "s"), "k": (3.0, float("nan"), "1")})
-    member = SimpleNamespace(candidate=SimpleNamespace(joint=1))
-    assert (claims._nothing(fitted(1.0, train=1.0), fitted(1.0, train=0.9), member) is None) is stands
+    after = fitted(1.0, train=0.9)
+    after.parameters_of = lambda effect, joint: {"T": (size, 0.1, "s"), "k": (3.0, float("nan"), "1")}
+    member = SimpleNamespace(candidate=SimpleNamespace(joint=1, key=("delay", 1)))
+    assert (claims._nothing(fitted(1.0, train=1.0), after, member) is None) is stands
 
 
 @pytest.mark.parametrize("error", [1.0, 1.3])
@@ -221,10 +223,11 @@ def test_dependences_are_sorted_and_say_something():
 
 
 def test_predictable_is_a_level_and_a_share():
-    assert predictable(left(0.3), 2) and not predictable(NOISE, 2) and not predictable(left(0.9 * WORTH), 2)
-    by_chance = replace(left(0.3), chance=0.3 * _UNKNOWN)  # half of it for each of two questions
-    assert predictable(by_chance, 1) and not predictable(by_chance, 2)  # a level for all joints together
-    assert predictable(replace(NOISE, tone=2.0 * WORTH), 2) and not predictable(replace(NOISE, tone=0.9 * WORTH), 2)
+    asked = lambda found, joints: found.predictable(joints, WORTH)  # noqa: E731
+    assert asked(left(0.3), 2) and not asked(NOISE, 2) and not asked(left(0.9 * WORTH), 2)
+    by_chance = replace(left(0.3), chance=0.3 * LEVEL)  # half of it for each of two questions
+    assert asked(by_chance, 1) and not asked(by_chance, 2)  # a level for all joints together
+    assert asked(replace(NOISE, tone=2.0 * WORTH), 2) and not asked(replace(NOISE, tone=0.9 * WORTH), 2)
 
 
 def test_a_tone_alone_is_unknown_and_its_share_is_said():
@@ -312,9 +315,9 @@ def asked_of_elbow(error: float, *, gain: float = 0.3, chance: float = 1e-3, nea
     """The elbow's verdict where ridge regression says nothing; the joints that were asked what their blocks agree on."""
     seen = []
 
-    def agreed(j: int) -> Agreement:
+    def agreed(j: int) -> Law:
         seen.append(j)
-        return Agreement(chance, "q_elbow and qd_shoulder", gain * NOISE.total)
+        return Law(chance, "q_elbow and qd_shoulder", gain * NOISE.total)
 
     found = verdicts(
         fitted(error), [], [NOISE, NOISE], [floor(), floor()], (), (), weighed, agreed, lambda j, own: near if own > 0 else ""
@@ -324,7 +327,7 @@ def asked_of_elbow(error: float, *, gain: float = 0.3, chance: float = 1e-3, nea
 
 def test_blocks_are_asked_of_joints_above_their_floors_alone():
     found, seen = asked_of_elbow(3.0)
-    assert found.status == "unknown" and seen == [1] and found.left.agreed == pytest.approx(0.3)
+    assert found.status == "unknown" and seen == [1] and found.left.single == pytest.approx(0.3)
     found, seen = asked_of_elbow(1.0)
     assert found.status == "complete" and seen == []
     # nor where the weights of the fit are most of it

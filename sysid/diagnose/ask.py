@@ -48,10 +48,7 @@ class Asked:
 
     def p(self, k: int) -> float:
         """Family-wise p-value of a group."""
-        return self._chance(self.statistics[k])
-
-    def _chance(self, statistic: float) -> float:
-        return float((1 + np.sum(self.maxima >= statistic)) / (1 + len(self.maxima)))
+        return null.chance(self.statistics[k], self.maxima)
 
     def near(self, joint: int, gain: float) -> str:
         """The effect on a joint that may be there and takes half of a gain, the most likely one;
@@ -59,7 +56,7 @@ class Asked:
         found, statistics, gains, _ = self.by_joint.get(joint, ([], [], [], None))
         takes = [k for k, own in enumerate(gains) if own > _HALF * gain]
         best = max(takes, key=lambda k: statistics[k], default=None)
-        may = best is not None and self._chance(statistics[best]) <= _MAY_BE
+        may = best is not None and null.chance(statistics[best], self.maxima) <= _MAY_BE
         return found[best].candidate.name if may else ""
 
 

@@ -15,7 +15,8 @@ from .. import comparison, pipeline
 from ..addition import grown, spelled
 from ..estimate import Fit
 from ..experiment_logs import Read
-from .findings import Finding, finding, judged_by, nought, parameters, where
+from ..unexplained import nought
+from .findings import Finding, finding, judged_by, where
 from .refits import Member
 from .steps import Step
 from .ties import Choice
@@ -104,7 +105,7 @@ def _nothing(before: Fit, after: Fit, member: Member) -> str | None:
     else:
         (change,) = (d for d in comparison.compare(before, after) if d.joint == own[0])
         unit, rise = before.rms("test")[own[0]], f"{max(change.delta_rms, 0.0):+.3g}"
-        if -change.delta_rms < change.se and nought(parameters(after, member)):
+        if -change.delta_rms < change.se and nought(after.parameters_of(*member.candidate.key)):
             return "its size is nothing beside its deviation, and the test error stays the same"
     if change.delta_rms > -_NOTHING * unit:
         return f"with it the error on the test logs does not fall ({rise})"

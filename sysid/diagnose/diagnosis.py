@@ -28,12 +28,14 @@ from ..notices import noticed
 from ..shown import ShownDiagnosis
 from ..specs import Experiment
 from ..transfer import transfers
+from ..unexplained import hidden_by_weights
 from ..view import View, first_view, too_short
 from . import claims as claiming
 from . import select
 from .claims import Claim, Refused
 from .detectable import Detectable, detectable
-from .findings import Finding, hidden_by_weights
+from .findings import Finding
+from .functions import law
 from .verdict import Verdict, verdicts
 
 
@@ -91,7 +93,7 @@ def diagnose(
         x = after.settled.x + after.design.change[: after.model.size]
         parts = measured.train, measured.test
         found, weighed = floors_of_fit(experiment, last, after.model, x, parts)
-        more = refused, transfers(last), weighed, after.agreement, then_asked.near
+        more = refused, transfers(last), weighed, lambda j: law(after, j), then_asked.near
         said = verdicts(fit, claims, after.unknown, found, *more)
         errors = last.rms("test").values()
         levels = np.array([e if f.rms is None else f.rms for f, e in zip(found, errors)])
@@ -105,4 +107,6 @@ def diagnose(
 
 def _notices(claims, refused) -> Iterator[str]:
     yield from (f"{r.effect} on {r.joint} is not claimed: {r.why}" for r in refused)
-    yield from (words for c in claims if (words := hidden_by_weights(c.head, c.after)) is not None)
+    for head, weights in ((c.head, c.after.weights) for c in claims):
+        if words := hidden_by_weights(head.effect, head.joint, head.parameters, weights):
+            yield words

@@ -14,8 +14,6 @@ from ..model_parameters import ROBOT
 from .refits import Member
 from .steps import Step
 
-_CLEAR = 2.0  # standard deviations
-
 
 @dataclass(frozen=True)
 class Finding:
@@ -80,39 +78,5 @@ def finding(
     words = tuple(name if at in (joint, "*") else f"{name} on {at}" for name, at in tied)
     heads = number if member is step.choice.head else None
     added = command(before.experiment.path, *spelled(member.candidate, joint))
-    numbers = parameters(after, member)
+    numbers = after.parameters_of(*member.candidate.key)
     return Finding(member, joint, step.p, chance, *errors, se, numbers, words, heads, added)
-
-
-def parameters(after: Fit, member: Member) -> dict[str, tuple[float, float, str]]:
-    """{name: (value, std or NaN, unit)} of an effect in the fit that has it."""
-    model, key = after.model, member.candidate.key
-    linear = zip(
-        model.coefficients, after.x[10 * model.bodies :], after.uncertainty.std[10 * model.bodies :]
-    )
-    out = {
-        c.name: (float(at), float(std), c.unit)
-        for c, at, std in linear
-        if (c.effect, c.joint) == key
-    }
-    for value, at, std in zip(model.shape_values, model.shapes, after.shape_std):
-        if (model.terms[value.term][0].name, value.joint) == key:
-            out[value.name] = (float(at), float(std), value.unit)
-    return out
-
-
-def nought(numbers: dict[str, tuple[float, float, str]]) -> bool:
-    """Whether all of an effect's parameters that are determined are nothing beside their standard
-    deviations, or none is determined."""
-    return all(abs(at) <= _CLEAR * std for at, std, _ in numbers.values() if np.isfinite(std))
-
-
-def hidden_by_weights(found: Finding, fit: Fit) -> str | None:
-    """What to know where the fit, in which all joints count alike, does not tell the size of an
-    effect that is there."""
-    if fit.weights is not None or not nought(found.parameters):
-        return None
-    return (
-        f"{found.effect} on {found.joint} is there, but this fit tells its size badly: joints with "
-        "more noise count as much as quiet ones; solver.weighting: noise tells it better"
-    )

@@ -42,6 +42,11 @@ def statistics(groups: Sequence[Group], belief: blocks.Belief = NONE) -> np.ndar
     return np.where([g.testable for g in groups], found, np.nan)
 
 
+def chance(statistic: float, greatest: np.ndarray) -> float:
+    """Family-wise p-value of a statistic beside `maxima`."""
+    return float((1 + np.sum(greatest >= statistic)) / (1 + len(greatest)))
+
+
 def maxima(
     groups: Sequence[Group],
     rng: np.random.Generator,

@@ -38,17 +38,19 @@ def groups_at(view: View, asked: Sequence[Asked]) -> list[Group]:
     out = []
     for (joints, _), parts in alike.items():
         names = [one for part in parts for one in part[0]]
-        plain, rough = (np.concatenate([part[i] for part in parts]) for i in (1, 2))
-        for some in range(0, len(names), _BATCH):
-            own = slice(some, some + _BATCH)
-            out += _made(view, names[own], joints, plain[own], rough[own])
+        out += made(view, names, joints, *(np.concatenate([p[i] for p in parts]) for i in (1, 2)))
     return out
 
 
-def _made(
-    view: View, asked: Sequence[Asked], joints: Sequence[int], plain: np.ndarray, rough: np.ndarray
+def made(
+    view: View, asked: Sequence, joints: Sequence[int], plain: np.ndarray, rough: np.ndarray
 ) -> list[Group]:
     """Groups of columns (asked, joints, n, k) on the motion, and on the rough one."""
+    parts = [slice(some, some + _BATCH) for some in range(0, len(asked), _BATCH)]
+    return [g for p in parts for g in _made(view, asked[p], joints, plain[p], rough[p])]
+
+
+def _made(view: View, asked, joints, plain: np.ndarray, rough: np.ndarray) -> list[Group]:
     design, sums, spans = view.design, view.sums, by_block(view.blocks)
     count, _, n, k = plain.shape
     size, kk = design.columns.shape[2], count * k

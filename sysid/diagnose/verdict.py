@@ -6,15 +6,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from ..estimate import Fit
-from ..flexible import Agreement, Unknown
+from ..flexible import Law, Unknown
+from ..noise import DOUBT
 from ..transfer import Transfer
 from ..unexplained import unexplained
 from .claims import Claim
 from .select import WORTH
 
-_FLOOR = 0.1  # of the floor: what a floor may be in doubt by and still be called reached
 _MOST = 0.5  # of what effects took and functions of the motion still predict: that part names
-_UNKNOWN = 0.05  # family-wise: it is asked of joints alone whose error stands above the floor
 
 
 @dataclass(frozen=True)
@@ -47,7 +46,7 @@ def verdicts(
     refused: Sequence = (),
     carried: Sequence[Transfer] = (),
     weighed: dict[str, float] | None = None,
-    agreed: Callable[[int], Agreement] | None = None,
+    law: Callable[[int], Law] | None = None,
     near: Callable[[int, float], str] | None = None,
 ) -> list[Verdict]:
     """The verdict on every joint.
@@ -56,12 +55,12 @@ def verdicts(
         fit: of the experiment as it is. left: what functions of the motion predict with all claims
             in the model. floors: of each joint's noise. carried: whether the model with all claims
             carries over, of each joint. weighed: {joint: RMS where each counts by its noise}.
-            agreed: what blocks of time agree on of a joint, asked where `left` says nothing. near:
-            the effect that may be what is left of a joint, by what the motion predicts of it.
+            law: the function that stands out most of what is left of a joint, asked where `left`
+            says nothing. near: the effect that may be what is left, by what the motion predicts.
     """
     last = claims[-1].after if claims else fit
     errors = last.rms("train"), last.rms("test")
-    reaches = [_at(f, max(e[j] for e in errors)) for f, j in zip(floors, fit.joints)]
+    reaches = [f.reached(max(e[j] for e in errors)) for f, j in zip(floors, fit.joints)]
     evens = [_even(last, joint, floors[j].rms, weighed or {}) for j, joint in enumerate(fit.joints)]
     asked = [not at and not even for at, even in zip(reaches, evens)]
     out = []
@@ -75,9 +74,9 @@ def verdicts(
         misfit = first**2 - (floor if floor is not None else then) ** 2
         explained = (first**2 - then**2) / misfit if misfit > 0 and claims else float("nan")
         seen, among = left[j], sum(asked) if asked[j] else len(left)
-        if agreed and asked[j] and then > 0.0 and not predictable(seen, among):
-            seen = seen.with_agreement(agreed(j))
-        remains = seen if predictable(seen, among) else None
+        if law and asked[j] and then > 0.0 and not seen.predictable(among, WORTH):
+            seen = seen.with_law(law(j))
+        remains = seen if seen.predictable(among, WORTH) else None
         looks = near(j, remains.share * remains.total) if near and remains else ""
         reached = reaches[j] and first > 0.0 and not _above(remains, then, floor)
         taken = sum(c.step.shares[j] for c in own)
@@ -86,12 +85,12 @@ def verdicts(
         elif own or (remains is not None and not looks and not reached and not evens[j]):
             told = ("unknown", own or others, explained, remains)
         elif not reached:
-            carries = not _at(floors[j], last.rms("train")[joint])
+            carries = not floors[j].reached(last.rms("train")[joint])
             even = weighed[joint] if evens[j] else None
             why = unexplained(then, floors[j], looks, even, carries)
             why += "".join(f"; {r.told}" for r in refused if r.joint in (joint, "*"))
             told = ("unresolved", others, explained, remains, why)
-        elif _at(floors[j], first) or not claims:
+        elif floors[j].reached(first) or not claims:
             told = ("complete",)
         else:
             most = max(claims, key=lambda c, j=j: c.step.shares[j])
@@ -99,11 +98,6 @@ def verdicts(
         out.append(Verdict(joint, *told))
     said = {found.joint: found.says for found in carried}
     return [replace(one, carries=said.get(one.joint, "")) for one in out]
-
-
-def _at(floor, error: float) -> bool:
-    """Whether an error is at a noise floor."""
-    return floor.rms is not None and error <= (1.0 + _FLOOR) * floor.rms + 2.0 * floor.std
 
 
 def _even(fit: Fit, joint: str, floor: float | None, weighed: dict[str, float]) -> bool:
@@ -114,15 +108,8 @@ def _even(fit: Fit, joint: str, floor: float | None, weighed: dict[str, float]) 
     return square - weighed.get(joint, square**0.5) ** 2 > _MOST * abs(square - floor**2)
 
 
-def predictable(found: Unknown, joints: int) -> bool:
-    """Whether functions of the motion predict a part worth having of what is left. Two questions
-    may be asked of each of `joints`, those above their floors: each has half of the level."""
-    functions = found.chance < 0.5 * _UNKNOWN / joints and found.predicted > WORTH
-    return bool(functions or found.tone > WORTH)
-
-
 def _above(remains: Unknown | None, error: float, floor: float) -> bool:
     """Whether what the motion predicts stands above the floor: the error without it does, and it is
     more than the floor's doubt lets pass."""
     left = 1.0 if remains is None else 1.0 - remains.share
-    return left < (1.0 + _FLOOR) ** -2 and left * error**2 >= floor**2
+    return left < (1.0 + DOUBT) ** -2 and left * error**2 >= floor**2

@@ -4,22 +4,14 @@ Linear splines over the joint's angle, speed and time, the same of every other j
 signs, what the load and the speed were a while ago, and random cosines of pairs of variables; all
 together one group, held small by a ridge that blocks held apart choose.
 
-The functions (`functions`), what they predict of what they were not fitted on (`ridge`), whether
-blocks agree on any small family of them (`agreement`), and what is said of it (`unknown`).
+The functions (`functions`), what they predict of what they were not fitted on (`ridge`), the
+products of two that are asked one by one, as every effect is (`products`), and what is said of it
+(`unknown`).
 
 Source: Rahimi & Recht 2007 (random features); Hoerl & Kennard 1970 (ridge).
 """
 
-from .agreement import Agreement, Projection, agreement
-from .functions import families
-from .unknown import TONE, Unknown, unknown
+from .products import products
+from .unknown import TONE, Law, Unknown, unknown
 
-__all__ = [
-    "TONE",
-    "Agreement",
-    "Projection",
-    "Unknown",
-    "agreement",
-    "families",
-    "unknown",
-]
+__all__ = ["TONE", "Law", "Unknown", "products", "unknown"]

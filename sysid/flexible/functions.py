@@ -29,7 +29,7 @@ def groups(
     features += [speed[:, None] * parts[name] for name in (f"q_{joint}", "time")]
     features += [
         known[f"qdd_{joint}"][:, None] * parts[f"q_{joint}"],
-        _remembered(speed, direction[:, 0], piece, step),
+        remembered([speed, direction[:, 0]], piece, step),
     ]
     for other in (name[2:] for name in known if name.startswith("q_") and name[2:] != joint):
         features += [
@@ -49,40 +49,13 @@ def groups(
     return out
 
 
-def families(
-    known: dict[str, np.ndarray], joint: str, piece, step: float, rng
-) -> dict[str, np.ndarray]:
-    """Small families of functions (n, k), by the variables that they are of: splines of each
-    variable with and without the direction of motion, these times speed and acceleration, waves of
-    two variables, and the past.
-
-    Args:
-        known, piece: as of `groups`.
-    """
-    speed, push = known[f"qd_{joint}"], known[f"qdd_{joint}"]
-    direction = np.sign(speed)[:, None]
-    parts = {name: _splines(name, values) for name, values in known.items()}
-    out = {name: _both_ways(own, direction) for name, own in parts.items()}
-    for name, own in parts.items():
-        if name.startswith("q_") or name in (f"qdd_{joint}", f"load_{joint}"):
-            out[f"qd_{joint} and {name}"] = speed[:, None] * own
-        if name.startswith("q_"):
-            out[f"qdd_{joint} and {name}"] = push[:, None] * own
-    out[f"qd_{joint} and its past"] = _remembered(speed, direction[:, 0], piece, step)
-    others = [name for name in known if name != "time" and not name.startswith("load")]
-    for own in (f"q_{joint}", f"qd_{joint}"):
-        for name in others:
-            if name != own:
-                out[f"{own} and {name}, waves"] = _cosines(known, own, name, 2 * _WAVES, rng)
-    return out
-
-
-def of_unit_size(values: np.ndarray, use) -> np.ndarray:
-    """Functions (n, k) at rows that count (n,), zero at others, each with a mean square of one;
-    without those that say nothing there."""
+def of_unit_size(values: np.ndarray, use) -> tuple[np.ndarray, np.ndarray]:
+    """Functions (n, k) at rows that count (n,), zero at others, each with a mean square of one; and
+    which they are, without those that say nothing there."""
     kept = np.where(use[:, None], values, 0.0)
-    kept = kept[:, kept.std(0) > 1e-9]
-    return kept / np.sqrt(np.mean(kept**2, axis=0))
+    which = np.flatnonzero(kept.std(0) > 1e-9)
+    kept = kept[:, which]
+    return kept / np.sqrt(np.mean(kept**2, axis=0)), which
 
 
 def _both_ways(values: np.ndarray, direction: np.ndarray) -> np.ndarray:
@@ -108,12 +81,12 @@ def _splines(name: str, values: np.ndarray) -> np.ndarray:
     return out
 
 
-def _remembered(speed, direction, piece, step: float) -> np.ndarray:
-    """Speed and direction (n, 2 memories) as they were a while ago, by first-order lags within each
-    piece."""
+def remembered(signals, piece, step: float) -> np.ndarray:
+    """Signals (n,) each as they were a while ago (n, signals x memories), by first-order lags
+    within each piece."""
     pieces = [piece == number for number in np.unique(piece)]
     out = []
-    for values in (speed, direction):
+    for values in signals:
         for span in _MEMORIES:
             weights = np.exp(-np.arange(0.0, 5.0 * span, step) / span)
             late = np.zeros(len(values))

@@ -30,7 +30,7 @@ def stretches(fold, t, piece) -> list[tuple[np.ndarray, np.ndarray]]:
 def predicted(features, y, use, spans) -> tuple[np.ndarray, np.ndarray]:
     """What ridge regression predicts (n,) of the rows of each fold from rows apart from it, and its
     gain (folds,)."""
-    scaled = of_unit_size(features, use)
+    scaled, _ = of_unit_size(features, use)
     if not scaled.shape[1]:
         return np.zeros(len(y)), np.zeros(len(spans))
     system, right = scaled.T @ scaled, scaled.T @ y

@@ -7,11 +7,22 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .. import blocks
-from .agreement import Agreement
 from .functions import groups
 from .ridge import predicted, stretches
 
 TONE = 1e-4  # probability of a line that strong by chance
+LEVEL = 0.05  # family-wise: it is asked of joints alone whose error stands above the floor
+
+
+@dataclass(frozen=True)
+class Law:
+    """The function of the motion, alone, that stands out most of a residual: `chance` of one that
+    stands out as much, were nothing there; the `variables` that it is of; `gain`: what it takes of
+    the squared residual of blocks that it was not fitted on."""
+
+    chance: float
+    variables: str
+    gain: float
 
 
 @dataclass(frozen=True)
@@ -20,8 +31,8 @@ class Unknown:
     told (n,) the torque that it predicts of folds that it was not fitted on, weighted; shares
     {variable: share of the squared residual that functions of it alone, and of the direction of
     motion, predict}; total: the squared residual; chance: the probability of predictions as good as
-    these, were nothing there; tone: the share of a steady tone, zero where there is none; agreed:
-    the share that one family of functions predicts, where blocks were asked what they agree on."""
+    these, were nothing there; tone: the share of a steady tone, zero where there is none; single:
+    the share that one function alone predicts, where these were asked one by one."""
 
     gain: np.ndarray
     told: np.ndarray
@@ -29,12 +40,12 @@ class Unknown:
     total: float
     chance: float = 1.0
     tone: float = 0.0
-    agreed: float = 0.0
+    single: float = 0.0
 
     @property
     def predicted(self) -> float:
         """Of the squared residual, what functions of the motion predict."""
-        return max(float(self.gain.sum() / self.total), self.agreed)
+        return max(float(self.gain.sum() / self.total), self.single)
 
     @property
     def share(self) -> float:
@@ -42,11 +53,18 @@ class Unknown:
         is more."""
         return max(self.predicted, self.tone)
 
-    def with_agreement(self, found: Agreement) -> Unknown:
-        """This and what blocks agree on; the chance is the smaller one of the two."""
+    def predictable(self, joints: int, worth: float) -> bool:
+        """Whether functions of the motion predict a part worth having, or a tone holds it. Two
+        questions may be asked of each of `joints`, those above their floors: each has half of the
+        level."""
+        functions = self.chance < 0.5 * LEVEL / joints and self.predicted > worth
+        return bool(functions or self.tone > worth)
+
+    def with_law(self, found: Law) -> Unknown:
+        """This and the function that stands out most; the chance is the smaller one of the two."""
         share = min(found.gain / self.total, 1.0)
         shares = self.shares | {found.variables: max(share, self.shares.get(found.variables, 0.0))}
-        return replace(self, chance=min(self.chance, found.chance), shares=shares, agreed=share)
+        return replace(self, chance=min(self.chance, found.chance), shares=shares, single=share)
 
 
 def unknown(

@@ -13,12 +13,12 @@ without a perfect model.
     of_pieces.py         the floors of a motion's pieces, and behind a fit's filter
 """
 
-from .floor import NoiseFloor, floor, floors
+from .floor import DOUBT, NoiseFloor, floor, floors
 from .of_angles import OfAngles, of_angles
 from .of_fit import floors_of_fit
 from .of_pieces import filtered, floors_of
 
 __all__ = [
-    "NoiseFloor", "OfAngles", "filtered", "floor", "floors", "floors_of", "floors_of_fit",
+    "DOUBT", "NoiseFloor", "OfAngles", "filtered", "floor", "floors", "floors_of", "floors_of_fit",
     "of_angles",
 ]  # fmt: skip

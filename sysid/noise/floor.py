@@ -24,6 +24,7 @@ from .stretches import (
 #: standard error over RMS beyond which a floor is not given: two of them are the 25 % that one can
 #: judge an error by
 UNSURE = 0.12
+DOUBT = 0.1  # of a floor: what it may be in doubt by and still be called reached
 
 
 @dataclass(frozen=True)
@@ -41,6 +42,10 @@ class NoiseFloor:
     detail: str
     low: float | None = None
     high: float | None = None
+
+    def reached(self, error: float) -> bool:
+        """Whether an error is at it, as far as it is known."""
+        return self.rms is not None and error <= (1.0 + DOUBT) * self.rms + 2.0 * self.std
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ from ..prior_weight import USUAL, with_weight
 from ..shape import Settled, settle
 from ..source import Source
 from ..specs import Experiment
-from .design import Design, Sums, by_block, designed, freed, instrumented, summed
+from .design import Design, Sums, by_block, designed, instrumented, summed
 from .stationary import spectra
 
 _FOLDS = 10
@@ -102,32 +102,6 @@ class View:
         """The residual (n, dof) and the columns (dof, n, size) as `instrumented` makes them."""
         known = self.rows.piece, self.motion.band, self.step
         return instrumented(self.design, self.rows.use, *known)
-
-    @cached_property
-    def _loud(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Blocks (n,) as long as if nothing of the residual followed the motion, the residual
-        (n, dof) as loud as before the fit, and its scores (blocks, size) with the instruments."""
-        (residual, z), columns, rows = self.instruments, self.design.columns, self.rows
-        memory = blocks.memory(self.design.residual, rows.use, rows.piece, self.step)
-        number = blocks.numbered(rows.t, rows.piece, memory=memory)
-        loud, scores = residual.copy(), []
-        for own in by_block(number):
-            a = columns[:, own]
-            (back,) = freed(
-                self.design.inverse, np.einsum("jnk,jnl->kl", a, a, optimize=True)[None]
-            )
-            loud[own] += np.einsum("jnk,k->nj", a, back @ np.einsum("jnk,nj->k", a, residual[own]))
-            scores.append(np.einsum("jnk,nj->k", z[:, own], loud[own]))
-        return number, loud, np.stack(scores)
-
-    def agreement(self, j: int) -> flexible.Agreement:
-        """Whether blocks of time agree on any function of the motion that joint j follows."""
-        (number, loud, scores), rows = self._loud, self.rows
-        name, rng = self.model.robot.joints[j], np.random.default_rng(j)
-        asked = flexible.families(self.variables, name, rows.piece, self.step, rng)
-        inverse, own = self.design.inverse, self.design.columns[j]
-        model = flexible.Projection(own, inverse, scores, loud[:, j], number)
-        return flexible.agreement(asked, rows.use[:, j], model, rng)
 
     @cached_property
     def blocks(self) -> np.ndarray:

@@ -1,0 +1,85 @@
+"""Products of two functions of the motion: what most laws are that nobody thought of."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from .functions import of_unit_size, remembered
+
+_OWN, _OTHER = 6, 2  # half waves over an angle's travel: of the joint's own, and of another's
+_SLOW = 0.3  # of the root mean square of a speed
+_BATCH = 64
+
+Factor = tuple[str, np.ndarray]  # the variable that it is of, empty for one; (n,)
+
+
+def products(
+    known: dict[str, np.ndarray], joint: str, use, piece, step: float
+) -> tuple[list[str], np.ndarray]:
+    """Functions (n, k) of the motion with a mean square of one on a joint's rows that count, and
+    the variables that each is of, in words.
+
+    Each is the product of two: waves, sizes, signs and squares of the joint's own angle, speed,
+    acceleration and load; the same of another joint; time; or one. All stand there once more times
+    the direction of motion, as friction does, and with them what the speed was a while ago.
+
+    Args:
+        known, piece, step: as of `functions.groups`. use: (n,) bool.
+    """
+    words, values = zip(*_all(known, joint, piece, step))
+    direction = np.sign(known[f"qd_{joint}"])[:, None]
+    out, names = [], []
+    for start in range(0, len(words), _BATCH):
+        own = np.stack(values[start : start + _BATCH], axis=1)
+        for some in (own, direction * own):
+            kept, which = of_unit_size(some, use)
+            out.append(kept)
+            names += [words[start + k] for k in which]
+    return names, np.concatenate(out, axis=1)
+
+
+def _all(known, joint: str, piece, step: float) -> Iterator[Factor]:
+    own = list(_factors(known, joint, _OWN))
+    few = list(_factors(known, joint, _OTHER))
+    yield from own
+    for k, first in enumerate(own):
+        yield from (_product(first, second) for second in own[k:])
+    yield f"qd_{joint}", np.ones(len(known["time"]))  # times the direction of motion
+    yield "time", known["time"]
+    yield from (_product(one, ("time", known["time"])) for one in few)
+    for other in (name[2:] for name in known if name.startswith("q_") and name[2:] != joint):
+        for second in _factors(known, other, _OTHER):
+            if second[0].startswith("load_"):
+                continue
+            yield second
+            yield from (_product(first, second) for first in few)
+    speed = known[f"qd_{joint}"]
+    past = remembered([speed, np.sign(speed), np.abs(speed)], piece, step)
+    yield from ((f"qd_{joint} and its past", one) for one in past.T)
+
+
+def _product(first: Factor, second: Factor) -> Factor:
+    variables = dict.fromkeys((first[0], second[0]))
+    return " and ".join(variables), first[1] * second[1]
+
+
+def _factors(known, joint: str, waves: int) -> Iterator[Factor]:
+    """Functions of one joint's motion, each of about unit size."""
+    angle, speed, push, load = (_sized(known[f"{k}_{joint}"]) for k in ("q", "qd", "qdd", "load"))
+    low, high = np.min(known[f"q_{joint}"]), np.max(known[f"q_{joint}"])
+    phase = 0.5 * np.pi * (2.0 * known[f"q_{joint}"] - low - high) / max(high - low, 1e-12)
+    angles = [angle, *(turn(m * phase) for m in range(1, waves + 1) for turn in (np.sin, np.cos))]
+    size, sign = np.abs(speed), np.sign(speed)
+    speeds = [speed, size, sign, speed * size]
+    if waves == _OWN:
+        speeds += [sign * np.exp(-size / _SLOW), sign * np.maximum(size - 1.0, 0.0)]
+    yield from ((f"q_{joint}", one) for one in angles)
+    yield from ((f"qd_{joint}", one) for one in speeds)
+    yield from ((f"qdd_{joint}", one) for one in (push, np.sign(push)))
+    yield from ((f"load_{joint}", one) for one in (load, np.abs(load)))
+
+
+def _sized(values: np.ndarray) -> np.ndarray:
+    return values / max(np.sqrt(np.mean(values**2)), 1e-12)
