@@ -76,7 +76,9 @@ def chosen(view: View, groups: list[Group], rng: np.random.Generator) -> Choice 
     kept = _least(members, priced.sum(0))
     members, table, priced = [members[k] for k in kept], table[:, kept], priced[:, kept]
     p = blocks.confidence_set(table, rng)
-    inside = [k for k in np.argsort(table.sum(0)) if p[k] >= _OUTSIDE]
+    # what is least once its numbers are paid for is no worse for predicting a little less
+    least = int(np.argmin(priced.sum(0)))
+    inside = [k for k in np.argsort(table.sum(0)) if p[k] >= _OUTSIDE or k == least]
     # the best, and of two that are the same the simplest: not what rounding left with less
     best = priced[:, inside].sum(0).min() + blocks.SAME * np.abs(table).sum(0).min()
     head = min(
