@@ -13,7 +13,8 @@ from ..unexplained import unexplained
 from .claims import Claim
 from .select import WORTH
 
-_MOST = 0.5  # of what effects took and functions of the motion still predict: that part names
+_MOST = 0.5  # of what stands above a floor
+_LEFT = 0.25  # of what effects took: they explain it, 80 % of all that anything does
 
 
 @dataclass(frozen=True)
@@ -80,7 +81,7 @@ def verdicts(
         looks = near(j, remains.share * remains.total) if near and remains else ""
         reached = reaches[j] and first > 0.0 and not _above(remains, then, floor)
         taken = sum(c.step.shares[j] for c in own)
-        if own and (remains is None or remains.share * max(1.0 - taken, 0.0) <= _MOST * taken):
+        if own and (remains is None or remains.share * max(1.0 - taken, 0.0) <= _LEFT * taken):
             told = ("missing", own, explained, remains)
         elif own or (remains is not None and not looks and not reached and not evens[j]):
             told = ("unknown", own or others, explained, remains)
