@@ -9,7 +9,7 @@ import pytest
 from scipy.stats import binomtest
 
 from scripts import blind_benchmark
-from scripts.blind_parts import cases, hidden, new_laws, old_laws, page, robots, scoring, summary, third_laws, trial
+from scripts.blind_parts import cases, fourth_laws, hidden, new_laws, old_laws, page, robots, scoring, summary, third_laws, trial
 
 
 def verdict(joint, said=None, tied=(), also=(), left=False):
@@ -158,7 +158,7 @@ def test_cases_are_as_promised():
     stribeck = [c.hidden[0]["size"] for c in full if c.kind == "one" and c.hidden[0]["effect"] == "stribeck"]
     assert min(stribeck) < 0.95 < max(stribeck)
     small = cases.cases(5, "small")
-    assert set(c.key for c in small) < set(c.key for c in full) and all(c in full for c in small) and 30 <= len(small) <= 65
+    assert set(c.key for c in small) < set(c.key for c in full) and all(c in full for c in small) and 30 <= len(small) <= 75
 
 
 def test_cases_of_old_keys_are_what_they_were():
@@ -168,8 +168,8 @@ def test_cases_of_old_keys_are_what_they_were():
     assert {key: full[key].seed for key in seeds} == seeds
     assert full["leg/hum/1"].hidden == ({"effect": "hum", "joint": "knee", "size": 1.1457, "other": "hip"},)
     drawn = Counter(c.hidden[0]["effect"] for c in full.values() if c.kind == "outside")
-    sets = (old_laws.OLD, new_laws.NEW, third_laws.THIRD)
-    assert set(drawn) == set().union(*sets) and [len(own) for own in sets] == [8, 8, 8] and len(drawn) == 24 and set(drawn.values()) == {5}
+    sets = (old_laws.OLD, new_laws.NEW, third_laws.THIRD, fourth_laws.FOURTH)
+    assert set(drawn) == set().union(*sets) and [len(own) for own in sets] == [8, 8, 8, 8] and len(drawn) == 32 and set(drawn.values()) == {5}
 
 
 @pytest.mark.parametrize("law", ["seal_carried_along", "heat", "ageing_contact", "loose_load", "bumper", "gas_strut"])
@@ -237,6 +237,56 @@ def test_third_laws_in_closed_form(law):
     else:
         assert after(0.1, [0.2, 0.1], [0, 0]) == 0.0 and after(0.1, [0.2, 0.3], [0, 0]) == 0.0
         assert after(0.3, [0.2, 0.6], [0, 0]) == pytest.approx(math.cos(0.5)) and after(0.1, [0.2, 0.1], [0, 0]) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("law", ["eddy_sector", "governor_shoes", "capstan_rope", "spindle_gyro", "return_line", "creeping_roller", "leaking_bellows", "gauge_hysteresis"])
+def test_fourth_laws_in_closed_form(law):
+    """At constant speeds, or at rest, each is what its equation says."""
+    fourth = fourth_laws.FOURTH
+    assert len(fourth) == 8 and not set(fourth) & {*old_laws.OLD, *new_laws.NEW, *third_laws.THIRD}
+    # a law of size 1 has about 1 N m
+    scales = {"torque": 8.0, "inertia": 2.0, "speed": 1.5, "coulomb": 0.5, "low": -1.0, "high": 1.0}
+    own, memory, clock = fourth[law][1](1.0, 0, 1, scales), {}, [0.0]
+
+    def after(seconds, q, qd, load=(0.0, 0.0)):
+        for _ in range(round(1e3 * seconds)):
+            out = own(q, qd, [0.0, 0.0], clock[0], load, memory)
+            clock[0] += 1e-3
+        return out
+
+    if law == "eddy_sector":
+        assert after(0.001, [1.0, 0], [0.375, 0]) == pytest.approx(2.5, rel=1e-3) == -after(0.001, [1.0, 0], [-0.375, 0])
+        assert after(0.001, [1.0, 0], [1.5, 0]) == pytest.approx(20.0 / 17.0, rel=1e-3) and after(0.001, [-1.0, 0], [0.375, 0]) == pytest.approx(0.0, abs=1e-3)
+        assert after(0.001, [0.0, 0], [0.375, 0]) == pytest.approx(1.25)
+    elif law == "governor_shoes":
+        assert after(0.001, [0, 0], [0.7, 0]) == 0.0 and after(0.001, [0, 0], [0.8, 0]) == pytest.approx(1.5) == after(0.001, [0, 0], [0.3, 0])
+        assert after(0.001, [0, 0], [-0.3, 0]) == pytest.approx(-1.5) and after(0.001, [0, 0], [0.2, 0]) == after(0.001, [0, 0], [0.7, 0]) == 0.0
+    elif law == "capstan_rope":
+        assert after(0.001, [1.0, 0], [1.0, 0.0]) == pytest.approx(0.7 * math.e) and after(0.001, [-1.0, 0], [1.0, -3.0]) == pytest.approx(-0.7 / math.e)
+        assert after(0.001, [0.5, 0], [1.0, -2.0]) == 0.0
+    elif law == "spindle_gyro":
+        assert after(0.001, [-0.2 + math.pi / 6, 0], [0.0, 0.6]) == pytest.approx(1.0) and after(0.001, [-0.2, 0], [1.0, 0.5]) == pytest.approx(0.0)
+    elif law == "return_line":
+        assert after(0.001, [0, 0], [0.3, -0.45]) == pytest.approx(0.5) and after(0.001, [0, 0], [-0.75, 0.0]) == pytest.approx(-0.5)
+        assert after(0.001, [0, 0], [1.0, 1.0]) == pytest.approx(2.0) and after(0.001, [0, 0], [0.0, 1.0]) == 0.0
+    elif law == "creeping_roller":
+        assert after(0.001, [math.pi / 16, 0], [0, 0]) == pytest.approx(1.4)
+        # forth and back by one radian each: without a load back where it was, with one 0.1 rad behind
+        after(1.0, [0, 0], [1.0, 0])
+        after(1.0, [0, 0], [-1.0, 0])
+        assert after(0.001, [0, 0], [0, 0]) == pytest.approx(1.4)
+        after(1.0, [0, 0], [1.0, 0], [8.0, 0])
+        after(1.0, [0, 0], [-1.0, 0], [8.0, 0])
+        assert after(0.001, [0, 0], [0, 0]) == pytest.approx(1.4 * math.cos(0.8), rel=1e-6)
+    elif law == "leaking_bellows":
+        # drawn out, it is full at once; pressed to 0.4 of that, the root of its pressure falls evenly
+        assert after(0.1, [-1.0, 0], [0, 0]) == 0.0 and after(0.001, [1.0, 0], [0, 0]) == pytest.approx(6.0)
+        assert after(1.5, [1.0, 0], [0, 0]) == pytest.approx(4.0 * (math.sqrt(1.5) - 1.5 / (2.0 * 0.4 * 3.0)) ** 2, rel=1e-2)
+        assert after(3.0, [1.0, 0], [0, 0]) == pytest.approx(0.0, abs=1e-4) and after(0.001, [0.5, 0], [0, 0]) == 0.0
+    else:
+        assert after(0.001, [0, 0], [0, 0]) == 0.0 and after(0.001, [0, 0], [0, 0], [2.0, 0]) == pytest.approx(0.6)
+        assert after(0.001, [0, 0], [0, 0], [10.0, 0]) == pytest.approx(1.2) and after(0.001, [0, 0], [0, 0], [6.0, 0]) == pytest.approx(0.0)
+        assert after(0.001, [0, 0], [0, 0], [0.0, 0]) == pytest.approx(-1.2) and after(0.001, [0, 0], [0, 0], [4.0, 0]) == pytest.approx(0.0)
 
 
 def test_keys_are_matched_by_their_parts():

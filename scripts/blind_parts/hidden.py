@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from .fourth_laws import FOURTH
 from .new_laws import NEW
 from .old_laws import OLD
 from .third_laws import THIRD
@@ -26,4 +27,4 @@ LARGEST = {
     "torque_saturation": 1.9,
 }  # beyond it friction turns negative, or little torque is read
 #: what the catalogue does not have: (equation, maker of the torque of joint j)
-OUTSIDE: dict[str, tuple[str, Callable]] = {**OLD, **NEW, **THIRD}
+OUTSIDE: dict[str, tuple[str, Callable]] = {**OLD, **NEW, **THIRD, **FOURTH}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from . import conditions
 from .claims import family
+from .fourth_laws import FOURTH
 from .hidden import ABSORBED, OUTSIDE
 from .new_laws import NEW
 from .old_laws import OLD
@@ -117,7 +118,7 @@ def page(found: dict, records: list[dict], settings: dict, notes: str = "") -> s
         if found["claims"]["list"] else "",
         "## Effects outside the catalogue",
         f"{listed(OLD)} are old: they were known when the method was last tuned. {listed(NEW)} were written before the method was changed, which is never done for one of them. "
-        f"{listed(THIRD)} were written later, before it was changed again, by somebody who had not seen it.",
+        f"{listed(THIRD)} were written later, before it was changed again, by somebody who had not seen it; {listed(FOURTH)} last of all, by another one.",
         table(["torque", "cases", "visible", "unknown", f"explained ({100 * EXPLAINED:.0f} % of the misfit)", "wrong", "of these, structure left is said", "unresolved", "missed"],
                [[f"{kind}: {OUTSIDE[kind][0]}", e["hidden"], e["visible"], e["unknown"], e["explained"], e["wrong"], e["admits"], e["unresolved"], e["missed"]] for kind, e in found["outside"].items()]),
         f"To be read beside the controls, of whose joints {percent(found['controls']['unknown_joints'])} are called unknown with nothing hidden: the word is worth what they leave of it.",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import statistics
 
 from . import claims
+from .fourth_laws import FOURTH
 from .hidden import ABSORBED, EFFECTS, OUTSIDE
 from .new_laws import NEW
 from .old_laws import OLD
@@ -52,6 +53,12 @@ _LAWS = (
         "outside, third laws",
         "third laws (written later, by somebody who had not seen the method)",
         THIRD,
+        0.85,
+    ),
+    (
+        "outside, fourth laws",
+        "fourth laws (written last, by somebody who had not seen the method)",
+        FOURTH,
         0.85,
     ),
 )
