@@ -129,7 +129,7 @@ def test_cases_with_nuisances_are_as_promised():
     assert (
         kinds["control"] >= 50
         and kinds["two"] >= 20
-        and kinds["outside"] == 48
+        and kinds["outside"] == 64
         and len(own) == 4
     )
     assert {h["effect"] for c in full if c.kind == "one" for h in c.hidden} == set(hidden.EFFECTS)
