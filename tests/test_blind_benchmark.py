@@ -200,17 +200,24 @@ def test_new_laws_in_closed_form(law):
         assert after(0.001, [-0.5, 0], [0.0, 0.0]) == pytest.approx(0.0) and after(0.001, [0.0, (math.pi / 2 - 0.5) / 0.7], [0.0, 0.0]) == pytest.approx(1.0 / 1.5**1.2)
 
 
-@pytest.mark.parametrize("law", ["clutched_spring", "one_way_pawl", "shared_pump", "stroke_cushion", "swept_grease", "current_foldback", "reflex_twitch", "rolling_ballast"])
-def test_third_laws_in_closed_form(law):
-    """At constant speeds, or at rest, each is what its equation says."""
-    scales = {"torque": 5.0, "inertia": 2.0, "speed": 1.5, "coulomb": 0.4, "low": -1.0, "high": 1.0}
-    own, memory, clock = third_laws.THIRD[law][1](1.0, 0, 1, scales), {}, [0.0]
+def stepped(entry, scales: dict):
+    """A law of size one on joint 0, called every millisecond: its torque after some seconds at a state."""
+    own, memory, clock = entry[1](1.0, 0, 1, scales), {}, [0.0]
 
     def after(seconds, q, qd, load=(0.0, 0.0)):
         for _ in range(round(1e3 * seconds)):
             out = own(q, qd, [0.0, 0.0], clock[0], load, memory)
             clock[0] += 1e-3
         return out
+
+    return after
+
+
+@pytest.mark.parametrize("law", ["clutched_spring", "one_way_pawl", "shared_pump", "stroke_cushion", "swept_grease", "current_foldback", "reflex_twitch", "rolling_ballast"])
+def test_third_laws_in_closed_form(law):
+    """At constant speeds, or at rest, each is what its equation says."""
+    scales = {"torque": 5.0, "inertia": 2.0, "speed": 1.5, "coulomb": 0.4, "low": -1.0, "high": 1.0}
+    after = stepped(third_laws.THIRD[law], scales)
 
     if law == "clutched_spring":
         assert after(0.001, [0.5, 0], [1.0, 0]) == 0.0 and after(0.001, [0.5, 0], [-1.0, 0]) == 0.0
@@ -246,13 +253,7 @@ def test_fourth_laws_in_closed_form(law):
     assert len(fourth) == 8 and not set(fourth) & {*old_laws.OLD, *new_laws.NEW, *third_laws.THIRD}
     # a law of size 1 has about 1 N m
     scales = {"torque": 8.0, "inertia": 2.0, "speed": 1.5, "coulomb": 0.5, "low": -1.0, "high": 1.0}
-    own, memory, clock = fourth[law][1](1.0, 0, 1, scales), {}, [0.0]
-
-    def after(seconds, q, qd, load=(0.0, 0.0)):
-        for _ in range(round(1e3 * seconds)):
-            out = own(q, qd, [0.0, 0.0], clock[0], load, memory)
-            clock[0] += 1e-3
-        return out
+    after = stepped(fourth[law], scales)
 
     if law == "eddy_sector":
         assert after(0.001, [1.0, 0], [0.375, 0]) == pytest.approx(2.5, rel=1e-3) == -after(0.001, [1.0, 0], [-0.375, 0])

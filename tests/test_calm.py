@@ -35,7 +35,7 @@ def test_least_squares_leaves_the_motion_and_instruments_do_not(seed):
     r, system = tau - a @ found, a.T @ a
     zero = np.zeros((1, N, 2))
     design = Design(a[None], r[:, None], system, np.linalg.inv(system), np.zeros(2), zero, np.zeros((N, 1)))
-    after = instrumented(design, np.ones((N, 1), bool), np.zeros(N, int), BAND, STEP)[0][:, 0]
+    after = instrumented(design, np.ones((N, 1), bool), np.zeros(N, int), BAND, STEP)[:, 0]
     true = np.stack([_acceleration(q), np.sin(q)], axis=1)
 
     def told(rest):
@@ -53,7 +53,7 @@ def test_without_noise_the_instruments_change_nothing():
     r = tau - a @ np.linalg.lstsq(a, tau, rcond=None)[0]
     system = a.T @ a
     design = Design(a[None], r[:, None], system, np.linalg.inv(system), np.zeros(2), np.zeros((1, N, 2)), np.zeros((N, 1)))
-    after = instrumented(design, np.ones((N, 1), bool), np.zeros(N, int), BAND, STEP)[0]
+    after = instrumented(design, np.ones((N, 1), bool), np.zeros(N, int), BAND, STEP)
     np.testing.assert_allclose(after[:, 0], 0.0, atol=1e-9)
 
 

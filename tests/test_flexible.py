@@ -135,7 +135,14 @@ def test_a_motion_that_stands_has_no_functions():
 
 
 ALL = np.ones(N, bool)
-WORDS, VALUES = products(KNOWN, "elbow", ALL, np.zeros(N, int), STEP)
+
+
+def all_products(known, use=ALL) -> tuple[list[str], np.ndarray]:
+    words, values = zip(*products(known, "elbow", use, np.zeros(N, int), STEP))
+    return sum(words, []), np.concatenate(values, axis=1)
+
+
+VALUES = all_products(KNOWN)[1]
 
 
 def left_by(values, *, columns=None, seconds: float = 0.5):
@@ -160,7 +167,7 @@ def coloured(seed: int, memory: float = 0.04):
 
 def test_products_are_functions_of_unit_size_on_rows_that_count():
     use = np.sin(KNOWN["time"]) > -0.5
-    words, values = products(KNOWN, "elbow", use, np.zeros(N, int), STEP)
+    words, values = all_products(KNOWN, use)
     assert len(words) == values.shape[1] > 500 and not values[~use].any()
     np.testing.assert_allclose(np.mean(values**2, axis=0), 1.0, rtol=1e-9)
     variables = {"time", "its past", *(f"{kind}_{joint}" for kind in ("q", "qd", "qdd", "load") for joint in ("shoulder", "elbow"))}
@@ -169,7 +176,7 @@ def test_products_are_functions_of_unit_size_on_rows_that_count():
 
 def test_a_joint_that_stands_has_no_products_of_its_own():
     still = {**KNOWN, "q_shoulder": np.zeros(N), "qd_shoulder": np.zeros(N), "qdd_shoulder": np.zeros(N)}
-    words, values = products(still, "elbow", ALL, np.zeros(N, int), STEP)
+    words, values = all_products(still)
     assert np.isfinite(values).all() and not any(word.endswith("qd_shoulder") for word in words)
 
 

@@ -233,13 +233,18 @@ def matches(key: str, wanted: str) -> bool:
     return all(not part or part == own for part, own in zip(wanted.split("/"), key.split("/")))
 
 
-def conditions_of(case: Case) -> dict:
-    usual = {
+def logged(case: Case) -> dict:
+    """What `simulate` is told of a case's logs, but for its pace and nuisances."""
+    return {
         "seed": case.seed,
         "duration": SECONDS[case.robot],
         "rate": RATE[case.robot],
         "colour": case.colour,
         "encoder": case.encoder,
-        "pace": case.pace,
     }
+
+
+def conditions_of(case: Case) -> dict:
+    """What a record tells of a case's logs."""
+    usual = logged(case) | {"pace": case.pace}
     return usual | ({"nuisances": case.nuisances} if case.nuisances else {})

@@ -19,9 +19,9 @@ from sysid import addition, loop, pipeline
 from sysid.errors import SysidError
 
 from . import conditions
-from .cases import Case, conditions_of
+from .cases import Case, conditions_of, logged
 from .hidden import ABSORBED, OUTSIDE
-from .robots import RATE, SECONDS, experiment_of
+from .robots import experiment_of
 
 MOST_STEPS = 4
 _LIMIT = 1200  # s a case may take
@@ -96,13 +96,7 @@ def _one(case: Case, folder: Path, found: dict, stage: list[str]) -> None:
 
     folder.mkdir(parents=True, exist_ok=True)
     experiment, machine = timed("simulate", lambda: experiment_of(case.robot, folder))
-    options = {
-        "seed": case.seed,
-        "duration": SECONDS[case.robot],
-        "rate": RATE[case.robot],
-        "colour": case.colour,
-        "encoder": case.encoder,
-    }
+    options = logged(case)
     options["speed"] = (
         None if case.pace is None else case.pace * float(motion.top_speeds(machine).max())
     )

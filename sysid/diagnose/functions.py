@@ -26,10 +26,10 @@ def law(view: View, j: int) -> flexible.Law:
     blocks alone tell: of a thousand slow functions one meets what a spectrum misses of slow noise.
     """
     use, joint = view.rows.use[:, j].astype(bool), view.model.robot.joints[j]
-    words, values = flexible.products(view.variables, joint, use, view.rows.piece, view.step)
-    # without the noise of the angles, which has nothing to add to them
-    columns = np.ascontiguousarray(values.T)[:, None, :, None]
-    groups = made(view, [(Function(word), {}) for word in words], [j], columns, columns)
+    asked, groups = flexible.products(view.variables, joint, use, view.rows.piece, view.step), []
+    for words, values in asked:
+        columns = np.ascontiguousarray(values.T)[:, None, :, None]  # the angles' noise adds nothing
+        groups += made(view, [(Function(word), {}) for word in words], [j], columns, columns)
     found = null.statistics(groups)
     if not np.isfinite(found).any():
         return flexible.Law(1.0, "", 0.0)

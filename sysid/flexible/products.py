@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import islice
 
 import numpy as np
 
@@ -10,16 +11,16 @@ from .functions import of_unit_size, remembered
 
 _OWN, _OTHER = 6, 2  # half waves over an angle's travel: of the joint's own, and of another's
 _SLOW = 0.3  # of the root mean square of a speed
-_BATCH = 64
+_PART = 64  # functions that stand in memory together, and as many times the direction of motion
 
-Factor = tuple[str, np.ndarray]  # the variable that it is of, empty for one; (n,)
+Factor = tuple[str, np.ndarray]  # the variables that it is of; (n,)
 
 
 def products(
     known: dict[str, np.ndarray], joint: str, use, piece, step: float
-) -> tuple[list[str], np.ndarray]:
+) -> Iterator[tuple[list[str], np.ndarray]]:
     """Functions (n, k) of the motion with a mean square of one on a joint's rows that count, and
-    the variables that each is of, in words.
+    the variables that each is of, in words; some at a time, as all of a long log fill the memory.
 
     Each is the product of two: waves, sizes, signs and squares of the joint's own angle, speed,
     acceleration and load; the same of another joint; time; or one. All stand there once more times
@@ -28,16 +29,14 @@ def products(
     Args:
         known, piece, step: as of `functions.groups`. use: (n,) bool.
     """
-    words, values = zip(*_all(known, joint, piece, step))
     direction = np.sign(known[f"qd_{joint}"])[:, None]
-    out, names = [], []
-    for start in range(0, len(words), _BATCH):
-        own = np.stack(values[start : start + _BATCH], axis=1)
+    found = _all(known, joint, piece, step)
+    while part := list(islice(found, _PART)):
+        words, values = zip(*part)
+        own = np.stack(values, axis=1)
         for some in (own, direction * own):
             kept, which = of_unit_size(some, use)
-            out.append(kept)
-            names += [words[start + k] for k in which]
-    return names, np.concatenate(out, axis=1)
+            yield [words[k] for k in which], kept
 
 
 def _all(known, joint: str, piece, step: float) -> Iterator[Factor]:

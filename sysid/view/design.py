@@ -75,9 +75,9 @@ def designed(found: Settled, weights, source: Source, rough: Source) -> Design:
     return Design(columns, residual, system, inverse, change, more, left)
 
 
-def instrumented(design: Design, use, piece, band: float, step: float):
+def instrumented(design: Design, use, piece, band: float, step: float) -> np.ndarray:
     """The residual (n, dof) where the columns without the noise of the angles, Z, tell the rest no
-    more: (Z'A + P) dx = (Z - A)'r, with the prior's P; and Z (dof, n, size).
+    more: (Z'A + P) dx = (Z - A)'r, with the prior's P.
 
     Least squares holds A'r = 0, but noise stands in A and r alike and bends the parameters; what
     it leaves then follows the motion though nothing is missing.
@@ -92,7 +92,7 @@ def instrumented(design: Design, use, piece, band: float, step: float):
     product = lambda one, other: np.einsum("jnk,jnl->kl", one, other, optimize=True)  # noqa: E731
     system = design.system + product(z - a, a)
     change = np.linalg.lstsq(system, np.einsum("jnk,nj->k", z - a, r), rcond=1e-10)[0]
-    return r - np.einsum("jnk,k->nj", a, change), z
+    return r - np.einsum("jnk,k->nj", a, change)
 
 
 def by_block(number: np.ndarray) -> list[slice]:

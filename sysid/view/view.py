@@ -82,7 +82,7 @@ class View:
         """What a flexible function of the motion takes of each joint."""
         # three stretches a fold, so that what is left out is seldom where nothing else was
         rows = self.rows
-        residual, _ = self.instruments
+        residual = instrumented(self.design, rows.use, rows.piece, self.motion.band, self.step)
         stretch = blocks.numbered(rows.t, rows.piece, shortest=np.inf, fewest=3 * _FOLDS)
         fold, names = stretch % _FOLDS, self.model.robot.joints
         take = lambda j, name: flexible.unknown(  # noqa: E731
@@ -96,12 +96,6 @@ class View:
             np.random.default_rng(j),
         )
         return tuple(take(j, name) for j, name in enumerate(names))
-
-    @cached_property
-    def instruments(self) -> tuple[np.ndarray, np.ndarray]:
-        """The residual (n, dof) and the columns (dof, n, size) as `instrumented` makes them."""
-        known = self.rows.piece, self.motion.band, self.step
-        return instrumented(self.design, self.rows.use, *known)
 
     @cached_property
     def blocks(self) -> np.ndarray:
