@@ -37,7 +37,9 @@ def test_the_net_holds(tmp_path, act, kind):
     import subprocess
 
     code = (
-        "from pathlib import Path\nfrom scripts import fuzz_readers as f\nf.LONGEST = 3.0\n"
+        "from pathlib import Path\nfrom scripts import fuzz_readers as f\n"
+        # a busy machine may take seconds to hand out a gigabyte, which is no hang
+        f"{'f.LONGEST = 3.0' if kind == 'hang' else ''}\n"
         f"def read(path, kind):\n    {act}\n"
         "f.read = read\nprint(f.tried(Path('x.csv'), '.csv').kind)\n"
     )
