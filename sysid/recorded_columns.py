@@ -11,6 +11,8 @@ from .readers.table import Table
 
 _DEFAULTS = ColumnsSpec()
 
+_KEYS = {"q": "position", "tau": "torque", "qd": "velocity", "qdd": "acceleration"}
+
 _QUANTITIES = {"q": "position", "qd": "position", "qdd": "position", "tau": "torque"}
 
 
@@ -91,6 +93,31 @@ def names_of(table: Table, pattern, joints, signal: str, needed: list[bool]) -> 
             do="correct data.columns",
         )
     return [single(table, c, signal) if own else None for c, own in zip(pattern, needed)]
+
+
+def refuse_shared(table: Table, wanted: dict, joints) -> None:
+    """Refuse a column that is said to be two things: of two joints, or two quantities of one.
+
+    Args:
+        wanted: {q, tau, qd or qdd: the column of each joint, or the one matrix of all}.
+
+    Raises:
+        LogError: which column, and what it is said to be.
+    """
+    said: dict[str, str] = {}
+    for key, names in wanted.items():
+        kind = _KEYS[key]
+        whole = len(names) < len(joints)  # a matrix
+        for k, name in enumerate(names):
+            own = f"the {kind} of {'every joint' if whole else joints[k]}"
+            if name is not None and name in said:
+                raise LogError(
+                    f"column {name!r} is said to be {said[name]} and {own}",
+                    where=str(table.path),
+                    allowed="a column of its own for each joint's position, torque, velocity ...",
+                    do="correct data.columns",
+                )
+            said[name] = own
 
 
 def single(table: Table, column, signal: str) -> str:

@@ -19,7 +19,7 @@ from .errors import LogError, SysidWarning
 from .log_spec import DataSpec, LogSpec
 from .readers import open_table
 from .readers.table import Table
-from .recorded_columns import check_headers, meant, names_of, single, time_of
+from .recorded_columns import check_headers, meant, names_of, refuse_shared, single, time_of
 
 _EPOCH = 1e6  # s: a clock that reads more counts from 1970, not from the log's start
 EPISODE = "episode_index"  # the column in which LeRobot numbers episodes
@@ -132,6 +132,7 @@ def _load(table: Table, data: DataSpec, joints, episodes, drives):
             own = needed.get(name, [True] * len(joints))
             there = names_of(table, pattern, joints, name, own) if any(own) else [None] * len(own)
             wanted[name] = there
+    refuse_shared(table, wanted, joints)
     wanted |= _signals(table, data, joints, drives)
     time = None if data.rate else time_of(table, meant(table, spec, "time"))
     counted = EPISODE if table.has(EPISODE) else None

@@ -80,6 +80,19 @@ def test_a_wrong_unit_is_said_once_and_nothing_that_follows_from_it(what, made, 
     assert not {f.fault for f in found} & {"joint_order", "sign_flipped", "mass_implausible", "not_excited"}
 
 
+@pytest.mark.parametrize(("column", "word"), [("q", "angle"), ("tau", "torque")])
+def test_one_signal_under_two_names_is_a_warning(column, word, made, tmp_path):
+    logs = shutil.copytree(made(), tmp_path / "logs")
+    spoiled = faults.Planted(logs, ("shoulder", "elbow"), np.random.default_rng(0))
+    train = logs / "train.csv"
+    twice = spoiled.tables[train][f"{column}_shoulder"].alias(f"{column}_elbow")
+    spoiled.tables[train] = spoiled.tables[train].with_columns(twice)
+    spoiled.save()
+    told = [f for f in check.check(pipeline.load(logs)) if "equal in every sample" in f.says]
+    assert [(f.fault, f.severity, f.joint, f.log) for f in told] == [("joint_order", "warning", "elbow", "train.csv")]
+    assert f"the {word} of shoulder and of elbow" in told[0].says
+
+
 def test_another_reading_is_scored_as_the_log_that_it_makes(made, tmp_path):
     """Exchanged columns read exchanged leave what the right ones leave."""
     right = looked(pipeline.load(made())).equations

@@ -111,6 +111,20 @@ def test_units(tmp_path, arm_logs, ending, unit, per_second):
         np.testing.assert_allclose(getattr(segment, name), expected[name], **EXACT)
 
 
+@pytest.mark.parametrize(
+    ("columns", "words"),
+    [
+        ({"position": ["q_elbow", "q_elbow"]}, ["'q_elbow'", "position of shoulder and the position of elbow"]),
+        ({"torque": ["tau_shoulder", "tau_shoulder"]}, ["'tau_shoulder'", "torque of shoulder and the torque of elbow"]),
+        ({"torque": "q_{joint}"}, ["'q_shoulder'", "position of shoulder and the torque of shoulder"]),
+        ({"position": [1, 1], "torque": [3, 4]}, ["position of shoulder and the position of elbow"]),
+    ],
+)
+@pytest.mark.parametrize("command", ["fit", "check"])
+def test_a_column_is_one_thing(experiment, cli, command, columns, words):
+    cli(command, experiment(config={"data.columns": columns})).complains(*words, "data.columns")
+
+
 def test_units_of_speeds_and_of_sliding_joints(tmp_path):
     """One unit is named for all joints: degrees leave a slide's metres alone, millimetres a hinge's radians."""
     n = 20

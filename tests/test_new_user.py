@@ -1,8 +1,11 @@
 """What stopped a reader on the way from a log to an added effect stays mended."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+import sysid
 from sysid import check, config, pipeline
 from sysid import cli as commands
 from sysid.check.faults import masses
@@ -16,6 +19,25 @@ from tests.conftest import JOINTS, csv
 BOTH = ("shoulder", "elbow")
 
 
+
+
+@pytest.mark.parametrize("kind", [str, Path])
+@pytest.mark.parametrize("name", ["fit", "diagnose", "check", "design", "predict", "write", "compare"])
+def test_a_path_in_the_place_of_an_experiment_says_what_to_hand_over(tmp_path, kind, name):
+    path = kind(tmp_path / "config.yaml")
+    others = {"predict": ["log.csv"], "write": [tmp_path / "run"], "compare": [path]}.get(name, [])
+    with pytest.raises(sysid.SysidError) as said:
+        getattr(sysid, name)(path, *others)
+    made = f"sysid.load({str(path)!r})"
+    made = made if name in ("fit", "diagnose", "check", "design") else f"sysid.fit({made})"
+    assert f"sysid.{name} is handed a path" in str(said.value)
+    assert str(said.value).endswith(f"hand it {made}") and not list(tmp_path.iterdir())
+
+
+def test_a_path_by_keyword_and_as_the_fit_of_a_diagnosis():
+    for call in (lambda: sysid.fit(experiment="a.yaml"), lambda: sysid.diagnose(None, fit="runs/a")):
+        with pytest.raises(sysid.SysidError, match="is handed a path"):
+            call()
 
 
 def test_a_folder_alone_becomes_the_experiment(experiment, cli):
