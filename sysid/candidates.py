@@ -3,6 +3,7 @@ columns that it would add."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -41,6 +42,10 @@ class Candidate:
     def key(self) -> tuple[str, int]:
         """Its word and its joint: variants share it."""
         return self.effect.name, self.joint
+
+    def told(self, joints: Sequence[str]) -> str:
+        """Its word, and the name of its joint where it has one."""
+        return self.name if self.joint == ROBOT else f"{self.name} on {joints[self.joint]}"
 
     @property
     def parameters(self) -> int:

@@ -14,6 +14,7 @@ FIT = {
     "left": ("looking at what is left", 1),
 }  # fmt: skip
 _WORDS = {"starting": "reading the logs", "ask": "asking what is missing", "drawing": "drawing"}
+_WITH = "ask, with "  # begins a round of questions, before the effect that joined last
 STAYS = "dashboard: "  # begins what is told once, and stays in sight
 _ASKED, _FIRST = 0.2, 0.5  # shares of a diagnosis: its fit, and the first round of questions
 _DRAWN = 0.97  # from here on a page is drawn
@@ -34,6 +35,11 @@ class Course:
         self._rounds: list[str] = []
         self._stages: list[str] = []
         self.share = 0.0
+
+    @property
+    def found(self) -> list[str]:
+        """The effects with which it was asked again, in order."""
+        return [name for _, comma, name in (stage.partition(_WITH) for stage in self._rounds) if comma]
 
     def tell(self, stage: str, share: float) -> tuple[str, float]:
         """A stage and the share of it that is done: in words, and the share of the whole, which never falls."""

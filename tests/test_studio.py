@@ -28,6 +28,7 @@ from sysid.studio.history import History, hashed
 from sysid.studio.jobs import Cancelled, Job, Worker
 from sysid.studio.serve import serve
 from sysid.studio.session import Session
+from sysid.studio.turn import Turn
 from sysid.studio.workspace import Workspace
 from sysid.vocabulary import vocabulary
 from tests.test_report import EVIL, Elements, parse_errors, written
@@ -199,7 +200,37 @@ def test_charts_are_answered_before_the_diagnosis(arm, tmp_path, monkeypatch):
     assert client.get("/export/rows.csv", params=asked).text.startswith("log,t [s],measured")
     assert client.get("/api/window", params={**asked, "part": "both"}).status_code == 422
     assert client.get("/api/window", params={**asked, "beside": "step:5"}).status_code == 422
+    assert {"cogging", "payload"} <= {e["effect"] for e in page["vocabulary"]} and "suspects" in page["order"]
     go_on.set()
+
+
+def test_a_preview_does_not_wait_for_the_end_of_the_diagnosis(arm, tmp_path, monkeypatch):
+    begun, seen, told = threading.Event(), threading.Event(), []
+    from sysid.studio import session
+
+    def asking(*args, progress, **more):
+        begun.set()
+        for k in range(3000):
+            progress("ask, with delay on elbow", k / 3000)
+            if seen.wait(0.02):
+                break
+        told.append(k)
+        return diagnose(*args, progress=progress, **more)
+
+    monkeypatch.setattr(session, "diagnose", asking)
+    own = studio.__new__(studio)
+    folder = shutil.copytree(arm[0], tmp_path / "arm")
+    own.file, own.run, own.session = folder / "config.yaml", tmp_path / "run", Session(folder, tmp_path / "run")
+    own.client = TestClient(application(own.session, port=PORT, csrf=CSRF), base_url=HOME)
+    own.session.run()
+    assert begun.wait(60.0)
+    key = previewed(own, effect="cogging", joint=EVIL, options={"lines": "2"})
+    state = own.session.state()
+    assert state["job"]["state"] == "running" and state["job"]["found"] == ["delay on elbow"] and not state["ready"]
+    shown = own.get("/api/window", sha=own.sha, joint=0, part="test", shown=f"preview:{key}", beside="now").json()
+    assert shown["rms"] < shown["beside"]
+    seen.set()
+    assert own.wait()["ready"] and told[0] < 2999
 
 
 def test_undo_and_redo_are_found_again_after_a_restart(opened, tmp_path):
@@ -424,7 +455,7 @@ def test_an_experiment_of_the_same_name_elsewhere_does_not_undo_into_this_one(op
 
 
 def test_a_job_that_waits_for_its_turn_can_be_cancelled():
-    turn, go = threading.Lock(), threading.Event()
+    turn, go = Turn(), threading.Event()
     first, second = Worker(turn), Worker(turn)
     first.start("a", lambda job: go.wait(10))
     waiting = second.start("b", lambda job: None)
@@ -434,6 +465,51 @@ def test_a_job_that_waits_for_its_turn_can_be_cancelled():
         time.sleep(0.01)
     assert waiting.state == "cancelled" and first.job.state == "running"
     go.set()
+
+
+def test_a_short_job_is_let_by_where_a_long_one_tells_how_far_it_is():
+    """One at a time: the short ones go ahead of a long one that waits, and between two reports of the one at work."""
+    turn, go, at_work, order = Turn(), threading.Event(), [], []
+
+    def long(job):
+        for k in range(400):
+            assert not at_work
+            at_work.append(job)
+            time.sleep(0.002)
+            assert at_work == [job]
+            at_work.clear()
+            job.tell("ask", k / 400)
+            if go.is_set() and k > 20:
+                break
+        order.append(job.sha)
+
+    def short(job):
+        assert not at_work
+        at_work.append(job)
+        job.tell("compress", 0.5)
+        time.sleep(0.02)
+        assert at_work == [job]
+        at_work.clear()
+        order.append(job.sha)
+
+    first, other, ahead, aside = Worker(turn), Worker(turn), Worker(turn, ahead=True), Worker(turn, ahead=True)
+    first.start("a", long)
+    other.start("b", long)
+    for worker, name in ((ahead, "c"), (aside, "d")):
+        worker.start(name, short)
+    wait = lambda *workers: [ended(worker) for worker in workers]  # noqa: E731
+    wait(ahead, aside)
+    assert sorted(order) == ["c", "d"] and first.job.state == other.job.state == "running"
+    go.set()
+    wait(first, other)
+    assert order[2:] in (["a", "b"], ["b", "a"]) and {w.job.state for w in (first, other, ahead, aside)} == {"done"}
+
+
+def ended(worker):
+    end = time.monotonic() + 30
+    while worker.job.state == "running" and time.monotonic() < end:
+        time.sleep(0.002)
+    assert worker.job.state == "done", worker.job
 
 
 def test_a_file_that_cannot_be_meant_is_said_on_the_page(opened):

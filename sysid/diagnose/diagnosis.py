@@ -1,5 +1,4 @@
-"""A fitted experiment -> where it fails, which effect is missing, and what its logs could have
-shown.
+"""A fitted experiment -> where it fails, what is missing, and what its logs could have shown.
 
 The whole loop on one page:
 

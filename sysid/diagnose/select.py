@@ -47,7 +47,8 @@ def search(
         steps = revised(first_view, joined_, worth)
         view = steps[-1].after
         kept = [s.candidate for s in steps] == [s.candidate for s in joined_]
-        say = lambda share, word=step.candidate.name: tell(f"ask, with {word}", share)  # noqa: E731
+        told = step.candidate.told(view.model.robot.joints)
+        say = lambda share, told=told: tell(f"ask, with {told}", share)  # noqa: E731
         asked = ask(view, extra, say, before=asked if kept else None, anew=step.changed)
     return steps, first, asked, open_
 

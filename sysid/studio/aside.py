@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import threading
-
 from .. import effect_entry, experiment_file, pipeline
 from ..errors import SysidError
 from . import designs
@@ -12,6 +10,7 @@ from .changes import Change
 from .history import History, hashed
 from .jobs import Job, Worker
 from .previews import Preview, Previews
+from .turn import Turn
 from .workspace import Workspace
 
 
@@ -19,18 +18,19 @@ class Aside:
     """The second worker of an experiment, and what it made. Safe to use from several threads.
 
     Args:
-        turn: the lock of the one that works.
+        turn: to work, of all jobs.
     """
 
-    def __init__(self, history: History, turn: threading.Lock):
-        self._history, self.worker, self.previews = history, Worker(turn), Previews()
+    def __init__(self, history: History, turn: Turn):
+        self._history, self.worker, self.previews = history, Worker(turn, ahead=True), Previews()
 
     def document(self, sha: str | None) -> dict:
         """The job, and what there is for the text with a hash."""
         job = self.worker.job
+        said = None if job is None else job.document()  # first: what it made when it was done is there
         made = [] if sha is None else self.previews.of(sha)
         return {
-            "aside": None if job is None else job.document(),
+            "aside": said,
             "previews": [{"sha": one.sha, "words": one.words} for one in made],
             "designs": designs.listed(self._history.run),
         }

@@ -43,16 +43,21 @@ class Diagnosed:
         joints, unit = self.fit.joints, units(self.fit)
         offered = [{"finding": k, "step": step, "effect": self.said["findings"][k]["effect"], "joint": self.said["findings"][k]["joint"]} for step, k in self.offered()]
         return {
-            "sha": self.sha, "sections": {**self._html, "steps": {"title": made.title, "html": made.html()}}, "order": ORDER,
+            "sha": self.sha, "sections": {**self._html, "steps": {"title": made.title, "html": made.html()}}, **offers(),
             "joints": [{"name": j, "unit": unit[j][0]} for j in joints],
             "findings": [{"effect": f["effect"], "joint": f["joint"]} for f in self.said["findings"]],
             "verdict": [{"joint": v["joint"], "status": v["status"]} for v in self.said["verdict"]], "offered": offered,
-            "vocabulary": spoken(), "made": self.said.get("made"), "converged": bool(self.fit.solution.converged),
+            "made": self.said.get("made"), "converged": bool(self.fit.solution.converged),
         }  # fmt: skip
 
     def chart(self, name: str) -> bytes | None:
         """The JSON of a chart."""
         return self._charts.get(name)
+
+
+def offers() -> dict:
+    """What a page holds whatever was found: its sections in order, and the effects that can be tried."""
+    return {"order": ORDER, "vocabulary": spoken()}
 
 
 @cache

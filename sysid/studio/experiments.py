@@ -13,6 +13,7 @@ from ..errors import SysidError
 from ..specs import Experiment
 from .cache import Cache
 from .session import Session
+from .turn import Turn
 
 _LOOKED_AT = 100_000  # bytes of a file, to see whether it is an experiment
 
@@ -28,7 +29,7 @@ class Experiments:
         self._paths, self._out = paths, out
         self.names = [Experiment(path=path).name for path in paths]
         self._sessions: dict[int, Session] = {}
-        self._cache, self._turn, self._lock = Cache(), threading.Lock(), threading.Lock()
+        self._cache, self._turn, self._lock = Cache(), Turn(), threading.Lock()
 
     @classmethod
     def of(cls, session: Session) -> Experiments:

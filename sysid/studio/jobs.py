@@ -9,8 +9,7 @@ from dataclasses import dataclass, field
 
 from ..errors import SysidError
 from ..progress import Course
-
-_WAIT = 0.1  # s between looks whether a job that waits was cancelled
+from .turn import Turn
 
 
 class Cancelled(Exception):
@@ -29,26 +28,29 @@ class Job:
     error: str | None = None
     said: str = ""
     stop: threading.Event = field(default_factory=threading.Event)
+    let_by: Callable[[], None] = lambda: None
     _course: Course = field(default_factory=lambda: Course(asks=True))
 
     def tell(self, stage: str, share: float) -> None:
         """Progress, as `pipeline.fit` and `diagnose` report it. Raises Cancelled."""
         if self.stop.is_set():
             raise Cancelled
+        self.let_by()
         self.stage, self.share = self._course.tell(stage, share)
 
     def document(self) -> dict:
         """What the page polls."""
-        return {"number": self.number, "sha": self.sha, "state": "cancelling" if self.state == "running" and self.stop.is_set() else self.state, "stage": self.stage, "share": self.share, "error": self.error, "said": self.said}
+        return {"number": self.number, "sha": self.sha, "state": "cancelling" if self.state == "running" and self.stop.is_set() else self.state, "stage": self.stage, "share": self.share, "error": self.error, "said": self.said, "found": self._course.found}
 
 
 class Worker:
     """Runs the newest job; one that it overtakes is stopped."""
 
-    def __init__(self, turn: threading.Lock | None = None):
-        """turn: held by the job that runs; shared by the workers of several experiments, of which one works at a time."""
+    def __init__(self, turn: Turn | None = None, *, ahead: bool = False):
+        """turn: held by the job that runs; shared by the workers of several experiments, of which one works at a time. ahead: its jobs are short, and
+        do not wait for the end of a long one."""
         self._lock = threading.Lock()
-        self._turn = turn or threading.Lock()
+        self._turn, self._ahead = turn or Turn(), ahead
         self.job: Job | None = None
         self._count = 0
 
@@ -75,10 +77,11 @@ class Worker:
                 self.job.stop.set()
 
     def _run(self, job: Job, work: Callable[[Job], None]) -> None:
-        while not self._turn.acquire(timeout=_WAIT):
-            if job.stop.is_set():  # overtaken or cancelled before its turn
-                job.state = "cancelled"
-                return
+        if not self._turn.take(job.stop, ahead=self._ahead):
+            job.state = "cancelled"  # or overtaken, before its turn
+            return
+        if not self._ahead:
+            job.let_by = self._turn.let_by
         try:
             try:
                 job.tell("starting", 0.0)
@@ -94,4 +97,4 @@ class Worker:
                 traceback.print_exc()
                 job.error, job.state = f"internal error, {type(error).__name__}: {error}", "failed"
         finally:
-            self._turn.release()
+            self._turn.give()

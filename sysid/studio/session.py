@@ -3,7 +3,6 @@ texts."""
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable
 from pathlib import Path
 
@@ -18,11 +17,12 @@ from . import beside, changes
 from .aside import Aside
 from .cache import Cache, key
 from .changes import Change
-from .diagnosed import Diagnosed
+from .diagnosed import Diagnosed, offers
 from .history import Changed, History, hashed
 from .jobs import Job, Worker
 from .rows import Shown
 from .stretch import compared, stretch
+from .turn import Turn
 from .workspace import Workspace, workspace_page
 
 
@@ -30,7 +30,7 @@ class Session:
     """What the requests of a page do. Safe to use from several threads.
 
     Args:
-        cache, turn: what several experiments share: the memory, and the lock of the one that works.
+        cache, turn: what several experiments share: the memory, and the turn to work.
     """
 
     def __init__(
@@ -39,9 +39,9 @@ class Session:
         out: Path | None = None,
         *,
         cache: Cache | None = None,
-        turn: threading.Lock | None = None,
+        turn: Turn | None = None,
     ):
-        self.history, turn = History(path, out), turn or threading.Lock()
+        self.history, turn = History(path, out), turn or Turn()
         self.worker, self.aside = Worker(turn), Aside(self.history, turn)
         self._cache = cache or Cache()
         self._last: dict | None = None
@@ -115,7 +115,7 @@ class Session:
     def fitted(self, sha: str) -> dict:
         """What the page shows of a fit before it is diagnosed."""
         seen = self.workspace(sha)
-        return workspace_page(seen, self._steps(sha, seen.fit))
+        return workspace_page(seen, self._steps(sha, seen.fit)) | offers()
 
     def workspace(self, sha: str, shown: str = "") -> Workspace:
         """The fit under the text with a hash, ready to be looked at, diagnosed or not.

@@ -6,6 +6,7 @@ const {sysid} = window, {at, make, button, get, post} = sysid.page;
 const {stands, act, tick, runs} = sysid.standing;
 let page = null;
 let wanted = null; // hash of the preview that is being made, to be shown when it is there
+let forms = null; // made once: what was typed stays when the diagnosis comes
 
 // ---- previews: the very fit that the change gives
 async function preview(body, wrong) {
@@ -22,9 +23,9 @@ async function preview(body, wrong) {
 }
 
 function follow(state) {
-  if (!page || stands.shown !== state.sha) return;
+  if (!page || ![stands.shown, stands.early].includes(state.sha)) return;
   sysid.workspace.previews(state.previews);
-  const aside = state.aside, failed = aside && aside.state === "failed";
+  const {aside} = state, failed = aside && aside.state === "failed";
   if (wanted && state.previews.some(one => one.sha === wanted.sha)) {
     sysid.workspace.previewed(wanted.sha, page.joints.findIndex(j => j.name === wanted.joint));
     wanted = null;
@@ -67,7 +68,7 @@ function form(id, fields, body, word) { // fields, and a button to preview and o
     act("api/add", body(), wrong);
   };
   const before = button("preview", () => preview(body(), wrong),
-    {"data-acts": true, id: id + "-preview", "data-key": id + "-preview"});
+    {"data-looks": true, id: id + "-preview", "data-key": id + "-preview"});
   const add = make("button", {type: "submit", "data-acts": true, "data-key": id}, word);
   return [make("form", {class: "own", id, onsubmit: send}, ...fields, add, before), wrong];
 }
@@ -104,9 +105,8 @@ function anyEffect() { // whatever the vocabulary has, suspect or not
     options: Object.fromEntries(Object.entries(inputs).map(([name, box]) => [name, box.value])),
   });
   const fields = [make("label", {}, "effect", effect), make("label", {}, "joint", where), options];
-  at("suspects").append(make("h3", {}, "Any other effect"), ...form("own", fields, body,
-    "add effect"), says);
   told();
+  return [make("h3", {}, "Any other effect"), ...form("own", fields, body, "add effect"), says];
 }
 
 function formula() {
@@ -115,10 +115,10 @@ function formula() {
   const where = whereabouts();
   const fields = [make("label", {class: "wide"}, "torque = ", box), make("label", {}, "joint",
     where)];
-  at("suspects").append(make("h3", {}, "A formula of your own"), make("p", {class: "quiet"},
+  const body = () => ({formula: box.value, joint: where.value || null});
+  return [make("h3", {}, "A formula of your own"), make("p", {class: "quiet"},
     "Torque as a formula of the joint’s motion; names that it does not know are fitted."),
-    ...form("formula", fields, () => ({formula: box.value, joint: where.value || null}),
-      "add formula"));
+    ...form("formula", fields, body, "add formula")];
 }
 
 // ---- a motion that separates what is tied, or that tells most
@@ -160,12 +160,12 @@ function designed(place, state) { // the design that was asked for here, where i
     ", ", link("design.json"), ". Log it, and give the log to data.train.");
 }
 
-function build(found) {
+function build(found) { // of a fit, or of its diagnosis
   page = found;
-  suspects();
-  anyEffect();
-  formula();
-  designs();
+  forms ??= [...anyEffect(), ...formula()];
+  if (found.findings) suspects();
+  at("suspects").append(...forms);
+  if (found.findings) designs();
   get("api/state").then(follow, () => {});
 }
 

@@ -17,15 +17,21 @@ sysid.figure = async id => {
   return chart;
 };
 
-function placed(name) {
-  let section = at(name);
-  if (!section) {
-    section = make("section", {id: name, "aria-labelledby": name + "-title"});
-    at("sections").append(section);
+function places(order) { // one for each section, in the page's order; empty ones are not seen
+  for (const name of order) {
+    if (at(name)) continue;
+    at("sections").append(make("section", {id: name, "aria-labelledby": name + "-title"}));
     at("links").append(make("li", {}, make("a", {href: "#" + name}, SHORT[name] || name)));
   }
-  return section;
 }
+
+function linked() {
+  for (const one of at("links").children) {
+    one.hidden = !document.querySelector(one.firstChild.hash).childElementCount;
+  }
+}
+
+const titled = (name, words) => make("h2", {id: name + "-title", tabindex: "-1"}, words);
 
 // ---- what the last change did
 function fell(found) {
@@ -51,15 +57,26 @@ async function showFit(sha) {
   const found = await get("api/fitted", {sha});
   if (stands.shown === sha || stands.looking !== sha) return;
   stands.early = sha;
-  if (!at("verdict")) {
-    placed("verdict").replaceChildren(make("h2", {id: "verdict-title", tabindex: "-1"}, "Verdict"),
-      make("p", {class: "lead"}, AT_WORK));
+  places(found.order);
+  if (!at("verdict-title")) {
+    at("verdict").append(titled("verdict", "Verdict"), make("p", {class: "lead"}, AT_WORK),
+      make("p", {id: "so-far", class: "quiet", "aria-live": "polite"}));
+    at("suspects").append(titled("suspects", "Try an effect"));
+    sysid.remedies.build(found);
   }
-  await workspace(found, sha, true);
+  const drawn = workspace(found, sha, true);
+  linked();
+  await drawn;
+}
+
+function soFar(names) { // what joined while the diagnosis is at work
+  const place = at("so-far"), words = names.length ? "Asked so far, each with those before it: "
+    + names.join("; ") + ". The verdict follows when all of them are weighed." : "";
+  if (place && place.textContent !== words) place.textContent = words;
 }
 
 async function workspace(found, sha, fresh) {
-  const section = placed("workspace");
+  const section = at("workspace");
   if (!section.childElementCount) sysid.workspace.build(section);
   section.classList.toggle("fresh", fresh);
   at("fall").classList.toggle("fresh", fresh);
@@ -78,17 +95,18 @@ async function show(sha) {
   page = found;
   const worst = page.verdict.findIndex(v => v.status === "missing");
   if (anew && worst >= 0) found.first = worst;
+  places(page.order);
   for (const name of page.order) {
-    const section = placed(name);
     if (name === "workspace") continue;
-    const part = page.sections[name];
+    const section = at(name), part = page.sections[name];
     section.innerHTML = part.html; // made and escaped by the server, as in the report
-    section.prepend(make("h2", {id: name + "-title", tabindex: "-1"}, part.title));
+    section.prepend(titled(name, part.title));
   }
   workspace(found, sha, false);
   offers();
   sysid.remedies.build(page);
   compared();
+  linked();
   sysid.begin();
   if (!lost) return;
   const again = [...document.querySelectorAll("[data-key]")].find(e => e.dataset.key === focus);
@@ -141,5 +159,5 @@ function compared() {
   ask();
 }
 
-sysid.sections = {show, showFit, on};
+sysid.sections = {show, showFit, soFar, on};
 })();

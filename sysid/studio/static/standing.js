@@ -43,7 +43,7 @@ const runs = job => Boolean(job) && (job.state === "running" || job.state === "c
 const working = state => runs(state.job);
 
 function enable() {
-  const state = stands.last || {}, {looking, shown} = stands;
+  const state = stands.last || {}, {looking, shown, early} = stands;
   const fresh = looking !== null && state.sha === looking && !busy && told !== "changed";
   for (const word of ["undo", "redo"]) {
     at(word).disabled = !(fresh && state[word]);
@@ -51,6 +51,9 @@ function enable() {
   }
   for (const one of document.querySelectorAll("[data-acts]")) {
     one.disabled = !(fresh && shown === looking && !working(state));
+  }
+  for (const one of document.querySelectorAll("[data-looks]")) { // beside a diagnosis, too
+    one.disabled = !(fresh && (shown === looking || early === looking));
   }
 }
 
@@ -118,6 +121,7 @@ async function follow(state) {
   if (!at("report").hidden) {
     at("report").href = "export/report.html?sha=" + encodeURIComponent(shown);
   }
+  if (first) sysid.sections.soFar(job.found);
   sysid.remedies.follow(state);
   enable();
 }
