@@ -7,6 +7,7 @@ const {stands, act, tick, runs} = sysid.standing;
 let page = null;
 let wanted = null; // hash of the preview that is being made, to be shown when it is there
 let forms = null; // made once: what was typed stays when the diagnosis comes
+const wheres = []; // their lists of joints
 
 // ---- previews: the very fit that the change gives
 async function preview(body, wrong) {
@@ -58,7 +59,14 @@ function whereabouts() {
   const where = make("select", {}, ...page.joints.map(j => make("option", {value: j.name}, j.name)),
     make("option", {value: ""}, "every joint"));
   where.value = page.joints[sysid.workspace.view.joint].name;
+  where.addEventListener("change", () => { where.dataset.chosen = "by hand"; });
+  wheres.push(where);
   return where;
+}
+
+function suggested() { // the joint in sight, where nobody chose another
+  const {name} = page.joints[sysid.workspace.view.joint];
+  for (const one of wheres) if (!one.dataset.chosen && !one.disabled) one.value = name;
 }
 
 function form(id, fields, body, word) { // fields, and a button to preview and one to add
@@ -165,6 +173,7 @@ function build(found) { // of a fit, or of its diagnosis
   forms ??= [...anyEffect(), ...formula()];
   if (found.findings) suspects();
   at("suspects").append(...forms);
+  suggested();
   if (found.findings) designs();
   get("api/state").then(follow, () => {});
 }
