@@ -49,7 +49,10 @@ def __getattr__(name: str):
         raise AttributeError(f"module 'sysid' has no attribute {name!r}")
     module, attribute = _WHERE[name]
     found = import_module(f".{module}", __name__)
-    return found if attribute is None else getattr(found, attribute)
+    if attribute is None:
+        return found
+    found = getattr(found, attribute)
+    return found if isinstance(found, type) else import_module(".callable_module", __name__).no_path(found)
 
 
 def __dir__():

@@ -16,6 +16,7 @@ from .threads import single_threaded
 _MADE = {"Experiment": "sysid.load({path!r})", "Fit": "sysid.fit(sysid.load({path!r}))"}  # from a path
 
 
+@functools.cache
 def no_path(work):
     """A function that says what to call where it is handed a path in the place of an experiment or a fit.
 

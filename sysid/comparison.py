@@ -10,7 +10,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from .blocks import Numbering, extents, jackknife, summed
-from .callable_module import no_path
 from .errors import SysidError
 from .estimate import Fit
 from .fit_document import number
@@ -56,7 +55,6 @@ class Differences(tuple[Difference, ...]):
         return figure
 
 
-@no_path
 def compare(first: Fit, second: Fit, names: tuple[str, str] | None = None) -> Differences:
     """Compare two fits joint by joint on their test logs.
 

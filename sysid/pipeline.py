@@ -20,7 +20,6 @@ import numpy as np
 from . import config, drives, gains, groups, listed_effects, masses, robot, rollout
 from . import filters as filtering
 from . import log as logs
-from .callable_module import no_path
 from .compress import compress
 from .drives import scale_is_told, with_drives
 from .earlier_fit import read_inertias
@@ -67,7 +66,6 @@ def build(experiment: Experiment) -> tuple[Robot, Model, np.ndarray]:
     return machine, structure, _prior(experiment, structure)
 
 
-@no_path
 @single_threaded
 def fit(
     experiment: Experiment, *, filters: dict | None = None, strength: PriorWeight | None = None, progress: Progress | None = None, measured: Read | None = None,
@@ -174,7 +172,6 @@ def refit(experiment: Experiment, before: Fit, *, filters: dict | None = None, *
     return after, fit(experiment, filters=after.filters, strength=before.strength, **how)
 
 
-@no_path
 def predict_log(found: Fit, log: str | LogSpec, *, levels: Mapping[str, str] | None = None) -> Prediction:
     """What a fitted model predicts on another log, read and filtered as the experiment says.
 

@@ -11,8 +11,8 @@ from .readers.table import Table
 
 _DEFAULTS = ColumnsSpec()
 
-_KEYS = {"q": "position", "tau": "torque", "qd": "velocity", "qdd": "acceleration"}
-
+#: the signals of the joints, and what an experiment's data.columns calls each
+KEYS = {"q": "position", "tau": "torque", "qd": "velocity", "qdd": "acceleration"}
 _QUANTITIES = {"q": "position", "qd": "position", "qdd": "position", "tau": "torque"}
 
 
@@ -106,7 +106,7 @@ def refuse_shared(table: Table, wanted: dict, joints) -> None:
     """
     said: dict[str, str] = {}
     for key, names in wanted.items():
-        kind = _KEYS[key]
+        kind = KEYS[key]
         whole = len(names) < len(joints)  # a matrix
         for k, name in enumerate(names):
             own = f"the {kind} of {'every joint' if whole else joints[k]}"

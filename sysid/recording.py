@@ -19,7 +19,7 @@ from .errors import LogError, SysidWarning
 from .log_spec import DataSpec, LogSpec
 from .readers import open_table
 from .readers.table import Table
-from .recorded_columns import check_headers, meant, names_of, refuse_shared, single, time_of
+from .recorded_columns import KEYS, check_headers, meant, names_of, refuse_shared, single, time_of
 
 _EPOCH = 1e6  # s: a clock that reads more counts from 1970, not from the log's start
 EPISODE = "episode_index"  # the column in which LeRobot numbers episodes
@@ -122,12 +122,7 @@ def _load(table: Table, data: DataSpec, joints, episodes, drives):
         "q": motor_side.has_column(data.position, (), joints),
         "tau": motor_side.has_column(data.torque, (*data.unused, *drives), joints),
     }
-    for name, key in (
-        ("q", "position"),
-        ("tau", "torque"),
-        ("qd", "velocity"),
-        ("qdd", "acceleration"),
-    ):
+    for name, key in KEYS.items():
         if (pattern := meant(table, spec, key)) is not None:
             own = needed.get(name, [True] * len(joints))
             there = names_of(table, pattern, joints, name, own) if any(own) else [None] * len(own)

@@ -16,7 +16,6 @@ from collections.abc import Callable
 from pathlib import Path
 
 from . import state
-from .callable_module import no_path
 from .differences import told
 from .estimate import Fit
 from .filters import settled
@@ -25,7 +24,6 @@ from .specs import Experiment, is_own
 from .whole_files import folder, sunk, write_together
 
 
-@no_path
 def write(fit: Fit, out: str | Path) -> dict:
     """Write the run folder; returns the document of fit.json."""
     from .urdf_export import identified_urdf

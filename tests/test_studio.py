@@ -99,12 +99,13 @@ class TestClient:
 
 
 class studio:
-    def __init__(self, folder, run, **more):
+    def __init__(self, folder, run, *, begin=True, **more):
         self.file, self.run = folder / "config.yaml", run
         self.session = Session(folder, run)
         self.client = TestClient(application(self.session, port=PORT, csrf=CSRF, **more), base_url=HOME)
-        self.session.run()
-        self.wait()
+        if begin:
+            self.session.run()
+            self.wait()
 
     def get(self, path, **words):
         return self.client.get(path, params=words)
@@ -218,10 +219,7 @@ def test_a_preview_does_not_wait_for_the_end_of_the_diagnosis(arm, tmp_path, mon
         return diagnose(*args, progress=progress, **more)
 
     monkeypatch.setattr(session, "diagnose", asking)
-    own = studio.__new__(studio)
-    folder = shutil.copytree(arm[0], tmp_path / "arm")
-    own.file, own.run, own.session = folder / "config.yaml", tmp_path / "run", Session(folder, tmp_path / "run")
-    own.client = TestClient(application(own.session, port=PORT, csrf=CSRF), base_url=HOME)
+    own = studio(shutil.copytree(arm[0], tmp_path / "arm"), tmp_path / "run", begin=False)
     own.session.run()
     assert begun.wait(60.0)
     key = previewed(own, effect="cogging", joint=EVIL, options={"lines": "2"})
@@ -497,11 +495,10 @@ def test_a_short_job_is_let_by_where_a_long_one_tells_how_far_it_is():
     other.start("b", long)
     for worker, name in ((ahead, "c"), (aside, "d")):
         worker.start(name, short)
-    wait = lambda *workers: [ended(worker) for worker in workers]  # noqa: E731
-    wait(ahead, aside)
+    ended(ahead), ended(aside)
     assert sorted(order) == ["c", "d"] and first.job.state == other.job.state == "running"
     go.set()
-    wait(first, other)
+    ended(first), ended(other)
     assert order[2:] in (["a", "b"], ["b", "a"]) and {w.job.state for w in (first, other, ahead, aside)} == {"done"}
 
 
@@ -691,9 +688,7 @@ def test_a_job_stops_where_it_tells_and_the_next_one_runs():
     first = worker.start("a", endless)
     assert begun.wait(5) and worker.start("a", endless) is first
     worker.start("b", lambda job: done.append(1))
-    end = time.monotonic() + 5
-    while worker.job.state == "running" and time.monotonic() < end:
-        time.sleep(0.01)
+    ended(worker)
     assert first.state == "cancelled" and worker.job.state == "done" and done == [1]
 
 
@@ -709,10 +704,7 @@ def test_shares_of_a_job_only_rise():
 
 
 def test_cancel_keeps_the_page_answering_and_the_file_whole(arm, tmp_path):
-    folder = shutil.copytree(arm[0], tmp_path / "arm")
-    own = studio.__new__(studio)
-    own.file, own.run, own.session = folder / "config.yaml", tmp_path / "run", Session(folder, tmp_path / "run")
-    own.client = TestClient(application(own.session, port=PORT, csrf=CSRF), base_url=HOME)
+    own = studio(shutil.copytree(arm[0], tmp_path / "arm"), tmp_path / "run", begin=False)
     before = own.file.read_bytes()
     assert own.post("/api/run").json()["job"]["state"] == "running"
     own.post("/api/cancel")

@@ -7,7 +7,6 @@ const {stands, act, tick, runs} = sysid.standing;
 let page = null;
 let wanted = null; // hash of the preview that is being made, to be shown when it is there
 let forms = null; // made once: what was typed stays when the diagnosis comes
-const wheres = []; // their lists of joints
 
 // ---- previews: the very fit that the change gives
 async function preview(body, wrong) {
@@ -56,17 +55,18 @@ function suspects() {
 const failure = () => make("p", {class: "wrong", role: "alert"});
 
 function whereabouts() {
-  const where = make("select", {}, ...page.joints.map(j => make("option", {value: j.name}, j.name)),
-    make("option", {value: ""}, "every joint"));
-  where.value = page.joints[sysid.workspace.view.joint].name;
+  const where = make("select", {class: "where"}, ...page.joints.map(j => make("option",
+    {value: j.name}, j.name)), make("option", {value: ""}, "every joint"));
   where.addEventListener("change", () => { where.dataset.chosen = "by hand"; });
-  wheres.push(where);
   return where;
 }
 
+const inSight = () => page.joints[sysid.workspace.view.joint].name;
+
 function suggested() { // the joint in sight, where nobody chose another
-  const {name} = page.joints[sysid.workspace.view.joint];
-  for (const one of wheres) if (!one.dataset.chosen && !one.disabled) one.value = name;
+  for (const one of at("suspects").querySelectorAll("select.where")) {
+    if (!one.dataset.chosen && !one.disabled) one.value = inSight();
+  }
 }
 
 function form(id, fields, body, word) { // fields, and a button to preview and one to add
@@ -97,7 +97,7 @@ function anyEffect() { // whatever the vocabulary has, suspect or not
       where.value = "*";
     } else if (!robot && whole.isConnected) {
       whole.remove();
-      where.value = page.joints[sysid.workspace.view.joint].name;
+      where.value = inSight();
     }
     where.disabled = robot;
     for (const name of Object.keys(inputs)) delete inputs[name];

@@ -27,7 +27,7 @@ function places(order) { // one for each section, in the page's order; empty one
 
 function linked() {
   for (const one of at("links").children) {
-    one.hidden = !document.querySelector(one.firstChild.hash).childElementCount;
+    one.hidden = !at(one.firstChild.hash.slice(1)).childElementCount;
   }
 }
 
