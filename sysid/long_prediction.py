@@ -93,14 +93,19 @@ class LongPrediction(Prediction):
     def __getattr__(self, name: str):
         if name not in _ARRAYS:
             raise AttributeError(name)
-        import polars as pl
-
         if name == "use" and not self.masked:
             return None
         word = {"measured": "measured_", "predicted": "predicted_", "use": "used_"}.get(name)
         wanted = [name] if word is None else [f"{word}{joint}" for joint in self.joints]
-        table = pl.scan_parquet(self.files).select(wanted).collect()
+        table = self.lazy().select(wanted).collect()
         return table[name].to_numpy() if word is None else table.to_numpy()
+
+    def _columns(self, joint: int) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
+        words = ("measured", "predicted", "used") if self.masked else ("measured", "predicted")
+        wanted = [f"{word}_{self.joints[joint]}" for word in words]
+        table = self.lazy().select(wanted).collect()
+        own = [table[name].to_numpy() for name in wanted]
+        return own[0], own[1], own[2] if self.masked else None
 
     def __repr__(self) -> str:
         errors = ", ".join(

@@ -84,10 +84,16 @@ class Prediction:
         residual = self.measured - self.predicted
         return residual if self.use is None else np.where(self.use, residual, 0.0)
 
-    def counted_residual(self, joint: int) -> np.ndarray:
-        """(n,) measured minus predicted torque of a joint, NaN where a row does not count."""
-        left = self.measured[:, joint] - self.predicted[:, joint]
-        return left if self.use is None else np.where(self.use[:, joint], left, np.nan)
+    def of_joint(self, joint: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Measured and predicted torque of a joint and their difference, (n,) each; the difference is NaN where a row
+        does not count."""
+        measured, predicted, use = self._columns(joint)
+        left = measured - predicted
+        return measured, predicted, left if use is None else np.where(use, left, np.nan)
+
+    def _columns(self, joint: int) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
+        own = (np.ascontiguousarray(v[:, joint]) for v in (self.measured, self.predicted))
+        return *own, None if self.use is None else self.use[:, joint]
 
     @property
     def counts(self) -> np.ndarray:

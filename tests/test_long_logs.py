@@ -78,6 +78,9 @@ def test_a_log_in_spans_is_fitted_as_the_log_as_one(filter_, monkeypatch):
             np.testing.assert_allclose(other.errors()[key], value, rtol=1e-9)
         assert other.told() == pytest.approx(one.told(), rel=1e-9)
         np.testing.assert_array_equal(other.greatest(3), one.greatest(3))
+        for joint in range(len(one.joints)):  # which is read alone
+            for there, here in zip(other.of_joint(joint), one.of_joint(joint)):
+                np.testing.assert_allclose(there, here, rtol=1e-9, atol=1e-9)
         np.testing.assert_array_equal(other.states.index, one.states.index)
         np.testing.assert_allclose(other.states.q, one.states.q, atol=1e-12)
 
@@ -205,6 +208,12 @@ def test_a_mask_is_one_event_however_many_spans_it_goes_through(short_spans, mon
     found = sysid.fit(spec)
     monkeypatch.setattr(spans, "SPAN", 2**18)
     assert found.events == sysid.fit(spec).events and len(found.events) == 1
+    one = found.predictions["train"]  # in files; a joint of it is read alone
+    measured, predicted, use = one.measured, one.predicted, one.use
+    for joint in range(len(one.joints)):
+        left = np.where(use[:, joint], measured[:, joint] - predicted[:, joint], np.nan)
+        np.testing.assert_array_equal(one.of_joint(joint)[2], left)
+    assert one.files and not use.all()
 
 
 def test_events_go_on_from_span_to_span():

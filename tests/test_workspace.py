@@ -114,7 +114,7 @@ def test_dots_say_where_the_joint_was(arm):
     forward = [c for c, v in zip(speed["marker"]["color"], speed["x"]) if v > 0.1]
     assert len(set(forward)) == 1
     rows = sum(map(sum, told["map"]["figure"]["data"][0]["customdata"]))
-    assert rows == np.isfinite(arm.predictions["test"].counted_residual(0)[states.index]).sum()
+    assert rows == np.isfinite(arm.predictions["test"].of_joint(0)[2][states.index]).sum()
 
 
 def test_the_robot_moves_as_the_log_says(arm):

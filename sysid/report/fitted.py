@@ -24,10 +24,7 @@ def torque(fit: Fit, document: dict) -> Section:
     line = charts.timeline({part: (p.log, p.t, names[part]) for part, p in parts.items()})
     drawn, unit, events = [], units(fit), document["events"]
     for j, joint in enumerate(fit.joints):
-        series = {}
-        for part, prediction in parts.items():
-            measured, predicted = prediction.measured[:, j], prediction.predicted[:, j]
-            series[part] = (measured, predicted, prediction.counted_residual(j))
+        series = {part: prediction.of_joint(j) for part, prediction in parts.items()}
         mine = [e for e in events if joint in e["joints"]]
         own = [span for e in mine for part in line.values() for span in placed(e, part)]
         force = unit[joint][0]

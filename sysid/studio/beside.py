@@ -7,13 +7,15 @@ from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
+import numpy as np
+
 from .. import bounded
 from ..errors import SysidError
 from ..estimate import Fit
 from ..prediction import Prediction
 from ..run import read_run
 from .diagnosed import step_name
-from .rows import Columns, columns
+from .rows import Columns
 
 _MOST = 40  # run folders that are offered
 
@@ -33,9 +35,13 @@ class OtherRun:
         """The RMS of each joint. Raises SysidError, as `prediction`."""
         return _told(self.folder, self._stamp(), part)
 
+    def times(self, part: str) -> np.ndarray:
+        """(n,) of its rows [s]. Raises SysidError, as `prediction`."""
+        return self.prediction(part).t
+
     def columns(self, part: str, joint: int) -> Columns:
-        """What is drawn of a joint. Raises SysidError, as `prediction`."""
-        return columns(self.prediction(part), joint)
+        """What it says of a joint. Raises SysidError, as `prediction`."""
+        return self.prediction(part).of_joint(joint)
 
     def _stamp(self) -> int:
         return (self.folder / "predictions.parquet").stat().st_mtime_ns

@@ -28,7 +28,8 @@ def time(joint: str, unit: str, t, lines: dict, *, own, breaks, window, shaded) 
             kind) of events.
     """
     x = charts.rounded(np.insert(np.asarray(t, dtype=float), breaks, np.nan), 7)
-    named = [[charts.plain(log), clock] for log, clock in own]
+    names = {log: charts.plain(log) for log in {log for log, _ in own}}
+    named = [[names[log], clock] for log, clock in own]
     left = charts.rounded(np.insert(lines["residual"], breaks, np.nan), 4)
     left = ["–" if value is None else value for value in left]
     told = {

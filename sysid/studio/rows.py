@@ -8,14 +8,8 @@ import numpy as np
 
 from ..prediction import Prediction
 
-Columns = tuple[np.ndarray, np.ndarray, np.ndarray]  # measured, predicted, residual, (n,) each
-
-
-def columns(found: Prediction, joint: int) -> Columns:
-    """What a prediction says of a joint, each in one piece of memory; the residual is NaN where a
-    row does not count."""
-    own = (np.ascontiguousarray(v[:, joint]) for v in (found.measured, found.predicted))
-    return *own, found.counted_residual(joint)
+# of a joint: measured, predicted, residual, (n,) each, as `Prediction.of_joint` has them
+Columns = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
 class Shown(Protocol):
@@ -27,22 +21,26 @@ class Shown(Protocol):
     def told(self, part: str) -> list[float | None]:
         """The RMS of each joint on it."""
 
+    def times(self, part: str) -> np.ndarray:
+        """(n,) of its rows [s], by the clocks of their logs."""
+
     def columns(self, part: str, joint: int) -> Columns:
-        """Of a joint, as the function of this name has it."""
+        """What it says of a joint."""
 
 
 def same_rows(other: Shown, seen: Shown, part: str, joint: int):
     """Predicted torque and residual (n,) of another model on the rows in sight, NaN where it has
     none of them; None where its logs are others."""
-    theirs, mine = other.prediction(part), seen.prediction(part)
-    if mine.t.shape == theirs.t.shape and np.array_equal(mine.t, theirs.t):
+    theirs, mine = other.times(part), seen.times(part)
+    if np.array_equal(mine, theirs):
         return other.columns(part, joint)[1:]
-    predicted, left = np.full(len(mine.t), np.nan), np.full(len(mine.t), np.nan)
+    predicted, left = np.full(len(mine), np.nan), np.full(len(mine), np.nan)
     _, torque, residual = other.columns(part, joint)
-    for log in np.unique(theirs.log):  # another filter has other edges
-        rows, own = np.flatnonzero(mine.log == log), np.flatnonzero(theirs.log == log)
-        at = np.minimum(np.searchsorted(theirs.t[own], mine.t[rows]), len(own) - 1)
-        same = theirs.t[own[at]] == mine.t[rows]
+    logs, shown = other.prediction(part).log, seen.prediction(part).log
+    for log in np.unique(logs):  # another filter has other edges
+        rows, own = np.flatnonzero(shown == log), np.flatnonzero(logs == log)
+        at = np.minimum(np.searchsorted(theirs[own], mine[rows]), len(own) - 1)
+        same = theirs[own[at]] == mine[rows]
         predicted[rows[same]], left[rows[same]] = (v[own[at[same]]] for v in (torque, residual))
     return (predicted, left) if np.isfinite(predicted).mean() > 0.5 else None
 

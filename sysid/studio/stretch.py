@@ -36,7 +36,7 @@ def stretch(
     inside, found, unit = (t >= low) & (t <= high), seen.prediction(part), units(fit)
     joints, taken = [], []
     for j, joint in enumerate(fit.joints):
-        left = found.counted_residual(j)
+        left = found.of_joint(j)[2]
         whole = seen.told(part)[j]
         here = whole if inside.all() else rms(left[inside])
         joints.append({"joint": joint, "unit": unit[joint][0], "here": here, "whole": whole})

@@ -21,7 +21,7 @@ from ..report.decimate import kept
 from ..report.fitted import log_names, placed
 from ..report.words import band, units
 from . import panels
-from .rows import Columns, Shown, columns, rms, same_rows
+from .rows import Columns, Shown, rms, same_rows
 
 MOST = 2000  # samples of a line before it is thinned: two for each pixel of a wide screen
 _DOTS = 3000  # of a cloud
@@ -38,6 +38,7 @@ class Workspace:
         self._lines: dict[str, dict] = {}
         self._told: dict[str, list[float | None]] = {}
         self._columns: dict[tuple[str, int], Columns] = {}
+        self._times: dict[str, np.ndarray] = {}
         self._films: dict[str, dict] = {}
 
     def prediction(self, part: str) -> Prediction:
@@ -52,11 +53,17 @@ class Workspace:
             self._told[part] = self.prediction(part).told()
         return self._told[part]
 
+    def times(self, part: str) -> np.ndarray:
+        """(n,) of the rows of a part [s], by the clocks of their logs."""
+        if part not in self._times:
+            self._times[part] = self.prediction(part).t
+        return self._times[part]
+
     def columns(self, part: str, joint: int) -> Columns:
         """What is drawn of a joint; of the one looked at last it is kept at hand."""
         found = self._columns.get((part, joint))  # another thread may put its own in its place
         if found is None:
-            found = columns(self.prediction(part), joint)
+            found = self.prediction(part).of_joint(joint)
             self._columns = {(part, joint): found}
         return found
 
@@ -70,7 +77,7 @@ class Workspace:
         """The logs of a part end to end, the first from 0 s: as `charts.timeline` has them."""
         if part not in self._lines:
             found = self.prediction(part)
-            parts = {part: (found.log, found.t, log_names(self.fit, part))}
+            parts = {part: (found.log, self.times(part), log_names(self.fit, part))}
             self._lines[part] = charts.timeline(parts)[part]
         return self._lines[part]
 
@@ -91,7 +98,7 @@ class Workspace:
             RMS of all rows that count, of those of the window, and of all of the other model's own
             (None where there is none); whether its rows are among these.
         """
-        name, line, found = self.joint(joint), self.line(part), self.prediction(part)
+        name, line = self.joint(joint), self.line(part)
         t, (measured, predicted, left) = line["t"], self.columns(part, joint)
         low, high = self._bounds(t, low, high)
         # one row beyond either edge, so that lines reach it
@@ -110,7 +117,7 @@ class Workspace:
         keep = keep if rows.stop - rows.start > MOST else np.arange(rows.stop - rows.start)
         chart = panels.time(
             name, units(self.fit)[name][0], t[rows][keep], {w: v[keep] for w, v in lines.items()},
-            own=_own_clock(line, rows.start + keep, found), breaks=_breaks(line, rows.start + keep),
+            own=self._own_clock(part, rows.start + keep), breaks=_breaks(line, rows.start + keep),
             window=(low, high), shaded=self._disturbed(part, name, low, high),
         )  # fmt: skip
         inside = (t >= low) & (t <= high)
@@ -126,7 +133,7 @@ class Workspace:
 
     def csv(self, part: str, joint: int, low=None, high=None) -> str:
         """Every row of a window of time as text of a CSV file: the log, its own clock, torques."""
-        name, line, found = self.joint(joint), self.line(part), self.prediction(part)
+        name, line = self.joint(joint), self.line(part)
         low, high = self._bounds(line["t"], low, high)
         rows = np.flatnonzero((line["t"] >= low) & (line["t"] <= high))
         unit = units(self.fit)[name][0]
@@ -138,16 +145,10 @@ class Workspace:
         out = io.StringIO()
         sheet = csv.writer(out, lineterminator="\n")
         sheet.writerow(heads)
-        left = found.counted_residual(joint)
-        for k, (log, _) in zip(rows, _own_clock(line, rows, found)):
-            torques = found.measured[k, joint], found.predicted[k, joint], left[k]
-            sheet.writerow(
-                [
-                    log,
-                    repr(float(found.t[k])),
-                    *(repr(float(v)) if np.isfinite(v) else "" for v in torques),
-                ]
-            )
+        own, t = self.columns(part, joint), self.times(part)
+        for k, (log, _) in zip(rows, self._own_clock(part, rows)):
+            torques = (repr(float(v[k])) if np.isfinite(v[k]) else "" for v in own)
+            sheet.writerow([log, repr(float(t[k])), *torques])
         return out.getvalue()
 
     @staticmethod
@@ -162,12 +163,12 @@ class Workspace:
 
     def own_clocks(self, part: str, low: float, high: float) -> list[tuple[str, float, float]]:
         """The logs that a stretch of time touches, and from when to when by their own clocks."""
-        line, found, out = self.line(part), self.prediction(part), []
+        line, t, out = self.line(part), self.times(part), []
         low, high = self._bounds(line["t"], min(low, high), max(low, high))
         for begin, end, name in line["spans"]:
             rows = (line["t"] >= max(low, begin)) & (line["t"] <= min(high, end))
             if rows.any():
-                own = found.t[rows]
+                own = t[rows]
                 out.append((name, float(f"{own.min():.9g}"), float(f"{own.max():.9g}")))
         return out
 
@@ -177,6 +178,14 @@ class Workspace:
         mine = [e for e in self.fit.events if e["part"] == part and joint in e["joints"]]
         spans = [(*span, e["kind"]) for e in mine for span in placed(e, line)]
         return [span for span in spans if span[1] >= low and span[0] <= high]
+
+    def _own_clock(self, part: str, rows) -> list[list]:
+        """Of each row its log's name and the time by the log's own clock [s]."""
+        line = self.line(part)
+        names = [name.rpartition("/")[2] for _, _, name in line["spans"]]
+        ends = np.array([end for _, end, _ in line["spans"]])
+        which = np.minimum(np.searchsorted(ends, line["t"][rows] - 1e-9), len(names) - 1)
+        return [[names[k], t] for k, t in zip(which, charts.rounded(self.times(part)[rows], 6))]
 
     # ---- the residual against position and speed
 
@@ -191,7 +200,7 @@ class Workspace:
         states = found.states
         if states is None:
             raise SysidError("where the joints were was not kept", do="reload")
-        left = found.counted_residual(joint)[states.index]
+        left = self.columns(part, joint)[2][states.index]
         q, qd = states.q[:, joint], states.qd[:, joint]
         seen = np.flatnonzero(np.isfinite(left))
         dots = seen[:: max(1, -(-len(seen) // _DOTS))]
@@ -251,14 +260,6 @@ def workspace_page(workspace: Workspace, steps: dict) -> dict:
 
 def _listed(frames) -> list:
     return [[charts.rounded(axis, 4) for axis in frame] for frame in frames]
-
-
-def _own_clock(line: dict, rows, found: Prediction) -> list[list]:
-    """Of each row its log's name and the time by the log's own clock [s]."""
-    names = [name.rpartition("/")[2] for _, _, name in line["spans"]]
-    ends = np.array([end for _, end, _ in line["spans"]])
-    which = np.minimum(np.searchsorted(ends, line["t"][rows] - 1e-9), len(names) - 1)
-    return [[names[k], t] for k, t in zip(which, charts.rounded(found.t[rows], 6))]
 
 
 def _breaks(line: dict, rows) -> np.ndarray:
