@@ -13,6 +13,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.optimize import lsq_linear
 
 from . import multistart
 from . import rows as row
@@ -20,6 +21,7 @@ from .deflection import Deflection
 from .effect import NotFinite
 from .estimate import Fit
 from .inertia import DIVERGENCES
+from .landscape import at_zero
 from .model import Model, moving_coefficients
 from .motion import Motion
 from .multistart import Searched
@@ -32,7 +34,8 @@ from .shape_search import Search
 from .specs import Experiment
 from .triangles import Compressed, Factor
 
-_MOST_ROWS, _STEPS, _SETTLED = 6000, 12, 1e-7
+_MOST_ROWS, _STEPS, _TRIES, _SETTLED = 6000, 12, 6, 1e-7
+_ROUNDING = 1e-14  # share of the greatest
 _LEAST_SHARE = 0.25  # of the way to another load
 
 
@@ -172,8 +175,12 @@ def _from_tries(found: Settled, motion: Motion, term: int, joint: int, weights) 
 
 
 def _descended(best: Settled, motion: Motion, solved, weights, tolerance: float) -> Settled:
-    """Damped Gauss-Newton over all shape values that are not held."""
+    """Damped Gauss-Newton over all shape values that are not held.
+
+    Source: Madsen, Nielsen & Tingleff 2004, 3.2 (damping by what a step kept of its promise).
+    """
     damping, scale = 1e-3, np.ones(best.model.robot.dof) if weights is None else np.asarray(weights)
+    growth = 2.0
     values = best.model.shape_values
     free = [k for k, value in enumerate(values) if not value.held]
     low, high = (np.array([getattr(v, end) for v in values]) for end in ("low", "high"))
@@ -185,19 +192,29 @@ def _descended(best: Settled, motion: Motion, solved, weights, tolerance: float)
         moving = _moving(best, motion, free, scale, low, high) if free else None
         if moving is not None and moving[3] > tolerance * abs(best.objective):
             inside, system, right, _ = moving
-            for _ in range(6):
-                diagonal = np.diagonal(system)
-                step = np.zeros(len(values))
-                step[inside] = inverted(system + damping * np.diag(np.where(diagonal > 0, diagonal, 1.0))) @ right
-                moved = np.clip(np.array(best.model.shapes) + step, low, high)
-                tried = solved(best.model.with_shapes(moved))
+            at = np.array(best.model.shapes)
+            for _ in range(_TRIES):
+                step = _damped(system, right, damping, low[inside] - at[inside], high[inside] - at[inside])
+                promised = float(right @ step - 0.5 * step @ system @ step)
+                moved = at.copy()
+                moved[inside] += step
+                tried = solved(best.model.with_shapes(np.clip(moved, low, high)))
                 if tried is not None and tried.objective < best.objective:
-                    best, damping = tried, max(damping * 0.1, 1e-9)
+                    kept = (best.objective - tried.objective) / promised if promised > 0 else 1.0
+                    best, damping, growth = tried, max(damping * max(1.0 / 3.0, 1.0 - (2.0 * kept - 1.0) ** 3), 1e-9), 2.0
                     break
-                damping *= 10.0
+                damping, growth = damping * growth, 2.0 * growth
         if not abs(before - best.objective) > tolerance * abs(before):
             break
     return best
+
+
+def _damped(system, right, damping: float, low, high) -> np.ndarray:
+    """The step of normal equations with their diagonal enlarged, within bounds."""
+    diagonal = np.diagonal(system)
+    sizes, axes = np.linalg.eigh(system + damping * np.diag(np.where(diagonal > 0, diagonal, 1.0)))
+    roots = np.sqrt(np.maximum(sizes, _ROUNDING * max(sizes[-1], _ROUNDING)))
+    return lsq_linear(roots[:, None] * axes.T, axes.T @ right / roots, bounds=(low, high), method="bvls").x
 
 
 def _moving(best: Settled, motion: Motion, free, scale, low, high):
@@ -224,13 +241,17 @@ def _renewed(best: Settled, solved, share: float) -> tuple[Settled, float]:
 
 
 def _normal(found: Settled, motion: Motion, free, scale):
-    """Normal equations of the shape values on what the linear parameters leave."""
+    """Normal equations of the shape values on what the linear parameters leave, those aside that a bound holds."""
     rows = found.rows
     residual = rows.residual(found.x)
     predicted = rows.tau - residual  # where rows count: elsewhere no slope does
     slopes = row.tangents(found.model, motion, found.x, found.stride, rows.use, predicted)[:, :, free]
+    still = 10 * found.model.bodies + np.flatnonzero(found.problem.coordinates.held)
+    still = np.append(still, 10 * found.model.bodies + np.array(at_zero(found), dtype=int))
+    loose = np.setdiff1d(np.arange(found.model.size), still)
     base = sum(2.0 * w**2 * a.T @ a for w, a in zip(scale, rows.columns)) + prior_hessian(found)
     cross = sum(2.0 * w**2 * a.T @ t for w, a, t in zip(scale, rows.columns, slopes))
+    base, cross = base[np.ix_(loose, loose)], cross[loose]
     system = sum(2.0 * w**2 * t.T @ t for w, t in zip(scale, slopes)) - cross.T @ inverted(base) @ cross
     right = sum(2.0 * w**2 * t.T @ r for w, t, r in zip(scale, slopes, residual.T))
     return system, right

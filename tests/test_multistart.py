@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from sysid import config, multistart, pipeline, shape
-from sysid.landscape import Landscape, landscape
+from sysid.landscape import Landscape, at_zero, landscape
 from sysid.listed_effects import build
 from sysid.preprocess import prepare
 from tests.problems import UR5, arm_log
@@ -144,3 +144,43 @@ def test_what_is_no_number_is_passed_by():
     )
     found, _ = multistart.places(seen, seen, [np.linspace(-3.0, 3.0, 13)], [seen.here])
     assert found[0].values[0] == pytest.approx(1.5, abs=1e-4)
+
+
+def test_a_step_of_the_shape_values_leaves_aside_what_a_bound_holds():
+    """Friction whose Coulomb part would have to be negative: with it held at zero a step arrives
+    where no other is to be made, and takes what it promises. Were it free to answer, it would take
+    most of what the exponent does, and the step would be far too long.
+    """
+    effects = ["viscous", "coulomb", {"sublinear_viscous": {"joints": ["elbow_joint"]}}]
+    experiment = config.experiment({"robot": {"urdf": UR5}, "model": {"effects": effects}})
+    machine, _, prior = pipeline.build(experiment)
+    log = arm_log(machine, np.random.default_rng(3), seconds=6.0, noise=0.1, viscous=-0.3, coulomb=-1.0)
+    (segment,) = log.segments
+    joint = machine.joints.index("elbow_joint")
+    qd = np.gradient(segment.q[:, joint], segment.t)
+    segment.tau[:, joint] += 8.0 * np.abs(qd) ** 0.6 * np.sign(qd)
+    motion = prepare([log], experiment.preprocess, machine.joints)
+    model = build(machine, experiment.model.effects).measured_by(motion)
+    held = lambda at: shape.settle(experiment, model.with_shapes([at]), motion, prior, hold=True)  # noqa: E731
+
+    def asked(found):
+        names = [model.coefficients[k].name for k in at_zero(found)]
+        system, right = shape._normal(found, motion, [0], np.ones(machine.dof))
+        return names, right[0] / system[0, 0], 0.5 * right[0] ** 2 / system[0, 0]
+
+    away = held(0.48)
+    names, step, promised = asked(away)
+    there = held(0.48 + step)
+    assert "coulomb.elbow_joint.Fc" in names and 0.02 < step < 0.4
+    assert away.objective - there.objective == pytest.approx(promised, rel=0.3)
+    assert abs(asked(there)[1]) < 0.3 * step
+
+
+def test_damped_steps_stay_within_their_bounds():
+    """What a bound takes of one value the others answer: the least of the quadratic within them."""
+    system, right = np.array([[2.0, 1.8], [1.8, 2.0]]), np.array([4.0, 0.0])
+    low, high = np.array([-1.0, -9.0]), np.array([1.0, 9.0])
+    step = shape._damped(system, right, 0.0, low, high)
+    np.testing.assert_allclose(step, [1.0, -0.9], atol=1e-9)  # a clipped step would have -9
+    small = shape._damped(system, right, 1e6, low, high)
+    np.testing.assert_allclose(small, right / (1e6 * np.diagonal(system)), rtol=1e-4, atol=1e-9)

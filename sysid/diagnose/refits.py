@@ -42,7 +42,8 @@ class Member:
     @property
     def shapes(self) -> dict[str, float]:
         """Its shape values, refitted."""
-        return {value.shape.name: at for value, at in zip(*_own(self.view))}
+        model, own = self.view.model, self.view.model.last_shapes
+        return {v.shape.name: at for v, at in zip(model.shape_values[own], model.shapes[own])}
 
 
 def losses(view: View, number: np.ndarray) -> np.ndarray:
@@ -85,17 +86,16 @@ def refitted(view: View, group: Group) -> Member | None:
     return Member(group, found, losses(found, view.blocks)) if _allowed(found, candidate) else None
 
 
-def joined(view: View, *added: tuple[Candidate, dict[str, float]], weights=None) -> View:
-    """A view's model with candidates, everything settled again from their shape values on.
+def joined(view: View, *added: tuple[Candidate, dict[str, float]], like: View | None = None):
+    """The view of a view's model with candidates, all settled again from their shape values on.
 
     Args:
-        weights: (dof,) of the joints, where they are not the view's own.
+        like: whose weights and noise it has, where these are not to be its own.
     """
     source = view.source
     for candidate, shapes in added:
         source = replace(source, model=grown(source, candidate, shapes))
-    own = view.weights if weights is None else weights
-    return _again(view, source.model, own, tolerance=COMPARED)
+    return _again(view, source.model, (like or view).weights, tolerance=COMPARED, like=like)
 
 
 def _allowed(view: View, candidate: Candidate) -> bool:
@@ -119,14 +119,10 @@ def weighed(view: View, weights=None) -> View:
     Args:
         weights: (dof,); None: by what the model now leaves each joint.
     """
-    return _again(view, view.model, inverse(view.rms()) if weights is None else weights)
+    how = {} if weights is None else {"tolerance": COMPARED, "like": view}
+    return _again(view, view.model, inverse(view.rms()) if weights is None else weights, **how)
 
 
 def _again(view: View, model, weights, **how) -> View:
     how |= {"stride": view.stride, "weights": weights, "grid": False, "inherited": view.blocks}
     return looked_at(view.experiment, model, view.motion, view.rough, view.prior, **how)
-
-
-def _own(view: View):
-    own = view.model.last_shapes
-    return view.model.shape_values[own], view.model.shapes[own]

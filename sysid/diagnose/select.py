@@ -11,12 +11,12 @@ from ..view import View
 from .ask import Asked, ask
 from .evidence import Group
 from .steps import Step, revised, step_of
-from .ties import Choice, alike, chosen
+from .ties import NEAR, Choice, alike, chosen
 
 LEVEL = 0.01  # family-wise: how often anything is accused where nothing is there
 WORTH = 0.03  # of a joint's squared residual under the low-pass: 1.5 % of its root mean square
 _ALONE = 1.645  # standard errors: five per cent, were it the only question
-_MOST_STEPS, _SHORTLIST, _NEAR = 8, 8, 0.4
+_MOST_STEPS, _SHORTLIST = 8, 8
 
 
 def search(
@@ -73,7 +73,7 @@ def _next(view: View, asked: Asked, level: float, worth: float, open_: list[Choi
     while hopeful:
         top = hopeful[0]
         where = set(asked.groups[top].candidate.touches(dof))
-        near = [k for k in rivals if asked.gains[k] >= _NEAR * asked.gains[top]]
+        near = [k for k in rivals if asked.gains[k] >= NEAR * asked.gains[top]]
         # who acts on the same joints, and who takes the same thing through bodies that bend
         short = [k for k in near if where & set(asked.groups[k].candidate.touches(dof))]
         short += [

@@ -13,7 +13,7 @@ from ..model_parameters import ROBOT
 from ..view import View
 from .projected import groups_at
 from .refits import joined, losses, taken, weighed
-from .ties import Choice, chosen
+from .ties import NEAR, Choice, chosen
 
 
 @dataclass(frozen=True)
@@ -76,9 +76,12 @@ def _revised_once(first: View, steps: list[Step], worth: float, stirred: set[int
             continue
         before, later = steps[:number], steps[number + 1 :]
         others = [(s.candidate, s.choice.head.shapes) for s in (*before, *later)]
-        without = joined(first, *others, weights=steps[-1].after.weights)
+        without = joined(first, *others, like=steps[-1].after)
         groups = groups_at(without, [(m.candidate, m.asked) for m in rivals])
-        found = chosen(without, groups, np.random.default_rng(1))
+        least = NEAR * max((group.taken for group in groups), default=0.0)
+        own = step.candidate.key
+        near = [group for group in groups if group.candidate.key == own or group.taken >= least]
+        found = chosen(without, near, np.random.default_rng(1))
         again = None if found is None else step_of(without, step.p, found, worth)
         if again is None:
             return _rejoined(first, [*before, *later]), step.changed

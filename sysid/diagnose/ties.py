@@ -21,6 +21,7 @@ from .refits import COMPARED, Member, losses, refitted, taken, weighed
 
 _OUTSIDE = 0.10  # a model is outside the set of 90 % where its p-value is below
 _UNEVEN = 0.35  # logarithm: two joints count half as much against each other, in power
+NEAR = 0.4  # of what the best takes, as all are asked at once: by less no refit makes it the best
 _CLOSE = 0.1  # of what the head takes: by less another may have lost to what still acted then
 _SAME = 0.99  # share of a candidate's torque that another one's columns hold
 

@@ -33,7 +33,8 @@ class View:
 
     motion: training logs under one low-pass; rough: the same with the angles' noise once more.
     weights: (dof,) inverse RMS by which joints count. prior: (bodies, 10). inherited: (n,) blocks
-    of the model that this one grew from, so that both lose in the same blocks.
+    of the model that this one grew from, so that both lose in the same blocks. like: a view of the
+    same motion whose noise is this one's.
     """
 
     experiment: Experiment
@@ -44,6 +45,7 @@ class View:
     weights: np.ndarray
     settled: Settled
     inherited: np.ndarray | None = None
+    like: View | None = None
 
     @property
     def model(self) -> Model:
@@ -116,6 +118,8 @@ class View:
     def spectra(self) -> np.ndarray:
         """(dof, frequencies) of what no function of the motion predicts, as noise that is always
         the same has it."""
+        if self.like is not None:
+            return self.like.spectra * ((self.weights / self.like.weights) ** 2)[:, None]
         left, memory = self._left
         return spectra(left, self.rows.use, memory, self.step)
 
@@ -156,6 +160,7 @@ def looked_at(
     grid: bool = True,
     tolerance: float = 1e-7,
     inherited=None,
+    like: View | None = None,
 ) -> View:
     """Settle a model on a motion.
 
@@ -164,13 +169,16 @@ def looked_at(
         grid: search the grids of shape values; without it, from those that the model has.
         tolerance: share of the objective by which a step of the shape values must lower it for
             another to follow.
-        inherited: (n,) blocks, where the model grew from another one's.
+        inherited: (n,) blocks, where the model grew from another one's. like: whose noise it has,
+            where that is known.
     """
 
     def view(weights, model: Model, grid: bool) -> View:
         options = {"weights": weights, "stride": stride, "grid": grid, "tolerance": tolerance}
         found = settle(experiment, model, motion, prior, **options)
-        return View(experiment, motion, rough, prior, stride, np.asarray(weights), found, inherited)
+        return View(
+            experiment, motion, rough, prior, stride, np.asarray(weights), found, inherited, like
+        )
 
     model = model if model.scales else model.scaled_by(motion)
     if weights is not None:
