@@ -256,6 +256,20 @@ def test_a_phone_shows_it_without_sideways_scrolling(browser, opened):
     assert page.evaluate("document.documentElement.scrollWidth") <= 390
 
 
+def test_on_paper_every_chart_is_drawn(opened):
+    """Those that nobody scrolled to as well: paper does not wait for an answer of the server."""
+    page = opened()
+    page.wait_for_function(DONE, timeout=WAIT)
+    wanted = page.locator("#sections figure.chart[data-chart]").count()
+    answers = "new Set(performance.getEntriesByType('resource').filter(e => e.name.includes('api/figure') && e.responseEnd).map(e => e.name)).size"
+    page.wait_for_function(f"{answers} >= {wanted}", timeout=WAIT)  # far from all are in sight
+    page.wait_for_timeout(200)
+    page.evaluate("dispatchEvent(new Event('beforeprint'))")
+    assert wanted > 10 and page.locator("#sections figure.chart .waiting").count() == 0
+    assert page.locator("#sections figure.chart .js-plotly-plot").count() >= wanted
+    page.evaluate("dispatchEvent(new Event('afterprint'))")
+
+
 def test_any_effect_is_added_by_keyboard_alone(opened):
     from playwright.sync_api import expect
 

@@ -18,8 +18,10 @@ function draw(place) {
   const source = document.getElementById("figure-" + place.dataset.chart);
   if (source) { show(place, () => JSON.parse(source.textContent)); return; }
   if (!sysid.figure) return;  // a page that is alive asks for it
+  const found = sysid.figure(place.dataset.chart);
+  if (!found.then) { show(place, () => found); return; }
   drawn.set(place, null);
-  sysid.figure(place.dataset.chart).then(
+  found.then(
     chart => { if (place.isConnected) show(place, () => chart); },
     error => { drawn.delete(place); failed(place, error); },
   );

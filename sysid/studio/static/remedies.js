@@ -170,9 +170,9 @@ function designed(place, state) { // the design that was asked for here, where i
 
 function build(found) { // of a fit, or of its diagnosis
   page = found;
-  forms ??= [...anyEffect(), ...formula()];
+  forms ??= make("div", {class: "on-screen"}, ...anyEffect(), ...formula());
   if (found.findings) suspects();
-  at("suspects").append(...forms);
+  at("suspects").append(forms);
   suggested();
   if (found.findings) designs();
   get("api/state").then(follow, () => {});

@@ -12,10 +12,22 @@ const SHORT = {
 const AT_WORK = "The fit stands; it is being diagnosed. Its charts are below.";
 let page = null; // what is shown
 const on = (effect, where) => where === "*" ? effect : effect + " to " + where;
-sysid.figure = async id => {
-  const [chart] = await Promise.all([get("api/figure", {sha: stands.shown, id}), engine()]);
+const charts = new Map(); // of the page that is shown: paper does not wait for an answer
+sysid.figure = id => charts.get(id) || asked(id);
+async function asked(id) {
+  const sha = stands.shown;
+  const [chart] = await Promise.all([get("api/figure", {sha, id}), engine()]);
+  if (sha === stands.shown) charts.set(id, chart);
   return chart;
-};
+}
+
+async function allAsked(sha) { // one after another, so that nothing waits for them
+  for (const place of document.querySelectorAll("#sections figure.chart[data-chart]")) {
+    const id = place.dataset.chart;
+    if (stands.shown !== sha) return;
+    if (!charts.has(id)) await asked(id).catch(() => null); // who looks at it is told why
+  }
+}
 
 function places(order) { // one for each section, in the page's order; empty ones are not seen
   for (const name of order) {
@@ -92,6 +104,7 @@ async function show(sha) {
   const lost = at("sections").contains(active);
   const anew = stands.shown === null;
   stands.shown = sha;
+  charts.clear();
   page = found;
   const worst = page.verdict.findIndex(v => v.status === "missing");
   if (anew && worst >= 0) found.first = worst;
@@ -102,7 +115,7 @@ async function show(sha) {
     section.innerHTML = part.html; // made and escaped by the server, as in the report
     section.prepend(titled(name, part.title));
   }
-  workspace(found, sha, false);
+  workspace(found, sha, false).then(() => allAsked(sha));
   offers();
   sysid.remedies.build(page);
   compared();
