@@ -141,10 +141,18 @@ def correction(fit: Fit, data: Compressed) -> np.ndarray:
         add_blocks(prior, fit.experiment.prior.weight * np.asarray(divergence.hessian(fit.pi)))
     if fit.known is not None:
         add_blocks(prior, fit.known)
-    columns, slopes = triangle_[:, :size], triangle_[:, size:-1]
+    loose = _loose(fit.model, fit.held, fit.certificate.at_zero)
+    columns, slopes = triangle_[:, loose], triangle_[:, size:-1]
     cross = columns.T @ slopes
-    system = slopes.T @ slopes - cross.T @ inverted(columns.T @ columns + 0.5 * prior) @ cross
+    system = slopes.T @ slopes - cross.T @ inverted(columns.T @ columns + 0.5 * prior[np.ix_(loose, loose)]) @ cross
     return inverted(system) @ (-slopes.T @ residual)
+
+
+def _loose(model: Model, held, pinned) -> np.ndarray:
+    """Numbers of the linear parameters that answer a step of shape values: all but coefficients that are held, or that their bound
+    holds at zero."""
+    still = 10 * model.bodies + np.array([*np.flatnonzero(held), *pinned], dtype=int)
+    return np.setdiff1d(np.arange(model.size), still)
 
 
 def _bodies(found: Settled) -> np.ndarray:
@@ -222,7 +230,7 @@ def _moving(best: Settled, motion: Motion, free, scale, low, high):
     where that is nothing to speak of, none need be tried."""
     system, right = _normal(best, motion, free, scale)
     at = np.array(best.model.shapes)[free]
-    inside = ~((at <= low[free]) & (right < 0) | (at >= high[free]) & (right > 0))
+    inside = ~((at <= low[free]) & (right <= 0) | (at >= high[free]) & (right >= 0))
     system, right = system[np.ix_(inside, inside)], right[inside]
     return np.array(free)[inside], system, right, 0.5 * float(right @ inverted(system) @ right) if inside.any() else 0.0
 
@@ -246,9 +254,7 @@ def _normal(found: Settled, motion: Motion, free, scale):
     residual = rows.residual(found.x)
     predicted = rows.tau - residual  # where rows count: elsewhere no slope does
     slopes = row.tangents(found.model, motion, found.x, found.stride, rows.use, predicted)[:, :, free]
-    still = 10 * found.model.bodies + np.flatnonzero(found.problem.coordinates.held)
-    still = np.append(still, 10 * found.model.bodies + np.array(at_zero(found), dtype=int))
-    loose = np.setdiff1d(np.arange(found.model.size), still)
+    loose = _loose(found.model, found.problem.coordinates.held, at_zero(found))
     base = sum(2.0 * w**2 * a.T @ a for w, a in zip(scale, rows.columns)) + prior_hessian(found)
     cross = sum(2.0 * w**2 * a.T @ t for w, a, t in zip(scale, rows.columns, slopes))
     base, cross = base[np.ix_(loose, loose)], cross[loose]

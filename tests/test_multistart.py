@@ -9,7 +9,10 @@ import numpy as np
 import pytest
 
 from sysid import config, multistart, pipeline, shape
+from sysid.compress import compress
+from sysid.estimate import identify
 from sysid.landscape import Landscape, at_zero, landscape
+from sysid.linearised import Linearised
 from sysid.listed_effects import build
 from sysid.preprocess import prepare
 from tests.problems import UR5, arm_log
@@ -146,26 +149,35 @@ def test_what_is_no_number_is_passed_by():
     assert found[0].values[0] == pytest.approx(1.5, abs=1e-4)
 
 
-def test_a_step_of_the_shape_values_leaves_aside_what_a_bound_holds():
-    """Friction whose Coulomb part would have to be negative: with it held at zero a step arrives
-    where no other is to be made, and takes what it promises. Were it free to answer, it would take
-    most of what the exponent does, and the step would be far too long.
+@cache
+def too_little_friction():
+    """A UR5 whose elbow's Coulomb friction would have to be negative: experiment, model, motion,
+    prior. Its friction grows with a power of the speed.
     """
     effects = ["viscous", "coulomb", {"sublinear_viscous": {"joints": ["elbow_joint"]}}]
     experiment = config.experiment({"robot": {"urdf": UR5}, "model": {"effects": effects}})
     machine, _, prior = pipeline.build(experiment)
-    log = arm_log(machine, np.random.default_rng(3), seconds=6.0, noise=0.1, viscous=-0.3, coulomb=-1.0)
+    friction = {"viscous": -0.3, "coulomb": -1.0}
+    log = arm_log(machine, np.random.default_rng(3), seconds=6.0, noise=0.1, **friction)
     (segment,) = log.segments
     joint = machine.joints.index("elbow_joint")
     qd = np.gradient(segment.q[:, joint], segment.t)
     segment.tau[:, joint] += 8.0 * np.abs(qd) ** 0.6 * np.sign(qd)
     motion = prepare([log], experiment.preprocess, machine.joints)
-    model = build(machine, experiment.model.effects).measured_by(motion)
+    return experiment, build(machine, experiment.model.effects).measured_by(motion), motion, prior
+
+
+def test_a_step_of_the_shape_values_leaves_aside_what_a_bound_holds():
+    """With the coefficient held at zero a step arrives where no other is to be made, and takes what
+    it promises. Were it free to answer, it would take most of what the exponent does, and the step
+    would be far too long.
+    """
+    experiment, model, motion, prior = too_little_friction()
     held = lambda at: shape.settle(experiment, model.with_shapes([at]), motion, prior, hold=True)  # noqa: E731
 
     def asked(found):
         names = [model.coefficients[k].name for k in at_zero(found)]
-        system, right = shape._normal(found, motion, [0], np.ones(machine.dof))
+        system, right = shape._normal(found, motion, [0], np.ones(model.robot.dof))
         return names, right[0] / system[0, 0], 0.5 * right[0] ** 2 / system[0, 0]
 
     away = held(0.48)
@@ -174,6 +186,18 @@ def test_a_step_of_the_shape_values_leaves_aside_what_a_bound_holds():
     assert "coulomb.elbow_joint.Fc" in names and 0.02 < step < 0.4
     assert away.objective - there.objective == pytest.approx(promised, rel=0.3)
     assert abs(asked(there)[1]) < 0.3 * step
+
+
+def test_a_correction_on_all_rows_is_the_step_on_those_in_memory():
+    """Where all rows are in memory; with a coefficient at its bound that does not answer."""
+    experiment, model, motion, prior = too_little_friction()
+    model = model.with_shapes([0.48])
+    found = shape.settle(experiment, model, motion, prior, stride=1, hold=True)
+    system, right = shape._normal(found, motion, [0], np.ones(model.robot.dof))
+    data = compress(Linearised(model, found.x), motion)
+    fit = identify(experiment, model, motion, data, prior)
+    assert fit.certificate.at_zero
+    np.testing.assert_allclose(shape.correction(fit, data), right / system[0], rtol=1e-3)
 
 
 def test_damped_steps_stay_within_their_bounds():
