@@ -49,12 +49,12 @@ def load(path: str | Path) -> Experiment:
         word = "a log" if is_log_folder(given) else "a folder without config.yaml"
     if (given / "experiment.yaml").is_file() and (given / "fit.json").is_file() and word:
         raise ConfigError(
-            "a run folder, and no experiment", where=str(given), allowed="a YAML file, or a folder with config.yaml",
+            "a run folder, not an experiment", where=str(given), allowed="a YAML file, or a folder with config.yaml",
             do=f"give the experiment that it is of, or {given / 'experiment.yaml'}, which gives the same fit",
         )  # fmt: skip
     if word:
         raise ConfigError(
-            f"{word}, and no experiment", where=str(given), allowed="a YAML file, or a folder with config.yaml",
+            f"{word}, not an experiment", where=str(given), allowed="a YAML file, or a folder with config.yaml",
             do=f"`sysid init {_begins(given)}` writes one from a robot and its logs" + _standing(),
         )  # fmt: skip
     try:

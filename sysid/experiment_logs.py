@@ -94,7 +94,8 @@ def read_all(experiment: Experiment, *, structure: Model | None = None) -> Read:
     Raises:
         SysidError: as `read`.
     """
-    machine = robot.load(experiment.robot, experiment.folder)
+    with noticed():  # of the robot the fit says it
+        machine = robot.load(experiment.robot, experiment.folder)
     with noticed() as notices:
         parts = [read(experiment, machine, part, structure=structure) for part in (experiment.data.train, experiment.data.test)]
     return Read(*parts, tuple(notices))

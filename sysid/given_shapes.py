@@ -17,7 +17,7 @@ def said_of_shapes(fit) -> list[str]:
         counts = sorted({one.profile for one in group})
         each = "its profile" if len(group) == 1 else "the profile over each"
         at = " to ".join(str(count) for count in dict.fromkeys((counts[0], counts[-1])))
-        begun = f"started from {starts} places" if starts > 1 else "started where nothing is done"
+        begun = f"started from {starts} places" if starts > 1 else "started where the effect does nothing"
         checked = f"{each} was checked at {at} values, {'which led to a lower place, and the search went on there' if lower else 'and none lay lower'}"
         out.append(f"{', '.join(one.name for one in group)}: {begun}; {checked if counts[-1] else 'no profile was checked'}")
     if held := [v.name for v in fit.model.shape_values if v.held]:

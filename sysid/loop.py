@@ -18,6 +18,7 @@ from .diagnose.diagnosis import Diagnosis, diagnose
 from .effect_entry import asked, with_effect
 from .errors import SysidError
 from .estimate import Fit
+from .notices import noticed
 from .specs import Experiment
 
 _HISTORY, _STEPS = "history.json", "steps"
@@ -74,8 +75,9 @@ def add(
     file = experiment.path
     joints = None if joints == ["*"] else joints  # every joint, or the whole robot
     read = experiment_file.read(file)
-    every = pipeline.build(experiment)[0].joints
-    with asked(file):
+    with noticed():  # what is decided of the robot the fits say
+        every = pipeline.build(experiment)[0].joints
+    with noticed(), asked(file):
         text = with_effect(experiment_file.text(read, str(file)), effect, joints, options, str(file), every=every)
         after = config.loads(text, file)
         pipeline.build(after)

@@ -28,7 +28,7 @@ def said(error) -> str:
     path = getattr(getattr(error, "ctx", None), "command_path", "") or "sysid"
     kind = type(error).__name__
     if kind == "MissingParameter":
-        return _missing(words, path)
+        return _missing(words, path, (getattr(error, "ctx", None) and error.ctx.params) or {})
     if "valid number" in words or "valid integer" in words:
         return f"{words.partition(':')[0].removeprefix('Invalid value for ')}: a number is needed; `{path} --help` says of what"
     if kind == "BadParameter" and "valid" in words:
@@ -40,11 +40,14 @@ def said(error) -> str:
     return words
 
 
-def _missing(words: str, path: str) -> str:
+def _missing(words: str, path: str, there: dict) -> str:
     name = words.split("'")[1] if "'" in words else ""
     if name.startswith("-"):
         return f"{words.rstrip('.')}; as in `{path} ... {name} FOLDER`; `{path} --help` says more"
     what, stands = _ARGUMENTS.get(name.rstrip(".").upper(), (words.rstrip("."), name))
+    if there.get("experiment"):  # the one that was typed, and no other
+        typed = stands.replace("EXPERIMENT", shlex.quote(str(there["experiment"])))
+        return f"{what}, as in `{path} {typed}`"
     here = standing() if stands.startswith("EXPERIMENT") else []
     if here:
         typed = stands.replace("EXPERIMENT", shlex.quote(here[0]))

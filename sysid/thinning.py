@@ -28,7 +28,8 @@ def read(experiment: Experiment) -> tuple[Read, Read | None]:
     Raises:
         SysidError: as `experiment_logs.read`.
     """
-    machine = robot.load(experiment.robot, experiment.folder)
+    with noticed():  # of the robot the fit says it
+        machine = robot.load(experiment.robot, experiment.folder)
     each = listed_effects.build(machine, [], experiment.folder)  # looks at rows one by one
     data = experiment.data
     with noticed() as notices:

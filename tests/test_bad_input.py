@@ -608,6 +608,15 @@ def test_inertia_is_repaired(experiment, cli, inertial, problem, remedy):
     assert "body 'lower'" in notice and problem in notice and remedy in notice
 
 
+@pytest.mark.parametrize("command", ["diagnose", "add"])
+def test_what_is_repaired_is_a_note_and_no_warning_of_python(experiment, cli, command):
+    inertial = stating(izz=1)
+    given = experiment(urdf=replaced((LOWER, f'<link name="lower">{inertial}</link>')))
+    said = cli(command, given, *(["stribeck", "--joint", "elbow", "--force"] if command == "add" else []))
+    assert said.status == 0 and "body 'lower'" in said.out + said.err
+    assert "SysidWarning" not in said.out + said.err and "link_priors" not in said.err
+
+
 def test_mimic_joint_is_locked(experiment, cli):
     finger = (
         '<link name="finger"><inertial><mass value="0.1"/><inertia ixx="1e-4" ixy="0" ixz="0" iyy="1e-4" iyz="0" izz="1e-4"/></inertial></link>'
@@ -676,7 +685,7 @@ def test_notices_come_once_and_good_input_has_none(experiment, cli):
 @pytest.mark.parametrize(("name", "word"), [("log.csv", "a log"), ("day.mcap", "a log"), ("arm.urdf", "a robot"), ("arm.xml", "a robot")])
 def test_a_file_that_is_no_experiment_is_told_what_to_do(name, word, cli, tmp_path):
     (tmp_path / name).write_text("t,q\n")
-    cli("fit", tmp_path / name).complains(name, f"{word}, and no experiment", "`sysid init URDF LOG...` writes one")
+    cli("fit", tmp_path / name).complains(name, f"{word}, not an experiment", "`sysid init URDF LOG...` writes one")
 
 
 def test_the_bare_command_says_what_to_type(monkeypatch, capfd):

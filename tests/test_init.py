@@ -624,7 +624,7 @@ def test_what_a_person_sees(experiment, cli):
     (folder / "bag/metadata.yaml").write_text("")
     (folder / "config.yaml").unlink()
     for given in (folder / "train.csv", folder / "robot.urdf", folder / "bag", folder):
-        cli("fit", given).complains("no experiment", f"`sysid init {folder}`" if given == folder else "`sysid init URDF LOG...`")
+        cli("fit", given).complains("not an experiment", f"`sysid init {folder}`" if given == folder else "`sysid init URDF LOG...`")
 
 
 # ---- robots of other people

@@ -61,7 +61,9 @@ def test_the_robot_may_stand_behind_its_logs(experiment, cli):
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        (["robot.urdf"], ["which logs?", "`sysid init", "LOG..."]),
+        (["robot.urdf"], ["no logs are named", "`sysid init", "LOG..."]),
+        (["rboot.urdf"], ["there is no such file", "did you mean robot.urdf?"]),
+        (["train.csv"], ["a log, and no robot", "`sysid init robot.urdf "]),
         (["robot.urdf", "trian.csv"], ["there is no such log", "did you mean train.csv?"]),
         (["train.csv", "test.csv"], ["no robot", "`sysid init robot.urdf"]),
     ],
@@ -74,7 +76,7 @@ def test_init_says_what_to_type(experiment, cli, words, told):
 def test_a_folder_with_two_robots_names_them(experiment, cli):
     folder = experiment(config=None)
     (folder / "old.urdf").write_text("<robot/>")
-    cli("init", folder, out=folder / "mine").complains("2 files of a robot", "old.urdf", "robot.urdf")
+    cli("init", folder, out=folder / "mine").complains("2 robot files in one folder", "old.urdf", "robot.urdf")
 
 
 def with_units(columns, position):
@@ -173,6 +175,7 @@ def test_what_is_no_yaml_has_a_cure(text, told, tmp_path):
     [
         (["fit"], ["which experiment?", "as in `sysid fit experiment`"]),
         (["add", "experiment", "stribeck", "elbow"], ["a joint is named with --joint"]),
+        (["add", "mine", "--joint", "elbow"], ["which effect?", "`sysid add mine EFFECT --joint"]),
         (["fit", "experiment", "--joint", "elbow"], ["No such option: --joint", "`sysid fit --help`"]),
         (["init", "robot.urdf", "a.csv", "--rate", "250hz"], ["'--rate': a number is needed"]),
         (["fit", "nothere"], ["check its name; experiments here: experiment"]),
@@ -210,7 +213,7 @@ def test_a_run_folder_stands_for_its_experiment_in_a_comparison(experiment, cli,
     cli("add", folder, "torque_bias", "--joint", "elbow", "--force")
     said = cli("compare", tmp_path / "run/steps/00-start", folder, out=tmp_path / "two")
     assert said.status == 0 and "00-start -> experiment" in said.out
-    cli("fit", tmp_path / "run", out=tmp_path / "other").complains("a run folder, and no experiment", "experiment.yaml")
+    cli("fit", tmp_path / "run", out=tmp_path / "other").complains("a run folder, not an experiment", "experiment.yaml")
 
 
 def test_logs_that_cannot_be_meant_are_checked_next_and_that_only_once(experiment, cli):

@@ -25,8 +25,9 @@ DRAWN = "() => document.querySelector('#workspace-said').textContent && !documen
 WAIT = 180_000  # ms, for a refit on a busy machine
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def browser():
+    """Closed with these tests: its event loop would be in the way of others in this process."""
     api = pytest.importorskip("playwright.sync_api", reason="Playwright is not installed")
     api.expect.set_options(timeout=30_000)  # a page is drawn late on a busy machine
     path = os.environ.get("SYSID_BROWSER") or shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")

@@ -37,10 +37,20 @@ def sorted_out(first: str, rest: list[str], out: Path | None) -> tuple[str, list
             where=robot,
             do=f"name its URDF before the logs: `sysid init robot.urdf {shlex.join(words)}`",
         )
+    if not logs and not Path(robot).exists() and "://" not in robot:
+        beside = [one.name for one in Path(robot).parent.glob("*")]
+        do = meant(Path(robot).name, beside, "check its name")
+        raise SysidError("there is no such file", where=robot, do=do)
+    if not logs and Path(robot).is_file() and not _is_robot(robot):
+        raise SysidError(
+            "a log, and no robot",
+            where=robot,
+            do=f"name its URDF before it: `sysid init robot.urdf {shlex.quote(robot)}`",
+        )
     if not logs:
         folder = shlex.quote(str(Path(robot).parent))
         raise SysidError(
-            "which logs?",
+            "no logs are named",
             do=f"`sysid init {shlex.quote(robot)} LOG...`, or `sysid init {folder}` where the "
             "robot and its logs stand together",
         )
@@ -71,9 +81,10 @@ def _robot_in(folder: Path) -> str:
     found = sorted(one for one in folder.iterdir() if _is_robot(one.name))
     if len(found) == 1:
         return str(found[0])
-    names = ", ".join(one.name for one in found) or "none"
+    names = ", ".join(one.name for one in found)
+    several = f"{len(found)} robot files in one folder ({names})"
     raise SysidError(
-        f"a folder with {len(found)} files of a robot ({names})",
+        several if found else "a folder without a robot",
         where=str(folder),
         allowed="one " + ", ".join(_ROBOTS),
         do="`sysid init URDF LOG...` names the robot and the logs",

@@ -46,7 +46,8 @@ def _files(entries: list[dict], seconds: list[float]) -> dict[str, Guess]:
             "train": [e for e, test in zip(entries, said) if not test],
             "test": [e for e, test in zip(entries, said) if test],
         }
-        return _guesses(parts, "what no name says is held out", "held out, as the files' names say")
+        said = "held out, as the files' names say"
+        return _guesses(parts, "all whose names do not say that they are held out", said)
     first = len(entries) - 1
     while first > 1 and sum(seconds[first:]) < (1.0 - 1e-9) * SHARE * sum(seconds):
         first -= 1

@@ -84,7 +84,7 @@ def position_unit(q: dict[str, np.ndarray], slides: dict[str, bool], named: str)
     if largest[joint] > DEGREES:
         turns = largest[joint] / _TURN
         why = f"{joint} reaches {largest[joint]:.4g}, which in rad would be {turns:.2g} turns"
-        return Guess(key, "deg", why, "write rad where a joint turns on and on")
+        return Guess(key, "deg", why, "write rad if a joint really makes many turns")
     return Guess(key, "rad", f"the largest angle is {largest[joint]:.3g}")
 
 

@@ -14,7 +14,9 @@ def detectable(fit: Fit, document: dict) -> Section:
     """The smallest sizes that these logs would have named, and what they show at no size."""
     found, joints = document["detectable"], fit.joints
     absorbed: dict[tuple[str, str], list[str]] = {}
-    for entry in document["absorbed"]:
+    named = {(f["effect"], f["joint"]) for f in document["findings"] if f["joins_as_step"]}
+    # what is named was seen with others in the model that took its place before
+    for entry in (e for e in document["absorbed"] if (e["effect"], e["joint"]) not in named):
         absorbed.setdefault((entry["effect"], entry["separate_by"]), []).append(entry["joint"])
     there = {(entry["effect"], entry["joint"]): entry for entry in found}
     # "–": asked, and shown at no size; nothing: in the model already

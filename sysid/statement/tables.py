@@ -70,7 +70,7 @@ def suspects(document: dict, width: int) -> list[str]:
         return []
     heads = ["step", "suspect", "joint", "probability", "test before", "after"]
     return [
-        "suspects, step by step: * joins the model, and the next step is asked with it in",
+        "suspects, step by step: * is kept, and the next step starts from the model with it",
         *fitted(heads, rows, 3, width),
     ]
 

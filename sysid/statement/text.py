@@ -48,7 +48,7 @@ def verdict(of: Told, width: int) -> list[tuple[str, list[str]]]:
         (f"{v['joint']}: {v['status']}", _joint(v, of, width, said)) for v in of.document["verdict"]
     ]
     if of.document.get("next_log"):
-        words = f"what is unresolved needs another log: {ANOTHER} is that of"
+        words = f"what is unresolved needs another log; {ANOTHER} is designed by"
         out.append(("", [*wrapped(words, width, "  "), of.document["next_log"]]))
     return out
 
@@ -122,7 +122,8 @@ def _head(f: dict, of: Told, joint: str, width: int, said: dict[str, str]) -> li
         rest = listed([f"{placed(e, j, f['joint'])} ({percent(p)})" for e, j, p in others], "or")
         words = f"  these logs cannot tell it ({percent(f['probability'])}) from {rest}"
         out += wrapped(words, width, "    ")
-        out += wrapped(f"  to separate them: {f['separate_by']}; or the motion of", width, "    ")
+        words = f"  to separate them: {f['separate_by']}; or play the motion designed by"
+        out += wrapped(words, width, "    ")
         out.append(designs(f["command"], (f["effect"], f["joint"]), others))
     return [*out, "  add it with", f["command"]]
 

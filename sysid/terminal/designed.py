@@ -21,7 +21,7 @@ def show_design(document: dict) -> None:
         print(f"from {own['start']:g} s on a maneuver of {own['duration']:g} s, {own['kind']}: {', '.join(moved) or 'left out'}")
     left = [f"{name} {100 * share:.1f} %" for name, share in document["margins"].items() if name != "collision"]
     near = document["margins"].get("collision")
-    print(f"left of the limits: {', '.join(left)}" + ("" if near is None else f"; links keep {near:.3g} m apart"))
+    print(f"unused of each limit: {', '.join(left)}" + ("" if near is None else f"; links keep {near:.3g} m apart"))
     for pair in document["separates"]:
         if pair["probability"] < _NEVER:
             print(f"{pair['a']} and {pair['b']}: no motion within these limits is likely to tell them apart; `sysid effects` says what else does")

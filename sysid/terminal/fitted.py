@@ -75,7 +75,7 @@ def _show_held(at_zero: dict[str, float]) -> None:
         joint, _, parameter = rest.rpartition(".")
         joints.setdefault(f"{effect} {parameter}", []).append(joint)
     for kind, own in joints.items():
-        words = f"  {kind} went to zero and is held there, below which it cannot be, on {', '.join(own)}"
+        words = f"  {kind} is zero, the least that it can be, on {', '.join(own)}"
         print("\n".join(text.wrapped(words, terminal_width(), "    ")))
 
 

@@ -55,8 +55,8 @@ def show_discovery(said: dict, found, document: dict, experiment=None) -> None:
     if not said["commands"]:
         next_step("report", typed(experiment.path), "--open")
         return
-    print(f"{experiment.path} is as it was; what was found is written into it by")
-    for command in said["commands"][1:]:
+    print(f"{experiment.path} is as it was; these commands, in order, write what was found into it:")
+    for command in said["commands"]:
         print(f"  {command}")
     print(f"next: {said['commands'][0]}")
 
