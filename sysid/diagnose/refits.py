@@ -117,7 +117,7 @@ def weighed(view: View, weights=None) -> View:
     """The view with every joint weighted anew.
 
     Args:
-        weights: (dof,); None: by what the model now leaves each joint.
+        weights: (dof,), to compare it by, its noise as known; None: what it now leaves each joint.
     """
     how = {} if weights is None else {"tolerance": COMPARED, "like": view}
     return _again(view, view.model, inverse(view.rms()) if weights is None else weights, **how)

@@ -31,22 +31,14 @@ def sorted_out(first: str, rest: list[str], out: Path | None) -> tuple[str, list
     elif not robots and Path(first).is_dir():
         words = [_robot_in(Path(first)), *words[1:]]
     robot, *logs = words
-    if logs and not robots and Path(robot).is_file():
+    if not robots and Path(robot).is_file():
         raise SysidError(
-            "no robot",
+            "a log, and no robot",
             where=robot,
             do=f"name its URDF before the logs: `sysid init robot.urdf {shlex.join(words)}`",
         )
     if not logs and not Path(robot).exists() and "://" not in robot:
-        beside = [one.name for one in Path(robot).parent.glob("*")]
-        do = meant(Path(robot).name, beside, "check its name")
-        raise SysidError("there is no such file", where=robot, do=do)
-    if not logs and Path(robot).is_file() and not _is_robot(robot):
-        raise SysidError(
-            "a log, and no robot",
-            where=robot,
-            do=f"name its URDF before it: `sysid init robot.urdf {shlex.quote(robot)}`",
-        )
+        raise SysidError("there is no such file", where=robot, do=_meant(Path(robot)))
     if not logs:
         folder = shlex.quote(str(Path(robot).parent))
         raise SysidError(
@@ -62,15 +54,18 @@ def _there(logs: list[str]) -> None:
     for log in logs:
         path = Path(log)
         if path.parent.is_dir() and not path.exists() and path.suffix and not set(log) & set("*?["):
-            beside = [one.name for one in path.parent.iterdir()]
-            do = meant(path.name, beside, "check its name")
-            raise LogError("there is no such log", where=log, do=do)
+            raise LogError("there is no such log", where=log, do=_meant(path))
         if path.is_dir() and not is_log_folder(path) and listed(str(path), Path()) == [str(path)]:
             raise LogError(
                 "a folder without a log",
                 where=log,
                 do="name the logs: files, or a pattern such as runs/*.csv",
             )
+
+
+def _meant(path: Path) -> str:
+    """What to do about a file that is not there."""
+    return meant(path.name, [one.name for one in path.parent.glob("*")], "check its name")
 
 
 def _is_robot(word: str) -> bool:

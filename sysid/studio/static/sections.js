@@ -12,20 +12,31 @@ const SHORT = {
 const AT_WORK = "The fit stands; it is being diagnosed. Its charts are below.";
 let page = null; // what is shown
 const on = (effect, where) => where === "*" ? effect : effect + " to " + where;
-const charts = new Map(); // of the page that is shown: paper does not wait for an answer
-sysid.figure = id => charts.get(id) || asked(id);
+// of the page that is shown, each as it came or while it is asked for: paper waits for no answer
+const charts = new Map();
+sysid.figure = id => {
+  if (!charts.has(id)) charts.set(id, asked(id));
+  return charts.get(id);
+};
 async function asked(id) {
   const sha = stands.shown;
-  const [chart] = await Promise.all([get("api/figure", {sha, id}), engine()]);
-  if (sha === stands.shown) charts.set(id, chart);
-  return chart;
+  const keep = (key, chart) => sha === stands.shown && charts[key](id, chart);
+  try {
+    const [chart] = await Promise.all([get("api/figure", {sha, id}), engine()]);
+    keep("set", chart);
+    return chart;
+  } catch (error) {
+    keep("delete"); // to be asked for again
+    throw error;
+  }
 }
 
 async function allAsked(sha) { // one after another, so that nothing waits for them
   for (const place of document.querySelectorAll("#sections figure.chart[data-chart]")) {
-    const id = place.dataset.chart;
     if (stands.shown !== sha) return;
-    if (!charts.has(id)) await asked(id).catch(() => null); // who looks at it is told why
+    try {
+      await sysid.figure(place.dataset.chart);
+    } catch { /* who looks at it is told why */ }
   }
 }
 
