@@ -8,6 +8,9 @@ from pathlib import Path
 
 from .specs import EffectSpec, Experiment
 
+#: below it a probability is told as "less than"
+LIKELY = 0.01
+
 
 def spelled(candidate, joint: str) -> tuple[str, list[str] | None, dict]:
     """A candidate as an experiment file names it: word, joints, options."""
@@ -66,8 +69,13 @@ def command(path, effect: str, joints: list[str] | None, options: dict) -> str:
 
 def apart(head: tuple[str, str], others) -> list[str]:
     """An effect and what it is not told from, as `sysid design --separate` names them."""
-    likely = [(e, j) for e, j, p in others if p >= 0.01] or [others[0][:2]]  # others: "less than"
-    return [f"{e}:{j}" for e, j in (head, *likely)]
+    told = likely(others) or others[:1]
+    return [f"{e}:{j}" for e, j in (head, *(m[:2] for m in told))]
+
+
+def likely(others) -> list:
+    """Of what an effect is not told from, (effect, joint, probability), what is likely enough to be worth a motion."""
+    return [m for m in others if m[2] >= LIKELY]
 
 
 def designs(added: str, head: tuple[str, str], others) -> str:

@@ -20,6 +20,8 @@ from .errors import SysidError
 from .estimate import Fit
 from .notices import noticed
 from .specs import Experiment
+from .statement import kept
+from .unexplained import nought
 
 _HISTORY, _STEPS = "history.json", "steps"
 
@@ -173,6 +175,8 @@ def discover(experiment: Experiment, run: Path, *, most: int = 10, progress=None
     with state.locked(run):
         fits, steps = [found.fit], _continued(run, found.fit)
         _write_history(run, steps)
+        # what `sysid report` of the experiment as it is asks for
+        whole_files.write_json(run / steps[-1]["folder"] / kept.FILE, kept.sealed(experiment, found, run))
     refused = {(r.effect, r.joint): r for r in found.refused}
     for step in steps:
         tell(step)
@@ -182,16 +186,15 @@ def discover(experiment: Experiment, run: Path, *, most: int = 10, progress=None
             commands.append(claim.head.command)
             fits.append(claim.after)
             with state.locked(run):  # a search that is interrupted keeps the steps that it made
-                steps.append(_record(run, len(steps), claim.after, spelled(claim.head.candidate, claim.head.joint)[0], claim.head.joint))
+                made = _record(run, len(steps), claim.after, spelled(claim.head.candidate, claim.head.joint)[0], claim.head.joint)
+                steps.append({**made, "command": claim.head.command})
                 _write_history(run, steps)
             tell(steps[-1])
         found = diagnose(fits[-1].experiment, fit=fits[-1], progress=progress)
         refused |= {(r.effect, r.joint): r for r in found.refused}
     results.write(fits[-1], run)
-    from .statement.document import document
-
-    said = document(found, run)
-    whole_files.write_json(run / "diagnosis.json", said)
+    said = kept.sealed(found.fit.experiment, found, run)
+    whole_files.write_json(run / kept.FILE, said)
     left = [{"effect": r.effect, "joint": r.joint, "why": r.why} for r in refused.values()]
     with state.locked(run):
         _write_history(run, steps, verdict=said["verdict"], refused=left)
@@ -208,9 +211,22 @@ def document(added: Added) -> dict:
     model = added.before.model
     before = {*model.names, *(value.name for value in model.shape_values)}
     found = fit_document.document(added.after)
+    own = [p for p in found["parameters"] if p["name"] not in before]
     return {
         "added": name, "experiment": str(added.experiment.path), "rms_test_before": added.before.rms("test"), "rms_test_after": added.after.rms("test"),
         "refused": added.refused, "says": added.says,
         "differences": [{"joint": d.joint, "delta_rms": d.delta_rms, "se": fit_document.number(d.se)} for d in added.differences],
-        "parameters": [p for p in found["parameters"] if p["name"] not in before], "converged": found["converged"], "notices": found["notices"],
+        "parameters": own, "untold": _untold(added, name, own), "converged": found["converged"], "notices": found["notices"],
     }  # fmt: skip
+
+
+def _untold(added: Added, name: str, parameters: list[dict]) -> str:
+    """What to know of an effect whose size is nothing beside its deviations and that lowers no error; empty of others."""
+    numbers = {p["name"]: (p["value"], float("nan") if p["std"] is None else p["std"], p["unit"]) for p in parameters}
+    falls = any(-d.delta_rms > d.se for d in added.differences)
+    if added.refused or not numbers or falls or not nought(numbers):
+        return ""
+    return (
+        f"nothing in these logs speaks for {name}: its size is nothing beside its standard deviation, and no held-out error falls by more than its "
+        f"standard error; take it out of model.effects in {added.experiment.path} unless you know that it is there"
+    )

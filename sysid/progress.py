@@ -37,6 +37,19 @@ class Course:
         self.share = 0.0
 
     @property
+    def open(self) -> str:
+        """What is not known of the end: "least" where rounds of questions may follow that depend on what is found, "rounds" within
+        these; else empty."""
+        return "rounds" if len(self._rounds) > 1 else "least" if self._asks else ""
+
+    def left(self, elapsed: float) -> str:
+        """The time left, in words, after so many seconds; empty where nothing tells yet."""
+        if self.open == "rounds":
+            return f"{spoken(elapsed)} so far; another round for each effect that joins"
+        rest = left(self.share, elapsed)
+        return "" if rest is None else f"{'at least' if self.open else 'about'} {spoken(rest)} left"
+
+    @property
     def found(self) -> list[str]:
         """The effects with which it was asked again, in order."""
         return [name for _, comma, name in (stage.partition(_WITH) for stage in self._rounds) if comma]

@@ -15,7 +15,7 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 
-from . import state
+from . import bounded, state
 from .differences import told
 from .estimate import Fit
 from .filters import settled
@@ -44,6 +44,14 @@ def write(fit: Fit, out: str | Path) -> dict:
         untrue = (path / "diagnosis.json",) if _another(path, texts["fit.json"]) else ()
         write_together(files | {path / name: lambda p, c=content: p.write_bytes(c) for name, content in texts.items()}, without=untrue)
     return found
+
+
+def notices(path: Path) -> list[str]:
+    """What the fit in a run folder told; nothing where there is none."""
+    try:
+        return [str(one) for one in json.loads(bounded.read_text(path / "fit.json"))["notices"]]
+    except (OSError, ValueError, KeyError, TypeError):
+        return []
 
 
 def _another(path: Path, text: bytes) -> bool:

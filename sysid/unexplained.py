@@ -6,16 +6,27 @@ from __future__ import annotations
 import numpy as np
 
 _CLEAR = 2.0  # standard deviations
+_MOST = 0.5  # of what stands above a floor
+WEIGHED = "`weighting: noise` under `solver:` in the experiment file"
 
 
-def unexplained(error: float, floor, looks: str, weighed: float | None, carries: bool) -> str:
+def unexplained(
+    errors: tuple[float, float],
+    floor,
+    looks: str = "",
+    weighed: float | None = None,
+    carries: bool = True,
+    louder: str = "",
+) -> str:
     """Why a joint is unresolved.
 
     Args:
-        error: on the test logs. floor: its NoiseFloor. looks: the effect that may be what is left.
-            weighed: the error where each joint counts by its noise, where that makes most of the
-            difference. carries: whether the error of the training logs stands above the floor too.
+        errors: on the training logs and on the test logs. floor: its NoiseFloor. looks: the effect
+            that may be what is left. weighed: the error where each joint counts by its noise, where
+            that makes most of the difference. carries: whether the error of the training logs
+            stands above the floor too. louder: the joint whose misfit is the greatest in torque.
     """
+    error = errors[1]
     if not error > 0.0:
         return "none of its rows on the test logs counts: unused, at a standstill, or disturbed"
     if looks:
@@ -28,22 +39,52 @@ def unexplained(error: float, floor, looks: str, weighed: float | None, carries:
             f"its noise floor is not known ({floor.detail}), so nobody can say what error is left "
             "above it"
         )
-    times = error / max(floor.rms, 1e-300)
     if weighed is not None:
+        whose = f"the greater one of {louder}" if louder else "those of noisier joints"
         return (
-            f"its error is {times:.2g} times the noise floor because joints with more noise count "
-            "as much as quiet ones in this fit; with solver.weighting: noise it would be "
-            f"{weighed / floor.rms:.2g} times"
+            f"its error is {_times(error, floor)}, as errors of all joints count alike in this fit "
+            f"and {whose} bend the bodies that they share; with {WEIGHED}, it would be "
+            f"{_times(weighed, floor)}"
         )
     if not carries:
         return (
             "the training logs are explained and the test logs are not: the model does not carry "
             "over to them"
         )
+    where = ""
+    if floor.reached(error):
+        error, where = errors[0], " on the training logs"
     return (
-        f"its error is {times:.2g} times the noise floor, and nothing in the motion of these logs "
+        f"its error{where} is {_times(error, floor)}, and nothing in the motion of these logs "
         "predicts the rest"
     )
+
+
+def _times(error: float, floor) -> str:
+    times = error / max(floor.rms, 1e-300)
+    return "at the noise floor" if times < 1.05 else f"{times:.2g} times the noise floor"
+
+
+def by_weights(fit, joint: str, floor: float | None, weighed: dict[str, float]) -> bool:
+    """Whether most of what stands above a joint's floor is how a fit weighs its joints.
+
+    Args:
+        weighed: {joint: RMS where each counts by its noise}.
+    """
+    if floor is None or fit.weights is not None:
+        return False
+    square = fit.rms("test")[joint] ** 2
+    return square - weighed.get(joint, square**0.5) ** 2 > _MOST * abs(square - floor**2)
+
+
+def loudest(errors: dict[str, float], floors, asked) -> str:
+    """Of the joints that are `asked` what their error is, the one with the most above its floor."""
+    over = {
+        joint: error**2 - floor.rms**2
+        for (joint, error), floor, ask in zip(errors.items(), floors, asked)
+        if ask and floor.rms is not None
+    }
+    return max(over, key=over.get, default="")
 
 
 def nought(numbers: dict[str, tuple[float, float, str]]) -> bool:
@@ -62,6 +103,6 @@ def hidden_by_weights(effect: str, joint: str, numbers, weights) -> str | None:
     if weights is not None or not nought(numbers):
         return None
     return (
-        f"{effect} on {joint} is there, but this fit tells its size badly: joints with more noise "
-        "count as much as quiet ones; solver.weighting: noise tells it better"
+        f"{effect} on {joint} is there, by how the test error falls, but this fit tells its size "
+        f"badly: joints with more noise count as much as quiet ones; {WEIGHED} tells it better"
     )

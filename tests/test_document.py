@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from sysid.candidates import candidates
 from sysid.failures import regions
 from sysid.lowpass import LEAST
 from sysid.report.sections import sections
@@ -142,11 +143,30 @@ def test_what_is_unresolved_needs_another_log(found):
     """The command that designs it is told where a joint is unresolved, and only there; in words, on a line of its own, whole."""
     target = found.fit.experiment.path.parent
     for status, command in (("unresolved", f"sysid design {target} --out next"), ("complete", None)):
-        verdict = tuple(replace(v, status=status, claims=(), says="why", left=None) for v in found.verdict)
+        verdict = tuple(replace(v, status=status, claims=(), says="why", left=None, may=None, even=False) for v in found.verdict)
         other = replace(found, verdict=verdict)
         said = document(other, "runs/x")
         assert said["next_log"] == command
         lines = [line for _, own in text.verdict(text.told(other, said), 60) for line in own]
         assert [line for line in lines if "sysid design" in line] == ([command] if command else [])
         card = sections(found.fit, said, [])["verdict"]["html"]
-        assert ("needs another log" in card) is ("sysid design" in card) is (command is not None)
+        assert ("shoulder and elbow need another log" in card) is ("sysid design" in card) is (command is not None)
+
+
+def test_what_may_be_it_is_to_be_tried_and_what_weights_leave_needs_no_log(found):
+    """Of two unresolved joints, one with an effect that may be it and one whose error is how joints are weighed: neither needs another log,
+    the first one's command stands on a line of its own and on the page."""
+    model, joints = found.fit.model, found.fit.joints
+    may = next(c for c in candidates(model) if c.name == "elasticity" and c.joint == 0)
+    plain = {"status": "unresolved", "claims": (), "says": "why", "left": None}
+    one, other = (replace(v, **plain, **more) for v, more in zip(found.verdict, ({"may": may}, {"even": True})))
+    made = replace(found, verdict=(one, other))
+    said = document(made, "runs/x")
+    command = f"sysid add {found.fit.experiment.path.parent} elasticity --joint {joints[0]}"
+    own = said["verdict"][0]["may_be"]
+    assert said["next_log"] is None and own["command"].startswith(command) and own["joint"] == joints[0]
+    assert own["options"] == dict(may.options) and said["verdict"][1]["weighting"] == "noise"
+    lines = [line for _, some in text.verdict(text.told(made, said), 60) for line in some]
+    assert own["command"] in lines and not any("design" in line for line in lines)
+    card = sections(found.fit, said, [])["verdict"]["html"]
+    assert command in card and "another log" not in card and "blind" not in card

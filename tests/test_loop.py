@@ -11,6 +11,7 @@ from sysid.addition import grown, spelled
 from sysid.candidates import candidates
 from sysid.effect_entry import with_effect
 from sysid.errors import ConfigError, LogError
+from sysid.statement import kept
 from sysid.vocabulary import find
 
 FILE = """\
@@ -295,7 +296,17 @@ def test_another_joint_s_error_does_not_refuse(experiment, cli):
     document = json.loads(said.out)
     assert said.status == 0 and document["refused"] is False and document["says"] == ""
     (elbow,) = [d for d in document["differences"] if d["joint"] == "elbow"]
-    assert elbow["delta_rms"] < -3 * elbow["se"]
+    assert elbow["delta_rms"] < -3 * elbow["se"] and document["untold"] == ""
+
+
+def test_an_effect_that_no_log_speaks_for_is_written_and_said_to_be_so(experiment, cli):
+    """It is the user's to know better; its size, nothing beside its deviation, is not left without a word."""
+    folder = experiment()
+    said = cli("add", folder, "torque_bias", "--joint", "elbow", "--force")
+    assert said.status == 0 and effects_of((folder / "config.yaml").read_text())[-1][0] == "torque_bias"
+    words = " ".join(said.out.split())
+    assert "nothing in these logs speaks for torque_bias: its size is nothing beside its standard deviation" in words
+    assert f"take it out of model.effects in {folder / 'config.yaml'} unless you know that it is there" in words
 
 
 def test_a_fit_that_fails_leaves_the_file_alone(experiment, cli, monkeypatch):
@@ -373,7 +384,7 @@ def test_diagnose_from_the_command_line(biased, cli):
     assert changed.status == 0 and {"joints", "findings", "not_visible", "verdict"} <= set(json.loads(changed.out))
 
 
-def test_discover_finds_and_its_steps_reproduce(biased, cli, tmp_path):
+def test_discover_finds_and_its_steps_reproduce(biased, cli, tmp_path, monkeypatch):
     before = (biased / "config.yaml").read_bytes()
     said = cli("discover", biased, "--json")
     assert said.status == 0 and said.err == ""
@@ -387,6 +398,14 @@ def test_discover_finds_and_its_steps_reproduce(biased, cli, tmp_path):
     for step in steps:
         again = cli("fit", said.run / step["folder"] / "experiment.yaml", "--json", out=tmp_path / "again")
         assert json.loads(again.out)["rms"]["test"] == pytest.approx(step["rms_test"], rel=1e-9)
+    # they are not in the file: what writes them is told, and a page of the experiment as it is needs no second diagnosis
+    assert steps[1]["command"] == f"sysid add {biased} torque_bias --joint elbow"
+    told = cli("history", biased).out.splitlines()
+    assert f"  {steps[1]['command']}" in told and told[-1] == f"next: {steps[1]['command']} --out {said.run}"
+    with monkeypatch.context() as patched:
+        patched.setattr(kept, "diagnose", lambda *given, **named: pytest.fail("asked again"))
+        page = json.loads(cli("report", biased, "--json").out)
+        assert page["verdict"][1]["status"] == "missing" and "it stayed as it was" in Path(page["report"]).read_text()
     # steps that are not asked for are not made
     none = json.loads(cli("discover", biased, "--max-steps", "0", "--json").out)
     assert [s["added"] for s in none["steps"]] == [None] and none["verdict"][1]["status"] == "missing"
@@ -412,7 +431,7 @@ def discoveries(monkeypatch, arm_model, claims=(("joint_coupling", "torque_bias"
     monkeypatch.setattr(loop, "diagnose", fake_diagnose)
     monkeypatch.setattr(loop.results, "write", lambda fit, folder: None)
     monkeypatch.setattr(loop.whole_files, "write_json", lambda *given: None)
-    monkeypatch.setattr("sysid.statement.document.document", lambda found, run: {"verdict": []})
+    monkeypatch.setattr(loop.kept, "sealed", lambda spec, found, run: {"verdict": []})
     return asked
 
 

@@ -198,11 +198,12 @@ def last(cli, *words, out=None):
 
 def test_every_command_ends_with_the_next_one(experiment, cli, tmp_path):
     folder, run = experiment(), tmp_path / "run"
-    assert last(cli, "check", folder) == f"next: sysid fit {folder}"
-    assert last(cli, "fit", folder) == f"next: sysid diagnose {folder}"
-    assert last(cli, "add", folder, "torque_bias:elbow", "--force") == f"next: sysid diagnose {folder}"
+    out = f" --out {run}"  # which a run folder of one's own needs every time
+    assert last(cli, "check", folder) == f"next: sysid fit {folder}{out}"
+    assert last(cli, "fit", folder) == f"next: sysid diagnose {folder}{out}"
+    assert last(cli, "add", folder, "torque_bias:elbow", "--force") == f"next: sysid diagnose {folder}{out}"
     assert "torque_bias: {joints: [elbow]}" in (folder / "config.yaml").read_text()
-    assert last(cli, "history", folder) == f"next: sysid diagnose {folder}"
+    assert last(cli, "history", folder) == f"next: sysid diagnose {folder}{out}"
     assert last(cli, "compare", folder, run / "steps/00-start", out=tmp_path / "two") == f"next: sysid diagnose {folder}"
     assert last(cli, "simulate", folder, "--duration", "4", "--rate", "250", out=tmp_path / "sim") == f"next: sysid diagnose {tmp_path / 'sim'}"
     assert last(cli, "effects") == "next: sysid effects NAME"
@@ -219,10 +220,13 @@ def test_a_run_folder_stands_for_its_experiment_in_a_comparison(experiment, cli,
 def test_logs_that_cannot_be_meant_are_checked_next_and_that_only_once(experiment, cli):
     """A check that finds the logs in order is not asked for again."""
     folder = experiment(test=lambda c: c | {f"tau_{j}": -c[f"tau_{j}"] for j in JOINTS})
-    assert last(cli, "fit", folder) == f"next: sysid check {folder}"
-    assert last(cli, "check", folder) in (f"next: sysid fit {folder}", f"next: sysid check {folder}")
-    (folder.parent / "run/check.json").write_text('{"ok": true, "faults": []}')
-    assert last(cli, "fit", folder) == f"next: sysid diagnose {folder}"
+    run = folder.parent / "run"
+    assert last(cli, "fit", folder) == f"next: sysid check {folder} --out {run}"
+    assert last(cli, "check", folder) in [f"next: sysid {word} {folder} --out {run}" for word in ("fit", "check")]
+    # who goes on all the same has read what the check says
+    for ok in ("true", "false"):
+        (run / "check.json").write_text(f'{{"ok": {ok}, "faults": []}}')
+        assert last(cli, "fit", folder) == f"next: sysid diagnose {folder} --out {run}"
 
 
 def test_what_is_held_at_zero_is_a_line_an_effect(capsys, monkeypatch):

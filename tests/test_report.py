@@ -240,7 +240,7 @@ LEFT = {"depends_on": [{"variable": f"qd_{EVIL}", "share": 0.3}, {"variable": "t
 def test_every_status_has_its_card(clean, more, words):
     found, said = clean
     made = sections(found.fit, judged(said, **more), [])
-    cards = re.findall(r'<article class="card (\w+)">(.*?)</article>', made["verdict"]["html"], re.S)
+    cards = re.findall(r'<article class="card (\w+)[ \w]*">(.*?)</article>', made["verdict"]["html"], re.S)
     assert cards[0][0] == more["status"] and words in "".join(Elements(cards[0][1]).texts)
     assert ("What the residual of" in made["detectable"]["html"]) == ("depends_on" in more)
 

@@ -220,6 +220,13 @@ def test_each_joint_is_said_in_a_paragraph():
         "with all that is named the held-out error goes from 0.4 to 0.11 N m"
     )
     (_, lines), *_ = text.verdict(of(document(verdict=[{"joint": "j3", "status": "complete"}])), 80)
+    assert " ".join(map(str.strip, lines)) == (
+        "j3: complete: no further effect is supported by these logs; its error is 4.00 times the "
+        "noise floor, which is known no nearer"
+    )
+    close = document(verdict=[{"joint": "j3", "status": "complete"}])
+    close["joints"]["j3"]["noise_floor"] = 0.39
+    (_, lines), *_ = text.verdict(of(close), 80)
     assert lines == ["j3: complete: no further effect is supported by these logs"]
 
 
@@ -245,11 +252,15 @@ def test_tables_say_what_is_not_known():
         "knock, day 1/a.csv, 4.08 to 4.22 s: " in " ".join(" ".join(events).split())
         and events[-1] == "  torque spike, b.csv, 1.00 s: rail"
     )
-    many = document(events=said["events"] * 30)
-    assert (
-        tables.events(many, 200)[-1] == "  and 40 more: see diagnosis.json"
-        and tables.events(document(events=[]), 80) == []
+    assert tables.events(document(events=[]), 80) == []
+    # many of a kind in a log are one line, with how many each joint has
+    _, *told = tables.events(document(events=said["events"] * 30), 200)
+    assert len(told) == 2 and told[1] == (
+        "  30 torque spikes, b.csv, 1.00 to 1.00 s: rail 30; each in diagnosis.json"
     )
+    few = [{**e, "log": f"{k}.csv"} for k in range(12) for e in said["events"]]
+    told = tables.events(document(events=few), 200)
+    assert len(told) == 22 and told[-1] == "  and 4 more: see diagnosis.json"
     assert tables.suspects(document(findings=[]), 80) == []
 
 

@@ -30,9 +30,12 @@ def add(
     Where the held-out error of its joint (over all joints for an effect of the whole robot) rises by more than its standard
     error nothing is written, and the status is 1.
     """
-    from .. import effect_entry, loop
+    from .. import effect_entry, loop, pipeline, results
 
     effect, joint = _on_joint(effect, joint)
+    spec = pipeline.load(experiment)
+    run = out or Path("runs") / spec.name
+    before = results.notices(run)
     with progress_of(quiet or as_json, 3) as progress:
         own = {**effect_entry.options(option or []), **({"per": per} if per else {}), **({"except": list(spared)} if spared else {})}
         found = loop.add(experiment, effect, list(joint) if joint else None, own, force=force, progress=progress, out=out)
@@ -42,7 +45,7 @@ def add(
     elif not quiet:
         from ..terminal.steps import show_added
 
-        show_added(said)
+        show_added(said, spec, run, before)
     elif found.refused and not as_json:
         print(f"sysid: {found.says}", file=sys.stderr)
     if found.refused or not found.after.solution.converged:
@@ -96,4 +99,4 @@ def history(experiment: ExperimentPath, as_json: Json = False, out: Out = None, 
     elif not quiet:
         from ..terminal.steps import show_history
 
-        show_history(steps, spec)
+        show_history(steps, spec, run)

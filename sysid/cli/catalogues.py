@@ -40,11 +40,11 @@ def export(
 def effects(name: Annotated[Optional[str], typer.Argument(help="One effect; without it, all.")] = None, as_json: Json = False, out: Out = None, quiet: Quiet = False) -> None:  # noqa: UP045
     """The catalogue of physical effects: equation, parameters, units, what it looks like, what it is confused with."""
     from .. import whole_files
+    from ..formula import DESCRIBED
     from ..vocabulary import describe, find, vocabulary
 
-    found = [describe(find(word)) for word in ([name] if name else vocabulary())]
+    found = [DESCRIBED] if name == "formula" else [describe(find(word)) for word in ([name] if name else vocabulary())]
     if out:
-
         whole_files.write_json(whole_files.folder(out) / "effects.json", {"effects": found})
     if as_json:
         print(json.dumps({"effects": found}))

@@ -39,7 +39,7 @@ def design(
     elif not quiet:
         from ..terminal.designed import show_design
 
-        show_design(document)
+        show_design(document, spec)
 
 
 def _suspect(text: str) -> tuple[str, str]:

@@ -22,7 +22,7 @@ def diagnose(
     trust: Trust = False, as_json: Json = False, out: Out = None, quiet: Quiet = False,
 ) -> None:  # fmt: skip
     """Where the model fails and which effect is missing; with --model, what changed on a new log."""
-    from .. import pipeline, whole_files
+    from .. import pipeline, results, whole_files
 
     spec = pipeline.load(experiment)
     if (model is None) != (not log):
@@ -36,6 +36,7 @@ def diagnose(
     from ..statement import kept
 
     run = whole_files.folder(out or Path("runs") / spec.name)
+    before = results.notices(run)
     with progress_of(quiet or as_json, asks=True) as progress:
         found = work(spec, progress=progress)
     said = kept.written(spec, found, run)
@@ -44,7 +45,7 @@ def diagnose(
     elif not quiet:
         from ..terminal.diagnosis import show_diagnosis
 
-        show_diagnosis(found, said, spec)
+        show_diagnosis(found, said, spec, before)
     if not found.fit.solution.converged:
         raise typer.Exit(1)
 
@@ -86,9 +87,9 @@ def report(
     elif not quiet:
         print(path)
         if not opened:
-            from ..terminal.next_steps import next_step
+            from ..terminal.next_steps import next_step, out_of
 
-            next_step("report", experiment, "--open")
+            next_step("report", experiment, "--open", out=out_of(spec, run))
     if opened:
         import webbrowser
 

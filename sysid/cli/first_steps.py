@@ -71,13 +71,14 @@ def check(experiment: ExperimentPath, trust: Trust = False, as_json: Json = Fals
 
     spec = pipeline.load(experiment)
     document = doctor.document(doctor.check(spec))
-    whole_files.write_json(whole_files.folder(out or Path("runs") / spec.name) / "check.json", document)
+    run = whole_files.folder(out or Path("runs") / spec.name)
+    whole_files.write_json(run / "check.json", document)
     if as_json:
         print(json.dumps(document, allow_nan=False))
     elif not quiet:
         from ..terminal.fitted import show_check
 
-        show_check(document, spec)
+        show_check(document, spec, run)
     if not document["ok"]:
         raise typer.Exit(1)
 

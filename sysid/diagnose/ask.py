@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from ..blocks import Belief
-from ..candidates import candidates
+from ..candidates import Candidate, candidates
 from ..view import View
 from . import null
 from .evidence import Group
@@ -50,14 +50,13 @@ class Asked:
         """Family-wise p-value of a group."""
         return null.chance(self.statistics[k], self.maxima)
 
-    def near(self, joint: int, gain: float) -> str:
-        """The effect on a joint that may be there and takes half of a gain, the most likely one;
-        empty where none does."""
+    def near(self, joint: int, gain: float) -> Candidate | None:
+        """The effect on a joint that may be there and takes half of a gain, the most likely one."""
         found, statistics, gains, _ = self.by_joint.get(joint, ([], [], [], None))
         takes = [k for k, own in enumerate(gains) if own > _HALF * gain]
         best = max(takes, key=lambda k: statistics[k], default=None)
         may = best is not None and null.chance(statistics[best], self.maxima) <= _MAY_BE
-        return found[best].candidate.name if may else ""
+        return found[best].candidate if may else None
 
 
 def ask(view: View, extra=(), tell=lambda share: None, *, before=None, anew=()) -> Asked:

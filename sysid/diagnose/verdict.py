@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
+from ..candidates import Candidate
 from ..estimate import Fit
 from ..flexible import Law, Unknown
 from ..noise import DOUBT
 from ..transfer import Transfer
-from ..unexplained import unexplained
+from ..unexplained import by_weights, loudest, unexplained
 from .claims import Claim
 from .select import WORTH
 
-_MOST = 0.5  # of what stands above a floor
 _LEFT = 0.25  # of what effects took: they explain it, 80 % of all that anything does
 
 
@@ -26,8 +26,9 @@ class Verdict:
     what is left, and no effect does), unresolved (error stands above the floor, or the floor is not
     known, and these logs do not say why). explained: share of the joint's misfit on the test logs
     that all claims take, NaN where the misfit is not known. left: what functions of the motion
-    predict of the rest; None where nothing. says: why it is unresolved. carries: that the training
-    logs do not carry the model over to the test logs, where they do not.
+    predict of the rest; None where nothing. says: why it is unresolved. may: the effect that may
+    be what is left. even: whether most of the rest is how the fit weighs its joints. carries: that
+    the training logs do not carry the model over to the test logs, where they do not.
     """
 
     joint: str
@@ -36,6 +37,8 @@ class Verdict:
     explained: float = float("nan")
     left: Unknown | None = None
     says: str = ""
+    may: Candidate | None = None
+    even: bool = False
     carries: str = ""
 
 
@@ -48,7 +51,7 @@ def verdicts(
     carried: Sequence[Transfer] = (),
     weighed: dict[str, float] | None = None,
     law: Callable[[int], Law] | None = None,
-    near: Callable[[int, float], str] | None = None,
+    near: Callable[[int, float], Candidate | None] | None = None,
 ) -> list[Verdict]:
     """The verdict on every joint.
 
@@ -62,8 +65,9 @@ def verdicts(
     last = claims[-1].after if claims else fit
     errors = last.rms("train"), last.rms("test")
     reaches = [f.reached(max(e[j] for e in errors)) for f, j in zip(floors, fit.joints)]
-    evens = [_even(last, joint, floors[j].rms, weighed or {}) for j, joint in enumerate(fit.joints)]
+    evens = [by_weights(last, joint, f.rms, weighed or {}) for f, joint in zip(floors, fit.joints)]
     asked = [not at and not even for at, even in zip(reaches, evens)]
+    louder = loudest(errors[1], floors, asked)
     out = []
     for j, joint in enumerate(fit.joints):
         taking = [c for c in claims if c.head.joint == joint or c.step.shares[j] >= WORTH]
@@ -78,7 +82,7 @@ def verdicts(
         if law and asked[j] and then > 0.0 and not seen.predictable(among, WORTH):
             seen = seen.with_law(law(j))
         remains = seen if seen.predictable(among, WORTH) else None
-        looks = near(j, remains.share * remains.total) if near and remains else ""
+        looks = near(j, remains.share * remains.total) if near and remains else None
         reached = reaches[j] and first > 0.0 and not _above(remains, then, floor)
         taken = sum(c.step.shares[j] for c in own)
         if own and (remains is None or remains.share * max(1.0 - taken, 0.0) <= _LEFT * taken):
@@ -86,11 +90,13 @@ def verdicts(
         elif own or (remains is not None and not looks and not reached and not evens[j]):
             told = ("unknown", own or others, explained, remains)
         elif not reached:
-            carries = not floors[j].reached(last.rms("train")[joint])
+            both = last.rms("train")[joint], then
             even = weighed[joint] if evens[j] else None
-            why = unexplained(then, floors[j], looks, even, carries)
+            carries = not floors[j].reached(both[0])
+            may = looks.name if looks else ""
+            why = unexplained(both, floors[j], may, even, carries, louder)
             why += "".join(f"; {r.told}" for r in refused if r.joint in (joint, "*"))
-            told = ("unresolved", others, explained, remains, why)
+            told = ("unresolved", others, explained, remains, why, looks, evens[j])
         elif floors[j].reached(first) or not claims:
             told = ("complete",)
         else:
@@ -99,14 +105,6 @@ def verdicts(
         out.append(Verdict(joint, *told))
     said = {found.joint: found.says for found in carried}
     return [replace(one, carries=said.get(one.joint, "")) for one in out]
-
-
-def _even(fit: Fit, joint: str, floor: float | None, weighed: dict[str, float]) -> bool:
-    """Whether most of what stands above a joint's floor is how the fit weighs its joints."""
-    if floor is None or fit.weights is not None:
-        return False
-    square = fit.rms("test")[joint] ** 2
-    return square - weighed.get(joint, square**0.5) ** 2 > _MOST * abs(square - floor**2)
 
 
 def _above(remains: Unknown | None, error: float, floor: float) -> bool:

@@ -117,7 +117,8 @@ def _drive(found: Signals, used: list[str]) -> list[Guess]:
     why = "friction, a bias and the rotors' inertia, which a URDF does not hold"
     window = "chosen on held-out stretches of the training logs"
     out.append(Guess("preprocess.window", "auto", window))
-    return [*out, Guess("model.effects", _EFFECTS, why)]
+    each = "each joint's error counts by its own noise; none: all alike"
+    return [*out, Guess("model.effects", _EFFECTS, why), Guess("solver.weighting", "noise", each)]
 
 
 def _wraps(data: list[Logged], used: list[str], robot, unit: str) -> tuple[str, ...]:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from ..addition import apart, designs
+from ..addition import LIKELY, apart, designs, likely
 from ..estimate import Fit
 from ..given_shapes import given_shapes, said_of_shapes
-from ..statement.text import ANOTHER
+from ..statement.text import ANOTHER, OWN, TRIED, blind, near, needing
 from ..statement.words import followed, percent
 from .section import Section
 from .words import (
@@ -54,7 +54,10 @@ def verdict(fit: Fit, document: dict) -> Section:
         "notices": document["notices"],
         "made": document.get("made", ""),
         "next_log": document.get("next_log"),
+        "needing": needing(document) if document.get("next_log") else "",
         "another": ANOTHER,
+        "own_law": OWN[0].upper() + OWN[1:].replace("`", ""),
+        "trying": TRIED,
         "band": band(fit),
     }
     return Section("Verdict", "verdict", values)
@@ -105,6 +108,9 @@ def _card(found: dict, fit: Fit, document: dict) -> dict:
         "claims": [_claim(*one, joint, several) for one in heads],
         "fall": fall,
         "left": left_words(found, fit),
+        "near": near(found, document) if status == "complete" else "",
+        "tried": found.get("may_be"),
+        "blind": joint in blind(document),
         "says": says[:1].upper() + says[1:],
         "commands": commands,
         "error": f"{level(error)}{SPACE}{force}",
@@ -147,15 +153,17 @@ def _claim(head: dict, tied: list[dict], joint: str, several: bool) -> dict:
     summary = head["summary"].replace("`", "").split(". ")[0].rstrip(".")
     every = [(one["effect"], one["joint"], one["probability"]) for one in tied]
     others = [one for one in every if one[:2] != effect]
+    told = likely(others)
     return {
         "effect": head["effect"],
         "figures": ": ".join(part for part in (takes, ", ".join(values)) if part),
         "summary": summary,
         "probability": chance(head["probability"]),
-        "others": [f"{placed(e, j, head['joint'])}{SPACE}({chance(p)})" for e, j, p in others],
+        "others": [f"{placed(e, j, head['joint'])}{SPACE}({chance(p)})" for e, j, p in told],
+        "few": [placed(e, j, head["joint"]) for e, j, p in others if p < LIKELY],
         "separate_by": head["separate_by"],
-        "design": designs(head["command"], effect, others) if others else "",
-        "separate": ",".join(apart(effect, others)) if others else "",
+        "design": designs(head["command"], effect, told) if told else "",
+        "separate": ",".join(apart(effect, told)) if told else "",
     }
 
 

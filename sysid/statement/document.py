@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 
-from ..addition import another_log
+from ..addition import another_log, command, spelled
 from ..diagnose.diagnosis import Diagnosis
 from ..diagnose.verdict import Verdict
 from ..filters import settled, torque_band
@@ -30,7 +32,7 @@ def document(found: Diagnosis, run="") -> dict:
         },
         "findings": [finding(f, claim, found) for claim in found.claims for f in claim.findings],
         "claims": list(claims(found)),
-        "verdict": [_verdict(v) for v in found.verdict],
+        "verdict": [_verdict(v, fit.experiment.path) for v in found.verdict],
         "detectable": [
             {
                 "effect": d.candidate.name,
@@ -102,8 +104,9 @@ def document(found: Diagnosis, run="") -> dict:
 
 
 def _next_log(found) -> str | None:
-    """The command that designs the log to take next, where these do not say why an error stands."""
-    blind = any(v.status == "unresolved" for v in found.verdict)
+    """The command that designs the log to take next, where these do not say why an error stands,
+    and neither an effect that may be it nor how the fit weighs its joints does."""
+    blind = any(v.status == "unresolved" and not (v.may or v.even) for v in found.verdict)
     return another_log(found.fit.experiment.path) if blind else None
 
 
@@ -121,7 +124,7 @@ def _floor(floor) -> dict:
     }
 
 
-def _verdict(v: Verdict) -> dict:
+def _verdict(v: Verdict, path="config.yaml") -> dict:
     out: dict = {"joint": v.joint, "status": v.status}
     if v.status in ("missing", "unknown") and v.claims:
         first = v.claims[0]
@@ -150,6 +153,13 @@ def _verdict(v: Verdict) -> dict:
         }
     if v.says or v.carries:
         out["says"] = "; ".join(words for words in (v.says, v.carries) if words)
+    if v.may is not None:
+        name, joints, options = spelled(v.may, v.joint)
+        adds = command(Path(path), name, joints, options)
+        told = {"effect": name, "joint": v.joint, "options": options}
+        out["may_be"] = {**told, "command": adds}
+    if v.even:
+        out["weighting"] = "noise"
     if v.left is not None:
         out |= {"depends_on": dependences(v.left), "share_left": v.left.share}
     return out

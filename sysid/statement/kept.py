@@ -35,10 +35,13 @@ def diagnosed(
     Raises:
         SysidError: bad input.
     """
-    if (said := _read(experiment, run)) is not None:
+    # that of the experiment as it is may be the start of a discovery
+    there = (_read(experiment, folder) for folder in (run, *sorted(run.glob("steps/*"))))
+    if (said := next((one for one in there if one is not None), None)) is not None:
         fit = pipeline.fit(experiment, progress=progress)
         if _of_its_logs(said, fit):
             results.write(fit, run)
+            whole_files.write_json(run / FILE, said)
             return fit, {**said, "run": str(run)}
         made = diagnose(experiment, fit=fit, progress=progress)  # of other logs
     else:
@@ -60,12 +63,18 @@ def written(experiment: Experiment, made: Diagnosis, run: Path) -> dict:
     """Write a fit and its diagnosis into a run folder; returns the diagnosis's document, which
     says what it is of and when it was made."""
     results.write(made.fit, run)
+    said = sealed(experiment, made, run)
+    whole_files.write_json(run / FILE, said)
+    return said
+
+
+def sealed(experiment: Experiment, made: Diagnosis, run: Path) -> dict:
+    """A diagnosis's document, with what it is of and when it was made."""
     now = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
     # as it will be read again
     said = json.loads(json.dumps(document(made, run), allow_nan=False))
     said |= {"made": now, "of": of(experiment)}
     said["seal"] = _seal(said)
-    whole_files.write_json(run / FILE, said)
     return said
 
 

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ..events import WORDS
+from ..events import WORDS, plural
 from .text import Told
 from .words import listed, percent, wrapped
 
-_EVENTS = 20  # lines; the rest is counted
+_EVENTS, _FEW = 20, 4  # lines; of one kind in one log: more are one line
 
 
 def errors(of: Told, width: int) -> list[str]:
@@ -76,9 +76,15 @@ def suspects(document: dict, width: int) -> list[str]:
 
 
 def events(document: dict, width: int) -> list[str]:
-    """What disturbed the logs, a line each."""
-    out = []
-    for e in document["events"][:_EVENTS]:
+    """What disturbed the logs: a line each, or one for many of a kind in a log."""
+    kinds: dict[tuple[str, str], list[dict]] = {}
+    for e in document["events"]:
+        kinds.setdefault((e["kind"], e["log"]), []).append(e)
+    out, shown = [], [one for some in kinds.values() if len(some) <= _FEW for one in some]
+    for (kind, log), some in kinds.items():
+        if len(some) > _FEW:
+            out += wrapped(f"  {_many(kind, log, some)}", width, "    ")
+    for e in shown[:_EVENTS]:
         span = (
             f"{e['start']:.2f} s"
             if e["stop"] - e["start"] < 0.01
@@ -91,10 +97,19 @@ def events(document: dict, width: int) -> list[str]:
             width,
             "    ",
         )
-    more = len(document["events"]) - _EVENTS
+    more = len(shown) - _EVENTS
     if more > 0:
         out.append(f"  and {more} more: see diagnosis.json")
     return ["events in the logs, left out", *out] if out else []
+
+
+def _many(kind: str, log: str, some: list[dict]) -> str:
+    joints = [joint for e in some for joint in e["joints"]]
+    on = ", ".join(f"{joint} {joints.count(joint)}" for joint in dict.fromkeys(joints))
+    span = f"{min(e['start'] for e in some):.2f} to {max(e['stop'] for e in some):.2f} s"
+    told = " (not left out)" if kind == "saturation" else ""
+    words = f"{len(some)} {plural(kind, len(some))}, {log}, {span}: {on}{told}"
+    return f"{words}; each in diagnosis.json"
 
 
 def fails(document: dict, width: int) -> list[str]:

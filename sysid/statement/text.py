@@ -5,13 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from ..addition import designs
+from ..addition import LIKELY, designs, likely
 from .words import followed, listed, percent, placed, quantity, valued, wrapped
 
 if TYPE_CHECKING:
     from ..diagnose.diagnosis import Diagnosis
 
 ANOTHER = "a motion that tells most of what these logs leave open"
+TRIED = "to try it, and see the held-out error before and after"
+OWN = "a law of your own can be tried: `sysid effects formula`"
 _TOGETHER = "several variables together"
 
 
@@ -48,7 +50,7 @@ def verdict(of: Told, width: int) -> list[tuple[str, list[str]]]:
         (f"{v['joint']}: {v['status']}", _joint(v, of, width, said)) for v in of.document["verdict"]
     ]
     if of.document.get("next_log"):
-        words = f"what is unresolved needs another log; {ANOTHER} is designed by"
+        words = f"{needing(of.document)}; {ANOTHER} is designed by"
         out.append(("", [*wrapped(words, width, "  "), of.document["next_log"]]))
     return out
 
@@ -66,7 +68,7 @@ def _joint(v: dict, of: Told, width: int, said: dict[str, str]) -> list[str]:
     ]
     named = listed(words, "and") if heads else ""
     first = {
-        "complete": lambda: "no further effect is supported by these logs",
+        "complete": lambda: f"no further effect is supported by these logs{near(v, of.document)}",
         "explained": lambda: (
             "by "
             + listed([placed(c["effect"], c["joint"]) for c in v["by"]], "and")
@@ -90,7 +92,36 @@ def _joint(v: dict, of: Told, width: int, said: dict[str, str]) -> list[str]:
     lines += rest if status != "unknown" else []
     if status != "unresolved" and v.get("says"):
         lines += wrapped(f"  {v['says']}", width, "    ")
+    if "may_be" in v:
+        lines += [f"  {TRIED}", v["may_be"]["command"]]
+    if status == "unknown":
+        lines += wrapped(f"  {OWN}", width, "    ")
     return lines
+
+
+def blind(document: dict) -> list[str]:
+    """The joints whose error another log may explain, and nothing that is known now."""
+    return [
+        v["joint"]
+        for v in document["verdict"]
+        if v["status"] == "unresolved" and "may_be" not in v and "weighting" not in v
+    ]
+
+
+def needing(document: dict) -> str:
+    """Which joints need another log, in words."""
+    joints = blind(document)
+    return f"{listed(joints, 'and')} need{'s' * (len(joints) == 1)} another log"
+
+
+def near(v: dict, document: dict) -> str:
+    """How far above its noise floor the error of a joint is that is at the floor, as near as that
+    is known."""
+    entry = document["joints"][v["joint"]]
+    floor, error = entry["noise_floor"], entry["rms"]["test"]
+    if not floor or error is None or error < 1.05 * floor:
+        return ""
+    return f"; its error is {error / floor:#.3g} times the noise floor, which is known no nearer"
 
 
 def _fall(v: dict, of: Told) -> str:
@@ -118,13 +149,16 @@ def _head(f: dict, of: Told, joint: str, width: int, said: dict[str, str]) -> li
     words = f"  {f['effect']}{takes}" + (f": {', '.join(values)}" if values else "")
     out = wrapped(words, width, "    ") if takes or values else []
     others = [m for m in of.sets[f["command"]] if m[:2] != (f["effect"], f["joint"])]
-    if others:
-        rest = listed([f"{placed(e, j, f['joint'])} ({percent(p)})" for e, j, p in others], "or")
+    if told := likely(others):
+        rest = listed([f"{placed(e, j, f['joint'])} ({percent(p)})" for e, j, p in told], "or")
         words = f"  these logs cannot tell it ({percent(f['probability'])}) from {rest}"
         out += wrapped(words, width, "    ")
         words = f"  to separate them: {f['separate_by']}; or play the motion designed by"
         out += wrapped(words, width, "    ")
-        out.append(designs(f["command"], (f["effect"], f["joint"]), others))
+        out.append(designs(f["command"], (f["effect"], f["joint"]), told))
+    if few := [placed(e, j, f["joint"]) for e, j, p in others if p < LIKELY]:
+        words = f"  not ruled out, though less than 1 % likely: {listed(few, 'and')}"
+        out += wrapped(words, width, "    ")
     return [*out, "  add it with", f["command"]]
 
 

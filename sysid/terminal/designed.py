@@ -1,5 +1,9 @@
 """A designed motion: what it tells, what it stays clear of, how to play it."""
 
+from pathlib import Path
+
+from ..addition import typed
+from .next_steps import next_step
 from .tables import show_notices
 
 _NEVER = 0.05  # probability below which a motion is no answer
@@ -11,7 +15,7 @@ _SHOWN_STD = 20  # parameters whose deviation falls most
 _SEEN = 0.01  # rad or m: what less of a maneuver does is none
 
 
-def show_design(document: dict) -> None:
+def show_design(document: dict, experiment) -> None:
     """What a designed motion promises, and what is left of its limits."""
     best = document["criterion"]["random_best"]
     beside = "" if best is None else f", {document['criterion']['log_det'] - best:.1f} above the best of the random motions it began from"
@@ -35,3 +39,6 @@ def show_design(document: dict) -> None:
             print(f"  {name}  {s['now']:.2g} -> {s['after']:.2g}")
     show_notices(document)
     print(f"folder: {document['run']}")
+    motion = Path(document["run"]) / "trajectory.csv"
+    said = f"play {motion} on the robot, and list its log beside the others in data.train of {experiment.path}"
+    next_step("diagnose", typed(experiment.path), first=said)

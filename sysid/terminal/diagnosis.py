@@ -5,12 +5,17 @@ from rich.text import Text
 
 from ..addition import typed
 from ..statement import sizes, tables, text
-from .next_steps import doubtful, implausible, next_step
+from ..unexplained import WEIGHED
+from .next_steps import implausible, mended_first, next_line, next_step, out_of
 from .tables import number, show_notices, table, terminal_width
 
 
-def show_diagnosis(found, document: dict, experiment=None) -> None:
-    """The verdict in words, then what it rests on."""
+def show_diagnosis(found, document: dict, experiment=None, before=()) -> None:
+    """The verdict in words, then what it rests on.
+
+    Args:
+        before: notices that were told already.
+    """
     of, width = text.told(found, document), terminal_width()
     _show_warnings(document)
     show_verdict(of, width)
@@ -19,10 +24,10 @@ def show_diagnosis(found, document: dict, experiment=None) -> None:
         if lines:
             print("\n" + "\n".join(lines))
     print()
-    show_notices({"notices": [n for n in document["notices"] if n not in implausible(document)]})
+    show_notices({"notices": [n for n in document["notices"] if n not in implausible(document)]}, before)
     print(f"run folder: {document['run']}")
     if experiment is not None:
-        _after_diagnosis(document, experiment)
+        _after_diagnosis(found, document, experiment)
 
 
 def _show_warnings(document: dict) -> None:
@@ -32,16 +37,22 @@ def _show_warnings(document: dict) -> None:
         print()
 
 
-def _after_diagnosis(document: dict, experiment) -> None:
-    """What is typed next: what checks logs that cannot be meant, the first addition, or the page with all of it."""
+def _after_diagnosis(found, document: dict, experiment) -> None:
+    """What is typed next: what mends numbers that cannot be meant, the first addition, what may be it, how joints are weighed, or the
+    page with all of it."""
     commands = [c for v in document["verdict"] for c in v.get("commands", ())]
     first = min((f for f in document["findings"] if f["command"] in commands and f["joins_as_step"]), key=lambda f: f["joins_as_step"], default=None)
-    if doubtful(document, experiment):
-        next_step("check", typed(experiment.path))
-    elif first is not None:
-        print(f"next: {first['command']}")
+    may = [v["may_be"]["command"] for v in document["verdict"] if "may_be" in v]
+    even = [v["joint"] for v in document["verdict"] if "weighting" in v]
+    target, out = typed(experiment.path), out_of(experiment, document["run"])
+    if mended_first(document, experiment, found.fit.masses):
+        return
+    if first is not None or may:
+        next_line(first["command"] if first else may[0], out=out)
+    elif even:
+        next_step("diagnose", target, first=f"write {WEIGHED} for {text.listed(even, 'and')}", out=out)
     else:
-        next_step("report", typed(experiment.path), "--open")
+        next_step("report", target, "--open", out=out)
 
 
 def show_verdict(of, width: int) -> None:

@@ -1,5 +1,7 @@
 """The vocabulary: every effect with its parameters."""
 
+from collections.abc import Iterator
+
 from ..statement import text
 from .tables import terminal_width
 
@@ -14,20 +16,28 @@ def show_effects(found: list[dict]) -> None:
         print("next: sysid effects NAME")
         return
     for effect in found:
-        print(f"{effect['name']}: {effect['summary']}")
-        print(f"  kind         {effect['kind']}, of {'the whole robot' if effect['scope'] == 'robot' else 'a joint'}")
-        print(f"  equation     {effect['equation']}")
-        for parameter in effect["parameters"]:
-            unit = "" if parameter["unit"] == "1" else f" {parameter['unit']}"
-            print(f"  {parameter['name']:<12}{unit}{_bounds(parameter)}: {parameter['says']}")
-        for option, says in effect["options"].items():
-            print(f"  {option + ':':<12} {says}")
-        print(f"  looks like   {effect['looks_like']}")
-        print(f"  tied with    {', '.join(effect['tied_with']) or 'nothing known'}")
-        print(f"  separate by  {effect['separate_by']}")
-        if effect.get("maneuvers"):
-            print(f"  maneuvers    {', '.join(effect['maneuvers'])}: `sysid design --separate` tries them")
-        print(f"  source       {effect['source']}")
+        for line in _described(effect):
+            print("\n".join(text.wrapped(line, terminal_width(), " " * _LEFT)))
+
+
+_LEFT = 15  # columns before what is said
+
+
+def _described(effect: dict) -> Iterator[str]:
+    yield f"{effect['name']}: {effect['summary']}"
+    yield f"  kind         {effect['kind']}, of {'the whole robot' if effect['scope'] == 'robot' else 'a joint'}"
+    yield f"  equation     {effect['equation']}"
+    for parameter in effect["parameters"]:
+        unit = "" if parameter["unit"] == "1" else f" {parameter['unit']}"
+        yield f"  {parameter['name']:<12}{unit}{_bounds(parameter)}: {parameter['says']}"
+    for option, says in effect["options"].items():
+        yield f"  {option + ':':<12} {says}"
+    yield f"  looks like   {effect['looks_like']}"
+    yield f"  tied with    {', '.join(effect['tied_with']) or 'nothing known'}"
+    yield f"  separate by  {effect['separate_by']}"
+    if effect.get("maneuvers"):
+        yield f"  maneuvers    {', '.join(effect['maneuvers'])}: `sysid design --separate` tries them"
+    yield f"  source       {effect['source']}"
 
 
 _SHARES = {"speed": "times the joint's top speed", "torque": "times its greatest torque", "angle": "times the angle it travels", "softness": "times the angle it travels over its greatest torque", "duration": "times the longest log"}

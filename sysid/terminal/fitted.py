@@ -9,7 +9,7 @@ from ..export import exported
 from ..given_shapes import given_shapes, said_of_shapes
 from ..init.text import flow
 from ..statement import faults, text
-from .next_steps import doubtful, next_step
+from .next_steps import mended_first, next_step, out_of
 from .tables import four, number, percent, show_notices, table, terminal_width
 
 _LOW = 0.1  # below this share the prior, not the data, gave a parameter
@@ -64,7 +64,8 @@ def show_fit(fit: Fit, document: dict) -> None:
     print(document["prior"]["says"])
     show_notices(document)
     print(f"run folder: {document['run']}")
-    next_step("check" if doubtful(document, fit.experiment) else "diagnose", typed(fit.experiment.path))
+    if not mended_first(document, fit.experiment, fit.masses):
+        next_step("diagnose", typed(fit.experiment.path), out=out_of(fit.experiment, document["run"]))
 
 
 def _show_held(at_zero: dict[str, float]) -> None:
@@ -112,10 +113,10 @@ def _show_filter(chosen: dict) -> None:
     print("\n".join(text.wrapped(words, terminal_width(), "  ")))
 
 
-def show_check(document: dict, experiment) -> None:
+def show_check(document: dict, experiment, run) -> None:
     """Every fault of the logs with its cure, the gravest first."""
     print("\n".join(faults.lines(document, terminal_width())))
-    next_step("fit" if document["ok"] else "check", typed(experiment.path), first="" if document["ok"] else f"correct {experiment.path} or the logs")
+    next_step("fit" if document["ok"] else "check", typed(experiment.path), first="" if document["ok"] else f"correct {experiment.path} or the logs", out=out_of(experiment, run))
 
 
 def show_comparison(document: dict, experiments) -> None:

@@ -5,15 +5,30 @@ import shlex
 from contextlib import suppress
 from pathlib import Path
 
+from ..addition import typed
 from ..statement import text
 from .tables import terminal_width
 
 
-def next_step(command: str, *words, first: str = "") -> None:
-    """The last line of a command: what is typed next, and what comes before it."""
+def next_step(command: str, *words, first: str = "", out=()) -> None:
+    """The last line of a command: what is typed next, and what comes before it.
+
+    Args:
+        out: of `out_of`.
+    """
+    next_line(shlex.join(["sysid", command, *map(str, words)]), first=first, out=out)
+
+
+def next_line(typed_whole: str, *, first: str = "", out=()) -> None:
+    """The same of a whole command."""
     if first:
         print("\n".join(text.wrapped(f"{first}; then", terminal_width(), "  ")))
-    print(f"next: {shlex.join(['sysid', command, *map(str, words)])}")
+    print(f"next: {' '.join([typed_whole, *map(shlex.quote, out)])}")
+
+
+def out_of(experiment, run) -> list[str]:
+    """`--out` with a run folder that is not the one that commands take by themselves."""
+    return [] if Path(run) == Path("runs") / experiment.name else ["--out", str(run)]
 
 
 def implausible(document: dict) -> list[str]:
@@ -21,11 +36,31 @@ def implausible(document: dict) -> list[str]:
     return [notice for notice in document["notices"] if notice.startswith("implausible")]
 
 
-def doubtful(document: dict, experiment) -> bool:
-    """Whether the logs are to be checked first: what came of them cannot be meant, and no check since the experiment file
-    was written found them in order."""
-    said = Path(document["run"]) / "check.json"
+def mended_first(document: dict, experiment, masses: dict) -> bool:
+    """Tell what is done before anything that rests on numbers that cannot be meant: what brings masses back, where that is
+    known; else a check of the logs, once. False where there is nothing of the kind.
+
+    Args:
+        masses: of a fit, as `masses.document` has them.
+    """
+    if not implausible(document):
+        return False
+    out, target = out_of(experiment, document["run"]), typed(experiment.path)
+    if masses.get("prior_weight") is not None:
+        adds = f" and type {masses['command']}" if masses.get("command") else ""
+        next_step("fit", target, first=f"the masses cannot be meant: write `weight: auto` under `prior:` in {experiment.path}{adds}", out=out)
+    elif masses.get("command"):
+        next_line(masses["command"], out=out)
+    elif _checked(document, experiment):
+        return False
+    else:
+        next_step("check", target, first="the masses, or how joints are explained, cannot be meant: see what the logs say", out=out)
+    return True
+
+
+def _checked(document: dict, experiment) -> bool:
+    """Whether the logs were checked since the experiment file was written, whatever came of it: who goes on has read it."""
     with suppress(OSError, ValueError, KeyError):
-        if said.stat().st_mtime >= experiment.path.stat().st_mtime and json.loads(said.read_text())["ok"]:
-            return False
-    return bool(implausible(document))
+        said = Path(document["run"]) / "check.json"
+        return said.stat().st_mtime >= experiment.path.stat().st_mtime and "ok" in json.loads(said.read_text())
+    return False

@@ -9,15 +9,19 @@ from rich.markup import escape
 from ..addition import typed
 from ..statement import text
 from .diagnosis import show_verdict
-from .next_steps import next_step
+from .next_steps import next_line, next_step, out_of
 from .tables import number, show_notices, table, terminal_width
 
 
-def show_added(document: dict) -> None:
-    """The held-out error before and after an effect."""
-    before, after = document["rms_test_before"], document["rms_test_after"]
+def show_added(document: dict, experiment, run, before=()) -> None:
+    """The held-out error before and after an effect.
+
+    Args:
+        before: notices that were told already.
+    """
+    first, after = document["rms_test_before"], document["rms_test_after"]
     rows = [
-        [d["joint"], number(before[d["joint"]]), number(after[d["joint"]]), f"{d['delta_rms']:+.{_decimals(before[d['joint']])}f}", "-" if d["se"] is None else f"{d['se']:.2g}"]
+        [d["joint"], number(first[d["joint"]]), number(after[d["joint"]]), f"{d['delta_rms']:+.{_decimals(first[d['joint']])}f}", "-" if d["se"] is None else f"{d['se']:.2g}"]
         for d in document["differences"]
     ]  # fmt: skip
     table(f"held-out RMS without and with {document['added']}", ["joint", "before", "after", "change", "standard error"], rows)
@@ -27,9 +31,10 @@ def show_added(document: dict) -> None:
         Console().print(escape(document["says"]), soft_wrap=True, highlight=False)
     if not document["refused"]:
         print(f"written into {document['experiment']}")
-    show_notices(document)
-    file = Path(document["experiment"])
-    next_step("diagnose", typed(file))
+    if document["untold"]:
+        print("\n".join(text.wrapped(document["untold"], terminal_width(), "  ")))
+    show_notices(document, before)
+    next_step("diagnose", typed(Path(document["experiment"])), out=out_of(experiment, run))
 
 
 def _decimals(level: float | None) -> int:
@@ -52,19 +57,20 @@ def show_discovery(said: dict, found, document: dict, experiment=None) -> None:
     print(f"steps and experiment files: {said['run']}/steps")
     if experiment is None:
         return
+    out = out_of(experiment, said["run"])
     if not said["commands"]:
-        next_step("report", typed(experiment.path), "--open")
+        next_step("report", typed(experiment.path), "--open", out=out)
         return
     print(f"{experiment.path} is as it was; these commands, in order, write what was found into it:")
     for command in said["commands"]:
         print(f"  {command}")
-    print(f"next: {said['commands'][0]}")
+    next_line(said["commands"][0], out=out)
 
 
 _LONGEST_BAR = 20  # twice the error of the start, or more
 
 
-def show_history(steps: list[dict], experiment) -> None:
+def show_history(steps: list[dict], experiment, run) -> None:
     """The steps, one a line, and the error of each joint as a falling row of bars."""
     joints, first = list(steps[0]["rms_test"]), steps[0]["rms_test"]
 
@@ -77,5 +83,12 @@ def show_history(steps: list[dict], experiment) -> None:
         [f"{number} start" if step["added"] is None else f"{number} + {step['added']} on {step['joint']}", *(cell(step["rms_test"], j) for j in joints)]
         for number, step in enumerate(steps)
     ]  # fmt: skip
-    table("held-out RMS [N m, or N on a prismatic joint]", ["step", *joints], rows)
-    next_step("diagnose", typed(experiment.path))
+    table("held-out RMS [N m, or N on a prismatic joint]; ten # are the error of the start", ["step", *joints], rows)
+    out, found = out_of(experiment, run), [step["command"] for step in steps if step.get("command")]
+    if found:
+        print(f"steps that `sysid discover` made are not in {experiment.path}; these commands, in order, write them:")
+        for command in found:
+            print(f"  {command}")
+        next_line(found[0], out=out)
+    else:
+        next_step("diagnose", typed(experiment.path), out=out)

@@ -1,5 +1,6 @@
 """Tables and the numbers in them, as wide as the terminal."""
 
+import re
 import shutil
 
 from rich.console import Console
@@ -33,9 +34,21 @@ def terminal_width() -> int:
     return shutil.get_terminal_size().columns
 
 
-def show_notices(document: dict) -> None:
-    """What was decided for the user, each on a line."""
-    console = Console()
-    for notice in document["notices"]:
+_KEY = re.compile(r"\b(robot|data|preprocess|model|prior|solver|actuator)\.([a-z]\w*)")
+
+
+def show_notices(document: dict, before=()) -> None:
+    """What was decided for the user, each on a line; where a key is named, how it stands in the file.
+
+    Args:
+        before: notices that another command told of the same run.
+    """
+    console, new = Console(), [notice for notice in document["notices"] if notice not in before]
+    if old := len(document["notices"]) - len(new):
+        new.append(f"{old} more on these logs and their fit {'are' if old > 1 else 'is'} as told before: see fit.json in the run folder")
+    for notice in new:
         lines = escape("\n".join(text.wrapped(f"note {notice}", terminal_width(), "  "))).removeprefix("note")
         console.print(f"[yellow]note[/yellow]{lines}", soft_wrap=True, highlight=False)
+    if key := _KEY.search(" ".join(new)):
+        words = f"a key such as {key[0]} stands in the experiment file as `{key[2]}:` under `{key[1]}:`"
+        print("\n".join(text.wrapped(f"  {words}", terminal_width(), "  ")))

@@ -28,9 +28,7 @@ def progress_bar(course=None):
                 bar.console.print(Text(f"sysid: {stage}"), soft_wrap=True)
                 return
             words, whole = course.tell(stage, share)
-            rest = progress.left(whole, time.monotonic() - begun)
-            told = "" if rest is None else f"about {progress.spoken(rest)} left"
-            bar.update(task, completed=whole, description=escape(words), left=told)
+            bar.update(task, completed=whole, description=escape(words), left=course.left(time.monotonic() - begun))
 
         yield report
 
@@ -49,8 +47,7 @@ def progress_lines(course):
         if not now["stage"] or elapsed < now["next"]:
             return
         now["next"] = elapsed + _EVERY
-        rest = progress.left(now["share"], elapsed)
-        told = f"{progress.spoken(elapsed)} so far" if rest is None else f"about {progress.spoken(rest)} left"
+        told = course.left(elapsed) or f"{progress.spoken(elapsed)} so far"
         line(f"{now['stage']}, {100 * now['share']:.0f} %, {told}")
 
     def line(said: str) -> None:

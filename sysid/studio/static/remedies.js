@@ -52,6 +52,19 @@ function suspects() {
   }
 }
 
+function tries() { // what may be what is left of a joint
+  for (const place of at("verdict").querySelectorAll("[data-tries]")) {
+    const {effect, joint, options} = JSON.parse(place.dataset.tries), wrong = failure();
+    const text = Object.entries(options).map(([name, value]) => [name, String(value)]);
+    const body = {effect, joint, options: Object.fromEntries(text)};
+    const named = {"data-acts": true, "data-key": "try-" + effect + "-" + joint};
+    place.append(make("div", {class: "acts"},
+      button("preview " + effect, () => preview(body, wrong), named),
+      button("add " + effect, () => act("api/add", body, wrong),
+        {...named, "data-key": named["data-key"] + "-add"})), wrong);
+  }
+}
+
 const failure = () => make("p", {class: "wrong", role: "alert"});
 
 function whereabouts() {
@@ -133,7 +146,7 @@ function formula() {
 function designs() {
   const tied = [...at("verdict").querySelectorAll("[data-separate]")];
   for (const place of tied) place.after(offered(place.dataset.separate.split(",")));
-  for (const card of at("verdict").querySelectorAll(".card.unresolved")) {
+  for (const card of at("verdict").querySelectorAll(".card.blind")) {
     if (!card.querySelector("[data-designs]")) card.append(offered(null));
   }
 }
@@ -171,7 +184,10 @@ function designed(place, state) { // the design that was asked for here, where i
 function build(found) { // of a fit, or of its diagnosis
   page = found;
   forms ??= make("div", {class: "on-screen"}, ...anyEffect(), ...formula());
-  if (found.findings) suspects();
+  if (found.findings) {
+    suspects();
+    tries();
+  }
   at("suspects").append(forms);
   suggested();
   if (found.findings) designs();
