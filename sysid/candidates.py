@@ -59,6 +59,12 @@ class Candidate:
         return isinstance(self.effect, (MotionEffect, SensorEffect))
 
     @property
+    def by_name(self) -> bool:
+        """Whether its options are those that the effect has where none is given."""
+        own = type(self.effect)
+        return all(getattr(own, name, None) in (None, value) for name, value in self.options)
+
+    @property
     def blows(self) -> bool:
         """Whether what it does comes in blows, a few of which may outweigh all others."""
         return isinstance(self.effect, Deflection) and self.effect.blows
@@ -86,11 +92,8 @@ def candidates(model: Model, extra=()) -> list[Candidate]:
                 out += _richer(model, effect.name, joint)
                 continue
             for options in _variants(effect, robot, joint):
-                out.append(
-                    Candidate(
-                        effect.given(**options).bound(robot, joint), joint, tuple(options.items())
-                    )
-                )
+                bound = effect.given(**options).bound(robot, joint)
+                out.append(Candidate(bound, joint, tuple(options.items())))
     return out
 
 
@@ -102,11 +105,8 @@ def _richer(model: Model, name: str, joint: int) -> list[Candidate]:
     ]
     if effect.level is not None:
         return []  # it would have to be richer at every level
-    own = [
-        (v, at)
-        for v, at in zip(model.shape_values, model.shapes)
-        if (v.term, v.joint) == (term, joint)
-    ]
+    values = zip(model.shape_values, model.shapes)
+    own = [(v, at) for v, at in values if (v.term, v.joint) == (term, joint)]
     if any(v.held for v, _ in own):
         return []
     low = {v.shape.name: v.low for v, _ in own}
@@ -271,9 +271,8 @@ def _slopes(source, candidate: Candidate, shapes: dict[str, float]) -> np.ndarra
         source.use,
         source.predicted if idle_yet else None,
     )[:, :, own]
-    free = [
-        k for k, v in enumerate(model.shape_values[own]) if not (idle_yet and v.shape.start is None)
-    ]
+    values = enumerate(model.shape_values[own])
+    free = [k for k, v in values if not (idle_yet and v.shape.start is None)]
     return slopes[:, :, free]
 
 

@@ -31,6 +31,9 @@ def finding(effect, joint, command, step, **more):
         "command": command,
         "joins_as_step": step,
         "options": {},
+        "options_say": {},
+        "size_told": True,
+        "misfit_known": True,
     } | more
 
 

@@ -47,14 +47,17 @@ def detectable(view: View, asked: Asked, candidates) -> list[Detectable]:
         # a force from outside has none until somebody says when it acts
         if candidate.parameters and not candidate.begins:
             best.setdefault(candidate.key, Detectable(candidate, *_leading(view, candidate)))
-    for group in (g for g in asked.groups if not g.candidate.begins):
-        size = _size(group, threshold, loss, asked.belief)
-        if group.candidate.nonlinear and not at_start(group.candidate, group.shapes):
+    for group in asked.groups:
+        size, begins = np.inf, at_start(group.candidate, group.shapes)
+        # not of variants that its name alone does not add, nor of blows that do not strike yet
+        if group.candidate.by_name and not (group.candidate.blows and begins):
+            size = _size(group, threshold, loss, asked.belief)
+        if group.candidate.nonlinear and not begins:
             # its torque is no multiple of another size's: this one is seen or it is not
             own = group.shapes[_leading(view, group.candidate)[0]]
             size = own if size <= own else np.inf
-        there = best[group.candidate.key]
-        if np.isfinite(size) and (there.size is None or size < there.size):
+        there = best.get(group.candidate.key)
+        if there and np.isfinite(size) and (there.size is None or size < there.size):
             name, unit = _leading(view, group.candidate)
             at = {shape: own for shape, own in group.shapes.items() if shape != name}
             best[group.candidate.key] = Detectable(group.candidate, name, unit, size, POWER, at)

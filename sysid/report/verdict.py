@@ -5,7 +5,7 @@ from __future__ import annotations
 from ..addition import LIKELY, apart, designs, likely
 from ..estimate import Fit
 from ..given_shapes import given_shapes, said_of_shapes
-from ..statement.text import ANOTHER, OWN, TRIED, blind, near, needing
+from ..statement.text import ANOTHER, OWN, TRIED, UNTOLD, blind, near, needing, untold_from
 from ..statement.words import followed, percent
 from .section import Section
 from .words import (
@@ -56,7 +56,7 @@ def verdict(fit: Fit, document: dict) -> Section:
         "next_log": document.get("next_log"),
         "needing": needing(document) if document.get("next_log") else "",
         "another": ANOTHER,
-        "own_law": OWN[0].upper() + OWN[1:].replace("`", ""),
+        "own_law": _first(OWN).replace("`", ""),
         "trying": TRIED,
         "band": band(fit),
     }
@@ -111,11 +111,16 @@ def _card(found: dict, fit: Fit, document: dict) -> dict:
         "near": near(found, document) if status == "complete" else "",
         "tried": found.get("may_be"),
         "blind": joint in blind(document),
-        "says": says[:1].upper() + says[1:],
+        "says": _first(says),
         "commands": commands,
         "error": f"{level(error)}{SPACE}{force}",
         "floor": stands,
     }
+
+
+def _first(words: str) -> str:
+    """Words that begin a sentence."""
+    return words[:1].upper() + words[1:]
 
 
 def _fall(found: dict, fit: Fit, document: dict) -> str:
@@ -147,7 +152,7 @@ def _claim(head: dict, tied: list[dict], joint: str, several: bool) -> dict:
     ]
     effect = head["effect"], head["joint"]
     takes = ""
-    if several:
+    if several and head["misfit_known"]:
         where = "" if head["joint"] == joint else " on all joints"
         takes = f"It takes {_share(head['misfit_removed'])} of what was left{where}"
     summary = head["summary"].replace("`", "").split(". ")[0].rstrip(".")
@@ -157,8 +162,10 @@ def _claim(head: dict, tied: list[dict], joint: str, several: bool) -> dict:
     return {
         "effect": head["effect"],
         "figures": ": ".join(part for part in (takes, ", ".join(values)) if part),
+        "options": [f"{n} {v}: {head['options_say'][n]}" for n, v in head["options"].items()],
+        "untold": "" if head["size_told"] else _first(UNTOLD),
         "summary": summary,
-        "probability": chance(head["probability"]),
+        "from": _first(untold_from(head["probability"])).replace(" %", f"{SPACE}%"),
         "others": [f"{placed(e, j, head['joint'])}{SPACE}({chance(p)})" for e, j, p in told],
         "few": [placed(e, j, head["joint"]) for e, j, p in others if p < LIKELY],
         "separate_by": head["separate_by"],

@@ -11,6 +11,7 @@ from ..diagnose.claims import Claim
 from ..diagnose.diagnosis import Diagnosis
 from ..diagnose.findings import Finding
 from ..fit_document import number
+from ..unexplained import nought
 from ..vocabulary import describe
 
 
@@ -48,6 +49,10 @@ def finding(f: Finding, claim: Claim, found: Diagnosis) -> dict:
         "effect": f.effect,
         "joint": f.joint,
         "options": dict(f.candidate.options),
+        "options_say": {
+            name: f.candidate.effect.options.get(name, "").partition(" (default")[0]
+            for name, _ in f.candidate.options
+        },
         # as an experiment file spells it
         "adds": dict(zip(("effect", "joints", "options"), spelled(f.candidate, f.joint))),
         "summary": describe(f.candidate.effect)["summary"],
@@ -56,11 +61,15 @@ def finding(f: Finding, claim: Claim, found: Diagnosis) -> dict:
         "rms_test_before": f.rms_before,
         "rms_test_after": f.rms_after,
         "misfit_removed": float((before - after) / misfit),
+        # where no floor is known, what was left of it is not either
+        "misfit_known": None not in levels,
         "misfit_removed_se": number(2.0 * f.rms_after * f.fall_se / misfit),
         "parameters": {
             name: {"value": number(v), "std": number(s), "unit": u}
             for name, (v, s, u) in f.parameters.items()
         },
+        # whether any is more than its deviation can make
+        "size_told": not nought(f.parameters),
         "tied_with": list(f.tied_with),
         "separate_by": f.candidate.effect.separate_by,
         "command": f.command,

@@ -13,7 +13,9 @@ if TYPE_CHECKING:
 
 ANOTHER = "a motion that tells most of what these logs leave open"
 TRIED = "to try it, and see the held-out error before and after"
+UNTOLD = "the held-out error says that it is there, and these logs tell its size badly"
 OWN = "a law of your own can be tried: `sysid effects formula`"
+_SURE = 0.9  # the set holds the truth so often
 _TOGETHER = "several variables together"
 
 
@@ -143,15 +145,19 @@ def _head(f: dict, of: Told, joint: str, width: int, said: dict[str, str]) -> li
     told = [(name.rpartition(".")[2], p) for name, p in f["parameters"].items()]
     values = [valued(name, p) for name, p in told if p["value"] is not None]
     takes = ""
-    if len(of.sets) > 1:
+    if len(of.sets) > 1 and f["misfit_known"]:
         where = "" if f["joint"] == joint else " on all joints"
         takes = f" takes {percent(max(f['misfit_removed'], 0.0))} of what was left{where}"
     words = f"  {f['effect']}{takes}" + (f": {', '.join(values)}" if values else "")
     out = wrapped(words, width, "    ") if takes or values else []
+    for name, value in f["options"].items():
+        out += wrapped(f"  {name} {value}: {f['options_say'][name]}", width, "    ")
+    if not f["size_told"]:
+        out += wrapped(f"  {UNTOLD}", width, "    ")
     others = [m for m in of.sets[f["command"]] if m[:2] != (f["effect"], f["joint"])]
     if told := likely(others):
         rest = listed([f"{placed(e, j, f['joint'])} ({percent(p)})" for e, j, p in told], "or")
-        words = f"  these logs cannot tell it ({percent(f['probability'])}) from {rest}"
+        words = f"  {untold_from(f['probability'])} {rest}"
         out += wrapped(words, width, "    ")
         words = f"  to separate them: {f['separate_by']}; or play the motion designed by"
         out += wrapped(words, width, "    ")
@@ -160,6 +166,13 @@ def _head(f: dict, of: Told, joint: str, width: int, said: dict[str, str]) -> li
         words = f"  not ruled out, though less than 1 % likely: {listed(few, 'and')}"
         out += wrapped(words, width, "    ")
     return [*out, "  add it with", f["command"]]
+
+
+def untold_from(probability: float) -> str:
+    """How sure an effect's name is, before what else it may be."""
+    if probability >= _SURE:
+        return f"it is {percent(probability)} likely; these logs do not rule out"
+    return f"these logs cannot tell it ({percent(probability)}) from"
 
 
 def _options(f: dict) -> str:
