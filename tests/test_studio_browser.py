@@ -571,7 +571,7 @@ def test_a_motion_is_designed_from_the_page(opened):
     page = opened()
     page.wait_for_function(DONE, timeout=WAIT)
     # the server's own words of an unresolved joint bring the button; here the page is asked for it
-    page.evaluate("document.querySelector('#verdict .card').classList.add('unresolved')")
+    page.evaluate("document.querySelector('#verdict .card').classList.add('blind')")
     page.evaluate("window.sysid.remedies.designs()")
     page.get_by_role("button", name="design the next motion").click()
     expect(page.locator("#status")).to_contain_text("design of a motion", timeout=WAIT)
@@ -579,6 +579,24 @@ def test_a_motion_is_designed_from_the_page(opened):
     with page.expect_download() as taken:
         page.get_by_role("link", name="trajectory.csv").click()
     assert Path(taken.value.path()).read_text().startswith("t,q_abad")
+
+
+def test_what_may_be_it_is_tried_and_added_from_its_card(opened):
+    """The server's own words bring the buttons, which the studio's tests of documents see; here the page is given them."""
+    from playwright.sync_api import expect
+
+    page = opened()
+    page.wait_for_function(DONE, timeout=WAIT)
+    page.evaluate("""() => {
+        const card = document.querySelector('#verdict .card:last-child');
+        card.dataset.tries = JSON.stringify({effect: "cogging", joint: "knee", options: {lines: 1}});
+        window.sysid.remedies.tries();
+    }""")
+    page.get_by_role("button", name="preview cogging").click()
+    expect(page.locator("#workspace-shown option:checked")).to_have_text("with cogging on knee", timeout=WAIT)
+    page.get_by_role("button", name="add cogging", exact=True).click()
+    expect(page.get_by_role("button", name="undo cogging on knee")).to_be_enabled(timeout=WAIT)
+    assert "cogging: {joints: [knee], lines: 1}" in opened.file.read_text()
 
 
 def test_charts_of_a_report_are_taken_along(browser, leg, tmp_path, monkeypatch):

@@ -194,5 +194,5 @@ function build(found) { // of a fit, or of its diagnosis
   get("api/state").then(follow, () => {});
 }
 
-sysid.remedies = {build, follow, preview, designs};
+sysid.remedies = {build, follow, preview, designs, tries};
 })();
