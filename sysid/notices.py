@@ -40,9 +40,9 @@ def refuse_no_torque(train: list[logs.Log]) -> None:
 
 def tell_still(motion: Motion) -> None:
     """Joints that stand still in much of what they are logged in, or in all of it."""
-    for joint, share in zip(motion.joints, motion.standing):
-        if share > _MUCH_STANDING and joint not in motion.still:
-            warnings.warn(SysidWarning(f"joint {joint!r} stands still in {100 * share:.0f} % of its rows, where its friction may have any value up to its greatest; preprocess.standstill: auto leaves them out"), stacklevel=2)
+    often = [f"{joint} {100 * share:.0f} %" for joint, share in zip(motion.joints, motion.standing) if share > _MUCH_STANDING and joint not in motion.still]
+    if often:
+        warnings.warn(SysidWarning(f"joints that stand still in much of their rows, where friction may have any value up to its greatest: {', '.join(often)}; preprocess.standstill: auto leaves them out"), stacklevel=2)
     for joint in motion.still:
         warnings.warn(SysidWarning(f"joint {joint!r} never moves in the training logs, or never clear of a standstill; its friction is held at its prior, and its bodies are where the other joints' torque leaves them"), stacklevel=2)
 

@@ -38,16 +38,17 @@ class Course:
 
     @property
     def open(self) -> str:
-        """What is not known of the end: "least" where rounds of questions may follow that depend on what is found, "rounds" within
+        """What is not known of the end: "more" where rounds of questions may follow that depend on what is found, "rounds" within
         these; else empty."""
-        return "rounds" if len(self._rounds) > 1 else "least" if self._asks else ""
+        return "rounds" if len(self._rounds) > 1 else "more" if self._asks else ""
 
     def left(self, elapsed: float) -> str:
         """The time left, in words, after so many seconds; empty where nothing tells yet."""
         if self.open == "rounds":
             return f"{spoken(elapsed)} so far; another round for each effect that joins"
         rest = left(self.share, elapsed)
-        return "" if rest is None else f"{'at least' if self.open else 'about'} {spoken(rest)} left"
+        more = ", more for each effect that joins" if self.open else ""
+        return "" if rest is None else f"about {spoken(rest)} left{more}"
 
     @property
     def found(self) -> list[str]:

@@ -38,7 +38,8 @@ class Transfer:
         if not self.fails:
             return ""
         shortest, longest = (f"{end(self.spans):.2g}" for end in (min, max))
-        many = f"the training logs ({len(self.spans)} of {shortest} to {longest} s) do"
+        lengths = longest if shortest == longest else f"{shortest} to {longest}"
+        many = f"the training logs ({len(self.spans)} of {lengths} s) do"
         one = f"the training log ({longest} s) does"
         return (
             f"{many if len(self.spans) > 1 else one} not carry the model to what is new in the test logs (places, motions, forces): "

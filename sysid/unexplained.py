@@ -13,26 +13,27 @@ WEIGHED = "`weighting: noise` under `solver:` in the experiment file"
 def unexplained(
     errors: tuple[float, float],
     floor,
-    looks: str = "",
+    looks=None,
+    may=None,
     weighed: float | None = None,
-    carries: bool = True,
     louder: str = "",
 ) -> str:
     """Why a joint is unresolved.
 
     Args:
-        errors: on the training logs and on the test logs. floor: its NoiseFloor. looks: the effect
-            that may be what is left. weighed: the error where each joint counts by its noise, where
-            that makes most of the difference. carries: whether the error of the training logs
-            stands above the floor too. louder: the joint whose misfit is the greatest in torque.
+        errors: on the training logs and on the test logs. floor: its NoiseFloor. looks: the
+            Candidate that may be what is left; may: the same where nobody fitted it. weighed: the
+            error where each joint counts by its noise, where that makes most of the difference.
+            louder: the joint whose misfit is the greatest in torque.
     """
     error = errors[1]
     if not error > 0.0:
         return "none of its rows on the test logs counts: unused, at a standstill, or disturbed"
     if looks:
+        tried = "" if may else ", though no fit with it bore that out,"
         return (
-            f"what is left may be {looks} or a law that the catalogue does not have: these logs do "
-            "not tell"
+            f"what is left may be {looks.name}{tried} or a law that the catalogue does not have: "
+            "these logs do not tell"
         )
     if floor.rms is None:
         return (
@@ -40,13 +41,13 @@ def unexplained(
             "above it"
         )
     if weighed is not None:
-        whose = f"the greater one of {louder}" if louder else "those of noisier joints"
+        whose = f"the greater one of {louder}" if louder else "that of a noisier joint"
         return (
-            f"its error is {_times(error, floor)}, as errors of all joints count alike in this fit "
-            f"and {whose} bend the bodies that they share; with {WEIGHED}, it would be "
+            f"its error is {_times(error, floor)}: in this fit the errors of all joints count "
+            f"alike, and {whose} bends the bodies that they share; with {WEIGHED}, it would be "
             f"{_times(weighed, floor)}"
         )
-    if not carries:
+    if floor.reached(errors[0]):
         return (
             "the training logs are explained and the test logs are not: the model does not carry "
             "over to them"

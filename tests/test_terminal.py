@@ -65,6 +65,7 @@ def document(**more):
             finding("spring", FIRST, "sysid add x spring", None, probability=0.3),
             finding("payload", "*", "sysid add x payload", 2),
         ],
+        "claims": [{"findings": [0, 1]}, {"findings": [2]}],
         "verdict": [
             {
                 "joint": FIRST,

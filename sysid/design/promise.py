@@ -97,8 +97,8 @@ def _named(left: float, asked: int) -> float:
     return float(ndtr(np.sqrt(left) + ndtri(_ACCUSED / max(asked, 1))))
 
 
-def deviations(fit: Fit, old: Motion, new: Motion, made) -> dict[str, dict[str, float | None]]:
-    """{parameter: {now, after}} of what a fit determines, shape values too: the deviation that noise and
+def deviations(fit: Fit, old: Motion, new: Motion, made) -> dict[str, dict]:
+    """{parameter: {now, after, unit}} of what a fit determines, shape values too: the deviation that noise and
     the prior's width make of a fit of the old logs, and of the old ones and the new one together.
 
     Args:
@@ -108,6 +108,7 @@ def deviations(fit: Fit, old: Motion, new: Motion, made) -> dict[str, dict[str, 
     model = Linearised(fit.model, fit.x)
     std = np.concatenate([fit.uncertainty.std, fit.shape_std[model.free]])
     names = (*fit.model.names, *(fit.model.shape_values[k].name for k in model.free))
+    units = (*fit.model.units, *(fit.model.shape_values[k].unit for k in model.free))
     free, count = np.isfinite(std), len(std)
     weights = np.ones(len(fit.joints)) if fit.weights is None else fit.weights
     own, more = (_gram(model, motion, weights, count) for motion in (old, new))
@@ -125,7 +126,8 @@ def deviations(fit: Fit, old: Motion, new: Motion, made) -> dict[str, dict[str, 
     first, then = (_scatter(model, motion, weights, noises, count) for motion in (old, new))
     now, after = deviation(own, first), deviation(own + more, first + then)
     kept = np.flatnonzero(free)
-    return {names[k]: {"now": float(now[k]), "after": float(after[k])} for k in kept}
+    told = {k: {"now": float(now[k]), "after": float(after[k])} for k in kept}
+    return {names[k]: {**own, "unit": units[k]} for k, own in told.items()}
 
 
 def _scatter(model, motion: Motion, weights, noises, size: int) -> np.ndarray:

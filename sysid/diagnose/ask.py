@@ -50,13 +50,13 @@ class Asked:
         """Family-wise p-value of a group."""
         return null.chance(self.statistics[k], self.maxima)
 
-    def near(self, joint: int, gain: float) -> Candidate | None:
-        """The effect on a joint that may be there and takes half of a gain, the most likely one."""
+    def near(self, joint: int, gain: float) -> tuple[Candidate, float] | None:
+        """The effect on a joint that may be there and takes half of a gain: the likeliest."""
         found, statistics, gains, _ = self.by_joint.get(joint, ([], [], [], None))
         takes = [k for k, own in enumerate(gains) if own > _HALF * gain]
         best = max(takes, key=lambda k: statistics[k], default=None)
-        may = best is not None and null.chance(statistics[best], self.maxima) <= _MAY_BE
-        return found[best].candidate if may else None
+        p = 1.0 if best is None else null.chance(statistics[best], self.maxima)
+        return (found[best].candidate, p) if p <= _MAY_BE else None
 
 
 def ask(view: View, extra=(), tell=lambda share: None, *, before=None, anew=()) -> Asked:

@@ -74,19 +74,15 @@ def claimed(
         spec = grown(last.experiment, name, joints, options, every=fit.joints)
         return pipeline.refit(spec, last, filters=fit.filters, progress=tell, measured=measured)
 
-    claims: list[Claim] = []
-    refused: list[Refused] = []
-    last = fit
+    claims, refused, last = list[Claim](), list[Refused](), fit
     for step in steps:
         head, *tied = step.choice.members
         after, compared = with_(last, head[0])
-        if (why := _nothing(last, compared, head[0])) is not None:
+        if (why := _nothing(last, compared, after, head[0])) is not None:
             refused.append(Refused(head[0].candidate.name, where(head[0], fit), why))
             continue
-        found = [(*head, after)]
-        for member, chance in tied[: _FITTED - 1]:
-            if chance >= _LIKELY:
-                found.append((member, chance, with_(last, member)[0]))
+        near = [(m, chance) for m, chance in tied[: _FITTED - 1] if chance >= _LIKELY]
+        found = [(*head, after), *((m, chance, with_(last, m)[0]) for m, chance in near)]
         findings = [finding(last, then, m, chance, step, len(claims)) for m, chance, then in found]
         named = [(m.candidate.name, where(m, fit), chance) for m, chance in step.choice.members]
         claims.append(Claim(step, tuple(findings), last, after, tuple(named)))
@@ -94,8 +90,9 @@ def claimed(
     return claims, refused
 
 
-def _nothing(before: Fit, after: Fit, member: Member) -> str | None:
-    """Why an effect that the search found is not claimed, None where it is."""
+def _nothing(before: Fit, after: Fit, told: Fit, member: Member) -> str | None:
+    """Why an effect that the search found is not claimed, None where it is. Both are fits with it:
+    after under the prior of the one before, told as `sysid add` gives it."""
     own = judged_by(member, before)
     if not any(after.rms("train")[joint] < before.rms("train")[joint] for joint in own):
         return "the fit's own error does not fall with it"
@@ -103,9 +100,11 @@ def _nothing(before: Fit, after: Fit, member: Member) -> str | None:
         change, unit = comparison.together(before, after), 1.0
         rise = f"{100 * change.delta_rms:+.2g} % over all joints"
     else:
-        (change,) = (d for d in comparison.compare(before, after) if d.joint == own[0])
+        changes = [comparison.compare(before, one) for one in (after, told)]
+        change, shown = (next(d for d in one if d.joint == own[0]) for one in changes)
         unit, rise = before.rms("test")[own[0]], f"{max(change.delta_rms, 0.0):+.3g}"
-        if -change.delta_rms < change.se and nought(after.parameters_of(*member.candidate.key)):
+        still = any(-d.delta_rms < d.se for d in (change, shown))
+        if still and nought(told.parameters_of(*member.candidate.key)):
             return "its size is nothing beside its deviation, and the test error stays the same"
     if change.delta_rms > -_NOTHING * unit:
         return f"with it the error on the test logs does not fall ({rise})"

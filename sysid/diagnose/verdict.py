@@ -12,7 +12,7 @@ from ..noise import DOUBT
 from ..transfer import Transfer
 from ..unexplained import by_weights, loudest, unexplained
 from .claims import Claim
-from .select import WORTH
+from .select import LEVEL, WORTH
 
 _LEFT = 0.25  # of what effects took: they explain it, 80 % of all that anything does
 
@@ -51,7 +51,7 @@ def verdicts(
     carried: Sequence[Transfer] = (),
     weighed: dict[str, float] | None = None,
     law: Callable[[int], Law] | None = None,
-    near: Callable[[int, float], Candidate | None] | None = None,
+    near: Callable[[int, float], tuple[Candidate, float] | None] | None = None,
 ) -> list[Verdict]:
     """The verdict on every joint.
 
@@ -92,11 +92,11 @@ def verdicts(
         elif not reached:
             both = last.rms("train")[joint], then
             even = weighed[joint] if evens[j] else None
-            carries = not floors[j].reached(both[0])
-            may = looks.name if looks else ""
-            why = unexplained(both, floors[j], may, even, carries, louder)
+            effect, p = looks or (None, 1.0)
+            may = effect if p > LEVEL else None  # what stands above the level was fitted, in vain
+            why = unexplained(both, floors[j], effect, may, even, louder)
             why += "".join(f"; {r.told}" for r in refused if r.joint in (joint, "*"))
-            told = ("unresolved", others, explained, remains, why, looks, evens[j])
+            told = ("unresolved", others, explained, remains, why, may, evens[j])
         elif floors[j].reached(first) or not claims:
             told = ("complete",)
         else:

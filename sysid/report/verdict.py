@@ -5,7 +5,7 @@ from __future__ import annotations
 from ..addition import LIKELY, apart, designs, likely
 from ..estimate import Fit
 from ..given_shapes import given_shapes, said_of_shapes
-from ..statement.text import ANOTHER, OWN, TRIED, UNTOLD, blind, near, needing, untold_from
+from ..statement import text
 from ..statement.words import followed, percent
 from .section import Section
 from .words import (
@@ -54,10 +54,10 @@ def verdict(fit: Fit, document: dict) -> Section:
         "notices": document["notices"],
         "made": document.get("made", ""),
         "next_log": document.get("next_log"),
-        "needing": needing(document) if document.get("next_log") else "",
-        "another": ANOTHER,
-        "own_law": _first(OWN).replace("`", ""),
-        "trying": TRIED,
+        "needing": text.needing(document) if document.get("next_log") else "",
+        "another": text.ANOTHER,
+        "own_law": _first(text.OWN).replace("`", ""),
+        "trying": text.TRIED,
         "band": band(fit),
     }
     return Section("Verdict", "verdict", values)
@@ -108,9 +108,9 @@ def _card(found: dict, fit: Fit, document: dict) -> dict:
         "claims": [_claim(*one, joint, several) for one in heads],
         "fall": fall,
         "left": left_words(found, fit),
-        "near": near(found, document) if status == "complete" else "",
+        "near": text.near(found, document) if status == "complete" else "",
         "tried": found.get("may_be"),
-        "blind": joint in blind(document),
+        "blind": joint in text.blind(document),
         "says": _first(says),
         "commands": commands,
         "error": f"{level(error)}{SPACE}{force}",
@@ -129,7 +129,7 @@ def _fall(found: dict, fit: Fit, document: dict) -> str:
     entry, claims = document["joints"][joint], document["claims"]
     last = claims[-1]["rms_test_after"] if claims else fit.rms("test")
     force = raised(units(fit)[joint][0])
-    it = "With it" if len(claims) == 1 else "With all that is named"
+    it = _first(text.together(found, document))
     error, then = level(entry["rms"]["test"]), level(last[joint])
     fall = f"the held-out error goes from {error} to {then}{SPACE}{force}"
     if entry["noise_floor"] is None or found.get("explained") is None:
@@ -163,9 +163,9 @@ def _claim(head: dict, tied: list[dict], joint: str, several: bool) -> dict:
         "effect": head["effect"],
         "figures": ": ".join(part for part in (takes, ", ".join(values)) if part),
         "options": [f"{n} {v}: {head['options_say'][n]}" for n, v in head["options"].items()],
-        "untold": "" if head["size_told"] else _first(UNTOLD),
+        "untold": "" if head["size_told"] else _first(text.UNTOLD),
         "summary": summary,
-        "from": _first(untold_from(head["probability"])).replace(" %", f"{SPACE}%"),
+        "from": _first(text.untold_from(head["probability"])).replace(" %", f"{SPACE}%"),
         "others": [f"{placed(e, j, head['joint'])}{SPACE}({chance(p)})" for e, j, p in told],
         "few": [placed(e, j, head["joint"]) for e, j, p in others if p < LIKELY],
         "separate_by": head["separate_by"],

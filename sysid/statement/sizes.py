@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from .tables import columns
 from .words import wrapped
+
+_MOST = {"": 1.0, "1": 1.0, "rad": math.pi}  # a share of all of it, half a turn
 
 
 def fitting(document: dict, joints: Sequence[str], width: int) -> list[str]:
@@ -32,7 +35,7 @@ def shown(document: dict, joints: Sequence[str], width: int) -> list[str]:
     if whole := [f"{_label(key)} {cells['*']}" for key, cells in sizes.items() if "*" in cells]:
         out += wrapped(f"  of the whole robot: {'; '.join(whole)}", width, "    ")
     if any("-" in cells for cells in own.values()):
-        words = "-: at no size, as other parameters take its place; "
+        words = "-: at no size that a robot can have, as other parameters take its place; "
         words += "`sysid effects NAME` says what shows it"
         out += wrapped(f"  {words}", width, "    ")
     if shaped := dict.fromkeys(d["effect"] for d in document["detectable"] if d["at"]):
@@ -52,7 +55,9 @@ def _found(document: dict) -> tuple[dict, dict]:
     """{(effect, parameter, unit): {joint: size}}, and {(effect, joint): "-"} of the absorbed."""
     sizes: dict[tuple[str, str, str], dict[str, str]] = {}
     for d in document["detectable"]:
-        sizes.setdefault((d["effect"], d["parameter"], d["unit"]), {})[d["joint"]] = size(d["size"])
+        most = _MOST.get(d["unit"], math.inf)
+        cell = size(d["size"]) if d["size"] <= most else "-"
+        sizes.setdefault((d["effect"], d["parameter"], d["unit"]), {})[d["joint"]] = cell
     return sizes, {(a["effect"], a["joint"]): "-" for a in document["absorbed"]}
 
 

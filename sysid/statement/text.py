@@ -131,10 +131,20 @@ def _fall(v: dict, of: Told) -> str:
     joint, entry = v["joint"], of.document["joints"][v["joint"]]
     error = f"{entry['rms']['test']:.4g} to {of.after[joint]:.4g} {of.units[joint]}"
     fall = f"the held-out error goes from {error}"
-    it = "with it" if len(of.sets) == 1 else "with all that is named"
+    it = together(v, of.document)
     if entry["noise_floor"] is None or v.get("explained") is None:
         return f"{it} {fall}"
     return f"{it} {percent(max(v['explained'], 0.0))} of the misfit is explained, {fall}"
+
+
+def together(v: dict, document: dict) -> str:
+    """What a joint's error falls with: all that is named, or the one effect, by name where it is
+    another joint's."""
+    heads = [document["findings"][claim["findings"][0]] for claim in document["claims"]]
+    if len(heads) != 1:
+        return "with all that is named"
+    own = "commands" in v or "by" in v
+    return "with it" if own else f"with {placed(heads[0]['effect'], heads[0]['joint'])}"
 
 
 def _head(f: dict, of: Told, joint: str, width: int, said: dict[str, str]) -> list[str]:

@@ -9,7 +9,7 @@ from .tables import show_notices
 _NEVER = 0.05  # probability below which a motion is no answer
 
 
-_SHOWN_STD = 20  # parameters whose deviation falls most
+_SHOWN_STD, _FALLS = 20, 0.95  # parameters whose deviation falls most; by less than this it stays what it is
 
 
 _SEEN = 0.01  # rad or m: what less of a maneuver does is none
@@ -18,8 +18,8 @@ _SEEN = 0.01  # rad or m: what less of a maneuver does is none
 def show_design(document: dict, experiment) -> None:
     """What a designed motion promises, and what is left of its limits."""
     best = document["criterion"]["random_best"]
-    beside = "" if best is None else f", {document['criterion']['log_det'] - best:.1f} above the best of the random motions it began from"
-    print(f"{document['duration']:g} s of motion; log det of the information {document['criterion']['log_det']:.1f}{beside}")
+    beside = "" if best is None else f"; of the best random motion that it began from: {best:.1f}"
+    print(f"{document['duration']:g} s of motion; what it tells of all parameters (log det of the information): {document['criterion']['log_det']:.1f}{beside}")
     for own in document.get("maneuvers", ()):
         moved = [f"{joint} {size:+.2g}" for joint, size in own["joints"].items() if abs(size) > _SEEN]
         print(f"from {own['start']:g} s on a maneuver of {own['duration']:g} s, {own['kind']}: {', '.join(moved) or 'left out'}")
@@ -31,12 +31,13 @@ def show_design(document: dict, experiment) -> None:
             print(f"{pair['a']} and {pair['b']}: no motion within these limits is likely to tell them apart; `sysid effects` says what else does")
             continue
         print(f"{pair['a']} and {pair['b']} will be told apart with probability {pair['probability']:.2f}")
-    told = [(name, s) for name, s in document["expected_std"].items() if s["now"] and s["now"] > 0.0]
+    told = [(name, s) for name, s in document["expected_std"].items() if s["now"] and s["after"] < _FALLS * s["now"]]
     told.sort(key=lambda one: one[1]["after"] / one[1]["now"])
     if told:
         print("standard deviations that fall most, now and after:")
         for name, s in told[:_SHOWN_STD]:
-            print(f"  {name}  {s['now']:.2g} -> {s['after']:.2g}")
+            unit = "" if s["unit"] in ("", "1") else f" {s['unit']}"
+            print(f"  {name}  {s['now']:.2g} -> {s['after']:.2g}{unit}")
     show_notices(document)
     print(f"folder: {document['run']}")
     motion = Path(document["run"]) / "trajectory.csv"

@@ -109,7 +109,7 @@ def _show_filter(chosen: dict) -> None:
     at = values.index(chosen[key]) if chosen[key] in values else None
     near = chosen["held_out"] if at is None else chosen["held_out"][max(at - 1, 0) : at + 2]  # the others are in fit.json
     shown = ", ".join(f"{entry[key]:g} {unit}: {100 * entry['relative_error']:.2f} %" for entry in near)
-    words = f"filter: {chosen['filter']}, {key} {chosen[key]:g} {unit} ({chosen['chosen']}); held-out error within the training logs, {shown}"
+    words = f"filter: {chosen['filter']}, {key} {chosen[key]:g} {unit} ({chosen['chosen']}); relative error on stretches of the training logs that were held apart: {shown}"
     print("\n".join(text.wrapped(words, terminal_width(), "  ")))
 
 

@@ -26,7 +26,10 @@ def show_added(document: dict, experiment, run, before=()) -> None:
     ]  # fmt: skip
     table(f"held-out RMS without and with {document['added']}", ["joint", "before", "after", "change", "standard error"], rows)
     for parameter in document["parameters"]:
-        print(text.valued(parameter["name"], parameter))
+        if parameter["std"] is not None:
+            print(text.valued(parameter["name"], parameter))
+    if held := [parameter["name"] for parameter in document["parameters"] if parameter["std"] is None]:
+        print("\n".join(text.wrapped(f"held at zero or at the prior: {', '.join(held)}", terminal_width(), "  ")))
     if document["says"]:
         Console().print(escape(document["says"]), soft_wrap=True, highlight=False)
     if not document["refused"]:
