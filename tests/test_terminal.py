@@ -65,7 +65,10 @@ def document(**more):
             finding("spring", FIRST, "sysid add x spring", None, probability=0.3),
             finding("payload", "*", "sysid add x payload", 2),
         ],
-        "claims": [{"findings": [0, 1]}, {"findings": [2]}],
+        "claims": [
+            {"findings": [0, 1], "rms_test_after": dict.fromkeys(JOINTS, 0.4)},
+            {"findings": [2], "rms_test_after": dict.fromkeys(JOINTS, 0.4)},
+        ],
         "verdict": [
             {
                 "joint": FIRST,

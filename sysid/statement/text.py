@@ -76,9 +76,7 @@ def _joint(v: dict, of: Told, width: int, said: dict[str, str]) -> list[str]:
             + listed([placed(c["effect"], c["joint"]) for c in v["by"]], "and")
             + f"; {_fall(v, of)}"
         ),
-        "unresolved": lambda: (
-            v["says"] + (f"; {_fall(v, of)}" if of.sets and seen else "")
-        ),
+        "unresolved": lambda: v["says"] + (f"; {_fall(v, of)}" if of.sets and seen else ""),
         "missing": lambda: f"{named or v['effect']}; {_fall(v, of)}",
         "unknown": lambda: (
             "no effect of the catalogue explains what is left"
@@ -117,11 +115,12 @@ def needing(document: dict) -> str:
 
 
 def near(v: dict, document: dict) -> str:
-    """How far above its noise floor the error of a joint is that is at the floor, as near as that
-    is known."""
+    """How far above its noise floor a joint's error is that is at it, as near as that is known."""
     entry = document["joints"][v["joint"]]
     floor, error = entry["noise_floor"], entry["rms"]["test"]
-    if not floor or error is None or error < 1.05 * floor:
+    if error is not None and document["claims"]:  # with all that is named
+        error = document["claims"][-1]["rms_test_after"][v["joint"]]
+    if not floor or (error or 0.0) < 1.05 * floor:
         return ""
     return f"; its error is {error / floor:#.3g} times the noise floor, which is known no nearer"
 
