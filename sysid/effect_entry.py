@@ -38,6 +38,8 @@ def _join(tree, effect: str, joints: list[str] | None, options: dict, where: str
         model["effects"].fa.set_flow_style()
     listed = model["effects"]
     formula = options.get("formula") if effect == "formula" else None
+    if effect == "formula" and formula is None:
+        raise ConfigError("add formula: which formula?", allowed="--option 'formula=a*sin(3*q)'", do="`sysid effects formula` says what may stand in it")
     own = {**({"joints": list(joints)} if joints is not None else {}), **options}
     for entry in list(listed):
         if formula is not None or _word(entry) != effect:

@@ -1,5 +1,6 @@
 """What stopped a reader on the way from a log to an added effect stays mended."""
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -179,6 +180,8 @@ def test_what_is_no_yaml_has_a_cure(text, told, tmp_path):
         (["fit", "experiment", "--joint", "elbow"], ["No such option: --joint", "`sysid fit --help`"]),
         (["init", "robot.urdf", "a.csv", "--rate", "250hz"], ["'--rate': a number is needed"]),
         (["fit", "nothere"], ["check its name; experiments here: experiment"]),
+        (["add", "experiment", "formula", "--joint", "elbow"], ["which formula?", "--option 'formula=a*sin(3*q)'", "`sysid effects formula`"]),
+        (["simulate", "experiment", "--hide", "stribeck:elbo"], ["allowed: shoulder, elbow", "did you mean elbow?"]),
         (["fit", "."], ["`sysid init URDF LOG...` writes one", "experiments here: experiment"]),
     ],
 )
@@ -207,6 +210,19 @@ def test_every_command_ends_with_the_next_one(experiment, cli, tmp_path):
     assert last(cli, "compare", folder, run / "steps/00-start", out=tmp_path / "two") == f"next: sysid diagnose {folder}"
     assert last(cli, "simulate", folder, "--duration", "4", "--rate", "250", out=tmp_path / "sim") == f"next: sysid diagnose {tmp_path / 'sim'}"
     assert last(cli, "effects") == "next: sysid effects NAME"
+
+
+def test_a_law_of_one_s_own_has_a_page(cli):
+    """Where the catalogue has no word for what is left."""
+    said = cli("effects", "formula")
+    words = " ".join(said.out.split())
+    assert said.status == 0 and "sysid add EXPERIMENT formula --joint JOINT --option" in words and "qdd (angle, speed, acceleration)" in words
+    from sysid.formula import FUNCTIONS, parse
+
+    assert all(name in words for name in FUNCTIONS) and parse("a*sin(3*q) + b*qd**3")
+    (described,) = json.loads(cli("effects", "formula", "--json").out)["effects"]
+    (other,) = json.loads(cli("effects", "stribeck", "--json").out)["effects"]
+    assert set(described) == set(other)
 
 
 def test_a_run_folder_stands_for_its_experiment_in_a_comparison(experiment, cli, tmp_path):

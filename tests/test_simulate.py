@@ -395,7 +395,7 @@ def test_the_folder_does_not_tell_what_is_hidden(cli, tmp_path):
     ("words", "complaint"),
     [
         (["--hide", "stribek:elbow"], ["stribek", "allowed: stribeck"]),
-        (["--hide", "stribeck:elbo"], ["elbo", "allowed: elbow"]),
+        (["--hide", "stribeck:elbo"], ["elbo", "allowed: shoulder, elbow; did you mean elbow?"]),
         (["--hide", "stribeck:elbow:df=2"], ["'df'", "dF, vs"]),
         (["--hide", "stribeck:elbow:dF=much"], ["much", "a number"]),
         (["--hide", "stribeck:elbow:vs=-1"], ["vs=-1", "a positive number"]),

@@ -65,6 +65,7 @@ def document(**more):
             finding("spring", FIRST, "sysid add x spring", None, probability=0.3),
             finding("payload", "*", "sysid add x payload", 2),
         ],
+        "not_claimed": [],
         "claims": [
             {"findings": [0, 1], "rms_test_after": dict.fromkeys(JOINTS, 0.4)},
             {"findings": [2], "rms_test_after": dict.fromkeys(JOINTS, 0.4)},
@@ -235,6 +236,24 @@ def test_each_joint_is_said_in_a_paragraph():
     close["joints"]["j3"]["noise_floor"] = 0.39
     (_, lines), *_ = text.verdict(of(close), 80)
     assert lines == ["j3: complete: no further effect is supported by these logs"]
+
+
+def test_what_a_verdict_told_is_no_note_again(monkeypatch, capsys):
+    said = document()
+    said["not_claimed"] = [
+        {"effect": "cable", "joint": "j5", "why": "its size is nothing"},
+        {"effect": "spring", "joint": "j3", "why": "the error rises"},
+    ]
+    said["notices"] = [
+        "cable on j5 is not claimed: its size is nothing",
+        "spring on j3 is not claimed: the error rises",
+    ]
+    unresolved = {"joint": "j5", "status": "unresolved", "says": "cable: its size is nothing"}
+    said["verdict"] = [*(v for v in said["verdict"] if v["joint"] != "j5"), unresolved]
+    monkeypatch.setattr(text, "told", lambda found, said: of(said))
+    show_diagnosis(SimpleNamespace(fit=SimpleNamespace(joints=JOINTS)), said)
+    out = capsys.readouterr().out
+    assert "note spring on j3 is not claimed" in out and "note cable" not in out
 
 
 def test_tables_say_what_is_not_known():

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..estimate import Fit
-from ..statement.sizes import size
+from ..statement.sizes import possible, size
 from ..statement.words import followed
 from .section import Section
 from .verdict import left_words
@@ -24,7 +24,9 @@ def detectable(fit: Fit, document: dict) -> Section:
 
     def cell(effect: str, joint: str) -> str:
         key = (effect, joint)
-        return _size(there[key]) if key in there else "–" if key in gone else ""
+        if key in there and possible(there[key]):
+            return _size(there[key])
+        return "–" if key in there or key in gone else ""
 
     on_robot = {effect for effect, joint in there if joint == "*"}
     values = {
@@ -46,7 +48,10 @@ def detectable(fit: Fit, document: dict) -> Section:
 
 
 def _size(entry: dict) -> str:
-    at = "".join(f", {name}{SPACE}{size(value)}" for name, value in entry["at"].items())
+    at = "".join(
+        f", {name}{SPACE}{size(value)}{unit_of(entry['at_units'][name])}"
+        for name, value in entry["at"].items()
+    )
     return f"{entry['parameter']}{SPACE}{size(entry['size'])}{unit_of(entry['unit'])}{at}"
 
 

@@ -86,8 +86,9 @@ def check(hide: Hidden, robot: Robot) -> None:
     if entry.robot and hide.joint != ROBOT:
         raise SysidError(f"{hide.effect} is an effect of the whole robot, not of {hide.joint!r}", where="--hide", allowed=f"{hide.effect}:{ROBOT}")
     if not entry.robot and hide.joint not in robot.joints:
-        close = difflib.get_close_matches(hide.joint, robot.joints, n=3, cutoff=0.5) or list(robot.joints)
-        raise SysidError(f"{hide.effect}: no joint {hide.joint!r} moves", where="--hide", allowed=", ".join(close))
+        close = difflib.get_close_matches(hide.joint, robot.joints, n=1, cutoff=0.6)
+        do = f"did you mean {close[0]}?" if close else ""
+        raise SysidError(f"{hide.effect}: no joint {hide.joint!r} moves", where="--hide", allowed=", ".join(robot.joints), do=do)
     if hide.effect == "joint_coupling":
         other = hide.values.get("other")
         others = [name for name in robot.joints if name != hide.joint]

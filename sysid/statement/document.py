@@ -13,6 +13,7 @@ from ..filters import settled, torque_band
 from ..fit_document import number, versions
 from ..flexible import Unknown
 from ..model_parameters import ROBOT
+from ..units import of_joint
 from .claims import chances, claims, finding
 
 
@@ -42,6 +43,7 @@ def document(found: Diagnosis, run="") -> dict:
                 "unit": d.unit,
                 "power": d.power,
                 "at": dict(d.at),
+                "at_units": _units(d, fit),
             }
             for d in found.detectable
             if d.size is not None
@@ -108,6 +110,13 @@ def _next_log(found) -> str | None:
     and neither an effect that may be it nor how the fit weighs its joints does."""
     blind = any(v.status == "unresolved" and not (v.may or v.even) for v in found.verdict)
     return another_log(found.fit.experiment.path) if blind else None
+
+
+def _units(d, fit) -> dict[str, str]:
+    """Of the shape values at which an effect shows best."""
+    slides = d.candidate.joint != ROBOT and bool(fit.model.robot.prismatic[d.candidate.joint])
+    shapes = d.candidate.effect.shapes()
+    return {s.name: of_joint(s.unit, prismatic=slides) for s in shapes if s.name in d.at}
 
 
 def _joint(candidate, joints) -> str:

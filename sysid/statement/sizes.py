@@ -55,8 +55,7 @@ def _found(document: dict) -> tuple[dict, dict]:
     """{(effect, parameter, unit): {joint: size}}, and {(effect, joint): "-"} of the absorbed."""
     sizes: dict[tuple[str, str, str], dict[str, str]] = {}
     for d in document["detectable"]:
-        most = _MOST.get(d["unit"], math.inf)
-        cell = size(d["size"]) if d["size"] <= most else "-"
+        cell = size(d["size"]) if possible(d) else "-"
         sizes.setdefault((d["effect"], d["parameter"], d["unit"]), {})[d["joint"]] = cell
     return sizes, {(a["effect"], a["joint"]): "-" for a in document["absorbed"]}
 
@@ -85,6 +84,11 @@ def _parts(rows: dict, joints: Sequence[str], width: int) -> list[list[int]]:
             parts.append([])
         parts[-1].append(k)
     return parts
+
+
+def possible(d: dict) -> bool:
+    """Whether a robot can have an effect of a detectable size."""
+    return d["size"] <= _MOST.get(d["unit"], math.inf)
 
 
 def size(value: float) -> str:

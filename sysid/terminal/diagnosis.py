@@ -24,10 +24,17 @@ def show_diagnosis(found, document: dict, experiment=None, before=()) -> None:
         if lines:
             print("\n" + "\n".join(lines))
     print()
-    show_notices({"notices": [n for n in document["notices"] if n not in implausible(document)]}, before)
+    said = {*implausible(document), *_said(document)}
+    show_notices({"notices": [n for n in document["notices"] if n not in said]}, before)
     print(f"run folder: {document['run']}")
     if experiment is not None:
         _after_diagnosis(found, document, experiment)
+
+
+def _said(document: dict) -> list[str]:
+    """Notices on what is not claimed that the verdict on a joint has told."""
+    told = " ".join(v.get("says", "") for v in document["verdict"])
+    return [f"{r['effect']} on {r['joint']} is not claimed: {r['why']}" for r in document["not_claimed"] if r["why"] in told]
 
 
 def _show_warnings(document: dict) -> None:
