@@ -114,6 +114,20 @@ def test_a_file_that_was_edited_or_cut_is_none(asked, tmp_path, edit):
     assert len(count) == 2
 
 
+def test_a_diagnosis_of_another_filter_is_questioned_anew(asked, tmp_path, monkeypatch, capsys):
+    """A discovery holds the filter that its first fit chose; the file's own fit may choose another."""
+    _, count = asked
+    typed(monkeypatch, capsys, "report", "arm", "--json")
+    path = tmp_path / "runs" / "arm" / kept.FILE
+    said = json.loads(path.read_text())
+    del said["seal"]
+    joint = next(iter(said["joints"]))
+    said["joints"][joint]["rms"]["test"] *= 1.001
+    path.write_text(json.dumps({**said, "seal": kept._seal(said)}))
+    typed(monkeypatch, capsys, "report", "arm", "--json")
+    assert count == ["arm", "arm"]
+
+
 def test_another_version_or_program_questions_anew(arm, tmp_path, monkeypatch):
     experiment = pipeline.load(arm[0])
     state = kept.of(experiment)

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 from collections.abc import Iterator
 from datetime import UTC, datetime
 from pathlib import Path
@@ -24,6 +25,7 @@ from ..specs import Experiment, is_own
 from .document import document
 
 FILE = "diagnosis.json"
+_SAME = 1e-6  # of an error: what two machines' fits of one model are apart, and more
 
 
 def diagnosed(
@@ -39,7 +41,7 @@ def diagnosed(
     there = (_read(experiment, folder) for folder in (run, *sorted(run.glob("steps/*"))))
     if (said := next((one for one in there if one is not None), None)) is not None:
         fit = pipeline.fit(experiment, progress=progress)
-        if _of_its_logs(said, fit):
+        if _of(said, fit):
             results.write(fit, run)
             whole_files.write_json(run / FILE, said)
             return fit, {**said, "run": str(run)}
@@ -52,11 +54,19 @@ def diagnosed(
 def found(experiment: Experiment, fit: Fit, run: Path) -> dict | None:
     """The diagnosis in a run folder, where it is of an experiment and of the logs of its fit."""
     said = _read(experiment, run)
-    return {**said, "run": str(run)} if said is not None and _of_its_logs(said, fit) else None
+    return {**said, "run": str(run)} if said is not None and _of(said, fit) else None
 
 
-def _of_its_logs(said: dict, fit: Fit) -> bool:
-    return said["logs"] == json.loads(json.dumps(list(fit.logs)))
+def _of(said: dict, fit: Fit) -> bool:
+    """Whether it is of a fit: of its logs, and of its errors, which a filter that was chosen anew
+    may have made others."""
+    pairs = zip(fit.joints, fit.predictions["test"].told())
+    errors = [(said["joints"][joint]["rms"]["test"], now) for joint, now in pairs]
+    same = all(
+        was == now if None in (was, now) else math.isclose(was, now, rel_tol=_SAME)
+        for was, now in errors
+    )
+    return same and said["logs"] == json.loads(json.dumps(list(fit.logs)))
 
 
 def written(experiment: Experiment, made: Diagnosis, run: Path) -> dict:
