@@ -102,15 +102,16 @@ def _nothing(before: Fit, after: Fit, told: Fit, member: Member) -> str | None:
     else:
         changes = [comparison.compare(before, one) for one in (after, told)]
         change, shown = (next(d for d in one if d.joint == own[0]) for one in changes)
-        unit, rise = before.rms("test")[own[0]], f"{max(change.delta_rms, 0.0):+.3g}"
+        unit = before.rms("test")[own[0]]
+        rise = f"{100 * max(change.delta_rms, 0.0) / max(unit, 1e-300):+.2g} %"
         still = any(-d.delta_rms < d.se for d in (change, shown))
         if still and nought(told.parameters_of(*member.candidate.key)):
-            return "its size is nothing beside its deviation, and the test error stays the same"
+            return "its size is nothing beside its deviation, and the test error does not clearly fall"
     if change.delta_rms > -_NOTHING * unit:
         return f"with it the error on the test logs does not fall ({rise})"
     # as the fit weighs them: it trades what a quiet joint loses for what a loud one gains
     if (paid := comparison.together(before, after, weighed=True)).delta_rms > paid.se:
-        return f"with it the test error of all joints together rises ({paid.delta_rms:+.2g})"
+        return "with it the test error of all joints together, as the fit weighs them, rises"
     return None
 
 

@@ -19,8 +19,9 @@ _KINDS = {
     ),
     "knock": (
         "knock",
-        "the arm was pushed or hit",
-        "a fit leaves these rows out; log again where it happens often",
+        "the torque leaps as where the arm is pushed or hit, or its own parts strike",
+        "a fit leaves these rows out; log again where somebody pushes it often, and write "
+        "`events: keep` under `preprocess:` where the machine strikes by itself: play, an end stop",
     ),
     "brake": (
         "brake_closed",
