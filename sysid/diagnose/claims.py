@@ -106,7 +106,7 @@ def _nothing(before: Fit, after: Fit, told: Fit, member: Member) -> str | None:
         rise = f"{100 * max(change.delta_rms, 0.0) / max(unit, 1e-300):+.2g} %"
         still = any(-d.delta_rms < d.se for d in (change, shown))
         if still and nought(told.parameters_of(*member.candidate.key)):
-            return "its size is nothing beside its deviation, and the test error does not clearly fall"
+            return "its size is nothing beside its deviation, and the test error hardly falls"
     if change.delta_rms > -_NOTHING * unit:
         return f"with it the error on the test logs does not fall ({rise})"
     # as the fit weighs them: it trades what a quiet joint loses for what a loud one gains
