@@ -3,11 +3,27 @@ words."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 _CLEAR = 2.0  # standard deviations
 _MOST = 0.5  # of what stands above a floor
 WEIGHED = "`weighting: noise` under `solver:` in the experiment file"
+
+
+@dataclass(frozen=True)
+class Refused:
+    """An effect that was looked at and is not claimed, and why, in words."""
+
+    effect: str
+    joint: str
+    why: str
+
+    @property
+    def told(self) -> str:
+        """In words."""
+        return f"{self.effect} was looked at and is not claimed: {self.why}"
 
 
 def unexplained(

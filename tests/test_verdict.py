@@ -360,8 +360,9 @@ def test_the_catalogue_is_not_said_to_lack_what_an_effect_of_it_may_be():
 
 def test_an_effect_is_near_that_stands_at_five_per_cent_and_takes_half():
     maxima = np.linspace(0.0, 4.0, 401)
-    group = lambda name: SimpleNamespace(candidate=SimpleNamespace(name=name))  # noqa: E731
-    one = ([group("spring"), group("cable"), group("cogging")], np.array([3.9, 3.95, 3.0]), np.array([6.0, 4.0, 9.0]), maxima)
+    group = lambda name: SimpleNamespace(candidate=SimpleNamespace(name=name), signed=name != "payload")  # noqa: E731
+    groups = [group("spring"), group("cable"), group("cogging"), group("payload")]  # whose sign forbids the last
+    one = (groups, np.array([3.9, 3.95, 3.0, 3.99]), np.array([6.0, 4.0, 9.0, 9.0]), maxima)
     asked = Asked({0: one}, Belief())
     assert asked.near(0, 10.0)[0].name == "spring"  # cable takes less than half, cogging may be chance
     assert asked.near(0, 7.0)[0].name == "cable" and asked.near(0, 20.0) is None is asked.near(1, 10.0)

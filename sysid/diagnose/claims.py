@@ -15,7 +15,7 @@ from .. import comparison, pipeline
 from ..addition import grown, spelled
 from ..estimate import Fit
 from ..experiment_logs import Read
-from ..unexplained import nought
+from ..unexplained import Refused, nought
 from .findings import Finding, finding, judged_by, where
 from .refits import Member
 from .steps import Step
@@ -44,20 +44,6 @@ class Claim:
     def after_square(self, joints) -> float:
         """Mean squared error on the test logs over joints, with the head in the model."""
         return float(np.mean([self.after.rms("test")[joint] ** 2 for joint in joints]))
-
-
-@dataclass(frozen=True)
-class Refused:
-    """A step that does not stand, and why, in words."""
-
-    effect: str
-    joint: str
-    why: str
-
-    @property
-    def told(self) -> str:
-        """In words."""
-        return f"{self.effect} was looked at and is not claimed: {self.why}"
 
 
 def claimed(

@@ -135,6 +135,16 @@ class Group:
         )
 
     @property
+    def signed(self) -> bool:
+        """Whether the coefficients have the signs that the effect allows."""
+        effect = self.candidate.effect
+        if self.candidate.nonlinear:
+            free = [s for s in effect.shapes() if s.start is not None]
+            return all(not (s.low == 0.0 and c < 0) for s, c in zip(free, self.coefficients))
+        signs = list(zip(effect.coefficients(), self.coefficients))
+        return len(signs) > 1 or all(one.lower != 0 or c >= 0 for one, c in signs)
+
+    @property
     def numbers(self) -> int:
         """How many numbers it fits: its directions, and shape values that were searched."""
         return len(self.c) + (0 if self.candidate.nonlinear else len(self.shapes))

@@ -9,7 +9,6 @@ import numpy as np
 
 from ..view import View
 from .ask import Asked, ask
-from .evidence import Group
 from .steps import Step, revised, step_of
 from .ties import NEAR, Choice, alike, chosen
 
@@ -56,11 +55,14 @@ def search(
 def _next(view: View, asked: Asked, level: float, worth: float, open_: list[Choice]) -> Step | None:
     """The candidate that joins next, None where none is there and worth having."""
     threshold = np.quantile(asked.maxima, 1.0 - level) if len(asked.groups) else np.inf
-    best: dict[tuple, int] = {}
+    own: dict[tuple, list[int]] = {}
     for k in np.flatnonzero(~(asked.statistics <= _ALONE) & (asked.gains > 0)):
-        key = (*asked.groups[k].candidate.key, asked.groups[k].candidate.options)
-        if _sign(asked.groups[k]) and (key not in best or asked.gains[k] > asked.gains[best[key]]):
-            best[key] = k
+        if asked.groups[k].signed:
+            candidate = asked.groups[k].candidate
+            own.setdefault((*candidate.key, candidate.options), []).append(k)
+    best = {key: max(ks, key=asked.gains.__getitem__) for key, ks in own.items()}
+    # it is there where any set of shape values says so that takes about what its best one does
+    clear = {best[key]: _clearest(asked, ks) for key, ks in own.items()}
     # far from worth having, whatever a refit adds to it
     least = 0.5 * worth * np.sum(view.design.residual**2, axis=0)
     dof = view.model.robot.dof
@@ -69,7 +71,7 @@ def _next(view: View, asked: Asked, level: float, worth: float, open_: list[Choi
             del best[key]
     # whoever takes as much as one that is there may be what is there
     rivals = sorted(best.values(), key=lambda k: -asked.gains[k])
-    hopeful = [k for k in rivals if asked.statistics[k] > threshold]
+    hopeful = [k for k in rivals if asked.statistics[clear[k]] > threshold]
     while hopeful:
         top = hopeful[0]
         where = set(asked.groups[top].candidate.touches(dof))
@@ -83,7 +85,7 @@ def _next(view: View, asked: Asked, level: float, worth: float, open_: list[Choi
         found = chosen(view, [asked.groups[k] for k in short], np.random.default_rng(1))
         if found is not None:
             # of all that were compared one at least is there, though its sign may forbid its name
-            step = step_of(view, min(asked.p(k) for k in short), found, worth)
+            step = step_of(view, min(asked.p(clear[k]) for k in short), found, worth)
             if step is not None and found.decided:
                 return step
             if step is not None:
@@ -92,10 +94,8 @@ def _next(view: View, asked: Asked, level: float, worth: float, open_: list[Choi
     return None
 
 
-def _sign(group: Group) -> bool:
-    """Whether the coefficients have the signs that the effect allows."""
-    if group.candidate.nonlinear:
-        free = [s for s in group.candidate.effect.shapes() if s.start is not None]
-        return all(not (s.low == 0.0 and c < 0) for s, c in zip(free, group.coefficients))
-    signs = list(zip(group.candidate.effect.coefficients(), group.coefficients))
-    return len(signs) > 1 or all(one.lower != 0 or c >= 0 for one, c in signs)
+def _clearest(asked: Asked, some: list[int]) -> int:
+    """Of groups of one candidate, the one that stands out most of those that take about as much."""
+    least = NEAR * asked.gains[some].max()
+    near = [k for k in some if asked.gains[k] >= least]
+    return max(near, key=lambda k: np.nan_to_num(asked.statistics[k], nan=-np.inf))
