@@ -7,6 +7,7 @@ with the simulator's truth.json, which the diagnosis does not read.
 import json
 import shlex
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from ruamel.yaml import YAML
 
 from sysid import effect_entry, fit_document, loop, pipeline, results, simulate
 from sysid.addition import command, grown, spelled
+from sysid.diagnose import select
 from sysid.diagnose.diagnosis import diagnose
 from sysid.diagnose.select import LEVEL, WORTH, search
 from sysid.statement.document import document
@@ -317,3 +319,19 @@ def test_what_was_beaten_is_asked_again_once_another_has_joined(tmp_path):
     found = pipeline.load(tmp_path / "logs")
     steps, *_ = search(first_view(found, pipeline.fit(found)))
     assert sorted(step.candidate.key for step in steps) == [("encoder_offset", 0), ("torque_gain", 0)]
+
+
+# ---- which of a candidate's shape values says that it is there
+
+
+@pytest.mark.parametrize(
+    ("gains", "statistics", "clearest"),
+    [
+        ((3.841, 3.838, 1.9), (3.17, 4.75, 2.7), 1),  # two speeds of a log: one takes a thousandth more, the other is told by more blocks
+        ((4.0, 1.5, 1.0), (3.0, 9.0, 9.0), 0),  # what takes less than NEAR of the best speaks for something else
+        ((4.0, 3.9, 3.8), (float("nan"), 2.0, float("nan")), 1),  # what cannot be tested says nothing
+    ],
+)
+def test_the_clearest_of_what_takes_about_as_much_says_that_it_is_there(gains, statistics, clearest):
+    asked = SimpleNamespace(gains=np.array(gains), statistics=np.array(statistics))
+    assert select._clearest(asked, [0, 1, 2]) == clearest
