@@ -10,10 +10,12 @@ import subprocess
 import sys
 import threading
 import time
+import types
 from dataclasses import replace
 
 import anyio
 import httpx
+import numpy as np
 import pytest
 
 from sysid import loop
@@ -26,6 +28,7 @@ from sysid.studio.diagnosed import Diagnosed
 from sysid.studio.experiments import Experiments, beside
 from sysid.studio.history import History, hashed
 from sysid.studio.jobs import Cancelled, Job, Worker
+from sysid.studio.rows import same_rows
 from sysid.studio.serve import serve
 from sysid.studio.session import Session
 from sysid.studio.turn import Turn
@@ -655,6 +658,29 @@ def test_another_run_is_laid_over_this_one(opened):
     assert told["laid"] and told["beside"] == pytest.approx(worse.rms("test")["elbow"], rel=1e-12)
     same = opened.get("/api/window", **asked, beside="run:steps/00-start").json()
     assert same["beside"] == same["rms"]
+
+
+def _model(times, logs, *, seed):
+    """What can be laid beside another: rows with values of their own."""
+    values = np.random.default_rng(seed).normal(size=(3, len(times)))
+    return types.SimpleNamespace(
+        times=lambda part: times,
+        columns=lambda part, joint: values,
+        prediction=lambda part: types.SimpleNamespace(log=logs),
+    )
+
+
+@pytest.mark.parametrize("gap", [slice(0, 0), slice(40, 42)])
+def test_rows_of_a_model_with_other_edges_are_laid_where_they_belong(gap):
+    """Two logs on clocks of their own, shorter at both ends, and once with rows missing between."""
+    t, logs = np.tile(np.arange(100) * 0.01, 2), np.repeat([0, 1], 100).astype(np.int16)
+    there = np.ones(200, dtype=bool)
+    there[[0, 1, 98, 99, 100, 198, 199]] = False
+    there[gap] = False
+    mine, other = _model(t, logs, seed=0), _model(t[there], logs[there], seed=1)
+    for laid, values in zip(same_rows(other, mine, "train", 0), other.columns("train", 0)[1:]):
+        assert np.isnan(laid[~there]).all()
+        np.testing.assert_array_equal(laid[there], values)
 
 
 def test_a_diagnosis_that_stands_is_not_made_again(arm, tmp_path, monkeypatch):

@@ -34,15 +34,36 @@ def same_rows(other: Shown, seen: Shown, part: str, joint: int):
     theirs, mine = other.times(part), seen.times(part)
     if np.array_equal(mine, theirs):
         return other.columns(part, joint)[1:]
-    predicted, left = np.full(len(mine), np.nan), np.full(len(mine), np.nan)
-    _, torque, residual = other.columns(part, joint)
+    torque, residual = (np.full(len(mine), np.nan) for _ in range(2))
+    known = other.columns(part, joint)[1:]
     logs, shown = other.prediction(part).log, seen.prediction(part).log
-    for log in np.unique(logs):  # another filter has other edges
-        rows, own = np.flatnonzero(shown == log), np.flatnonzero(logs == log)
-        at = np.minimum(np.searchsorted(theirs[own], mine[rows]), len(own) - 1)
-        same = theirs[own[at]] == mine[rows]
-        predicted[rows[same]], left[rows[same]] = (v[own[at[same]]] for v in (torque, residual))
-    return (predicted, left) if np.isfinite(predicted).mean() > 0.5 else None
+    for log in np.flatnonzero(np.bincount(shown)):
+        rows, own = _span(shown == log), _span(logs == log)
+        if not len(theirs[own]):
+            continue
+        here, there = _meeting(mine[rows], theirs[own])
+        for out, values in zip((torque, residual), known):
+            out[rows][here] = values[own][there]
+    return (torque, residual) if np.isfinite(torque).mean() > 0.5 else None
+
+
+def _span(some) -> slice:
+    """The rows of one log, which stand together."""
+    found = np.flatnonzero(some)
+    return slice(int(found[0]), int(found[-1]) + 1) if len(found) else slice(0, 0)
+
+
+def _meeting(mine, theirs):
+    """Places in two rising sequences that hold the same; mostly, as another filter has other edges,
+    a stretch of each."""
+    first = max(mine[0], theirs[0])
+    a, b = int(np.searchsorted(mine, first)), int(np.searchsorted(theirs, first))
+    n = min(len(mine) - a, len(theirs) - b)
+    if np.array_equal(mine[a : a + n], theirs[b : b + n]):
+        return slice(a, a + n), slice(b, b + n)
+    at = np.minimum(np.searchsorted(theirs, mine), len(theirs) - 1)
+    same = theirs[at] == mine
+    return same, at[same]
 
 
 def rms(values) -> float | None:

@@ -185,7 +185,7 @@ class Workspace:
         names = [name.rpartition("/")[2] for _, _, name in line["spans"]]
         ends = np.array([end for _, end, _ in line["spans"]])
         which = np.minimum(np.searchsorted(ends, line["t"][rows] - 1e-9), len(names) - 1)
-        return [[names[k], t] for k, t in zip(which, charts.rounded(self.times(part)[rows], 6))]
+        return [[names[k], t] for k, t in zip(which.tolist(), charts.rounded(self.times(part)[rows], 6))]
 
     # ---- the residual against position and speed
 
