@@ -42,7 +42,11 @@ def trace(chart, name):
 def test_a_window_is_drawn_with_every_sample_where_there_are_few(long):
     workspace, found = Workspace(long), long.predictions["test"]
     whole = workspace.window("test", 0)
-    assert whole["samples"] == len(found.t) and whole["drawn"] <= 3 * MOST
+    assert whole["samples"] == len(found.t) and whole["drawn"] <= MOST
+    shifted = replace(found, predicted=found.predicted + 0.1)
+    other = Workspace(replace(long, predictions={**long.predictions, "test": shifted}))
+    beside = workspace.window("test", 0, beside=other)
+    assert beside["laid"] and beside["drawn"] <= MOST  # however many lines there are
     peak = len(found.t) // 3
     drawn = [y for y in trace(whole["chart"], "measured")["y"] if y is not None]
     assert max(drawn) == pytest.approx(found.measured[peak, 0], rel=1e-4)  # no peak is lost

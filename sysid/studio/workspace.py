@@ -23,7 +23,7 @@ from ..report.words import band, units
 from . import panels
 from .rows import Columns, Shown, rms, same_rows
 
-MOST = 2000  # samples of a line before it is thinned: two for each pixel of a wide screen
+MOST = 6000  # samples of a chart before it is thinned: two of each line for each pixel
 _DOTS = 3000  # of a cloud
 _FRAMES = 400  # of the robot
 _CELLS = (28, 20)  # of a map, over position and speed
@@ -113,8 +113,10 @@ class Workspace:
             lines |= {"predicted beside": there, "residual beside": missed}
             # where rows do not count, neither model is asked
             lines["difference"] = missed - lines["residual"]
-        keep = np.unique(np.concatenate([kept(v, MOST) for v in lines.values()]))
-        keep = keep if rows.stop - rows.start > MOST else np.arange(rows.stop - rows.start)
+        keep = np.arange(rows.stop - rows.start)
+        if len(keep) > MOST:  # as many in all, however many lines there are
+            each = MOST // len(lines)
+            keep = np.unique(np.concatenate([kept(v, each) for v in lines.values()]))
         chart = panels.time(
             name, units(self.fit)[name][0], t[rows][keep], {w: v[keep] for w, v in lines.items()},
             own=self._own_clock(part, rows.start + keep), breaks=_breaks(line, rows.start + keep),
@@ -185,7 +187,8 @@ class Workspace:
         names = [name.rpartition("/")[2] for _, _, name in line["spans"]]
         ends = np.array([end for _, end, _ in line["spans"]])
         which = np.minimum(np.searchsorted(ends, line["t"][rows] - 1e-9), len(names) - 1)
-        return [[names[k], t] for k, t in zip(which.tolist(), charts.rounded(self.times(part)[rows], 6))]
+        clock = charts.rounded(self.times(part)[rows], 6)
+        return [[names[k], t] for k, t in zip(which.tolist(), clock)]
 
     # ---- the residual against position and speed
 
