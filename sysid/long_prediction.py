@@ -118,10 +118,6 @@ class LongPrediction(Prediction):
         """(dof,) rows that count."""
         return self._sums.counts
 
-    def sums(self) -> Sums:
-        """As of `Prediction`."""
-        return self._sums
-
     def greatest(self, count: int) -> np.ndarray:
         """As of `Prediction`, for a few."""
         return self._greatest[:count] if count <= _GREATEST else super().greatest(count)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -103,6 +104,10 @@ class Prediction:
 
     def sums(self) -> Sums:
         """What errors are made of."""
+        return self._sums
+
+    @cached_property
+    def _sums(self) -> Sums:
         kept = self.measured if self.use is None else np.where(self.use, self.measured, 0.0)
         return Sums(_sum(self.residual**2), _sum(kept**2), _sum(kept), self.counts)
 
