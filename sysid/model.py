@@ -99,13 +99,22 @@ class Model(Terms):
         """Rows of a piece with the load that effects look at, and moved as the motion effects say."""
         part = piece.part(rows)
         if loaded or any(effect.uses_load and not effect.memory for effect, _ in self.terms):
-            part = replace(part, load=regressor.torque(self.robot, self._bodies, part.q, part.qd, part.qdd))
+            part = replace(part, load=self._load(piece, rows, part))
         for term, (effect, joints) in enumerate(self.terms):
             if isinstance(effect, MotionEffect):
                 for joint in joints:
                     known = {"behind": remembered[term, joint][:, rows]} if isinstance(effect, Deflection) else {}
                     part = effect.moved(part, joint, **known, **self.shapes_of(term, joint))
         return part
+
+    def _load(self, piece: Piece, rows: slice, part: Piece) -> np.ndarray:
+        """Load (n, dof) of rows of a piece, seen as `part`: that of the last bodies stays with the piece."""
+        key = ("load", rows.start, rows.stop, rows.step)
+        robot, bodies, load = piece.kept.get(key, (None, None, None))
+        if robot is not self.robot or bodies is not self._bodies:
+            load = regressor.torque(self.robot, self._bodies, part.q, part.qd, part.qdd)
+            piece.kept[key] = self.robot, self._bodies, load
+        return load
 
     def columns(self, piece: Piece, rows: slice, remembered: dict | None = None, *, keep: bool = False) -> list[np.ndarray]:
         """For each joint the columns (support in this piece, n) of the rows `rows` of a piece, filtered where its torque is.

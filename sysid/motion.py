@@ -28,6 +28,8 @@ class Piece:
 
     `weight` (n, dof) is what each row counts in the filter of both sides, None where all count alike: an average over what counts.
 
+    `kept` is for what is made of these rows once for all who ask; it goes with the piece.
+
     What a model adds: `load` (n, dof) the torque that its bodies alone need; `gravity` (3,) or None for the robot's own;
     `deflection` (3, n, dof), how far each link is behind its motor in q, qd and qdd, or None.
     """
@@ -53,6 +55,7 @@ class Piece:
     gravity: np.ndarray | None = None
     deflection: np.ndarray | None = None
     weight: np.ndarray | None = None
+    kept: dict = field(init=False, default_factory=dict, repr=False, compare=False)
 
     def direction(self, joint: int) -> np.ndarray:
         """sign(qd) (n,) of a joint, zero where the filter of a constant angle leaves nothing but rounding."""
