@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 _CLEAR = 2.0  # standard deviations
-_MOST = 0.5  # of what stands above a floor
+_MOST = 0.5  # of what stands above a floor, or of a square
 WEIGHED = "`weighting: noise` under `solver:` in the experiment file"
 
 
@@ -80,6 +80,18 @@ def unexplained(
 def _times(error: float, floor) -> str:
     times = error / max(floor.rms, 1e-300)
     return "at the noise floor" if times < 1.05 else f"{times:.2g} times the noise floor"
+
+
+def explains(before: float, after: float, floor: float) -> float:
+    """The share of a misfit that goes, of errors and the noise in both; NaN where there is none."""
+    misfit = before**2 - floor**2
+    return (before**2 - after**2) / misfit if misfit > 0 else float("nan")
+
+
+def mostly_noise(error: float, floor) -> bool:
+    """Whether most of an error's square is noise, as its NoiseFloor has it; not where that is not
+    known."""
+    return floor.rms is not None and _MOST * error**2 <= floor.rms**2
 
 
 def by_weights(fit, joint: str, floor: float | None, weighed: dict[str, float]) -> bool:

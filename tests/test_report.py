@@ -235,7 +235,7 @@ LEFT = {"depends_on": [{"variable": f"qd_{EVIL}", "share": 0.3}, {"variable": "t
     ({"status": "explained", "by": [{"effect": "joint_coupling", "joint": "elbow"}], "explained": 0.93}, "joint_coupling on elbow. With all that is named 93\u00a0% of the misfit is explained"),
     ({"status": "unresolved", "says": "its noise floor is not known (<b>why</b>)"}, "Its noise floor is not known (<b>why</b>)."),
     ({"status": "unresolved", "says": "so it is", **LEFT}, f"The motion predicts 40\u00a0% of what is left (the speed of {EVIL} alone 30\u00a0%, time alone 10\u00a0%)."),
-    ({"status": "unknown", "also": [], **LEFT}, "Structure is left that no effect of the catalogue explains. The motion predicts 40\u00a0% of what is left"),
+    ({"status": "unknown", "also": [], **LEFT}, "No effect of the catalogue explains what is left. The motion predicts 40\u00a0% of what is left"),
 ])  # fmt: skip
 def test_every_status_has_its_card(clean, more, words):
     found, said = clean

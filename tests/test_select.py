@@ -321,6 +321,18 @@ def test_what_was_beaten_is_asked_again_once_another_has_joined(tmp_path):
     assert sorted(step.candidate.key for step in steps) == [("encoder_offset", 0), ("torque_gain", 0)]
 
 
+@pytest.mark.parametrize("seed", [2, 5])
+def test_two_effects_that_hide_each_other_are_both_named(simulated, monkeypatch, seed):
+    """In a short log what each does is the other's noise: alone neither stands out."""
+    folder = simulated(f"masked-{seed}", "encoder_eccentricity:shoulder:d=0.2,phi=4.43", "torque_saturation:elbow:size=2", seed=seed, duration=5.0)
+    experiment = pipeline.load(folder)
+    view = first_view(experiment, pipeline.fit(experiment))
+    keys = {("encoder_eccentricity", 0), ("torque_saturation", 1)}
+    assert {step.candidate.key for step in search(view)[0]} == keys
+    monkeypatch.setattr(select, "_pair", lambda *given: None)
+    assert not keys <= {step.candidate.key for step in search(view)[0]}
+
+
 # ---- which of a candidate's shape values says that it is there
 
 

@@ -7,9 +7,9 @@ import pytest
 
 from sysid import blocks, pipeline
 from sysid.diagnose.ask import ask
-from sysid.diagnose.refits import losses, refitted, weighed
+from sysid.diagnose.refits import refitted, weighed
 from sysid.diagnose.ties import Choice, chosen, holds
-from sysid.view import first_view
+from sysid.view import first_view, losses
 from tests.evidences import posed, stacked, viewed
 
 

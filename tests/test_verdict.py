@@ -164,6 +164,23 @@ def test_the_greater_part_gives_the_name(taken, share, status):
     assert (said["effect"] == "cogging") if status == "missing" else (said["also"] == ["cogging"] and "effect" not in said)
 
 
+@pytest.mark.parametrize(
+    ("first", "then", "train", "noise", "status", "says"),
+    [
+        (3.0, 2.5, 2.5, 1.0, "unknown", "its error is 2.5 times the noise floor"), (3.0, 2.0, 2.0, 1.0, "missing", ""), (1.6, 1.4, 1.4, 1.0, "missing", ""),
+        (3.0, 2.5, 1.2, 1.0, "missing", ""), (3.0, 2.5, 2.5, None, "unknown", "its noise floor is not known (the band is narrow)"), (3.0, 2.0, 2.0, None, "missing", ""),
+    ],
+)  # fmt: skip
+def test_what_takes_the_smaller_part_is_no_name_for_the_misfit(first, then, train, noise, status, says):
+    """Half of what stands above the floor, or what leaves mostly noise, on the training logs at least; where the floor is not known, half of all."""
+    found = elbow(first, [claim("presliding", "elbow", [0.0, 0.5], fitted(then, train=train))], level=floor(noise))
+    said = _verdict(found)
+    assert found.status == status and says in found.says
+    assert found.explained == pytest.approx((first**2 - then**2) / (first**2 - (noise or 0.0) ** 2))
+    if status == "unknown":
+        assert said["also"] == ["presliding"] and said["depends_on"] == [] and said["commands"] == ["sysid add x presliding"]
+
+
 def test_error_above_the_floor_that_nothing_predicts_is_unresolved():
     found = elbow(2.0)
     assert found.status == "unresolved" and "2 times the noise floor" in found.says
@@ -207,7 +224,7 @@ def test_a_floor_that_nobody_knows_leaves_it_unresolved():
     assert found.status == "unresolved" and "noise floor is not known (the band is narrow)" in found.says
     # what is there is named all the same, and what it explains is told of what can be known
     found = elbow(2.0, [claim("torque_bias", "elbow", [0.0, 0.8], fitted(1.2))], level=floor(None))
-    assert found.status == "missing" and found.explained == pytest.approx(1.0)
+    assert found.status == "missing" and found.explained == pytest.approx((4.0 - 1.44) / 4.0)
     assert elbow(2.0, rest=left(0.6), level=floor(None)).status == "unknown"
 
 

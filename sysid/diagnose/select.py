@@ -1,5 +1,10 @@
 """One effect after another joins the model, each asked anew with all that joined before it. Only
-training logs are looked at."""
+training logs are looked at.
+
+Two effects may hide each other: what one does is noise to the other. Where none stands out, one
+that takes much joins on trial; if another stands out with it, and then the first or a third with
+that one alone, both are there.
+"""
 
 from __future__ import annotations
 
@@ -9,24 +14,21 @@ import numpy as np
 
 from ..view import View
 from .ask import Asked, ask
-from .steps import Step, revised, step_of
+from .steps import Step, rejoined, revised, step_of
 from .ties import NEAR, Choice, alike, chosen
 
 LEVEL = 0.01  # family-wise: how often anything is accused where nothing is there
 WORTH = 0.03  # of a joint's squared residual under the low-pass: 1.5 % of its root mean square
 _ALONE = 1.645  # standard errors: five per cent, were it the only question
 _MOST_STEPS, _SHORTLIST = 8, 8
+_HIDES = 0.25  # of a joint's squared residual: without less, statistics grow by less than a seventh
+_TRIALS = 2
 
 
 def search(
-    view: View,
-    extra=(),
-    *,
-    level: float = LEVEL,
-    worth: float = WORTH,
-    most: int = _MOST_STEPS,
+    view: View, extra=(), *, level: float = LEVEL, worth: float = WORTH, most: int = _MOST_STEPS,
     tell: Callable[[str, float], None] = lambda stage, share: None,
-):
+):  # fmt: skip
     """The effects that join, in order, and the answers under the first model and the last.
 
     Args:
@@ -37,44 +39,36 @@ def search(
         (steps, asked first, asked last, what is there and cannot be told from effects elsewhere)
     """
     first_view, steps, open_ = view, list[Step](), list[Choice]()
+
+    def asked_with(step: Step, view: View, before: Asked | None) -> Asked:
+        told = step.candidate.told(view.model.robot.joints)
+        say = lambda share: tell(f"ask, with {told}", share)  # noqa: E731
+        return ask(view, extra, say, before=before, anew=step.changed)
+
     first = asked = ask(view, extra, lambda share: tell("ask", share))
     for _ in range(most):  # a step may go again: no more rounds than steps
         step = _next(view, asked, level, worth, open_)
-        if step is None:
+        pair = [step] if step else _pair(view, asked, level, worth, asked_with)
+        if not pair:
             break
-        joined_ = [*steps, step]
+        joined_ = [*steps, *pair] if step else rejoined(first_view, [*steps, *pair])
+        step, asked = joined_[-1], asked if step else None
         steps = revised(first_view, joined_, worth)
         view = steps[-1].after
-        kept = [s.candidate for s in steps] == [s.candidate for s in joined_]
-        told = step.candidate.told(view.model.robot.joints)
-        say = lambda share, told=told: tell(f"ask, with {told}", share)  # noqa: E731
-        asked = ask(view, extra, say, before=asked if kept else None, anew=step.changed)
+        kept = asked and [s.candidate for s in steps] == [s.candidate for s in joined_]
+        asked = asked_with(step, view, asked if kept else None)
     return steps, first, asked, open_
 
 
 def _next(view: View, asked: Asked, level: float, worth: float, open_: list[Choice]) -> Step | None:
     """The candidate that joins next, None where none is there and worth having."""
     threshold = np.quantile(asked.maxima, 1.0 - level) if len(asked.groups) else np.inf
-    own: dict[tuple, list[int]] = {}
-    for k in np.flatnonzero(~(asked.statistics <= _ALONE) & (asked.gains > 0)):
-        if asked.groups[k].signed:
-            candidate = asked.groups[k].candidate
-            own.setdefault((*candidate.key, candidate.options), []).append(k)
-    best = {key: max(ks, key=asked.gains.__getitem__) for key, ks in own.items()}
-    # it is there where any set of shape values says so that takes about what its best one does
-    clear = {best[key]: _clearest(asked, ks) for key, ks in own.items()}
-    # far from worth having, whatever a refit adds to it
-    least = 0.5 * worth * np.sum(view.design.residual**2, axis=0)
-    dof = view.model.robot.dof
-    for key, k in [*best.items()]:
-        if asked.gains[k] < least[asked.groups[k].candidate.touches(dof)].min():
-            del best[key]
-    # whoever takes as much as one that is there may be what is there
-    rivals = sorted(best.values(), key=lambda k: -asked.gains[k])
-    hopeful = [k for k in rivals if asked.statistics[clear[k]] > threshold]
+    rivals, dof = _rivals(view, asked, worth), view.model.robot.dof
+    hopeful = [k for k, (clear, _) in rivals.items() if asked.statistics[clear] > threshold]
     while hopeful:
         top = hopeful[0]
         where = set(asked.groups[top].candidate.touches(dof))
+        # whoever takes as much as one that is there may be what is there
         near = [k for k in rivals if asked.gains[k] >= NEAR * asked.gains[top]]
         # who acts on the same joints, and who takes the same thing through bodies that bend
         short = [k for k in near if where & set(asked.groups[k].candidate.touches(dof))]
@@ -85,12 +79,47 @@ def _next(view: View, asked: Asked, level: float, worth: float, open_: list[Choi
         found = chosen(view, [asked.groups[k] for k in short], np.random.default_rng(1))
         if found is not None:
             # of all that were compared one at least is there, though its sign may forbid its name
-            step = step_of(view, min(asked.p(clear[k]) for k in short), found, worth)
+            step = step_of(view, min(asked.p(rivals[k][0]) for k in short), found, worth)
             if step is not None and found.decided:
                 return step
             if step is not None:
                 open_.append(found)
         hopeful = [k for k in hopeful if k not in short]
+    return None
+
+
+def _rivals(view: View, asked: Asked, worth: float) -> dict[int, tuple[int, float]]:
+    """Of each candidate that may be worth having, the shape values that take most, by falling gain:
+    with those that say best that it is there, and the share taken of a joint that it acts on."""
+    own: dict[tuple, list[int]] = {}
+    for k in np.flatnonzero(~(asked.statistics <= _ALONE) & (asked.gains > 0)):
+        if asked.groups[k].signed:
+            candidate = asked.groups[k].candidate
+            own.setdefault((*candidate.key, candidate.options), []).append(k)
+    loss, dof, out = np.sum(view.design.residual**2, axis=0), view.model.robot.dof, {}
+    for ks in own.values():
+        k = max(ks, key=asked.gains.__getitem__)
+        left = loss[asked.groups[k].candidate.touches(dof)]
+        # else far from worth having, whatever a refit adds to it
+        if asked.gains[k] >= 0.5 * worth * left.min():
+            # it is there where any set of values says so that takes about what its best one does
+            out[k] = _clearest(asked, ks), asked.gains[k] / max(left.mean(), 1e-300)
+    return dict(sorted(out.items(), key=lambda one: -asked.gains[one[0]]))
+
+
+def _pair(view: View, asked: Asked, level: float, worth: float, asked_with) -> list[Step] | None:
+    """Two effects each of which stands out with the other in the model, first what takes more; None
+    where there are no such two."""
+    trials = [k for k, (_, share) in _rivals(view, asked, worth).items() if share > _HIDES]
+    for k in trials[:_TRIALS]:
+        found = chosen(view, [asked.groups[k]], np.random.default_rng(1))
+        trial = found and step_of(view, asked.p(k), found, worth)
+        then = trial and asked_with(trial, trial.after, asked)
+        if other := then and _next(trial.after, then, level, worth, []):
+            (first,) = rejoined(view, [other])
+            then = asked_with(first, first.after, asked)
+            if last := _next(first.after, then, level, worth, []):
+                return sorted((first, last), key=lambda step: -step.choice.gain.sum())
     return None
 
 

@@ -10,9 +10,9 @@ import numpy as np
 from .. import blocks
 from ..candidates import Candidate
 from ..model_parameters import ROBOT
-from ..view import View
+from ..view import View, losses, taken
 from .projected import groups_at
-from .refits import joined, losses, taken, weighed
+from .refits import joined, weighed
 from .ties import NEAR, Choice, chosen
 
 
@@ -57,7 +57,7 @@ def revised(first: View, steps: list[Step], worth: float) -> list[Step]:
     # what came again with more to it has taken the place of what was there
     last = {step.candidate.key: step for step in steps}
     if len(last) < len(steps):
-        steps = _rejoined(first, [step for step in steps if last[step.candidate.key] is step])
+        steps = rejoined(first, [step for step in steps if last[step.candidate.key] is step])
     stirred = steps[-1].changed
     for _ in range(2 * len(steps)):  # two that speak for each other could take turns for ever
         steps, changed = _revised_once(first, steps, worth, stirred)
@@ -84,14 +84,14 @@ def _revised_once(first: View, steps: list[Step], worth: float, stirred: set[int
         found = chosen(without, near, np.random.default_rng(1))
         again = None if found is None else step_of(without, step.p, found, worth)
         if again is None:
-            return _rejoined(first, [*before, *later]), step.changed
+            return rejoined(first, [*before, *later]), step.changed
         if again.candidate.key != step.candidate.key:
-            return _rejoined(first, [*before, again, *later]), step.changed | again.changed
+            return rejoined(first, [*before, again, *later]), step.changed | again.changed
         steps = [*before, replace(step, choice=found), *later]
     return steps, set()
 
 
-def _rejoined(first: View, steps: list[Step]) -> list[Step]:
+def rejoined(first: View, steps: list[Step]) -> list[Step]:
     """The heads of steps, joined one after another anew."""
     out: list[Step] = []
     for step in steps:

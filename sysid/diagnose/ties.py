@@ -14,10 +14,10 @@ import numpy as np
 from .. import blocks
 from ..candidates import columns_of
 from ..posed_problem import inverse
-from ..view import View
+from ..view import View, losses, taken
 from .evidence import Group
 from .projected import groups_at
-from .refits import COMPARED, Member, losses, refitted, taken, weighed
+from .refits import COMPARED, Member, refitted, weighed
 
 _OUTSIDE = 0.10  # a model is outside the set of 90 % where its p-value is below
 _UNEVEN = 0.35  # logarithm: two joints count half as much against each other, in power

@@ -10,7 +10,7 @@ from ..estimate import Fit
 from ..flexible import Law, Unknown
 from ..noise import DOUBT
 from ..transfer import Transfer
-from ..unexplained import by_weights, loudest, unexplained
+from ..unexplained import by_weights, explains, loudest, mostly_noise, unexplained
 from .claims import Claim
 from .select import LEVEL, WORTH
 
@@ -23,12 +23,12 @@ class Verdict:
 
     status: complete (nothing is left above the noise), missing (`claims`: what is claimed, first
     the first), explained (by the claims of other joints' equations), unknown (the motion predicts
-    what is left, and no effect does), unresolved (error stands above the floor, or the floor is not
-    known, and these logs do not say why). explained: share of the joint's misfit on the test logs
-    that all claims take, NaN where the misfit is not known. left: what functions of the motion
-    predict of the rest; None where nothing. says: why it is unresolved. may: the effect that may
-    be what is left. even: whether most of the rest is how the fit weighs its joints. carries: that
-    the training logs do not carry the model over to the test logs, where they do not.
+    what is left, or claims take the smaller part of it, and no effect does), unresolved (error
+    stands above the floor, or the floor is not known, and these logs do not say why). explained:
+    share of the joint's misfit on the test logs that all claims take, NaN where there is none.
+    left: what functions of the motion predict of the rest; None where nothing. says: why something
+    is left. may: the effect that may be it. even: whether most of the rest is how the fit weighs
+    its joints. carries: that the model does not carry over to the test logs, where it does not.
     """
 
     joint: str
@@ -76,8 +76,12 @@ def verdicts(
         own = tuple(c for c in taking if c.head.joint in (joint, "*") and falls)
         others = tuple(c for c in taking if c.head.joint not in (joint, "*"))
         first, then, floor = fit.rms("test")[joint], last.rms("test")[joint], floors[j].rms
-        misfit = first**2 - (floor if floor is not None else then) ** 2
-        explained = (first**2 - then**2) / misfit if misfit > 0 and claims else float("nan")
+        least = floor or floors[j].low or 0.0  # where it is not known, no less than this
+        told = [explains(fit.rms(p)[joint], last.rms(p)[joint], least) for p in ("train", "test")]
+        both = last.rms("train")[joint], then
+        # who takes the smaller part of it is no name for what is missing
+        whole = any(s > 0.5 for s in told) or any(mostly_noise(e, floors[j]) for e in both)
+        explained = told[1] if claims else float("nan")
         seen, among = left[j], sum(asked) if asked[j] else len(left)
         if law and asked[j] and then > 0.0 and not seen.predictable(among, WORTH):
             seen = seen.with_law(law(j))
@@ -85,12 +89,13 @@ def verdicts(
         looks = near(j, remains.share * remains.total) if near and remains else None
         reached = reaches[j] and first > 0.0 and not _above(remains, then, floor)
         taken = sum(c.step.shares[j] for c in own)
-        if own and (remains is None or remains.share * max(1.0 - taken, 0.0) <= _LEFT * taken):
+        little = remains is None or remains.share * max(1.0 - taken, 0.0) <= _LEFT * taken
+        if own and (whole or evens[j]) and little:
             told = ("missing", own, explained, remains)
         elif own or (remains is not None and not looks and not reached and not evens[j]):
-            told = ("unknown", own or others, explained, remains)
+            why = "" if remains else unexplained(both, floors[j])
+            told = ("unknown", own or others, explained, remains, why)
         elif not reached:
-            both = last.rms("train")[joint], then
             even = weighed[joint] if evens[j] else None
             effect, p = looks or (None, 1.0)
             may = effect if p > LEVEL else None  # what stands above the level was fitted, in vain

@@ -67,5 +67,5 @@ def _followed(fit: Fit, document: dict) -> list[dict]:
             ],
         }
         for found in document["verdict"]
-        if "depends_on" in found
+        if "share_left" in found
     ]

@@ -176,7 +176,7 @@ def _claim(head: dict, tied: list[dict], joint: str, several: bool) -> dict:
 
 def left_words(found: dict, fit: Fit) -> str:
     """How much of what is left the motion predicts, and which variables; empty where nothing."""
-    if "depends_on" not in found:
+    if "share_left" not in found:
         return ""
     alone = [
         f"{followed(d, lambda v: _named(v, fit))} {percentage(d['share'])}"

@@ -171,6 +171,8 @@ def _verdict(v: Verdict, path="config.yaml") -> dict:
         out["weighting"] = "noise"
     if v.left is not None:
         out |= {"depends_on": dependences(v.left), "share_left": v.left.share}
+    elif v.status == "unknown":
+        out["depends_on"] = []
     return out
 
 

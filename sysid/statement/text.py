@@ -84,7 +84,7 @@ def _joint(v: dict, of: Told, width: int, said: dict[str, str]) -> list[str]:
         ),
     }[status]()
     lines = wrapped(f"{joint}: {status}: {first}", width, "  ")
-    rest = wrapped(f"  {_left(v)}", width, "    ") if "depends_on" in v else []
+    rest = wrapped(f"  {_left(v)}", width, "    ") if "share_left" in v else []
     if status == "unknown":
         lines += rest
     for head in heads:

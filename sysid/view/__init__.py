@@ -1,6 +1,7 @@
 """What a diagnosis looks at: a model settled on the training motion, and its least squares."""
 
 from .design import Design, Sums, by_block, designed, instrumented, summed
+from .losses import losses, taken
 from .view import View, first_view, looked_at, too_short
 
 __all__ = [
@@ -12,6 +13,8 @@ __all__ = [
     "first_view",
     "instrumented",
     "looked_at",
+    "losses",
     "summed",
+    "taken",
     "too_short",
 ]

@@ -1,0 +1,37 @@
+"""What a model leaves of blocks of time that it was not fitted on, in units of how well it can tell
+them; what the angles' noise alone makes of that is taken off.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .. import blocks
+from .design import by_block
+from .view import View
+
+
+def losses(view: View, number: np.ndarray) -> np.ndarray:
+    """(blocks, dof) what a model leaves in each block `number` (n,), fitted on the other folds,
+    times what it leaves fitted on all, less what the angles' noise makes: the quadratic form of the
+    predictive density (Geisser & Eddy 1979), in which a fold that no other tells counts little.
+    """
+    design, spans = view.design, by_block(number)
+    fold = blocks.folds(len(spans))
+    out = np.zeros((len(spans), len(view.weights)))
+    for f in range(fold.max() + 1):
+        own = np.flatnonzero(fold == f)
+        rows = slice(spans[own[0]].start, spans[own[-1]].stop)
+        a, r = design.columns[:, rows], design.residual[rows]
+        pull = np.einsum("jnk,nj->k", a, r)
+        squares = np.einsum("jnk,jnl->kl", a, a, optimize=True)
+        change = np.linalg.lstsq(design.system - squares, pull, rcond=1e-10)[0]
+        told = (r + np.einsum("jnk,k->nj", a, change)) * r - design.rough_residual[rows] ** 2
+        out[own] = np.add.reduceat(told, [spans[b].start - rows.start for b in own])
+    return out
+
+
+def taken(view: View, before: np.ndarray, after: np.ndarray) -> np.ndarray:
+    """The share (dof,) of each joint's loss in a view that goes, of losses (blocks, dof)."""
+    whole = before.sum(0) + np.sum(view.design.rough_residual**2, axis=0)
+    return (before - after).sum(0) / np.maximum(whole, 1e-300)
