@@ -71,11 +71,10 @@ def verdicts(
     out = []
     for j, joint in enumerate(fit.joints):
         taking = [c for c in claims if c.head.joint == joint or c.step.shares[j] >= WORTH]
-        # what does not lower the joint's error on the test logs is no name for it
-        falls = last.rms("test")[joint] < fit.rms("test")[joint]
-        own = tuple(c for c in taking if c.head.joint in (joint, "*") and falls)
-        others = tuple(c for c in taking if c.head.joint not in (joint, "*"))
         first, then, floor = fit.rms("test")[joint], last.rms("test")[joint], floors[j].rms
+        # what does not lower the joint's error on the test logs is no name for it
+        own = tuple(c for c in taking if c.head.joint in (joint, "*") and then < first)
+        others = tuple(c for c in taking if c.head.joint not in (joint, "*"))
         least = floor or floors[j].low or 0.0  # where it is not known, no less than this
         told = [explains(fit.rms(p)[joint], last.rms(p)[joint], least) for p in ("train", "test")]
         both = last.rms("train")[joint], then
@@ -89,24 +88,25 @@ def verdicts(
         looks = near(j, remains.share * remains.total) if near and remains else None
         reached = reaches[j] and first > 0.0 and not _above(remains, then, floor)
         taken = sum(c.step.shares[j] for c in own)
+        even = evens[j] and floors[j].reached(weighed[joint])  # it explains all
         little = remains is None or remains.share * max(1.0 - taken, 0.0) <= _LEFT * taken
         if own and (whole or evens[j]) and little:
             told = ("missing", own, explained, remains)
-        elif own or (remains is not None and not looks and not reached and not evens[j]):
+        elif own or (remains is not None and not looks and not reached and not even):
             why = "" if remains else unexplained(both, floors[j])
             told = ("unknown", own or others, explained, remains, why)
         elif not reached:
-            even = weighed[joint] if evens[j] else None
+            without = weighed[joint] if evens[j] else None
             effect, p = looks or (None, 1.0)
             may = effect if p > LEVEL else None  # what stands above the level was fitted, in vain
-            why = unexplained(both, floors[j], effect, may, even, louder)
+            why = unexplained(both, floors[j], effect, may, without, louder)
             why += "".join(f"; {r.told}" for r in refused if r.joint in (joint, "*"))
             told = ("unresolved", others, explained, remains, why, may, evens[j])
         elif floors[j].reached(first) or not claims:
             told = ("complete",)
         else:
-            most = max(claims, key=lambda c, j=j: c.step.shares[j])
-            told = ("explained", others or (most,), explained)
+            most = others or (max(claims, key=lambda c, j=j: c.step.shares[j]),)
+            told = ("explained", most, explained)
         out.append(Verdict(joint, *told))
     said = {found.joint: found.says for found in carried}
     return [replace(one, carries=said.get(one.joint, "")) for one in out]
