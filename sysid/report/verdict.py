@@ -94,7 +94,7 @@ def _card(found: dict, fit: Fit, document: dict) -> dict:
     if status == "explained":
         names = [placed(c["effect"], c["joint"]) for c in found["by"]]
     fall = ""
-    if status in ("explained", "missing") or (status == "unresolved" and claims):
+    if status in ("explained", "missing") or heads or (status == "unresolved" and claims):
         fall = _fall(found, fit, document)
     several = len(claims) > 1
     says = found.get("says") or ""

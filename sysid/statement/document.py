@@ -145,11 +145,8 @@ def _verdict(v: Verdict, path="config.yaml") -> dict:
             "explained": number(v.explained),
         }
         also = [c.head.effect for c in v.claims[1:]]
-        out |= (
-            {**named, "also": also}
-            if v.status == "missing"
-            else {"also": [first.head.effect, *also]}
-        )
+        part = {"also": [first.head.effect, *also], "explained": named["explained"]}
+        out |= {**named, "also": also} if v.status == "missing" else part
         out["commands"] = [c.head.command for c in v.claims]
     elif v.status == "unknown":
         out["also"] = []

@@ -80,7 +80,7 @@ def _joint(v: dict, of: Told, width: int, said: dict[str, str]) -> list[str]:
         "missing": lambda: f"{named or v['effect']}; {_fall(v, of)}",
         "unknown": lambda: (
             "no effect of the catalogue explains what is left"
-            + (f"; part of it looks like {named}" if named else "")
+            + (f"; part of it looks like {named}; {_fall(v, of)}" if named else "")
         ),
     }[status]()
     lines = wrapped(f"{joint}: {status}: {first}", width, "  ")
