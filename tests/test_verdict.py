@@ -201,6 +201,14 @@ def test_what_only_the_weights_of_the_joints_leave_is_said_to_be_theirs(weighed,
     assert "weighting" not in verdicts(fit, (), [NOISE, NOISE], floors, weighed={"elbow": weighed})[1].says
 
 
+def test_what_is_left_with_other_weights_may_still_be_unknown():
+    """With `weighting: noise` the error would be 1.35 times the floor, and the motion predicts half of that."""
+    known = {"weighed": {"elbow": 1.35}}
+    assert verdicts(fitted(2.0), (), [NOISE, left(0.5)], [floor(), floor()], **known)[1].status == "unknown"
+    found = verdicts(fitted(2.0), (), [NOISE, NOISE], [floor(), floor()], **known)[1]
+    assert found.status == "unresolved" and "it would be 1.4 times the noise floor" in found.says
+
+
 def test_the_weights_do_what_the_verdict_says_of_them(tmp_path):
     """An elbow six times as quiet as the shoulder, in slow noise: what is said of its error holds when it is done."""
     experiment, machine = robots.experiment_of("planar", tmp_path)
