@@ -108,12 +108,13 @@ class Model(Terms):
         return part
 
     def _load(self, piece: Piece, rows: slice, part: Piece) -> np.ndarray:
-        """Load (n, dof) of rows of a piece, seen as `part`: that of the last bodies stays with the piece."""
-        key = ("load", rows.start, rows.stop, rows.step)
+        """Load (n, dof) of rows of a piece, seen as `part`: that of a slice for the last bodies stays with the piece."""
+        key = ("load", rows.start, rows.stop, rows.step) if isinstance(rows, slice) else None
         robot, bodies, load = piece.kept.get(key, (None, None, None))
         if robot is not self.robot or bodies is not self._bodies:
             load = regressor.torque(self.robot, self._bodies, part.q, part.qd, part.qdd)
-            piece.kept[key] = self.robot, self._bodies, load
+            if key is not None:
+                piece.kept[key] = self.robot, self._bodies, load
         return load
 
     def columns(self, piece: Piece, rows: slice, remembered: dict | None = None, *, keep: bool = False) -> list[np.ndarray]:

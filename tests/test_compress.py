@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sysid import prediction
+from sysid import prediction, vocabulary
 from sysid.compress import compress
 from sysid.model import chunks
 from sysid.triangles import merge
@@ -45,6 +45,23 @@ def test_residuals_of_any_parameters():
         scores = data.scores(x)
         gradient = 2 * np.einsum("jnk,jn->k", rows, residual)
         np.testing.assert_allclose(scores.sum(0), gradient, rtol=1e-9, atol=1e-9 * np.abs(gradient).max())
+
+
+def test_a_load_is_that_of_the_bodies_and_rows_that_are_asked():
+    """That of the last bodies stays with a piece: not for others, nor for rows by their numbers."""
+    _, structure, motion, *_ = arm()
+    (piece,) = motion.pieces
+    friction = vocabulary.find("load_friction").given().bound(structure.robot, 0)
+    light = structure.with_effect(friction, (0,))
+    heavy = light.with_reference(2.0 * structure.robot.prior)
+    rows = slice(10, 50, 3)
+    for model in (light, heavy, light):
+        fresh = model.columns(replace(piece), rows)
+        for kept in (model.columns(piece, rows), model.columns(piece, np.arange(50)[rows])):
+            for own, expected in zip(kept, fresh):
+                np.testing.assert_allclose(own, expected, rtol=1e-12)
+    own, twice = (model.columns(piece, rows)[0][-1] for model in (light, heavy))
+    np.testing.assert_allclose(twice, 2.0 * own, rtol=1e-12)
 
 
 def test_parts_merge_to_the_whole_and_blocks_leave_out():
