@@ -108,7 +108,7 @@ class Model(Terms):
         return part
 
     def _load(self, piece: Piece, rows: slice, part: Piece) -> np.ndarray:
-        """Load (n, dof) of rows of a piece, seen as `part`: that of a slice for the last bodies stays with the piece."""
+        """Load (n, dof) of rows of a piece, seen as `part`; the last of a slice is kept."""
         key = ("load", rows.start, rows.stop, rows.step) if isinstance(rows, slice) else None
         robot, bodies, load = piece.kept.get(key, (None, None, None))
         if robot is not self.robot or bodies is not self._bodies:
