@@ -48,15 +48,14 @@ def search(
     first = asked = ask(view, extra, lambda share: tell("ask", share))
     for _ in range(most):  # a step may go again: no more rounds than steps
         step = _next(view, asked, level, worth, open_)
-        pair = [step] if step else _pair(view, asked, level, worth, asked_with)
-        if not pair:
+        new = [step] if step else _pair(view, asked, level, worth, asked_with)
+        if not new:
             break
-        joined_ = [*steps, *pair] if step else rejoined(first_view, [*steps, *pair])
-        step, asked = joined_[-1], asked if step else None
+        joined_ = [*steps, *new]
         steps = revised(first_view, joined_, worth)
         view = steps[-1].after
-        kept = asked and [s.candidate for s in steps] == [s.candidate for s in joined_]
-        asked = asked_with(step, view, asked if kept else None)
+        kept = step and [s.candidate for s in steps] == [s.candidate for s in joined_]
+        asked = asked_with(new[-1], view, asked if kept else None)
     return steps, first, asked, open_
 
 
@@ -119,7 +118,7 @@ def _pair(view: View, asked: Asked, level: float, worth: float, asked_with) -> l
             (first,) = rejoined(view, [other])
             then = asked_with(first, first.after, asked)
             if last := _next(first.after, then, level, worth, []):
-                return sorted((first, last), key=lambda step: -step.choice.gain.sum())
+                return rejoined(view, sorted((first, last), key=lambda s: -s.choice.gain.sum()))
     return None
 
 

@@ -76,11 +76,11 @@ def verdicts(
         own = tuple(c for c in taking if c.head.joint in (joint, "*") and then < first)
         others = tuple(c for c in taking if c.head.joint not in (joint, "*"))
         least = floor or floors[j].low or 0.0  # where it is not known, no less than this
-        told = [explains(fit.rms(p)[joint], last.rms(p)[joint], least) for p in ("train", "test")]
-        both = last.rms("train")[joint], then
+        both = [e[joint] for e in errors]
+        shares = [explains(fit.rms(p)[joint], e, least) for p, e in zip(("train", "test"), both)]
         # who takes the smaller part of it is no name for what is missing
-        whole = any(s > 0.5 for s in told) or any(mostly_noise(e, floors[j]) for e in both)
-        explained = told[1] if claims else float("nan")
+        whole = any(s > 0.5 for s in shares) or any(mostly_noise(e, floors[j]) for e in both)
+        explained = shares[1] if claims else float("nan")
         seen, among = left[j], sum(asked) if asked[j] else len(left)
         if law and asked[j] and then > 0.0 and not seen.predictable(among, WORTH):
             seen = seen.with_law(law(j))
