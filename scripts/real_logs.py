@@ -110,8 +110,8 @@ def _verdict(v: dict) -> str:
         words += f", part of it `{'`, `'.join(v['also'])}`"
     if v["status"] == "explained":
         words += " by " + ", ".join(f"`{b['effect']}` on {b['joint']}" for b in v["by"])
-    if v["status"] == "unknown":
-        words += "; follows " + ", ".join(d["variable"] for d in v.get("depends_on", [])[:3])
+    if v["status"] == "unknown" and v.get("depends_on"):
+        words += "; follows " + ", ".join(d["variable"] for d in v["depends_on"][:3])
     return words
 
 

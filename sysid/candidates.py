@@ -43,6 +43,11 @@ class Candidate:
         """Its word and its joint: variants share it."""
         return self.effect.name, self.joint
 
+    @property
+    def kind(self) -> tuple:
+        """What it is, however many terms of the same sum it has."""
+        return *self.key, *(one for one in self.options if one[0] not in self.effect.nested)
+
     def told(self, joints: Sequence[str]) -> str:
         """Its word, and the name of its joint where it has one."""
         return self.name if self.joint == ROBOT else f"{self.name} on {joints[self.joint]}"
@@ -91,7 +96,7 @@ def candidates(model: Model, extra=()) -> list[Candidate]:
             if (effect.name, joint) in there:
                 out += _richer(model, effect.name, joint)
                 continue
-            for options in _variants(effect, robot, joint):
+            for options in effect.variants(robot, joint):
                 bound = effect.given(**options).bound(robot, joint)
                 out.append(Candidate(bound, joint, tuple(options.items())))
     return out
@@ -120,12 +125,6 @@ def _richer(model: Model, name: str, joint: int) -> list[Candidate]:
         for options, at in effect.richer(**{v.shape.name: at for v, at in own})
         if all(value >= low[name] for name, value in at.items())
     ]
-
-
-def _variants(effect: Effect, robot, joint: int) -> list[dict]:
-    if effect.name == "joint_coupling" and robot.dof < 2:
-        return []
-    return effect.variants(robot, joint)
 
 
 def own_effects(experiment: Experiment) -> list[Effect]:

@@ -35,6 +35,7 @@ class Effect(ABC):
 
     scope: "joint", or "robot" for an effect of the whole robot, whose joint is called `*`.
     options: {name: what it says} of the keys beside `joints` that an experiment file may give.
+    nested: options that say how many terms of the same sum there are.
     tied_with: words of the vocabulary that look alike; `separate_by`: the experiment that tells them apart; maneuvers: the kinds
         of `design.maneuvers` that show it, of those that the harmonics of a designed motion do badly.
     reach: samples on either side of a row that its columns look at; memory: they look back to the start of the log.
@@ -60,6 +61,7 @@ class Effect(ABC):
     source: ClassVar[str]
     scope: ClassVar[str] = "joint"
     options: ClassVar[dict[str, str]] = {}
+    nested: ClassVar[tuple[str, ...]] = ()
     reach: ClassVar[int] = 0
     memory: ClassVar[bool] = False
     group: ClassVar[str | None] = None

@@ -116,6 +116,11 @@ def loudest(errors: dict[str, float], floors, asked) -> str:
     return max(over, key=over.get, default="")
 
 
+def changed(share: float) -> str:
+    """A change as a share of what it was, in per cent with its sign."""
+    return f"{100 * share:+.0f} %" if abs(share) > 0.995 else f"{100 * share:+.2g} %"
+
+
 def nought(numbers: dict[str, tuple[float, float, str]]) -> bool:
     """Whether all of an effect's parameters {name: (value, std, unit)} that are determined are
     nothing beside their standard deviations, or none is determined."""

@@ -3,12 +3,14 @@
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pinocchio as pin
 import pytest
 
 from sysid import effect, regressor, robot, robot_spec, specs, vocabulary
+from sysid.candidates import candidates
 from sysid.errors import ConfigError
 from sysid.inertia import pseudo
 from sysid.motion import Piece
@@ -113,6 +115,18 @@ def test_a_ripple_that_is_there_may_have_more_lines():
     assert min(options["lines"] * at["k"] for options, at in found) == 14.0 and all(options["lines"] > 1 for options, _ in found)
     assert all(at["k"] >= 1.0 for _, at in vocabulary.find("cogging").richer(k=2.5))
     assert not vocabulary.find("cogging").given(lines=8).richer(k=14.0) and not vocabulary.find("spring").richer(q0=0.0)
+
+
+def test_sums_of_few_terms_and_of_many_are_one_kind_of_candidate():
+    machine, _ = arm_moving()
+    own = [c for c in candidates(SimpleNamespace(robot=machine, terms=())) if c.joint == 0]
+    kinds = {name: [c.kind for c in own if c.name == name] for name in ("position_friction", "cable", "elasticity")}
+    assert [len(set(kinds[name])) for name in kinds] == [2, 1, 2] and [len(kinds[name]) for name in kinds] == [4, 2, 2]
+    assert all(any(c.by_name for c in own if c.name == name) for name in kinds)
+    few = vocabulary.find("position_friction").given(times="speed", harmonics=1)
+    assert [options for options, _ in few.richer()] == [{"times": "speed", "harmonics": count} for count in (2, 3)]
+    assert vocabulary.find("cable").given(order=3).richer() == [({"order": 5}, {})]
+    assert vocabulary.find("cable").richer() == [] == vocabulary.find("position_friction").richer()
 
 
 @pytest.mark.parametrize("name", MOVERS + SENSORS)

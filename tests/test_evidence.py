@@ -192,6 +192,17 @@ def test_normal_scores_are_normal_quantiles_of_f_ratios(d1, d2):
     assert (np.diff(grid) > 0).all()
 
 
+@pytest.mark.parametrize("d1", [1.0, 2.0, 5.0])
+@pytest.mark.parametrize("d2", [3.0, 8.0, 60.0])
+def test_a_ratio_is_found_at_its_normal_score(d1, d2):
+    for score in (0.0, 0.7, 2.0, 2.6):
+        assert blocks.normal_scores(blocks.ratio_at(score, d1, d2), d1, d2) == pytest.approx(score, abs=1e-6)
+    most = blocks.normal_scores(1e15, d1, d2)
+    assert blocks.ratio_at(1.01 * most, d1, d2) == np.inf
+    assert blocks.ratio_at(-3.0, d1, d2) == blocks.ratio_at(0.0, d1, d2)
+    assert blocks.ratio_at(np.inf, d1, d2) == np.inf
+
+
 # ---- the noise of the angles
 
 

@@ -283,6 +283,24 @@ def test_a_ripple_of_several_lines_is_named_with_them(simulated, tmp_path):
         assert np.hypot(values[f"a{line}"], values[f"b{line}"]) == pytest.approx(truly, abs=0.1)
 
 
+@pytest.mark.parametrize("terms", [1, 3])
+def test_friction_of_the_angle_has_as_many_harmonics_as_it_shows(simulated, terms):
+    """By formulas of the simulator, not by the effect: one harmonic is named with one, whose coefficients are then numbers."""
+    size = [0.7, 0.0, 0.6][:terms]
+
+    def rubbing(q, qd, qdd, t, load, memory):
+        return np.array([0.0, np.tanh(qd[1] / 1e-3) * sum(a * np.sin(k * q[1]) for k, a in enumerate(size, 1))])
+
+    own = verdict(diagnose(pipeline.load(simulated(f"rubbing_{terms}", rubbing, seed=4, duration=14.0))), "elbow")
+    assert own.status == "missing" and {c.head.effect for c in own.claims} == {"position_friction"}
+    last = own.claims[-1].head
+    assert {"harmonics": 3, **dict(last.candidate.options)} == {"times": "direction", "harmonics": terms}
+    for k, truly in enumerate(size, 1):
+        for word, expected in (("a", 0.0), ("b", truly)):
+            value, std, _ = last.parameters[f"position_friction.elbow.{word}{k}"]
+            assert abs(value - expected) < 3.0 * std and (terms > 1 or std < 0.1), (word, k, value, std)
+
+
 def test_friction_that_falls_at_low_speed_only_is_no_warmth(simulated):
     """What a joint has beyond its friction while it breaks away, once, at the start: less at speed is no part of warmth."""
 

@@ -34,7 +34,7 @@ from .numbering import (
     summed,
 )
 from .parameters import covariance, widening
-from .redrawn import left_out, normal_scores, redrawn
+from .redrawn import left_out, normal_scores, ratio_at, redrawn
 from .rivals import SAME, chances, confidence_set, within_one_error
 
 __all__ = [
@@ -57,6 +57,7 @@ __all__ = [
     "memory",
     "normal_scores",
     "numbered",
+    "ratio_at",
     "redrawn",
     "resting",
     "shared",

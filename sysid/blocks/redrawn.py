@@ -39,3 +39,14 @@ def normal_scores(statistic, directions, rest) -> np.ndarray:
     one, two = 2.0 / (9.0 * directions), 2.0 / (9.0 * rest)
     root = np.cbrt(statistic)
     return ((1.0 - two) * root - (1.0 - one)) / np.sqrt(two * root**2 + one)
+
+
+def ratio_at(score: float, directions: float, rest: float) -> float:
+    """The F ratio whose normal score is `score`, or zero where that is less; infinity where none is
+    as much."""
+    score, one, two = max(score, 0.0), 2.0 / (9.0 * directions), 2.0 / (9.0 * rest)
+    lead, half = (1.0 - two) ** 2 - two * score**2, (1.0 - two) * (1.0 - one)
+    if not (score < np.inf and lead > 0.0):
+        return np.inf
+    left = max(half**2 - lead * ((1.0 - one) ** 2 - one * score**2), 0.0)
+    return float(((half + np.sqrt(left)) / lead) ** 3)

@@ -15,13 +15,13 @@ from .. import comparison, pipeline
 from ..addition import grown, spelled
 from ..estimate import Fit
 from ..experiment_logs import Read
-from ..unexplained import Refused, nought
+from ..unexplained import Refused, changed, nought
 from .findings import Finding, finding, judged_by, where
 from .refits import Member
 from .steps import Step
 from .ties import Choice
 
-_NOTHING = 5e-4  # of an error: a fall that four digits do not show
+_NOTHING = 5e-3  # of an error: a hundredth of its square, the least that is told in per cent
 _FITTED, _LIKELY = 3, 0.1  # members of a set that are fitted, and how likely; the rest is named
 
 
@@ -84,17 +84,18 @@ def _nothing(before: Fit, after: Fit, told: Fit, member: Member) -> str | None:
         return "the fit's own error does not fall with it"
     if where(member, before) == "*":
         change, unit = comparison.together(before, after), 1.0
-        rise = f"{100 * change.delta_rms:+.2g} % over all joints"
+        rise = f"{changed(change.delta_rms)} over all joints"
     else:
         changes = [comparison.compare(before, one) for one in (after, told)]
         change, shown = (next(d for d in one if d.joint == own[0]) for one in changes)
         unit = before.rms("test")[own[0]]
-        rise = f"{100 * max(change.delta_rms, 0.0) / max(unit, 1e-300):+.2g} %"
+        rise = changed(change.delta_rms / max(unit, 1e-300))
         still = any(-d.delta_rms < d.se for d in (change, shown))
         if still and nought(told.parameters_of(*member.candidate.key)):
             return "its size is nothing beside its deviation, and the test error hardly falls"
     if change.delta_rms > -_NOTHING * unit:
-        return f"with it the error on the test logs does not fall ({rise})"
+        falls = "hardly falls" if change.delta_rms < 0.0 else "does not fall"
+        return f"with it the error on the test logs {falls} ({rise})"
     # as the fit weighs them: it trades what a quiet joint loses for what a loud one gains
     if (paid := comparison.together(before, after, weighed=True)).delta_rms > paid.se:
         return "with it the test error of all joints together, as the fit weighs them, rises"

@@ -9,11 +9,12 @@ passes both in nine of ten logs.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cache, partial
 
 import numpy as np
 from scipy.special import ndtri
 
-from ..blocks import Belief, normal_scores
+from ..blocks import Belief, ratio_at
 from ..candidates import Candidate, at_start
 from ..model_parameters import ROBOT
 from ..view import View
@@ -42,11 +43,11 @@ def detectable(view: View, asked: Asked, candidates) -> list[Detectable]:
     """For every candidate's best set of shape values and variant."""
     threshold = float(np.quantile(asked.maxima, 1.0 - LEVEL)) if len(asked.groups) else np.inf
     loss = np.maximum(np.sum(view.design.residual**2, axis=0), 1e-300)
-    best: dict[tuple, Detectable] = {}
+    best, leading = dict[tuple, Detectable](), cache(partial(_leading, view))
     for candidate in candidates:
         # a force from outside has none until somebody says when it acts
         if candidate.parameters and not candidate.begins:
-            best.setdefault(candidate.key, Detectable(candidate, *_leading(view, candidate)))
+            best.setdefault(candidate.key, Detectable(candidate, *leading(candidate)))
     for group in asked.groups:
         size, begins = np.inf, at_start(group.candidate, group.shapes)
         # not of variants that its name alone does not add, nor of blows that do not strike yet
@@ -54,11 +55,11 @@ def detectable(view: View, asked: Asked, candidates) -> list[Detectable]:
             size = _size(group, threshold, loss, asked.belief)
         if group.candidate.nonlinear and not begins:
             # its torque is no multiple of another size's: this one is seen or it is not
-            own = group.shapes[_leading(view, group.candidate)[0]]
+            own = group.shapes[leading(group.candidate)[0]]
             size = own if size <= own else np.inf
         there = best.get(group.candidate.key)
         if there and np.isfinite(size) and (there.size is None or size < there.size):
-            name, unit = _leading(view, group.candidate)
+            name, unit = leading(group.candidate)
             at = {shape: own for shape, own in group.shapes.items() if shape != name}
             best[group.candidate.key] = Detectable(group.candidate, name, unit, size, POWER, at)
     return list(best.values())
@@ -79,11 +80,8 @@ def _size(group: Group, threshold: float, loss: np.ndarray, belief: Belief) -> f
     if not (group.sizes[0] > 0 and group.testable):
         return np.inf
     directions, (spread, rest) = group.freedom[0], belief.moderated(*group.spreads)
-    grid = np.geomspace(0.1, 1e4, 400)
-    passes = np.flatnonzero(normal_scores(grid, directions, rest) > threshold)
-    if not len(passes):
-        return np.inf  # it rests on too few blocks to stand out, whatever its size
-    needed = np.sqrt(grid[passes[0]] * spread)
+    # infinite where it rests on too few blocks to stand out, whatever its size
+    needed = np.sqrt(ratio_at(threshold, directions, rest) * spread)
     joints = slice(None) if group.candidate.joint == ROBOT else [group.candidate.joint]
     # what it takes, of the residual and of what it adds to it, must be worth having
     worth = np.sqrt(WORTH / (1.0 - WORTH) * loss[joints].min())

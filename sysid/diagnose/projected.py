@@ -81,7 +81,7 @@ def _made(view: View, asked, joints, plain: np.ndarray, rough: np.ndarray) -> li
     score = (score - (sums.scores - sums.rough_scores) @ absorbed).reshape(len(spans), count, k)
     prior = (sums.scores.sum(0) @ absorbed).reshape(count, k)
     # what stands across a candidate's columns and the model's, in each block and in the noise
-    pair = lambda a, b: np.einsum("...psk,...psl->...skl", a, b)  # noqa: E731
+    pair = lambda a, b: np.einsum("...psk,...psl->...skl", a, b, optimize=True)  # noqa: E731
     split = lambda a: a.reshape(*a.shape[:-1], count, k)  # noqa: E731
     by, mixed = split(absorbed), split(cross - sums.squares @ absorbed)
     squares = own - pair(split(cross), by) - pair(by, mixed)

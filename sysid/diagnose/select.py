@@ -15,7 +15,7 @@ import numpy as np
 from ..view import View
 from .ask import Asked, ask
 from .steps import Step, rejoined, revised, step_of
-from .ties import NEAR, Choice, alike, chosen
+from .ties import NEAR, Choice, alike, chosen, number_price
 
 LEVEL = 0.01  # family-wise: how often anything is accused where nothing is there
 WORTH = 0.03  # of a joint's squared residual under the low-pass: 1.5 % of its root mean square
@@ -93,11 +93,12 @@ def _rivals(view: View, asked: Asked, worth: float) -> dict[int, tuple[int, floa
     own: dict[tuple, list[int]] = {}
     for k in np.flatnonzero(~(asked.statistics <= _ALONE) & (asked.gains > 0)):
         if asked.groups[k].signed:
-            candidate = asked.groups[k].candidate
-            own.setdefault((*candidate.key, candidate.options), []).append(k)
+            own.setdefault(asked.groups[k].candidate.kind, []).append(k)
     loss, dof, out = np.sum(view.design.residual**2, axis=0), view.model.robot.dof, {}
     for ks in own.values():
-        k = max(ks, key=asked.gains.__getitem__)
+        # of those with more terms and with fewer, who takes most once its numbers are paid for
+        number = number_price(view, asked.groups[max(ks, key=asked.gains.__getitem__)])
+        k = max(ks, key=lambda k: asked.gains[k] - number * asked.groups[k].numbers)  # noqa: B023
         left = loss[asked.groups[k].candidate.touches(dof)]
         # else far from worth having, whatever a refit adds to it
         if asked.gains[k] >= 0.5 * worth * left.min():
@@ -124,6 +125,5 @@ def _pair(view: View, asked: Asked, level: float, worth: float, asked_with) -> l
 
 def _clearest(asked: Asked, some: list[int]) -> int:
     """Of groups of one candidate, the one that stands out most of those that take about as much."""
-    least = NEAR * asked.gains[some].max()
-    near = [k for k in some if asked.gains[k] >= least]
+    near = [k for k in some if asked.gains[k] >= NEAR * asked.gains[some].max()]
     return max(near, key=lambda k: np.nan_to_num(asked.statistics[k], nan=-np.inf))

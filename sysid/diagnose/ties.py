@@ -73,7 +73,8 @@ def chosen(view: View, groups: list[Group], rng: np.random.Generator) -> Choice 
     group = members[int(np.argmin(table.sum(0)))].group
     if view is not first:  # with these weights
         group = (groups_at(view, [(group.candidate, group.shapes)]) or [group])[0]
-    priced = table + _price(view, members, group)
+    numbers = np.array([member.group.numbers for member in members])
+    priced = table + numbers * number_price(view, group) / len(table)
     kept = _least(members, priced.sum(0))
     members, table, priced = [members[k] for k in kept], table[:, kept], priced[:, kept]
     p = blocks.confidence_set(table, rng)
@@ -113,8 +114,8 @@ def _even(view: View, members: list[Member]) -> tuple[View, list[Member]]:
     return view, [Member(group, found, losses(found, view.blocks)) for group, found in even]
 
 
-def _price(view: View, members: list[Member], group: Group) -> np.ndarray:
-    """(members,) what each member's numbers cost it in every block.
+def number_price(view: View, group: Group) -> float:
+    """What each number costs its member, of the loss of all blocks.
 
     Blocks held apart ask who predicts best, and what holds the truth and more predicts about as
     well as the truth. Who is the truth is another question: a number then costs the logarithm of
@@ -123,8 +124,7 @@ def _price(view: View, members: list[Member], group: Group) -> np.ndarray:
     1978).
     """
     values = 2.0 * view.cutoff * view.step * float(np.mean(view.rows.use.sum(0)))
-    one = np.sum(group.moves**2) / len(group.c) / len(group.scores)
-    return np.array([m.group.numbers for m in members]) * one * max(np.log(values) - 1.0, 0.0)
+    return np.sum(group.moves**2) / len(group.c) * max(np.log(values) - 1.0, 0.0)
 
 
 def _least(members: list[Member], lost: np.ndarray) -> list[int]:

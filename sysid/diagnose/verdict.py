@@ -23,7 +23,7 @@ class Verdict:
 
     status: complete (nothing is left above the noise), missing (`claims`: what is claimed, first
     the first), explained (by the claims of other joints' equations), unknown (the motion predicts
-    what is left, or claims take the smaller part of it, and no effect does), unresolved (error
+    what is left, or claims take less than 80 % of it, and no effect does), unresolved (error
     stands above the floor, or the floor is not known, and these logs do not say why). explained:
     share of the joint's misfit on the test logs that all claims take, NaN where there is none.
     left: what functions of the motion predict of the rest; None where nothing. says: why something
@@ -78,8 +78,9 @@ def verdicts(
         least = floor or floors[j].low or 0.0  # where it is not known, no less than this
         both = [e[joint] for e in errors]
         shares = [explains(fit.rms(p)[joint], e, least) for p, e in zip(("train", "test"), both)]
-        # who takes the smaller part of it is no name for what is missing
-        whole = any(s > 0.5 for s in shares) or any(mostly_noise(e, floors[j]) for e in both)
+        # who leaves more of it than that is no name for what is missing
+        whole = any((1.0 + _LEFT) * s >= 1.0 for s in shares)
+        whole |= any(mostly_noise(error, floors[j]) for error in both)
         explained = shares[1] if claims else float("nan")
         seen, among = left[j], sum(asked) if asked[j] else len(left)
         if law and asked[j] and then > 0.0 and not seen.predictable(among, WORTH):
@@ -100,7 +101,8 @@ def verdicts(
             effect, p = looks or (None, 1.0)
             may = effect if p > LEVEL else None  # what stands above the level was fitted, in vain
             why = unexplained(both, floors[j], effect, may, without, louder)
-            why += "".join(f"; {r.told}" for r in refused if r.joint in (joint, "*"))
+            said_of = {r.effect: f"; {r.told}" for r in refused if r.joint in (joint, "*")}
+            why += "".join(said_of.values())
             told = ("unresolved", others, explained, remains, why, may, evens[j])
         elif floors[j].reached(first) or not claims:
             told = ("complete",)

@@ -20,12 +20,20 @@ class Cable(TorqueEffect):
     elementwise = True
     options = {"order": "highest power of the angle, from 1 (default 5)"}
 
+    nested = ("order",)
+
     order = 5
 
     def given(self, **options):
         chosen = super().given(**options)
         whole(chosen, "order", 9)
         return chosen
+
+    def variants(self, robot, joint):
+        return [{"order": 3}, {}]
+
+    def richer(self, **shapes):
+        return [({"order": type(self).order}, {})] if self.order < type(self).order else []
 
     def coefficients(self):
         return tuple(called(Linear("N m", says=f"power {i} of the half turn"), f"c{i}") for i in range(1, self.order + 1))

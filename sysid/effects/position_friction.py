@@ -23,6 +23,8 @@ class PositionFriction(TorqueEffect):
         "harmonics": "how many k, from 1 (default 3)",
     }
 
+    nested = ("harmonics",)
+
     times = "direction"
     harmonics = 3
 
@@ -40,7 +42,12 @@ class PositionFriction(TorqueEffect):
         )
 
     def variants(self, robot, joint):
-        return [{"times": "direction"}, {"times": "speed"}]
+        # of a short travel several harmonics are nearly one curve, and their coefficients no numbers of its friction
+        return [{"times": times, **few} for few in ({"harmonics": 1}, {}) for times in ("direction", "speed")]
+
+    def richer(self, **shapes):
+        own = type(self).harmonics
+        return [({"times": self.times, "harmonics": count}, {}) for count in range(self.harmonics + 1, own + 1)]
 
     def columns(self, motion, joint):
         weight = motion.direction(joint) if self.times == "direction" else motion.qd[:, joint]

@@ -37,7 +37,7 @@ def of_angles(logs: Sequence[Sequence[Log]], spec, fit: Fit) -> OfAngles:
     """
     rng, out, bands = np.random.default_rng(0), [], []
     for part in logs:
-        cutoff = widest(part)
+        cutoff = widest(part, known=(own_band := band(part)))
         drawn = lambda s: again(s, angle_noise(s, cutoff), cutoff, rng)  # noqa: E731, B023
         noisy = [replace(log, segments=tuple(map(drawn, log.segments))) for log in part]
         motions = plain, _ = [prepare(own, spec, fit.joints) for own in (part, noisy)]
@@ -46,5 +46,5 @@ def of_angles(logs: Sequence[Sequence[Log]], spec, fit: Fit) -> OfAngles:
         # a clock that is late shifts the measured torque as well
         error = [one.predicted - one.measured for one in told]
         out += np.split(error[1] - error[0], ends)
-        bands.append(band(part))
+        bands.append(own_band)
     return OfAngles(out, max(bands))

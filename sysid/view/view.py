@@ -13,7 +13,7 @@ from .. import blocks, experiment_logs, flexible
 from .. import rows as row
 from ..errors import LogError
 from ..estimate import Fit
-from ..lowpass import again, calm, lowpassed, narrowed, stride_of, widest
+from ..lowpass import again, band, calm, lowpassed, narrowed, stride_of, widest
 from ..model import Model
 from ..motion import Motion
 from ..posed_problem import inverse
@@ -200,15 +200,15 @@ def first_view(experiment: Experiment, fit: Fit, logs=None) -> View:
     experiment = with_weight(experiment, USUAL) if fit.strength.auto else experiment
     if logs is None:
         logs = experiment_logs.read(experiment, fit.model.robot, experiment.data.train)
-    cutoff = widest(logs)
-    view = _under(experiment, fit, logs, cutoff)
+    cutoff = widest(logs, known=(own_band := band(logs)))
+    view = _under(experiment, fit, logs, cutoff, own_band)
     if view is None:
         raise too_short()
     rough, residual = view.design.rough_residual, view.design.residual
     # in the middle of the rows: about reversals, and where something is missing, there is more
     share = _middle(rough, view.rows.use) / np.maximum(_middle(residual, view.rows.use), 1e-300)
     lower = narrowed(cutoff, float(np.median(share)))
-    narrow = None if lower > 0.9 * cutoff else _under(experiment, fit, logs, lower)
+    narrow = None if lower > 0.9 * cutoff else _under(experiment, fit, logs, lower, own_band)
     return view if narrow is None else narrow  # of short logs a narrow low-pass leaves nothing
 
 
@@ -216,14 +216,14 @@ def _middle(values, use) -> np.ndarray:
     return np.array([np.median(v[u] ** 2) if u.any() else 1.0 for v, u in zip(values.T, use.T)])
 
 
-def _under(experiment: Experiment, fit: Fit, logs, cutoff: float) -> View | None:
-    motion = lowpassed(logs, fit.joints, cutoff)
+def _under(experiment: Experiment, fit: Fit, logs, cutoff: float, own: float) -> View | None:
+    motion = lowpassed(logs, fit.joints, cutoff, known=own)
     if motion is None or motion.samples < 50:
         return None
     rng, noise = np.random.default_rng(0), np.max([piece.noise for piece in motion.pieces], axis=0)
     drawn = lambda s: again(s, noise, cutoff, rng)  # noqa: E731
     noisy = [replace(log, segments=tuple(map(drawn, log.segments))) for log in logs]
-    rough = lowpassed(noisy, fit.joints, cutoff)
+    rough = lowpassed(noisy, fit.joints, cutoff, known=own)
     stride = stride_of(motion, cutoff)
     return looked_at(experiment, fit.model, motion, rough, fit.prior, stride=stride)
 
