@@ -5,13 +5,14 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 from scipy.signal import lfilter
 from scipy.stats import binom
 
 from sysid import blocks
 from sysid.diagnose.functions import law
 from sysid.diagnose.select import LEVEL, WORTH
-from sysid.flexible import Law, Unknown, products, unknown
+from sysid.flexible import Law, Unknown, pasts, products, unknown
 from sysid.statement.document import dependences
 from sysid.statement.words import followed, quantity
 from tests.evidences import viewed
@@ -172,6 +173,78 @@ def test_products_are_functions_of_unit_size_on_rows_that_count():
     np.testing.assert_allclose(np.mean(values**2, axis=0), 1.0, rtol=1e-9)
     variables = {"time", "its past", *(f"{kind}_{joint}" for kind in ("q", "qd", "qdd", "load") for joint in ("shoulder", "elbow"))}
     assert {one for word in words for one in word.split(" and ")} == variables - {"load_shoulder"}
+
+
+# ---- what the motion was
+
+
+def loose_load(known):
+    """What a load that swings at 2 Hz behind the elbow's link needs, by an integrator of steps that it chooses itself."""
+    omega, damping, t = 4.0 * np.pi, 0.15, known["time"]
+    push = lambda at: np.interp(at, t, known["qdd_elbow"])  # noqa: E731
+    behind = solve_ivp(
+        lambda at, y: [y[1], -push(at) - omega**2 * y[0] - 2.0 * damping * omega * y[1]], (0.0, t[-1]), [0.0, 0.0], t_eval=t, rtol=1e-6, max_step=STEP
+    )  # fmt: skip
+    return known["qdd_elbow"] + np.gradient(behind.y[1], STEP)
+
+
+def dragged_load(known):
+    """A hysteresis of the load: what stays where the last turn of it left it."""
+    load, place = known["load_elbow"], [known["load_elbow"][0]]
+    width = 0.1 * np.ptp(load)
+    for value in load[1:]:
+        place.append(min(max(place[-1], value - width), value + width))
+    return load - np.array(place)
+
+
+PASTS = {
+    "a load that swings": (loose_load, "qdd_elbow and its past"),
+    "a hysteresis of the load": (dragged_load, "load_elbow and its past"),
+    "warmth": (lambda v: lfilter([STEP / 0.8], [1.0, STEP / 0.8 - 1.0], np.abs(v["load_elbow"])), "load_elbow and its past"),
+}
+
+
+@pytest.mark.parametrize("name", PASTS)
+def test_what_the_motion_was_stands_out(name):
+    own, variable = PASTS[name]
+    held = np.column_stack([KNOWN["qdd_elbow"], np.ones(N)])  # bodies and a bias, which the model has
+    own = own(KNOWN) - held @ np.linalg.lstsq(held, own(KNOWN), rcond=None)[0]
+    found = law(left_by(own / np.std(own) + 1.5 * coloured(3), columns=held), 1)
+    assert found.chance < 5e-3 and found.variables == variable and found.gain > 0.4 * N
+
+
+def test_a_dragged_place_stands_until_the_width_is_taken_up():
+    values = np.concatenate([np.linspace(0.0, 1.0, 50), np.linspace(1.0, 0.0, 50)])
+    (place,) = pasts.dragged(values, np.array([0.2]))
+    assert (np.abs(values - place) <= 0.2 + 1e-12).all() and place[:9] == pytest.approx(0.0, abs=0.02)
+    assert place[49] == pytest.approx(0.8) == place[55] and place[-1] == pytest.approx(0.2)
+
+
+def test_pasts_are_those_of_their_closed_forms():
+    late = pasts.fading(np.ones(400), STEP)
+    for own, span in zip(late, (0.1, 0.3, 1.0, 3.0)):
+        np.testing.assert_allclose(own, 1.0 - np.exp(-STEP * np.arange(1, 401) / span), rtol=1e-9)
+    t = STEP * np.arange(3000)
+    for own, hertz in zip(pasts.swinging(np.sin(0.4 * np.pi * t), STEP), (1.0, 2.0, 4.0, 8.0)):
+        slow = 1.0 / (1.0 - (0.2 / hertz) ** 2)  # far below its own frequency it follows
+        assert np.abs(own[1500:]).max() == pytest.approx(slow, rel=0.02)
+    swung = pasts.swinging(np.sin(4.0 * np.pi * t), STEP)[1]
+    assert np.abs(swung[1500:]).max() == pytest.approx(np.hypot(1.0, 0.3) / 0.3, rel=0.1)  # at it
+    turned = pasts.turned(np.stack([np.sin(t), np.cos(t)]), STEP)
+    age = np.where(t < 0.5 * np.pi, t, (t - 0.5 * np.pi) % np.pi)
+    np.testing.assert_allclose(turned[1][t > 1.6], np.exp(-age / 0.2)[t > 1.6], atol=0.06)
+    assert not turned[:, t < 1.5].any()
+    np.testing.assert_allclose(turned[3][t > 1.6], (np.sin(t) - np.sin(t - age))[t > 1.6], atol=0.02)
+
+
+def test_every_piece_has_a_past_of_its_own():
+    half = {name: values[: N // 2] for name, values in KNOWN.items()}
+    twice = {name: np.concatenate([values, values]) for name, values in half.items()}
+    number = np.repeat([0, 1], N // 2)
+    found = list(pasts.pasts(twice, "elbow", number, STEP))
+    for (word, own), (same, alone) in zip(found, pasts.pasts(half, "elbow", number[: N // 2], STEP)):
+        assert word == same and word.endswith("and its past")
+        np.testing.assert_allclose(own, np.concatenate([alone, alone]), atol=1e-12)
 
 
 def test_a_joint_that_stands_has_no_products_of_its_own():

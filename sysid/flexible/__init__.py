@@ -5,8 +5,8 @@ signs, what the load and the speed were a while ago, and random cosines of pairs
 together one group, held small by a ridge that blocks held apart choose.
 
 The functions (`functions`), what they predict of what they were not fitted on (`ridge`), the
-products of two that are asked one by one, as every effect is (`products`), and what is said of it
-(`unknown`).
+products of two and the functions of what the motion was (`pasts`) that are asked one by one, as
+every effect is (`products`), and what is said of it (`unknown`).
 
 Source: Rahimi & Recht 2007 (random features); Hoerl & Kennard 1970 (ridge).
 """

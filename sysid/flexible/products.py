@@ -8,6 +8,7 @@ from itertools import islice
 import numpy as np
 
 from .functions import of_unit_size, remembered
+from .pasts import pasts
 
 _OWN, _OTHER = 6, 2  # half waves over an angle's travel: of the joint's own, and of another's
 _SLOW = 0.3  # of the root mean square of a speed
@@ -57,6 +58,7 @@ def _all(known, joint: str, piece, step: float) -> Iterator[Factor]:
     speed = known[f"qd_{joint}"]
     past = remembered([speed, np.sign(speed), np.abs(speed)], piece, step)
     yield from ((f"qd_{joint} and its past", one) for one in past.T)
+    yield from pasts(known, joint, piece, step)
 
 
 def _product(first: Factor, second: Factor) -> Factor:
