@@ -101,7 +101,7 @@ def verdicts(
             effect, p = looks or (None, 1.0)
             may = effect if p > LEVEL else None  # what stands above the level was fitted, in vain
             why = unexplained(both, floors[j], effect, may, without, louder)
-            said_of = {r.effect: f"; {r.told}" for r in refused if r.joint in (joint, "*")}
+            said_of = {r.effect: f"; {r.told}" for r in refused if r.joint == joint}
             why += "".join(said_of.values())
             told = ("unresolved", others, explained, remains, why, may, evens[j])
         elif floors[j].reached(first) or not claims:
