@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import pytest
 
 from sysid.statement import sizes, tables, text
+from sysid.statement.words import untold
 from sysid.terminal.diagnosis import show_diagnosis
 from sysid.terminal.steps import show_discovery
 
@@ -303,6 +304,15 @@ def test_tables_say_what_is_not_known():
 )
 def test_shares_are_not_rounded_to_nothing_or_all(share, words):
     assert text.percent(share) == words
+
+
+@pytest.mark.parametrize(
+    ("stds", "words"),
+    [((0.5, None), "and these logs tell its size badly"), ((None,), "its size badly"), ((None, None), "do together, and none of them alone")],
+)  # fmt: skip
+def test_what_is_there_and_has_no_numbers_is_said(stds, words):
+    parameters = {f"position_friction.rail.a{k}": {"value": -2.5e6, "std": std, "unit": "N"} for k, std in enumerate(stds)}
+    assert untold(parameters).endswith(words) and untold(parameters).startswith("the held-out error says that it is there")
 
 
 def test_a_discovery_ends_with_the_verdict_and_what_was_refused(monkeypatch, capsys):

@@ -6,7 +6,7 @@ from ..addition import LIKELY, apart, designs, likely
 from ..estimate import Fit
 from ..given_shapes import given_shapes, said_of_shapes
 from ..statement import text
-from ..statement.words import followed, percent
+from ..statement.words import followed, percent, untold
 from .section import Section
 from .words import (
     SPACE,
@@ -163,7 +163,7 @@ def _claim(head: dict, tied: list[dict], joint: str, several: bool) -> dict:
         "effect": head["effect"],
         "figures": ": ".join(part for part in (takes, ", ".join(values)) if part),
         "options": [f"{n} {v}: {head['options_say'][n]}" for n, v in head["options"].items()],
-        "untold": "" if head["size_told"] else _first(text.UNTOLD),
+        "untold": "" if head["size_told"] else _first(untold(head["parameters"])),
         "summary": summary,
         "from": _first(text.untold_from(head["probability"])).replace(" %", f"{SPACE}%"),
         "others": [f"{placed(e, j, head['joint'])}{SPACE}({chance(p)})" for e, j, p in told],

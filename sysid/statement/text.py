@@ -6,14 +6,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from ..addition import LIKELY, designs, likely
-from .words import followed, listed, percent, placed, quantity, valued, wrapped
+from .words import followed, listed, percent, placed, quantity, untold, valued, wrapped
 
 if TYPE_CHECKING:
     from ..diagnose.diagnosis import Diagnosis
 
 ANOTHER = "a motion that tells most of what these logs leave open"
 TRIED = "to try it, and see the held-out error before and after"
-UNTOLD = "the held-out error says that it is there, and these logs tell its size badly"
 OWN = "a law of your own can be tried: `sysid effects formula`"
 _SURE = 0.9  # the set holds the truth so often
 _TOGETHER = "several variables together"
@@ -162,7 +161,7 @@ def _head(f: dict, of: Told, joint: str, width: int, said: dict[str, str]) -> li
     for name, value in f["options"].items():
         out += wrapped(f"  {name} {value}: {f['options_say'][name]}", width, "    ")
     if not f["size_told"]:
-        out += wrapped(f"  {UNTOLD}", width, "    ")
+        out += wrapped(f"  {untold(f['parameters'])}", width, "    ")
     others = [m for m in of.sets[f["command"]] if m[:2] != (f["effect"], f["joint"])]
     if told := likely(others):
         rest = listed([f"{placed(e, j, f['joint'])} ({percent(p)})" for e, j, p in told], "or")

@@ -27,6 +27,15 @@ def valued(name: str, p: dict) -> str:
     return f"{name} = {p['value']:.4g}{std}{unit}"
 
 
+def untold(parameters: dict[str, dict]) -> str:
+    """What is said of an effect that is there and whose parameters {name: {value, std, unit}} are
+    nothing beside their deviations, or of which none is known."""
+    words = "the held-out error says that it is there, and these logs tell "
+    if len(parameters) > 1 and all(p["std"] is None for p in parameters.values()):
+        return words + "what its coefficients do together, and none of them alone"
+    return words + "its size badly"
+
+
 def placed(effect: str, joint: str, here: str = "") -> str:
     """An effect with its joint, where that is not `here`."""
     return (
