@@ -15,10 +15,12 @@ from .experiment_logs import Read
 from .experiment_logs import read as read_logs
 from .log import Log
 from .notices import noticed
-from .spans import Spans
+from .spans import SPAN, Spans
 from .specs import Experiment
 
-MOST = 2**20  # rows of the training logs, and of the test logs; at 1 kHz, 17 minutes
+# rows of the training logs, and of the test logs: four minutes at 1 kHz, of which a low-pass leaves
+# more rows than are asked; what memory a diagnosis takes does not grow beyond
+MOST = SPAN
 
 
 def read(experiment: Experiment) -> tuple[Read, Read | None]:
