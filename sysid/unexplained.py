@@ -118,7 +118,8 @@ def loudest(errors: dict[str, float], floors, asked) -> str:
 
 def changed(share: float) -> str:
     """A change as a share of what it was, in per cent with its sign."""
-    return f"{100 * share:+.0f} %" if abs(share) > 0.995 else f"{100 * share:+.2g} %"
+    percent = round(100.0 * share, 2) + 0.0  # no zero has a sign of its own
+    return f"{percent:+.0f} %" if abs(percent) > 99.5 else f"{percent:+.2g} %"
 
 
 def nought(numbers: dict[str, tuple[float, float, str]]) -> bool:

@@ -26,6 +26,7 @@ from sysid.noise import NoiseFloor
 from sysid.simulate import simulate, write
 from sysid.statement.document import _verdict, dependences
 from sysid.transfer import Transfer
+from sysid.unexplained import changed
 from sysid.view import first_view
 
 # ---- verdicts, by hand
@@ -82,6 +83,13 @@ def test_what_is_nothing_in_size_and_error_is_not_claimed(monkeypatch, fall, tol
     shown.parameters_of = lambda effect, joint: {"T": (size, 0.1, "s"), "k": (3.0, float("nan"), "1")}
     member = SimpleNamespace(candidate=SimpleNamespace(joint=1, key=("delay", 1)))
     assert (claims._nothing(fitted(1.0, train=1.0), after, shown, member) is None) is stands
+
+
+@pytest.mark.parametrize(
+    ("share", "words"), [(-2.6e-15, "+0 %"), (-0.0023, "-0.23 %"), (0.23, "+23 %"), (0.9949, "+99 %"), (1.0, "+100 %"), (11.8, "+1180 %"), (-1e-7, "+0 %")]
+)  # fmt: skip
+def test_a_change_is_told_in_per_cent(share, words):
+    assert changed(share) == words
 
 
 @pytest.mark.parametrize("error", [1.0, 1.3])
