@@ -13,7 +13,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import lsq_linear
 
 from . import multistart
 from . import rows as row
@@ -219,6 +218,8 @@ def _descended(best: Settled, motion: Motion, solved, weights, tolerance: float)
 
 def _damped(system, right, damping: float, low, high) -> np.ndarray:
     """The step of normal equations with their diagonal enlarged, within bounds."""
+    from scipy.optimize import lsq_linear  # its import takes as long as a small fit
+
     diagonal = np.diagonal(system)
     sizes, axes = np.linalg.eigh(system + damping * np.diag(np.where(diagonal > 0, diagonal, 1.0)))
     roots = np.sqrt(np.maximum(sizes, _ROUNDING * max(sizes[-1], _ROUNDING)))

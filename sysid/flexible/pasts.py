@@ -12,7 +12,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from scipy.signal import bilinear, lfilter
 
 _WIDTHS = (0.05, 0.15, 0.4)  # of a signal's range
 _SPANS = (0.1, 0.3, 1.0, 3.0)  # s
@@ -66,6 +65,8 @@ def dragged(values: np.ndarray, widths: np.ndarray) -> np.ndarray:
 
 def fading(values: np.ndarray, step: float) -> np.ndarray:
     """A signal (n,) behind lags of several spans (spans, n), at rest before it began."""
+    from scipy.signal import lfilter  # takes long to import, and is seldom asked for
+
     keep = np.exp(-step / np.array(_SPANS))
     return np.stack([lfilter([1.0 - a], [1.0, -a], values) for a in keep])
 
@@ -73,6 +74,8 @@ def fading(values: np.ndarray, step: float) -> np.ndarray:
 def swinging(push: np.ndarray, step: float) -> np.ndarray:
     """The accelerations (swings, n) of what a spring and a damper hold on a joint whose own (n,) is
     given."""
+    from scipy.signal import bilinear, lfilter
+
     out = []
     for omega in 2.0 * np.pi * np.array(_SWINGS):
         if omega * step < 0.5 * np.pi:  # four samples a swing
