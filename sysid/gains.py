@@ -19,7 +19,7 @@ import numpy as np
 from . import listed_effects, motor_side, rows
 from . import log as logs
 from .drive_spec import ActuatorSpec, FreeFactor
-from .lowpass import lowpassed, stride_of, widest
+from .lowpass import band, lowpassed, stride_of, widest
 from .motion import Motion
 from .robot import Robot
 from .segment import Segment
@@ -102,7 +102,8 @@ def _command(spec: ActuatorSpec) -> ActuatorSpec:
 def _seen(machine: Robot, read: list[logs.Log], drives: dict[str, ActuatorSpec]) -> Motion | None:
     """The training motion under one low-pass, each drive's torque per unit of its factor."""
     read = [replace(log, segments=tuple(_driven(machine, segment, drives) for segment in log.segments)) for log in read]
-    return lowpassed(read, machine.joints, widest(read))
+    cutoff = widest(read, known=(own_band := band(read)))
+    return lowpassed(read, machine.joints, cutoff, known=own_band)
 
 
 def _driven(machine: Robot, segment: Segment, drives: dict[str, ActuatorSpec]) -> Segment:

@@ -14,7 +14,7 @@ from ..errors import SysidError
 from ..estimate import Fit
 from ..listed_effects import build, found
 from ..log_spec import LogSpec
-from ..lowpass import lowpassed, stride_of, widest
+from ..lowpass import band, lowpassed, stride_of, widest
 from ..model import Model
 from ..motion import Motion
 from ..notices import noticed
@@ -85,8 +85,8 @@ class Look:
         """The training motion under a low-pass, with the columns of rigid bodies and of what any
         joint has; None where the logs are too short."""
         train = [log.log for log in self.part("train")]
-        cutoff = widest(train)
-        motion = lowpassed(train, self.robot.joints, cutoff)
+        cutoff = widest(train, known=(own_band := band(train)))
+        motion = lowpassed(train, self.robot.joints, cutoff, known=own_band)
         if motion is None or motion.samples < FEWEST:
             return None
         model, stride = self._plain, stride_of(motion, cutoff)

@@ -125,5 +125,5 @@ def _pair(view: View, asked: Asked, level: float, worth: float, asked_with) -> l
 
 def _clearest(asked: Asked, some: list[int]) -> int:
     """Of groups of one candidate, the one that stands out most of those that take about as much."""
-    near = [k for k in some if asked.gains[k] >= NEAR * asked.gains[some].max()]
+    near = np.array(some)[asked.gains[some] >= NEAR * asked.gains[some].max()]
     return max(near, key=lambda k: np.nan_to_num(asked.statistics[k], nan=-np.inf))

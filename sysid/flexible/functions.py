@@ -84,16 +84,15 @@ def _splines(name: str, values: np.ndarray) -> np.ndarray:
 def remembered(signals, piece, step: float) -> np.ndarray:
     """Signals (n,) each as they were a while ago (n, signals x memories), by first-order lags
     within each piece."""
-    pieces = [piece == number for number in np.unique(piece)]
-    out = []
-    for values in signals:
-        for span in _MEMORIES:
-            weights = np.exp(-np.arange(0.0, 5.0 * span, step) / span)
-            late = np.zeros(len(values))
-            for own in pieces:
-                late[own] = np.convolve(values[own], weights / weights.sum())[: own.sum()]
-            out.append(late)
-    return np.column_stack(out)
+    kernels = [np.exp(-np.arange(0.0, 5.0 * span, step) / span) for span in _MEMORIES]
+    late = lambda own, kernel: np.convolve(own, kernel / kernel.sum())[: len(own)]  # noqa: E731
+    return np.column_stack([by_piece(piece, late, s, k) for s in signals for k in kernels])
+
+
+def by_piece(piece, law, values: np.ndarray, *how) -> np.ndarray:
+    """A law (..., n) of signals (..., n), of each piece (n,), ascending, by itself."""
+    cuts = np.flatnonzero(np.diff(piece)) + 1
+    return np.concatenate([law(own, *how) for own in np.split(values, cuts, axis=-1)], axis=-1)
 
 
 def _waves(known: dict, own: str, rng: np.random.Generator) -> np.ndarray:

@@ -13,6 +13,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from .functions import by_piece, remembered
+
 _WIDTHS = (0.05, 0.15, 0.4)  # of a signal's range
 _SPANS = (0.1, 0.3, 1.0, 3.0)  # s
 _SWINGS = (1.0, 2.0, 4.0, 8.0)  # Hz
@@ -27,30 +29,26 @@ def pasts(known: dict[str, np.ndarray], joint: str, piece, step: float) -> Itera
         known, piece, step: as of `functions.groups`.
     """
     angle, speed, push, load = (known[f"{k}_{joint}"] for k in ("q", "qd", "qdd", "load"))
+    for late in remembered([speed, np.sign(speed), np.abs(speed)], piece, step).T:
+        yield _past(f"qd_{joint}"), late
     of = {f"q_{joint}": angle, f"load_{joint}": load}
     for name, values in of.items():
         widths = 0.5 * np.ptp(values) * np.array(_WIDTHS)
-        for places in _each(piece, dragged, values, widths):
+        for places in by_piece(piece, dragged, values, widths):
             yield _past(name), places
             yield _past(name), values - places
     sizes = ((f"load_{joint}", np.abs(load)), (f"qd_{joint}", np.abs(speed)))
     for name, values in (*of.items(), *sizes, (f"load_{joint}", load * speed)):
-        for late in _each(piece, fading, values - values.mean(), step):
+        for late in by_piece(piece, fading, values - values.mean(), step):
             yield _past(name), late
-    for swing in _each(piece, swinging, push, step):
+    for swing in by_piece(piece, swinging, push, step):
         yield _past(f"qdd_{joint}"), swing
-    for own in _each(piece, turned, np.stack([angle, speed]), step):
+    for own in by_piece(piece, turned, np.stack([angle, speed]), step):
         yield _past(f"qd_{joint}"), own
 
 
 def _past(name: str) -> str:
     return f"{name} and its past"
-
-
-def _each(piece, law, values: np.ndarray, *how) -> np.ndarray:
-    """A law (k, n) of signals (..., n), of each piece by itself."""
-    cuts = np.flatnonzero(np.diff(piece)) + 1
-    return np.concatenate([law(own, *how) for own in np.split(values, cuts, axis=-1)], axis=-1)
 
 
 def dragged(values: np.ndarray, widths: np.ndarray) -> np.ndarray:
@@ -82,7 +80,7 @@ def swinging(push: np.ndarray, step: float) -> np.ndarray:
             drag = 2.0 * _DAMPING * omega
             law = bilinear([drag, omega**2], [1.0, drag, omega**2], fs=1.0 / step)
             out.append(lfilter(*law, push))
-    return np.stack(out) if out else np.zeros((0, len(push)))
+    return np.array(out).reshape(-1, len(push))
 
 
 def turned(motion: np.ndarray, step: float) -> np.ndarray:

@@ -7,7 +7,7 @@ from itertools import islice
 
 import numpy as np
 
-from .functions import of_unit_size, remembered
+from .functions import of_unit_size
 from .pasts import pasts
 
 _OWN, _OTHER = 6, 2  # half waves over an angle's travel: of the joint's own, and of another's
@@ -55,9 +55,6 @@ def _all(known, joint: str, piece, step: float) -> Iterator[Factor]:
                 continue
             yield second
             yield from (_product(first, second) for first in few)
-    speed = known[f"qd_{joint}"]
-    past = remembered([speed, np.sign(speed), np.abs(speed)], piece, step)
-    yield from ((f"qd_{joint} and its past", one) for one in past.T)
     yield from pasts(known, joint, piece, step)
 
 
