@@ -151,6 +151,10 @@ class TorqueEffect(Effect):
             shapes: its shape values by name.
         """
 
+    def columns_at(self, motion: Piece, joint: int, tried: list[dict[str, float]]) -> list[np.ndarray]:
+        """`columns` at several sets of shape values."""
+        return [self.columns(motion, joint, **shapes) for shapes in tried]
+
 
 class WrenchEffect(Effect):
     """An effect that adds torque to several joints at once."""

@@ -58,6 +58,11 @@ class _AddsTorque(AtLevel):
         rows = (len(self.coefficients()), len(motion.t))
         return np.zeros((where.dof, *rows) if isinstance(self, WrenchEffect) else rows)
 
+    def columns_at(self, motion, joint, tried):
+        if self.present(motion):
+            return super().columns_at(motion, joint, tried)
+        return [self.columns(motion, joint, **shapes) for shapes in tried]
+
 
 class _Moves(AtLevel):
     def moved(self, motion, joint, **how):

@@ -213,7 +213,7 @@ def signatures(model: Model, motion: Motion, pieces: list, effect, joint: int, t
     out = []
     for piece, part, rows in zip(motion.pieces, pieces, starts(motion, stride)):
         # (joints, tried k, n): everything that follows is linear and the same for each
-        values = [effect.columns(part, model.robot if joint < 0 else joint, **shapes) for shapes in tried]
+        values = [effect.columns(part, model.robot, **shapes) for shapes in tried] if joint < 0 else effect.columns_at(part, joint, tried)
         stacked = np.concatenate([v if v.ndim == 3 else v[None] for v in values], axis=1)
         joints = range(model.robot.dof) if joint < 0 else [joint]
         read = [model.sensed(entry, piece, j) for entry, j in zip(stacked, joints)]

@@ -14,6 +14,7 @@ from sysid.candidates import candidates
 from sysid.errors import ConfigError
 from sysid.inertia import pseudo
 from sysid.motion import Piece
+from sysid.per_level import at_level
 from tests.problems import UR5, fourier_motion
 
 SLIDE = """<robot name="slide"><link name="base"/>
@@ -105,6 +106,21 @@ def test_grid_of_cogging_misses_no_line():
         values = k.values(k.low, k.high, angle)
         assert values[0] == k.low and values[-1] == k.high and np.diff(values).max() * angle <= np.pi / 2
     assert len(k.values(k.low, k.high)) == k.grid and np.diff(k.values(k.low, k.high)).max() < 0.25
+
+
+@pytest.mark.parametrize("lines", [1, 2])
+@pytest.mark.parametrize("tried", [[7.0], [1.0, 5.0, 7.0], [3.0, 2.0, 9.0, 120.0, 1.0], *(list(np.linspace(1.0, 120.0, n)) for n in (2, 4, 5, 480))])
+def test_ripples_of_many_pitches_at_once_are_those_of_each(lines, tried):
+    piece, ripple = small_piece(), vocabulary.find("cogging").given(lines=lines)
+    found = ripple.columns_at(piece, 1, [{"k": k} for k in tried])
+    np.testing.assert_allclose(found, [ripple.columns(piece, 1, k=k) for k in tried], atol=1e-12)
+
+
+def test_a_ripple_at_one_level_is_nothing_elsewhere_at_many_pitches_either():
+    there = at_level(vocabulary.find("cogging"), "robot", "r2", ("r1", "r2"))
+    tried = [{"k": k} for k in np.linspace(1.0, 9.0, 9)]
+    one, other = (there.columns_at(replace(small_piece(), levels={"robot": level}), 1, tried) for level in ("r1", "r2"))
+    assert not np.any(one) and np.all(np.any(other, axis=(1, 2)))
 
 
 def test_a_ripple_that_is_there_may_have_more_lines():

@@ -1,10 +1,14 @@
 """Torque ripple over the angle."""
 
+import math
+
 import numpy as np
 
 from ..effect import TorqueEffect
 from ..effect_options import whole
 from ..effect_parameters import Linear, Shape, called
+
+_EVEN = 1e-12  # of the grid's width: as even as rounding leaves it
 
 
 class Cogging(TorqueEffect):
@@ -50,3 +54,13 @@ class Cogging(TorqueEffect):
     def columns(self, motion, joint, k):
         angles = np.arange(1, self.lines + 1)[:, None] * k * motion.q[:, joint]
         return np.stack([np.sin(angles), np.cos(angles)], axis=1).reshape(2 * self.lines, -1)
+
+    def columns_at(self, motion, joint, tried):
+        k = np.array([shapes["k"] for shapes in tried])
+        size = math.isqrt(len(k))
+        if self.lines > 1 or size < 2 or np.ptp(np.diff(k)) > _EVEN * np.ptp(k):
+            return super().columns_at(motion, joint, tried)
+        # each of an even grid is a coarse step and a fine one, whose turns multiply
+        turned = lambda values: np.exp(1j * values[:, None] * motion.q[:, joint])  # noqa: E731
+        coarse, fine = turned(k[::size]), turned(k[:size] - k[0])
+        return [np.stack([turn.imag, turn.real]) for one in coarse for turn in one * fine][: len(k)]
