@@ -25,8 +25,7 @@ _ANGLES = 4.0
 # Laws are evaluated at this many samples a cycle of the cutoff: what is steeper than that, friction
 # at a reversal, is left out anyway.
 _SAMPLES_PER_CYCLE = 16.0
-# At least: at twice the cutoff, which so many rows a cycle hold, a sixteenth of the power is left
-_ROWS_PER_CYCLE = 4.0
+_ROWS_PER_CYCLE = 6.67  # 100 Hz at 15 Hz
 # The mean of so many frequencies of white noise is so far above its own in one of fifty thousand
 _TOGETHER, _ABOVE = 9, 3.0
 _SELDOM = 0.05  # of an octave
@@ -128,7 +127,7 @@ def stride_of(motion: Motion, cutoff: float) -> int:
     """Every how many samples a row is kept: several a cycle of the cutoff, and no more than fit in
     memory."""
     step = float(np.median([piece.step for piece in motion.pieces]))
-    fine = max(1, int(1.0 / (step * cutoff * _ROWS_PER_CYCLE) + 1e-9))
+    fine = max(1, round(1.0 / (step * cutoff * _ROWS_PER_CYCLE)))
     return max(fine, -(-motion.samples // MOST_ROWS))
 
 
