@@ -75,13 +75,14 @@ def verdicts(
         # what does not lower the joint's error on the test logs is no name for it
         own = tuple(c for c in taking if c.head.joint in (joint, "*") and then < first)
         others = tuple(c for c in taking if c.head.joint not in (joint, "*"))
-        least = floor or floors[j].low or 0.0  # where it is not known, no less than this
+        low, noise = (floor or unsure or 0.0 for unsure in (floors[j].low, floors[j].about))
         both = [e[joint] for e in errors]
-        shares = [explains(fit.rms(p)[joint], e, least) for p, e in zip(("train", "test"), both)]
-        # who leaves more of it than that is no name for what is missing
+        before = fit.rms("train")[joint], first
+        shares = [explains(b, e, min(e, noise)) for b, e in zip(before, both)]
+        # who leaves more that is no noise is no name for what is missing
         whole = any((1.0 + _LEFT) * s >= 1.0 for s in shares)
         whole |= any(mostly_noise(error, floors[j]) for error in both)
-        explained = shares[1] if claims else float("nan")
+        explained = explains(first, then, low) if claims else float("nan")
         seen, among = left[j], sum(asked) if asked[j] else len(left)
         if law and asked[j] and then > 0.0 and not seen.predictable(among, WORTH):
             seen = seen.with_law(law(j))
@@ -92,7 +93,7 @@ def verdicts(
         even = evens[j] and floors[j].reached(weighed[joint])  # it explains all
         little = remains is None or remains.share * max(1.0 - taken, 0.0) <= _LEFT * taken
         if own and (whole or evens[j]) and little:
-            told = ("missing", own, explained, remains)
+            told = "missing", own, explained, remains
         elif own or (remains is not None and not looks and not reached and not even):
             why = "" if remains else unexplained(both, floors[j])
             told = ("unknown", own or others, explained, remains, why)
@@ -110,8 +111,7 @@ def verdicts(
             most = others or (max(claims, key=lambda c, j=j: c.step.shares[j]),)
             told = ("explained", most, explained)
         out.append(Verdict(joint, *told))
-    said = {found.joint: found.says for found in carried}
-    return [replace(one, carries=said.get(one.joint, "")) for one in out]
+    return [replace(v, carries={f.joint: f.says for f in carried}.get(v.joint, "")) for v in out]
 
 
 def _above(remains: Unknown | None, error: float, floor: float) -> bool:

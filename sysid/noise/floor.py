@@ -33,7 +33,8 @@ class NoiseFloor:
     determine them.
 
     method: "repeats", "spectral" or "none". detail: how it was found, or why not. low, high: at
-        least and at most [N m or N], None where nothing is known.
+        least and at most [N m or N], None where nothing is known. about: the estimate that was too
+        unsure to be `rms`, None where there is none.
     """
 
     rms: float | None
@@ -42,6 +43,7 @@ class NoiseFloor:
     detail: str
     low: float | None = None
     high: float | None = None
+    about: float | None = None
 
     def reached(self, error: float) -> bool:
         """Whether an error is at it, as far as it is known."""
@@ -107,7 +109,7 @@ def judged(found: Estimate) -> NoiseFloor:
         return NoiseFloor(None, None, "none", found.doubt, None, found.own)
     if found.std > UNSURE * found.rms:
         why = f"not determined: {found.doubt} ({found.detail})"
-        return NoiseFloor(None, None, "none", why, min(low, found.least), found.own)
+        return NoiseFloor(None, None, "none", why, min(low, found.least), found.own, found.rms)
     return NoiseFloor(found.rms, found.std, found.method, found.detail, low, high)
 
 

@@ -8,6 +8,8 @@ import numpy as np
 from .floor import NoiseFloor, floors
 from .of_angles import OfAngles
 
+_SIZES = ("rms", "std", "low", "high", "about")
+
 
 def floors_of(
     pieces: Sequence, predicted: np.ndarray, *, angles: OfAngles | None = None
@@ -35,7 +37,7 @@ def filtered(found: Sequence[NoiseFloor], smoother) -> list[NoiseFloor]:
     gain = float(np.sqrt(np.sum(smoother(impulse) ** 2)))
 
     def through(floor: NoiseFloor) -> NoiseFloor:
-        values = {name: getattr(floor, name) for name in ("rms", "std", "low", "high")}
+        values = {name: getattr(floor, name) for name in _SIZES}
         scaled = {name: None if v is None else v * gain for name, v in values.items()}
         return replace(floor, **scaled, detail=f"{floor.detail}; carried through the fit's filter")
 
