@@ -399,6 +399,21 @@ def test_the_catalogue_is_not_said_to_lack_what_an_effect_of_it_may_be():
     assert "may be warmup, though no fit with it bore that out, or a law" in found.says
 
 
+def test_an_effect_that_may_be_there_is_told_where_nothing_else_predicts_the_rest():
+    """It takes half of all that is left then."""
+    asked = []
+
+    def near(j: int, own: float):
+        asked.append((j, own))
+        return SimpleNamespace(name="torque_saturation"), 0.012
+
+    for level, says in ((floor(), True), (floor(None), True), (floor(3.0), False)):
+        found = verdicts(fitted(3.0), [], [NOISE, NOISE], [floor(), level], near=near)[1]
+        assert (found.status, found.may is not None) == (("unresolved", True) if says else ("complete", False))
+        assert ("what is left may be torque_saturation or a law" in found.says) is says
+    assert {own for _, own in asked} == {NOISE.total}
+
+
 def test_an_effect_is_near_that_stands_at_five_per_cent_and_takes_half():
     maxima = np.linspace(0.0, 4.0, 401)
     group = lambda name: SimpleNamespace(candidate=SimpleNamespace(name=name), signed=name != "payload")  # noqa: E731

@@ -60,7 +60,7 @@ def verdicts(
             in the model. floors: of each joint's noise. carried: whether the model with all claims
             carries over, of each joint. weighed: {joint: RMS where each counts by its noise}.
             law: the function that stands out most of what is left of a joint, asked where `left`
-            says nothing. near: the effect that may be what is left, by what the motion predicts.
+            says nothing. near: the effect that may be what is left, or predicted of it.
     """
     last = claims[-1].after if claims else fit
     errors = last.rms("train"), last.rms("test")
@@ -87,7 +87,7 @@ def verdicts(
         if law and asked[j] and then > 0.0 and not seen.predictable(among, WORTH):
             seen = seen.with_law(law(j))
         remains = seen if seen.predictable(among, WORTH) else None
-        looks = near(j, remains.share * remains.total) if near and remains else None
+        looks = near(j, (remains.share if remains else 1.0) * seen.total) if near else None
         reached = reaches[j] and first > 0.0 and not _above(remains, then, floor)
         taken = sum(c.step.shares[j] for c in own)
         even = evens[j] and floors[j].reached(weighed[joint])  # it explains all
