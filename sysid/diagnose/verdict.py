@@ -76,8 +76,7 @@ def verdicts(
         own = tuple(c for c in taking if c.head.joint in (joint, "*") and then < first)
         others = tuple(c for c in taking if c.head.joint not in (joint, "*"))
         low, noise = (floor or unsure or 0.0 for unsure in (floors[j].low, floors[j].about))
-        both = [e[joint] for e in errors]
-        before = fit.rms("train")[joint], first
+        before, both = ([f.rms(p)[joint] for p in ("train", "test")] for f in (fit, last))
         shares = [explains(b, e, min(e, noise)) for b, e in zip(before, both)]
         # who leaves more that is no noise is no name for what is missing
         whole = any((1.0 + _LEFT) * s >= 1.0 for s in shares)
@@ -93,7 +92,7 @@ def verdicts(
         even = evens[j] and floors[j].reached(weighed[joint])  # it explains all
         little = remains is None or remains.share * max(1.0 - taken, 0.0) <= _LEFT * taken
         if own and (whole or evens[j]) and little:
-            told = "missing", own, explained, remains
+            told = ("missing", own, explained, remains)
         elif own or (remains is not None and not looks and not reached and not even):
             why = "" if remains else unexplained(both, floors[j])
             told = ("unknown", own or others, explained, remains, why)
@@ -111,7 +110,8 @@ def verdicts(
             most = others or (max(claims, key=lambda c, j=j: c.step.shares[j]),)
             told = ("explained", most, explained)
         out.append(Verdict(joint, *told))
-    return [replace(v, carries={f.joint: f.says for f in carried}.get(v.joint, "")) for v in out]
+    said = {found.joint: found.says for found in carried}
+    return [replace(one, carries=said.get(one.joint, "")) for one in out]
 
 
 def _above(remains: Unknown | None, error: float, floor: float) -> bool:
