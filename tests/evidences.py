@@ -6,6 +6,7 @@ import numpy as np
 
 from sysid.diagnose.projected import made
 from sysid.view import Design, by_block, summed
+from sysid.view.design import told
 from sysid.view.stationary import spectra
 
 
@@ -23,8 +24,9 @@ def viewed(p):
     x = np.linalg.lstsq(m, y, rcond=None)[0]
     residual = (p.tau - np.einsum("jnk,k->nj", p.a, x)) * p.weights
     columns = p.a * p.weights[:, None, None]
-    system = m.T @ m
-    design = Design(columns, residual, system, np.linalg.inv(system), np.zeros(len(x)), 0.0 * columns, 0.0 * residual)
+    turn = told(sum(a.T @ a for a in columns), m.T @ m)
+    columns = columns @ turn
+    design = Design(columns, residual, np.zeros(len(x)), turn, 0.0 * columns, 0.0 * residual)
     noise = spectra(residual, np.ones(residual.shape, bool), 0.01, 0.01)
     return SimpleNamespace(design=design, sums=summed(design, by_block(p.number)), blocks=p.number, weights=p.weights, x=x, spectra=noise)
 

@@ -70,8 +70,7 @@ def _made(view: View, asked, joints, plain: np.ndarray, rough: np.ndarray) -> li
             cross[b] += design.columns[j][rows].T @ values[rows]
             score[b] += design.residual[rows, j] @ values[rows] - noise[rows].sum(0)
             own[b] += square(values[rows].reshape(-1, count, k))
-    total = cross.sum(0)
-    absorbed = design.inverse @ total
+    absorbed = cross.sum(0)  # in the design's directions, in which the system is one
     foreseen = np.zeros((count, k, k))
     for i, j in enumerate(joints):
         left = view.weights[j] * np.moveaxis(plain[:, i], 1, 0)
@@ -91,7 +90,7 @@ def _made(view: View, asked, joints, plain: np.ndarray, rough: np.ndarray) -> li
     loud = score + np.einsum("bp,bpsk->bsk", scores, freed, optimize=True)
     noise = split(rough_cross - sums.rough_squares @ absorbed)
     rough_square = rough_own - pair(split(rough_cross), by) - pair(by, noise)
-    whole = own.sum(0) - pair(by, split(total))
+    whole = own.sum(0) - pair(by, by)
     out = []
     for s in range(count):
         found = directions(own[:, s].sum(0), whole[s], squares[:, s], rough_square[s])

@@ -176,5 +176,5 @@ def _taken(view: View, group: Group) -> np.ndarray:
     )
     out = np.zeros(design.columns.shape[:2])
     out[joints] = own
-    absorbed = design.inverse @ np.einsum("jnk,jn->k", design.columns, out)
+    absorbed = np.einsum("jnk,jn->k", design.columns, out)
     return out - np.einsum("jnk,k->jn", design.columns, absorbed)

@@ -10,34 +10,36 @@ import numpy as np
 
 from .. import rows as row
 from ..lowpass import calm
-from ..projection import inverted, prior_hessian
+from ..projection import prior_hessian, spanned
 from ..shape import Settled
 from ..source import Source
 
 _FIRST = 1e-6  # share of a direction: less is none, and what is left of it rounding
+_TOLD = 1e-10  # of a direction, that the data tell beside the prior: less moves no torque
 
 
 @dataclass(frozen=True)
 class Design:
-    """Weighted columns (dof, n, size), slopes last; the residual (n, dof) at their optimum,
-    weighted; `system` (size, size), columns' columns plus half of the prior's Hessian, and its
-    inverse; `change` (size,) from the model's own optimum, whose friction may be held at zero, to
-    this one, where it is free; what the angles' noise, once more, adds to columns and residual."""
+    """Weighted columns (dof, n, directions) of the directions of the parameters, and of the shape
+    values' slopes, that data tell at all, which of many bodies are a third. In these directions
+    columns' columns plus half of the prior's Hessian are one. The residual (n, dof) at their
+    optimum, weighted; `change` (size,) of the parameters from the model's own optimum, whose
+    friction may be held at zero, to this one, where it is free; `turn` (size, directions); what the
+    angles' noise, once more, adds to columns and residual."""
 
     columns: np.ndarray
     residual: np.ndarray
-    system: np.ndarray
-    inverse: np.ndarray
     change: np.ndarray
+    turn: np.ndarray
     rough_columns: np.ndarray
     rough_residual: np.ndarray
 
 
 @dataclass(frozen=True)
 class Sums:
-    """Over blocks: squares (blocks, size, size) of the columns, scores (blocks, size) of columns
-    and residual, `rough_scores` of what the angles' noise adds to both; over all, `rough_squares`;
-    `freed` (blocks, size, size) as the function of this name tells."""
+    """Over blocks: squares (blocks, k, k) of the columns, scores (blocks, k) of columns and
+    residual, `rough_scores` of what the angles' noise adds to both; over all, `rough_squares`;
+    `freed` (blocks, k, k) as the function of this name tells."""
 
     squares: np.ndarray
     scores: np.ndarray
@@ -55,13 +57,15 @@ def designed(found: Settled, weights, source: Source, rough: Source) -> Design:
     weighted = weights[:, None, None]
     columns = source.full(found.rows.columns) * weighted
     own, size = found.model.size, columns.shape[2]
-    system = np.einsum("jnk,jnl->kl", columns, columns, optimize=True)
+    squares = sum(a.T @ a for a in columns)
+    system = squares.copy()
     system[:own, :own] += 0.5 * prior_hessian(found)
-    inverse = inverted(system)
+    turn = told(squares, system)
     residual = found.rows.residual(found.x) * weights
     # what is held at zero, and what was settled to a tolerance only, takes its last step here
     slopes = np.einsum("jnk,nj->k", columns[:, :, own:], residual)
-    change = inverse @ np.append(-0.5 * found.problem.objective.gradient(found.x), slopes)
+    change = np.append(-0.5 * found.problem.objective.gradient(found.x), slopes)
+    change = turn @ (turn.T @ change)
     residual = residual - np.einsum("jnk,k->nj", columns, change)
     # near a reversal the noise, drawn again, would leave out other rows, and a row that is missing
     # is no noise: those count that count in the source
@@ -72,7 +76,16 @@ def designed(found: Settled, weights, source: Source, rough: Source) -> Design:
     x = np.append(found.x, np.zeros(size - own)) + change
     # a clock that is late shifts the measured torque as well
     left = (noisy.tau - found.rows.tau) * weights - np.einsum("jnk,k->nj", more, x)
-    return Design(columns, residual, system, inverse, change, more, left)
+    return Design(columns @ turn, residual, change, turn, more @ turn, left)
+
+
+def told(squares: np.ndarray, system: np.ndarray) -> np.ndarray:
+    """Directions (size, k) of parameters in which a system (size, size) is one, of those that the
+    data's part of it, squares (size, size), tells at all."""
+    scale, values, vectors = spanned(system)
+    free = vectors / np.sqrt(values) / scale[:, None]
+    share, vectors = np.linalg.eigh(free.T @ squares @ free)
+    return free @ vectors[:, share > _TOLD]
 
 
 def instrumented(design: Design, use, piece, band: float, step: float) -> np.ndarray:
@@ -89,8 +102,7 @@ def instrumented(design: Design, use, piece, band: float, step: float) -> np.nda
     """
     a, r = design.columns, design.residual
     z = np.stack([calm(own, piece, band, step) * use[:, [j]] for j, own in enumerate(a)])
-    product = lambda one, other: np.einsum("jnk,jnl->kl", one, other, optimize=True)  # noqa: E731
-    system = design.system + product(z - a, a)
+    system = np.eye(a.shape[2]) + sum(one.T @ other for one, other in zip(z - a, a))
     change = np.linalg.lstsq(system, np.einsum("jnk,nj->k", z - a, r), rcond=1e-10)[0]
     return r - np.einsum("jnk,k->nj", a, change)
 
@@ -101,21 +113,18 @@ def by_block(number: np.ndarray) -> list[slice]:
     return [slice(a, b) for a, b in zip(cuts, cuts[1:])]
 
 
-def freed(inverse: np.ndarray, squares: np.ndarray) -> np.ndarray:
-    """(blocks, size, size) R by which A_b R A_b' + 1 is (1 - H_b)^(-1/2) of each block's rows A_b,
-    where H_b = A_b `inverse` A_b' is what a fit takes of their noise: times it, what the fit left
-    of noise of one size has this size again, with no part that another direction holds.
+def freed(squares: np.ndarray) -> np.ndarray:
+    """(blocks, k, k) R by which A_b R A_b' + 1 is (1 - H_b)^(-1/2) of each block's rows A_b, where
+    H_b = A_b A_b' is what a fit takes of their noise: times it, what the fit left of noise of one
+    size has this size again, with no part that another direction holds.
 
     Args:
-        squares: (blocks, size, size) A_b' A_b.
+        squares: (blocks, k, k) A_b' A_b.
 
     Source: Bell & McCaffrey 2002 (the second cluster-robust covariance).
     """
-    values, vectors = np.linalg.eigh(inverse)
-    root = vectors * np.sqrt(np.clip(values, 0.0, None))
-    taken, turn = np.linalg.eigh(root.T @ squares @ root)
+    taken, turn = np.linalg.eigh(squares)
     taken = np.clip(taken, _FIRST, 1.0 - _FIRST)[:, None]
-    turn = root @ turn
     return (turn * ((1.0 - taken) ** -0.5 - 1.0) / taken) @ np.swapaxes(turn, 1, 2)
 
 
@@ -128,6 +137,6 @@ def summed(design: Design, spans: list[slice]) -> Sums:
         squares,
         np.stack([product(columns, design.residual, s) for s in spans]),
         np.stack([product(more, design.rough_residual, s) for s in spans]),
-        np.einsum("jnk,jnl->kl", more, more, optimize=True),
-        freed(design.inverse, squares),
+        sum(a.T @ a for a in more),
+        freed(squares),
     )

@@ -24,8 +24,8 @@ def losses(view: View, number: np.ndarray) -> np.ndarray:
         rows = slice(spans[own[0]].start, spans[own[-1]].stop)
         a, r = design.columns[:, rows], design.residual[rows]
         pull = np.einsum("jnk,nj->k", a, r)
-        squares = np.einsum("jnk,jnl->kl", a, a, optimize=True)
-        change = np.linalg.lstsq(design.system - squares, pull, rcond=1e-10)[0]
+        rest = np.eye(a.shape[2]) - sum(one.T @ one for one in a)
+        change = np.linalg.lstsq(rest, pull, rcond=1e-10)[0]
         told = (r + np.einsum("jnk,k->nj", a, change)) * r - design.rough_residual[rows] ** 2
         out[own] = np.add.reduceat(told, [spans[b].start - rows.start for b in own])
     return out
