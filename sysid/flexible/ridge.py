@@ -11,6 +11,7 @@ _APART = (
     0.15  # s, several memories of the filters: what is predicted, and what it is predicted from
 )
 _RIDGES = np.geomspace(1e-3, 30.0, 10)
+_LEAST = 0.1  # of the least ridge: a direction with less is a tenth at most of what it would be
 
 
 def stretches(fold, t, piece) -> list[tuple[np.ndarray, np.ndarray]]:
@@ -34,16 +35,18 @@ def predicted(features, y, use, spans) -> tuple[np.ndarray, np.ndarray]:
     scaled, _ = of_unit_size(features, use)
     if not scaled.shape[1]:
         return np.zeros(len(y)), np.zeros(len(spans))
+    ridges = _RIDGES * len(y) / len(_RIDGES)
+    values, vectors = np.linalg.eigh(scaled.T @ scaled)
+    scaled = scaled @ vectors[:, values > _LEAST * ridges[0]]
     system, right = scaled.T @ scaled, scaled.T @ y
     # the ridge of a fold is the one that serves the other folds best
-    gains, all_told = np.zeros((len(_RIDGES), len(spans))), np.zeros((len(_RIDGES), len(y)))
+    gains, all_told = np.zeros((len(ridges), len(spans))), np.zeros((len(ridges), len(y)))
     for f, (rows, near) in enumerate(spans):
         rest = system - scaled[near].T @ scaled[near]
         left = right - scaled[near].T @ y[near]
-        for i, ridge in enumerate(_RIDGES):
-            # a factorization for each ridge costs a third of the eigenvalues for all
-            more = ridge * len(y) / len(_RIDGES)
-            told = scaled[rows] @ dposv(rest + more * np.eye(len(rest)), left)[1]
+        for i, ridge in enumerate(ridges):
+            # a factorization for each ridge costs less than the eigenvalues for all
+            told = scaled[rows] @ dposv(rest + ridge * np.eye(len(rest)), left)[1]
             all_told[i, rows] = told
             gains[i, f] = np.sum(2.0 * told * y[rows] - told**2)
     chosen = [int(np.argmax(gains.sum(1) - gains[:, f])) for f in range(len(spans))]

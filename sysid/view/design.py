@@ -15,7 +15,6 @@ from ..shape import Settled
 from ..source import Source
 
 _FIRST = 1e-6  # share of a direction: less is none, and what is left of it rounding
-_TOLD = 1e-10  # of a direction, that the data tell beside the prior: less moves no torque
 
 
 @dataclass(frozen=True)
@@ -85,7 +84,7 @@ def told(squares: np.ndarray, system: np.ndarray) -> np.ndarray:
     scale, values, vectors = spanned(system)
     free = vectors / np.sqrt(values) / scale[:, None]
     share, vectors = np.linalg.eigh(free.T @ squares @ free)
-    return free @ vectors[:, share > _TOLD]
+    return free @ vectors[:, share > _FIRST]
 
 
 def instrumented(design: Design, use, piece, band: float, step: float) -> np.ndarray:
