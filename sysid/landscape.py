@@ -182,13 +182,19 @@ def landscape(
     # what is held, or stands at its bound of zero, does not answer
     still = [*np.flatnonzero(found.problem.coordinates.held), *(at_zero(found) if pinned else ())]
     rest = np.setdiff1d(np.arange(model.size), [*own, *(count + k for k in still)])
-    columns = scale[:, None, None] * found.rows.columns[np.ix_(range(len(scale)), kept, rest)]
     residual = scale * found.rows.residual(found.x)[kept]
-    half = _half_inverse(columns, prior_hessian(found)[np.ix_(rest, rest)])
-    basis = columns[joint] @ half
+    columns = lambda j, which: scale[j] * found.rows.columns[j][np.ix_(kept, which)]  # noqa: E731
+    if len(kept) < len(found.rows.t):
+        data = [columns(j, rest) for j in range(len(scale))]
+    else:  # all of them stand in a triangle, and that known bodies are known as well: once or twice
+        data = [np.sqrt(2.0) * found.problem.objective.triangle[:, rest]]
+    half = _half_inverse(data, prior_hessian(found)[np.ix_(rest, rest)])
+    basis = columns(joint, rest) @ half
     # a coefficient at its bound is at no stationary point: it would move by itself
-    pull = half.T @ np.where(rest >= count, np.einsum("jnk,nj->k", columns, residual), 0.0)
-    now = scale[joint] * found.rows.columns[joint][np.ix_(kept, own)] @ found.x[own]
+    linear_ones = rest[rest >= count]
+    pull = sum(columns(j, linear_ones).T @ own for j, own in enumerate(residual.T))
+    pull = half[rest >= count].T @ pull
+    now = columns(joint, own) @ found.x[own]
     left = now - basis @ (basis.T @ now)
     target = residual[:, joint] - basis @ pull + left
     names = tuple(v.shape.name for v in free)
@@ -202,8 +208,8 @@ def landscape(
     )  # fmt: skip
 
 
-def _half_inverse(columns: np.ndarray, prior: np.ndarray) -> np.ndarray:
-    """G (size, r) with GG' = (A'A + P)^-1 on its range, of columns A (joints, n, size): from
+def _half_inverse(columns: list[np.ndarray], prior: np.ndarray) -> np.ndarray:
+    """G (size, r) with GG' = (A'A + P)^-1 on its range, of columns A in parts (n, size): from
     singular values, as those of A'A would lose half the digits."""
     sizes, axes = np.linalg.eigh(prior)
     root = (axes * np.sqrt(np.clip(sizes, 0.0, None))).T

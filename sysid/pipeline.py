@@ -69,7 +69,7 @@ def build(experiment: Experiment) -> tuple[Robot, Model, np.ndarray]:
 @single_threaded
 def fit(
     experiment: Experiment, *, filters: dict | None = None, strength: PriorWeight | None = None, progress: Progress | None = None, measured: Read | None = None,
-    workers: int = 1, scheduler: str | None = None,
+    near: Model | None = None, workers: int = 1, scheduler: str | None = None,
 ) -> Fit:
     """Identify an experiment: everything from its logs to its errors on held-out data.
 
@@ -77,6 +77,7 @@ def fit(
         filters, strength: what an earlier fit of the same logs chose, `Fit.filters` and `Fit.strength`; by default filters
             are compared again, and the weight of the prior is chosen where the experiment says so.
         measured: its logs, where they are at hand.
+        near: its model with shape values that are not far from the best, where that is known: no others are searched.
         workers, scheduler: as of `workers.crew`: who reads, filters, compresses and predicts. What is found does not depend on it.
 
     Raises:
@@ -85,12 +86,12 @@ def fit(
     """
     tell = progress or (lambda stage, share: None)
     if workers == 1 and scheduler is None:
-        return _fit(experiment, filters, strength, tell, measured, None)
+        return _fit(experiment, filters, strength, tell, measured, near, None)
     with crew(workers, scheduler, lambda text: tell(text, 0.0)) as mapped:
-        return _fit(experiment, filters, strength, tell, measured, mapped)
+        return _fit(experiment, filters, strength, tell, measured, near, mapped)
 
 
-def _fit(experiment: Experiment, filters: dict | None, strength: PriorWeight | None, tell: Progress, measured: Read | None, mapped: Mapped | None) -> Fit:
+def _fit(experiment: Experiment, filters: dict | None, strength: PriorWeight | None, tell: Progress, measured: Read | None, near: Model | None, mapped: Mapped | None) -> Fit:
     experiment = experiment if strength is None else with_weight(experiment, strength.value)
     seconds: dict[str, float] = {}
     with noticed() as notices:
@@ -113,7 +114,7 @@ def _fit(experiment: Experiment, filters: dict | None, strength: PriorWeight | N
         tell_left_out(motion, preprocess)
         disturbed = tell_events("train", motion)
         with _timed(seconds, "shape", tell):
-            structure, slopes, searched, weight = refined(experiment, structure, motion, prior)
+            structure, slopes, searched, weight = refined(experiment, structure, motion, prior, near)
         with _timed(seconds, "compress", tell):  # the regressor is built and reduced chunk by chunk, never whole
             compressed = compress(slopes or structure, motion, progress=lambda share: tell("compress", share))
         with _timed(seconds, "weight", tell):
@@ -164,12 +165,15 @@ def refit(experiment: Experiment, before: Fit, *, filters: dict | None = None, *
     Args:
         filters, how: as of `fit`.
     """
-    if before.strength.auto:
-        experiment = with_weight(experiment, AUTO)
-    after = fit(experiment, filters=filters, **how)
+    after = fit_grown(experiment, before, filters=filters, **how)
     if after.strength.value == before.strength.value:
         return after, after
-    return after, fit(experiment, filters=after.filters, strength=before.strength, **how)
+    return after, fit(experiment, filters=after.filters, strength=before.strength, near=after.model, **how)
+
+
+def fit_grown(experiment: Experiment, before: Fit, **how) -> Fit:
+    """The first of the two fits of `refit`."""
+    return fit(with_weight(experiment, AUTO) if before.strength.auto else experiment, **how)
 
 
 def predict_log(found: Fit, log: str | LogSpec, *, levels: Mapping[str, str] | None = None) -> Prediction:

@@ -9,6 +9,7 @@ import numpy as np
 from .objective import add_blocks
 
 _FLAT = 1e-6  # share of a column's square: what the model leaves of it beyond that is rounding
+_TOLD = 1e-6  # of a direction's square: less than that the data say nothing
 _DATA = 0.5  # of a direction's square must stand in the data; the prior may not tell most of it
 _NOISE = 0.25  # of a direction's square: noise to half of its size, it says nothing about a law
 
@@ -118,6 +119,15 @@ def inverted(system: np.ndarray) -> np.ndarray:
     """Inverse of a positive semidefinite matrix on its range."""
     scale, values, vectors = spanned(system)
     return (vectors / values) @ vectors.T / np.outer(scale, scale)
+
+
+def told(data: np.ndarray, system: np.ndarray) -> np.ndarray:
+    """Directions (size, k) of parameters in which a system (size, size) is one, of those that the
+    data's part of it (size, size) tells at all; of many bodies they are a half of all."""
+    scale, values, vectors = spanned(system)
+    free = vectors / np.sqrt(values) / scale[:, None]
+    share, vectors = np.linalg.eigh(free.T @ data @ free)
+    return free @ vectors[:, share > _TOLD]
 
 
 def root(products: np.ndarray) -> np.ndarray:

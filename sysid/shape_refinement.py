@@ -21,10 +21,14 @@ _PASSES, _NEAR = 3, 0.1  # refinements on all rows; of a standard deviation
 _ROUNDS = 3  # of a prior's weight and the shape values under it
 
 
-def refined(experiment: Experiment, structure: Model, motion: Motion, prior) -> tuple[Model, Linearised | None, tuple[Searched, ...], PriorWeight | None]:
+def refined(experiment: Experiment, structure: Model, motion: Motion, prior, near: Model | None = None) -> tuple[Model, Linearised | None, tuple[Searched, ...], PriorWeight | None]:
     """The model measured by a motion, its shape values found: on rows that fit in memory, then by Gauss-Newton steps on all
     of them. Its slopes there, None where no shape value is free, and what was done to find them. And the prior's weight, None
-    where it had no part in it."""
+    where it had no part in it.
+
+    Args:
+        near: the model with shape values that are not far from the best, where that is known.
+    """
     structure = finite(structure.measured_by(motion), motion)
     if not (structure.shape_values or structure.uses_load):
         return structure, None, (), None
@@ -33,7 +37,10 @@ def refined(experiment: Experiment, structure: Model, motion: Motion, prior) -> 
         begun = Linearised(structure, np.append(prior.ravel(), np.zeros(len(structure.coefficients))))
         strength = prior_strength(experiment, structure, motion, compress(begun if structure.gains else structure, motion), prior)
     weighed = experiment if strength is None else with_weight(experiment, strength.value)
-    found = shape.settle(weighed, structure, motion, prior, profile=True)
+    if near is None:
+        found = shape.settle(weighed, structure, motion, prior, profile=True)
+    else:  # the search has been made
+        found = shape.settle(weighed, structure.with_shapes(near.shapes), motion, prior, grid=False)
     bodies, searched = found.x[: 10 * structure.bodies].reshape(-1, 10), found.searched
     if (scaled := rescaled(found.model, weighed, bodies, prior)) is not found.model:
         found = shape.settle(weighed, scaled, motion, prior, grid=False)

@@ -16,6 +16,7 @@ import numpy as np
 from . import blocks
 from .objective import Objective, add_blocks
 from .prior_weight import weakest
+from .projection import told
 from .triangles import Compressed
 
 
@@ -49,7 +50,7 @@ def estimate(objective: Objective, compressed: Compressed, x: np.ndarray, fixed:
     claim = max(1.0, objective.weight / least) if least > 0.0 else 1.0
     inverse, undetermined = _inverse(data[pick] + prior[pick])
     covariance = np.full((size, size), np.nan)
-    covariance[pick] = _noise(compressed, x, weights, data + prior, free) * _widened(compressed, free) + 2.0 * variance * claim * inverse @ prior[pick] @ inverse
+    covariance[pick] = _noise(compressed, x, weights, data[pick], prior[pick], free) * _widened(compressed, free) + 2.0 * variance * claim * inverse @ prior[pick] @ inverse
     total = np.diagonal(inverse)
     from_noise = np.einsum("ij,jk,ki->i", inverse, data[pick], inverse)
     share = np.zeros(size)
@@ -71,9 +72,9 @@ def _widened(compressed: Compressed, free) -> np.ndarray:
 _FLAT = 1e-12  # eigenvalues that are none, as a share of the largest
 
 
-def _noise(compressed: Compressed, x, weights, hessian, free) -> np.ndarray:
-    """The covariance (free, free) that noise gives the estimate."""
-    basis = whitening(hessian[np.ix_(free, free)])
+def _noise(compressed: Compressed, x, weights, data, prior, free) -> np.ndarray:
+    """The covariance (free, free) that noise gives the estimate; of directions that no data tell it says nothing."""
+    basis = told(data, data + prior)
     return basis @ blocks.covariance(*by_block(compressed, x, weights, basis, free)) @ basis.T
 
 

@@ -5,8 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 
 from sysid.diagnose.projected import made
+from sysid.projection import told
 from sysid.view import Design, by_block, summed
-from sysid.view.design import told
 from sysid.view.stationary import spectra
 
 

@@ -5,6 +5,7 @@ import pytest
 
 from sysid.frequencies import low
 from sysid.lowpass import calm
+from sysid.projection import told
 from sysid.view import Design, instrumented
 
 STEP, N, BAND = 0.01, 4000, 1.2

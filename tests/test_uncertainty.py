@@ -120,7 +120,7 @@ def test_deviations_are_right_under_white_noise():
         basis = uncertainty.whitening(2.0 * normal)
         moves, _ = parameters.left_out(*uncertainty.by_block(data, x, None, basis, np.arange(size)))
         plain[k] = np.diagonal(basis @ parameters.neighbours(moves) @ basis.T)
-        found = uncertainty._noise(data, x, None, 2.0 * normal, np.arange(size)) / parameters.widening(blocks) ** 2
+        found = uncertainty._noise(data, x, None, 2.0 * normal, 0.0, np.arange(size)) / parameters.widening(blocks) ** 2
         corrected[k], along[k] = np.diagonal(found), direction @ found @ direction
     # 200 repeats know the mean to 5 %
     np.testing.assert_allclose(corrected.mean(axis=0) / known, 1.0, atol=0.15)

@@ -55,20 +55,21 @@ def claimed(
         fit: of the experiment as it is. measured: its logs; None: read anew.
     """
 
-    def with_(last: Fit, member: Member) -> tuple[Fit, Fit]:  # and under the last one's prior
+    def with_(how: Callable, last: Fit, member: Member):
         name, joints, options = spelled(member.candidate, where(member, fit))
         spec = grown(last.experiment, name, joints, options, every=fit.joints)
-        return pipeline.refit(spec, last, filters=fit.filters, progress=tell, measured=measured)
+        return how(spec, last, filters=fit.filters, progress=tell, measured=measured)
 
     claims, refused, last = list[Claim](), list[Refused](), fit
     for step in steps:
         head, *tied = step.choice.members
-        after, compared = with_(last, head[0])
+        after, compared = with_(pipeline.refit, last, head[0])  # and under the last one's prior
         if (why := _nothing(last, compared, after, head[0])) is not None:
             refused.append(Refused(head[0].candidate.name, where(head[0], fit), why))
             continue
         near = [(m, chance) for m, chance in tied[: _FITTED - 1] if chance >= _LIKELY]
-        found = [(*head, after), *((m, chance, with_(last, m)[0]) for m, chance in near)]
+        rivals = ((*one, with_(pipeline.fit_grown, last, one[0])) for one in near)
+        found = [(*head, after), *rivals]
         findings = [finding(last, then, m, chance, step, len(claims)) for m, chance, then in found]
         named = [(m.candidate.name, where(m, fit), chance) for m, chance in step.choice.members]
         claims.append(Claim(step, tuple(findings), last, after, tuple(named)))

@@ -10,7 +10,7 @@ import numpy as np
 
 from .. import rows as row
 from ..lowpass import calm
-from ..projection import prior_hessian, spanned
+from ..projection import prior_hessian, told
 from ..shape import Settled
 from ..source import Source
 
@@ -76,15 +76,6 @@ def designed(found: Settled, weights, source: Source, rough: Source) -> Design:
     # a clock that is late shifts the measured torque as well
     left = (noisy.tau - found.rows.tau) * weights - np.einsum("jnk,k->nj", more, x)
     return Design(columns @ turn, residual, change, turn, more @ turn, left)
-
-
-def told(squares: np.ndarray, system: np.ndarray) -> np.ndarray:
-    """Directions (size, k) of parameters in which a system (size, size) is one, of those that the
-    data's part of it, squares (size, size), tells at all."""
-    scale, values, vectors = spanned(system)
-    free = vectors / np.sqrt(values) / scale[:, None]
-    share, vectors = np.linalg.eigh(free.T @ squares @ free)
-    return free @ vectors[:, share > _FIRST]
 
 
 def instrumented(design: Design, use, piece, band: float, step: float) -> np.ndarray:
