@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.linalg.lapack import dposv
 
 from .functions import of_unit_size
 
@@ -42,13 +41,12 @@ def predicted(features, y, use, spans) -> tuple[np.ndarray, np.ndarray]:
     # the ridge of a fold is the one that serves the other folds best
     gains, all_told = np.zeros((len(ridges), len(spans))), np.zeros((len(ridges), len(y)))
     for f, (rows, near) in enumerate(spans):
-        rest = system - scaled[near].T @ scaled[near]
-        left = right - scaled[near].T @ y[near]
-        for i, ridge in enumerate(ridges):
-            # a factorization for each ridge costs less than the eigenvalues for all
-            told = scaled[rows] @ dposv(rest + ridge * np.eye(len(rest)), left)[1]
-            all_told[i, rows] = told
-            gains[i, f] = np.sum(2.0 * told * y[rows] - told**2)
+        values, vectors = np.linalg.eigh(system - scaled[near].T @ scaled[near])
+        turned = vectors.T @ (right - scaled[near].T @ y[near])
+        shrunk = turned[:, None] / (np.clip(values, 0.0, None)[:, None] + ridges)
+        told = (scaled[rows] @ (vectors @ shrunk)).T
+        all_told[:, rows] = told
+        gains[:, f] = np.sum(2.0 * told * y[rows] - told**2, axis=1)
     chosen = [int(np.argmax(gains.sum(1) - gains[:, f])) for f in range(len(spans))]
     told = np.zeros(len(y))
     for i, (rows, _) in zip(chosen, spans):
