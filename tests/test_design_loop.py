@@ -33,8 +33,9 @@ def test_a_tie_is_designed_away(tmp_path, monkeypatch):
         said.append(text)
     simulated, first, designed, _, second, added = said
     assert "cannot tell it" in first and "cannot tell" not in second
-    pair = json.loads((Path("next") / "design.json").read_text())["separates"][0]
-    assert {pair["a"], pair["b"]} == {"stribeck:knee", "position_friction:knee"} and pair["probability"] > 0.9
+    pairs = json.loads((Path("next") / "design.json").read_text())["separates"]
+    assert {"stribeck:knee", "position_friction:knee"} in [{pair["a"], pair["b"]} for pair in pairs]
+    assert all(pair["probability"] > 0.9 for pair in pairs)
     true = float(re.search(r"dF=(\S+),", simulated)[1])
     size, deviation = map(float, re.search(r"stribeck.knee.dF = (\S+) \+- (\S+)", added).groups())
     assert size == pytest.approx(true, abs=3.0 * deviation) and deviation < 0.1 * true

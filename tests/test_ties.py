@@ -8,7 +8,7 @@ import pytest
 from sysid import blocks, pipeline
 from sysid.diagnose.ask import ask
 from sysid.diagnose.refits import refitted, weighed
-from sysid.diagnose.ties import Choice, chosen, holds
+from sysid.diagnose.ties import Choice, chosen, holds, price_of
 from sysid.view import first_view, losses
 from tests.evidences import posed, stacked, viewed
 
@@ -81,6 +81,18 @@ def test_what_only_adds_freedom_is_told(biased):
     assert not holds(view, bias, twin) and not holds(view, twin, bias)
     drag = refitted(view, of(groups, "position_friction", 1))
     assert not holds(view, drag, bias)  # more numbers, and another torque
+
+
+def test_a_number_costs_the_logarithm_of_the_values_and_of_its_signs(biased):
+    """A delay may go either way, a lag is late: of two that leave the same, the half of a prior that is known to be wrong costs ln 2
+    in likelihood, which is half of a loss."""
+    view, groups = biased
+    bias, delay, lag, cable = (of(groups, name, 1) for name in ("torque_bias", "delay", "current_lag", "cable"))
+    price, variance = price_of(view, bias), np.sum(bias.moves**2)
+    assert (delay.either, lag.either, cable.either) == (1, 0, len(cable.candidate.effect.coefficients()))
+    assert price(delay) - price(lag) == pytest.approx(2.0 * np.log(2.0) * variance)
+    values = 2.0 * view.cutoff * np.mean(view.rows.use.sum(0)) * view.step
+    assert price(lag) == pytest.approx((np.log(values) - 1.0) * variance)
 
 
 def test_a_size_that_may_not_be_negative_is_no_member(simulated):

@@ -150,6 +150,13 @@ class Group:
         return len(self.c) + (0 if self.candidate.nonlinear else len(self.shapes))
 
     @property
+    def either(self) -> int:
+        """How many of its numbers may have either sign."""
+        effect = self.candidate.effect
+        shapes = sum(s.low < 0.0 < s.high for s in effect.shapes())
+        return shapes + sum(c.lower != 0 for c in effect.coefficients())
+
+    @property
     def coefficients(self) -> np.ndarray:
         """(k0,) the candidate's own."""
         return self.back @ self.c

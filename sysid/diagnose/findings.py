@@ -69,9 +69,8 @@ def finding(
         number: of the step among those that stand.
     """
     own, joint = judged_by(member, before), where(member, before)
-    errors = [
-        float(np.sqrt(np.mean([fit.rms("test")[j] ** 2 for j in own]))) for fit in (before, after)
-    ]
+    square = lambda fit: np.mean([fit.rms("test")[j] ** 2 for j in own])  # noqa: E731
+    errors = [float(np.sqrt(square(fit))) for fit in (before, after)]
     differences = {d.joint: d.se for d in comparison.compare(before, after, ("before", "after"))}
     se = float(np.sqrt(np.nansum([differences[j] ** 2 for j in own]) / len(own)))
     tied = [(m.candidate.name, where(m, before)) for m, _ in step.choice.members if m is not member]

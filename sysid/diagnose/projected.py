@@ -21,9 +21,8 @@ Asked = tuple[Candidate, dict[str, float]]  # a candidate at shape values
 def groups(view: View, candidates: Sequence[Candidate]) -> list[Group]:
     """The groups of candidates, one for each set of shape values tried; none of those that the
     model absorbs."""
-    return groups_at(
-        view, [(candidate, shapes) for candidate in candidates for shapes in tried(view, candidate)]
-    )
+    asked = [(candidate, at) for candidate in candidates for at in tried(view, candidate)]
+    return groups_at(view, asked)
 
 
 def groups_at(view: View, asked: Sequence[Asked]) -> list[Group]:
@@ -42,9 +41,7 @@ def groups_at(view: View, asked: Sequence[Asked]) -> list[Group]:
     return out
 
 
-def made(
-    view: View, asked: Sequence, joints: Sequence[int], plain: np.ndarray, rough: np.ndarray
-) -> list[Group]:
+def made(view: View, asked: Sequence, joints: Sequence[int], plain, rough) -> list[Group]:
     """Groups of columns (asked, joints, n, k) on the motion, and on the rough one."""
     parts = [slice(some, some + _BATCH) for some in range(0, len(asked), _BATCH)]
     return [g for p in parts for g in _made(view, asked[p], joints, plain[p], rough[p])]

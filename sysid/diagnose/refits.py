@@ -75,12 +75,9 @@ def _allowed(view: View, candidate: Candidate) -> bool:
     own = [k for k, c in enumerate(model.coefficients) if (c.effect, c.joint) == candidate.key]
     if any(model.coefficients[k].positive and x[first + k] <= 0.0 for k in own):
         return False
-    starts = [
-        (v, at)
-        for v, at in zip(model.shape_values[model.last_shapes], model.shapes[model.last_shapes])
-        if v.shape.start is not None
-    ]
-    return not starts or any(at != v.shape.start for v, at in starts)
+    own = zip(model.shape_values[model.last_shapes], model.shapes[model.last_shapes])
+    starts = [(v.shape.start, at) for v, at in own if v.shape.start is not None]
+    return not starts or any(at != start for start, at in starts)
 
 
 def weighed(view: View, weights=None) -> View:

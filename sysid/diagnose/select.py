@@ -15,7 +15,7 @@ import numpy as np
 from ..view import View
 from .ask import Asked, ask
 from .steps import Step, rejoined, revised, step_of
-from .ties import NEAR, Choice, alike, chosen, number_price
+from .ties import NEAR, Choice, alike, chosen, price_of
 
 LEVEL = 0.01  # family-wise: how often anything is accused where nothing is there
 WORTH = 0.03  # of a joint's squared residual under the low-pass: 1.5 % of its root mean square
@@ -71,9 +71,8 @@ def _next(view: View, asked: Asked, level: float, worth: float, open_: list[Choi
         near = [k for k in rivals if asked.gains[k] >= NEAR * asked.gains[top]]
         # who acts on the same joints, and who takes the same thing through bodies that bend
         short = [k for k in near if where & set(asked.groups[k].candidate.touches(dof))]
-        short += [
-            k for k in near if k not in short and alike(view, asked.groups[k], asked.groups[top])
-        ]
+        same = lambda k: alike(view, asked.groups[k], asked.groups[top])  # noqa: B023, E731
+        short += [k for k in near if k not in short and same(k)]
         short = [top, *(k for k in short if k != top)][:_SHORTLIST]
         found = chosen(view, [asked.groups[k] for k in short], np.random.default_rng(1))
         if found is not None:
@@ -97,8 +96,8 @@ def _rivals(view: View, asked: Asked, worth: float) -> dict[int, tuple[int, floa
     loss, dof, out = np.sum(view.design.residual**2, axis=0), view.model.robot.dof, {}
     for ks in own.values():
         # of those with more terms and with fewer, who takes most once its numbers are paid for
-        number = number_price(view, asked.groups[max(ks, key=asked.gains.__getitem__)])
-        k = max(ks, key=lambda k: asked.gains[k] - number * asked.groups[k].numbers)  # noqa: B023
+        price = price_of(view, asked.groups[max(ks, key=asked.gains.__getitem__)])
+        k = max(ks, key=lambda k: asked.gains[k] - price(asked.groups[k]))  # noqa: B023
         left = loss[asked.groups[k].candidate.touches(dof)]
         # else far from worth having, whatever a refit adds to it
         if asked.gains[k] >= 0.5 * worth * left.min():

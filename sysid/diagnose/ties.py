@@ -7,6 +7,7 @@ heads it is told by these losses and by how many numbers each one needs.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -73,8 +74,8 @@ def chosen(view: View, groups: list[Group], rng: np.random.Generator) -> Choice 
     group = members[int(np.argmin(table.sum(0)))].group
     if view is not first:  # with these weights
         group = (groups_at(view, [(group.candidate, group.shapes)]) or [group])[0]
-    numbers = np.array([member.group.numbers for member in members])
-    priced = table + numbers * number_price(view, group) / len(table)
+    price = price_of(view, group)
+    priced = table + np.array([price(member.group) for member in members]) / len(table)
     kept = _least(members, priced.sum(0))
     members, table, priced = [members[k] for k in kept], table[:, kept], priced[:, kept]
     p = blocks.confidence_set(table, rng)
@@ -114,17 +115,20 @@ def _even(view: View, members: list[Member]) -> tuple[View, list[Member]]:
     return view, [Member(group, found, losses(found, view.blocks)) for group, found in even]
 
 
-def number_price(view: View, group: Group) -> float:
-    """What each number costs its member, of the loss of all blocks.
+def price_of(view: View, group: Group) -> Callable[[Group], float]:
+    """What the numbers of a candidate cost, of the loss of all blocks.
 
     Blocks held apart ask who predicts best, and what holds the truth and more predicts about as
     well as the truth. Who is the truth is another question: a number then costs the logarithm of
     the count of values (those that a band holds: two a cycle of its cutoff) times the variance of
     one direction (that of the best one's `group`), of which holding apart has charged one (Schwarz
-    1978).
+    1978); and one that may have either sign twice the logarithm of two times it, as half of what
+    it could be lies on the other side.
     """
     values = 2.0 * view.cutoff * view.step * float(np.mean(view.rows.use.sum(0)))
-    return np.sum(group.moves**2) / len(group.c) * max(np.log(values) - 1.0, 0.0)
+    one = np.sum(group.moves**2) / len(group.c)
+    each = max(np.log(values) - 1.0, 0.0)
+    return lambda other: one * (each * other.numbers + 2.0 * np.log(2.0) * other.either)
 
 
 def _least(members: list[Member], lost: np.ndarray) -> list[int]:
@@ -151,10 +155,8 @@ def holds(view: View, general: Member, special: Member) -> bool:
     wanted = target[:, joints].T.ravel()
     rest = lambda a: wanted - a @ np.linalg.lstsq(a, wanted, rcond=1e-9)[0]  # noqa: E731
     alone = np.sum(rest(base) ** 2)
-    return bool(
-        alone > 0
-        and np.sum(rest(np.concatenate([base, flat], axis=1)) ** 2) < (1.0 - _SAME) * alone
-    )
+    both = np.sum(rest(np.concatenate([base, flat], axis=1)) ** 2)
+    return bool(alone > 0 and both < (1.0 - _SAME) * alone)
 
 
 def alike(view: View, one: Group, other: Group) -> bool:
@@ -169,11 +171,8 @@ def _taken(view: View, group: Group) -> np.ndarray:
     """(dof, n) weighted torque that a group takes of the residual, the model's own columns
     refitted."""
     design, joints = view.design, group.candidate.touches(view.model.robot.dof)
-    own = (
-        columns_of(view.source, group.candidate, [group.shapes])[0]
-        @ group.coefficients
-        * view.weights[joints, None]
-    )
+    columns = columns_of(view.source, group.candidate, [group.shapes])[0]
+    own = columns @ group.coefficients * view.weights[joints, None]
     out = np.zeros(design.columns.shape[:2])
     out[joints] = own
     absorbed = np.einsum("jnk,jn->k", design.columns, out)
