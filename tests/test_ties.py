@@ -8,6 +8,7 @@ import pytest
 from sysid import blocks, pipeline
 from sysid.diagnose.ask import ask
 from sysid.diagnose.refits import refitted, weighed
+from sysid.diagnose.select import _beside
 from sysid.diagnose.ties import Choice, chosen, holds, price_of
 from sysid.view import first_view, losses
 from tests.evidences import posed, stacked, viewed
@@ -81,6 +82,16 @@ def test_what_only_adds_freedom_is_told(biased):
     assert not holds(view, bias, twin) and not holds(view, twin, bias)
     drag = refitted(view, of(groups, "position_friction", 1))
     assert not holds(view, drag, bias)  # more numbers, and another torque
+
+
+def test_who_is_compared_stands_on_the_joint_or_takes_the_same_part(biased):
+    """What a shoulder that gives moves of an elbow's torque is not the elbow's bias, though it changes that torque too."""
+    view, groups = biased
+    bias, twin = (of(groups, name, 1) for name in ("torque_bias", "asymmetric_coulomb"))
+    assert _beside(view, twin, bias)
+    gives = [g for g in groups if g.candidate.key == ("elasticity", 0)]
+    assert gives and not any(_beside(view, g, bias) for g in gives)
+    assert all(_beside(view, g, gives[0]) for g in groups if g.candidate.joint == 0)
 
 
 def test_a_number_costs_the_logarithm_of_the_values_and_of_its_signs(biased):

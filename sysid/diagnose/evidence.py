@@ -152,9 +152,8 @@ class Group:
     @property
     def either(self) -> int:
         """How many of its numbers may have either sign."""
-        effect = self.candidate.effect
-        shapes = sum(s.low < 0.0 < s.high for s in effect.shapes())
-        return shapes + sum(c.lower != 0 for c in effect.coefficients())
+        shapes, own = self.candidate.effect.shapes(), self.candidate.effect.coefficients()
+        return sum(s.low < 0.0 < s.high for s in shapes) + sum(c.lower != 0 for c in own)
 
     @property
     def coefficients(self) -> np.ndarray:

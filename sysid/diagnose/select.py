@@ -14,6 +14,7 @@ import numpy as np
 
 from ..view import View
 from .ask import Asked, ask
+from .evidence import Group
 from .steps import Step, rejoined, revised, step_of
 from .ties import NEAR, Choice, alike, chosen, price_of
 
@@ -62,17 +63,13 @@ def search(
 def _next(view: View, asked: Asked, level: float, worth: float, open_: list[Choice]) -> Step | None:
     """The candidate that joins next, None where none is there and worth having."""
     threshold = np.quantile(asked.maxima, 1.0 - level) if len(asked.groups) else np.inf
-    rivals, dof = _rivals(view, asked, worth), view.model.robot.dof
+    rivals = _rivals(view, asked, worth)
     hopeful = [k for k, (clear, _) in rivals.items() if asked.statistics[clear] > threshold]
     while hopeful:
         top = hopeful[0]
-        where = set(asked.groups[top].candidate.touches(dof))
         # whoever takes as much as one that is there may be what is there
         near = [k for k in rivals if asked.gains[k] >= NEAR * asked.gains[top]]
-        # who acts on the same joints, and who takes the same thing through bodies that bend
-        short = [k for k in near if where & set(asked.groups[k].candidate.touches(dof))]
-        same = lambda k: alike(view, asked.groups[k], asked.groups[top])  # noqa: B023, E731
-        short += [k for k in near if k not in short and same(k)]
+        short = [k for k in near if _beside(view, asked.groups[k], asked.groups[top])]
         short = [top, *(k for k in short if k != top)][:_SHORTLIST]
         found = chosen(view, [asked.groups[k] for k in short], np.random.default_rng(1))
         if found is not None:
@@ -84,6 +81,12 @@ def _next(view: View, asked: Asked, level: float, worth: float, open_: list[Choi
                 open_.append(found)
         hopeful = [k for k in hopeful if k not in short]
     return None
+
+
+def _beside(view: View, one: Group, other: Group) -> bool:
+    """Whether two candidates may explain the same: on one joint, or the same part of what is left,
+    wherever they stand. What moves a joint changes all torques, and may take something else."""
+    return one.candidate.joint == other.candidate.joint or alike(view, one, other)
 
 
 def _rivals(view: View, asked: Asked, worth: float) -> dict[int, tuple[int, float]]:
