@@ -123,7 +123,7 @@ def inverted(system: np.ndarray) -> np.ndarray:
 
 def told(data: np.ndarray, system: np.ndarray) -> np.ndarray:
     """Directions (size, k) of parameters in which a system (size, size) is one, of those that the
-    data's part of it (size, size) tells at all; of many bodies they are a half of all."""
+    data's part of it (size, size) tells at all."""
     scale, values, vectors = spanned(system)
     free = vectors / np.sqrt(values) / scale[:, None]
     share, vectors = np.linalg.eigh(free.T @ data @ free)

@@ -15,6 +15,7 @@ from sysid.candidates import candidates
 from sysid.diagnose import evidence, null, projected
 from sysid.log import Log, Segment
 from sysid.lowpass import lowpassed, stride_of
+from sysid.projection import told
 from sysid.view import looked_at
 from tests.evidences import grouped, posed, stacked, viewed
 from tests.problems import fourier_motion
@@ -340,3 +341,15 @@ def test_blows_told_evenly_keep_the_level():
     p = np.array([chance(struck(seed, 0.0)) for seed in range(200)])
     assert 0.01 <= np.mean(p < 0.05) <= 0.10 and 0.38 < np.mean(p < 0.5) < 0.62
     assert all(chance(struck(seed, 0.3)) < 0.01 for seed in range(10))
+
+
+def test_the_directions_that_data_tell_hold_all_that_a_fit_takes():
+    """Columns of rank four in nine parameters of units far apart, beside a prior: what a fit takes of any torque stands in four directions."""
+    rng = np.random.default_rng(3)
+    a = rng.normal(size=(60, 4)) @ rng.normal(size=(4, 9)) * 10.0 ** rng.uniform(-4.0, 4.0, 9)
+    root = 0.3 * np.diag(np.linalg.norm(a, axis=0)) @ rng.normal(size=(9, 9))
+    system = a.T @ a + root @ root.T
+    turn = told(a.T @ a, system)
+    assert turn.shape == (9, 4)
+    np.testing.assert_allclose(turn.T @ system @ turn, np.eye(4), atol=1e-9)
+    np.testing.assert_allclose(a @ turn @ turn.T @ a.T, a @ np.linalg.solve(system, a.T), atol=1e-6)

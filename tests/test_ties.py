@@ -34,6 +34,14 @@ def test_losses_are_the_predictive_densitys_of_the_fold_that_refits_did_not_see(
             np.testing.assert_allclose(found[b], told[p.number[own] == b].sum(0), rtol=1e-7)
 
 
+def test_losses_do_not_depend_on_units():
+    """A parameter in units a million times smaller, or larger, is the same parameter."""
+    p = posed(np.random.default_rng(5))
+    units = 10.0 ** np.array([-6.0, -3.0, 0.0, 3.0, 6.0])
+    other = SimpleNamespace(**(vars(p) | {"a": p.a * units, "root": p.root * units, "target": p.target / units}))
+    np.testing.assert_allclose(losses(viewed(other), p.number), losses(viewed(p), p.number), rtol=1e-6)
+
+
 def test_what_the_angles_noise_makes_is_taken_off_the_losses():
     p = posed(np.random.default_rng(4))
     view = viewed(p)

@@ -20,7 +20,7 @@ _FIRST = 1e-6  # share of a direction: less is none, and what is left of it roun
 @dataclass(frozen=True)
 class Design:
     """Weighted columns (dof, n, directions) of the directions of the parameters, and of the shape
-    values' slopes, that data tell at all, which of many bodies are a third. In these directions
+    values' slopes, that data tell at all: of many bodies about half. In these directions
     columns' columns plus half of the prior's Hessian are one. The residual (n, dof) at their
     optimum, weighted; `change` (size,) of the parameters from the model's own optimum, whose
     friction may be held at zero, to this one, where it is free; `turn` (size, directions); what the
