@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from . import motor_side, units
-from .clock import corrected
+from .clock import Clock, corrected
 from .drive_spec import ActuatorSpec
 from .errors import LogError, SysidWarning
 from .events import Event
@@ -29,6 +29,9 @@ GAP_STEPS = 10.0
 UNIFORM = 0.02
 # Of a step: stamps that are off by less are right.
 _TOLD = 1e-3
+# Of what stamps are rounded to: as much beside a line is a steady clock's own rounding. Twice that is most likely a steady one's
+# too, which ran late now and then, unless the angles tell otherwise.
+_ROUNDED = 0.505
 _LARGEST = 1e20  # no unit makes a measured signal larger (a clock in ns, logged as a signal, reads 2e18)
 NO_ACTUATORS: dict[str, ActuatorSpec] = {}
 DEGREES = 4.0 * np.pi  # rad: no robot joint turns so far from zero, but its angle in degrees does
@@ -200,15 +203,16 @@ def _segments(t, signals, where: str, breaks: Iterable[int] = ()):
         clock = t[a:b]
         if b - a < 2:
             continue
-        if _is_uniform(clock, step):
+        rounding = _of_rounding(clock, step)
+        true = corrected(clock, part["q"]) if rounding > _ROUNDED else Clock(clock)
+        told, left = true.off > _TOLD * step, None
+        if not told and rounding <= 2.0 * _ROUNDED:
             mean = (clock[-1] - clock[0]) / (len(clock) - 1)
             yield segment(clock[0] + mean * np.arange(len(clock)), mean, part)
             continue
         own = np.diff(clock)
         # as many samples as were measured: the mean step, without the samples that are missing
         own = float(np.mean(own[own < 1.5 * step]))
-        true, left = corrected(clock, part["q"]), None
-        told = true.off > _TOLD * step
         if told:
             clock, off = true.t, max(off, true.off)
         clock, part = _resampled(clock, part, own)
@@ -230,18 +234,32 @@ def _segments(t, signals, where: str, breaks: Iterable[int] = ()):
         )
 
 
-def _is_uniform(t, step: float) -> bool:
-    """A steady clock: every step close to the median one, or every stamp a steady one that was rounded."""
+def _of_rounding(t, step: float) -> float:
+    """By how much stamps (n,) are off a steady clock, in what they are rounded to: half of it of a clock that is steady; zero of stamps that are near enough."""
     if np.abs(np.diff(t) - step).max() <= UNIFORM * step:
-        return True
-    steady = np.linspace(t[0], t[-1], len(t))
+        return 0.0
     since = t - t[0]
     for digits in range(10):
         quantum = 10.0**-digits
         if quantum <= step and np.abs(since / quantum - np.round(since / quantum)).max() < 1e-3:
-            # the two end stamps are rounded as well, each by up to half a quantum
-            return bool(np.abs(t - steady).max() <= 1.01 * quantum)
-    return False
+            return _off_line(since / quantum)
+    return np.inf
+
+
+def _off_line(values) -> float:
+    """The least by which all of values (n,) stay within of a straight line: an edge of their hull is as steep as the best."""
+    from scipy.spatial import ConvexHull, QhullError
+
+    along = np.linspace(0.0, 1.0, len(values))
+    beside = values - (values[0] + (values[-1] - values[0]) * along)
+    try:
+        corners = ConvexHull(np.stack([along, beside], axis=1)).vertices
+    except QhullError:  # a straight line
+        return float(np.abs(beside).max())
+    along, beside = along[corners], beside[corners]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        steep = (np.roll(beside, 1) - beside) / (np.roll(along, 1) - along)
+    return 0.5 * min(float(np.ptp(beside - one * along)) for one in steep[np.isfinite(steep)])
 
 
 def segment(t, step, part) -> Segment:

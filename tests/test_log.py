@@ -366,3 +366,44 @@ def test_rounded_stamps_are_a_steady_clock(rate, digits, recwarn):
     np.testing.assert_array_equal(segment.q, q)
     np.testing.assert_allclose(segment.step, 1 / rate, rtol=1e-3)
     assert not recwarn.list
+
+
+@pytest.mark.parametrize("n", [2, 3, 10, 300])
+@pytest.mark.parametrize("quantum", [1.0, 1e-3])
+def test_how_far_stamps_are_off_a_line_is_what_a_linear_program_says(n, quantum):
+    """The hull of the stamps tells the best line in Chebyshev's sense."""
+    from scipy.optimize import linprog
+
+    from sysid.log import _off_line
+
+    rng = np.random.default_rng(n)
+    values = 10.0 * np.arange(n) + quantum * rng.normal(size=n)
+    rows = np.stack([np.ones(n), np.arange(n)], axis=1)
+    signs = np.concatenate([rows, -rows])
+    best = linprog(
+        [0.0, 0.0, 1.0], np.column_stack([signs, -np.ones(2 * n)]), np.concatenate([values, -values]), bounds=[(None, None), (None, None), (0, None)]
+    )
+    assert _off_line(values) == pytest.approx(best.fun, abs=1e-6 * quantum)
+
+
+def test_stamps_that_jitter_by_what_they_are_rounded_to_are_put_right():
+    """A logger that is early or late by 0.5 ms and writes milliseconds has every stamp within one of a steady clock; the angles tell them apart."""
+    from sysid.log import _segments
+
+    rng = np.random.default_rng(3)
+    steady = 0.01 * np.arange(400)
+    taken = steady + np.clip(5e-4 * rng.standard_normal(400), -1.4e-3, 1.4e-3)
+    taken[[0, -1]] = steady[[0, -1]]
+    stamps = np.round(taken, 3)
+    assert np.abs(stamps - steady).max() < 1.01e-3 < np.abs(np.diff(stamps) - 0.01).max()
+    at = lambda t: np.stack([np.sin(5.0 * t), np.cos(3.0 * t), np.sin(4.0 * t + 1.0)], axis=1)  # noqa: E731
+    q = at(taken)
+    with pytest.warns(SysidWarning) as told:
+        (segment,) = _segments(stamps, {"q": q, "tau": q}, "made")
+    assert "the time stamps are off" in str([str(one.message) for one in told])
+    rms = lambda x: np.sqrt(np.mean(np.square(x[20:-20])))  # noqa: E731
+    assert rms(segment.q - at(segment.t)) < 0.4 * rms(q - at(steady))
+    # where nothing moves fast enough to tell, they are a steady clock's
+    slow = at(0.02 * taken) + 1e-4 * rng.standard_normal((400, 3))
+    (segment,) = _segments(stamps, {"q": slow, "tau": slow}, "made")
+    np.testing.assert_array_equal(segment.q, slow)
