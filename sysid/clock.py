@@ -37,7 +37,9 @@ _LEAST = 0.01
 _BINS, _ROUNDS, _FEWEST = 20, 3, 200
 _MEDIAN = 0.4549  # of a squared normal variable
 _MOST = 3.0  # deviations of the clock
-_SELDOM = 1e-3  # windows of a clock that is as even as any, in which its spectrum seems to fall
+# Times what the clock makes of a band: twice, half of it is motion, and to take it for the clock's
+# costs as much as to leave the clock's (Mallows 1973)
+_MOTION = 2.0
 _ORDERED = 0.45  # of the way to a neighbour: samples keep their order
 
 
@@ -45,28 +47,32 @@ _ORDERED = 0.45  # of the way to a neighbour: samples keep their order
 class Clock:
     """When samples were taken: t (n,) [s]; off: RMS [s] by which their stamps were off, zero where
     they were right; deviation [s] of one stamp's error; below (n,) [Hz]: the frequency above which
-    the errors about each sample were read off. What is slower than that is left in t."""
+    the errors about each sample were read off. What is slower than that is left in t, and of what
+    is faster the share `doubt` (n,) of its power: of slow joints no angle tells much."""
 
     t: np.ndarray
     off: float = 0.0
     deviation: float = 0.0
     below: np.ndarray | None = None
+    doubt: np.ndarray | None = None
 
     def at(self, t, step: float) -> Left | None:
         """What is left of the errors at times t (m,) [s] a `step` apart; None where none is."""
         if self.below is None:
             return None
         nearest = np.searchsorted(0.5 * (self.t[1:] + self.t[:-1]), t)
-        return Left(self.deviation, self.below[nearest], step)
+        return Left(self.deviation, self.below[nearest], self.doubt[nearest], step)
 
 
 @dataclass(frozen=True)
 class Left:
     """Errors of a clock that no angle told: those of stamps `step` [s] apart, white and of RMS
-    `deviation` [s], as far as they stay below the frequencies `below` (n,) [Hz]."""
+    `deviation` [s], as far as they stay below the frequencies `below` (n,) [Hz], and of what is
+    faster the share `doubt` (n,) of the power."""
 
     deviation: float
     below: np.ndarray
+    doubt: np.ndarray
     step: float
 
     def drawn(self, rng: np.random.Generator) -> np.ndarray:
@@ -74,8 +80,8 @@ class Left:
         errors = self.deviation * rng.standard_normal(len(self.below))
         out = np.zeros(len(errors))
         for frequency in np.unique(self.below):
-            here = self.below == frequency
-            out[here] = low(errors, frequency, self.step)[here]
+            here, slow = self.below == frequency, low(errors, frequency, self.step)
+            out[here] = (slow + np.sqrt(self.doubt) * (errors - slow))[here]
         return out
 
 
@@ -99,36 +105,35 @@ def corrected(t: np.ndarray, q: np.ndarray) -> Clock:
     for _ in range(_ROUNDS):
         even = _evenly(t + late, q)
         told = [_late(t, q, late, even, band) for band in bands]
-        late, below = _lowest(t, told, bands, step)
+        (late, doubt), below = _lowest(t, told, bands, density, step)
         late = np.clip(late, -room[:-1], room[1:])
         late[[0, -1]] = 0.0
-    return Clock(t + late, float(np.sqrt(np.mean(late**2))), float(np.sqrt(density)), below)
+    return Clock(t + late, float(np.sqrt(np.mean(late**2))), float(np.sqrt(density)), below, doubt)
 
 
-def _lowest(t, told: list[np.ndarray], bands: list[float], step: float):
-    """How late (n,) samples were, and above which frequency (n,) [Hz] that was read off: the lowest
-    that has forgotten the log's ends and above which nothing moves near a sample.
+def _lowest(t, told: list[np.ndarray], bands: list[float], density: float, step: float):
+    """How late samples were, with their doubt (2, n), and above which frequency (n,) [Hz] that was
+    read off: the lowest that has forgotten the log's ends and above which little moves near a
+    sample.
 
     A short fast move, too seldom to count in the whole log, is told from the clock by its spectrum:
-    the clock's is even, a move's falls with frequency."""
+    the clock's is even, of `density` [s^2], a move's falls with frequency."""
     from scipy.ndimage import maximum_filter1d, uniform_filter1d
-    from scipy.stats import f as ratios
 
-    late, highest, below = told[0], bands[0], np.full(len(t), bands[0])
+    late, below = told[0], np.full(len(t), bands[0])
     to_end, still = np.minimum(t - t[0], t[-1] - t), np.ones(len(t), bool)
-    for band, own in zip(bands[1:], told[1:]):
+    for k, band in enumerate(bands[1:], 1):
         width = max(3, round(2.0 / (band * step)))
-        power = lambda values: uniform_filter1d(values**2, width)  # noqa: E731, B023
-        between, above = _kept(band * step) - _kept(highest * step), _kept(highest * step)
-        unlikely = ratios.isf(_SELDOM, max(1.0, between * width), max(1.0, above * width))
-        beyond = power(own - told[0]) * above > unlikely * between * power(told[0])
-        still &= ~maximum_filter1d(beyond, width) & (to_end >= 1.0 / band)
-        late, below = np.where(still, own, late), np.where(still, band, below)
+        power = uniform_filter1d((told[k][0] - told[k - 1][0]) ** 2, width)
+        clock = density * (_kept(band * step) - _kept(bands[k - 1] * step))
+        still &= ~maximum_filter1d(power > _MOTION * clock, width) & (to_end >= 1.0 / band)
+        late, below = np.where(still, told[k], late), np.where(still, band, below)
     return late, below
 
 
 def _late(t, q, late, even, band: float) -> np.ndarray:
-    """How late (n,) [s] samples were, of a motion that stays below a frequency.
+    """How late [s] samples were, of a motion that stays below a frequency, and the share of an
+    error's power that is left of it (2, n).
 
     Args:
         late: (n,) as far as it is known. even: `_evenly` of the samples with that.
@@ -137,13 +142,15 @@ def _late(t, q, late, even, band: float) -> np.ndarray:
     beside = beside + speed * late[:, None]
     noise, off = _components(beside, speed)
     if not off > 0.0:
-        return np.zeros(len(t))
+        return np.zeros((2, len(t)))
     # less than this of what the clock makes of fast motion is not to be told from corners of slow
     weight = 1.0 / np.maximum(noise, _LEAST * off * np.max(speed**2, axis=0))
-    found = (beside * speed) @ weight / (speed**2 @ weight + 1.0 / off)
+    told = speed**2 @ weight + 1.0 / off
+    found = (beside * speed) @ weight / told
     # what is slower, an earlier round and another frequency brought in
     found = found - low(found, band, even[0][1] - even[0][0])
-    return np.clip(found, -_MOST * np.sqrt(off), _MOST * np.sqrt(off))
+    doubt = (1.0 / off + speed**2 @ (weight**2 * noise)) / (off * told**2)
+    return np.stack([np.clip(found, -_MOST * np.sqrt(off), _MOST * np.sqrt(off)), doubt])
 
 
 def _bands(t, q, step: float) -> tuple[list[float], float]:

@@ -117,3 +117,35 @@ def test_what_no_angle_told_of_the_clock_is_drawn_again():
     for low, high in ((0.5, 1.5), (1.5, 3.0)):
         here = (frequency > low) & (frequency < high)
         assert np.mean(np.array(drawn)[:, here]) == pytest.approx(np.mean(np.array(left)[:, here]), rel=0.5), (low, high)
+
+
+def stopping(t, seed):
+    """Angles (n, 3): moves of half a second to a second and a half, with stops in between."""
+    rng = np.random.default_rng(seed)
+    out = np.zeros((len(t), 3))
+    for j in range(3):
+        at = 0.0
+        while at < t[-1]:
+            way, took = rng.uniform(-1.2, 1.2), rng.uniform(0.5, 1.5)
+            s = np.clip((t - at) / took, 0.0, 1.0)
+            out[:, j] += way * s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
+            at += took + rng.uniform(0.0, 1.0)
+    return out
+
+
+@pytest.mark.parametrize("moves", [motion, stopping])
+def test_what_is_left_of_the_clock_is_foreseen_in_accelerations(moves):
+    """Moves that the clock is not told from, and joints too slow to tell it, leave more of it: what is drawn again is about as large
+    where it counts, below 15 Hz in accelerations."""
+    from sysid.frequencies import low
+
+    left, drawn = [], []
+    for seed in range(6):
+        instants = taken(seed)
+        t = instants - 1e-3 * np.random.default_rng(seed + 20).integers(0, 2, len(instants))
+        q = moves(t, seed)
+        clock, speed = corrected(instants, q), np.gradient(q, t, axis=0)
+        felt = lambda late: np.diff(low((late - np.median(late))[:, None] * speed, 15.0, STEP), 2, axis=0)[50:-50]  # noqa: E731, B023
+        left.append(np.mean(felt(clock.t - t) ** 2))
+        drawn.append(np.mean(felt(clock.at(STEP * np.arange(len(t)), STEP).drawn(np.random.default_rng(seed))) ** 2))
+    assert 0.5 < np.sqrt(np.mean(left) / np.mean(drawn)) < 1.4
