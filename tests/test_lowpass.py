@@ -313,3 +313,25 @@ def test_windows_that_overlap_are_summed_as_each_alone():
         starts = range(0, values.shape[1] - size + 1, stride)
         wanted = np.array([values[:, k : k + size] @ weights for k in starts]).T
         np.testing.assert_allclose(_weighed(values, weights, stride), wanted, atol=1e-12)
+
+
+def test_a_closed_brake_says_nothing_of_the_noise_in_motion():
+    """An angle that is held for most of the log, to the last digit or to what a spline leaves of it, is as noisy as it is where it moves."""
+    from types import SimpleNamespace
+
+    from sysid.lowpass.angles import angle_noise, rougher
+
+    rng = np.random.default_rng(2)
+    t = 0.01 * np.arange(3000)
+    q = np.sin(t)[:, None] * np.ones(2)
+    noisy = q + 1e-4 * rng.normal(size=q.shape)
+    moves = t > 20.0
+    held = np.where(moves[:, None], noisy, noisy[~moves][-1])
+    for braked in (held, held + 1e-13 * rng.normal(size=q.shape)):
+        segment = SimpleNamespace(q=braked, step=0.01)
+        noise = angle_noise(segment, 3.0)
+        np.testing.assert_allclose(noise, 1e-4, rtol=0.3)
+        more = rougher(segment, noise, 3.0, np.random.default_rng(3)) - braked
+        np.testing.assert_allclose(more[t > 20.5].std(axis=0), 1e-4, rtol=0.3)
+        assert np.abs(more[t < 19.5]).max() < 1e-9
+    assert not angle_noise(SimpleNamespace(q=np.ones((3000, 2)), step=0.01), 3.0).any()

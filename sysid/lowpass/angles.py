@@ -10,6 +10,7 @@ from ..gaussian import HIGHEST, Gaussian
 
 _WINDOW = 0.1  # s
 _BAND = 4.0  # the angles' own low-pass, as a multiple of the cutoff
+_HELD = 1e-9  # of an angle's range: less than any encoder's noise
 _FEWEST = 50  # steps; and counts of a grain beyond which any number is near a whole one
 
 
@@ -17,8 +18,8 @@ def noise_of(q, smooth, taken: float, step: float) -> np.ndarray:
     """RMS (dof,) of white noise on angles q (n, dof): the lesser of what a low-pass took off and of
     what third differences show, as either may hold motion too; each in the middle of all windows of
     time, as about a reversal there is more."""
-    taken_off, differences_ = (_by_window(v, step) for v in ((q - smooth) / taken, _third(q)))
-    return np.minimum(np.median(taken_off, axis=0), np.median(differences_, axis=0))
+    held = _HELD * np.ptp(q, axis=0)
+    return np.minimum(*(_usual(_by_window(v, step), held) for v in ((q - smooth) / taken, _third(q))))
 
 
 def angle_noise(segment, cutoff: float) -> np.ndarray:
@@ -30,6 +31,14 @@ def angle_noise(segment, cutoff: float) -> np.ndarray:
         return np.zeros(segment.q.shape[1])
     smooth = low(segment.q, axis=0)[inside]
     return noise_of(segment.q[inside], smooth, low.taken_of_noise, segment.step)
+
+
+def _usual(by_window, held) -> np.ndarray:
+    """The middle (dof,) of windows (windows, dof), but for those of no more than `held` (dof,): a
+    brake that is closed says nothing of the noise in motion. Zero where all are."""
+    from numpy.ma import masked_less_equal, median
+
+    return median(masked_less_equal(by_window, held), axis=0).filled(0.0)
 
 
 def _third(q) -> np.ndarray:
@@ -70,7 +79,7 @@ def rougher(segment, noise, cutoff: float, rng: np.random.Generator) -> np.ndarr
 
     q = segment.q
     local = median_filter(_by_window(_third(q), segment.step), size=(5, 1), mode="nearest")
-    middle = np.median(local, axis=0)
+    middle = _usual(local, _HELD * np.ptp(q, axis=0))
     at = np.linspace(0, len(q) - 1, len(local) + 1)
     at = 0.5 * (at[1:] + at[:-1])
     size = local * np.minimum(noise / np.maximum(middle, 1e-300), 1.0)
