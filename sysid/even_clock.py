@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .log import GAP_STEPS, UNIFORM
+from .log import GAP_STEPS
+from .rounded_stamps import UNIFORM
 
 
 @dataclass(frozen=True)

@@ -20,13 +20,12 @@ from .events import Event
 from .groups import levels_of
 from .log_spec import DataSpec, LogSpec
 from .recording import Recording, recorded
+from .rounded_stamps import off_steady
 from .segment import Segment
 from .spans import Spans
 
 # A step longer than this many median steps is a hole that interpolation would invent motion for.
 GAP_STEPS = 10.0
-# Steps that all stay this close to the median are uniform sampling with rounded time stamps.
-UNIFORM = 0.02
 # Of a step: stamps that are off by less are right.
 _TOLD = 1e-3
 # Of what stamps are rounded to: as much beside a line is a steady clock's own rounding. Twice that is most likely a steady one's
@@ -203,7 +202,7 @@ def _segments(t, signals, where: str, breaks: Iterable[int] = ()):
         clock = t[a:b]
         if b - a < 2:
             continue
-        rounding = _of_rounding(clock, step)
+        rounding = off_steady(clock, step)
         true = corrected(clock, part["q"]) if rounding > _ROUNDED else Clock(clock)
         told, left = true.off > _TOLD * step, None
         if not told and rounding <= 2.0 * _ROUNDED:
@@ -232,34 +231,6 @@ def _segments(t, signals, where: str, breaks: Iterable[int] = ()):
             ),
             stacklevel=3,
         )
-
-
-def _of_rounding(t, step: float) -> float:
-    """By how much stamps (n,) are off a steady clock, in what they are rounded to: half of it of a clock that is steady; zero of stamps that are near enough."""
-    if np.abs(np.diff(t) - step).max() <= UNIFORM * step:
-        return 0.0
-    since = t - t[0]
-    for digits in range(10):
-        quantum = 10.0**-digits
-        if quantum <= step and np.abs(since / quantum - np.round(since / quantum)).max() < 1e-3:
-            return _off_line(since / quantum)
-    return np.inf
-
-
-def _off_line(values) -> float:
-    """The least by which all of values (n,) stay within of a straight line: an edge of their hull is as steep as the best."""
-    from scipy.spatial import ConvexHull, QhullError
-
-    along = np.linspace(0.0, 1.0, len(values))
-    beside = values - (values[0] + (values[-1] - values[0]) * along)
-    try:
-        corners = ConvexHull(np.stack([along, beside], axis=1)).vertices
-    except QhullError:  # a straight line
-        return float(np.abs(beside).max())
-    along, beside = along[corners], beside[corners]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        steep = (np.roll(beside, 1) - beside) / (np.roll(along, 1) - along)
-    return 0.5 * min(float(np.ptp(beside - one * along)) for one in steep[np.isfinite(steep)])
 
 
 def segment(t, step, part) -> Segment:

@@ -138,8 +138,7 @@ def root(products: np.ndarray) -> np.ndarray:
 
 def directions(plain, whole, squares, rough):
     """Orthonormal directions (k0, k) of columns that a model leaves, that the data tell and that are
-    no noise, the squares (blocks, k, k) in them, and the norm (k0,) of what is left of each column;
-    None where there is none.
+    no noise, and the norm (k0,) of what is left of each column; None where there is none.
 
     Args:
         plain, whole: (k0, k0) squares of the columns, and of what the model leaves of them, prior
@@ -158,5 +157,4 @@ def directions(plain, whole, squares, rough):
         turn = turn @ vectors[:, good(values)]
         if not turn.shape[1]:
             return None
-    turned = turn.T @ squares @ turn
-    return turn, turned, np.sqrt(np.clip(np.diagonal(whole), 0.0, None))
+    return turn, np.sqrt(np.clip(np.diagonal(whole), 0.0, None))

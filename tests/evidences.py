@@ -27,7 +27,7 @@ def viewed(p):
     turn = told(sum(a.T @ a for a in columns), m.T @ m)
     columns = columns @ turn
     design = Design(columns, residual, np.zeros(len(x)), turn, 0.0 * columns, 0.0 * residual)
-    noise = spectra(residual, np.ones(residual.shape, bool), 0.01, 0.01)
+    noise = spectra(residual, columns, np.ones(residual.shape, bool), 0.01, 0.01)
     return SimpleNamespace(design=design, sums=summed(design, by_block(p.number)), blocks=p.number, weights=p.weights, x=x, spectra=noise)
 
 

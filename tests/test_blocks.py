@@ -154,13 +154,6 @@ def test_sums_of_nothing_seldom_stand_away():
     assert abs(np.median(far)) < 0.1
 
 
-def test_signs_are_signs():
-    found = blocks.signs(40, 5000, np.random.default_rng(0))
-    assert found.shape == (5000, 40) and set(np.unique(found)) == {-1.0, 1.0}
-    assert abs(found.mean()) < 4 / np.sqrt(found.size)
-    np.testing.assert_allclose(found.T @ found / 5000, np.eye(40), atol=5 / np.sqrt(5000))
-
-
 # ---- the confidence set
 
 

@@ -374,7 +374,7 @@ def test_how_far_stamps_are_off_a_line_is_what_a_linear_program_says(n, quantum)
     """The hull of the stamps tells the best line in Chebyshev's sense."""
     from scipy.optimize import linprog
 
-    from sysid.log import _off_line
+    from sysid.rounded_stamps import off_line
 
     rng = np.random.default_rng(n)
     values = 10.0 * np.arange(n) + quantum * rng.normal(size=n)
@@ -383,7 +383,7 @@ def test_how_far_stamps_are_off_a_line_is_what_a_linear_program_says(n, quantum)
     best = linprog(
         [0.0, 0.0, 1.0], np.column_stack([signs, -np.ones(2 * n)]), np.concatenate([values, -values]), bounds=[(None, None), (None, None), (0, None)]
     )
-    assert _off_line(values) == pytest.approx(best.fun, abs=1e-6 * quantum)
+    assert off_line(values) == pytest.approx(best.fun, abs=1e-6 * quantum)
 
 
 def test_stamps_that_jitter_by_what_they_are_rounded_to_are_put_right():

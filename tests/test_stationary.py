@@ -15,12 +15,17 @@ def coloured(rng, shape, keep: float):
     return out[start:]
 
 
+def nothing(values):
+    """Of a fit of no columns."""
+    return np.zeros((values.shape[1], len(values), 0))
+
+
 def test_spectrum_is_that_of_the_correlation():
     rng = np.random.default_rng(0)
     n, keep, step = 20_000, 0.8, 0.01
     values = coloured(rng, (n, 2), keep) * np.array([1.0, 3.0])
     use = rng.random((n, 2)) < 0.8
-    found = spectra(values, use, step / (1.0 - keep), step)
+    found = spectra(values, nothing(values), use, step / (1.0 - keep), step)
     alike = np.fft.irfft(found, axis=1)[:, :10]
     lags = 8 / (1.0 - keep)
     wanted = keep ** np.arange(10) * (1.0 - np.arange(10) / (lags + 1.0))  # Bartlett's window
@@ -34,7 +39,7 @@ def test_covariance_is_the_dense_one(scale):
     rng = np.random.default_rng(1)
     n, lags = 300, 40
     values = coloured(rng, (n, 1), 0.7)
-    (spectrum,) = spectra(values, np.ones((n, 1), bool), 0.05, 0.01)
+    (spectrum,) = spectra(values, nothing(values), np.ones((n, 1), bool), 0.05, 0.01)
     correlation = np.fft.irfft(spectrum)
     assert np.abs(correlation[lags + 1 : -lags]).max() < 1e-2 * correlation[0]
     columns = rng.normal(size=(n, 4, 2)).cumsum(axis=0)
@@ -57,9 +62,32 @@ def test_covariance_is_that_of_scores_of_noise_that_is_drawn():
     spectrum = np.fft.rfft(0.9**lag).real
     np.testing.assert_allclose(np.diag(covariance(columns, spectrum)[0]), np.mean(scores**2, axis=1), rtol=0.08)
     # as read off another stretch of the noise: Bartlett's window over eight memories takes a tenth of the slowest
-    (read,) = spectra(coloured(rng, (100_000, 1), 0.9)[: 60 * n], np.ones((60 * n, 1), bool), 0.1, 0.01)
+    values = coloured(rng, (60 * n, 1), 0.9)
+    (read,) = spectra(values, nothing(values), np.ones((60 * n, 1), bool), 0.1, 0.01)
     alike = np.fft.irfft(read)
     long = np.zeros(size)
     long[: n // 2], long[-n // 2 :] = alike[: n // 2], alike[-n // 2 :]
     found = covariance(columns, np.clip(np.fft.rfft(long).real, 0.0, None))
     np.testing.assert_allclose(np.diag(found[0]), np.mean(scores**2, axis=1), rtol=0.2)
+
+
+def test_a_spectrum_is_that_of_the_noise_before_a_fit():
+    """Slow columns take of slow noise: what they leave tells what it was, white or not."""
+    rng = np.random.default_rng(3)
+    n, step = 2000, 0.01
+    t = step * np.arange(n)
+    waves = np.concatenate([[f(2.0 * np.pi * k * t / 20.0) for k in range(1, 13)] for f in (np.sin, np.cos)]).T
+    columns = np.linalg.qr(waves)[0]
+    score = np.sin(2.0 * np.pi * 0.4 * t)[:, None, None]  # as slow as they are, and not among them
+    score[:, 0, 0] *= np.sign(np.sin(0.3 * t))
+    for keep in (0.0, 0.9):
+        own, plain, column = [], [], score[:, 0, 0]
+        wanted = column @ toeplitz(keep ** np.arange(n)) @ column
+        for _ in range(60):
+            noise = coloured(rng, (n, 1), keep)
+            left = noise - columns @ (columns.T @ noise)
+            memory = step / (1.0 - keep)
+            own.append(covariance(score, spectra(left, columns[None], np.ones((n, 1), bool), memory, step)[0]))
+            plain.append(covariance(score, spectra(left, nothing(left), np.ones((n, 1), bool), memory, step)[0]))
+        assert np.mean(own) == pytest.approx(wanted, rel=0.3), keep  # Bartlett's window takes a part of slow noise too
+        assert abs(np.mean(own) - wanted) < 0.7 * abs(np.mean(plain) - wanted), keep

@@ -1,7 +1,6 @@
 """How sure a sum over blocks is, or an estimate that blocks were left out of.
 
-Source: White 1980; Cameron & Miller 2015 (clustered scores); Liu 1988, Davidson & Flachaire 2008
-(signs).
+Source: White 1980; Cameron & Miller 2015 (clustered scores).
 """
 
 from __future__ import annotations
@@ -63,11 +62,6 @@ def jackknife(without) -> np.ndarray:
     without = np.asarray(without)
     count = len(without)
     return np.sqrt((count - 1) / count * ((without - without.mean(0)) ** 2).sum(0))
-
-
-def signs(count: int, draws: int, rng: np.random.Generator) -> np.ndarray:
-    """Random signs (draws, count)."""
-    return rng.integers(0, 2, (draws, count)) * 2.0 - 1.0
 
 
 def resting(squares: np.ndarray) -> float:

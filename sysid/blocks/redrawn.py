@@ -1,8 +1,10 @@
-"""Coefficients that blocks tell, their blocks' signs drawn anew."""
+"""Coefficients that blocks tell, drawn anew from noise alone."""
 
 from __future__ import annotations
 
 import numpy as np
+
+_FOURTH = 3.0  # moment of a normal variable
 
 
 def left_out(squares: np.ndarray) -> np.ndarray:
@@ -10,27 +12,21 @@ def left_out(squares: np.ndarray) -> np.ndarray:
     return np.linalg.inv(np.eye(squares.shape[-1]) - squares)
 
 
-def redrawn(squares: np.ndarray, moves: np.ndarray, sign: np.ndarray):
-    """What draws tell that keep the size of every block's move: the square (draws, groups) of the
-    coefficients, and the spread (draws, groups) of the moves after each draw's own refit.
+def redrawn(moves: np.ndarray, noise: np.ndarray):
+    """Draws of what noise as loud, block by block, tells where nothing is there: the square (draws,
+    groups) of the coefficients, and the spread (draws, groups) that blocks would tell of them.
+
+    Blocks are long, so their sums are normal, and what they add to a coefficient says nothing of
+    how far they scatter (Cochran 1934). A move's square already scatters about what it tells, three
+    times as wide as its like: a draw's spread scatters by as much less.
 
     Args:
-        squares: (groups, blocks, k, k). moves: (groups, blocks, k). sign: (draws, blocks).
+        moves: (groups, blocks, k). noise: (2, draws, blocks) normal variables, for one and the
+            other.
     """
-    out = left_out(squares)
-    # what a draw's own scores move by, before its refit
-    again = np.einsum("gbkl,gbl->gbk", out, moves)
-    pulled = out @ squares
-    after = np.einsum("gbkl,gbl->gbk", pulled, again)
-    twice = np.einsum("gbkl,gblm->gkm", pulled, pulled, optimize=True)
-    count, b, k = moves.shape
-    flat = lambda a: np.moveaxis(a, 1, 0).reshape(b, count * k)  # noqa: E731
-    c = (sign @ flat(moves)).reshape(-1, count, k)
-    u = (sign @ flat(after)).reshape(-1, count, k)
-    size = sign**2 @ np.sum(again**2, axis=2).T
-    spread = size - 2.0 * np.sum(c * u, axis=2)
-    spread += np.einsum("dgk,gkl,dgl->dg", c, twice, c, optimize=True)
-    return np.sum(c * c, axis=2), np.maximum(spread, 1e-9 * size)
+    told, size = np.einsum("db,gbk->dgk", noise[0], moves, optimize=True), np.sum(moves**2, axis=2)
+    own = 1.0 + (noise[1] ** 2 - 1.0) / np.sqrt(_FOURTH)
+    return np.sum(told**2, axis=2), own @ size.T
 
 
 def normal_scores(statistic, directions, rest) -> np.ndarray:

@@ -78,7 +78,7 @@ def ask(view: View, extra=(), tell=lambda share: None, *, before=None, anew=()) 
     for joint, own in made.items():
         if joint not in out:
             gains = np.array([group.taken for group in own])
-            # the same signs for all: draws of one residual
-            maxima = null.maxima(own, np.random.default_rng(0), belief)
+            # draws of one residual, the joint's own
+            maxima = null.maxima(own, np.random.default_rng(joint + 1), belief)
             out[joint] = own, null.statistics(own, belief), gains, maxima
     return Asked(out, belief)

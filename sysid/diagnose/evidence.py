@@ -4,7 +4,8 @@ A group is the columns of one candidate at one set of shape values, projected of
 model and made orthonormal. Over blocks b:
 
     s_b = Q_b' r_b - (what the angles' noise makes of it),   G_b = Q_b' Q_b
-    c = sum_b s_b + s_0                   its coefficients; s_0, the prior's, is never left out
+    c = sum_b s_b                         its coefficients; the prior is one more block, the last:
+                                          it is wrong by some chance too, but no fold leaves it out
     a_b, A_b                              s_b, G_b of noise as loud as before the model's own fit
     m_b = (1 - G_b)^-1 (a_b - A_b c)      how far they move when a block is left out
     T = c'c / sum_b |m_b|^2               is it there?
@@ -35,8 +36,8 @@ _LEVERAGE = 0.9  # of a direction: what one block may hold of it
 @dataclass(frozen=True)
 class Group:
     """One candidate at shape values. scores (blocks, k), squares (blocks, k, k) of the orthonormal
-    columns, `loud` and `loud_squares` the same of rows whose noise is as loud as before the model's
-    fit, `kept` (k,) the prior's score; `back` (k0, k) turns coefficients of these into the
+    columns, the prior's last, `loud` and `loud_squares` the same of rows whose noise is as loud as
+    before the model's fit; `back` (k0, k) turns coefficients of these into the
     candidate's own; `sizes` (k0,) the weighted norm of what the model leaves of each own column;
     `foreseen` (k, k) the scores' covariance, were the noise always the same; `loss` the squared
     residual of its joints."""
@@ -47,7 +48,6 @@ class Group:
     squares: np.ndarray
     loud: np.ndarray
     loud_squares: np.ndarray
-    kept: np.ndarray
     back: np.ndarray
     sizes: np.ndarray
     foreseen: np.ndarray
@@ -56,7 +56,7 @@ class Group:
     @cached_property
     def c(self) -> np.ndarray:
         """(k,) coefficients of the orthonormal columns."""
-        return self.scores.sum(0) + self.kept
+        return self.scores.sum(0)
 
     @cached_property
     def taken(self) -> float:
@@ -72,11 +72,12 @@ class Group:
     @cached_property
     def spreads(self) -> tuple[float, float, float]:
         """The moves' sum of squares, what it would be were the noise always the same (that of the
-        residual without what the group takes), and the first one's degrees of freedom."""
+        residual without what the group takes; of the prior, its own move), and the first one's
+        degrees of freedom."""
         left = 1.0 - np.clip(self.taken / max(self.loss, 1e-300), 0.0, _LEVERAGE)
         directions, rest = self.freedom
-        own = directions * max(rest - 1.0, 1.0)
-        return float(np.sum(self.moves**2)), float(np.trace(self.foreseen) * left), own
+        own, squared = directions * max(rest - 1.0, 1.0), np.sum(self.moves**2, axis=1)
+        return float(squared.sum()), float(np.trace(self.foreseen) * left + squared[-1]), own
 
     @cached_property
     def freedom(self) -> tuple[float, float]:
@@ -85,14 +86,14 @@ class Group:
         moves = self.moves
         spread = moves.T @ moves
         directions = np.trace(spread) ** 2 / max(np.sum(spread**2), 1e-300)
-        return float(directions), blocks.resting(self.squares)
+        return float(directions), blocks.resting(self.squares[:-1])
 
     @cached_property
     def testable(self) -> bool:
         """Whether it rests on enough blocks to be told from chance; if not, it may still be a rival
         of one that is."""
-        most = float(np.linalg.eigvalsh(self.squares).max())
-        return blocks.resting(self.squares) >= _FEWEST and most <= _LEVERAGE
+        most = float(np.linalg.eigvalsh(self.squares[:-1]).max())
+        return blocks.resting(self.squares[:-1]) >= _FEWEST and most <= _LEVERAGE
 
     @cached_property
     def tested(self) -> Group:
@@ -102,17 +103,17 @@ class Group:
         a sign. What it takes, and its coefficients, are the group's own."""
         if self.testable and not self.candidate.blows:
             return self
-        turn = blocks.shared(self.squares, _LEVERAGE)
+        turn = blocks.shared(self.squares[:-1], _LEVERAGE)
         group = self if turn.shape[1] in (0, len(turn)) else self._turned(turn)
-        share = np.einsum("bkk->b", group.squares)
+        share = np.einsum("bkk->b", group.squares[:-1])
         weight = np.minimum(1.0, blocks.even(share, 2.0 * _FEWEST) / np.maximum(share, 1e-300))
         if weight.min() == 1.0 or (group.testable and not self.candidate.blows):
             return group
-        squares = group.squares * weight[:, None, None]
+        w = np.append(weight, 1.0)[:, None]
+        squares = group.squares * w[:, None]
         values, vectors = np.linalg.eigh(squares.sum(0))
         if values.min() < 1e-6:
             return self
-        w = weight[:, None]
         told = {"scores": w * group.scores, "loud": w * group.loud, "squares": squares}
         told["foreseen"] = group.foreseen * np.sum(weight**2 * share) / share.sum()
         even = replace(group, **told, loud_squares=w[:, None] * group.loud_squares)
@@ -128,7 +129,6 @@ class Group:
             squares=turn.T @ self.squares @ turn,
             loud=self.loud @ turn,
             loud_squares=turn.T @ self.loud_squares @ turn,
-            kept=self.kept @ turn,
             foreseen=turn.T @ self.foreseen @ turn,
             back=self.back @ turn,
             sizes=self.sizes * left / np.maximum(whole, 1e-300),
@@ -164,8 +164,8 @@ class Group:
 def gain(group: Group) -> np.ndarray:
     """(folds,) what a group takes of the weighted squared residual of blocks that it was not fitted
     on."""
-    fold = blocks.folds(len(group.scores))
-    s, g = blocks.summed(fold, group.scores), blocks.summed(fold, group.squares)
+    fold = blocks.folds(len(group.scores) - 1)
+    s, g = blocks.summed(fold, group.scores[:-1]), blocks.summed(fold, group.squares[:-1])
     without = (group.c - s)[:, :, None]
     rest = np.linalg.solve((1.0 + 1e-9) * np.eye(s.shape[1]) - g, without)[:, :, 0]
     return 2.0 * np.sum(rest * s, axis=1) - np.einsum("fi,fij,fj->f", rest, g, rest)

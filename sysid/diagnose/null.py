@@ -1,12 +1,14 @@
 """One null for all candidates at once: what would the greatest statistic be if nothing were there?
 
-What each block moves the coefficients by, m_b, keeps its size and gets a random sign (the wild
-bootstrap of clusters, with the effect's own share left out); each draw is refitted, and the
-greatest statistic over all groups is taken. A group whose statistic stands above all but a share of
-these maxima is there at that family-wise level, whatever the number of candidates and however
-alike.
+What each block moves the coefficients by, m_b, keeps its size and is multiplied by a normal
+variable, the same for all groups on a joint (the multiplier bootstrap of clusters, with the
+effect's own share left out), and the greatest statistic over all groups is taken. A group whose
+statistic stands above all but a share of these maxima is there at that family-wise level, whatever
+the number of candidates and however alike. Random signs in place of normal variables reach as far
+as a dozen blocks do: the greatest of hundreds of groups came beyond twice as often as told.
 
-Source: Westfall & Young 1993; Davidson & Flachaire 2008; Cameron, Gelbach & Miller 2008.
+Source: Westfall & Young 1993; Chernozhukov, Chetverikov & Kato 2013 (maxima by normal
+multipliers); Cameron, Gelbach & Miller 2008 (clusters).
 """
 
 from __future__ import annotations
@@ -60,18 +62,16 @@ def maxima(
     groups = [g.tested for g in groups if g.tested.testable]
     if not groups:
         return out
-    sign = blocks.signs(len(groups[0].scores), draws, rng)
+    noise = rng.normal(size=(2, draws, len(groups[0].scores)))
     by_size: dict[int, list[Group]] = {}
     for group in groups:
         by_size.setdefault(group.scores.shape[1], []).append(group)
     for own in by_size.values():
-        out = np.maximum(out, _greatest(own, sign, belief))
+        top, spread = blocks.redrawn(np.stack([g.moves for g in own]), noise)
+        seen = _spreads(own)
+        loud = belief.moderated(*seen)[0] / seen[0]  # as loud as it is believed to be
+        spread, rest = belief.moderated(*seen, drawn=loud * spread)
+        directions = np.array([g.freedom[0] for g in own])
+        found = blocks.normal_scores(loud * top / spread, directions, rest)
+        out = np.maximum(out, np.max(found, axis=1))
     return out
-
-
-def _greatest(groups: list[Group], sign: np.ndarray, belief: blocks.Belief) -> np.ndarray:
-    squares, moves = (np.stack([getattr(g, word) for g in groups]) for word in ("squares", "moves"))
-    top, spread = blocks.redrawn(squares, moves, sign)
-    spread, rest = belief.moderated(*_spreads(groups), drawn=spread)
-    directions = np.array([g.freedom[0] for g in groups])
-    return np.max(blocks.normal_scores(top / spread, directions, rest), axis=1)

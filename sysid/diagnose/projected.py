@@ -50,9 +50,9 @@ def made(view: View, asked: Sequence, joints: Sequence[int], plain, rough) -> li
 def _made(view: View, asked, joints, plain: np.ndarray, rough: np.ndarray) -> list[Group]:
     design, sums, spans = view.design, view.sums, by_block(view.blocks)
     count, _, n, k = plain.shape
-    size, kk = design.columns.shape[2], count * k
-    cross, own = np.zeros((len(spans), size, kk)), np.zeros((len(spans), count, k, k))
-    score, rough_cross = np.zeros((len(spans), kk)), np.zeros((size, kk))
+    size, kk, parts = design.columns.shape[2], count * k, len(sums.scores)  # a prior has no columns
+    cross, own = np.zeros((parts, size, kk)), np.zeros((parts, count, k, k))
+    score, rough_cross = np.zeros((parts, kk)), np.zeros((size, kk))
     rough_own = np.zeros((count, k, k))
     square = lambda a: np.einsum("nsk,nsl->skl", a, a)  # noqa: E731
     for i, j in enumerate(joints):
@@ -74,8 +74,7 @@ def _made(view: View, asked, joints, plain: np.ndarray, rough: np.ndarray) -> li
         left = left - (design.columns[j] @ absorbed).reshape(n, count, k)
         foreseen += covariance(left, view.spectra[j])
     loss = float(np.sum(design.residual[:, joints] ** 2))
-    score = (score - (sums.scores - sums.rough_scores) @ absorbed).reshape(len(spans), count, k)
-    prior = (sums.scores.sum(0) @ absorbed).reshape(count, k)
+    score = (score - (sums.scores - sums.rough_scores) @ absorbed).reshape(parts, count, k)
     # what stands across a candidate's columns and the model's, in each block and in the noise
     pair = lambda a, b: np.einsum("...psk,...psl->...skl", a, b, optimize=True)  # noqa: E731
     split = lambda a: a.reshape(*a.shape[:-1], count, k)  # noqa: E731
@@ -90,11 +89,12 @@ def _made(view: View, asked, joints, plain: np.ndarray, rough: np.ndarray) -> li
     whole = own.sum(0) - pair(by, by)
     out = []
     for s in range(count):
-        found = directions(own[:, s].sum(0), whole[s], squares[:, s], rough_square[s])
+        found = directions(own[:, s].sum(0), whole[s], squares[:-1, s], rough_square[s])
         if found is None:
             continue
-        (candidate, shapes), (turn, turned, sizes) = asked[s], found
+        (candidate, shapes), (turn, sizes) = asked[s], found
+        turned = turn.T @ squares[:, s] @ turn
         told = score[:, s] @ turn, turned, loud[:, s] @ turn, turned + turn.T @ more[:, s] @ turn
-        rest = prior[s] @ turn, turn, sizes, turn.T @ foreseen[s] @ turn, loss
+        rest = turn, sizes, turn.T @ foreseen[s] @ turn, loss
         out.append(Group(candidate, dict(shapes), *told, *rest))
     return out

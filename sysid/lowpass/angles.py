@@ -19,7 +19,8 @@ def noise_of(q, smooth, taken: float, step: float) -> np.ndarray:
     what third differences show, as either may hold motion too; each in the middle of all windows of
     time, as about a reversal there is more."""
     held = _HELD * np.ptp(q, axis=0)
-    return np.minimum(*(_usual(_by_window(v, step), held) for v in ((q - smooth) / taken, _third(q))))
+    taken_off, differences_ = (_by_window(v, step) for v in ((q - smooth) / taken, _third(q)))
+    return np.minimum(_usual(taken_off, held), _usual(differences_, held))
 
 
 def angle_noise(segment, cutoff: float) -> np.ndarray:

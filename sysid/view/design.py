@@ -36,9 +36,10 @@ class Design:
 
 @dataclass(frozen=True)
 class Sums:
-    """Over blocks: squares (blocks, k, k) of the columns, scores (blocks, k) of columns and
-    residual, `rough_scores` of what the angles' noise adds to both; over all, `rough_squares`;
-    `freed` (blocks, k, k) as the function of this name tells."""
+    """Over blocks, the prior's behind those of time: squares (blocks + 1, k, k) of the columns,
+    scores (blocks + 1, k) of columns and residual, `rough_scores` of what the angles' noise adds to
+    both; over all, `rough_squares`; `freed` (blocks + 1, k, k) as the function of this name tells.
+    """
 
     squares: np.ndarray
     scores: np.ndarray
@@ -123,10 +124,14 @@ def summed(design: Design, spans: list[slice]) -> Sums:
     more, columns = design.rough_columns, design.columns
     product = lambda a, r, s: sum(a[j][s].T @ r[s, j] for j in range(len(a)))  # noqa: E731
     squares = np.stack([sum(a[s].T @ a[s] for a in columns) for s in spans])
+    scores = np.stack([product(columns, design.residual, s) for s in spans])
+    rough = np.stack([product(more, design.rough_residual, s) for s in spans])
+    # in these directions all squares are one together, and at the optimum all scores nothing
+    squares = np.concatenate([squares, [np.eye(squares.shape[1]) - squares.sum(0)]])
     return Sums(
         squares,
-        np.stack([product(columns, design.residual, s) for s in spans]),
-        np.stack([product(more, design.rough_residual, s) for s in spans]),
+        np.concatenate([scores, [-scores.sum(0)]]),
+        np.concatenate([rough, [0.0 * scores[0]]]),
         sum(a.T @ a for a in more),
         freed(squares),
     )

@@ -6,27 +6,35 @@ import numpy as np
 from scipy.fft import next_fast_len, rfft
 
 _MEMORIES = 8.0  # of the noise: beyond these its correlation counts as none
+_LEAST = 0.1  # share that a fit may have left: what it took more of says little of the noise
 
 
-def spectra(values, use, memory: float, step: float) -> np.ndarray:
-    """Power spectra (k, frequencies) of values (n, k), as the transform of their correlation up to
-    eight memories (Blackman & Tukey 1958, Bartlett's window).
+def spectra(values, columns, use, memory: float, step: float) -> np.ndarray:
+    """Power spectra (k, frequencies) of the noise that a fit has left values (n, k) of, as the
+    transform of their correlation up to eight memories (Blackman & Tukey 1958, Bartlett's window),
+    over the share that the fit has left of white noise there: of slow noise a model takes more.
 
     Args:
-        use: (n, k) bool, rows that count. memory: [s]. step: from row to row [s].
+        columns: (k, n, p) orthonormal, of the fit. use: (n, k) bool, rows that count. memory: [s].
+        step: from row to row [s].
     """
     n = len(values)
     lags = min(n - 1, max(1, int(_MEMORIES * memory / step)))
     size = next_fast_len(n + lags, real=True)
     size += size % 2
-    kept = np.where(use, values, 0.0)
     square = lambda x: np.abs(np.fft.rfft(x, size, axis=0)) ** 2  # noqa: E731
-    power = lambda x: np.fft.irfft(square(x), size, axis=0)  # noqa: E731
-    pairs = power(use.astype(float))
-    alike = np.where(pairs > 0.5, power(kept) / np.maximum(pairs, 0.5), 0.0)
+    pairs = np.fft.irfft(square(use.astype(float)), size, axis=0)
     lag = np.minimum(np.arange(size), size - np.arange(size))
     window = np.clip(1.0 - lag / (lags + 1.0), 0.0, None)[:, None]
-    return np.clip(np.fft.rfft(alike * window, axis=0).real, 0.0, None).T
+    weight = np.where(pairs > 0.5, window / np.maximum(pairs, 0.5), 0.0)
+
+    def smoothed(power):
+        alike = np.fft.irfft(power, size, axis=0) * weight
+        return np.clip(np.fft.rfft(alike, axis=0).real, 0.0, None).T
+
+    taken = [square(own * u[:, None]).sum(axis=1) for own, u in zip(columns, use.T)]
+    left = 1.0 - smoothed(np.stack(taken, axis=1))
+    return smoothed(square(np.where(use, values, 0.0))) / np.maximum(left, _LEAST)
 
 
 def covariance(columns, spectrum) -> np.ndarray:

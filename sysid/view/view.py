@@ -121,7 +121,7 @@ class View:
         if self.like is not None:
             return self.like.spectra * ((self.weights / self.like.weights) ** 2)[:, None]
         left, memory = self._left
-        return spectra(left, self.rows.use, memory, self.step)
+        return spectra(left, self.design.columns, self.rows.use, memory, self.step)
 
     @cached_property
     def source(self) -> Source:
