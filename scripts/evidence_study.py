@@ -41,6 +41,7 @@ from scripts.blind_parts import cases  # noqa: E402
 from scripts.blind_parts.robots import JOINTS, RATE, SECONDS, experiment_of  # noqa: E402
 from scripts.blind_parts.trial import simulated  # noqa: E402
 from sysid import fit_document, pipeline, whole_files  # noqa: E402
+from sysid.errors import SysidError  # noqa: E402
 from sysid.studies.journal import Journal, run  # noqa: E402
 from sysid.terminal import watched  # noqa: E402
 
@@ -85,7 +86,10 @@ def size(case: dict, level: float, worth: float) -> dict:
 
     with warnings.catch_warnings(), tempfile.TemporaryDirectory() as folder:
         warnings.simplefilter("ignore")
-        view = _view(case, Path(folder))
+        try:
+            view = _view(case, Path(folder))
+        except SysidError as error:  # this robot does not follow its reference
+            return {**case, "impossible": str(error)[:120]}
         asked = ask(view)
         best = int(np.nanargmax(asked.statistics)) if len(asked.groups) else -1
         steps, *_ = select.search(view, level=level, worth=worth, most=1)
@@ -104,7 +108,10 @@ def power(case: dict, level: float, worth: float) -> dict:
     rng = np.random.default_rng(case["seed"])
     with warnings.catch_warnings(), tempfile.TemporaryDirectory() as folder:
         warnings.simplefilter("ignore")
-        view = _view(case, Path(folder) / "plain")
+        try:
+            view = _view(case, Path(folder) / "plain")
+        except SysidError as error:
+            return {**case, "hidden": None, "impossible": str(error)[:120]}
         joints = JOINTS[case["robot"]]
         found = [d for d in detectable(view, ask(view), candidates(view.model)) if d.size and d.candidate.name in HIDDEN]
         for pick in rng.permutation(len(found)):
@@ -204,6 +211,7 @@ def told(kind: str, records: list[dict]) -> dict:
         groups = {"control": [r for r in records if not r["hidden"]], "delay and current_lag": [r for r in records if r["hidden"]]}
         return {name: {"called_soft": share(sum(r["soft"] for r in own), len(own))} for name, own in groups.items()}
     if kind == "size":
+        records = [r for r in records if "impossible" not in r]
         by = {name: [r for r in records if r["robot"] == name] for name in dict.fromkeys(ROBOTS)}
         return {"accused": share(sum(bool(r["accused"]) for r in records), len(records))} | {
             name: share(sum(bool(r["accused"]) for r in own), len(own)) for name, own in by.items()
