@@ -4,8 +4,7 @@ A group is the columns of one candidate at one set of shape values, projected of
 model and made orthonormal. Over blocks b:
 
     s_b = Q_b' r_b - (what the angles' noise makes of it),   G_b = Q_b' Q_b
-    c = sum_b s_b                         its coefficients; the prior is one more block, the last:
-                                          it is wrong by some chance too, but no fold leaves it out
+    c = sum_b s_b                         its coefficients; the last block, in no fold, is the prior
     a_b, A_b                              s_b, G_b of noise as loud as before the model's own fit
     m_b = (1 - G_b)^-1 (a_b - A_b c)      how far they move when a block is left out
     T = c'c / sum_b |m_b|^2               is it there?

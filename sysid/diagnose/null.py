@@ -4,8 +4,7 @@ What each block moves the coefficients by, m_b, keeps its size and is multiplied
 variable, the same for all groups on a joint (the multiplier bootstrap of clusters, with the
 effect's own share left out), and the greatest statistic over all groups is taken. A group whose
 statistic stands above all but a share of these maxima is there at that family-wise level, whatever
-the number of candidates and however alike. Random signs in place of normal variables reach as far
-as a dozen blocks do: the greatest of hundreds of groups came beyond twice as often as told.
+the number of candidates and however alike. Random signs reach no further than the blocks do.
 
 Source: Westfall & Young 1993; Chernozhukov, Chetverikov & Kato 2013 (maxima by normal
 multipliers); Cameron, Gelbach & Miller 2008 (clusters).

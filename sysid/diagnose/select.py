@@ -93,7 +93,9 @@ def _rivals(view: View, asked: Asked, worth: float) -> dict[int, tuple[int, floa
     """Of each candidate that may be worth having, the shape values that take most, by falling gain:
     with those that say best that it is there, and the share taken of a joint that it acts on."""
     own: dict[tuple, list[int]] = {}
-    for k in np.flatnonzero(~(asked.statistics <= _ALONE) & (asked.gains > 0)):
+    # what rests on few blocks stands out of none, and may be what another one speaks for
+    few = np.array([not group.testable for group in asked.groups], dtype=bool)
+    for k in np.flatnonzero((~(asked.statistics <= _ALONE) | few) & (asked.gains > 0)):
         if asked.groups[k].signed:
             own.setdefault(asked.groups[k].candidate.kind, []).append(k)
     loss, dof, out = np.sum(view.design.residual**2, axis=0), view.model.robot.dof, {}
