@@ -136,14 +136,13 @@ def root(products: np.ndarray) -> np.ndarray:
     return scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
 
 
-def directions(plain, whole, squares, rough):
+def directions(plain, whole, data, rough):
     """Orthonormal directions (k0, k) of columns that a model leaves, that the data tell and that are
     no noise, and the norm (k0,) of what is left of each column; None where there is none.
 
     Args:
         plain, whole: (k0, k0) squares of the columns, and of what the model leaves of them, prior
-            included. squares: (blocks, k0, k0) the same of the data alone. rough: (k0, k0) of what
-            noise adds.
+            included. data, rough: (k0, k0) the same of the data alone, and of what noise adds.
     """
     size = np.sqrt(np.clip(np.diagonal(plain), 0.0, None))
     if not np.all(np.isfinite(whole)) or not size.max() > 0:
@@ -152,7 +151,7 @@ def directions(plain, whole, squares, rough):
     values, vectors = np.linalg.eigh(whole / np.outer(scale, scale))
     kept = values > _FLAT
     turn = vectors[:, kept] / np.sqrt(values[kept]) / scale[:, None]
-    for matrix, good in ((squares.sum(0), lambda v: v > _DATA), (rough, lambda v: v < _NOISE)):
+    for matrix, good in ((data, lambda v: v > _DATA), (rough, lambda v: v < _NOISE)):
         values, vectors = np.linalg.eigh(turn.T @ matrix @ turn)
         turn = turn @ vectors[:, good(values)]
         if not turn.shape[1]:

@@ -13,7 +13,7 @@ model and made orthonormal. Over blocks b:
 
 T is told on the scale of a normal variable: groups that rest on few blocks and on many compare.
 
-The noise of the angles stands in residual and columns alike, which neither signs nor folds can see.
+The noise of the angles stands in residual and columns alike, which neither blocks nor folds see.
 Drawn once more, what it adds to columns times what it adds to the residual has the mean of what the
 first one left in s_b, and is taken off (simulation extrapolation: Cook & Stefanski 1994).
 """

@@ -86,10 +86,10 @@ def _made(view: View, asked, joints, plain: np.ndarray, rough: np.ndarray) -> li
     loud = score + np.einsum("bp,bpsk->bsk", scores, freed, optimize=True)
     noise = split(rough_cross - sums.rough_squares @ absorbed)
     rough_square = rough_own - pair(split(rough_cross), by) - pair(by, noise)
-    whole = own.sum(0) - pair(by, by)
+    whole, data = own.sum(0) - pair(by, by), squares[:-1].sum(0)
     out = []
     for s in range(count):
-        found = directions(own[:, s].sum(0), whole[s], squares[:-1, s], rough_square[s])
+        found = directions(own[:, s].sum(0), whole[s], data[s], rough_square[s])
         if found is None:
             continue
         (candidate, shapes), (turn, sizes) = asked[s], found
