@@ -27,8 +27,8 @@ class Source:
 
     @cached_property
     def pieces(self) -> list:
-        """Whole pieces as effects see them."""
-        return row.seen(self.model, self.motion)
+        """Whole pieces as effects see them: under the load of the bodies found, not the URDF's."""
+        return row.seen(self.referenced, self.motion)
 
     @cached_property
     def referenced(self) -> Model:

@@ -11,7 +11,7 @@ from scipy.stats import norm
 from scipy.stats import t as student
 
 from sysid import blocks, config, listed_effects, regressor
-from sysid.candidates import candidates
+from sysid.candidates import candidates, columns_of
 from sysid.diagnose import evidence, null, projected
 from sysid.log import Log, Segment
 from sysid.lowpass import lowpassed, stride_of
@@ -269,6 +269,20 @@ def test_the_noise_of_the_angles_is_taken_off(views):
     # Student's, eleven degrees of freedom, six questions: one in a thousand in all
     assert max(abs(corrected) for _, corrected in away.values()) < student.isf(0.5e-3 / 6, 11), away
     assert min(abs(plain) for plain, _ in away.values()) > 2.0 and abs(away["encoder_offset", 0][0]) > 8.0, away
+
+
+def test_effects_are_asked_under_the_load_of_the_bodies_found(planar, views):
+    """Not of the URDF's, whatever these are: their load may be twice as much, or of another shape."""
+    view, columns = views[0], []
+    for heavier in (1.0, 3.0):
+        robot = replace(planar, prior=heavier * np.array(planar.prior))
+        source = replace(view.source, model=replace(view.model, robot=robot, reference=None))
+        (candidate,) = [c for c in candidates(source.model) if (c.name, c.joint) == ("load_friction", 1)]
+        columns.append(columns_of(source, candidate, [{}])[0])
+    np.testing.assert_array_equal(*columns)
+    bodies = view.settled.x[: 10 * view.model.bodies].reshape(-1, 10)
+    source = replace(source, model=source.model.with_reference(bodies))
+    np.testing.assert_allclose(columns[0], columns_of(source, candidate, [{}])[0], rtol=1e-12)
 
 
 @pytest.mark.parametrize("slow", [0.05, 0.3])

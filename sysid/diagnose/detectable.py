@@ -75,15 +75,15 @@ def _leading(view: View, candidate: Candidate) -> tuple[str, str]:
 
 
 def _size(group: Group, threshold: float, loss: np.ndarray, belief: Belief) -> float:
-    """Of the first own coefficient, the others zero."""
+    """Of the first own coefficient alone; infinite where too few blocks let nothing stand out."""
     group = group.tested
     if not (group.sizes[0] > 0 and group.testable):
         return np.inf
     directions, (spread, rest) = group.freedom[0], belief.moderated(*group.spreads)
-    # infinite where it rests on too few blocks to stand out, whatever its size
     needed = np.sqrt(ratio_at(threshold, directions, rest) * spread)
-    joints = slice(None) if group.candidate.joint == ROBOT else [group.candidate.joint]
-    # what it takes, of the residual and of what it adds to it, must be worth having
-    worth = np.sqrt(WORTH / (1.0 - WORTH) * loss[joints].min())
-    chance = ndtri(POWER) * np.sqrt(spread / directions)
+    least = loss.min() if group.candidate.joint == ROBOT else loss[group.candidate.joint]
+    # what it takes of rows that it was not fitted on, one variance less, must be worth having
+    worth = np.sqrt(WORTH / (1.0 - WORTH) * least + spread / directions)
+    # the coefficient scatters, and so do the spreads that this log tells and the other one
+    chance = ndtri(POWER) * np.sqrt(spread / directions + needed**2 / rest)
     return float((max(needed, worth) + chance) / group.sizes[0])
