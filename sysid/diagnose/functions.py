@@ -33,6 +33,6 @@ def law(view: View, j: int) -> flexible.Law:
     found = null.statistics(groups)
     if not np.isfinite(found).any():
         return flexible.Law(1.0, "", 0.0)
-    best = int(np.nanargmax(found))
-    chance = null.chance(found[best], null.maxima(groups, np.random.default_rng(j)))
-    return flexible.Law(chance, groups[best].candidate.variables, max(groups[best].taken, 0.0))
+    best = groups[k := int(np.nanargmax(found))]
+    chance = null.chance(found[k], null.maxima(groups, np.random.default_rng(j), draws=4000))
+    return flexible.Law(chance, best.candidate.variables, max(best.taken, 0.0))

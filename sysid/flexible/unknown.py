@@ -11,7 +11,7 @@ from .functions import groups
 from .ridge import predicted, stretches
 
 TONE = 1e-4  # probability of a line that strong by chance
-LEVEL = 0.05  # family-wise: it is asked of joints alone whose error stands above the floor
+LEVEL = 0.02  # family-wise: how often a law is said to be missing where none is
 
 
 @dataclass(frozen=True)
