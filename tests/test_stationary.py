@@ -5,7 +5,7 @@ import pytest
 from scipy.linalg import toeplitz
 from scipy.signal import lfilter
 
-from sysid.view.stationary import covariance, spectra
+from sysid.view.stationary import covariance, drawn, spectra
 
 
 def coloured(rng, shape, keep: float):
@@ -25,7 +25,7 @@ def test_spectrum_is_that_of_the_correlation():
     n, keep, step = 20_000, 0.8, 0.01
     values = coloured(rng, (n, 2), keep) * np.array([1.0, 3.0])
     use = rng.random((n, 2)) < 0.8
-    found = spectra(values, nothing(values), use, step / (1.0 - keep), step)
+    found = spectra(values, nothing(values), use, 0.5 * step / (1.0 - keep), step)
     alike = np.fft.irfft(found, axis=1)[:, :10]
     lags = 8 / (1.0 - keep)
     wanted = keep ** np.arange(10) * (1.0 - np.arange(10) / (lags + 1.0))  # Bartlett's window
@@ -39,7 +39,7 @@ def test_covariance_is_the_dense_one(scale):
     rng = np.random.default_rng(1)
     n, lags = 300, 40
     values = coloured(rng, (n, 1), 0.7)
-    (spectrum,) = spectra(values, nothing(values), np.ones((n, 1), bool), 0.05, 0.01)
+    (spectrum,) = spectra(values, nothing(values), np.ones((n, 1), bool), 0.025, 0.01)
     correlation = np.fft.irfft(spectrum)
     assert np.abs(correlation[lags + 1 : -lags]).max() < 1e-2 * correlation[0]
     columns = rng.normal(size=(n, 4, 2)).cumsum(axis=0)
@@ -61,7 +61,7 @@ def test_covariance_is_that_of_scores_of_noise_that_is_drawn():
     lag = np.minimum(np.arange(size), size - np.arange(size))
     spectrum = np.fft.rfft(0.9**lag).real
     np.testing.assert_allclose(np.diag(covariance(columns, spectrum)[0]), np.mean(scores**2, axis=1), rtol=0.08)
-    # as read off another stretch of the noise: Bartlett's window over eight memories takes a tenth of the slowest
+    # as read off another stretch of the noise: Bartlett's window over sixteen memories takes a sixteenth of the slowest
     values = coloured(rng, (60 * n, 1), 0.9)
     (read,) = spectra(values, nothing(values), np.ones((60 * n, 1), bool), 0.1, 0.01)
     alike = np.fft.irfft(read)
@@ -69,6 +69,18 @@ def test_covariance_is_that_of_scores_of_noise_that_is_drawn():
     long[: n // 2], long[-n // 2 :] = alike[: n // 2], alike[-n // 2 :]
     found = covariance(columns, np.clip(np.fft.rfft(long).real, 0.0, None))
     np.testing.assert_allclose(np.diag(found[0]), np.mean(scores**2, axis=1), rtol=0.2)
+
+
+def test_noise_is_drawn_that_has_the_spectrum():
+    rng = np.random.default_rng(4)
+    keep, n = 0.9, 400
+    spectrum = 4.0 * np.fft.rfft(keep ** np.minimum(np.arange(1000), 1000 - np.arange(1000))).real
+    found = drawn(spectrum, n, 3000, rng)
+    assert found.shape == (n, 3000)
+    for lag in (0, 1, 10, 40):  # the last stands about nothing as the first does
+        alike = np.mean(found[: n - lag] * found[lag:])
+        assert alike == pytest.approx(4.0 * keep**lag, abs=0.1)
+    np.testing.assert_allclose(np.std(found, axis=1), 2.0, rtol=0.08)
 
 
 def test_a_spectrum_is_that_of_the_noise_before_a_fit():

@@ -1,5 +1,5 @@
 """The unknown as a candidate: does a function of the motion, a product of two, take what a model
-leaves of a joint? Asked as every effect is, by the same statistic and against the same null."""
+leaves of a joint?"""
 
 from __future__ import annotations
 
@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .. import flexible
-from ..view import View
-from . import null
+from ..view import View, greatest
 from .projected import made
 
 
@@ -22,17 +21,13 @@ class Function:
 
 
 def law(view: View, j: int) -> flexible.Law:
-    """The function of the motion that stands out most of what a view's model leaves of joint j, as
-    blocks alone tell: of a thousand slow functions one meets what a spectrum misses of slow noise.
-    """
+    """The function of the motion that stands out most of what a view's model leaves of joint j."""
     use, joint = view.rows.use[:, j].astype(bool), view.model.robot.joints[j]
-    asked, groups = flexible.products(view.variables, joint, use, view.rows.piece, view.step), []
-    for words, values in asked:
-        columns = np.ascontiguousarray(values.T)[:, None, :, None]  # the angles' noise adds nothing
-        groups += made(view, [(Function(word), {}) for word in words], [j], columns, columns)
-    found = null.statistics(groups)
-    if not np.isfinite(found).any():
+    known, rest = view.variables, (joint, use, view.rows.piece, view.step)
+    found = greatest(view, j, lambda: flexible.products(known, *rest), np.random.default_rng(j))
+    if found is None:
         return flexible.Law(1.0, "", 0.0)
-    best = groups[k := int(np.nanargmax(found))]
-    chance = null.chance(found[k], null.maxima(groups, np.random.default_rng(j), draws=4000))
-    return flexible.Law(chance, best.candidate.variables, max(best.taken, 0.0))
+    column = found.column[None, None, :, None]  # the angles' noise adds nothing to it
+    groups = made(view, [(Function(found.words), {})], [j], column, column)
+    taken = max((group.taken for group in groups), default=0.0)
+    return flexible.Law(found.chance, found.words, max(taken, 0.0))

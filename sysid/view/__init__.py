@@ -2,6 +2,7 @@
 
 from .design import Design, Sums, by_block, designed, instrumented, summed
 from .losses import losses, taken
+from .singles import greatest
 from .view import View, first_view, looked_at, too_short
 
 __all__ = [
@@ -11,6 +12,7 @@ __all__ = [
     "by_block",
     "designed",
     "first_view",
+    "greatest",
     "instrumented",
     "looked_at",
     "losses",

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.fft import next_fast_len, rfft
+from scipy.fft import irfft, next_fast_len, rfft
 
-_MEMORIES = 8.0  # of the noise: beyond these its correlation counts as none
+_MEMORIES = 16.0  # of the noise: the window takes a sixteenth of what is slow, of first order
 _LEAST = 0.1  # share that a fit may have left: what it took more of says little of the noise
 
 
 def spectra(values, columns, use, memory: float, step: float) -> np.ndarray:
     """Power spectra (k, frequencies) of the noise that a fit has left values (n, k) of, as the
-    transform of their correlation up to eight memories (Blackman & Tukey 1958, Bartlett's window),
+    transform of their correlation up to sixteen memories (Blackman & Tukey 1958, Bartlett's window),
     over the share that the fit has left of white noise there: of slow noise a model takes more.
 
     Args:
@@ -35,6 +35,13 @@ def spectra(values, columns, use, memory: float, step: float) -> np.ndarray:
     taken = [square(own * u[:, None]).sum(axis=1) for own, u in zip(columns, use.T)]
     left = 1.0 - smoothed(np.stack(taken, axis=1))
     return smoothed(square(np.where(use, values, 0.0))) / np.maximum(left, _LEAST)
+
+
+def drawn(spectrum, n: int, draws: int, rng: np.random.Generator) -> np.ndarray:
+    """Normal noise (n, draws) of a power spectrum as `spectra` tells it; in single precision."""
+    size = 2 * (len(spectrum) - 1)
+    white = rfft(rng.normal(size=(size, draws)).astype(np.float32), axis=0)
+    return irfft(white * np.sqrt(spectrum).astype(np.float32)[:, None], size, axis=0)[:n]
 
 
 def covariance(columns, spectrum) -> np.ndarray:
