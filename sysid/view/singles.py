@@ -67,13 +67,13 @@ def _beyond(value: float, maxima: np.ndarray) -> float:
     """Probability that the greatest of many is more than a value, by maxima (draws,) of noise: that
     of as many independent normal variables of such a size as have the quartiles of these."""
     low, middle, high = np.quantile(maxima, [0.25, 0.5, 0.75])
-    # the more there are, the narrower their greatest
-    count = np.geomspace(1.0, 1e6, 200)[:, None]
-    scores = -ndtri(-np.expm1(np.log([0.25, 0.5, 0.75]) / count))
-    spread = (scores[:, 2] - scores[:, 0]) / np.maximum(scores[:, 1], 1e-9)
-    k = int(np.argmin(np.abs(np.log(np.maximum(spread, 1e-9) * middle / (high - low)))))
-    log = count[k, 0] * np.log1p(-ndtr(-value * scores[k, 1] / middle))
-    return float(-np.expm1(log))
+    # the more there are, the narrower their greatest beside how far out it is
+    count = np.geomspace(1.0, 1e6, 200)
+    log = np.log([0.25, 0.5, 0.75])[:, None]
+    least, half, most = -ndtri(-np.expm1(log / count))
+    k = int(np.argmin(np.abs(half / (most - least) - middle / max(high - low, 1e-12))))
+    size = max(high - low + middle, 1e-12) / (most - least + half)[k]
+    return float(-np.expm1(count[k] * np.log1p(-ndtr(-value / size))))
 
 
 @dataclass(frozen=True)

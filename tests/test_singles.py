@@ -1,0 +1,97 @@
+"""Single columns, asked all at once: each as a group of its own is, and the greatest of many as often as its chance says."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.stats import norm
+
+from sysid.view import greatest
+from sysid.view.singles import _Asker, _beyond
+from tests.evidences import grouped, posed, viewed
+
+N, BLOCKS = 400, 20
+
+
+def problem(seed: int = 0):
+    rng = np.random.default_rng(seed)
+    p = posed(rng, n=N, blocks=BLOCKS)
+    columns = rng.normal(size=(N, 6))
+    columns[p.number >= 12, 4] = 0.0  # rests on twelve blocks
+    columns[p.number >= 3, 5] = 0.0  # on three, and on what the model makes of it elsewhere
+    return p, columns
+
+
+def test_single_columns_are_told_as_groups_are():
+    p, columns = problem()
+    view = viewed(p)
+    told = _Asker(view, 1, np.random.default_rng(0)).told_by(view.weights[1] * columns)
+    groups = [g.tested for g in grouped(view, columns.T[:, None, :, None], joints=(1,))]
+    assert told.kept.tolist() == list(range(6)) and all(g.testable for g in groups)
+    for k, group in enumerate(groups):
+        assert told.c[0, k] ** 2 == pytest.approx(group.c @ group.c, rel=1e-9)
+        assert told.seen[0, k] == pytest.approx(np.sum(group.moves**2), rel=1e-9)
+        assert told.own[k] == pytest.approx(group.freedom[1] - 1.0, rel=1e-9)
+
+
+def test_what_few_blocks_outweigh_is_told_as_the_group_is_tested():
+    p, _ = problem()
+    own = np.random.default_rng(3).normal(size=N) * np.where(p.number == 7, 30.0, 1.0)
+    view = viewed(p)
+    told = _Asker(view, 0, np.random.default_rng(0)).told_by(view.weights[0] * own[:, None])
+    (group,) = grouped(view, own[None, None, :, None], joints=(0,))
+    assert not group.testable and group.tested.testable
+    assert told.seen[0, 0] == pytest.approx(np.sum(group.tested.moves**2), rel=1e-9)
+    assert told.c[0, 0] ** 2 == pytest.approx(group.tested.c @ group.tested.c, rel=1e-9)
+
+
+def test_draws_are_fitted_by_the_model_as_the_residual_is():
+    """The model's own columns are nothing to any of them, but for what the prior holds."""
+    p, _ = problem()
+    p.root = 0.0 * p.root
+    view = viewed(p)
+    asker = _Asker(view, 1, np.random.default_rng(0))
+    assert np.abs(asker.told[-1]).max() < 1e-3 * np.abs(asker.told[0]).max()
+    assert asker.rows.shape == (N, 201) and np.std(asker.loss[1:]) < 0.3 * np.mean(asker.loss[1:])
+
+
+def test_the_greatest_stands_out_as_often_as_its_chance_says():
+    p, columns = problem()
+    view, chances = viewed(p), []
+    for seed in range(60):
+        rng = np.random.default_rng(100 + seed)
+        p.tau = rng.normal(size=(N, 2))
+        view = viewed(p)
+        many = rng.normal(size=(N, 80))
+        found = greatest(view, 1, lambda: [([str(k) for k in range(80)], many)], rng)  # noqa: B023
+        chances.append(found.chance)
+    # one in a thousand, each
+    assert np.sum(np.array(chances) < 0.05) <= 10 and 0.25 < np.median(chances) < 0.75
+
+
+def test_what_is_there_is_the_greatest_and_comes_back_whole():
+    p, columns = problem()
+    p.tau[:, 1] += 2.0 * columns[:, 2]
+    words = list("abcdef")
+    parts = lambda: iter([(words[:2], columns[:, :2]), (words[2:], columns[:, 2:])])  # noqa: E731
+    found = greatest(viewed(p), 1, parts, np.random.default_rng(0))
+    assert found.words == "c" and found.chance < 1e-4
+    np.testing.assert_array_equal(found.column, columns[:, 2])
+
+
+def test_nothing_to_ask_is_nothing():
+    p, _ = problem()
+    nothing = SimpleNamespace(**{**vars(viewed(p))})
+    assert greatest(nothing, 1, lambda: [], np.random.default_rng(0)) is None
+    own = p.a[1][:, :1]  # the model has it
+    assert greatest(nothing, 1, lambda: [(["own"], 0.0 * own)], np.random.default_rng(0)) is None
+
+
+@pytest.mark.parametrize("count,size", [(1, 1.0), (30, 1.0), (1000, 1.4)])
+def test_beyond_the_draws_it_is_the_law_of_the_greatest(count, size):
+    """Of independent normal variables; far out, where no draw was, to a factor that quartiles leave open."""
+    rng = np.random.default_rng(count)
+    maxima = size * rng.normal(size=(4000, count)).max(axis=1)
+    for share in (0.1, 0.01, 1e-4):
+        at = size * norm.isf(-np.expm1(np.log1p(-share) / count))
+        assert 0.3 < _beyond(at, maxima) / share < 3.0, share
