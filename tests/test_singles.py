@@ -79,6 +79,15 @@ def test_what_is_there_is_the_greatest_and_comes_back_whole():
     np.testing.assert_array_equal(found.column, columns[:, 2])
 
 
+def test_a_long_log_is_asked_beside_fewer_draws(monkeypatch):
+    p, columns = problem()
+    monkeypatch.setattr("sysid.view.singles._MOST", 60.0 * N)
+    assert _Asker(viewed(p), 1, np.random.default_rng(0)).rows.shape == (N, 61)
+    p.tau[:, 1] += 2.0 * columns[:, 2]
+    found = greatest(viewed(p), 1, lambda: [(list("abcdef"), columns)], np.random.default_rng(0))
+    assert found.words == "c" and found.chance < 1e-4
+
+
 def test_nothing_to_ask_is_nothing():
     p, _ = problem()
     nothing = SimpleNamespace(**{**vars(viewed(p))})

@@ -23,6 +23,7 @@ from .stationary import drawn
 Columns = Callable[[], Iterable[tuple[list[str], np.ndarray]]]
 
 _DRAWS = 200  # of noise: quartiles of a maximum are known to a tenth of its deviation
+_LEAST, _MOST = 50, 2e6  # draws of a long log, where they and its rows are many: to a fifth
 _FEWEST, _LEVERAGE = 5.0, 0.9  # blocks that a column must rest on; of it in one, at most
 _DATA = 0.5  # of a column, by data and not by the prior
 
@@ -104,9 +105,10 @@ class _Asker:
     def __init__(self, view, j: int, rng: np.random.Generator):
         design, sums, self.spans = view.design, view.sums, by_block(view.blocks)
         use = np.any(design.columns != 0.0, axis=2) | (design.residual.T != 0.0)
-        told = np.zeros((len(self.spans), design.columns.shape[2], _DRAWS))
+        draws = int(np.clip(_MOST / use.shape[1], _LEAST, _DRAWS))
+        told = np.zeros((len(self.spans), design.columns.shape[2], draws))
         for k, columns in enumerate(design.columns):
-            noise = drawn(view.spectra[k], use.shape[1], _DRAWS, rng) * use[k][:, None]
+            noise = drawn(view.spectra[k], use.shape[1], draws, rng) * use[k][:, None]
             for b, rows in enumerate(self.spans):
                 told[b] += columns[rows].T @ noise[rows]
             if k == j:
