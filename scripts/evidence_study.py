@@ -64,7 +64,8 @@ def conditions(seed: int, number: int) -> dict:
     }  # fmt: skip
 
 
-def _view(case: dict, folder: Path, hide=()):
+def view_of(case: dict, folder: Path, hide=(), **how):
+    """The first view of a simulated case; `how`: more of `simulate`."""
     from sysid.simulate import simulate, write
     from sysid.view import first_view
 
@@ -72,7 +73,7 @@ def _view(case: dict, folder: Path, hide=()):
     experiment, machine = experiment_of(case["robot"], folder)
     told = simulate(
         machine, hide=list(hide), seed=case["seed"], duration=SECONDS[case["robot"]], rate=RATE[case["robot"]],
-        colour=case["colour"], encoder=case["encoder"],
+        colour=case["colour"], encoder=case["encoder"], **how,
     )  # fmt: skip
     write(told, experiment, folder / "case")
     experiment = pipeline.load(folder / "case")
@@ -87,7 +88,7 @@ def size(case: dict, level: float, worth: float) -> dict:
     with warnings.catch_warnings(), tempfile.TemporaryDirectory() as folder:
         warnings.simplefilter("ignore")
         try:
-            view = _view(case, Path(folder))
+            view = view_of(case, Path(folder))
         except SysidError as error:  # this robot does not follow its reference
             return {**case, "impossible": str(error)[:120]}
         asked = ask(view)
@@ -109,7 +110,7 @@ def power(case: dict, level: float, worth: float) -> dict:
     with warnings.catch_warnings(), tempfile.TemporaryDirectory() as folder:
         warnings.simplefilter("ignore")
         try:
-            view = _view(case, Path(folder) / "plain")
+            view = view_of(case, Path(folder) / "plain")
         except SysidError as error:
             return {**case, "hidden": None, "impossible": str(error)[:120]}
         joints = JOINTS[case["robot"]]
@@ -120,7 +121,7 @@ def power(case: dict, level: float, worth: float) -> dict:
             values = {one.parameter: sign * one.size, **one.at}
             text = f"{one.candidate.name}:{joint}:{','.join(f'{name}={value:.6g}' for name, value in values.items())}"
             try:
-                view = _view(case, Path(folder) / f"hidden{pick}", [hidden(text)])
+                view = view_of(case, Path(folder) / f"hidden{pick}", [hidden(text)])
             except Exception as error:  # noqa: BLE001 - a size that this robot cannot have
                 case = {**case, "impossible": f"{text}: {error}"[:120]}
                 continue

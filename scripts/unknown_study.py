@@ -26,9 +26,8 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 os.environ["PYTHONPATH"] = os.pathsep.join([str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])])
 
-from scripts.blind_parts.robots import RATE, SECONDS, experiment_of  # noqa: E402
-from scripts.evidence_study import conditions  # noqa: E402
-from sysid import fit_document, pipeline, whole_files  # noqa: E402
+from scripts.evidence_study import conditions, view_of  # noqa: E402
+from sysid import fit_document, whole_files  # noqa: E402
 from sysid.errors import SysidError  # noqa: E402
 from sysid.studies.journal import Journal, run  # noqa: E402
 from sysid.terminal import watched  # noqa: E402
@@ -39,20 +38,11 @@ MOTIONS, SLOW, LEVELS = ("exciting", "moves"), 0.1, (0.05, 0.01)
 def one(case: dict) -> dict:
     """Of every joint, the chance of the function that stands out most, and that of all together."""
     from sysid.diagnose.functions import law
-    from sysid.simulate import simulate, write
-    from sysid.view import first_view
 
     with warnings.catch_warnings(), tempfile.TemporaryDirectory() as folder:
         warnings.simplefilter("ignore")
         try:
-            experiment, machine = experiment_of(case["robot"], Path(folder))
-            told = simulate(
-                machine, seed=case["seed"], duration=SECONDS[case["robot"]], rate=RATE[case["robot"]], colour=case["colour"],
-                encoder=case["encoder"], motion=case["motion"], brakes=case["motion"] == "moves",
-            )  # fmt: skip
-            write(told, experiment, Path(folder) / "case")
-            experiment = pipeline.load(Path(folder) / "case")
-            view = first_view(experiment, pipeline.fit(experiment))
+            view = view_of(case, Path(folder), motion=case["motion"], brakes=case["motion"] == "moves")
         except SysidError as error:  # this robot does not follow its reference
             return {**case, "impossible": str(error)[:120]}
         single = [law(view, j).chance for j in range(view.model.robot.dof)]

@@ -8,9 +8,9 @@ import numpy as np
 
 from .objective import add_blocks
 
-_FLAT = 1e-6  # share of a column's square: what the model leaves of it beyond that is rounding
+FLAT = 1e-6  # share of a column's square: what the model leaves of it beyond that is rounding
 _TOLD = 1e-6  # of a direction's square: less than that the data say nothing
-_DATA = 0.5  # of a direction's square must stand in the data; the prior may not tell most of it
+DATA = 0.5  # of a direction's square must stand in the data; the prior may not tell most of it
 _NOISE = 0.25  # of a direction's square: noise to half of its size, it says nothing about a law
 
 
@@ -149,9 +149,9 @@ def directions(plain, whole, data, rough):
         return None
     scale = np.where(size > 0, size, 1.0)
     values, vectors = np.linalg.eigh(whole / np.outer(scale, scale))
-    kept = values > _FLAT
+    kept = values > FLAT
     turn = vectors[:, kept] / np.sqrt(values[kept]) / scale[:, None]
-    for matrix, good in ((data, lambda v: v > _DATA), (rough, lambda v: v < _NOISE)):
+    for matrix, good in ((data, lambda v: v > DATA), (rough, lambda v: v < _NOISE)):
         values, vectors = np.linalg.eigh(turn.T @ matrix @ turn)
         turn = turn @ vectors[:, good(values)]
         if not turn.shape[1]:

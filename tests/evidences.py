@@ -28,7 +28,8 @@ def viewed(p):
     columns = columns @ turn
     design = Design(columns, residual, np.zeros(len(x)), turn, 0.0 * columns, 0.0 * residual)
     noise = spectra(residual, columns, np.ones(residual.shape, bool), 0.01, 0.01)
-    return SimpleNamespace(design=design, sums=summed(design, by_block(p.number)), blocks=p.number, weights=p.weights, x=x, spectra=noise)
+    rows = SimpleNamespace(use=np.ones(residual.shape, bool))
+    return SimpleNamespace(rows=rows, design=design, sums=summed(design, by_block(p.number)), blocks=p.number, weights=p.weights, x=x, spectra=noise)
 
 
 def stacked(p, own, joints=(0, 1), keep=None):

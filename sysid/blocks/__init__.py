@@ -11,7 +11,10 @@ and which model loses least (`rivals`).
 """
 
 from .deviations import (
+    LEVERAGE,
+    RESTING,
     even,
+    evening,
     jackknife,
     resting,
     shared,
@@ -39,8 +42,10 @@ from .rivals import SAME, chances, confidence_set, within_one_error
 __all__ = [
     "Belief",
     "FEWEST",
+    "LEVERAGE",
     "MOST",
     "Numbering",
+    "RESTING",
     "SAME",
     "SHORTEST",
     "believed",
@@ -49,6 +54,7 @@ __all__ = [
     "covariance",
     "divided",
     "even",
+    "evening",
     "extents",
     "folds",
     "jackknife",

@@ -9,6 +9,9 @@ import numpy as np
 
 from .numbering import summed
 
+RESTING = 5.0  # blocks that a test must rest on
+LEVERAGE = 0.9  # of a direction: what one block may hold of it
+
 
 def standard_error(values):
     """Standard error of the sum of values (blocks, ...) about zero change; NaN of a single
@@ -68,6 +71,12 @@ def resting(squares: np.ndarray) -> float:
     """On how many blocks something rests: one over the sum of squared shares (blocks, k, k)."""
     share = np.einsum("bkk->b", squares)
     return float(share.sum() ** 2 / max(np.sum(share**2), 1e-300))
+
+
+def evening(share: np.ndarray) -> np.ndarray:
+    """Weights of blocks by their shares (blocks,), under which twice the fewest take part: no block
+    counts more than the rest allows."""
+    return np.minimum(1.0, even(share, 2.0 * RESTING) / np.maximum(share, 1e-300))
 
 
 def even(share: np.ndarray, parts: float) -> float:

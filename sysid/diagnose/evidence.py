@@ -28,9 +28,6 @@ import numpy as np
 from .. import blocks
 from ..candidates import Candidate
 
-_FEWEST = 5.0  # blocks that a test must rest on
-_LEVERAGE = 0.9  # of a direction: what one block may hold of it
-
 
 @dataclass(frozen=True)
 class Group:
@@ -73,7 +70,7 @@ class Group:
         """The moves' sum of squares, what it would be were the noise always the same (that of the
         residual without what the group takes; of the prior, its own move), and the first one's
         degrees of freedom."""
-        left = 1.0 - np.clip(self.taken / max(self.loss, 1e-300), 0.0, _LEVERAGE)
+        left = 1.0 - np.clip(self.taken / max(self.loss, 1e-300), 0.0, blocks.LEVERAGE)
         directions, rest = self.freedom
         own, squared = directions * max(rest - 1.0, 1.0), np.sum(self.moves**2, axis=1)
         return float(squared.sum()), float(np.trace(self.foreseen) * left + squared[-1]), own
@@ -92,7 +89,7 @@ class Group:
         """Whether it rests on enough blocks to be told from chance; if not, it may still be a rival
         of one that is."""
         most = float(np.linalg.eigvalsh(self.squares[:-1]).max())
-        return blocks.resting(self.squares[:-1]) >= _FEWEST and most <= _LEVERAGE
+        return blocks.resting(self.squares[:-1]) >= blocks.RESTING and most <= blocks.LEVERAGE
 
     @cached_property
     def tested(self) -> Group:
@@ -102,10 +99,10 @@ class Group:
         a sign. What it takes, and its coefficients, are the group's own."""
         if self.testable and not self.candidate.blows:
             return self
-        turn = blocks.shared(self.squares[:-1], _LEVERAGE)
+        turn = blocks.shared(self.squares[:-1], blocks.LEVERAGE)
         group = self if turn.shape[1] in (0, len(turn)) else self._turned(turn)
         share = np.einsum("bkk->b", group.squares[:-1])
-        weight = np.minimum(1.0, blocks.even(share, 2.0 * _FEWEST) / np.maximum(share, 1e-300))
+        weight = blocks.evening(share)
         if weight.min() == 1.0 or (group.testable and not self.candidate.blows):
             return group
         w = np.append(weight, 1.0)[:, None]

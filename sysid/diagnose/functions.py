@@ -3,21 +3,11 @@ leaves of a joint?"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from .. import flexible
 from ..view import View, greatest
 from .projected import made
-
-
-@dataclass(frozen=True)
-class Function:
-    """Stands where a candidate does: a function of some variables."""
-
-    variables: str
-    blows: bool = False
 
 
 def law(view: View, j: int) -> flexible.Law:
@@ -28,6 +18,6 @@ def law(view: View, j: int) -> flexible.Law:
     if found is None:
         return flexible.Law(1.0, "", 0.0)
     column = found.column[None, None, :, None]  # the angles' noise adds nothing to it
-    groups = made(view, [(Function(found.words), {})], [j], column, column)
+    groups = made(view, [(None, {})], [j], column, column)
     taken = max((group.taken for group in groups), default=0.0)
     return flexible.Law(found.chance, found.words, max(taken, 0.0))

@@ -12,20 +12,21 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from itertools import islice
+from operator import attrgetter
 
 import numpy as np
 from scipy.special import ndtr, ndtri
 
 from .. import blocks
+from ..projection import DATA, FLAT
 from .design import by_block
 from .stationary import drawn
 
 Columns = Callable[[], Iterable[tuple[list[str], np.ndarray]]]
 
 _DRAWS = 200  # of noise: quartiles of a maximum are known to a tenth of its deviation
-_LEAST, _MOST = 50, 2e6  # draws of a long log, where they and its rows are many: to a fifth
-_FEWEST, _LEVERAGE = 5.0, 0.9  # blocks that a column must rest on; of it in one, at most
-_DATA = 0.5  # of a column, by data and not by the prior
+_LEAST = 50  # of a long log
+_MOST = 2e6  # draws times rows, up to where fewer draws are made
 
 
 @dataclass(frozen=True)
@@ -50,15 +51,16 @@ def greatest(view, j: int, asked: Columns, rng: np.random.Generator) -> Single |
     if not places:
         return None
     joined = lambda pick: np.concatenate([pick(one) for one in found], axis=-1)  # noqa: E731
-    c, seen, own = joined(lambda one: one.c), joined(lambda one: one.seen), joined(lambda one: one.own)
+    c, seen, own = (joined(attrgetter(name)) for name in ("c", "seen", "own"))
     # noise as always, less what the column takes of it
-    left = 1.0 - np.minimum(c**2 / np.maximum(asker.loss[:, None], 1e-300), _LEVERAGE)
+    left = 1.0 - np.minimum(c**2 / np.maximum(asker.loss[:, None], 1e-300), blocks.LEVERAGE)
     foreseen = np.mean(c[1:] ** 2, axis=0) * left
     belief = blocks.believed(seen[0], foreseen[0], own, len(view.sums.scores))
     spread, rest = belief.moderated(seen, foreseen, own)
     scores = blocks.normal_scores(c**2 / np.maximum(spread, 1e-300), 1.0, rest)
     best = int(np.argmax(scores[0]))
     part, k = places[best]
+    # made again, not kept: those of a long log fill the memory
     words, values = next(islice(asked(), part, None))
     chance = _beyond(scores[0, best], scores[1:].max(axis=1))
     return Single(words[k], np.ascontiguousarray(values[:, k]), chance)
@@ -104,11 +106,11 @@ class _Asker:
 
     def __init__(self, view, j: int, rng: np.random.Generator):
         design, sums, self.spans = view.design, view.sums, by_block(view.blocks)
-        use = np.any(design.columns != 0.0, axis=2) | (design.residual.T != 0.0)
-        draws = int(np.clip(_MOST / use.shape[1], _LEAST, _DRAWS))
+        size = len(design.residual)
+        draws = int(np.clip(_MOST / size, _LEAST, _DRAWS))
         told = np.zeros((len(self.spans), design.columns.shape[2], draws))
         for k, columns in enumerate(design.columns):
-            noise = drawn(view.spectra[k], use.shape[1], draws, rng) * use[k][:, None]
+            noise = drawn(view.spectra[k], size, draws, rng) * view.rows.use[:, [k]]
             for b, rows in enumerate(self.spans):
                 told[b] += columns[rows].T @ noise[rows]
             if k == j:
@@ -136,16 +138,14 @@ class _Asker:
         mixed = cross - self.squares @ absorbed
         squares = own - np.einsum("bpk,pk->bk", cross + mixed, absorbed)
         whole, data = squares.sum(0), squares[:-1].sum(0)
-        known = (whole > 1e-6 * own.sum(0)) & (data > _DATA * whole)
+        known = (whole > FLAT * own.sum(0)) & (data > DATA * whole)
         weight = np.ones_like(squares)
         rest, most = _resting(squares, np.where(known, data, np.inf))
-        for k in np.flatnonzero(known & ((rest < _FEWEST) | (most > _LEVERAGE))):
+        for k in np.flatnonzero(known & ((rest < blocks.RESTING) | (most > blocks.LEVERAGE))):
             # no block counts more than the rest allows: a choice that looks at the column alone
-            share = squares[:-1, k] / data[k]
-            even = blocks.even(share, 2.0 * _FEWEST)
-            weight[:-1, k] = np.minimum(1.0, even / np.maximum(share, 1e-300))
+            weight[:-1, k] = blocks.evening(squares[:-1, k] / data[k])
         rest, most = _resting(weight * squares, np.where(known, data, np.inf))
-        good = known & (rest >= _FEWEST) & (most <= _LEVERAGE)
+        good = known & (rest >= blocks.RESTING) & (most <= blocks.LEVERAGE)
         absorbed, mixed, squares = absorbed[:, good], mixed[:, :, good], squares[:, good]
         freed = self.freed @ mixed  # what the model's own columns took of a block's noise
         back = np.swapaxes(self.told, 1, 2)
