@@ -7,17 +7,20 @@ import math
 import numpy as np
 
 _WIDTH = 4.0  # standard deviations of the kernel that are kept
+_FEWEST = 8  # windows of one product
 HIGHEST = 0.3  # of the sampling rate: the last cutoff at which the kernel still has a shape
 
 
 def _weighed(seen, weights, stride: int) -> np.ndarray:
     """Sums (..., n) of every `stride`-th window of values (..., m) under weights (k,).
 
-    Several windows that overlap are one product with a band of weights: a quarter more of values
-    than one window has, and a matrix library's speed.
+    Several windows that overlap are one product with a band of weights, at a matrix library's
+    speed: a quarter more of values than one window has, of short windows up to twice as many, as
+    a product with fewer than eight columns is not worth its call.
     """
     size = len(weights)
-    count, many = (seen.shape[-1] - size) // stride + 1, max(1, size // (4 * stride))
+    count = (seen.shape[-1] - size) // stride + 1
+    many = max(size // (4 * stride), min(_FEWEST, 1 + size // stride))
     out = np.empty(seen.shape[:-1] + (count,))
     whole, view = count // many, np.lib.stride_tricks.sliding_window_view
     if whole:

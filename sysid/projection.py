@@ -157,3 +157,23 @@ def directions(plain, whole, data, rough):
         if not turn.shape[1]:
             return None
     return turn, np.sqrt(np.clip(np.diagonal(whole), 0.0, None))
+
+
+def directions_of(plain, whole, data, rough) -> list:
+    """`directions` of many groups of columns, of arrays (groups, k0, k0), at once."""
+    diagonals = np.diagonal(plain, axis1=1, axis2=2)
+    usual = np.isfinite(whole).all(axis=(1, 2)) & (diagonals > 0.0).all(axis=1)
+    scale = np.where(usual[:, None], np.sqrt(np.where(diagonals > 0.0, diagonals, 1.0)), 1.0)
+    system = whole / (scale[:, :, None] * scale[:, None])
+    values, turn = np.linalg.eigh(np.where(usual[:, None, None], system, 0.0))
+    usual &= values[:, 0] > FLAT
+    turn = turn / np.sqrt(np.where(usual[:, None], values, 1.0))[:, None] / scale[:, :, None]
+    for matrix, good in ((data, lambda v: v > DATA), (rough, lambda v: v < _NOISE)):
+        inside = np.swapaxes(turn, 1, 2) @ matrix @ turn
+        values, vectors = np.linalg.eigh(np.where(usual[:, None, None], inside, 0.0))
+        usual &= good(values).all(axis=1)
+        turn = turn @ vectors
+    size = np.sqrt(np.clip(np.diagonal(whole, axis1=1, axis2=2), 0.0, None))
+    # of nearly all groups every direction stays; each of the others is asked by itself
+    parts = zip(usual, turn, size, plain, whole, data, rough)
+    return [own[:2] if there else directions(*own[2:]) for there, *own in parts]

@@ -14,7 +14,7 @@ from . import regressor
 from .effect import NotFinite, TorqueEffect
 from .model import Model, chunks
 from .motion import Motion, Piece
-from .two_masses import link_side
+from .two_masses import link_load
 
 _STRETCH = 16384  # samples whose columns are computed at once
 
@@ -150,7 +150,7 @@ def seen(model: Model, motion: Motion) -> list:
     return [model.seen(piece) for piece in motion.pieces]
 
 
-_NUDGES = (1e-4, 1e-3, 1e-1)  # rad, rad/s, rad/s²: torque bends little over them
+NUDGES = (1e-4, 1e-3, 1e-1)  # rad, rad/s, rad/s²: torque bends little over them
 
 
 @dataclass(frozen=True)
@@ -164,20 +164,32 @@ class Bent:
     seen: Piece
 
 
-def bent(model: Model, motion: Motion, x, joint: int) -> list[Bent]:
-    """Of each piece, at parameters x (size,)."""
+def unbent(model: Model, motion: Motion, x) -> list[tuple[Piece, np.ndarray]]:
+    """Each whole piece as effects see it, and the torque (n, dof) of the bodies of parameters x (size,) there."""
+    parts = seen(model, motion)
+    return [(part, _bodies_torque(model, x, part, part.deflection)) for part in parts]
+
+
+def _bodies_torque(model: Model, x, part: Piece, behind) -> np.ndarray:
     pi = np.asarray(x)[: 10 * model.bodies].reshape(-1, 10)
-    out = []
-    for piece in motion.pieces:
-        part = model.seen(piece)
-        still = np.zeros((3, *part.q.shape)) if part.deflection is None else part.deflection
-        torque = lambda behind, part=part: regressor.torque(model.robot, pi, part.q, part.qd, part.qdd, gravity=part.gravity, deflection=behind)  # noqa: E731
-        base, slopes = torque(still), []
-        for order, nudge in enumerate(_NUDGES):
-            behind = still.copy()
+    return regressor.torque(model.robot, pi, part.q, part.qd, part.qdd, gravity=part.gravity, deflection=behind)
+
+
+def bent(model: Model, motion: Motion, x, joint: int, before: list[tuple[Piece, np.ndarray]] | None = None) -> list[Bent]:
+    """Of each piece, at parameters x (size,).
+
+    Args:
+        before: `unbent(model, motion, x)`, where it is at hand.
+    """
+    pi, out = np.asarray(x)[: 10 * model.bodies].reshape(-1, 10), []
+    for part, base in unbent(model, motion, x) if before is None else before:
+        slopes = []
+        for order, nudge in enumerate(NUDGES):
+            behind = np.zeros((3, *part.q.shape)) if part.deflection is None else part.deflection.copy()
             behind[order, :, joint] += nudge
-            slopes.append((torque(behind) - base).T / nudge)
-        out.append(Bent(np.stack(slopes), *link_side(model.robot, pi, part, joint), part))
+            slopes.append((_bodies_torque(model, x, part, behind) - base).T / nudge)
+        inertia = -slopes[-1][joint]  # of the link alone: its rotor stays with the motor
+        out.append(Bent(np.stack(slopes), link_load(model.robot, pi, part, joint), inertia, part))
     return out
 
 
@@ -191,11 +203,18 @@ def secants(model: Model, motion: Motion, known: list[Bent], effect, tried: list
     """
     out = []
     apart = apart or [effect.several([(one.load, one.inertia, one.seen, shapes) for shapes in tried]) for one in known]
-    for piece, rows, one, own in zip(motion.pieces, starts(motion, stride), known, apart):
-        far = np.stack(own)
-        read = [model.sensed(np.einsum("on,ton->tn", one.slopes[:, j], far), piece, j) for j in range(model.robot.dof)]
-        out.append(np.stack([piece.settled(entry, rows, j) for j, entry in enumerate(read)], axis=1))
-    return np.concatenate(out, axis=-1) * use.T
+    for one, own in zip(known, apart):
+        out.append(np.einsum("ojn,ton->tjn", one.slopes, np.stack(own)))
+    return settled(model, motion, out, stride) * use.T
+
+
+def settled(model: Model, motion: Motion, torque: list[np.ndarray], stride: int) -> np.ndarray:
+    """Torque (..., dof, n) of each whole piece, on the rows that a stride keeps, as sensors and the low-pass of both sides show it."""
+    out = []
+    for piece, rows, whole in zip(motion.pieces, starts(motion, stride), torque):
+        read = [model.sensed(whole[..., j, :], piece, j) for j in range(model.robot.dof)]
+        out.append(np.stack([piece.settled(own, rows, j) for j, own in enumerate(read)], axis=-2))
+    return np.concatenate(out, axis=-1)
 
 
 def signature(model: Model, motion: Motion, pieces: list, effect, joint: int, shapes: dict, stride: int, use: np.ndarray) -> np.ndarray:
@@ -218,8 +237,9 @@ def signatures(model: Model, motion: Motion, pieces: list, effect, joint: int, t
         joints = range(model.robot.dof) if joint < 0 else [joint]
         read = [model.sensed(entry, piece, j) for entry, j in zip(stacked, joints)]
         out.append(np.stack([piece.settled(entry, rows, j) for j, entry in zip(joints, read)]))
-    joined = np.moveaxis(np.concatenate(out, axis=-1), 1, 2)
-    joined = joined * (use[:, [joint]] if joint >= 0 else use.T[:, :, None])
+    joined = np.concatenate(out, axis=-1)  # samples stay last in memory, as a product with them wants it
+    joined *= use[:, joint] if joint >= 0 else use.T[:, None]
+    joined = np.swapaxes(joined, 1, 2)
     k = joined.shape[2] // len(tried)
     return [joined[0, :, i : i + k] if joint >= 0 else joined[:, :, i : i + k] for i in range(0, k * len(tried), k)] if k else [joined] * len(tried)
 

@@ -9,14 +9,15 @@ import numpy as np
 
 from . import rows as row
 from .model import Model
-from .motion import Motion
+from .motion import Motion, Piece
 
 
 @dataclass(frozen=True)
 class Source:
     """One motion under one model at parameters x (size,): what candidates make their columns of.
 
-    use: (n, dof) bool of the rows that a stride keeps.
+    use: (n, dof) bool of the rows that a stride keeps. beside: the same on another motion, which will
+    be asked the same: what is integrated step by step is integrated for both at once.
     """
 
     model: Model
@@ -24,6 +25,7 @@ class Source:
     motion: Motion
     stride: int
     use: np.ndarray
+    beside: Source | None = None
 
     @cached_property
     def pieces(self) -> list:
@@ -38,6 +40,10 @@ class Source:
         return self.model.with_reference(self.x[: 10 * self.model.bodies].reshape(-1, 10))
 
     @cached_property
+    def _unbent(self) -> list:
+        return row.unbent(self.model, self.motion, self.x)
+
+    @cached_property
     def _bent(self) -> dict:
         return {}
 
@@ -45,8 +51,31 @@ class Source:
         """What a joint's link would change if it stood apart from its motor: the same for whatever
         parts them."""
         if joint not in self._bent:
-            self._bent[joint] = row.bent(self.model, self.motion, self.x, joint)
+            self._bent[joint] = row.bent(self.model, self.motion, self.x, joint, self._unbent)
         return self._bent[joint]
+
+    @cached_property
+    def _shifted(self) -> dict:
+        return {}
+
+    def shifted(self, joint: int) -> list[np.ndarray]:
+        """Of each whole piece, slopes (3, dof, n) of the unfiltered torque in the angle, speed and
+        acceleration of a joint as measured: the same for whatever says that it moved otherwise."""
+        if joint not in self._shifted:
+            bodies, rest = np.split(self.x, [10 * self.model.bodies])
+            out = []
+            for piece, base in zip(self._whole, self.unfiltered):
+                slopes = []
+                for name, nudge in zip(("q", "qd", "qdd"), row.NUDGES):
+                    moved = {"q": piece.q.copy(), name: getattr(piece, name).copy()}
+                    moved[name][:, joint] += nudge
+                    torque = self.model.torque(
+                        replace(piece, **moved), bodies.reshape(-1, 10), rest
+                    )
+                    slopes.append((torque.T - base) / nudge)
+                out.append(np.stack(slopes))
+            self._shifted[joint] = out
+        return self._shifted[joint]
 
     @cached_property
     def _flights(self) -> dict:
@@ -56,31 +85,50 @@ class Source:
         """How far each joint's link stands apart, of each piece (tried, 3, n), at sets of shape values
         that are tried on each joint: all links at once, once for all who ask with a `key`."""
         if key not in self._flights:
-            bent = [self.bent(joint) for joint in range(len(tries))]
-            pieces = []
+            both = [self] if self.beside is None else [self, self.beside]
+            bent = [[source.bent(joint) for joint in range(len(tries))] for source in both]
+            found: list[list] = [[] for _ in both]
             for k in range(len(self.motion.pieces)):
-                cases = [(b[k].load, b[k].inertia, b[k].seen, s) for b, own in zip(bent, tries) for s in own]
-                found = iter(effect.several(cases))
-                pieces.append([[next(found) for _ in own] for own in tries])
-            self._flights[key] = [[piece[joint] for piece in pieces] for joint in range(len(tries))]
+                cases = [
+                    (b[k].load, b[k].inertia, b[k].seen, s)
+                    for known in bent
+                    for b, own in zip(known, tries)
+                    for s in own
+                ]
+                each = iter(effect.several(cases))
+                for pieces in found:
+                    pieces.append([[next(each) for _ in own] for own in tries])
+            for source, pieces in zip(both, found):
+                source._flights[key] = [
+                    [piece[joint] for piece in pieces] for joint in range(len(tries))
+                ]
         return self._flights[key]
 
     @cached_property
     def predicted(self) -> np.ndarray:
         """Torque (n, dof), low-passed as the columns are."""
-        return row.predicted(self.model, self.motion, self.x, self.stride)
+        kept = row.starts(self.motion, self.stride)
+        found = zip(self.motion.pieces, self.unfiltered, kept)
+        low = [[piece.settled(own, rows, j) for j, own in enumerate(t)] for piece, t, rows in found]
+        return np.concatenate(low, axis=1).T
 
     @cached_property
     def unfiltered(self) -> list[np.ndarray]:
         """Torque (dof, n) over whole pieces, before the low-pass."""
         bodies, rest = np.split(self.x, [10 * self.model.bodies])
-        whole = (replace(p, smoother=None, core=slice(0, len(p.t))) for p in self.motion.pieces)
-        return [self.model.torque(piece, bodies.reshape(-1, 10), rest).T for piece in whole]
+        return [self.model.torque(piece, bodies.reshape(-1, 10), rest).T for piece in self._whole]
+
+    @cached_property
+    def _whole(self) -> list[Piece]:
+        """The pieces without their low-pass, all of their rows."""
+        return [replace(p, smoother=None, core=slice(0, len(p.t))) for p in self.motion.pieces]
 
     def full(self, columns: np.ndarray) -> np.ndarray:
         """The model's columns with the slopes of its free shape values after them."""
+        free = [k for k, value in enumerate(self.model.shape_values) if not value.held]
+        if not free:
+            return columns
         slopes = row.tangents(
             self.model, self.motion, self.x, self.stride, self.use, self.predicted
         )
-        free = [k for k, value in enumerate(self.model.shape_values) if not value.held]
         return np.concatenate([columns, slopes[:, :, free]], axis=2)

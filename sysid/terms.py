@@ -16,7 +16,7 @@ from .effect_parameters import Shape
 from .errors import SysidError
 from .inertia import PARAMETERS, UNITS
 from .model_parameters import ROBOT, Coefficient, ShapeValue, holds
-from .motion import Motion
+from .motion import Motion, Piece
 from .robot import Robot
 from .scales import Scales, scales
 
@@ -77,12 +77,20 @@ class Terms:
         if key not in self.scales.ranges:  # with the effect itself, so that no other comes to its place
             sample, angle = self.scales.sample, None if joint == ROBOT else float(self.scales.angle[joint])
             if effect.uses_load:
-                sample = replace(sample, load=regressor.torque(self.robot, self.robot.prior, sample.q, sample.qd, sample.qdd))
+                sample = self._loaded(sample)
             sized = effect.sized(sample, self.scales.rows, joint)
             bounds = lambda s: (s.low, s.high) if sized is not None else s.bounds(self.scales.of(s.of, joint), angle)  # noqa: E731
             shapes = effect.shapes() if sized is None else sized
             self.scales.ranges[key] = effect, [(s, *_within(s, effect, bounds(s)), angle) for s in shapes]
         return self.scales.ranges[key][1]
+
+    def _loaded(self, sample: Piece) -> Piece:
+        """A sample of the motion with the torque that the prior's bodies need, the same for all effects."""
+        robot, load = sample.kept.get("load of the prior", (None, None))
+        if robot is not self.robot:
+            load = regressor.torque(self.robot, self.robot.prior, sample.q, sample.qd, sample.qdd)
+            sample.kept["load of the prior"] = self.robot, load
+        return replace(sample, load=load)
 
     def _name(self, effect: Effect, joint: int, word: str) -> str:
         level = "" if effect.level is None else f"[{effect.level}]"

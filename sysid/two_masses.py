@@ -28,14 +28,25 @@ def link_side(robot: Robot, pi, motion: Piece, joint: int) -> tuple[np.ndarray, 
     Args:
         pi: (bodies, 10). motion: q, qd, qdd (n, dof).
     """
-    carried = np.array(pi, dtype=float)
-    for b, body in enumerate(robot.bodies):
-        if body.kind == "rotor" and robot.transmission[body.row, joint]:
-            carried[b] = 0.0
     alone = np.zeros_like(motion.q)
     alone[:, joint] = 1.0
-    load = regressor.torque(robot, carried, motion.q, motion.qd, motion.qdd)[:, joint]
-    return load, regressor.torque(robot, carried, motion.q, 0.0 * motion.q, alone, gravity=np.zeros(3))[:, joint]
+    carried, still = _carried(robot, pi, joint), 0.0 * motion.q
+    inertia = regressor.torque(robot, carried, motion.q, still, alone, gravity=np.zeros(3))[:, joint]
+    return link_load(robot, pi, motion, joint), inertia
+
+
+def link_load(robot: Robot, pi, motion: Piece, joint: int) -> np.ndarray:
+    """The first of `link_side`."""
+    return regressor.torque(robot, _carried(robot, pi, joint), motion.q, motion.qd, motion.qdd)[:, joint]
+
+
+def _carried(robot: Robot, pi, joint: int) -> np.ndarray:
+    """Bodies (bodies, 10) without a joint's own rotor."""
+    out = np.array(pi, dtype=float)
+    for b, body in enumerate(robot.bodies):
+        if body.kind == "rotor" and robot.transmission[body.row, joint]:
+            out[b] = 0.0
+    return out
 
 
 def sprung(load, inertia, step: float, *, compliance: float, damping: float) -> np.ndarray:
@@ -145,7 +156,8 @@ def flown(load, inertia, step: float, *, b, teeth) -> np.ndarray:
     for k, (first, more) in enumerate(zip(h * driven[:-1], (h / fine) * np.diff(driven, axis=0)), 1):
         push = first.copy()
         for _ in range(fine):
-            np.clip(d, -half, half, out=into)
+            np.maximum(d, -half, out=into)
+            np.minimum(into, half, out=into)
             np.subtract(d, into, out=into)  # how far into the teeth, zero between
             np.multiply(into, spring, out=held)
             np.multiply(v, damper, out=change)

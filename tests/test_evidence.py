@@ -11,7 +11,8 @@ from scipy.stats import norm
 from scipy.stats import t as student
 
 from sysid import blocks, config, listed_effects, regressor
-from sysid.candidates import candidates, columns_of
+from sysid.candidate_columns import columns_of
+from sysid.candidates import candidates
 from sysid.diagnose import evidence, null, projected
 from sysid.log import Log, Segment
 from sysid.lowpass import lowpassed, stride_of

@@ -18,7 +18,7 @@ ROOT = Path(__file__).resolve().parent.parent
 
 # The order of the method: a module imports only from modules above it.
 ORDER = [
-    "errors", "mistyped", "bounded", "unfinished", "whole_files", "yaml_text", "state", "trusted", "progress", "units", "picture", "threads", "silence", "callable_module", "workers", "inertia", "urdf_checks", "urdf_files", "urdf", "readers", "datasets", "spec_values", "robot_spec", "drive_spec", "log_spec", "specs", "groups", "prior", "link_priors", "rotors", "robot", "regressor", "outliers", "knocks", "jumps", "repeats",
+    "errors", "mistyped", "bounded", "nonnegative", "unfinished", "whole_files", "yaml_text", "state", "trusted", "progress", "units", "picture", "threads", "silence", "callable_module", "workers", "inertia", "urdf_checks", "urdf_files", "urdf", "readers", "datasets", "spec_values", "robot_spec", "drive_spec", "log_spec", "specs", "groups", "prior", "link_priors", "rotors", "robot", "regressor", "outliers", "knocks", "jumps", "repeats",
     "frequencies", "clock", "segment", "spans", "events", "motor_side", "recorded_columns", "recording", "rounded_stamps", "log", "even_clock", "long_log", "masks", "gaussian", "smoother",
     "motion", "extent", "standstill", "preprocess", "long_motion", "blocks", "two_masses", "lowpass", "flexible", "effect_parameters", "effect_options", "effect", "deflection",
     "vocabulary", "formula", "effects", "own_effects",
@@ -26,7 +26,7 @@ ORDER = [
     "reduction", "triangles", "linearised", "compress", "symmetric_matrices", "interior", "nearby", "certificate", "trust_region", "solve", "prior_weight", "uncertainty", "differences", "prediction", "posed_problem", "given_shapes", "estimate",
     "long_prediction", "base_parameters", "held_apart", "masses", "plausible", "shape_search", "shape", "bumps", "filters", "fit_document", "results", "earlier_fit", "shape_refinement", "notices", "experiment_logs", "thinning",
     "experiment_file", "yaml_edit", "effect_entry", "urdf_export", "gains", "simulate", "rollout", "pipeline", "run", "export", "check", "init", "comparison",
-    "transfer", "noise", "candidates", "design", "view", "failures", "unexplained", "shown", "diagnose", "changes", "online", "fleet", "statement", "loop", "report",
+    "transfer", "noise", "candidates", "candidate_columns", "design", "view", "failures", "unexplained", "shown", "diagnose", "changes", "online", "fleet", "statement", "loop", "report",
     "studies", "studio", "terminal", "cli", "__main__",
 ]  # fmt: skip
 # Late imports that close a loop on purpose: a path that names a data set, a prior that is a previous run, the effects

@@ -44,7 +44,7 @@ def test_covariance_is_the_dense_one(scale):
     assert np.abs(correlation[lags + 1 : -lags]).max() < 1e-2 * correlation[0]
     columns = rng.normal(size=(n, 4, 2)).cumsum(axis=0)
     columns[50:90] = 0.0  # rows that do not count
-    found = covariance(scale * columns, spectrum)
+    found = covariance(scale * np.moveaxis(columns, 0, -1), spectrum)
     dense = toeplitz(correlation[:n])
     wanted = np.einsum("nsk,nm,msl->skl", columns, dense, columns)
     np.testing.assert_allclose(found / scale**2, wanted, rtol=1e-4, atol=1e-4 * np.abs(wanted).max())
@@ -60,14 +60,14 @@ def test_covariance_is_that_of_scores_of_noise_that_is_drawn():
     size = 2 * n
     lag = np.minimum(np.arange(size), size - np.arange(size))
     spectrum = np.fft.rfft(0.9**lag).real
-    np.testing.assert_allclose(np.diag(covariance(columns, spectrum)[0]), np.mean(scores**2, axis=1), rtol=0.08)
+    np.testing.assert_allclose(np.diag(covariance(columns.transpose(1, 2, 0), spectrum)[0]), np.mean(scores**2, axis=1), rtol=0.08)
     # as read off another stretch of the noise: Bartlett's window over sixteen memories takes a sixteenth of the slowest
     values = coloured(rng, (60 * n, 1), 0.9)
     (read,) = spectra(values, nothing(values), np.ones((60 * n, 1), bool), 0.1, 0.01)
     alike = np.fft.irfft(read)
     long = np.zeros(size)
     long[: n // 2], long[-n // 2 :] = alike[: n // 2], alike[-n // 2 :]
-    found = covariance(columns, np.clip(np.fft.rfft(long).real, 0.0, None))
+    found = covariance(columns.transpose(1, 2, 0), np.clip(np.fft.rfft(long).real, 0.0, None))
     np.testing.assert_allclose(np.diag(found[0]), np.mean(scores**2, axis=1), rtol=0.2)
 
 
@@ -99,7 +99,7 @@ def test_a_spectrum_is_that_of_the_noise_before_a_fit():
             noise = coloured(rng, (n, 1), keep)
             left = noise - columns @ (columns.T @ noise)
             memory = step / (1.0 - keep)
-            own.append(covariance(score, spectra(left, columns[None], np.ones((n, 1), bool), memory, step)[0]))
-            plain.append(covariance(score, spectra(left, nothing(left), np.ones((n, 1), bool), memory, step)[0]))
+            own.append(covariance(score.T, spectra(left, columns[None], np.ones((n, 1), bool), memory, step)[0]))
+            plain.append(covariance(score.T, spectra(left, nothing(left), np.ones((n, 1), bool), memory, step)[0]))
         assert np.mean(own) == pytest.approx(wanted, rel=0.3), keep  # Bartlett's window takes a part of slow noise too
         assert abs(np.mean(own) - wanted) < 0.7 * abs(np.mean(plain) - wanted), keep

@@ -5,11 +5,12 @@ Neighbouring rows of a filtered signal say the same thing twice. So rows are sum
 time that are long against every memory in them (the filter's, the noise's), and blocks are what is
 counted, left out and resampled.
 
-Which rows stand together (`numbering`), how sure a sum or an estimate is (`deviations`, `redrawn`,
-and `moderated` where blocks are few), how sure the parameters of a fit are together (`parameters`),
-and which model loses least (`rivals`).
+Which rows stand together (`numbering`), what blocks tell of coefficients (`coefficients`), how sure
+a sum or an estimate is (`deviations`, `redrawn`, and `moderated` where blocks are few), how sure the
+parameters of a fit are together (`parameters`), and which model loses least (`rivals`).
 """
 
+from .coefficients import gains, moves, taking_part
 from .deviations import (
     LEVERAGE,
     RESTING,
@@ -57,9 +58,11 @@ __all__ = [
     "evening",
     "extents",
     "folds",
+    "gains",
     "jackknife",
     "left_out",
     "memory",
+    "moves",
     "normal_scores",
     "numbered",
     "ratio_at",
@@ -69,6 +72,7 @@ __all__ = [
     "slope_chance",
     "standard_error",
     "summed",
+    "taking_part",
     "widening",
     "within_one_error",
     "z_score",

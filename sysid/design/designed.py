@@ -25,6 +25,7 @@ from ..lowpass import lowpassed, widest
 from ..motion import Motion
 from ..noise import of_angles
 from ..notices import noticed
+from ..prediction import predict
 from ..preprocess import prepare
 from ..segment import Segment
 from ..specs import Experiment
@@ -181,7 +182,9 @@ def _questioned(base: Basis, log: Log) -> Motion:
 def _of_angles(base: Basis) -> np.ndarray:
     """(n, dof) what the noise of the angles, drawn once more, adds to the torque of the logs' rows."""
     spec = settled(base.fit.experiment.preprocess, base.fit.filters)
-    return np.concatenate(of_angles([base.logs], spec, base.fit).torque)
+    of = base.fit.model, base.fit.x
+    known = [predict(*of, base.motion)]
+    return np.concatenate(of_angles([base.logs], [base.motion], known, spec, of).torque)
 
 
 def _margins(problem: Problem, bounds: Limits, found: Found) -> dict[str, float]:

@@ -13,7 +13,8 @@ from types import MappingProxyType, SimpleNamespace
 
 import numpy as np
 
-from ..candidates import Candidate, bounds_of, columns_of, tried
+from ..candidate_columns import bounds_of, columns_of, tried
+from ..candidates import Candidate
 from ..effect import SensorEffect
 from ..effect_parameters import Shape
 from ..estimate import Fit

@@ -15,7 +15,8 @@ import numpy as np
 from scipy.special import ndtri
 
 from ..blocks import Belief, ratio_at
-from ..candidates import Candidate, at_start
+from ..candidate_columns import at_start
+from ..candidates import Candidate
 from ..model_parameters import ROBOT
 from ..view import View
 from .ask import Asked

@@ -62,8 +62,7 @@ class Group:
     @cached_property
     def moves(self) -> np.ndarray:
         """(blocks, k) how far they move when a block is left out."""
-        own = self.loud - self.loud_squares @ self.c
-        return np.einsum("bkl,bl->bk", blocks.left_out(self.squares), own)
+        return blocks.moves(self.c, self.loud, self.loud_squares, self.squares)
 
     @cached_property
     def spreads(self) -> tuple[float, float, float]:
@@ -79,10 +78,7 @@ class Group:
     def freedom(self) -> tuple[float, float]:
         """Degrees of freedom: directions that take part (Satterthwaite 1946), and blocks that they
         rest on."""
-        moves = self.moves
-        spread = moves.T @ moves
-        directions = np.trace(spread) ** 2 / max(np.sum(spread**2), 1e-300)
-        return float(directions), blocks.resting(self.squares[:-1])
+        return float(blocks.taking_part(self.moves)), blocks.resting(self.squares[:-1])
 
     @cached_property
     def testable(self) -> bool:
@@ -160,8 +156,23 @@ class Group:
 def gain(group: Group) -> np.ndarray:
     """(folds,) what a group takes of the weighted squared residual of blocks that it was not fitted
     on."""
-    fold = blocks.folds(len(group.scores) - 1)
-    s, g = blocks.summed(fold, group.scores[:-1]), blocks.summed(fold, group.squares[:-1])
-    without = (group.c - s)[:, :, None]
-    rest = np.linalg.solve((1.0 + 1e-9) * np.eye(s.shape[1]) - g, without)[:, :, 0]
-    return 2.0 * np.sum(rest * s, axis=1) - np.einsum("fi,fij,fj->f", rest, g, rest)
+    return blocks.gains(group.c, group.scores, group.squares)
+
+
+def known_together(groups: list[Group]) -> None:
+    """What every group is asked for, of all with as many directions at once: many small products
+    are one large one. Each keeps its own, as if it had been asked by itself."""
+    by_size: dict[tuple, list[Group]] = {}
+    for group in groups:
+        by_size.setdefault(group.scores.shape, []).append(group)
+    for own in by_size.values():
+        names = ("scores", "squares", "loud", "loud_squares")
+        scores, squares, loud, loud_squares = (
+            np.stack([getattr(g, n) for g in own]) for n in names
+        )
+        c = scores.sum(-2)
+        moves = blocks.moves(c, loud, loud_squares, squares)
+        found = c, moves, blocks.gains(c, scores, squares).sum(-1), blocks.taking_part(moves)
+        for group, c, moves, taken, directions in zip(own, *found):
+            freedom = float(directions), blocks.resting(group.squares[:-1])
+            vars(group).update(c=c, moves=moves, taken=float(taken), freedom=freedom)

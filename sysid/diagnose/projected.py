@@ -7,11 +7,12 @@ from itertools import groupby
 
 import numpy as np
 
-from ..candidates import Candidate, columns_of, tried
-from ..projection import directions
+from ..candidate_columns import columns_of, tried
+from ..candidates import Candidate
+from ..projection import directions_of
 from ..view import View, by_block
 from ..view.stationary import covariance
-from .evidence import Group
+from .evidence import Group, known_together
 
 _BATCH = 256  # columns' sets that stand in memory at once
 
@@ -31,7 +32,8 @@ def groups_at(view: View, asked: Sequence[Asked]) -> list[Group]:
     dof, alike = view.model.robot.dof, {}
     for candidate, found in groupby(asked, key=lambda one: one[0]):
         own = [shapes for _, shapes in found]
-        plain, rough = (columns_of(s, candidate, own) for s in (view.source, view.rough_source))
+        # the rough one first: what it integrates step by step it does for both
+        rough, plain = (columns_of(s, candidate, own) for s in (view.rough_source, view.source))
         key = (tuple(candidate.touches(dof)), plain.shape[3])
         alike.setdefault(key, []).append(([(candidate, shapes) for shapes in own], plain, rough))
     out = []
@@ -51,45 +53,43 @@ def _made(view: View, asked, joints, plain: np.ndarray, rough: np.ndarray) -> li
     design, sums, spans = view.design, view.sums, by_block(view.blocks)
     count, _, n, k = plain.shape
     size, kk, parts = design.columns.shape[2], count * k, len(sums.scores)  # a prior has no columns
-    cross, own = np.zeros((parts, size, kk)), np.zeros((parts, count, k, k))
-    score, rough_cross = np.zeros((parts, kk)), np.zeros((size, kk))
+    cross, own = np.zeros((parts, kk, size)), np.zeros((parts, count, k, k))
+    score, rough_cross = np.zeros((parts, kk)), np.zeros((kk, size))
     rough_own = np.zeros((count, k, k))
-    square = lambda a: np.einsum("nsk,nsl->skl", a, a)  # noqa: E731
-    for i, j in enumerate(joints):
-        values, noisy = (
-            view.weights[j] * np.moveaxis(a[:, i], 1, 0).reshape(n, kk) for a in (plain, rough)
-        )
-        more = noisy - values
-        noise = more * design.rough_residual[:, j, None]
-        rough_cross += design.rough_columns[j].T @ more
-        rough_own += square(more.reshape(n, count, k))
+    # what stands across columns (..., k, n) of the same set
+    pair = lambda a, b: np.einsum("...kn,...ln->...kl", a, b)  # noqa: E731
+    split = lambda a: a.reshape(*a.shape[:-2], count, k, a.shape[-1])  # noqa: E731
+    last = lambda a: np.swapaxes(a, 1, 2).reshape(kk, n)  # noqa: E731 - samples last, as in memory
+    weighted = [view.weights[j] * last(plain[:, i]) for i, j in enumerate(joints)]
+    for i, (j, values) in enumerate(zip(joints, weighted)):
+        more = view.weights[j] * last(rough[:, i]) - values
+        rough_cross += more @ design.rough_columns[j]
+        rough_own += pair(split(more), split(more))
+        columns, left, noise = design.columns[j], design.residual[:, j], design.rough_residual[:, j]
         for b, rows in enumerate(spans):
-            cross[b] += design.columns[j][rows].T @ values[rows]
-            score[b] += design.residual[rows, j] @ values[rows] - noise[rows].sum(0)
-            own[b] += square(values[rows].reshape(-1, count, k))
+            here = values[:, rows]
+            cross[b] += here @ columns[rows]
+            score[b] += here @ left[rows] - more[:, rows] @ noise[rows]
+            own[b] += pair(split(here), split(here))
     absorbed = cross.sum(0)  # in the design's directions, in which the system is one
     foreseen = np.zeros((count, k, k))
-    for i, j in enumerate(joints):
-        left = view.weights[j] * np.moveaxis(plain[:, i], 1, 0)
-        left = left - (design.columns[j] @ absorbed).reshape(n, count, k)
-        foreseen += covariance(left, view.spectra[j])
+    for j, values in zip(joints, weighted):
+        foreseen += covariance(split(values - absorbed @ design.columns[j].T), view.spectra[j])
     loss = float(np.sum(design.residual[:, joints] ** 2))
-    score = (score - (sums.scores - sums.rough_scores) @ absorbed).reshape(parts, count, k)
+    scores = sums.scores - sums.rough_scores
+    score = (score - scores @ absorbed.T).reshape(parts, count, k)
     # what stands across a candidate's columns and the model's, in each block and in the noise
-    pair = lambda a, b: np.einsum("...psk,...psl->...skl", a, b, optimize=True)  # noqa: E731
-    split = lambda a: a.reshape(*a.shape[:-1], count, k)  # noqa: E731
-    by, mixed = split(absorbed), split(cross - sums.squares @ absorbed)
-    squares = own - pair(split(cross), by) - pair(by, mixed)
+    by, mixed = split(absorbed), cross - absorbed @ sums.squares
+    squares = own - pair(split(cross), by) - pair(by, split(mixed))
     # the model's own columns took a part of the noise: as loud as before they did
-    freed = split(sums.freed @ mixed.reshape(cross.shape))
-    more, scores = pair(mixed, freed), sums.scores - sums.rough_scores
-    loud = score + np.einsum("bp,bpsk->bsk", scores, freed, optimize=True)
-    noise = split(rough_cross - sums.rough_squares @ absorbed)
-    rough_square = rough_own - pair(split(rough_cross), by) - pair(by, noise)
+    freed = split(mixed @ sums.freed)
+    more = pair(split(mixed), freed)
+    loud = score + np.einsum("bp,bskp->bsk", scores, freed)
+    noise = rough_cross - absorbed @ sums.rough_squares
+    rough_square = rough_own - pair(split(rough_cross), by) - pair(by, split(noise))
     whole, data = own.sum(0) - pair(by, by), squares[:-1].sum(0)
     out = []
-    for s in range(count):
-        found = directions(own[:, s].sum(0), whole[s], data[s], rough_square[s])
+    for s, found in enumerate(directions_of(own.sum(0), whole, data, rough_square)):
         if found is None:
             continue
         (candidate, shapes), (turn, sizes) = asked[s], found
@@ -97,4 +97,5 @@ def _made(view: View, asked, joints, plain: np.ndarray, rough: np.ndarray) -> li
         told = score[:, s] @ turn, turned, loud[:, s] @ turn, turned + turn.T @ more[:, s] @ turn
         rest = turn, sizes, turn.T @ foreseen[s] @ turn, loss
         out.append(Group(candidate, dict(shapes), *told, *rest))
+    known_together(out)
     return out

@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..candidates import Candidate, at_start, bounds_of, grown
+from ..candidate_columns import at_start, bounds_of, grown
+from ..candidates import Candidate
 from ..posed_problem import inverse
 from ..view import View, looked_at, losses
 from .evidence import Group

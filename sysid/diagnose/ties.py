@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .. import blocks
-from ..candidates import columns_of
+from ..candidate_columns import columns_of
 from ..posed_problem import inverse
 from ..view import View, losses, taken
 from .evidence import Group

@@ -37,13 +37,25 @@ class Backlash(Deflection):
         return played(load, inertia, step, b=b, teeth=teeth)
 
     def links(self, cases):
-        if self.encoder == "joint" or len(cases) < _MANY or len({(len(load), step) for load, _, step, _ in cases}) > 1:
+        if self.encoder == "joint":
             return super().links(cases)
-        load, inertia, (step, *_), shapes = zip(*cases)
-        b, teeth = ([own[word] for own in shapes] for word in ("b", "teeth"))
-        return list(flown(load, inertia, step, b=b, teeth=teeth))
+        alike: dict[tuple, list[int]] = {}
+        for number, (load, _, step, _) in enumerate(cases):
+            alike.setdefault((len(load), step), []).append(number)
+        out = [None] * len(cases)
+        for (_, step), numbers in alike.items():
+            own = [cases[number] for number in numbers]
+            for number, behind in zip(numbers, super().links(own) if len(own) < _MANY else _together(own, step)):
+                out[number] = behind
+        return out
 
     def flights(self, bounds):
         # the time of flight grows with the cube root of the play: neighbours' are a sixth apart
         most, (low, high) = bounds["b"][1], bounds["teeth"]
         return [{"b": float(b), "teeth": float(np.sqrt(low * high))} for b in np.geomspace(most / 500.0, most, 14)]
+
+
+def _together(cases: list[tuple], step: float) -> np.ndarray:
+    """`behind` (links, n) of links on logs of the same length."""
+    load, inertia, _, shapes = zip(*cases)
+    return flown(load, inertia, step, **{word: [own[word] for own in shapes] for word in ("b", "teeth")})

@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..estimate import Fit
 from ..log import Log
 from ..lowpass import again, angle_noise, band, widest
-from ..prediction import predict
+from ..motion import Motion
+from ..prediction import Prediction, predict
 from ..preprocess import prepare
 
 
@@ -23,7 +23,9 @@ class OfAngles:
     band: float
 
 
-def of_angles(logs: Sequence[Sequence[Log]], spec, fit: Fit) -> OfAngles:
+def of_angles(
+    logs: Sequence[Sequence[Log]], motions: Sequence[Motion], told: Sequence[Prediction], spec, of
+) -> OfAngles:
     """What the angles' noise, drawn once more, adds to each piece of the prepared logs.
 
     Derivatives make what is white on an angle anything but white in the torque, stamps that jitter
@@ -31,20 +33,20 @@ def of_angles(logs: Sequence[Sequence[Log]], spec, fit: Fit) -> OfAngles:
     Its shape is known so; its size only as well as the angles tell it.
 
     Args:
-        logs: of each part, as prepared with `spec`.
+        logs: of each part. motions: the same, prepared with `spec`. told: what a model predicts of
+            these. of: (model, x (size,)) that does.
 
     Source: Cook & Stefanski 1994 (simulation extrapolation).
     """
     rng, out, bands = np.random.default_rng(0), [], []
-    for part in logs:
+    for part, plain, known in zip(logs, motions, told):
         cutoff = widest(part, known=(own_band := band(part)))
         drawn = lambda s: again(s, angle_noise(s, cutoff), cutoff, rng)  # noqa: E731, B023
         noisy = [replace(log, segments=tuple(map(drawn, log.segments))) for log in part]
-        motions = plain, _ = [prepare(own, spec, fit.joints) for own in (part, noisy)]
-        told = [predict(fit.model, fit.x, motion) for motion in motions]
+        found = predict(*of, prepare(noisy, spec, plain.joints))
         ends = np.cumsum([piece.samples for piece in plain.pieces])[:-1]
         # a clock that is late shifts the measured torque as well
-        error = [one.predicted - one.measured for one in told]
+        error = [one.predicted - one.measured for one in (known, found)]
         out += np.split(error[1] - error[0], ends)
         bands.append(own_band)
     return OfAngles(out, max(bands))

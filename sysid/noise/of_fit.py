@@ -34,7 +34,8 @@ def floors_of_fit(
     told = [predict(model, x, motion) for motion in motions]
     pieces = [piece for motion in motions for piece in motion.pieces]
     predicted = np.concatenate([one.predicted for one in told])
-    found = floors_of(pieces, predicted, angles=of_angles(logs, plain, fit))
+    angles = of_angles(logs, motions, told, plain, (model, x))
+    found = floors_of(pieces, predicted, angles=angles)
     if plain is not spec:
         told = [predict(model, x, prepare(part, spec, fit.joints)) for part in logs]
     left = np.max([one.errors()["rms"] for one in told], axis=0)

@@ -11,6 +11,7 @@ import math
 
 import numpy as np
 
+from ..nonnegative import least_squares
 from .stretches import Run, bridged, moving
 
 _OUTLYING = 5.0  # robust standard deviations: a Gaussian does that once in two million
@@ -93,23 +94,20 @@ def _by_local(
     """The usual size (n,) of values that are white noise plus some multiple of noise whose size is
     `local` (n,) of each run: from medians among values where it is alike. `unsure`: by how much
     that of each run may be too small."""
-    from scipy.optimize import nnls
-
     every, size = np.concatenate(values), np.concatenate(local)
     there = ~np.isnan(every)
     every, size = np.abs(every[there]), size[there]
     if len(every) < _ALIKE**2 or not size.any():
         return [np.full(len(v), typical) for v in values]
-    bins = np.array_split(np.argsort(size), _ALIKE)
+    ends = len(size) * np.arange(1, _ALIKE) // _ALIKE
+    bins = np.split(np.argpartition(size, ends), ends)
     usual = np.array([np.median(every[own]) / _NORMAL for own in bins]) ** 2
     square = np.array([np.mean(size[own] ** 2) for own in bins])
     shape = np.stack([np.full(_ALIKE, typical**2), square], axis=1)
     weight = 1.0 / np.maximum(usual, 1e-6 * usual.max())  # each median is as sure as it is large
-    white, more = nnls(shape * weight[:, None], usual * weight)[0]
+    white, more = least_squares(shape * weight[:, None], usual * weight)
     more = min(more, _KNOWN)
-    return [
-        np.sqrt(white * typical**2 + more * (u * own) ** 2) for own, u in zip(local, unsure)
-    ]
+    return [np.sqrt(white * typical**2 + more * (u * own) ** 2) for own, u in zip(local, unsure)]
 
 
 def _step(values: np.ndarray, counts: np.ndarray, width: int) -> np.ndarray:

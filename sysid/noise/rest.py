@@ -50,14 +50,18 @@ def rest_of(shared: Shared, raw, torque, joint: int, drawn):
         highest = KEPT * shared.bandwidth
         predicted = [low(p, highest, step) for p, step in zip(predicted, steps)]
     asked = Functions(shared.calm, shared.motion, predicted, joint, shared.bandwidth)
-    rest, _, _ = asked.removed_from(raw, [run.counts for run in runs])
+    counts = [run.counts for run in runs]
+    found = asked.removed_from(raw, counts)
+    rest = found[0]
     usual = outliers.usual(rest, drawn, steps, shared.bandwidth)
-    kept = bursts.calm(rest, [run.counts for run in runs], steps, usual)
+    kept = bursts.calm(rest, counts, steps, usual)
     even = rest if usual is None else [v / u for v, u in zip(rest, usual)]
     kept = outliers.away_from_reversals(runs, shared.motion.v, even, kept)
     rest = [bridged(v, k) for v, k in zip(rest, kept)]
     digit = outliers.digit_of(np.concatenate([m[run.counts] for m, run in zip(torque, runs)]))
     kept, _ = outliers.without(rest, kept, steps, shared.bandwidth, digit, drawn)
     # once more, without what no noise does
-    rest, number, removed = asked.removed_from(raw, kept)
+    if not all(np.array_equal(own, all_) for own, all_ in zip(kept, counts)):
+        found = asked.removed_from(raw, kept)
+    rest, number, removed = found
     return [bridged(v, k) for v, k in zip(rest, kept)], kept, number, removed

@@ -45,14 +45,13 @@ def drawn(spectrum, n: int, draws: int, rng: np.random.Generator) -> np.ndarray:
 
 
 def covariance(columns, spectrum) -> np.ndarray:
-    """Covariance (..., k, k) of the scores of columns (n, ..., k), zero where rows do not count.
+    """Covariance (..., k, k) of the scores of columns (..., k, n), zero where rows do not count.
 
     In single precision: it says how sure something is."""
-    size, columns = 2 * (len(spectrum) - 1), np.asarray(columns)
-    most = np.maximum(np.abs(columns).max(axis=0), 1e-300)
-    columns = (columns / most).astype(np.float32)
-    turned = np.moveaxis(rfft(columns, size, axis=0), 0, -1)
+    size = 2 * (len(spectrum) - 1)
+    most = np.maximum(np.abs(columns).max(axis=-1, keepdims=True), 1e-300)
+    turned = rfft((columns / most).astype(np.float32), size, axis=-1)
     weight = spectrum / size * np.where(np.arange(len(spectrum)) % (size // 2), 2.0, 1.0)
-    turned = turned * np.sqrt(weight).astype(np.float32)
-    both = np.concatenate([turned.real, turned.imag], axis=-1)
-    return (both @ np.swapaxes(both, -1, -2)).astype(float) * most[..., None, :] * most[..., None]
+    turned *= np.sqrt(weight).astype(np.float32)
+    both = turned.view(np.float32)  # real and imaginary parts side by side
+    return (both @ np.swapaxes(both, -1, -2)).astype(float) * most * np.swapaxes(most, -1, -2)

@@ -131,7 +131,7 @@ class View:
     @cached_property
     def rough_source(self) -> Source:
         """The motion with the angles' noise once more; the same rows count."""
-        return replace(self.source, motion=self.rough)
+        return replace(self.source, motion=self.rough, beside=self.source)
 
     @cached_property
     def design(self) -> Design:

@@ -1,0 +1,232 @@
+"""The columns that what could be missing would add to a model's rows, at the shape values that are
+worth trying."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from . import rows as row
+from .candidates import Candidate
+from .deflection import Deflection
+from .effect import Effect, MotionEffect, SensorEffect
+from .model import Model
+from .model_parameters import ROBOT
+from .motion import Piece
+
+_STEP = 1e-4  # of what the bounds of a shape value span: a difference's
+
+
+def tried(view, candidate: Candidate) -> list[dict[str, float]]:
+    """Sets of shape values to try: a grid over each value in turn, the others midway; where an
+    effect does nothing yet, that, and what it says to try beside it."""
+    if candidate.begins:
+        return [dict(at) for at in candidate.begins]
+    bounds = bounds_of(view.model, candidate)
+    if candidate.nonlinear:
+        starts = [
+            s.start if s.start is not None else float(np.sqrt(low * high))
+            for s, low, high, _ in bounds
+        ]
+        return [
+            {s.name: at for (s, *_), at in zip(bounds, starts)},
+            *further(view.model, candidate),
+        ]
+    if not candidate.effect.coefficients():
+        return []
+    if not bounds:
+        return [{}]
+    lists = {s.name: _worth(candidate.effect, s, *own) for s, *own in bounds}
+    middle = {name: float(np.median(own)) for name, own in lists.items()}
+    return [{**middle, name: float(at)} for name, own in lists.items() for at in own]
+
+
+_MOST = 500  # values of one shape value that are tried
+
+
+def _worth(effect: Effect, shape, low: float, high: float, angle: float | None) -> np.ndarray:
+    """The values of a shape value that are tried: the user's, where it is given."""
+    asked = effect.asked.get(shape.name)
+    if asked is not None and asked.held is not None:
+        return np.array([asked.held])
+    own = shape.values(low, high, angle)
+    return own[:: -(-len(own) // _MOST)]
+
+
+def bounds_of(model: Model, candidate: Candidate) -> list[tuple]:
+    """(shape, low, high, angle travelled) of a candidate's shape values."""
+    return model.ranges(candidate.effect, candidate.joint)
+
+
+def further(model: Model, candidate: Candidate) -> list[dict[str, float]]:
+    """Sets of shape values to try beyond an effect's start, at which its torque is no multiple of
+    its slope there."""
+    if not isinstance(candidate.effect, Deflection):
+        return []
+    return candidate.effect.tries(
+        {s.name: (low, high) for s, low, high, _ in bounds_of(model, candidate)}
+    )
+
+
+def at_start(candidate: Candidate, shapes: dict[str, float]) -> bool:
+    """Whether an effect does nothing at shape values."""
+    return all(shapes[s.name] == s.start for s in candidate.effect.shapes() if s.start is not None)
+
+
+def grown(source, candidate: Candidate, shapes: dict[str, float]) -> Model:
+    """A source's model with a candidate at shape values, in the place of what it has of the same
+    effect on that joint."""
+    model = source.referenced if candidate.effect.uses_load else source.model
+    model = model.without(*candidate.key).with_effect(candidate.effect, (candidate.joint,))
+    own = model.last_shapes
+    asked = [
+        shapes.get(v.shape.name, at) for v, at in zip(model.shape_values[own], model.shapes[own])
+    ]
+    return model.with_shapes([*model.shapes[: own.start], *asked])
+
+
+def columns_of(source, candidate: Candidate, shapes: list[dict[str, float]]) -> np.ndarray:
+    """Columns (shapes, joints, n, k) that a candidate would add to a source's rows, its own joint's
+    or every joint's.
+
+    Of an effect that is no column, the slopes of the predicted torque in its values; away from its
+    start the change of the torque as a share of its first value. In memory samples come last.
+    """
+    if isinstance(candidate.effect, SensorEffect):
+        return _stacked([_sensed(source, candidate, own)[None] for own in shapes])
+    if candidate.swings:
+        return _stacked(_changes(source, candidate, shapes))
+    if candidate.nonlinear:
+        by_shift = [_by_shift(source, candidate, own) for own in shapes]
+        rest = (
+            one is None and _slopes(source, candidate, own) for one, own in zip(by_shift, shapes)
+        )
+        return _stacked([own if one is None else one for one, own in zip(by_shift, rest)])
+    asked = (source.model, source.motion, source.pieces, candidate.effect, candidate.joint, shapes)
+    found = row.signatures_where_finite(*asked, source.stride, source.use)
+    return _stacked([values[None] if values.ndim == 2 else values for values in found])
+
+
+def _stacked(found: Sequence[np.ndarray]) -> np.ndarray:
+    """(sets, joints, n, k), samples last in memory, of sets (joints, n, k)."""
+    return np.swapaxes(np.stack([np.swapaxes(values, 1, 2) for values in found]), 2, 3)
+
+
+def _changes(source, candidate: Candidate, shapes: list[dict[str, float]]) -> list[np.ndarray]:
+    """Of each set (dof, n, 1); where the link does not stand apart yet, of its first step."""
+    effect = candidate.effect
+    leading = next(s.name for s in effect.shapes() if s.start is not None)
+    begun = [_begun(source, candidate, leading, own) for own in shapes]
+    known, apart = source.bent(candidate.joint), None
+    if effect.blows and not candidate.begins and shapes == tried(source, candidate):
+        everywhere = [replace(candidate, joint=joint) for joint in range(source.model.robot.dof)]
+        tries = [
+            [_begun(source, one, leading, own) for own in tried(source, one)] for one in everywhere
+        ]
+        apart = source.flights((candidate.name, candidate.options), effect, tries)[candidate.joint]
+    found = row.secants(
+        source.model, source.motion, known, effect, begun, source.stride, source.use, apart
+    )
+    return [change[:, :, None] / own[leading] for change, own in zip(found, begun)]
+
+
+def _begun(source, candidate: Candidate, leading: str, shapes: dict[str, float]):
+    """Shape values at which an effect does something: those at which it does nothing yet with a
+    small step of its first one."""
+    if not at_start(candidate, shapes):
+        return shapes
+    low, high = next(
+        (low, high) for s, low, high, _ in bounds_of(source.model, candidate) if s.name == leading
+    )
+    return {**shapes, leading: shapes[leading] + _STEP * (high - low)}
+
+
+def _by_shift(source, candidate: Candidate, shapes: dict[str, float]) -> np.ndarray | None:
+    """Slopes (dof, n, k) of an effect that moves one joint and does not yet, by what such a move
+    changes whatever makes it; None of all others."""
+    joint, effect, out = candidate.joint, candidate.effect, []
+    if joint == ROBOT or not isinstance(effect, MotionEffect) or not at_start(candidate, shapes):
+        return None
+    for shape, low, high, _ in bounds_of(source.model, candidate):
+        step = _STEP * (high - low)
+        step = step if shapes[shape.name] + step <= high else -step
+        at = {**shapes, shape.name: shapes[shape.name] + step}
+        if shape.start is None:
+            continue  # a value that only says how it does what it does not yet
+        changes = []
+        for one, slopes in zip(source.bent(joint), source.shifted(joint)):
+            known = (
+                {"behind": effect.apart(one.load, 0.0 * one.load, one.seen, **at)}
+                if isinstance(effect, Deflection)
+                else {}
+            )
+            found = _shift(one, effect.moved(one.seen, joint, **known, **at), slopes, joint)
+            if found is None:
+                return None
+            changes.append(found[None] / step)
+        (found,) = row.settled(source.model, source.motion, changes, source.stride)
+        out.append(found * source.use.T)
+    return np.stack(out, axis=2)
+
+
+def _shift(one, moved: Piece, slopes: np.ndarray, joint: int) -> np.ndarray | None:
+    """What of the torque (dof, n) a move of one joint changes; None where more than that moved."""
+    was, others = one.seen, np.arange(moved.q.shape[1]) != joint
+    steps = [getattr(moved, name) - getattr(was, name) for name in ("q", "qd", "qdd")]
+    none = np.zeros((3, *moved.q.shape))
+    behind = (none if part.deflection is None else part.deflection for part in (moved, was))
+    behind = np.subtract(*behind)
+    if moved.gravity is not was.gravity or np.any(np.stack([*steps, *behind])[:, :, others]):
+        return None
+    ahead = np.stack(steps)[:, :, joint]
+    return np.einsum("on,ojn->jn", ahead, slopes) + np.einsum(
+        "on,ojn->jn", behind[:, :, joint], one.slopes
+    )
+
+
+def _slopes(source, candidate: Candidate, shapes: dict[str, float]) -> np.ndarray:
+    model = grown(source, candidate, shapes)
+    own = model.last_shapes
+    idle_yet = at_start(candidate, shapes)
+    # where an effect does nothing yet, a value that only says how it does it changes nothing
+    idle = [
+        *model.shape_values[: own.start],
+        *(v for v in model.shape_values[own] if idle_yet and v.shape.start is None),
+    ]
+    held = tuple(((v.term, v.joint, v.shape.name), 0.0) for v in idle)
+    held_model = replace(model, held=(*model.held, *held))
+    slopes = row.tangents(
+        held_model,
+        source.motion,
+        source.x,
+        source.stride,
+        source.use,
+        source.predicted if idle_yet else None,
+    )[:, :, own]
+    values = enumerate(model.shape_values[own])
+    free = [k for k, v in values if not (idle_yet and v.shape.start is None)]
+    return slopes[:, :, free]
+
+
+def _sensed(source, candidate: Candidate, shapes: dict[str, float]) -> np.ndarray:
+    """Slopes (n, k) of a sensor effect: what it makes of the predicted torque of its joint, by
+    differences."""
+    out = []
+    for piece, torque, kept in zip(
+        source.motion.pieces, source.unfiltered, row.starts(source.motion, source.stride)
+    ):
+        base, own = torque[None, candidate.joint], []
+        for shape, low, high, _ in bounds_of(source.model, candidate):
+            step = _STEP * (high - low)
+            read = [
+                candidate.effect.sensed(
+                    base, piece.step, **{**shapes, shape.name: shapes[shape.name] + h}
+                )
+                for h in (0.0, step)
+            ]
+            slope = (read[1] - read[0])[0] / step
+            own.append(piece.settled(slope, kept, candidate.joint))
+        out.append(np.stack(own, axis=1))
+    return np.concatenate(out) * source.use[:, [candidate.joint]]
