@@ -6,8 +6,8 @@ time that are long against every memory in them (the filter's, the noise's), and
 counted, left out and resampled.
 
 Which rows stand together (`numbering`), what blocks tell of coefficients (`coefficients`), how sure
-a sum or an estimate is (`deviations`, `redrawn`, and `moderated` where blocks are few), how sure the
-parameters of a fit are together (`parameters`), and which model loses least (`rivals`).
+a sum or an estimate is (`deviations`, `redrawn`, and `moderated` where blocks are few), how sure
+the parameters of a fit are together (`parameters`), and which model loses least (`rivals`).
 """
 
 from .coefficients import gains, moves, taking_part
