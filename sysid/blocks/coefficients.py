@@ -26,8 +26,8 @@ def taking_part(moves) -> np.ndarray:
 
 
 def gains(c, scores, squares) -> np.ndarray:
-    """(..., folds) of coefficients c (..., k) with scores (..., blocks, k), of which the last is the
-    prior's and in no fold."""
+    """(..., folds) of coefficients c (..., k) with scores (..., blocks, k); the last block, the
+    prior, is in no fold."""
     first = np.flatnonzero(np.diff(folds(scores.shape[-2] - 1), prepend=-1))
     s = np.add.reduceat(scores[..., :-1, :], first, axis=-2)
     g = np.add.reduceat(squares[..., :-1, :, :], first, axis=-3)
