@@ -3,9 +3,12 @@ words."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+
+from .candidates import Candidate
 
 _CLEAR = 2.0  # standard deviations
 _MOST = 0.5  # of what stands above a floor, or of a square
@@ -14,16 +17,33 @@ WEIGHED = "`weighting: noise` under `solver:` in the experiment file"
 
 @dataclass(frozen=True)
 class Refused:
-    """An effect that was looked at and is not claimed, and why, in words."""
+    """An effect that was looked at and is not claimed, and why, in words.
+
+    candidate, p, shares: of one that the training logs told: what joined, its family-wise p-value,
+    and of each joint's squared residual there (dof,) what it took.
+    """
 
     effect: str
     joint: str
     why: str
+    candidate: Candidate | None = None
+    p: float = 1.0
+    shares: Sequence[float] = ()
 
     @property
     def told(self) -> str:
         """In words."""
         return f"{self.effect} was looked at and is not claimed: {self.why}"
+
+
+def told_in_vain(refused: Sequence[Refused], joints, j: int, least: float):
+    """The Candidate on joint j, with its p-value, that took at least such a share of what the
+    training logs leave of it and which no fit bore out; None where there is none."""
+    own = [
+        r for r in refused if r.candidate and r.joint in (joints[j], "*") and r.shares[j] >= least
+    ]
+    best = max(own, key=lambda r: r.shares[j], default=None)
+    return best and (best.candidate, best.p)
 
 
 def unexplained(

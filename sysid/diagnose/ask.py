@@ -15,7 +15,7 @@ from .evidence import Group
 from .projected import groups
 
 _MAY_BE = 0.05  # family-wise: an effect that may be there, though it is not claimed
-_HALF = 0.5  # of what functions of the motion predict: that much may be the effect
+HALF = 0.5  # of what functions of the motion predict: that much may be the effect
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class Asked:
     def near(self, joint: int, gain: float) -> tuple[Candidate, float] | None:
         """The effect on a joint that may be there and takes half of a gain: the likeliest."""
         found, statistics, gains, _ = self.by_joint.get(joint, ([], [], [], None))
-        takes = [k for k, own in enumerate(gains) if own > _HALF * gain and found[k].signed]
+        takes = [k for k, own in enumerate(gains) if own > HALF * gain and found[k].signed]
         best = max(takes, key=lambda k: statistics[k], default=None)
         p = 1.0 if best is None else null.chance(statistics[best], self.maxima)
         return (found[best].candidate, p) if p <= _MAY_BE else None

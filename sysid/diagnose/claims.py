@@ -65,7 +65,8 @@ def claimed(
         head, *tied = step.choice.members
         after, compared = with_(pipeline.refit, last, head[0])  # and under the last one's prior
         if (why := _nothing(last, compared, after, head[0])) is not None:
-            refused.append(Refused(head[0].candidate.name, where(head[0], fit), why))
+            told = step.candidate, step.p, step.shares
+            refused.append(Refused(step.candidate.name, where(head[0], fit), why, *told))
             continue
         near = [(m, chance) for m, chance in tied[: _FITTED - 1] if chance >= _LIKELY]
         rivals = ((*one, with_(pipeline.fit_grown, last, one[0])) for one in near)

@@ -10,7 +10,8 @@ from ..estimate import Fit
 from ..flexible import Law, Unknown
 from ..noise import DOUBT
 from ..transfer import Transfer
-from ..unexplained import by_weights, explains, loudest, mostly_noise, unexplained
+from ..unexplained import by_weights, explains, loudest, mostly_noise, told_in_vain, unexplained
+from .ask import HALF
 from .claims import Claim
 from .select import LEVEL, WORTH
 
@@ -86,7 +87,9 @@ def verdicts(
         if law and asked[j] and then > 0.0 and not seen.predictable(among, WORTH):
             seen = seen.with_law(law(j))
         remains = seen if seen.predictable(among, WORTH) else None
-        looks = near(j, (remains.share if remains else 1.0) * seen.total) if near else None
+        most = remains.share if remains else 1.0
+        looks = near(j, most * seen.total) if near else None
+        looks = looks or told_in_vain(refused, fit.joints, j, HALF * most)
         reached = reaches[j] and first > 0.0 and not _above(remains, then, floor)
         taken = sum(c.step.shares[j] for c in own)
         even = evens[j] and floors[j].reached(weighed[joint])  # it explains all
