@@ -9,7 +9,7 @@ import pytest
 from scipy.stats import binomtest
 
 from scripts import blind_benchmark
-from scripts.blind_parts import cases, fourth_laws, hidden, new_laws, old_laws, page, robots, scoring, summary, third_laws, trial
+from scripts.blind_parts import cases, fourth_laws, hidden, new_laws, old_laws, page, robots, scoring, sizes, summary, third_laws, trial
 
 
 def verdict(joint, said=None, tied=(), also=(), left=False):
@@ -128,6 +128,21 @@ def test_summary_holds_the_bars_of_the_issue():
     text = page.page(found, records, settings, "## Causes\n\nBy hand.")
     assert "--seed 7" in text and text.endswith("By hand.\n") and "LinAlgError" in text and "**no**" in text
     json.dumps(blind_benchmark._plain(found), allow_nan=False)
+
+
+def test_sizes_of_what_is_named_rightly_are_counted_in_their_stated_deviations():
+    """A name that is wrong, or is only tied, has no size to be judged by; nor has a value that the simulator does not have."""
+    known = {"stribeck.knee.dF": (1.1, 0.1), "stribeck.knee.vs": (0.3, 0.01), "stribeck.knee.alpha": (2.0, 0.1)}
+    found = finding("stribeck", "knee", 1) | {"parameters": {n: v for n, (v, _) in known.items()}, "deviations": {n: s for n, (_, s) in known.items()}}
+    made = record(("stribeck", "knee"), knee=verdict("knee", "stribeck"), findings=[found])
+    made["hidden"][0]["values"] = {"dF": 1.0, "vs": 0.2}
+    assert [one["z"] for one in sizes.distances(made)] == pytest.approx([1.0, 10.0]) and sizes.covered([made, CRASH, WRONG]) == (1, 2)
+    made["hidden"][0]["effect"] = "presliding"
+    assert sizes.distances(made) == []
+    soft = finding("elasticity", "knee", 1) | {"parameters": {"elasticity.knee.compliance": 0.012}, "deviations": {"elasticity.knee.compliance": 0.001}}
+    made = record(("elasticity", "knee"), knee=verdict("knee", "elasticity"), findings=[soft])
+    made["hidden"][0]["values"] = {"K": 100.0, "D": 1.0}
+    assert [one["z"] for one in sizes.distances(made)] == pytest.approx([2.0])
 
 
 @pytest.mark.parametrize("successes, count", [(8, 10), (0, 7), (7, 7), (284, 300)])

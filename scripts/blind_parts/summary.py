@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import statistics
 
-from . import claims
+from . import claims, sizes
 from .fourth_laws import FOURTH
 from .hidden import ABSORBED, EFFECTS, OUTSIDE
 from .new_laws import NEW
@@ -111,6 +111,7 @@ def summary(records: list[dict], under: str = "clean") -> dict:
         _bar("controls at peace", "controls neither accused nor unknown", share(len(at_peace), len(controls)), ask["at peace"]),
         _bar("floors", "joints whose noise floor is within 25 % of the true noise, or null", share(*said["floors"]), 0.90),
         _bar("after discover", "named cases whose held-out RMS after discover is within 5 % of the true model's", share(sum(r["within"] for r in named), len(named)), 0.90),
+        _bar("sizes", "parameters of effects named rightly within two stated deviations of the truth", share(*sizes.covered(records)), 0.92),
         *(
             _bar(name, f"visible effects outside the catalogue, {says}, called unknown, or explained by 80 %",
                  share(count(own, "category", "unknown", "explained"), len(own)), bound)

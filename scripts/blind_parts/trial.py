@@ -155,7 +155,8 @@ def _one(case: Case, folder: Path, found: dict, stage: list[str]) -> None:
     ]
     found["findings"] = [
         {"effect": f["effect"], "joint": f["joint"], "tied_with": f.get("tied_with", []), "step": f.get("joins_as_step"), "removed": f.get("misfit_removed"),
-         "visible": f.get("visible"), "probability": f.get("probability"), "parameters": {name: p["value"] for name, p in f.get("parameters", {}).items()}}
+         "visible": f.get("visible"), "probability": f.get("probability"), "parameters": {name: p["value"] for name, p in f.get("parameters", {}).items()},
+         "deviations": {name: p["std"] for name, p in f.get("parameters", {}).items()}}
         for f in first["findings"]
     ]  # fmt: skip
     unseen = {(entry["effect"], entry["joint"]) for entry in first.get("absorbed", [])}
