@@ -25,7 +25,7 @@ from .drives import scale_is_told, with_drives
 from .earlier_fit import read_inertias
 from .errors import SysidWarning
 from .estimate import Fit, identify
-from .experiment_logs import Read, read
+from .experiment_logs import Read, read, read_all
 from .held_apart import prior_strength
 from .inertia.consistency import is_consistent
 from .log_spec import LogSpec
@@ -160,7 +160,7 @@ def refit(experiment: Experiment, before: Fit, *, filters: dict | None = None, *
     """Fit an experiment that grew from a fitted one: as its file says, and under that one's prior, by which the two are compared.
 
     Where the weight of the prior is chosen, what was missing before may let it be another: the second fit is the first
-    where it is the same.
+    where it is the same, and else has its shape values, which a prior of the bodies hardly moves.
 
     Args:
         filters, how: as of `fit`.
@@ -168,7 +168,20 @@ def refit(experiment: Experiment, before: Fit, *, filters: dict | None = None, *
     after = fit_grown(experiment, before, filters=filters, **how)
     if after.strength.value == before.strength.value:
         return after, after
-    return after, fit(experiment, filters=after.filters, strength=before.strength, near=after.model, **how)
+    return after, _under(before.strength, after, how.get("measured"))
+
+
+def _under(strength: PriorWeight, found: Fit, measured: Read | None) -> Fit:
+    """A fit's model as it would be under another weight of the prior, on the same triangles."""
+    experiment = with_weight(found.experiment, strength.value)
+    preprocess = filtering.settled(experiment.preprocess, found.filters)
+    with noticed():  # of the logs the fit said it
+        logs_ = measured or read_all(experiment, structure=found.model)
+        train, test = (prepare(part, preprocess, found.joints) for part in (logs_.train, logs_.test))
+        own = identify(experiment, found.model, train, found.compressed, found.prior)
+        told = {part: predicted(own.model, own.x, motion) for part, motion in (("train", train), ("test", test))}
+    same = ("samples", "left_out", "seconds", "filters", "logs", "notices", "events", "searched")
+    return replace(own, strength=strength, predictions=told, **{name: getattr(found, name) for name in same})
 
 
 def fit_grown(experiment: Experiment, before: Fit, **how) -> Fit:
