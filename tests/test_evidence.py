@@ -10,7 +10,7 @@ from scipy.stats import f as fisher
 from scipy.stats import norm
 from scipy.stats import t as student
 
-from sysid import blocks, config, listed_effects, regressor
+from sysid import blocks, candidate_columns, config, listed_effects, regressor
 from sysid.candidate_columns import columns_of
 from sysid.candidates import candidates
 from sysid.diagnose import evidence, null, projected
@@ -284,6 +284,30 @@ def test_effects_are_asked_under_the_load_of_the_bodies_found(planar, views):
     bodies = view.settled.x[: 10 * view.model.bodies].reshape(-1, 10)
     source = replace(source, model=source.model.with_reference(bodies))
     np.testing.assert_allclose(columns[0], columns_of(source, candidate, [{}])[0], rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("name", "options"),
+    [("encoder_offset", ()), ("encoder_eccentricity", ()), ("elasticity", (("encoder", "joint"),)), ("elasticity", (("encoder", "motor"),))],
+)  # fmt: skip
+def test_what_moves_one_joint_has_the_slopes_of_the_whole_model(views, name, options):
+    """By slopes that are made once for all effects, and by a difference of the model's torque with the effect in it."""
+    source = views[0].source
+    for one in (c for c in candidates(source.model) if (c.name, c.options) == (name, options)):
+        (at, *_) = candidate_columns.tried(source, one)
+        found, wanted = columns_of(source, one, [at])[0], candidate_columns._slopes(source, one, at)
+        assert found.shape == wanted.shape
+        np.testing.assert_allclose(found, wanted, atol=2e-3 * np.abs(wanted).max())
+
+
+def test_links_that_fly_are_integrated_for_both_motions_at_once(views):
+    """With the same flights as each would have by itself, whoever is asked first."""
+    (play,) = [c for c in candidates(views[0].model) if (c.name, c.joint, c.options) == ("backlash", 0, (("encoder", "motor"),))]
+    asked = candidate_columns.tried(views[0], play)
+    together = [columns_of(s, play, asked) for s in (views[0].rough_source, views[0].source)]
+    alone = [columns_of(replace(s, beside=None), play, asked) for s in (views[0].rough_source, views[0].source)]
+    for one, other in zip(together, alone):
+        np.testing.assert_allclose(one, other, rtol=1e-9, atol=1e-12)
 
 
 @pytest.mark.parametrize("slow", [0.05, 0.3])
