@@ -20,7 +20,7 @@ class Refused:
     """An effect that was looked at and is not claimed, and why, in words.
 
     candidate, p, shares: of one that the training logs told: what joined, its family-wise p-value,
-    and of each joint's squared residual there (dof,) what it took.
+    and of each joint's squared residual on the test logs, under the low-pass, what it takes (dof,).
     """
 
     effect: str
@@ -33,12 +33,16 @@ class Refused:
     @property
     def told(self) -> str:
         """In words."""
-        return f"{self.effect} was looked at and is not claimed: {self.why}"
+        said = f"{self.effect} was looked at and is not claimed: {self.why}"
+        if not max(self.shares, default=0.0) >= _MOST:
+            return said
+        return f"{said}; under the low-pass of a diagnosis it takes {max(self.shares):.0%} of it"
 
 
 def told_in_vain(refused: Sequence[Refused], joints, j: int, least: float):
-    """The Candidate on joint j, with its p-value, that took at least such a share of what the
-    training logs leave of it and which no fit bore out; None where there is none."""
+    """The Candidate on joint j, with its p-value, that takes at least such a share of its squared
+    residual on the test logs, under the low-pass, and which no fit bore out; None where there is
+    none."""
     own = [
         r for r in refused if r.candidate and r.joint in (joints[j], "*") and r.shares[j] >= least
     ]

@@ -206,7 +206,7 @@ def test_error_above_the_floor_that_nothing_predicts_is_unresolved():
 
 
 @pytest.mark.parametrize(("joint", "share", "status"), [("elbow", 0.9, "unresolved"), ("*", 0.9, "unresolved"), ("elbow", 0.1, "unknown"), ("shoulder", 0.9, "unknown")])
-def test_what_the_training_logs_told_and_no_fit_bore_out_is_not_called_a_law_that_nobody_knows(joint, share, status):
+def test_what_test_logs_bear_out_under_the_low_pass_and_no_fit_does_is_not_called_a_law_that_nobody_knows(joint, share, status):
     """What functions of the motion predict then is that effect: half of it at least."""
     what = SimpleNamespace(name="elasticity", joint=1)
     refused = claims.Refused("elasticity", joint, "the error on the test logs does not fall", what, 0.001, np.array([0.9, share]))

@@ -15,6 +15,8 @@ from .. import comparison, pipeline
 from ..addition import grown, spelled
 from ..estimate import Fit
 from ..experiment_logs import Read
+from ..failures import taken
+from ..motion import Motion
 from ..unexplained import Refused, changed, nought
 from .findings import Finding, finding, judged_by, where
 from .refits import Member
@@ -47,12 +49,12 @@ class Claim:
 
 
 def claimed(
-    steps: list[Step], fit: Fit, measured: Read | None, tell: Callable[[str, float], None]
+    steps: list[Step], fit: Fit, measured: Read | None, test: Motion, tell: pipeline.Progress
 ) -> tuple[list[Claim], list[Refused]]:
     """Fit each step's head, and the best of what is tied with it, on top of what stands before it.
 
     Args:
-        fit: of the experiment as it is. measured: its logs; None: read anew.
+        fit: of the experiment as it is. measured: its logs; None: read anew. test: low-passed.
     """
 
     def with_(how: Callable, last: Fit, member: Member):
@@ -65,7 +67,7 @@ def claimed(
         head, *tied = step.choice.members
         after, compared = with_(pipeline.refit, last, head[0])  # and under the last one's prior
         if (why := _nothing(last, compared, after, head[0])) is not None:
-            told = step.candidate, step.p, step.shares
+            told = step.candidate, step.p, taken(step.before.settled, step.after.settled, test)
             refused.append(Refused(step.candidate.name, where(head[0], fit), why, *told))
             continue
         near = [(m, chance) for m, chance in tied[: _FITTED - 1] if chance >= _LIKELY]

@@ -83,11 +83,11 @@ def diagnose(
     with noticed():
         view = first_view(fit.experiment, fit, measured.train)
         steps, asked, then_asked, undecided = select.search(view, extra, level=level, tell=tell)
-        claims, refused = claiming.claimed(steps, fit, whole, tell)
-        refused += [claiming.undecided(choice, fit) for choice in undecided[-1:]]
-        after, last = (claims[-1].step.after, claims[-1].after) if claims else (view, fit)
         if (test := lowpassed(measured.test, fit.joints, view.cutoff)) is None:
             raise too_short()
+        claims, refused = claiming.claimed(steps, fit, whole, test, tell)
+        refused += [claiming.undecided(choice, fit) for choice in undecided[-1:]]
+        after, last = (claims[-1].step.after, claims[-1].after) if claims else (view, fit)
         first, then = (HeldOut(one.settled, test) for one in (view, after))
         x = after.settled.x + after.design.change[: after.model.size]
         parts = measured.train, measured.test

@@ -166,12 +166,10 @@ def known_together(groups: list[Group]) -> None:
     for group in groups:
         by_size.setdefault(group.scores.shape, []).append(group)
     for own in by_size.values():
-        names = ("scores", "squares", "loud", "loud_squares")
-        scores, squares, loud, loud_squares = (
-            np.stack([getattr(g, n) for g in own]) for n in names
-        )
+        what = ("scores", "squares", "loud", "loud_squares")
+        scores, squares, *loud = (np.stack([getattr(g, name) for g in own]) for name in what)
         c = scores.sum(-2)
-        moves = blocks.moves(c, loud, loud_squares, squares)
+        moves = blocks.moves(c, *loud, squares)
         found = c, moves, blocks.gains(c, scores, squares).sum(-1), blocks.taking_part(moves)
         for group, c, moves, taken, directions in zip(own, *found):
             freedom = float(directions), blocks.resting(group.squares[:-1])

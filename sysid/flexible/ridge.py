@@ -11,7 +11,6 @@ _APART = (
     0.15  # s, several memories of the filters: what is predicted, and what it is predicted from
 )
 _RIDGES = np.geomspace(1e-3, 30.0, 10)
-_PATIENCE = 2  # ridges that may tell less than a greater one before no smaller one is tried
 _LEAST = 0.1  # of the least ridge: a direction with less is a tenth at most of what it would be
 
 
@@ -32,41 +31,28 @@ def stretches(fold, t, piece) -> list[tuple[np.ndarray, np.ndarray]]:
 
 def predicted(features, y, use, spans) -> tuple[np.ndarray, np.ndarray]:
     """What ridge regression predicts (n,) of the rows of each fold from rows apart from it, and its
-    gain (folds,).
-
-    Ridges are tried from the greatest on, as long as one of the last few told more than all before.
-    """
+    gain (folds,)."""
     scaled, _ = of_unit_size(features, use)
     if not scaled.shape[1]:
         return np.zeros(len(y)), np.zeros(len(spans))
-    ridges = _RIDGES[::-1] * len(y) / len(_RIDGES)
+    ridges = _RIDGES * len(y) / len(_RIDGES)
     values, vectors = np.linalg.eigh(scaled.T @ scaled)
-    scaled = scaled @ vectors[:, values > _LEAST * ridges[-1]]
+    scaled = scaled @ vectors[:, values > _LEAST * ridges[0]]
     system, right = scaled.T @ scaled, scaled.T @ y
-    parts = [_without(system, right, scaled[near], y[near]) for _, near in spans]
-    gains, all_told = [], []
-    for ridge in ridges:
-        told = np.zeros(len(y))
-        for (rows, _), (own, pull) in zip(spans, parts):
-            told[rows] = scaled[rows] @ _solved(own, ridge, pull)
-        gain = 2.0 * told * y - told**2
-        gains.append([gain[rows].sum() for rows, _ in spans])
-        all_told.append(told)
-        best = int(np.argmax(np.sum(gains, axis=1)))
-        if len(gains) - best > _PATIENCE:
-            break
+    gains, all_told = np.zeros((len(ridges), len(spans))), np.zeros((len(ridges), len(y)))
+    for f, (rows, near) in enumerate(spans):
+        own = system - scaled[near].T @ scaled[near]
+        pull = right - scaled[near].T @ y[near]
+        # of a few ridges a factor each costs less than all of them by the eigenvalues
+        told = (scaled[rows] @ np.stack([_solved(own, r, pull) for r in ridges], axis=1)).T
+        all_told[:, rows] = told
+        gains[:, f] = np.sum(2.0 * told * y[rows] - told**2, axis=1)
     # the ridge of a fold is the one that serves the other folds best
-    table = np.array(gains)
-    chosen = np.argmax(table.sum(axis=1, keepdims=True) - table, axis=0)
+    chosen = [int(np.argmax(gains.sum(1) - gains[:, f])) for f in range(len(spans))]
     told = np.zeros(len(y))
     for i, (rows, _) in zip(chosen, spans):
-        told[rows] = all_told[i][rows]
-    return told, table[chosen, np.arange(len(spans))]
-
-
-def _without(system, right, near, values):
-    """Normal equations without some rows."""
-    return system - near.T @ near, right - near.T @ values
+        told[rows] = all_told[i, rows]
+    return told, np.array([gains[i, f] for f, i in enumerate(chosen)])
 
 
 def _solved(system, ridge: float, right) -> np.ndarray:
