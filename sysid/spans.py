@@ -48,6 +48,11 @@ class Spans(Sequence):
         """How many stretches without a gap there are."""
         return len({id(rows) for rows, *_ in self._spans})
 
+    @property
+    def held(self) -> bool:
+        """Whether rows stand in this process's memory, where another cannot read them."""
+        return any(isinstance(rows, Held) for rows, *_ in self._spans)
+
     def clocks(self) -> list[tuple[float, float]]:
         """First and last time [s] of each stretch without a gap."""
         whole = {id(rows): (rows, n) for rows, _, _, n in self._spans}

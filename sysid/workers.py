@@ -46,7 +46,8 @@ class Died(SysidError):
 def crew(
     workers: int = 1, scheduler: str | None = None, tell: Callable[[str], None] | None = None
 ) -> Iterator[Mapped]:
-    """Gives `mapped(work, arguments)`, an iterator over `work(*each)` for each of the arguments, in their order.
+    """Gives `mapped(work, arguments)`, an iterator over `work(*each)` for each of the arguments, in their order. Other processes
+    begin before it is asked for the first.
 
     Args:
         workers: processes of this machine; one is this process itself. scheduler: address of a Dask scheduler in their place,
@@ -108,21 +109,26 @@ def _gathered(client, work: Callable, arguments: Iterable[tuple]) -> Iterator:
             warnings.simplefilter("ignore")
             return client.submit(_worked, work, each, pure=False)
 
-    rest, number = iter(arguments), 0
+    rest = iter(arguments)
     ahead = _AHEAD * sum(client.ncores().values()) or _UNKNOWN
     futures = deque(submitted(each) for each in islice(rest, ahead))
-    while futures:
-        number += 1
-        try:
-            result, said = futures.popleft().result()
-        except KilledWorker:
-            raise Died(
-                f"{_DEATHS} workers died at piece {number}", do="give workers more memory"
-            ) from None
-        futures += (submitted(each) for each in islice(rest, 1))
-        for warning in said:
-            warnings.warn(warning, stacklevel=2)
-        yield result
+
+    def results() -> Iterator:
+        number = 0
+        while futures:
+            number += 1
+            try:
+                result, said = futures.popleft().result()
+            except KilledWorker:
+                raise Died(
+                    f"{_DEATHS} workers died at piece {number}", do="give workers more memory"
+                ) from None
+            futures.extend(submitted(each) for each in islice(rest, 1))
+            for warning in said:
+                warnings.warn(warning, stacklevel=2)
+            yield result
+
+    return results()
 
 
 @cache
