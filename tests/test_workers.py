@@ -50,6 +50,13 @@ def test_other_processes_begin_before_the_first_result_is_asked_for(two, tmp_pat
     assert (tmp_path / "begun").exists() and list(found) == [None]
 
 
+def test_workers_are_told_how_often_to_look_after_themselves(two):
+    """At Dask's own intervals a process that waits is busy with it."""
+    config = pytest.importorskip("dask.config")
+    for key in ("distributed.admin.tick.interval", "distributed.worker.memory.monitor-interval"):
+        assert list(two[0](config.get, [(key,)])) == ["1s"]
+
+
 def test_a_fleet_does_not_depend_on_who_fits(two, planar, tmp_path):
     folder = robots(planar, tmp_path, 4)
     (folder / "r3" / "train.csv").write_text("nothing")
