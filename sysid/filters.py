@@ -12,77 +12,109 @@ from dataclasses import replace
 
 import numpy as np
 
-from . import interior
 from .blocks import within_one_error
-from .compress import compress
 from .drives import slowest
 from .errors import SysidError, SysidWarning
-from .events import usable
+from .filter_errors import held_out
 from .log import Log
 from .lowpass import band
-from .model import Model, moving_coefficients
-from .multistart import finite
-from .posed_problem import pose
-from .preprocess import prepare
+from .model import Model
 from .smoother import Smoother
 from .spans import Spans
 from .specs import Experiment, PreprocessSpec
-from .triangles import Compressed
+from .workers import Mapped
 
 _WINDOWS = (0.02, 0.03, 0.05, 0.07, 0.1, 0.15, 0.2, 0.3, 0.4, 0.6, 0.8)  # s
 _CUTOFFS = (1.0, 1.5, 2.0, 3.0, 5.0, 7.0, 10.0, 15.0, 20.0, 30.0, 50.0, 100.0)  # Hz
-_FOLDS = 4
 # Windows of an angle, a cycle of the low-pass on both sides. A polynomial of order 4 is -3 dB at 1.56 / window: friction's jump is smeared
 # over a short time only, and the noise that comes through stays behind the low-pass.
 _ANGLES, _POSES = 12.0, 50
 # Enough to rank filters; a long log need not be read whole for it.
-_MOST_SAMPLES, _ROWS = 30_000, 5_000
-_EXACT = 1e-16  # squared relative error: less is rounding
+_MOST_SAMPLES = 30_000
 
 
 def compare(
-    experiment: Experiment, model: Model, logs: Sequence[Log], prior, *, progress: Callable[[float], None] | None = None
+    experiment: Experiment, model: Model, logs: Sequence[Log], prior, *, progress: Callable[[float], None] | None = None, mapped: Mapped | None = None
 ) -> dict:  # fmt: skip
     """The chosen filter and its neighbours with their held-out errors.
 
     Args:
-        progress: called with the share of them that is done.
+        progress, mapped: as of `begun`.
 
     Returns:
         {"filter", "order", "window" or "cutoff", "torque", "chosen": "given" or "held-out error", "held_out": [
         {"window" or "cutoff": value, "relative_error": geometric mean over the joints, "rms": {joint: N m}}, ...]}; neighbours are half and
         double the value where it was given, the whole grid where it was `auto`.
     """
+    return begun(experiment, model, logs, prior, progress=progress, mapped=mapped)()
+
+
+def is_given(experiment: Experiment) -> bool:
+    """Whether an experiment says which filter is taken: its neighbours are compared with it, and change nothing."""
+    spec = experiment.preprocess
+    return not lowpassed(experiment) and (spec.filter == "none" or getattr(spec, _key(spec)) != "auto")
+
+
+def begun(
+    experiment: Experiment, model: Model, logs: Sequence[Log], prior, *, progress: Callable[[float], None] | None = None, mapped: Mapped | None = None
+) -> Callable[[], dict]:  # fmt: skip
+    """A comparison that other processes are at, where there are any: what gives its result, as of `compare`.
+
+    Args:
+        progress: called with the share of the filters that is done. mapped: what shares work among processes, as of `workers.crew`;
+            None: there is this one.
+    """
     spec = experiment.preprocess
     if lowpassed(experiment):
-        return _of_the_motion(experiment, model, logs, prior)
+        return lambda: _of_the_motion(experiment, model, logs, prior)
     said = {"filter": spec.filter, "torque": spec.torque, "standstill": spec.standstill}
     if spec.filter == "none":
-        return {**said, "chosen": "given", "held_out": []}
-    key = "window" if spec.filter == "savitzky-golay" else "cutoff"
+        return lambda: {**said, "chosen": "given", "held_out": []}
+    key = _key(spec)
     value = getattr(spec, key)
     automatic = value == "auto"
     candidates = (_WINDOWS if key == "window" else _CUTOFFS) if automatic else (value / 2, value, value * 2)
     shortened = [_middle(log) for log in logs]
-    edge, tried = _widest_edge(spec, key, candidates, shortened), []
-    for number, candidate in enumerate(candidates):
-        if progress:
-            progress(number / len(candidates))
-        try:
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore", SysidWarning)
-                tried.append({key: candidate, **_held_out(experiment, spec.model_copy(update={key: candidate}), model, shortened, prior, edge)})
-        except SysidError:
-            continue  # a window shorter than its order, a cutoff above half the sampling rate: no candidate
-    if automatic:
-        if not tried:
-            raise SysidError(f"no {key} suits the logs", where="preprocess", do=f"give {key} a number")
-        value = _best(tried, key, 0.1 if key == "window" else 10.0)
-        place = [entry[key] for entry in tried].index(value)
-        if len(tried) > 1 and place in (0, len(tried) - 1):
-            warnings.warn(SysidWarning(f"preprocess.{key}: auto chose {value:g}, the end of what was tried; give a number to go further"), stacklevel=2)
-    shown = [{name: entry[name] for name in (key, "relative_error", "rms")} for entry in tried]
-    return {**said, "order": spec.order, key: value, "chosen": "held-out error" if automatic else "given", "held_out": shown}
+    edge = _widest_edge(spec, key, candidates, shortened)
+    # a file that others read, they read themselves
+    sent = [log if mapped and isinstance(log.segments, Spans) and not log.segments.held else own for log, own in zip(logs, shortened)]
+    share = mapped or (lambda work, arguments: (work(*each) for each in arguments))
+    tries = share(_tried, ((experiment, key, candidate, model, sent, prior, edge) for candidate in candidates))
+
+    def result() -> dict:
+        tried: list[dict] = []
+        for number, found in enumerate(tries):
+            tried += [] if found is None else [found]
+            if progress:
+                progress((number + 1) / len(candidates))
+        chosen = value
+        if automatic:
+            if not tried:
+                raise SysidError(f"no {key} suits the logs", where="preprocess", do=f"give {key} a number")
+            chosen = _best(tried, key, 0.1 if key == "window" else 10.0)
+            place = [entry[key] for entry in tried].index(chosen)
+            if len(tried) > 1 and place in (0, len(tried) - 1):
+                warnings.warn(SysidWarning(f"preprocess.{key}: auto chose {chosen:g}, the end of what was tried; give a number to go further"), stacklevel=2)
+        shown = [{name: entry[name] for name in (key, "relative_error", "rms")} for entry in tried]
+        return {**said, "order": spec.order, key: chosen, "chosen": "held-out error" if automatic else "given", "held_out": shown}
+
+    return result
+
+
+def _key(spec: PreprocessSpec) -> str:
+    return "window" if spec.filter == "savitzky-golay" else "cutoff"
+
+
+def _tried(experiment: Experiment, key: str, candidate: float, model: Model, logs: Sequence[Log], prior, edge: float) -> dict | None:
+    """What a filter leaves of the middles of logs; None where it is none: a window shorter than its order, a cutoff above half the
+    sampling rate."""
+    spec = experiment.preprocess.model_copy(update={key: candidate})
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", SysidWarning)
+            return {key: candidate, **held_out(experiment, spec, model, [_middle(log) for log in logs], prior, edge)}
+    except SysidError:
+        return None
 
 
 def lowpassed(experiment: Experiment) -> bool:
@@ -167,61 +199,3 @@ def _middle(log: Log) -> Log:
         signals={name: values[rows] for name, values in segment.signals.items()},
     )  # fmt: skip
     return replace(log, segments=(part,))
-
-
-def _held_out(experiment: Experiment, spec: PreprocessSpec, model: Model, logs, prior, edge: float) -> dict:
-    motion = prepare(logs, spec, model.robot.joints)
-    model = finite(model.measured_by(motion), motion)
-    motion = replace(motion, pieces=tuple(_trimmed(piece, logs[piece.log].segments[0], edge) for piece in motion.pieces))
-    # against the torque as logged, over every row: what a filter smooths away or masks it has not explained
-    # but for what disturbed the logs, as far as the widest candidate sees of it
-    told = np.array([joint not in motion.unused for joint in model.robot.joints])
-
-    def calm(piece):
-        joints = model.robot.joints
-        use = usable(piece.t, joints, logs[piece.log].events, angles=edge, torque=edge) if motion.events else None
-        return use if told.all() else told & (np.ones(piece.q.shape, dtype=bool) if use is None else use)
-
-    raw = replace(motion, pieces=tuple(replace(piece, tau=piece.measured, use=calm(piece)) for piece in motion.pieces))
-    thin = max(1, motion.samples // _ROWS)
-    data = compress(model, motion, thin=thin)
-    target = data if spec.torque == "raw" and spec.standstill == "keep" and not motion.events else compress(model, raw, thin=thin)
-    moving = moving_coefficients(model, motion)
-    folds = data.stretches(_FOLDS)
-    size = np.array([max(float(np.sum(f.triangle[:, -1] ** 2)), 1e-300) for f in target.by_joint]) / np.maximum(target.rows, 1)
-    squares, rows, errors = np.zeros(model.robot.dof), np.zeros(model.robot.dof), []
-    if len(folds) < 2:
-        raise SysidError("the log is too short to hold a part of it out", where="preprocess")
-    for fold in folds:
-        kept = data.without(fold)
-        problem = pose(experiment, model, kept, moving, prior)
-        iterates, _, _ = interior.minimise(
-            problem.objective, problem.coordinates.positive, problem.coordinates.held, problem.coordinates.physical(problem.start),
-            tolerance=experiment.solver.tolerance,
-        )  # fmt: skip
-        held = _only(target, fold)
-        own = held.squares(iterates[-1])
-        squares += own
-        rows += held.rows
-        errors.append(_logarithm(own, size, held.rows))
-    rms = np.sqrt(squares / np.maximum(rows, 1))
-    relative = float(np.exp(0.5 * _logarithm(squares, size, rows)))
-    return {"relative_error": relative, "rms": dict(zip(model.robot.joints, rms.tolist())), "folds": errors}
-
-
-def _logarithm(squares: np.ndarray, size: np.ndarray, rows: np.ndarray) -> float:
-    """The mean over the joints, as many rows as each has, of the logarithm of their squared error over that of their torque."""
-    count = rows > 0
-    error = squares[count] / rows[count] / size[count]
-    return float(np.average(np.log(np.maximum(error, _EXACT)), weights=rows[count]))
-
-
-def _trimmed(piece, segment, edge: float):
-    """The piece with its core cut to what lies `edge` seconds inside its segment."""
-    inside = np.flatnonzero((piece.t > segment.t[0] + edge - 0.5 * piece.step) & (piece.t < segment.t[-1] - edge + 0.5 * piece.step))
-    start, stop = max(piece.core.start, int(inside[0])), min(piece.core.stop, int(inside[-1]) + 1)
-    return replace(piece, core=slice(start, stop))
-
-
-def _only(data: Compressed, blocks) -> Compressed:
-    return data.without(set(range(data.blocks)) - set(blocks))

@@ -38,10 +38,19 @@ def read(
     actuators=logs.NO_ACTUATORS,
 ) -> Log:
     """As `log.read`; the segments of a long log are spans of it. Raises LogError."""
-    source = _source(log, data, joints, prismatic, folder, actuators)
-    if source is not None and (found := source.log()) is not None:
-        return found
-    return spanned(logs.read(log, data, joints, prismatic, folder, actuators))
+    how = (log, data, joints, prismatic, folder, actuators)
+    found = in_spans(*how)
+    return spanned(logs.read(*how)) if found is None else found
+
+
+def in_spans(log: LogSpec, *how) -> Log | None:
+    """A log whose file is read span by span; None where it is short, or has to be read whole.
+
+    Args:
+        how: what else `read` is given.
+    """
+    source = _source(log, *how)
+    return None if source is None else source.log()
 
 
 def in_parts(log: LogSpec, *how) -> bool:

@@ -105,11 +105,16 @@ def _fit(experiment: Experiment, filters: dict | None, strength: PriorWeight | N
         refuse_no_torque(train)
         provenance = [_provenance("train", log, spec) for log, spec in zip(train, experiment.data.train)]
         with _timed(seconds, "filters", tell):
-            chosen = filtering.compare(experiment, structure, train, prior, progress=lambda share: tell("filters", share)) if filters is None else filters
+            how = {"progress": None if mapped else lambda share: tell("filters", share), "mapped": mapped}
+            comparing = (lambda: filters) if filters is not None else filtering.begun(experiment, structure, train, prior, **how)
+            # where a filter is given, others are at its neighbours while the logs go through it
+            later = filters is None and mapped is not None and filtering.is_given(experiment)
+            chosen = {} if later else comparing()
             preprocess = filtering.settled(experiment.preprocess, chosen)
         with _timed(seconds, "preprocess", tell):
             motion = prepare(train, preprocess, machine.joints, mapped)
-            del train  # the filtered motion holds all that is needed from here on
+            chosen = comparing() if later else chosen
+            del train, comparing  # the filtered motion holds all that is needed from here on
         tell_still(motion)
         tell_left_out(motion, preprocess)
         disturbed = tell_events("train", motion)

@@ -19,6 +19,7 @@ from .segment import Segment
 
 SPAN = 2**18  # rows; at 1 kHz four minutes
 _PARTS = 8  # of a span, where a log is looked at in parts: half a minute
+_SHORTEST = 64  # parts of a span: of one of very many logs, that are still four seconds
 
 #: (first, last) -> those rows of a stretch without a gap
 Rows = Callable[[int, int], Segment]
@@ -48,6 +49,11 @@ class Spans(Sequence):
         """How many stretches without a gap there are."""
         return len({id(rows) for rows, *_ in self._spans})
 
+    @property
+    def held(self) -> bool:
+        """Whether rows stand in this process's memory, where another cannot read them."""
+        return any(isinstance(rows, Held) for rows, *_ in self._spans)
+
     def clocks(self) -> list[tuple[float, float]]:
         """First and last time [s] of each stretch without a gap."""
         whole = {id(rows): (rows, n) for rows, _, _, n in self._spans}
@@ -64,7 +70,8 @@ class Spans(Sequence):
         whole = {id(rows): (rows, n) for rows, _, _, n in self._spans}.values()
         if self.samples <= most:
             return tuple(rows(0, n) for rows, n in whole)
-        size = SPAN // _PARTS
+        # of one of many logs shorter parts: all together are no more than are asked for
+        size = min(SPAN // _PARTS, max(most // 2, SPAN // _SHORTEST))
         parts = [(rows, own) for rows, n in whole for own in pairwise(edges(n, size))]
         count = min(max(2, most // size), len(parts))
         chosen = [k * (len(parts) - 1) // (count - 1) for k in range(count)]

@@ -38,7 +38,7 @@ def read(experiment: Experiment) -> tuple[Read, Read | None]:
         logs = [
             read_logs(experiment, machine, part, structure=each) for part in (data.train, data.test)
         ]
-    found = [_thinned(part) for part in logs]
+    found = [thinned(part) for part in logs]
     rows, kept = (sum(log.samples for part in them for log in part) for them in (logs, found))
     if kept == rows:
         return (whole := Read(*found, tuple(notices))), whole
@@ -46,7 +46,8 @@ def read(experiment: Experiment) -> tuple[Read, Read | None]:
     return Read(*found, (said,)), None
 
 
-def _thinned(logs: Sequence[Log]) -> list[Log]:
+def thinned(logs: Sequence[Log]) -> list[Log]:
+    """Logs that are looked at together: of those in spans, stretches spread over them."""
     total = sum(log.samples for log in logs)
     own = lambda log: max(1, MOST * log.samples // total)  # noqa: E731
     return [

@@ -276,6 +276,23 @@ def test_of_long_logs_stretches_spread_over_them_are_kept(monkeypatch):
     assert apart.max() < 1.3 * apart.min() and apart.min() > 0.5
 
 
+@pytest.mark.parametrize("many", [1, 3, 7, 25])
+def test_of_many_long_logs_no_more_rows_are_kept_than_of_one(many, monkeypatch):
+    """Of each its beginning and its end, and what is between as far as there is room."""
+    rows = np.arange(5000.0)[:, None]
+    segment = Segment(1e-3 * np.arange(5000), 1e-3, rows, rows, None, None, {})
+    monkeypatch.setattr(spans, "SPAN", 1000)
+    monkeypatch.setattr(thinning, "MOST", 1000)
+    each = [
+        logs.Log(str(k), Path(str(k)), "", spans.Spans([spans.of_segment(segment)]))
+        for k in range(many)
+    ]
+    found = thinning.thinned(each)
+    assert 500 <= sum(log.samples for log in found) <= 1050
+    for log in found:
+        assert log.segments[0].t[0] == 0.0 and log.segments[-1].t[-1] == segment.t[-1]
+
+
 def test_a_diagnosis_of_a_part_of_the_logs_finds_what_is_missing(tmp_path, monkeypatch):
     """A long log of which a half is looked at; its claim is fitted on all of it."""
     hidden = ["--hide", "stribeck:knee:size=2", "--duration", "40", "--out", str(tmp_path)]

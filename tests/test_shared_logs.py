@@ -7,7 +7,7 @@ import polars as pl
 import pytest
 
 import sysid
-from sysid import experiment_logs, long_prediction, pipeline, spans
+from sysid import experiment_logs, filters, long_prediction, pipeline, spans
 from sysid.workers import crew
 from tests.test_long_logs import LEG, experiment, leg_table
 
@@ -45,6 +45,7 @@ def same(one, other) -> None:
     np.testing.assert_allclose(other.x, one.x, rtol=1e-10, atol=1e-12)
     assert one.logs == other.logs and one.notices == other.notices and one.events == other.events
     assert one.samples == other.samples and one.left_out == other.left_out
+    assert one.filters == other.filters and one.filters  # to the last bit
     for part in ("train", "test"):
         ours, theirs = one.predictions[part], other.predictions[part]
         for name in ("t", "measured", "predicted"):
@@ -58,6 +59,17 @@ def test_long_logs_are_fitted_alike_by_any_number_of_workers(how, short_spans, c
     spec = experiment(preprocess=how)
     one, two = sysid.fit(spec), sysid.fit(spec, scheduler=address(cluster))
     assert len(two.predictions["train"].files) > 2
+    same(one, two)
+
+
+@pytest.mark.parametrize("how", [{"window": "auto"}, {"filter": "butterworth", "cutoff": 20.0}, {}])
+def test_filters_are_compared_where_the_workers_are(how, short_spans, cluster, monkeypatch):
+    """One that is chosen before the logs go through it, one that is given meanwhile."""
+    spec = experiment(preprocess=how)
+    one = sysid.fit(spec)
+    monkeypatch.setattr(filters, "held_out", None)
+    two = sysid.fit(spec, scheduler=address(cluster))
+    assert len(two.filters["held_out"]) == len(one.filters["held_out"]) >= 3
     same(one, two)
 
 

@@ -2,6 +2,7 @@
 
 import os
 import sys
+import time
 
 import numpy as np
 import pytest
@@ -34,6 +35,26 @@ def test_a_worker_that_dies_is_replaced_and_changes_nothing(two, tmp_path):
     found = list(mapped(squared, [(k, str(tmp_path)) for k in range(8)]))
     assert (tmp_path / "died").exists() and found == [(k, float(np.sqrt(k))) for k in range(8)]
     assert told[0].startswith("dashboard: http")
+
+
+def marked(path: str) -> None:
+    """Work that leaves a trace."""
+    open(path, "w").close()
+
+
+def test_other_processes_begin_before_the_first_result_is_asked_for(two, tmp_path):
+    found = two[0](marked, [(str(tmp_path / "begun"),)])
+    until = time.monotonic() + 30.0
+    while not (tmp_path / "begun").exists() and time.monotonic() < until:
+        time.sleep(0.02)
+    assert (tmp_path / "begun").exists() and list(found) == [None]
+
+
+def test_workers_are_told_how_often_to_look_after_themselves(two):
+    """At Dask's own intervals a process that waits is busy with it."""
+    config = pytest.importorskip("dask.config")
+    for key in ("distributed.admin.tick.interval", "distributed.worker.memory.monitor-interval"):
+        assert list(two[0](config.get, [(key,)])) == ["1s"]
 
 
 def test_a_fleet_does_not_depend_on_who_fits(two, planar, tmp_path):

@@ -1,6 +1,8 @@
 """The log doctor: what is wrong with an experiment's logs, before any fit.
 
-look.py       every log as measured, and as it is used
+look.py       what is looked at: all logs, their motion, a fit
+logged.py     every log, as measured and as it is used; of a long one stretches
+tally.py      what rows tell by themselves, of all rows of a log; samples.py: at how many, and when
 equations.py  what the URDF's robot makes of it, however its columns are read
 faults/       what can be wrong; each module has `find(look)`, says AFTER which others it is asked
               (a number), and errors of which it would be SENSELESS

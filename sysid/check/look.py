@@ -1,50 +1,28 @@
-"""What a check looks at: the samples of every log as they were measured, and as they are used."""
+"""What a check looks at: the logs, their motion under a low-pass, what the robot and a fit say."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from pathlib import Path
 
 import numpy as np
 
 from .. import experiment_logs, pipeline, robot
-from .. import log as logs
 from ..errors import SysidError
 from ..estimate import Fit
 from ..listed_effects import build, found
-from ..log_spec import LogSpec
 from ..lowpass import band, lowpassed, stride_of, widest
 from ..model import Model
 from ..motion import Motion
 from ..notices import noticed
-from ..recording import Recording
 from ..robot import Robot
 from ..rows import Rows, stack
 from ..specs import EffectSpec, Experiment
 from ..trusted import Untrusted
 from .equations import FEWEST, Equations
+from .logged import Logged, read
 
 _HAS = ("armature", "viscous", "coulomb", "torque_bias")  # what any joint has
-
-
-@dataclass(frozen=True)
-class Logged:
-    """One log: part "train" or "test", its entry in the experiment file, the file, stamps t (n,)
-    [s], angles q and torque tau (n, dof) as measured, and the log in segments with its events."""
-
-    part: str
-    spec: LogSpec
-    path: Path
-    t: np.ndarray
-    q: np.ndarray
-    tau: np.ndarray
-    log: logs.Log
-
-    @property
-    def step(self) -> float:
-        """Median seconds from sample to sample."""
-        return float(np.median(np.diff(self.t)))
 
 
 @dataclass(frozen=True)
@@ -132,25 +110,4 @@ def looked(experiment: Experiment) -> Look:
     """Read everything that an experiment names. Raises SysidError, as a fit would."""
     experiment = pipeline.started(experiment)
     machine = robot.load(experiment.robot, experiment.folder)
-    args = (
-        experiment.data, machine.joints, machine.prismatic, experiment.folder, experiment.actuator,
-    )  # fmt: skip
-    out, data = [], experiment.data
-    for part in ("train", "test"):
-        specs = getattr(experiment.data, part)
-        told = [logs.measured(spec, *args) for spec in specs]
-        whole = [logs.assembled(one, spec, data) for one, spec in zip(told, specs)]
-        whole = experiment_logs.with_events(machine, whole)
-        for spec, one, log in zip(specs, told, whole):
-            out += [_logged(part, spec, one.rows(*rows), log) for rows in one.parts]
-    return Look(experiment, machine, tuple(out))
-
-
-def _logged(part: str, spec: LogSpec, samples: Recording, log: logs.Log) -> Logged:
-    """What was recorded in one go, with its own part of the log."""
-    t, signals = samples.t, samples.signals
-    inside = lambda at: t[0] <= at <= t[-1]  # noqa: E731
-    segments = tuple(s for s in log.segments if inside(0.5 * (s.t[0] + s.t[-1])))
-    events = tuple(e for e in log.events if inside(e.start))
-    own = replace(log, segments=segments, events=events)
-    return Logged(part, spec, log.path, t, signals["q"], signals["tau"], own)
+    return Look(experiment, machine, read(experiment, machine))

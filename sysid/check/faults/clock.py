@@ -4,20 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-import numpy as np
-
-from ...log import GAP_STEPS
 from ...lowpass import band
 from ..fault import ERROR, WARNING, Fault
 from ..look import Logged, Look
+from ..tally import JITTER
 
 AFTER, SENSELESS = 0, ()
-_JITTER = 0.05  # of a step, RMS: what is less, resampling mends
 _STEPS = (2e-5, 0.5)  # s from sample to sample: no logger of a robot is faster or slower
 # Samples in a cycle of the fastest motion, and a second: accelerations need some, and what friction
 # does at a reversal none more than that
 _CYCLE, _FAST = 20.0, 120.0
-_SHOWN = 8
 
 
 def find(look: Look) -> Iterator[Fault]:
@@ -26,29 +22,21 @@ def find(look: Look) -> Iterator[Fault]:
         if not _STEPS[0] <= log.step <= _STEPS[1]:
             yield _unit(log)
             continue
-        steps = np.diff(log.t)
-        gaps = np.flatnonzero(steps > GAP_STEPS * log.step)
-        if len(gaps):
-            times = tuple(float(log.t[k]) for k in gaps[:_SHOWN])
+        gaps, jitter = log.tally.gaps, log.tally.jitter
+        if gaps.count:
             yield Fault(
                 "clock_gap",
                 WARNING,
                 (
-                    f"{len(gaps)} gap{'s' * (len(gaps) > 1)} in {log.log.name}, the longest "
-                    f"{steps[gaps].max():.3g} s "
-                    f"at {log.t[gaps[np.argmax(steps[gaps])]]:.4g} s"
+                    f"{gaps.count} gap{'s' * (gaps.count > 1)} in {log.log.name}, the longest "
+                    f"{gaps.most:.3g} s at {gaps.at:.4g} s"
                 ),
                 "the log is split there; log without gaps",
                 log=log.log.name,
-                times=times,
-                rows=len(gaps),
+                times=gaps.times,
+                rows=gaps.count,
             )
-        regular = steps[steps <= GAP_STEPS * log.step]
-        # missing samples are whole steps more, and no jitter
-        late = regular - log.step * np.maximum(np.round(regular / log.step), 1.0)
-        jitter = float(np.sqrt(np.mean(late**2)))
-        if jitter > _JITTER * log.step:
-            worst = float(log.t[int(np.argmax(np.abs(steps - log.step)))])
+        if jitter > JITTER * log.step:
             yield Fault(
                 "clock_jitter",
                 WARNING,
@@ -61,8 +49,8 @@ def find(look: Look) -> Iterator[Fault]:
                     "and what the angles show of their time is corrected"
                 ),
                 log=log.log.name,
-                times=(worst,),
-                rows=int(np.sum(np.abs(late) > _JITTER * log.step)),
+                times=(log.tally.worst.at,),
+                rows=log.tally.late.count,
             )
         fastest = band([log.log])
         if fastest * log.step * _CYCLE > 1.0 and log.step * _FAST > 1.0:
@@ -75,7 +63,7 @@ def find(look: Look) -> Iterator[Fault]:
                 ),
                 f"log at {min(_CYCLE * fastest, _FAST):.0f} Hz or more, or move slower",
                 log=log.log.name,
-                rows=len(log.t),
+                rows=log.samples,
             )
 
 
@@ -85,9 +73,9 @@ def _unit(log: Logged) -> Fault:
         ERROR,
         (
             f"{log.log.name} has {log.step:.3g} s from sample to sample, "
-            f"{np.ptp(log.t):.4g} s in all"
+            f"{log.tally.end - log.tally.begin:.4g} s in all"
         ),
         "set data.units.time (s, ms, us, ns)",
         log=log.log.name,
-        rows=len(log.t),
+        rows=log.samples,
     )

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-import numpy as np
-
 from ..fault import WARNING, Fault
 from ..look import Look
 
@@ -68,20 +66,19 @@ def find(look: Look) -> Iterator[Fault]:
                 times,
                 rows,
             )
-        again = np.all(np.diff(log.q, axis=0) == 0.0, axis=1) & np.all(
-            np.diff(log.tau, axis=0) == 0.0, axis=1
-        )
-        if np.ptp(log.q, axis=0).any() and np.mean(again) > _AGAIN:
+        again = log.tally.again
+        share = again.count / max(log.samples - 1, 1)
+        if log.tally.travel.any() and share > _AGAIN:
             yield Fault(
                 "values_held",
                 WARNING,
                 (
-                    f"{100 * np.mean(again):.0f} % of the rows of {log.log.name} only "
+                    f"{100 * share:.0f} % of the rows of {log.log.name} only "
                     "repeat the row before: it was written faster than it was measured"
                 ),
                 "log at the rate of the measurement",
                 "",
                 log.log.name,
-                (float(log.t[int(np.argmax(again)) + 1]),),
-                int(np.sum(again)),
+                again.times[:1],
+                again.count,
             )

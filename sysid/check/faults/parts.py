@@ -29,6 +29,6 @@ def find(look: Look) -> Iterator[Fault]:
                     "give data.test another recording, or another piece of this one",
                     log=test.log.name,
                     times=(max(test.spec.start or 0.0, train.spec.start or 0.0),),
-                    rows=len(test.t),
+                    rows=test.samples,
                 )
                 break

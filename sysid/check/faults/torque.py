@@ -23,22 +23,23 @@ def find(look: Look) -> Iterator[Fault]:
 
 
 def _of_log(look: Look, log: Logged, j: int, joint: str) -> Iterator[Fault]:
-    tau, name = log.tau[:, j], log.log.name
-    if not np.ptp(tau) > 0.0:
-        moves = np.ptp(log.q[:, j]) > _TRAVELS
-        if moves or not log.tau.any():
+    tally, name = log.tally, log.log.name
+    if not tally.swing[j] > 0.0:
+        moves = tally.travel[j] > _TRAVELS
+        if moves or not (tally.low[1].any() or tally.high[1].any()):
             why = "the joint moves" if moves else "so is that of every other joint"
             yield Fault(
                 "effort_missing",
                 ERROR,
-                f"the torque of {joint} is {tau[0]:.4g} throughout {name}, and {why}",
+                f"the torque of {joint} is {tally.first[j]:.4g} throughout {name}, and {why}",
                 "log its torque or current, or name the joint in data.unused",
                 joint,
                 name,
-                (float(log.t[0]),),
-                len(tau),
+                (tally.begin,),
+                log.samples,
             )
         return
+    tau = log.column("tau", j)
     grain, most = float(quantum(tau)), float(np.quantile(np.abs(tau - np.median(tau)), 0.999))
     if grain > _COARSE * most:
         yield Fault(
@@ -51,5 +52,5 @@ def _of_log(look: Look, log: Logged, j: int, joint: str) -> Iterator[Fault]:
             "log it with more digits",
             joint,
             name,
-            rows=len(tau),
+            rows=log.samples,
         )

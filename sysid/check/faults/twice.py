@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from itertools import combinations
 
-import numpy as np
-
 from ..fault import WARNING, Fault
 from ..look import Look
 
@@ -20,10 +18,11 @@ def find(look: Look) -> Iterator[Fault]:
     a mechanism couples may share one encoder.
     """
     for log in look.logs:
-        for word, values in (("angle", log.q), ("torque", log.tau)):
+        tally = log.tally
+        for k, (word, spread) in enumerate((("angle", tally.travel), ("torque", tally.swing))):
             for i, j in combinations(range(look.robot.dof), 2):
                 # two that stand still, or whose torque is not used, are equal and tell nothing
-                if np.array_equal(values[:, i], values[:, j]) and np.ptp(values[:, i]) > 0.0:
+                if tally.equal[k, i, j] and spread[i] > 0.0:
                     one, other = look.robot.joints[i], look.robot.joints[j]
                     yield Fault(
                         "joint_order", WARNING,
@@ -31,5 +30,5 @@ def find(look: Look) -> Iterator[Fault]:
                         f"{log.log.name}",
                         "is one of them logged under the other's name? correct the logger or "
                         "data.columns",
-                        other, log.log.name, rows=len(values),
+                        other, log.log.name, rows=log.samples,
                     )  # fmt: skip

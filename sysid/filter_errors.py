@@ -1,0 +1,91 @@
+"""What a filter leaves of held-out stretches of logs: the errors by which filters are compared."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from . import interior
+from .compress import compress
+from .errors import SysidError
+from .events import usable
+from .log import Log
+from .model import Model, moving_coefficients
+from .multistart import finite
+from .posed_problem import pose
+from .preprocess import prepare
+from .specs import Experiment, PreprocessSpec
+from .triangles import Compressed
+
+_FOLDS = 4
+_ROWS = 5_000  # enough to rank filters
+_EXACT = 1e-16  # squared relative error: less is rounding
+
+
+def held_out(experiment: Experiment, spec: PreprocessSpec, model: Model, logs: Sequence[Log], prior, edge: float) -> dict:
+    """What a fit of a model to logs under a filter leaves of each stretch that it has not seen.
+
+    Args:
+        logs: of one segment each. prior: bodies (bodies, 10). edge: [s] that are left out at both ends of each.
+
+    Returns:
+        {"relative_error": geometric mean over the joints, "rms": {joint: N m or N}, "folds": logarithms of squared relative errors}.
+
+    Raises:
+        SysidError: the filter cannot be, or the logs are too short to hold a part of them out.
+    """
+    motion = prepare(logs, spec, model.robot.joints)
+    model = finite(model.measured_by(motion), motion)
+    motion = replace(motion, pieces=tuple(_trimmed(piece, logs[piece.log].segments[0], edge) for piece in motion.pieces))
+    # against the torque as logged, over every row: what a filter smooths away or masks it has not explained
+    # but for what disturbed the logs, as far as the widest candidate sees of it
+    told = np.array([joint not in motion.unused for joint in model.robot.joints])
+
+    def calm(piece):
+        joints = model.robot.joints
+        use = usable(piece.t, joints, logs[piece.log].events, angles=edge, torque=edge) if motion.events else None
+        return use if told.all() else told & (np.ones(piece.q.shape, dtype=bool) if use is None else use)
+
+    raw = replace(motion, pieces=tuple(replace(piece, tau=piece.measured, use=calm(piece)) for piece in motion.pieces))
+    thin = max(1, motion.samples // _ROWS)
+    data = compress(model, motion, thin=thin)
+    target = data if spec.torque == "raw" and spec.standstill == "keep" and not motion.events else compress(model, raw, thin=thin)
+    moving = moving_coefficients(model, motion)
+    folds = data.stretches(_FOLDS)
+    size = np.array([max(float(np.sum(f.triangle[:, -1] ** 2)), 1e-300) for f in target.by_joint]) / np.maximum(target.rows, 1)
+    squares, rows, errors = np.zeros(model.robot.dof), np.zeros(model.robot.dof), []
+    if len(folds) < 2:
+        raise SysidError("the log is too short to hold a part of it out", where="preprocess")
+    for fold in folds:
+        kept = data.without(fold)
+        problem = pose(experiment, model, kept, moving, prior)
+        iterates, _, _ = interior.minimise(
+            problem.objective, problem.coordinates.positive, problem.coordinates.held, problem.coordinates.physical(problem.start),
+            tolerance=experiment.solver.tolerance,
+        )  # fmt: skip
+        held = _only(target, fold)
+        own = held.squares(iterates[-1])
+        squares += own
+        rows += held.rows
+        errors.append(_logarithm(own, size, held.rows))
+    rms = np.sqrt(squares / np.maximum(rows, 1))
+    relative = float(np.exp(0.5 * _logarithm(squares, size, rows)))
+    return {"relative_error": relative, "rms": dict(zip(model.robot.joints, rms.tolist())), "folds": errors}
+
+
+def _logarithm(squares: np.ndarray, size: np.ndarray, rows: np.ndarray) -> float:
+    """The mean over the joints, as many rows as each has, of the logarithm of their squared error over that of their torque."""
+    count = rows > 0
+    error = squares[count] / rows[count] / size[count]
+    return float(np.average(np.log(np.maximum(error, _EXACT)), weights=rows[count]))
+
+
+def _trimmed(piece, segment, edge: float):
+    """The piece with its core cut to what lies `edge` seconds inside its segment."""
+    inside = np.flatnonzero((piece.t > segment.t[0] + edge - 0.5 * piece.step) & (piece.t < segment.t[-1] - edge + 0.5 * piece.step))
+    start, stop = max(piece.core.start, int(inside[0])), min(piece.core.stop, int(inside[-1]) + 1)
+    return replace(piece, core=slice(start, stop))
+
+
+def _only(data: Compressed, blocks) -> Compressed:
+    return data.without(set(range(data.blocks)) - set(blocks))
