@@ -150,12 +150,11 @@ def _by_shift(source, candidate: Candidate, shapes: dict[str, float]) -> np.ndar
     if joint == ROBOT or not isinstance(effect, MotionEffect) or not at_start(candidate, shapes):
         return None
     for shape, low, high, _ in bounds_of(source.model, candidate):
+        if shape.start is None:
+            continue  # it only says how the effect does what it does not yet
         step = _STEP * (high - low)
         step = step if shapes[shape.name] + step <= high else -step
-        at = {**shapes, shape.name: shapes[shape.name] + step}
-        if shape.start is None:
-            continue  # a value that only says how it does what it does not yet
-        changes = []
+        at, changes = {**shapes, shape.name: shapes[shape.name] + step}, []
         for one, slopes in zip(source.bent(joint), source.shifted(joint)):
             known = (
                 {"behind": effect.apart(one.load, 0.0 * one.load, one.seen, **at)}
@@ -168,7 +167,7 @@ def _by_shift(source, candidate: Candidate, shapes: dict[str, float]) -> np.ndar
             changes.append(found[None] / step)
         (found,) = row.settled(source.model, source.motion, changes, source.stride)
         out.append(found * source.use.T)
-    return np.stack(out, axis=2)
+    return np.stack(out, axis=2) if out else None
 
 
 def _shift(one, moved: Piece, slopes: np.ndarray, joint: int) -> np.ndarray | None:
