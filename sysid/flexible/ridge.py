@@ -11,6 +11,7 @@ _APART = (
     0.15  # s, several memories of the filters: what is predicted, and what it is predicted from
 )
 _RIDGES = np.geomspace(1e-3, 30.0, 10)
+_MANY = 64  # columns from which on a factor for each ridge costs less than the eigenvalues for all
 _LEAST = 0.1  # of the least ridge: a direction with less is a tenth at most of what it would be
 
 
@@ -43,8 +44,7 @@ def predicted(features, y, use, spans) -> tuple[np.ndarray, np.ndarray]:
     for f, (rows, near) in enumerate(spans):
         own = system - scaled[near].T @ scaled[near]
         pull = right - scaled[near].T @ y[near]
-        # of a few ridges a factor each costs less than all of them by the eigenvalues
-        told = (scaled[rows] @ np.stack([_solved(own, r, pull) for r in ridges], axis=1)).T
+        told = (scaled[rows] @ _solved(own, ridges, pull)).T
         all_told[:, rows] = told
         gains[:, f] = np.sum(2.0 * told * y[rows] - told**2, axis=1)
     # the ridge of a fold is the one that serves the other folds best
@@ -55,8 +55,15 @@ def predicted(features, y, use, spans) -> tuple[np.ndarray, np.ndarray]:
     return told, np.array([gains[i, f] for f, i in enumerate(chosen)])
 
 
-def _solved(system, ridge: float, right) -> np.ndarray:
-    """Coefficients of normal equations with a ridge, which makes them definite."""
-    definite = system.copy()
-    definite.flat[:: len(system) + 1] += ridge
-    return dposv(definite.T, right, overwrite_a=True)[1]  # columns first, as LAPACK wants them
+def _solved(system, ridges, right) -> np.ndarray:
+    """Coefficients (k, ridges) of normal equations with each of some ridges."""
+    if len(system) < _MANY:
+        values, vectors = np.linalg.eigh(system)
+        shrunk = (vectors.T @ right)[:, None] / (np.clip(values, 0.0, None)[:, None] + ridges)
+        return vectors @ shrunk
+    out = []
+    for ridge in ridges:
+        definite = system.copy()
+        definite.flat[:: len(system) + 1] += ridge
+        out.append(dposv(definite.T, right, overwrite_a=True)[1])  # as LAPACK wants its columns
+    return np.stack(out, axis=1)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.fft import irfft, next_fast_len, rfft
 
 _MEMORIES = 16.0  # of the noise: the window takes a sixteenth of what is slow, of first order
 _LEAST = 0.1  # share that a fit may have left: what it took more of says little of the noise
@@ -20,8 +19,7 @@ def spectra(values, columns, use, memory: float, step: float) -> np.ndarray:
     """
     n = len(values)
     lags = min(n - 1, max(1, int(_MEMORIES * memory / step)))
-    size = next_fast_len(n + lags, real=True)
-    size += size % 2
+    size = _smooth(n + lags)
     square = lambda x: np.abs(np.fft.rfft(x, size, axis=0)) ** 2  # noqa: E731
     pairs = np.fft.irfft(square(use.astype(float)), size, axis=0)
     lag = np.minimum(np.arange(size), size - np.arange(size))
@@ -37,11 +35,19 @@ def spectra(values, columns, use, memory: float, step: float) -> np.ndarray:
     return smoothed(square(np.where(use, values, 0.0))) / np.maximum(left, _LEAST)
 
 
+def _smooth(least: int) -> int:
+    """The least even number that is not below another and has no prime factors above five, as fast
+    Fourier transforms want it: `scipy.fft.next_fast_len`, whose import takes as long as they do."""
+    threes = [3**b * 5**c for b in range(21) for c in range(14) if 3**b * 5**c <= 2 * least]
+    return min(odd << max(1, (-(-least // odd) - 1).bit_length()) for odd in threes)
+
+
 def drawn(spectrum, n: int, draws: int, rng: np.random.Generator) -> np.ndarray:
     """Normal noise (n, draws) of a power spectrum as `spectra` tells it; in single precision."""
     size = 2 * (len(spectrum) - 1)
-    white = rfft(rng.normal(size=(size, draws)).astype(np.float32), axis=0)
-    return irfft(white * np.sqrt(spectrum).astype(np.float32)[:, None], size, axis=0)[:n]
+    white = np.fft.rfft(rng.normal(size=(size, draws)).astype(np.float32), axis=0)
+    white *= np.sqrt(spectrum).astype(np.float32)[:, None]
+    return np.fft.irfft(white, size, axis=0)[:n].astype(np.float32)
 
 
 def covariance(columns, spectrum) -> np.ndarray:
@@ -50,7 +56,8 @@ def covariance(columns, spectrum) -> np.ndarray:
     In single precision: it says how sure something is."""
     size = 2 * (len(spectrum) - 1)
     most = np.maximum(np.abs(columns).max(axis=-1, keepdims=True), 1e-300)
-    turned = rfft((columns / most).astype(np.float32), size, axis=-1)
+    turned = np.fft.rfft((columns / most).astype(np.float32), size, axis=-1)
+    turned = np.ascontiguousarray(turned, dtype=np.complex64)  # NumPy 1 transforms in double
     weight = spectrum / size * np.where(np.arange(len(spectrum)) % (size // 2), 2.0, 1.0)
     turned *= np.sqrt(weight).astype(np.float32)
     both = turned.view(np.float32)  # real and imaginary parts side by side
