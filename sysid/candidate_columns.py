@@ -99,11 +99,7 @@ def columns_of(source, candidate: Candidate, shapes: list[dict[str, float]]) -> 
     if candidate.swings:
         return _stacked(_changes(source, candidate, shapes))
     if candidate.nonlinear:
-        by_shift = [_by_shift(source, candidate, own) for own in shapes]
-        rest = (
-            one is None and _slopes(source, candidate, own) for one, own in zip(by_shift, shapes)
-        )
-        return _stacked([own if one is None else one for one, own in zip(by_shift, rest)])
+        return _stacked([_moved(source, candidate, own) for own in shapes])
     asked = (source.model, source.motion, source.pieces, candidate.effect, candidate.joint, shapes)
     found = row.signatures_where_finite(*asked, source.stride, source.use)
     return _stacked([values[None] if values.ndim == 2 else values for values in found])
@@ -143,6 +139,12 @@ def _begun(source, candidate: Candidate, leading: str, shapes: dict[str, float])
     return {**shapes, leading: shapes[leading] + _STEP * (high - low)}
 
 
+def _moved(source, candidate: Candidate, shapes: dict[str, float]) -> np.ndarray:
+    """Of each value (dof, n, k)."""
+    found = _by_shift(source, candidate, shapes)
+    return _slopes(source, candidate, shapes) if found is None else found
+
+
 def _by_shift(source, candidate: Candidate, shapes: dict[str, float]) -> np.ndarray | None:
     """Slopes (dof, n, k) of an effect that moves one joint and does not yet, by what such a move
     changes whatever makes it; None of all others."""
@@ -155,34 +157,33 @@ def _by_shift(source, candidate: Candidate, shapes: dict[str, float]) -> np.ndar
         step = _STEP * (high - low)
         step = step if shapes[shape.name] + step <= high else -step
         at, changes = {**shapes, shape.name: shapes[shape.name] + step}, []
-        for one, slopes in zip(source.bent(joint), source.shifted(joint)):
+        parts = zip(source.motion.pieces, source.bent(joint), source.shifted(joint))
+        for piece, one, slopes in parts:
             known = (
                 {"behind": effect.apart(one.load, 0.0 * one.load, one.seen, **at)}
                 if isinstance(effect, Deflection)
                 else {}
             )
-            found = _shift(one, effect.moved(one.seen, joint, **known, **at), slopes, joint)
-            if found is None:
+            moved = _shift(one.seen, effect.moved(one.seen, joint, **known, **at), joint)
+            if moved is None:
                 return None
-            changes.append(found[None] / step)
-        (found,) = row.settled(source.model, source.motion, changes, source.stride)
-        out.append(found * source.use.T)
+            ahead, behind = (own / step for own in moved)
+            torque = np.einsum("on,ojn->jn", ahead, slopes)
+            torque += np.einsum("on,ojn->jn", behind, one.slopes)
+            changes += list(row.sensed(source.model, piece, torque[None]))
+        out.append(row.low_passed(source.motion, changes, source.stride) * source.use.T)
     return np.stack(out, axis=2) if out else None
 
 
-def _shift(one, moved: Piece, slopes: np.ndarray, joint: int) -> np.ndarray | None:
-    """What of the torque (dof, n) a move of one joint changes; None where more than that moved."""
-    was, others = one.seen, np.arange(moved.q.shape[1]) != joint
-    steps = [getattr(moved, name) - getattr(was, name) for name in ("q", "qd", "qdd")]
-    none = np.zeros((3, *moved.q.shape))
-    behind = (none if part.deflection is None else part.deflection for part in (moved, was))
-    behind = np.subtract(*behind)
-    if moved.gravity is not was.gravity or np.any(np.stack([*steps, *behind])[:, :, others]):
+def _shift(was: Piece, moved: Piece, joint: int) -> tuple[np.ndarray, np.ndarray] | None:
+    """How far (3, n) a joint, and its link behind it, moved; None where more than these did."""
+    others, none = np.arange(moved.q.shape[1]) != joint, np.zeros((3, *moved.q.shape))
+    ahead = np.stack([getattr(moved, name) - getattr(was, name) for name in ("q", "qd", "qdd")])
+    parts = (none if part.deflection is None else part.deflection for part in (moved, was))
+    behind = np.subtract(*parts)
+    if moved.gravity is not was.gravity or ahead[:, :, others].any() or behind[:, :, others].any():
         return None
-    ahead = np.stack(steps)[:, :, joint]
-    return np.einsum("on,ojn->jn", ahead, slopes) + np.einsum(
-        "on,ojn->jn", behind[:, :, joint], one.slopes
-    )
+    return ahead[:, :, joint], behind[:, :, joint]
 
 
 def _slopes(source, candidate: Candidate, shapes: dict[str, float]) -> np.ndarray:

@@ -9,7 +9,7 @@ def least_squares(columns, values) -> np.ndarray:
     """The coefficients (2,) >= 0 of columns (n, 2) that leave least of values (n,).
 
     Of two, the least within the bounds is the least without them, or one of them alone. As
-    `scipy.optimize.nnls`, whose import takes a tenth of a diagnosis.
+    `scipy.optimize.nnls`, whose import takes a tenth of a second.
     """
     columns, values = np.asarray(columns, dtype=float), np.asarray(values, dtype=float)
     free = np.linalg.lstsq(columns, values, rcond=None)[0]

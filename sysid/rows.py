@@ -203,17 +203,22 @@ def secants(model: Model, motion: Motion, known: list[Bent], effect, tried: list
     """
     out = []
     apart = apart or [effect.several([(one.load, one.inertia, one.seen, shapes) for shapes in tried]) for one in known]
-    for one, own in zip(known, apart):
-        out.append(np.einsum("ojn,ton->tjn", one.slopes, np.stack(own)))
-    return settled(model, motion, out, stride) * use.T
+    for piece, one, own in zip(motion.pieces, known, apart):
+        out.append(sensed(model, piece, np.einsum("ojn,ton->tjn", one.slopes, np.stack(own))))
+    return low_passed(motion, out, stride) * use.T
 
 
-def settled(model: Model, motion: Motion, torque: list[np.ndarray], stride: int) -> np.ndarray:
-    """Torque (..., dof, n) of each whole piece, on the rows that a stride keeps, as sensors and the low-pass of both sides show it."""
+def sensed(model: Model, piece: Piece, torque: np.ndarray) -> np.ndarray:
+    """What the sensors of a model show of torque (k, dof, n) over a whole piece."""
+    return np.stack([model.sensed(torque[:, j], piece, j) for j in range(model.robot.dof)], axis=1)
+
+
+def low_passed(motion: Motion, torque: list[np.ndarray], stride: int) -> np.ndarray:
+    """What sensors show of torque (..., dof, n) over each whole piece, on the rows that a stride keeps, as both sides are seen."""
     out = []
     for piece, rows, whole in zip(motion.pieces, starts(motion, stride), torque):
-        read = [model.sensed(whole[..., j, :], piece, j) for j in range(model.robot.dof)]
-        out.append(np.stack([piece.settled(own, rows, j) for j, own in enumerate(read)], axis=-2))
+        each = [piece.settled(whole[..., j, :], rows, j) for j in range(whole.shape[-2])]
+        out.append(np.stack(each, axis=-2))
     return np.concatenate(out, axis=-1)
 
 

@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from . import rows as row
+from .effect import SensorEffect
 from .model import Model
 from .motion import Motion, Piece
 
@@ -59,20 +60,16 @@ class Source:
         return {}
 
     def shifted(self, joint: int) -> list[np.ndarray]:
-        """Of each whole piece, slopes (3, dof, n) of the unfiltered torque in the angle, speed and
+        """Of each whole piece, slopes (3, dof, n) of the torque before sensors in the angle, speed and
         acceleration of a joint as measured: the same for whatever says that it moved otherwise."""
         if joint not in self._shifted:
-            bodies, rest = np.split(self.x, [10 * self.model.bodies])
-            out = []
-            for piece, base in zip(self._whole, self.unfiltered):
+            out, model = [], self._unsensed
+            for piece, base in zip(self._whole, self._base):
                 slopes = []
                 for name, nudge in zip(("q", "qd", "qdd"), row.NUDGES):
                     moved = {"q": piece.q.copy(), name: getattr(piece, name).copy()}
                     moved[name][:, joint] += nudge
-                    torque = self.model.torque(
-                        replace(piece, **moved), bodies.reshape(-1, 10), rest
-                    )
-                    slopes.append((torque.T - base) / nudge)
+                    slopes.append((self._torque(model, replace(piece, **moved)) - base) / nudge)
                 out.append(np.stack(slopes))
             self._shifted[joint] = out
         return self._shifted[joint]
@@ -107,16 +104,30 @@ class Source:
     @cached_property
     def predicted(self) -> np.ndarray:
         """Torque (n, dof), low-passed as the columns are."""
-        kept = row.starts(self.motion, self.stride)
-        found = zip(self.motion.pieces, self.unfiltered, kept)
-        low = [[piece.settled(own, rows, j) for j, own in enumerate(t)] for piece, t, rows in found]
-        return np.concatenate(low, axis=1).T
+        return row.low_passed(self.motion, self.unfiltered, self.stride).T
 
     @cached_property
     def unfiltered(self) -> list[np.ndarray]:
-        """Torque (dof, n) over whole pieces, before the low-pass."""
+        """Torque (dof, n) over whole pieces as sensors show it, before the low-pass."""
+        return [self._torque(self.model, piece) for piece in self._whole]
+
+    @cached_property
+    def _unsensed(self) -> Model:
+        """The model without its sensors, which have no parameters in x."""
+        model = self.model
+        for effect, joints in self.model.terms:
+            for joint in joints if isinstance(effect, SensorEffect) else ():
+                model = model.without(effect.name, joint)
+        return model
+
+    @cached_property
+    def _base(self) -> list[np.ndarray]:
+        plain = self._unsensed is self.model
+        return self.unfiltered if plain else [self._torque(self._unsensed, p) for p in self._whole]
+
+    def _torque(self, model: Model, piece: Piece) -> np.ndarray:
         bodies, rest = np.split(self.x, [10 * self.model.bodies])
-        return [self.model.torque(piece, bodies.reshape(-1, 10), rest).T for piece in self._whole]
+        return model.torque(piece, bodies.reshape(-1, 10), rest).T
 
     @cached_property
     def _whole(self) -> list[Piece]:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .candidates import Candidate
+from .model_parameters import ROBOT
 
 _CLEAR = 2.0  # standard deviations
 _MOST = 0.5  # of what stands above a floor, or of a square
@@ -34,9 +35,11 @@ class Refused:
     def told(self) -> str:
         """In words."""
         said = f"{self.effect} was looked at and is not claimed: {self.why}"
-        if not max(self.shares, default=0.0) >= _MOST:
+        if self.candidate is None or self.candidate.joint == ROBOT:
             return said
-        return f"{said}; under the low-pass of a diagnosis it takes {max(self.shares):.0%} of it"
+        share = self.shares[self.candidate.joint]  # another joint's may be all that falls
+        low = f"; under the low-pass of a diagnosis it takes {share:.0%} of that error's square"
+        return said + low * bool(share >= _MOST)
 
 
 def told_in_vain(refused: Sequence[Refused], joints, j: int, least: float):

@@ -10,7 +10,7 @@ from scipy.stats import f as fisher
 from scipy.stats import norm
 from scipy.stats import t as student
 
-from sysid import blocks, candidate_columns, config, listed_effects, regressor
+from sysid import blocks, candidate_columns, config, listed_effects, regressor, vocabulary
 from sysid.candidate_columns import columns_of
 from sysid.candidates import candidates
 from sysid.diagnose import evidence, null, projected
@@ -298,6 +298,19 @@ def test_what_moves_one_joint_has_the_slopes_of_the_whole_model(views, name, opt
         found, wanted = columns_of(source, one, [at])[0], candidate_columns._slopes(source, one, at)
         assert found.shape == wanted.shape
         np.testing.assert_allclose(found, wanted, atol=2e-3 * np.abs(wanted).max())
+
+
+def test_what_moves_one_joint_is_seen_by_the_sensors_once(views):
+    """Of a model with a gain and a lag of the measured torque, each as large as they come."""
+    source = views[0].source
+    for name, value in (("torque_gain", 0.5), ("current_lag", 0.05)):
+        model = source.model.with_effect(vocabulary.find(name), (0, 1))
+        seen = replace(source, model=model.with_shapes([*source.model.shapes, value, value]))
+        for word, options in (("encoder_offset", ()), ("elasticity", (("encoder", "joint"),))):
+            for one in (c for c in candidates(seen.model) if (c.name, c.options) == (word, options)):
+                (at, *_) = candidate_columns.tried(seen, one)
+                found, wanted = columns_of(seen, one, [at])[0], candidate_columns._slopes(seen, one, at)
+                np.testing.assert_allclose(found, wanted, atol=2e-3 * np.abs(wanted).max())
 
 
 def test_links_that_fly_are_integrated_for_both_motions_at_once(views):

@@ -212,6 +212,7 @@ def test_what_test_logs_bear_out_under_the_low_pass_and_no_fit_does_is_not_calle
     refused = claims.Refused("elasticity", joint, "the error on the test logs does not fall", what, 0.001, np.array([0.9, share]))
     found = elbow(3.0, rest=left(0.5), refused=[refused])
     assert found.status == status and found.may is None
+    assert ("takes 90%" in refused.told) is (share == 0.9)  # not what it takes of the other joint
     assert ("what is left may be elasticity, though no fit with it bore that out" in found.says) is (status == "unresolved")
 
 

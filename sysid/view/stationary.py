@@ -38,8 +38,8 @@ def spectra(values, columns, use, memory: float, step: float) -> np.ndarray:
 def _smooth(least: int) -> int:
     """The least even number that is not below another and has no prime factors above five, as fast
     Fourier transforms want it: `scipy.fft.next_fast_len`, whose import takes as long as they do."""
-    threes = [3**b * 5**c for b in range(21) for c in range(14) if 3**b * 5**c <= 2 * least]
-    return min(odd << max(1, (-(-least // odd) - 1).bit_length()) for odd in threes)
+    odds = [3**b * 5**c for b in range(21) for c in range(14) if 3**b * 5**c <= 2 * least]
+    return min(odd << max(1, (-(-least // odd) - 1).bit_length()) for odd in odds)
 
 
 def drawn(spectrum, n: int, draws: int, rng: np.random.Generator) -> np.ndarray:
