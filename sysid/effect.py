@@ -96,7 +96,8 @@ class Effect(ABC):
 
     def _declared(self, what: type) -> tuple:
         """What a class and those it derives from declare, these first."""
-        found = {name: value for kind in reversed(type(self).__mro__) for name, value in vars(kind).items()}
+        # copies: Python itself adds to a class that is asked for its annotations in another thread
+        found = {name: value for kind in reversed(type(self).__mro__) for name, value in dict(vars(kind)).items()}
         return tuple(value for value in found.values() if isinstance(value, what))
 
     def given(self, **options) -> Effect:
