@@ -173,13 +173,13 @@ def test_what_rests_on_few_blocks_is_told_by_the_others():
     """Noise in two blocks is no evidence, however large."""
     rng = np.random.default_rng(10)
     p = posed(rng)
-    for count, told in ((2, False), (15, True)):
+    for count, seen in ((2, False), (15, True)):
         own = rng.normal(size=(1, 2, 240, 1)) * (p.number < count)[None, None, :, None]
         (group,) = grouped(viewed(p), own)
-        assert group.testable is told and blocks.resting(group.squares) == pytest.approx(count, rel=0.15)
+        assert group.testable is seen and blocks.resting(group.squares) == pytest.approx(count, rel=0.15)
         assert null.statistics([group])[0] < 3.0
         share = np.einsum("bkk->b", group.tested.squares)
-        assert share.max() <= 0.2 * share.sum() and (group.tested is group) is told
+        assert share.max() <= 0.2 * share.sum() and (group.tested is group) is seen
 
 
 # ---- the scale of a normal variable

@@ -38,12 +38,13 @@ def predicted(features, y, use, spans) -> tuple[np.ndarray, np.ndarray]:
         return np.zeros(len(y)), np.zeros(len(spans))
     ridges = _RIDGES * len(y) / len(_RIDGES)
     values, vectors = np.linalg.eigh(scaled.T @ scaled)
-    scaled = scaled @ vectors[:, values > _LEAST * ridges[0]]
-    system, right = scaled.T @ scaled, scaled.T @ y
+    large = values > _LEAST * ridges[0]
+    scaled = scaled @ vectors[:, large]
+    system, right = np.diag(values[large]), scaled.T @ y
     gains, all_told = np.zeros((len(ridges), len(spans))), np.zeros((len(ridges), len(y)))
     for f, (rows, near) in enumerate(spans):
-        own = system - scaled[near].T @ scaled[near]
-        pull = right - scaled[near].T @ y[near]
+        here = scaled[near]
+        own, pull = system - here.T @ here, right - here.T @ y[near]
         told = (scaled[rows] @ _solved(own, ridges, pull)).T
         all_told[:, rows] = told
         gains[:, f] = np.sum(2.0 * told * y[rows] - told**2, axis=1)
