@@ -57,22 +57,23 @@ def transfers(fit: Fit) -> list[Transfer]:
     """
     train, test = (fit.predictions[part].thinned(MOST) for part in ("train", "test"))
     spans = tuple(float(np.ptp(train.t[train.log == number])) for number in np.unique(train.log))
+    parts = [(part, part.residual) for part in (train, test)]
     out = []
     for j, joint in enumerate(fit.joints):
-        (first, one), (second, two) = (_level(part, j) for part in (train, test))
+        (first, one), (second, two) = (_level(part, left[:, j], j) for part, left in parts)
         ratio = float(np.exp(second - first)) if np.isfinite(first) and np.isfinite(second) else float("nan")
         out.append(Transfer(joint, ratio, ratio * float(np.hypot(one, two)), spans))
     return out
 
 
-def _level(part: Prediction, j: int) -> tuple[float, float]:
-    """Logarithm of a joint's RMS, and its standard error."""
+def _level(part: Prediction, left, j: int) -> tuple[float, float]:
+    """Logarithm of the RMS of what is left (n,) of joint j, and its standard error."""
     use = part.use[:, j] if part.use is not None else np.ones(len(part.t), dtype=bool)
-    square = part.residual[:, j] ** 2 * use
+    square = left**2 * use
     if not square.sum() > 0:
         return float("nan"), float("nan")
     step = float(np.median(np.diff(part.t)))
-    memory = blocks.memory(part.residual[:, [j]], use[:, None], part.log, step)
+    memory = blocks.memory(left[:, None], use[:, None], part.log, step)
     number = blocks.numbered(part.t, part.log, memory=memory)
     sums, counts = blocks.summed(number, square), blocks.summed(number, use.astype(float))
     sums, counts = sums[counts > 0], counts[counts > 0]

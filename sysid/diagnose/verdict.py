@@ -76,13 +76,13 @@ def verdicts(
         # what does not lower the joint's error on the test logs is no name for it
         own = tuple(c for c in taking if c.head.joint in (joint, "*") and then < first)
         others = tuple(c for c in taking if c.head.joint not in (joint, "*"))
+        both = [e[joint] for e in errors]
         low, noise = (floor or unsure or 0.0 for unsure in (floors[j].low, floors[j].about))
-        before, both = ([f.rms(p)[joint] for p in ("train", "test")] for f in (fit, last))
-        shares = [explains(b, e, min(e, noise)) for b, e in zip(before, both)]
-        # who leaves more that is no noise is no name for what is missing
-        whole = any((1.0 + _LEFT) * s >= 1.0 for s in shares)
-        whole |= any(mostly_noise(error, floors[j]) for error in both)
         explained = explains(first, then, low) if claims else float("nan")
+        # who leaves more that is no noise is no name for what is missing; in no log is there more
+        # noise than an error of another, so that what does not carry over is no noise
+        whole = (1.0 + _LEFT) * explains(first, then, min(*both, noise)) >= 1.0
+        whole |= any(mostly_noise(error, floors[j]) for error in both)
         seen, among = left[j], sum(asked) if asked[j] else len(left)
         if law and asked[j] and then > 0.0 and not seen.predictable(among, WORTH):
             seen = seen.with_law(law(j))
