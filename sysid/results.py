@@ -65,20 +65,22 @@ def _another(path: Path, text: bytes) -> bool:
 
 
 def _predictions(fit: Fit):
+    """What makes the table of predictions, part by part; of one in files a part is in memory at a time."""
     import polars as pl
 
-    kept = {part: prediction.lazy() for part, prediction in fit.predictions.items()}
-    told = {part: set(table.collect_schema().names()) for part, table in kept.items()}
+    told = {part: set(prediction.lazy().collect_schema().names()) for part, prediction in fit.predictions.items()}
     masked = any(f"used_{joint}" in names for names in told.values() for joint in fit.joints)
-    frames = []
-    for part, table in kept.items():
-        columns = [pl.lit(part).alias("part"), pl.col("log"), pl.col("t")]
-        for joint in fit.joints:
-            columns += [pl.col(f"measured_{joint}"), pl.col(f"predicted_{joint}")]
-            used = f"used_{joint}"
-            columns += [] if not masked else [pl.col(used) if used in told[part] else pl.lit(True).alias(used)]
-        frames.append(table.select(columns))
-    return pl.concat(frames)
+
+    def tables():
+        for part, prediction in fit.predictions.items():
+            columns = [pl.lit(part).alias("part"), pl.col("log"), pl.col("t")]
+            for joint in fit.joints:
+                columns += [pl.col(f"measured_{joint}"), pl.col(f"predicted_{joint}")]
+                used = f"used_{joint}"
+                columns += [] if not masked else [pl.col(used) if used in told[part] else pl.lit(True).alias(used)]
+            yield from (piece.to_dataframe().select(columns) for piece in prediction.parts())
+
+    return tables
 
 
 def _relocated(experiment: Experiment, run: Path) -> dict:

@@ -3,7 +3,7 @@
 import json
 import os
 import stat
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
 
@@ -73,13 +73,25 @@ def parquet(table) -> Callable[[Path], None]:
     return write
 
 
-def sunk(table) -> Callable[[Path], None]:
-    """As `parquet`, of a lazy table: one that is in files does not come into memory whole."""
+_ROWS = 2**15  # of a table that are written as one: a few dozen such stand in memory meanwhile
+
+
+def sunk(tables: Callable[[], Iterator]) -> Callable[[Path], None]:
+    """As `parquet`, of tables of Polars made one after another, each when it is asked for: the whole is never in memory.
+
+    It is no scan of files, of which Polars reads hundreds of row groups ahead of what it writes (its issues 28312 and 28569).
+    """
     import polars as pl
+    from polars.io.plugins import register_io_source
+
+    def source(columns, *_) -> Iterator:
+        for table in tables():
+            yield from (table if columns is None else table.select(columns)).iter_slices(_ROWS)
 
     def write(path: Path) -> None:
         try:
-            table.sink_parquet(path, compression_level=1)  # of zstd: noise is no smaller at a higher one
+            whole = register_io_source(source, schema=next(tables()).schema)
+            whole.sink_parquet(path, compression_level=1, row_group_size=_ROWS)  # of zstd: noise is no smaller at a higher one
         except pl.exceptions.PolarsError as error:
             raise OSError(str(error)) from None
 
