@@ -20,6 +20,7 @@ from .differences import told
 from .estimate import Fit
 from .filters import settled
 from .fit_document import document
+from .spans import released
 from .specs import Experiment, is_own
 from .whole_files import folder, sunk, write_together
 
@@ -78,7 +79,9 @@ def _predictions(fit: Fit):
                 columns += [pl.col(f"measured_{joint}"), pl.col(f"predicted_{joint}")]
                 used = f"used_{joint}"
                 columns += [] if not masked else [pl.col(used) if used in told[part] else pl.lit(True).alias(used)]
-            yield from (piece.to_dataframe().select(columns) for piece in prediction.parts())
+            for piece in prediction.parts():
+                released()
+                yield piece.to_dataframe().select(columns)
 
     return tables
 
