@@ -10,6 +10,7 @@ suspects.py     what effects that a model may lack would add along a motion
 noise.py        how quiet and how large torques are
 information.py  what a motion is worth: log det M, evidence between suspects, and its slope
 problem.py      a motion against its limits, and how far it must shrink
+linear_program.py  the best step within many limits
 solve.py        linear programs within a trust region
 search.py       several starts in several processes
 spectrum.py     the noise that a fit's residual tells, and what it makes of a fit

@@ -27,10 +27,11 @@ _SLIDES = 10.0  # m that a joint without limits is taken to slide at most
 
 @dataclass(frozen=True)
 class Near:
-    """Pairs that are near at poses: each one's pose (m,), distance (m,) [m] and the slope of that
-    (m, dof)."""
+    """Pairs that are near at poses: each one's pose (m,), number (m,), distance (m,) [m] and the slope of
+    that (m, dof)."""
 
     pose: np.ndarray
+    pair: np.ndarray
     distance: np.ndarray
     slope: np.ndarray
 
@@ -98,7 +99,8 @@ class Geometry:
         """Every pair nearer than `within` [m] at poses q (n, dof), in the order of a motion."""
         found = list(self._nearer(np.asarray(q), within)) if self.looks else []
         if not found:
-            return Near(np.zeros(0, dtype=int), np.zeros(0), np.zeros((0, len(self.order))))
+            none = np.zeros(0, dtype=int)
+            return Near(none, none, np.zeros(0), np.zeros((0, len(self.order))))
         pose, pair, distance, way, one, two, jacobian = (list(own) for own in zip(*found))
         way, jacobian = np.array(way), np.array(jacobian)
         slope = np.zeros((len(pose), self.model.nv))
@@ -108,7 +110,7 @@ class Geometry:
             own = np.einsum("mi,mij->mj", way, jacobian[:, :3])
             own += np.einsum("mi,mij->mj", turned, jacobian[:, 3:])
             slope += sign * own * self._carried[self._ends[pair][:, end]]
-        return Near(np.array(pose), np.array(distance), slope[:, self.order])
+        return Near(np.array(pose), np.array(pair), np.array(distance), slope[:, self.order])
 
     def _nearer(self, q, within: float):
         """(pose, pair, distance, direction from the second to the first, points of both, joint
@@ -120,25 +122,26 @@ class Geometry:
         may = keys[own] - np.abs(q - asked[own]) @ self._reach.T < within
         data, found = self.model.createData(), self.shapes.createData()
         whole, up = self._whole(q), np.array([0.0, 0.0, 1.0])
-        for k in np.flatnonzero(may.any(axis=1)):
+        pairs = self.pairs
+        for k in np.flatnonzero(may.any(axis=1)).tolist():
             pin.updateGeometryPlacements(self.model, data, self.shapes, found, whole[k])
             jacobian = None
             for pair in np.flatnonzero(may[k]).tolist():
-                if pair < self.pairs:
+                if pair < pairs:
                     result = pin.computeDistance(self.shapes, found, pair)
                     distance = result.min_distance
                 else:
-                    distance, point = self._lowest(found, self._above[pair - self.pairs])
+                    distance, point = self._lowest(found, self._above[pair - pairs])
                 if distance >= within:
                     continue
                 if jacobian is None:
                     jacobian = pin.computeJointJacobians(self.model, data, whole[k]).copy()
-                if pair < self.pairs:
+                if pair < pairs:
                     way = -np.array(result.normal)
                     ends = np.array(result.getNearestPoint1()), np.array(result.getNearestPoint2())
                 else:
                     way, ends = up, (point, point)
-                yield int(k), pair, distance, way, *ends, jacobian
+                yield k, pair, distance, way, *ends, jacobian
 
     def _whole(self, q) -> np.ndarray:
         """(n, nq) configurations of the Pinocchio model."""

@@ -26,7 +26,7 @@ import numpy as np
 from ..inertia import DIVERGENCES
 from ..model import Model
 from ..model_parameters import ROBOT
-from .columns import columns
+from .columns import columns, piece
 from .suspects import Suspect, along
 
 
@@ -83,6 +83,22 @@ class Known:
             else:
                 own.append(along([one], self.model, self.x, q, qd, qdd))
         return np.concatenate(own, axis=1) * self.counted(qd, qdd)[:, None]
+
+    def pulled(self, pull, q, qd, qdd) -> np.ndarray:
+        """(n,) the sum of all columns of samples (n, dof), each times its share in `pull` (dof, all, m): of
+        samples again and again over m instants. What looks back in time has none."""
+        seen, over = piece(q, qd, qdd), self.counted(qd, qdd)
+        found = self.model.columns(seen, slice(0, len(q)))
+        own = [(j, self.model.support(j), c) for j, c in enumerate(found)]
+        for place, one in zip(self.places, self.suspects):
+            if not one.looks_back:
+                told = along([one], self.model, self.x, q, qd, qdd)
+                own += [(j, place, c) for j, c in enumerate(told)]
+        out = np.zeros((len(q) // pull.shape[2], pull.shape[2]))
+        for j, place, c in own:
+            told = np.einsum("pcn,pn->cn", c.reshape(len(c), *out.shape), pull[j, place])
+            out += told * over[j].reshape(out.shape)
+        return out.ravel()
 
     def counted(self, qd, qdd) -> np.ndarray:
         """(dof, n) what a row of each joint is multiplied by: one over its noise, less where it moves
