@@ -26,7 +26,7 @@ import numpy as np
 from ..inertia import DIVERGENCES
 from ..model import Model
 from ..model_parameters import ROBOT
-from .columns import columns, piece
+from .columns import columns
 from .suspects import Suspect, along
 
 
@@ -76,29 +76,20 @@ class Known:
     def all_columns(self, q, qd, qdd) -> np.ndarray:
         """(dof, all, n) of samples (n, dof), each over its joint's noise, as far as it counts. Zero of
         suspects that look back in time."""
-        own = [columns(self.model, q, qd, qdd)]
-        for one in self.suspects:
-            if one.looks_back:
-                own.append(np.zeros((self.dof, len(one.size), len(q))))
-            else:
-                own.append(along([one], self.model, self.x, q, qd, qdd))
-        return np.concatenate(own, axis=1) * self.counted(qd, qdd)[:, None]
+        out = np.zeros((self.dof, len(self.before), len(q)))
+        out[:, : self.model.size] = columns(self.model, q, qd, qdd)
+        place, found = self.of_suspects(q, qd, qdd)
+        out[:, place] = found
+        return out * self.counted(qd, qdd)[:, None]
 
-    def pulled(self, pull, q, qd, qdd) -> np.ndarray:
-        """(n,) the sum of all columns of samples (n, dof), each times its share in `pull` (dof, all, m): of
-        samples again and again over m instants. What looks back in time has none."""
-        seen, over = piece(q, qd, qdd), self.counted(qd, qdd)
-        found = self.model.columns(seen, slice(0, len(q)))
-        own = [(j, self.model.support(j), c) for j, c in enumerate(found)]
-        for place, one in zip(self.places, self.suspects):
-            if not one.looks_back:
-                told = along([one], self.model, self.x, q, qd, qdd)
-                own += [(j, place, c) for j, c in enumerate(told)]
-        out = np.zeros((len(q) // pull.shape[2], pull.shape[2]))
-        for j, place, c in own:
-            told = np.einsum("pcn,pn->cn", c.reshape(len(c), *out.shape), pull[j, place])
-            out += told * over[j].reshape(out.shape)
-        return out.ravel()
+    def of_suspects(self, q, qd, qdd) -> tuple[np.ndarray, np.ndarray]:
+        """Where the coefficients of suspects of the instant stand among all (k,), and their columns (dof, k,
+        n); all at once, as the load that they look at is the same."""
+        own = [(place, one) for place, one in zip(self.places, self.suspects) if not one.looks_back]
+        if not own:
+            return np.zeros(0, dtype=int), np.zeros((self.dof, 0, len(q)))
+        place, suspects = zip(*own)
+        return np.concatenate(place), along(suspects, self.model, self.x, q, qd, qdd)
 
     def counted(self, qd, qdd) -> np.ndarray:
         """(dof, n) what a row of each joint is multiplied by: one over its noise, less where it moves

@@ -60,7 +60,7 @@ class Problem:
 
     def of(self, family: Fourier) -> Problem:
         """The same of another family of motions."""
-        return replace(self, family=family)
+        return self if family == self.family else replace(self, family=family)
 
     def with_rounds(self, rounds: int) -> Problem:
         """The same of harmonics of other frequencies."""

@@ -22,6 +22,7 @@ from .columns import with_changes
 from .fourier import Fourier
 from .information import information, worth
 from .problem import Problem, looking_back, passed, shares, shrunk, told, torque, value
+from .slopes import slopes
 
 STEPS = (40, 15, 10, 10)  # linear programs, again each time that more times are looked at
 _FIRST, _WIDEST, _NARROWEST = 0.1, 0.5, 1e-3  # rad or m: radius of the trust region
@@ -188,11 +189,9 @@ def climbs(problem: Problem, at: _Look, grid: _Grid, back: dict | None = None) -
         back: slopes of what looks back along the motion, by suspect, with the coordinates that they
             are of: they stand for others nearby, and new ones are put there.
     """
-    known, dof, weight = problem.known, problem.family.dof, problem.samples / grid.nodes
+    known, weight = problem.known, problem.samples / grid.nodes
     pull = 2.0 * weight * np.matmul(at.slope, at.columns)
-    pulled = lambda *asked: known.pulled(pull, *asked)  # noqa: E731
-    _, change = with_changes(pulled, *at.motion[:3, : grid.nodes])
-    by_node = change.reshape(3, dof, -1)
+    by_node = slopes(known, pull, *at.motion[:3, : grid.nodes])
     out = np.einsum("rin,rnz->iz", by_node, grid.basis[:3, : grid.nodes])
     back = {} if back is None else back
     for i, (place, one) in enumerate(zip(known.places, known.suspects)):
