@@ -73,11 +73,15 @@ class Known:
         ends = np.cumsum([self.model.size, *(len(one.size) for one in self.suspects)])
         return [np.arange(a, b) for a, b in zip(ends[:-1], ends[1:])]
 
-    def all_columns(self, q, qd, qdd) -> np.ndarray:
+    def all_columns(self, q, qd, qdd, own=None) -> np.ndarray:
         """(dof, all, n) of samples (n, dof), each over its joint's noise, as far as it counts. Zero of
-        suspects that look back in time."""
+        suspects that look back in time.
+
+        Args:
+            own: (dof, size, n) the model's columns, where they are at hand.
+        """
         out = np.zeros((self.dof, len(self.before), len(q)))
-        out[:, : self.model.size] = columns(self.model, q, qd, qdd)
+        out[:, : self.model.size] = columns(self.model, q, qd, qdd) if own is None else own
         place, found = self.of_suspects(q, qd, qdd)
         out[:, place] = found
         return out * self.counted(qd, qdd)[:, None]

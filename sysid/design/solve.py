@@ -18,7 +18,7 @@ import numpy as np
 from ..model_parameters import ROBOT
 from . import linear_program
 from .collision import Near
-from .columns import with_changes
+from .columns import columns, with_changes
 from .fourier import Fourier
 from .information import information, worth
 from .problem import Problem, looking_back, passed, shares, shrunk, told, torque, value
@@ -144,10 +144,12 @@ class _Look:
 
 
 def _look(problem: Problem, z, grid: _Grid) -> _Look:
-    found, weights = told(problem, z), np.full(grid.nodes, problem.samples / grid.nodes)
-    value, slope = worth(problem.known, information(problem.known, found, weights))
-    motion = grid.basis @ z.T
-    needed = torque(problem, *motion[:3])
+    known, motion = problem.known, grid.basis @ z.T
+    own = columns(known.model, *motion[:3])
+    needed = np.einsum("jpn,p->nj", own, known.x)
+    found = told(problem, z, motion[:, : grid.nodes], own[..., : grid.nodes])
+    weights = np.full(grid.nodes, problem.samples / grid.nodes)
+    value, slope = worth(known, information(known, found, weights))
     clearance = problem.limits.clearance
     least = problem.geometry.least(grid.poses @ z.T, clearance)
     lacks = float(np.max(clearance - least, initial=0.0)) / max(clearance, 1e-3)
