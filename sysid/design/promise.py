@@ -123,18 +123,21 @@ def deviations(fit: Fit, old: Motion, new: Motion, heard: Heard) -> dict[str, di
     weights = np.ones(len(fit.joints)) if fit.weights is None else fit.weights
     own, more = (_gram(model, motion, weights, count) for motion in (old, new))
     beside, (variance, claim) = _beside(fit, count), _claim(fit, weights)
-    noises = _noises(fit, model, heard, beside / (variance * claim), free)
+    noises = _noises(fit, model, heard, beside / (variance * claim))
 
     # a poor log lets a strong prior be chosen, which the next one will not: it claims what it knows
     honest = beside / claim
 
-    def deviation(hessian, noise):
+    def deviation(hessian, noise, free):
         inverse = _inverse(hessian + honest, free)
         spread = np.diagonal(inverse @ (noise + variance * honest) @ inverse)
         return np.sqrt(np.maximum(spread, 0.0))
 
     first, then = (_scatter(model, motion, weights, noises, count) for motion in (old, new))
-    now, after = deviation(own, first), deviation(own + more, first + then)
+    # what the poor log's noise held at a bound the next fit may set free
+    later, coefficients = free.copy(), slice(10 * fit.model.bodies, fit.model.size)
+    later[coefficients] |= np.diagonal(own + more)[coefficients] > 0.0
+    now, after = deviation(own, first, free), deviation(own + more, first + then, later)
     kept = np.flatnonzero(free)
     told = {k: {"now": float(now[k]), "after": float(after[k])} for k in kept}
     return {names[k]: {**own, "unit": units[k]} for k, own in told.items()}
@@ -158,14 +161,16 @@ def _gram(model, motion: Motion, weights, size: int) -> np.ndarray:
     return out
 
 
-def _noises(fit: Fit, model, heard: Heard, claimed, free) -> list[Noise]:
+def _noises(fit: Fit, model, heard: Heard, claimed) -> list[Noise]:
     """The noise of each joint.
 
     Where joints are not as loud as each other, the noise of one bends what another leaves; and a strong
     prior bends what all leave. So it is told of what a fit leaves in which each joint counts by its
     own noise and the prior by what it claims to know (size, size); and of all logs, as nearly all
-    of one poor log's slow noise goes into parameters.
+    of one poor log's slow noise goes into parameters. No bound holds any of these: what one log's noise
+    held at its bound, another log misses.
     """
+    free = np.ones(len(claimed), dtype=bool)
     left, even = heard.left, _over(fit.predictions["train"].errors()["rms"])
     inverse = _inverse(_gram(model, heard.motion, even, len(free)) + claimed, free)
     pull = np.zeros(len(free))
