@@ -27,7 +27,9 @@ import os
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import argparse
+import shutil
 import sys
+import tempfile
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -63,8 +65,13 @@ def main(arguments: list[str] | None = None) -> None:
         options.out
         / f"{options.study}_{options.seed}_{'_'.join(robots)}_{settings['source']}.jsonl"
     )
-    journal = Journal(path, settings)
-    if not options.table:
+    if options.table:
+        # of a copy: a journal that is opened is written anew, and another process may be at it
+        with tempfile.TemporaryDirectory() as place:
+            copy = shutil.copy(path, place) if path.exists() else Path(place) / path.name
+            done = Journal(Path(copy), settings).done
+    else:
+        journal = Journal(path, settings)
         tasks = [(str(n), (part.case(options.seed, n, robots),)) for n in range(options.number)]
         run(
             journal,
@@ -73,7 +80,8 @@ def main(arguments: list[str] | None = None) -> None:
             jobs=options.jobs,
             progress=lambda share: print(f"{share:.0%}", file=sys.stderr, flush=True),
         )
-    print("\n".join(part.table(list(journal.done.values()))))
+        done = journal.done
+    print("\n".join(part.table(list(done.values()))))
 
 
 if __name__ == "__main__":

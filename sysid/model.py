@@ -87,13 +87,13 @@ class Model(Terms):
         return self.robot.prior if self.reference is None else self.reference
 
     def seen(self, piece: Piece, remembered: dict | None = None) -> Piece:
-        """A whole piece as effects see it: with the load that its bodies need, and moved as the motion effects say.
-
-        Args:
-            remembered: `remembered(piece)`, where it is at hand.
-        """
+        """A whole piece, of which `remembered(piece)` is known, as effects see it: moved, with the load that its bodies need."""
         known = self.remembered(piece) if remembered is None else remembered
         return self._seen(piece, slice(0, len(piece.t)), known, True)
+
+    def moved(self, piece: Piece) -> Piece:
+        """The same, with a load only where an effect of the model looks at it."""
+        return self._seen(piece, slice(0, len(piece.t)), self.remembered(piece))
 
     def _seen(self, piece: Piece, rows: slice, remembered: dict, loaded: bool = False) -> Piece:
         """Rows of a piece with the load that effects look at, and moved as the motion effects say."""

@@ -42,10 +42,10 @@ def body_motions(robot: Robot, q, qd, qdd, *, gravity=None, deflection=None) -> 
         gravity: (3,) [m/s^2] in the base frame, where it is not the robot's own.
         deflection: (3, n, dof) or None: how far q, qd and qdd of each joint's link stand behind those of its motor.
     """
-    frames = _frames(robot, q, qd, qdd, gravity=gravity, deflection=deflection)
-    zero = np.zeros((3, frames[0].angular.shape[1]))
+    found = frames(robot, q, qd, qdd, gravity=gravity, deflection=deflection)
+    zero = np.zeros((3, found[0].angular.shape[1]))
     jacobians: list[dict] = []
-    for i, (parent, frame) in enumerate(zip(robot.parents, frames)):
+    for i, (parent, frame) in enumerate(zip(robot.parents, found)):
         linear, angular = robot.subspaces[i, :3, None], robot.subspaces[i, 3:, None]
         turn, p = frame.turn, frame.origin
         carried = {
@@ -57,13 +57,13 @@ def body_motions(robot: Robot, q, qd, qdd, *, gravity=None, deflection=None) -> 
             carried[j] = (jl + gain * linear + zero, ja + gain * angular + zero)
         jacobians.append(carried)
     return [
-        BodyMotion(frames[b.row].angular, frames[b.row].angular_acceleration, frames[b.row].acceleration, jacobians[b.row])
+        BodyMotion(found[b.row].angular, found[b.row].angular_acceleration, found[b.row].acceleration, jacobians[b.row])
         for b in robot.bodies
     ]
 
 
 @dataclass(frozen=True)
-class _Frame:
+class Frame:
     """Motion of a frame of the tree, (3, n) in its own axes; `turn` takes vectors from its parent's axes to its own, `origin`
     (3, 1 or n) is where it stands in these."""
 
@@ -74,7 +74,8 @@ class _Frame:
     origin: np.ndarray
 
 
-def _frames(robot: Robot, q, qd, qdd, *, gravity, deflection) -> list[_Frame]:
+def frames(robot: Robot, q, qd, qdd, *, gravity=None, deflection=None) -> list[Frame]:
+    """Motion of every frame of the tree, parents first. Arguments: see `body_motions`."""
     q, qd, qdd = (np.ascontiguousarray(np.asarray(x, dtype=float).T) for x in (q, qd, qdd))
     n = q.shape[1]
     full_q, full_qd, full_qdd = (robot.transmission @ x for x in (q, qd, qdd))
@@ -85,7 +86,7 @@ def _frames(robot: Robot, q, qd, qdd, *, gravity, deflection) -> list[_Frame]:
     zero = np.zeros((3, n))
     # the base accelerates upward at -g: gravity enters every body at no cost
     base = (zero, zero, np.repeat(-np.asarray(robot.gravity if gravity is None else gravity)[:, None], n, 1))
-    out: list[_Frame] = []
+    out: list[Frame] = []
     for i, parent in enumerate(robot.parents):
         w, alpha, a = (out[parent].angular, out[parent].angular_acceleration, out[parent].acceleration) if parent >= 0 else base
         linear, angular = robot.subspaces[i, :3, None], robot.subspaces[i, 3:, None]
@@ -103,7 +104,7 @@ def _frames(robot: Robot, q, qd, qdd, *, gravity, deflection) -> list[_Frame]:
             new_w = new_w + angular * speed
         else:
             new_a = new_a + linear * push + 2.0 * _cross(new_w, linear * speed)
-        out.append(_Frame(new_w, new_alpha, new_a, turn, p))
+        out.append(Frame(new_w, new_alpha, new_a, turn, p))
     return out
 
 
@@ -217,13 +218,13 @@ def torque(robot: Robot, pi, q, qd, qdd, *, gravity=None, deflection=None) -> np
     for start in range(0, len(q), _CHUNK):
         part = slice(start, start + _CHUNK)
         behind = None if deflection is None else deflection[:, part]
-        frames = _frames(robot, q[part], qd[part], qdd[part], gravity=gravity, deflection=behind)
+        found = frames(robot, q[part], qd[part], qdd[part], gravity=gravity, deflection=behind)
         wrenches: dict[int, list] = {}  # force and moment about the origin of each frame, all that hangs on it included
         for parameters, body in zip(np.asarray(pi), robot.bodies):
-            force, moment = _wrench(parameters, frames[body.row])
+            force, moment = _wrench(parameters, found[body.row])
             held = wrenches.setdefault(body.row, [0.0, 0.0])
             held[0], held[1] = held[0] + force, held[1] + moment
-        for i in reversed(range(len(frames))):  # children before their parents
+        for i in reversed(range(len(found))):  # children before their parents
             if i not in wrenches:
                 continue
             force, moment = wrenches[i]
@@ -233,8 +234,8 @@ def torque(robot: Robot, pi, q, qd, qdd, *, gravity=None, deflection=None) -> np
                 out[part, j] += robot.transmission[i, j] * along
             if robot.parents[i] >= 0:
                 held = wrenches.setdefault(robot.parents[i], [0.0, 0.0])
-                force = frames[i].turn.back(force)
-                held[0], held[1] = held[0] + force, held[1] + frames[i].turn.back(moment) + _cross(frames[i].origin, force)
+                force = found[i].turn.back(force)
+                held[0], held[1] = held[0] + force, held[1] + found[i].turn.back(moment) + _cross(found[i].origin, force)
     return out
 
 

@@ -1,6 +1,7 @@
 """Designed motions: at rest at both ends, within every limit, and telling more than chance does."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pinocchio as pin
@@ -8,7 +9,8 @@ import pytest
 
 from scripts.design_parts.limits import summed
 from sysid import config, listed_effects, pipeline, robot
-from sysid.design import basis, design, document, limits, links, problem, search, solve
+from sysid.design import basis, design, document, limits, links, problem, promise, search, solve
+from sysid.design import designed as designing
 from sysid.design.collision import corners
 from sysid.design.columns import columns, of_the_instant
 from sysid.design.fourier import Fourier
@@ -287,6 +289,30 @@ def test_the_promised_deviations_are_achieved(poor, designed):
     now = {name: s for name, s in designed.deviations.items() if s["after"] < 0.5 * s["now"] and np.isfinite(std[name])}
     ratio = np.array([std[name] / s["after"] for name, s in now.items()])
     assert len(ratio) and 0.4 < np.median(ratio) < 2.5
+
+
+def test_what_a_poor_log_held_at_a_bound_the_next_fit_sets_free(poor, designed):
+    """A bound by itself changes nothing of what is promised after the next log, nor of the noise that is heard."""
+    base = basis.basis(pipeline.load(poor[0]), [], lambda stage, share: None)
+    new = designing._fitted(base, designing._log(base, designed.t, designed.q, designed.torque))
+    whole = promise.deviations(base.fit, base.motion, new, designing._heard(base))
+    held = base.fit.model.names.index("viscous.shoulder.Fv")
+    sure = base.fit.uncertainty
+    std = np.where(np.arange(len(sure.std)) == held, np.nan, sure.std)
+    bound = replace(base.fit, uncertainty=replace(sure, std=std))
+    told = promise.deviations(bound, base.motion, new, designing._heard(base))
+    assert set(whole) - set(told) == {"viscous.shoulder.Fv"}
+    for name, own in told.items():
+        assert own["after"] == pytest.approx(whole[name]["after"], rel=1e-6)
+    assert told["coulomb.shoulder.Fc"]["now"] < 0.9 * whole["coulomb.shoulder.Fc"]["now"]
+
+
+def test_noise_is_heard_in_the_test_logs_too(poor):
+    base = basis.basis(pipeline.load(poor[0]), [], lambda stage, share: None)
+    heard, train = designing._heard(base), base.fit.predictions["train"]
+    assert len(heard.left) == len(train.t) + len(base.fit.predictions["test"].t) == len(heard.made)
+    np.testing.assert_allclose(heard.left[: len(train.t)], train.residual, atol=1e-9)
+    np.testing.assert_allclose(heard.left[len(train.t) :], base.fit.predictions["test"].residual, atol=1e-9)
 
 
 WRONG = {

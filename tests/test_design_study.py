@@ -3,9 +3,10 @@
 from dataclasses import replace
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
-from scripts.design_parts import limits, precision, promise, robots, solvers, ties
+from scripts.design_parts import capsules, limits, precision, promise, robots, solvers, ties
 from sysid import design
 
 
@@ -26,6 +27,23 @@ def test_a_motion_beyond_its_limits_is_seen(planar):
     assert max(beyond["shares"].values()) > 1.0
     results = [{"robot": "planar", **one} for one in (kept, beyond)]
     assert limits.table(results)[-1].endswith("beyond any limit: 1")
+
+
+@pytest.mark.filterwarnings("ignore::sysid.errors.SysidWarning")  # no log, no shapes
+def test_rods_by_hand_are_as_far_apart_as_coal_says():
+    """Of the UR10e, whose URDF has no shapes; and segments against a search along both."""
+    problem, pose, _ = robots.unlogged("ur10e")
+    rng = np.random.default_rng(0)
+    poses = pose + rng.uniform(-1.5, 1.5, (40, len(pose)))
+    looked = problem.geometry.at(pose[None])[0] > 0.0
+    told = capsules.least(problem.known.model.robot, poses, pose, 0.0)
+    assert told == pytest.approx(problem.geometry.at(poses)[:, looked].min(), abs=1e-6)
+    ends = rng.normal(size=(4, 30, 3))
+    share = np.linspace(0.0, 1.0, 201)[:, None, None]
+    one, two = (a + share * (b - a) for a, b in (ends[:2], ends[2:]))
+    searched = np.linalg.norm(one[:, None] - two[None], axis=3).min(axis=(0, 1))
+    found = capsules.segments(*ends)
+    assert np.all(found <= searched + 1e-9) and np.all(found > searched - 0.02)
 
 
 def test_a_tie_is_what_holds_90_per_cent():

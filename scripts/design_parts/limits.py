@@ -12,6 +12,7 @@ import pinocchio as pin
 from scipy.interpolate import BPoly
 from scipy.spatial import ConvexHull
 
+from scripts.design_parts import capsules
 from scripts.design_parts.robots import experiment_with, unlogged_experiment
 from sysid import robot as robots
 from sysid.design.limits import LimitsSpec
@@ -65,7 +66,7 @@ def _suspects(experiment, case: dict) -> list[tuple[str, str]]:
 
 def checked(experiment, found, case: dict) -> dict:
     """From the coefficients in design.json's own words: position, velocity, torque by Pinocchio with
-    friction by hand, distance by hulls made here."""
+    friction by hand, distance by hulls made here or by rods in closed form."""
     machine = robots.load(experiment.robot, experiment.folder)
     family = found.family
     t = np.arange(0.0, family.duration + 5e-4, 1e-3)
@@ -81,11 +82,13 @@ def checked(experiment, found, case: dict) -> dict:
     shares["rest"] = float(max(np.abs(qd[[0, -1]]).max(), np.abs(qdd[[0, -1]]).max()))
     shares["torque"] = _torque(experiment, machine, found, q, qd, qdd, kept)
     told = {"shares": shares, "distance": None, "least": None}
-    shapes = _shapes(machine)
-    if shapes is not None:
-        base = found_pose(experiment, machine)
-        least = _least(machine, *shapes, q[::_EVERY], base, case["clearance"])
-        told |= {"least": least, "distance": least - case["clearance"]}
+    shapes, base, clearance = _shapes(machine), found_pose(experiment, machine), case["clearance"]
+    if shapes is None:
+        least = capsules.least(machine, q[::_EVERY], base, clearance)
+    else:
+        least = _least(machine, *shapes, q[::_EVERY], base, clearance)
+    if np.isfinite(least):  # two links have none that are no neighbours
+        told |= {"least": least, "distance": least - clearance}
     return told
 
 
@@ -112,7 +115,9 @@ def found_pose(experiment, machine) -> np.ndarray:
     """The pose that motions are about, pairs too close in which are not looked at."""
     from sysid.design.basis import basis
 
-    return basis(experiment, [], lambda stage, share: None).pose
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # what they say the design has said
+        return basis(experiment, [], lambda stage, share: None).pose
 
 
 def _torque(experiment, machine, found, q, qd, qdd, kept) -> float:

@@ -39,7 +39,8 @@ _USUAL = 10.0  # s of a motion that says how a robot usually moves, where no log
 
 @dataclass(frozen=True)
 class Basis:
-    """What a design starts from. logs: those of the fit; motion: these, filtered."""
+    """What a design starts from. logs: those of the fit; motion: these, filtered; test: logs that it
+    was tested on."""
 
     robot: Robot
     fit: Fit | None
@@ -50,6 +51,7 @@ class Basis:
     window: float
     levels: Mapping[str, str]
     logs: tuple[Log, ...] = ()
+    test: tuple[Log, ...] = ()
 
     @property
     def fastest(self) -> float:
@@ -64,13 +66,14 @@ def basis(
     machine, structure, prior = pipeline.build(experiment)
     levels = _levels(structure, levels)
     _suspects(experiment, structure, separate)  # a suspect that is not there is told before any work
-    fit, motion, logs = None, None, ()
+    fit, motion, logs, test = None, None, (), ()
     if _has_logs(experiment):
         read = experiment_logs.read_all(experiment)
         fit = pipeline.fit(experiment, progress=tell, measured=read)
         spec = settled(fit.experiment.preprocess, fit.filters)
         motion = prepare(read.train, spec, machine.joints)
-        structure, x, logs = fit.model, fit.x, tuple(read.train)
+        structure, x = fit.model, fit.x
+        logs, test = tuple(read.train), tuple(read.test)
         noise = noise_of(fit)
         pose = np.concatenate([p.q for p in motion.pieces]).mean(axis=0)
         rate = 1.0 / motion.pieces[0].step
@@ -92,7 +95,7 @@ def basis(
     asked = _suspects(experiment, structure, separate)
     known = _known(structure, levels, fit, x, noise, prior, asked, motion)
     known = replace(known, **_left_out(machine, experiment, fit, rate, window))
-    return Basis(machine, fit, motion, known, pose, rate, window, levels, logs)
+    return Basis(machine, fit, motion, known, pose, rate, window, levels, logs, test)
 
 
 def _left_out(machine: Robot, experiment: Experiment, fit, rate: float, window: float) -> dict:

@@ -1,15 +1,7 @@
 """How close a robot's links come to each other, and to the floor, along a motion.
 
-Every pair's distance is asked of coal at some poses, its keys. Between them a distance changes by no
-more than the points of its shapes move, so that most pairs need not be asked again:
-
-    d(q) >= d(q_key) - sum_j r_j |q_j - q_key_j|,
-
-with j the joints between the two links, and r_j the farthest that a point of the outer shape can be
-from joint j's axis (one for a joint that slides). The floor is the base's: shapes above it are pairs
-of their own.
-
-Source: the bound is that of conservative advancement, Mirtich 1996, ch. 2.
+Which pairs may be near is told by spheres about their shapes, of a whole motion at once (`spheres`); these
+alone are asked of coal. The floor is the base's: shapes above it are pairs of their own.
 """
 
 from __future__ import annotations
@@ -21,16 +13,20 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-_EVERY = 8  # poses from one at which all pairs are asked to the next
-_SLIDES = 10.0  # m that a joint without limits is taken to slide at most
+from . import spheres
+
+_EVERY = 8  # poses from one at which all pairs are asked to the next, for a first idea of the least
+_CHUNK = 2048  # poses whose spheres stand in memory at once
+_UP = np.array([0.0, 0.0, 1.0])
 
 
 @dataclass(frozen=True)
 class Near:
-    """Pairs that are near at poses: each one's pose (m,), distance (m,) [m] and the slope of that
-    (m, dof)."""
+    """Pairs that are near at poses: each one's pose (m,), number (m,), distance (m,) [m] and the slope of
+    that (m, dof)."""
 
     pose: np.ndarray
+    pair: np.ndarray
     distance: np.ndarray
     slope: np.ndarray
 
@@ -70,7 +66,7 @@ class Geometry:
     def at(self, q) -> np.ndarray:
         """Distances [m] of every pair, then above the floor of every shape that moves, (n, pairs +
         shapes), at poses q (n, dof)."""
-        out = np.empty((len(q), len(self._reach)))
+        out = np.empty((len(q), len(self._ends)))
         data, found = self.model.createData(), self.shapes.createData()
         for own, pose in zip(out, self._whole(q)):
             pin.computeDistances(self.model, data, self.shapes, found, pose)
@@ -83,7 +79,7 @@ class Geometry:
         a motion; `most` [m] where it is more."""
         out = np.full(len(q), most)
         if self.looks:
-            for k, _, distance, *_ in self._nearer(np.asarray(q), most):
+            for k, _, distance, *_ in self._asked(q, self._may(np.asarray(q), most)):
                 out[k] = min(out[k], distance)
         return out
 
@@ -96,9 +92,23 @@ class Geometry:
 
     def near(self, q, within: float) -> Near:
         """Every pair nearer than `within` [m] at poses q (n, dof), in the order of a motion."""
-        found = list(self._nearer(np.asarray(q), within)) if self.looks else []
+        q, found, last, pairs = np.asarray(q), [], -1, self.pairs
+        asked = self._asked(q, self._may(q, within)) if self.looks else ()
+        for pose, pair, distance, data, touch in asked:
+            if distance >= within:
+                continue
+            if pose != last:  # about the base's origin
+                last, jacobian = pose, pin.computeJointJacobians(self.model, data).copy()
+            if pair < pairs:
+                ends = touch.getNearestPoint1(), touch.getNearestPoint2()
+                found.append(
+                    (pose, pair, distance, -np.array(touch.normal), *map(np.array, ends), jacobian)
+                )
+            else:
+                found.append((pose, pair, distance, _UP, touch, touch, jacobian))
         if not found:
-            return Near(np.zeros(0, dtype=int), np.zeros(0), np.zeros((0, len(self.order))))
+            none = np.zeros(0, dtype=int)
+            return Near(none, none, np.zeros(0), np.zeros((0, len(self.order))))
         pose, pair, distance, way, one, two, jacobian = (list(own) for own in zip(*found))
         way, jacobian = np.array(way), np.array(jacobian)
         slope = np.zeros((len(pose), self.model.nv))
@@ -108,37 +118,52 @@ class Geometry:
             own = np.einsum("mi,mij->mj", way, jacobian[:, :3])
             own += np.einsum("mi,mij->mj", turned, jacobian[:, 3:])
             slope += sign * own * self._carried[self._ends[pair][:, end]]
-        return Near(np.array(pose), np.array(distance), slope[:, self.order])
+        return Near(np.array(pose), np.array(pair), np.array(distance), slope[:, self.order])
 
-    def _nearer(self, q, within: float):
-        """(pose, pair, distance, direction from the second to the first, points of both, joint
-        Jacobians at the base's origin) of every pair nearer than `within`."""
-        asked = q[_EVERY // 2 :: _EVERY] if len(q) > _EVERY // 2 else q[:1]
-        keys = self.at(asked)
-        own = np.minimum(np.arange(len(q)) // _EVERY, len(asked) - 1)
-        # pairs that may be near, by pose
-        may = keys[own] - np.abs(q - asked[own]) @ self._reach.T < within
+    def _may(self, q, within: float) -> np.ndarray:
+        """(n, pairs) bool: which pairs, and shapes above the floor, may be nearer than `within` at poses."""
+        parts = [q[k : k + _CHUNK] for k in range(0, max(len(q), 1), _CHUNK)]
+        return np.concatenate([self._may_here(part, within) for part in parts])
+
+    def _may_here(self, q, within: float) -> np.ndarray:
+        frames = spheres.placements(self.model, self._whole(q))
+        (whole, size), (parts, sizes) = (self._placed(frames, own) for own in zip(*self._covers))
+        first, second = self._numbers
+        way = np.moveaxis(whole[..., 0], 2, 0)
+        far = np.sqrt(np.sum((way[:, first] - way[:, second]) ** 2, axis=0))
+        out = np.empty((len(self._ends), len(q)), dtype=bool)
+        out[: self.pairs] = far - size[first] - size[second] < within
+        pair, pose = np.nonzero(out[: self.pairs])
+        a, b = first[pair], second[pair]
+        apart = spheres.apart(parts[a, pose], sizes[a], parts[b, pose], sizes[b])
+        out[pair, pose] = apart < within
+        for k, shape in enumerate(self._above, self.pairs):
+            out[k] = (parts[shape, :, 2] - sizes[shape]).min(axis=1) - self.floor < within
+        return out.T
+
+    def _placed(self, frames, covers) -> tuple[np.ndarray, np.ndarray]:
+        """Centres (shapes, n, 3, k) of k spheres about each shape in the base's axes, and radii (shapes, k)."""
+        out = np.empty((len(covers), len(frames[0][1]), 3, len(covers[0])))
+        for own, held, shape in zip(out, covers, self.shapes.geometryObjects):
+            turned, origin = frames[shape.parentJoint]
+            own[:] = np.matmul(turned, held[:, :3].T) + origin[:, :, None]
+        return out, np.array(covers)[..., 3]
+
+    def _asked(self, q, may):
+        """(pose, pair, distance, Pinocchio's data there, where it is least: coal's result, or the point above the
+        floor) of every pair that may be near (n, pairs) at poses q (n, dof)."""
         data, found = self.model.createData(), self.shapes.createData()
-        whole, up = self._whole(q), np.array([0.0, 0.0, 1.0])
-        for k in np.flatnonzero(may.any(axis=1)):
-            pin.updateGeometryPlacements(self.model, data, self.shapes, found, whole[k])
-            jacobian = None
-            for pair in np.flatnonzero(may[k]).tolist():
-                if pair < self.pairs:
-                    result = pin.computeDistance(self.shapes, found, pair)
-                    distance = result.min_distance
-                else:
-                    distance, point = self._lowest(found, self._above[pair - self.pairs])
-                if distance >= within:
-                    continue
-                if jacobian is None:
-                    jacobian = pin.computeJointJacobians(self.model, data, whole[k]).copy()
-                if pair < self.pairs:
-                    way = -np.array(result.normal)
-                    ends = np.array(result.getNearestPoint1()), np.array(result.getNearestPoint2())
-                else:
-                    way, ends = up, (point, point)
-                yield int(k), pair, distance, way, *ends, jacobian
+        whole, pairs, last = self._whole(q), self.pairs, -1
+        for k, pair in np.argwhere(may).tolist():
+            if k != last:
+                pin.updateGeometryPlacements(self.model, data, self.shapes, found, whole[k])
+                last = k
+            if pair < pairs:
+                result = pin.computeDistance(self.shapes, found, pair)
+                yield k, pair, result.min_distance, data, result
+            else:
+                distance, point = self._lowest(found, self._above[pair - pairs])
+                yield k, pair, distance, data, point
 
     def _whole(self, q) -> np.ndarray:
         """(n, nq) configurations of the Pinocchio model."""
@@ -164,6 +189,21 @@ class Geometry:
         return [corners(shape.geometry) for shape in self.shapes.geometryObjects]
 
     @cached_property
+    def _covers(self) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Of each shape, the sphere about it and those about its slabs, in its joint's axes."""
+        out = []
+        for own, shape in zip(self._corners, self.shapes.geometryObjects):
+            points = own @ shape.placement.rotation.T + shape.placement.translation
+            out.append((spheres.cover(points, 1), spheres.cover(points, spheres.SLABS)))
+        return out
+
+    @cached_property
+    def _numbers(self) -> np.ndarray:
+        """(2, pairs) numbers of the shapes of each pair."""
+        own = [(pair.first, pair.second) for pair in self.shapes.collisionPairs]
+        return np.array(own, dtype=int).reshape(-1, 2).T
+
+    @cached_property
     def _ends(self) -> np.ndarray:
         """(pairs, 2) joints that carry the shapes of each pair; the floor's is 0, the base."""
         joint = [shape.parentJoint for shape in self.shapes.geometryObjects]
@@ -177,39 +217,6 @@ class Geometry:
         for joint in range(1, self.model.njoints):
             out[joint] = out[self.model.parents[joint]]
             out[joint, self.model.joints[joint].idx_v] = True
-        return out
-
-    @cached_property
-    def _reach(self) -> np.ndarray:
-        """(pairs, dof) by how much a pair's distance can change [m] for each rad or m of a joint."""
-        numbers = [(pair.first, pair.second) for pair in self.shapes.collisionPairs]
-        numbers += [(k, None) for k in self._above]
-        out = np.zeros((len(numbers), self.model.nv))
-        for row, shapes, joints in zip(out, numbers, self._ends):
-            between = self._carried[joints[0]] != self._carried[joints[1]]
-            for shape in shapes:
-                if shape is not None:
-                    far = self._far(shape)
-                    row[between & (far > 0.0)] = far[between & (far > 0.0)]
-        return out[:, self.order]
-
-    def _far(self, shape: int) -> np.ndarray:
-        """(nv,) how far a shape's points move at most for each rad or m of a joint that carries it;
-        zero of others."""
-        model, out = self.model, np.zeros(self.model.nv)
-        joint = self.shapes.geometryObjects[shape].parentJoint
-        placed = self.shapes.geometryObjects[shape].placement
-        points = self._corners[shape] @ placed.rotation.T + placed.translation
-        reach = float(np.linalg.norm(points, axis=1).max())
-        while joint:
-            own = model.joints[joint]
-            slides = not own.createData().S.ravel()[3:].any()
-            out[own.idx_v] = 1.0 if slides else max(reach, 1e-9)
-            if slides:
-                ends = model.lowerPositionLimit[own.idx_q], model.upperPositionLimit[own.idx_q]
-                reach += min(float(np.abs(ends).max()), _SLIDES)
-            reach += float(np.linalg.norm(model.jointPlacements[joint].translation))
-            joint = model.parents[joint]
         return out
 
 

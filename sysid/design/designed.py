@@ -135,7 +135,7 @@ def _told(
     spread, pairs = {}, []
     if base.fit is not None:
         log = _log(base, t, q, needed)
-        spread = promise.deviations(base.fit, base.motion, _fitted(base, log), _of_angles(base))
+        spread = promise.deviations(base.fit, base.motion, _fitted(base, log), _heard(base))
         if len(base.known.suspects) > 1:
             seen = _questioned(base, log)
             asked = len(candidates(base.fit.model, ()))
@@ -179,12 +179,21 @@ def _questioned(base: Basis, log: Log) -> Motion:
     return _fitted(base, log) if found is None else found
 
 
-def _of_angles(base: Basis) -> np.ndarray:
-    """(n, dof) what the noise of the angles, drawn once more, adds to the torque of the logs' rows."""
-    spec = settled(base.fit.experiment.preprocess, base.fit.filters)
-    of = base.fit.model, base.fit.x
-    known = [predict(*of, base.motion)]
-    return np.concatenate(of_angles([base.logs], [base.motion], known, spec, of).torque)
+def _heard(base: Basis) -> promise.Heard:
+    """Where the noise of the next log is heard: in what the fit leaves of all logs that there are."""
+    fit = base.fit
+    spec, of = settled(fit.experiment.preprocess, fit.filters), (fit.model, fit.x)
+    logs, motions = [base.logs], [base.motion]
+    if base.test:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", SysidWarning)
+            motions.append(prepare(base.test, spec, fit.joints))
+        logs.append(base.test)
+    known = [predict(*of, motion) for motion in motions]
+    made = of_angles(logs, motions, known, spec, of).torque
+    pieces = [piece for motion in motions for piece in motion.pieces]
+    left = np.concatenate([one.residual for one in known])
+    return promise.Heard(replace(base.motion, pieces=pieces), left, np.concatenate(made))
 
 
 def _margins(problem: Problem, bounds: Limits, found: Found) -> dict[str, float]:

@@ -73,16 +73,27 @@ class Known:
         ends = np.cumsum([self.model.size, *(len(one.size) for one in self.suspects)])
         return [np.arange(a, b) for a, b in zip(ends[:-1], ends[1:])]
 
-    def all_columns(self, q, qd, qdd) -> np.ndarray:
+    def all_columns(self, q, qd, qdd, own=None) -> np.ndarray:
         """(dof, all, n) of samples (n, dof), each over its joint's noise, as far as it counts. Zero of
-        suspects that look back in time."""
-        own = [columns(self.model, q, qd, qdd)]
-        for one in self.suspects:
-            if one.looks_back:
-                own.append(np.zeros((self.dof, len(one.size), len(q))))
-            else:
-                own.append(along([one], self.model, self.x, q, qd, qdd))
-        return np.concatenate(own, axis=1) * self.counted(qd, qdd)[:, None]
+        suspects that look back in time.
+
+        Args:
+            own: (dof, size, n) the model's columns, where they are at hand.
+        """
+        out = np.zeros((self.dof, len(self.before), len(q)))
+        out[:, : self.model.size] = columns(self.model, q, qd, qdd) if own is None else own
+        place, found = self.of_suspects(q, qd, qdd)
+        out[:, place] = found
+        return out * self.counted(qd, qdd)[:, None]
+
+    def of_suspects(self, q, qd, qdd) -> tuple[np.ndarray, np.ndarray]:
+        """Where the coefficients of suspects of the instant stand among all (k,), and their columns (dof, k,
+        n); all at once, as the load that they look at is the same."""
+        own = [(place, one) for place, one in zip(self.places, self.suspects) if not one.looks_back]
+        if not own:
+            return np.zeros(0, dtype=int), np.zeros((self.dof, 0, len(q)))
+        place, suspects = zip(*own)
+        return np.concatenate(place), along(suspects, self.model, self.x, q, qd, qdd)
 
     def counted(self, qd, qdd) -> np.ndarray:
         """(dof, n) what a row of each joint is multiplied by: one over its noise, less where it moves

@@ -60,17 +60,22 @@ class Problem:
 
     def of(self, family: Fourier) -> Problem:
         """The same of another family of motions."""
-        return replace(self, family=family)
+        return self if family == self.family else replace(self, family=family)
 
     def with_rounds(self, rounds: int) -> Problem:
         """The same of harmonics of other frequencies."""
         return self.of(replace(self.family, rounds=rounds))
 
 
-def told(problem: Problem, z) -> np.ndarray:
-    """(dof, all, nodes) columns of a motion over their noise."""
+def told(problem: Problem, z, motion=None, own=None) -> np.ndarray:
+    """(dof, all, nodes) columns of a motion over their noise.
+
+    Args:
+        motion (4, nodes, dof) and own (dof, size, nodes), the model's columns: where they are at hand.
+    """
     known = problem.known
-    out = known.all_columns(*problem.family.motion(z, problem.nodes)[:3])
+    motion = problem.family.motion(z, problem.nodes) if motion is None else motion
+    out = known.all_columns(*motion[:3], own)
     for place, one in zip(known.places, known.suspects):
         if one.looks_back:
             out[:, place] = looking_back(problem, one, z)

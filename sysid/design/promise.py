@@ -7,7 +7,7 @@ Standard deviations are what noise makes of the fit's own estimate, to first ord
 over the rows of the old logs and of the new one, filtered as a fit filters them, with those left out
 that it leaves out; the prior says that bodies are within a factor of the URDF's, whatever weight the poor
 log was fitted under; N_j is the covariance of joint j's noise, whose spectrum the first fit's residual
-tells (`spectrum`). What a fit of few blocks states of its own deviations, from their spread, is uncertain
+of all logs tells (`spectrum`). What a fit of few blocks states of its own deviations, from their spread, is uncertain
 by a third: it allows for noise of any kind, and for what a model lacks.
 
 A suspect a that is true leaves, of its torque s_a, what the model and its rival b cannot make
@@ -97,13 +97,23 @@ def _named(left: float, asked: int) -> float:
     return float(ndtr(np.sqrt(left) + ndtri(_ACCUSED / max(asked, 1))))
 
 
-def deviations(fit: Fit, old: Motion, new: Motion, made) -> dict[str, dict]:
+@dataclass(frozen=True)
+class Heard:
+    """Where noise is heard: the motion of all logs, also of those that a fit does not use; what the fit
+    leaves of them, left (n, dof) [N m or N], zero where a row does not count; made (n, dof): what the
+    angles' noise, drawn once more, adds to their torque."""
+
+    motion: Motion
+    left: np.ndarray
+    made: np.ndarray
+
+
+def deviations(fit: Fit, old: Motion, new: Motion, heard: Heard) -> dict[str, dict]:
     """{parameter: {now, after, unit}} of what a fit determines, shape values too: the deviation that noise and
     the prior's width make of a fit of the old logs, and of the old ones and the new one together.
 
     Args:
         old, new: motions of the logs of the fit and of the one to come, filtered as the fit filters.
-        made (n, dof): what the angles' noise, drawn once more, adds to the torque of the old one's rows.
     """
     model = Linearised(fit.model, fit.x)
     std = np.concatenate([fit.uncertainty.std, fit.shape_std[model.free]])
@@ -113,18 +123,21 @@ def deviations(fit: Fit, old: Motion, new: Motion, made) -> dict[str, dict]:
     weights = np.ones(len(fit.joints)) if fit.weights is None else fit.weights
     own, more = (_gram(model, motion, weights, count) for motion in (old, new))
     beside, (variance, claim) = _beside(fit, count), _claim(fit, weights)
-    noises = _noises(fit, model, old, made, beside / (variance * claim), free)
+    noises = _noises(fit, model, heard, beside / (variance * claim))
 
     # a poor log lets a strong prior be chosen, which the next one will not: it claims what it knows
     honest = beside / claim
 
-    def deviation(hessian, noise):
+    def deviation(hessian, noise, free):
         inverse = _inverse(hessian + honest, free)
         spread = np.diagonal(inverse @ (noise + variance * honest) @ inverse)
         return np.sqrt(np.maximum(spread, 0.0))
 
     first, then = (_scatter(model, motion, weights, noises, count) for motion in (old, new))
-    now, after = deviation(own, first), deviation(own + more, first + then)
+    # what the poor log's noise held at a bound the next fit may set free
+    later, coefficients = free.copy(), slice(10 * fit.model.bodies, fit.model.size)
+    later[coefficients] |= np.diagonal(own + more)[coefficients] > 0.0
+    now, after = deviation(own, first, free), deviation(own + more, first + then, later)
     kept = np.flatnonzero(free)
     told = {k: {"now": float(now[k]), "after": float(after[k])} for k in kept}
     return {names[k]: {**own, "unit": units[k]} for k, own in told.items()}
@@ -148,25 +161,27 @@ def _gram(model, motion: Motion, weights, size: int) -> np.ndarray:
     return out
 
 
-def _noises(fit: Fit, model, old: Motion, made, claimed, free) -> list[Noise]:
+def _noises(fit: Fit, model, heard: Heard, claimed) -> list[Noise]:
     """The noise of each joint.
 
     Where joints are not as loud as each other, the noise of one bends what another leaves; and a strong
     prior bends what all leave. So it is told of what a fit leaves in which each joint counts by its
-    own noise and the prior by what it claims to know (size, size).
+    own noise and the prior by what it claims to know (size, size); and of all logs, as nearly all
+    of one poor log's slow noise goes into parameters. No bound holds any of these: what one log's noise
+    held at its bound, another log misses.
     """
-    told = fit.predictions["train"]
-    left, even = told.residual, _over(told.errors()["rms"])
-    inverse = _inverse(_gram(model, old, even, len(free)) + claimed, free)
+    free = np.ones(len(claimed), dtype=bool)
+    left, even = heard.left, _over(fit.predictions["train"].errors()["rms"])
+    inverse = _inverse(_gram(model, heard.motion, even, len(free)) + claimed, free)
     pull = np.zeros(len(free))
-    for part in stretches(model, old):
+    for part in stretches(model, heard.motion):
         pull[part.support] += even[part.joint] ** 2 * part.columns @ left[part.rows, part.joint]
 
     def takes(part, seen):
         at = np.ix_(part.support, part.support)
         return even[part.joint] ** 2 * np.einsum("am,am->m", seen.conj(), inverse[at] @ seen).real
 
-    return noise_left(stretches(model, old), left, inverse @ pull, made, takes)
+    return noise_left(stretches(model, heard.motion), left, inverse @ pull, heard.made, takes)
 
 
 def _over(size) -> np.ndarray:

@@ -87,9 +87,9 @@ def _improved(starts: list[Found]) -> list[Found]:
 
 
 def _starts(problem: Problem, pose, fastest: float, seed: int) -> list[tuple]:
-    """What `start` is asked for."""
-    own = rounds(problem.family, fastest)
-    return [(problem, pose, (seed, r, k)) for r in own for k in range(DRAWN)]
+    """What `start` is asked for: of as many rounds one problem, that its bases are made once."""
+    own = [problem.with_rounds(r) for r in rounds(problem.family, fastest)]
+    return [(one, pose, (seed, one.family.rounds, k)) for one in own for k in range(DRAWN)]
 
 
 def rounds(family: Fourier, fastest: float) -> list[int]:

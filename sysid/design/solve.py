@@ -10,17 +10,19 @@ Source: Fletcher & Sainz de la Maza 1989 (successive linear programs with a trus
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy.optimize import linprog
 
 from ..model_parameters import ROBOT
+from . import linear_program
 from .collision import Near
-from .columns import with_changes
+from .columns import columns, with_changes
 from .fourier import Fourier
 from .information import information, worth
 from .problem import Problem, looking_back, passed, shares, shrunk, told, torque, value
+from .slopes import slopes
 
 STEPS = (40, 15, 10, 10)  # linear programs, again each time that more times are looked at
 _FIRST, _WIDEST, _NARROWEST = 0.1, 0.5, 1e-3  # rad or m: radius of the trust region
@@ -82,9 +84,9 @@ def climbed(problem: Problem, climb: Climb, steps: int) -> Climb:
     while steps > 0 and not climb.over:
         grid = _grid(problem, climb.extra)
         at, radius, done, settled = _look(problem, climb.z, grid), climb.radius, climb.steps, False
-        near = _nearby(problem, at, grid)
+        near, touched = _nearby(problem, at, grid), np.zeros(0, dtype=int)
         while steps > 0 and done < STEPS[climb.stage] and not settled:
-            new, radius, settled = _stepped(problem, at, near, grid, radius)
+            new, radius, settled, touched = _stepped(problem, at, near, grid, radius, touched)
             done, steps = done + 1, steps - 1
             if new is not at:
                 at, near = new, _nearby(problem, new, grid, near.back)
@@ -142,10 +144,12 @@ class _Look:
 
 
 def _look(problem: Problem, z, grid: _Grid) -> _Look:
-    found, weights = told(problem, z), np.full(grid.nodes, problem.samples / grid.nodes)
-    value, slope = worth(problem.known, information(problem.known, found, weights))
-    motion = grid.basis @ z.T
-    needed = torque(problem, *motion[:3])
+    known, motion = problem.known, grid.basis @ z.T
+    own = columns(known.model, *motion[:3])
+    needed = np.einsum("jpn,p->nj", own, known.x)
+    found = told(problem, z, motion[:, : grid.nodes], own[..., : grid.nodes])
+    weights = np.full(grid.nodes, problem.samples / grid.nodes)
+    value, slope = worth(known, information(known, found, weights))
     clearance = problem.limits.clearance
     least = problem.geometry.least(grid.poses @ z.T, clearance)
     lacks = float(np.max(clearance - least, initial=0.0)) / max(clearance, 1e-3)
@@ -187,10 +191,9 @@ def climbs(problem: Problem, at: _Look, grid: _Grid, back: dict | None = None) -
         back: slopes of what looks back along the motion, by suspect, with the coordinates that they
             are of: they stand for others nearby, and new ones are put there.
     """
-    known, dof, weight = problem.known, problem.family.dof, problem.samples / grid.nodes
+    known, weight = problem.known, problem.samples / grid.nodes
     pull = 2.0 * weight * np.matmul(at.slope, at.columns)
-    _, change = with_changes(known.all_columns, *at.motion[:3, : grid.nodes])
-    by_node = np.einsum("jpn,jpvn->vn", pull, change).reshape(3, dof, -1)
+    by_node = slopes(known, pull, *at.motion[:3, : grid.nodes])
     out = np.einsum("rin,rnz->iz", by_node, grid.basis[:3, : grid.nodes])
     back = {} if back is None else back
     for i, (place, one) in enumerate(zip(known.places, known.suspects)):
@@ -216,14 +219,22 @@ def _back(problem: Problem, suspect, z, joint: int, here) -> np.ndarray:
 
 
 def _stepped(
-    problem: Problem, at: _Look, near: _Nearby, grid: _Grid, radius: float
-) -> tuple[_Look, float, bool]:
-    """A motion after one linear program, the radius of the next, and whether it is settled."""
-    found = _step(problem, at, near, grid, radius)
-    if found is None:
-        return at, radius, True
-    change, promised = found
-    new = _look(problem, at.z + change, grid)
+    problem: Problem, at: _Look, near: _Nearby, grid: _Grid, radius: float, touched
+) -> tuple[_Look, float, bool, np.ndarray]:
+    """A motion after one linear program, the radius of the next, whether it is settled, and the limits
+    that the program touched.
+
+    Args:
+        touched: by the program before.
+    """
+    step = linear_program.best(
+        near.slope.ravel(), _limits(problem, at, near, grid), radius=radius, price=_PRICE,
+        first=touched,
+    )  # fmt: skip
+    if step is None:
+        return at, radius, True, touched
+    promised = step.gain + _PRICE * at.beyond
+    new = _look(problem, at.z + step.change.reshape(at.z.shape), grid)
     gained = new.merit - at.merit
     wider = gained > _GOOD * promised
     if gained <= _BAD * promised:
@@ -231,47 +242,30 @@ def _stepped(
     elif wider:
         radius = min(2.0 * radius, _WIDEST)
     if gained <= 0.0:
-        return at, radius, radius < _NARROWEST
-    return new, radius, gained < _SETTLED
+        return at, radius, radius < _NARROWEST, step.touched
+    return new, radius, gained < _SETTLED, step.touched
 
 
-def _step(
-    problem: Problem, at: _Look, near: _Nearby, grid: _Grid, radius: float
-) -> tuple[np.ndarray, float] | None:
-    """The change (dof, size) of the best linear program within a radius, and by how much it promises
-    to raise the merit; None where there is none."""
-    limits, dof, size = problem.limits, problem.family.dof, problem.family.size
-    rows, most = [], []
-
-    def bound(values, slopes, limit):
-        """|values + slopes d| <= limit, of those rows that a step can bring there."""
-        can = np.abs(values) + radius * np.abs(slopes).sum(axis=1) > limit
-        for sign in (1.0, -1.0):
-            rows.append(sign * slopes[can])
-            most.append(limit - sign * values[can])
-
+def _limits(
+    problem: Problem, at: _Look, near: _Nearby, grid: _Grid
+) -> Iterator[linear_program.Limit]:
+    """Every limit of a joint's rate, of its torque, and of links, to first order, as shares."""
+    limits, (dof, size) = problem.limits, at.z.shape
     bounds = (limits.half, limits.velocity, limits.acceleration, limits.jerk)
-    middle = (limits.middle, 0.0, 0.0, 0.0)
+    middle = (limits.middle, *np.zeros((3, dof)))
     for own, reach, limit, centre in zip(at.motion, grid.basis, bounds, middle):
         for j in range(dof):
             slopes = np.zeros((len(reach), dof, size))
-            slopes[:, j] = reach
-            value = own[:, j] - (centre[j] if np.ndim(centre) else centre)
-            bound(value / limit[j], slopes.reshape(len(reach), -1) / limit[j], 1.0)
+            slopes[:, j] = reach / limit[j]
+            slopes = slopes.reshape(len(reach), -1)
+            yield from linear_program.both((own[:, j] - centre[j]) / limit[j], slopes)
     for j, slopes in near.torque.items():
-        bound(at.torque[near.strong, j] / limits.torque[j], slopes, 1.0)
+        share = at.torque[near.strong, j] / limits.torque[j]
+        yield from linear_program.both(share, slopes, near.strong)
     links, scale = near.links, max(limits.clearance, 1e-2)
     slopes = np.einsum("mi,mz->miz", links.slope, grid.poses[links.pose]).reshape(-1, dof * size)
-    room = links.distance - limits.clearance
-    can = radius * np.abs(slopes).sum(axis=1) > room
-    rows.append(-slopes[can] / scale)
-    most.append(room[can] / scale)
-    rows, most = np.concatenate(rows), np.concatenate(most)
-    # one slack for all, so that there is a step from where a limit is passed, too
-    matrix = np.column_stack([rows, -np.ones(len(rows))])
-    gain = np.append(-near.slope.ravel(), _PRICE)
-    free = [(-radius, radius)] * (dof * size) + [(0.0, None)]
-    found = linprog(gain, A_ub=matrix, b_ub=most, bounds=free, method="highs")
-    if found.status != 0:
-        return None
-    return found.x[:-1].reshape(dof, size), _PRICE * at.beyond - found.fun
+    order = np.lexsort((links.pose, links.pair))  # as time goes, for each pair
+    yield linear_program.Limit(
+        -slopes[order] / scale, (links.distance - limits.clearance)[order] / scale,
+        (links.pair * len(grid.poses) + links.pose)[order],
+    )  # fmt: skip

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from types import MappingProxyType, SimpleNamespace
 
 import numpy as np
@@ -69,9 +70,19 @@ def along(
     first, _, stride = rows.indices(len(q))
     motion = played(q, qd, qdd, step, model.robot.joints, first)
     use = np.ones((-(-(len(q) - first) // stride), q.shape[1]), dtype=bool)
-    source = Source(model, np.asarray(x), motion, stride, use)
+    loaded = any(one.candidate.effect.uses_load for one in suspects)
+    source = (Source if loaded else _Unloaded)(model, np.asarray(x), motion, stride, use)
     found = [on_every_joint(source, one.candidate, one.shapes) for one in suspects]
     return np.moveaxis(np.concatenate(found, axis=2), 1, 2)
+
+
+class _Unloaded(Source):
+    """A source of effects none of which looks at the load, which takes longer than they do."""
+
+    @cached_property
+    def pieces(self) -> list:
+        """Whole pieces as these effects see them."""
+        return [self.model.moved(piece) for piece in self.motion.pieces]
 
 
 def played(
