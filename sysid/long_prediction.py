@@ -65,6 +65,12 @@ class LongPrediction(Prediction):
         """As of `Prediction`."""
         return (self._read([path]) for path in self.files)
 
+    def tables(self):
+        """As of `Prediction`."""
+        import polars as pl
+
+        return (pl.read_parquet(path) for path in self.files)
+
     def _read(self, paths: list[Path]) -> Prediction:
         import polars as pl
 

@@ -71,6 +71,10 @@ class Prediction:
         """The prediction in parts that fit in memory, in order."""
         yield self
 
+    def tables(self) -> Iterator:
+        """`to_dataframe` in parts that fit in memory, in order."""
+        yield self.to_dataframe()
+
     def thinned(self, most: int) -> Prediction:
         """About so many rows of it, in evenly spaced parts, where it is in files; else itself."""
         return self

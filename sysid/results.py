@@ -79,9 +79,9 @@ def _predictions(fit: Fit):
                 columns += [pl.col(f"measured_{joint}"), pl.col(f"predicted_{joint}")]
                 used = f"used_{joint}"
                 columns += [] if not masked else [pl.col(used) if used in told[part] else pl.lit(True).alias(used)]
-            for piece in prediction.parts():
+            for table in prediction.tables():
                 released()
-                yield piece.to_dataframe().select(columns)
+                yield table.select(columns)
 
     return tables
 

@@ -67,10 +67,18 @@ def jackknife(without) -> np.ndarray:
     return np.sqrt((count - 1) / count * ((without - without.mean(0)) ** 2).sum(0))
 
 
-def resting(squares: np.ndarray) -> float:
-    """On how many blocks something rests: one over the sum of squared shares (blocks, k, k)."""
-    share = np.einsum("bkk->b", squares)
-    return float(share.sum() ** 2 / max(np.sum(share**2), 1e-300))
+def resting(squares: np.ndarray) -> np.ndarray:
+    """On how many blocks (...) something rests: one over the sum of squared shares (..., blocks, k,
+    k)."""
+    share = np.einsum("...bkk->...b", squares)
+    return share.sum(-1) ** 2 / np.maximum(np.sum(share**2, axis=-1), 1e-300)
+
+
+def many(squares: np.ndarray) -> np.ndarray:
+    """Whether something rests on enough blocks (...) to be told from chance, no direction of it on
+    nearly one alone, by its shares (..., blocks, k, k)."""
+    most = np.linalg.eigvalsh(squares).max(axis=(-1, -2))
+    return (resting(squares) >= RESTING) & (most <= LEVERAGE)
 
 
 def evening(share: np.ndarray) -> np.ndarray:

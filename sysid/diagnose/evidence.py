@@ -84,8 +84,7 @@ class Group:
     def testable(self) -> bool:
         """Whether it rests on enough blocks to be told from chance; if not, it may still be a rival
         of one that is."""
-        most = float(np.linalg.eigvalsh(self.squares[:-1]).max())
-        return blocks.resting(self.squares[:-1]) >= blocks.RESTING and most <= blocks.LEVERAGE
+        return bool(blocks.many(self.squares[:-1]))
 
     @cached_property
     def tested(self) -> Group:
@@ -170,7 +169,7 @@ def known_together(groups: list[Group]) -> None:
         scores, squares, *loud = (np.stack([getattr(g, name) for g in own]) for name in what)
         c = scores.sum(-2)
         moves = blocks.moves(c, *loud, squares)
-        found = c, moves, blocks.gains(c, scores, squares).sum(-1), blocks.taking_part(moves)
-        for group, c, moves, taken, directions in zip(own, *found):
-            freedom = float(directions), blocks.resting(group.squares[:-1])
-            vars(group).update(c=c, moves=moves, taken=float(taken), freedom=freedom)
+        freedom = zip(blocks.taking_part(moves), blocks.resting(data := squares[:, :-1]))
+        told = moves, blocks.gains(c, scores, squares).sum(-1), freedom, blocks.many(data).tolist()
+        for group, *found in zip(own, c, *told):
+            vars(group).update(zip(("c", "moves", "taken", "freedom", "testable"), found))
