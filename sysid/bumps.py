@@ -20,6 +20,7 @@ from .outliers import BURST, CHANCE, bursts, ratio, surprise
 from .projection import inverted
 from .robot import Robot
 from .rows import Rows, stack
+from .running import running
 from .specs import EffectSpec
 
 _EFFECTS = ("viscous", "coulomb", "torque_bias")  # what any joint has
@@ -39,8 +40,6 @@ def bumps(robot: Robot, logs: Sequence[Log], *, among: int = 1) -> list[Event]:
     Args:
         among: as of `outliers.spikes`.
     """
-    from scipy.ndimage import maximum_filter1d
-
     if robot.dof < 2:
         return []
     cutoff = widest(logs, known=(own_band := band(logs)))
@@ -58,7 +57,7 @@ def bumps(robot: Robot, logs: Sequence[Log], *, among: int = 1) -> list[Event]:
     for number, piece in enumerate(motion.pieces):
         (at,) = np.nonzero(rows.piece == number)
         # at once: within a burst, as each joint's rows may count at other moments of it
-        wide = maximum_filter1d(own[at], max(1, round(BURST / step)), axis=0)
+        wide = running(own[at], max(1, round(BURST / step)), "max")
         for a, b in bursts(np.sort(wide, axis=1)[:, -2], level):
             greatest = own[at[a : b + 1]].max(axis=0)
             joints = tuple(robot.joints[j] for j in np.flatnonzero(greatest > 0.5 * level))
@@ -97,7 +96,6 @@ def _left(rows: Rows, kind: np.ndarray) -> np.ndarray:
 
 def _surprise(size, use, piece, step: float) -> np.ndarray:
     """How surprising (n,) sizes are among those that count; less than nothing where none does."""
-    from scipy.ndimage import median_filter
 
     out = np.full(len(size), -1.0)
     if use.sum() < _FEWEST:
@@ -106,7 +104,7 @@ def _surprise(size, use, piece, step: float) -> np.ndarray:
     for number in np.unique(piece[use]):
         (own,) = np.nonzero(use & (piece == number))
         near = min(2 * round(_NEARBY / step) + 1, len(own))
-        about[own] = median_filter(size[own], near, mode="nearest")
+        about[own] = running(size[own], near, "median", "edge")
     usual = np.median(size[use])
     out[use] = surprise(ratio(size[use], np.maximum(about[use], usual)), _WHITE)
     return out

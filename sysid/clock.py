@@ -21,6 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .frequencies import low
+from .running import running
 
 _HIGHEST = 0.25  # of the sampling rate: the last frequency below which a motion may stay
 _LOWEST = 2.0  # Hz
@@ -118,15 +119,14 @@ def _lowest(t, told: list[np.ndarray], bands: list[float], density: float, step:
 
     A short fast move, too seldom to count in the whole log, is told from the clock by its spectrum:
     the clock's is even, of `density` [s^2], a move's falls with frequency."""
-    from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
     late, below = told[0], np.full(len(t), bands[0])
     to_end, still = np.minimum(t - t[0], t[-1] - t), np.ones(len(t), bool)
     for k, band in enumerate(bands[1:], 1):
         width = max(3, round(2.0 / (band * step)))
-        power = uniform_filter1d((told[k][0] - told[k - 1][0]) ** 2, width)
+        power = running((told[k][0] - told[k - 1][0]) ** 2, width, "mean")
         clock = density * (_kept(band * step) - _kept(bands[k - 1] * step))
-        still &= ~maximum_filter1d(power > _MOTION * clock, width) & (to_end >= 1.0 / band)
+        still &= (running(power > _MOTION * clock, width, "max") == 0.0) & (to_end >= 1.0 / band)
         late, below = np.where(still, told[k], late), np.where(still, band, below)
     return late, below
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from .outliers import CHANCE, NOTHING, SPIKE, quantum, surprise
+from .running import running
 
 _WHITE = 0.70  # z75 - z50 of a Gaussian's absolute values over their median
 _TOP = 0.8  # of the largest nearby: a jump stands within a fifth of L of it
@@ -23,7 +24,6 @@ def jumps(tau, reach: int) -> np.ndarray:
     the steps L rows earlier and later, which a torque that bends smoothly makes as well; out of
     the ordinary among all of its log.
     """
-    from scipy.ndimage import maximum_filter1d, median_filter
 
     out = np.zeros(tau.shape, dtype=bool)
     length = max(1, reach // 2)
@@ -33,7 +33,7 @@ def jumps(tau, reach: int) -> np.ndarray:
     # column by column: the filter of one axis is several times as fast as that of two
     level = np.empty(tau.shape)
     for j, own in enumerate((tau - tau.mean(axis=0)).T):
-        level[:, j] = median_filter(own, 2 * SPIKE + 1, mode="nearest")
+        level[:, j] = running(own, 2 * SPIKE + 1, "median", "edge")
     total = np.concatenate([np.zeros((1, tau.shape[1])), np.cumsum(level, axis=0)])
     mean = (total[length:] - total[:-length]) / length  # of the rows from k on
     step = mean[length:] - mean[:-length]  # at row k + length
@@ -43,7 +43,7 @@ def jumps(tau, reach: int) -> np.ndarray:
     for j, size in enumerate(sizes.T):
         least = max(np.median(size), quantum(tau[:, j]), NOTHING * np.std(tau[:, j]))
         if least > 0.0:
-            top = size > _TOP * maximum_filter1d(size, 2 * length + 1)
+            top = size > _TOP * running(size, 2 * length + 1, "max")
             found = top & (surprise(size / least, _WHITE) > least_said)
             out[2 * length : 2 * length + len(size), j] = found
     return out

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from .outliers import BURST, CHANCE, FEWEST, NOTHING, RESTING, bursts, quantum, ratio, surprise
+from .running import running
 
 _NEARBY = 0.3  # s to either side whose median level a burst must exceed: a knock rings for less
 _FINEST = 1e-5  # share of an angle's spread that no encoder tells
@@ -67,12 +68,10 @@ def _most(angle, torque) -> np.ndarray:
 
 def _bursts(values, first, length: int, near: int, moves, nothing: float) -> np.ndarray:
     """Surprise (windows,) of what is unexplained in windows of `length` samples from `first`."""
-    from scipy.ndimage import median_filter
-
     total = np.concatenate([[0.0], np.cumsum(unexplained(values, length) ** 2)])
     level = np.sqrt(np.maximum(total[first + length] - total[first], 0.0) / length)
     usual = np.median(level[moves]) if moves.any() else np.median(level)
-    about = median_filter(level, min(near, len(level)), mode="nearest")
+    about = running(level, min(near, len(level)), "median", "edge")
     least = max(usual, quantum(values), nothing * np.std(values))
     scale = np.maximum(about, least)
     return surprise(ratio(level, scale), _WHITE)

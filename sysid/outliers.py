@@ -15,6 +15,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from .running import running
+
 CHANCE = 0.01  # of one event of a kind in a clean log
 SPIKE = 3  # samples: "one or a few"
 FEWEST = 7  # samples that a parabola and its rest need
@@ -109,13 +111,11 @@ def spikes(tau, *, among: int = 1) -> list[list[tuple[int, int]]]:
 
 def _pulses(tau):
     """Pulses of tau (n,) of each width: first sample, size over the usual step, is it alone."""
-    from scipy.ndimage import median_filter  # its import takes as long as a small fit
-
     step = np.diff(tau)
     size = np.abs(step)
     least = max(np.median(size), quantum(tau), NOTHING * np.std(tau))
     usual = np.maximum(least, _thereabouts(size))
-    away = np.abs(tau - median_filter(tau, 4 * SPIKE + 1, mode="nearest"))
+    away = np.abs(tau - running(tau, 4 * SPIKE + 1, "median", "edge"))
     for width in range(1, SPIKE + 1):
         into = np.arange(_ABOUT, len(tau) - 1 - width - _ABOUT)  # the step into sample into + 1
         into = into[step[into] * step[into + width] < 0.0]
@@ -142,9 +142,7 @@ def ratio(values, scale) -> np.ndarray:
 
 def _thereabouts(values) -> np.ndarray:
     """Running median (n,) of values, constant in blocks."""
-    from scipy.ndimage import median_filter
-
     blocks = -(-len(values) // _BLOCK)
     padded = np.pad(values, (0, blocks * _BLOCK - len(values)), mode="reflect")
-    middle = median_filter(np.median(padded.reshape(blocks, _BLOCK), axis=1), 5, mode="nearest")
+    middle = running(np.median(padded.reshape(blocks, _BLOCK), axis=1), 5, "median", "edge")
     return np.repeat(middle, _BLOCK)[: len(values)]

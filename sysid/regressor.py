@@ -74,8 +74,12 @@ class Frame:
     origin: np.ndarray
 
 
-def frames(robot: Robot, q, qd, qdd, *, gravity=None, deflection=None) -> list[Frame]:
-    """Motion of every frame of the tree, parents first. Arguments: see `body_motions`."""
+def frames(robot: Robot, q, qd, qdd, *, gravity=None, deflection=None, bearing=None) -> list[Frame]:
+    """Motion of every frame of the tree, parents first. Arguments: see `body_motions`.
+
+    Args:
+        bearing: rows of those that are asked for, with all that they hang on; the others are None. All where it is None.
+    """
     q, qd, qdd = (np.ascontiguousarray(np.asarray(x, dtype=float).T) for x in (q, qd, qdd))
     n = q.shape[1]
     full_q, full_qd, full_qdd = (robot.transmission @ x for x in (q, qd, qdd))
@@ -88,6 +92,9 @@ def frames(robot: Robot, q, qd, qdd, *, gravity=None, deflection=None) -> list[F
     base = (zero, zero, np.repeat(-np.asarray(robot.gravity if gravity is None else gravity)[:, None], n, 1))
     out: list[Frame] = []
     for i, parent in enumerate(robot.parents):
+        if bearing is not None and i not in bearing:
+            out.append(None)
+            continue
         w, alpha, a = (out[parent].angular, out[parent].angular_acceleration, out[parent].acceleration) if parent >= 0 else base
         linear, angular = robot.subspaces[i, :3, None], robot.subspaces[i, 3:, None]
         speed, push = full_qd[i], full_qdd[i]
@@ -100,10 +107,10 @@ def frames(robot: Robot, q, qd, qdd, *, gravity=None, deflection=None) -> list[F
         # classical acceleration of the child's origin
         new_a = turn(a + _cross(alpha, p) + _cross(w, _cross(w, p)))
         if revolute:
-            new_alpha = new_alpha + angular * push + _cross(new_w, angular * speed)
+            new_alpha = new_alpha + angular * push + _cross(new_w, angular) * speed
             new_w = new_w + angular * speed
         else:
-            new_a = new_a + linear * push + 2.0 * _cross(new_w, linear * speed)
+            new_a = new_a + linear * push + 2.0 * _cross(new_w, linear) * speed
         out.append(Frame(new_w, new_alpha, new_a, turn, p))
     return out
 
@@ -132,23 +139,26 @@ class _Turn:
 
 def _rotation_to_child(placement, subspace, angle) -> np.ndarray:
     """(R_placement exp(S(axis) angle))' for every sample: (3, 3, n), by Rodrigues' formula."""
-    x, y, z = subspace[3:]
-    skew = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    constant, sine, cosine = placement, placement @ skew, placement @ skew @ skew
-    out = np.empty((3, 3, angle.size))
-    s, c = np.sin(angle), 1.0 - np.cos(angle)
-    for r in range(3):
-        for k in range(3):
-            out[k, r] = constant[r, k]
-            if sine[r, k]:  # joints mostly turn about an axis of their frame: many are zero
-                out[k, r] += sine[r, k] * s
-            if cosine[r, k]:
-                out[k, r] += cosine[r, k] * c
-    return out
+    skew = _skew(subspace[3:])
+    parts = [placement, placement @ skew, placement @ skew @ skew]
+    shares = np.stack([part.T.ravel() for part in parts], axis=1)
+    half = np.tan(0.5 * angle)  # sine and cosine of the whole in the time of one of them
+    sine = 2.0 * half / (1.0 + half**2)
+    return (shares @ np.stack([np.ones_like(half), sine, half * sine])).reshape(3, 3, half.size)
+
+
+def _skew(vector) -> np.ndarray:
+    x, y, z = vector
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
 
 def _cross(a, b) -> np.ndarray:
-    out = np.empty((3, max(np.shape(a)[1], np.shape(b)[1])))
+    """a x b (3, n); of a vector that is the same for every sample one product with a matrix."""
+    if np.shape(b)[1] == 1:
+        return _skew(-b[:, 0]) @ a
+    if np.shape(a)[1] == 1:
+        return _skew(a[:, 0]) @ b
+    out = np.empty(np.shape(a))
     for k, (i, j) in enumerate(((1, 2), (2, 0), (0, 1))):
         np.multiply(a[i], b[j], out=out[k])
         out[k] -= a[j] * b[i]
@@ -212,17 +222,23 @@ def regressor_chunks(robot: Robot, q, qd, qdd, *, chunk: int = _CHUNK) -> Iterat
 
 
 def torque(robot: Robot, pi, q, qd, qdd, *, gravity=None, deflection=None) -> np.ndarray:
-    """Inverse dynamics (n, dof) [N m] of bodies pi (bodies, 10), rotors included, friction not."""
+    """Inverse dynamics (n, dof) [N m] of bodies pi (bodies, 10), rotors included, friction not. Bodies without mass cost nothing."""
     q, qd, qdd = (np.asarray(x, dtype=float) for x in (q, qd, qdd))
+    heavy = [(parameters, body.row) for parameters, body in zip(np.asarray(pi), robot.bodies) if parameters.any()]
+    bearing = set()
+    for _, row in heavy:
+        while row >= 0 and row not in bearing:
+            bearing.add(row)
+            row = robot.parents[row]
     out = np.zeros((len(q), robot.dof))
     for start in range(0, len(q), _CHUNK):
         part = slice(start, start + _CHUNK)
         behind = None if deflection is None else deflection[:, part]
-        found = frames(robot, q[part], qd[part], qdd[part], gravity=gravity, deflection=behind)
+        found = frames(robot, q[part], qd[part], qdd[part], gravity=gravity, deflection=behind, bearing=bearing)
         wrenches: dict[int, list] = {}  # force and moment about the origin of each frame, all that hangs on it included
-        for parameters, body in zip(np.asarray(pi), robot.bodies):
-            force, moment = _wrench(parameters, found[body.row])
-            held = wrenches.setdefault(body.row, [0.0, 0.0])
+        for parameters, row in heavy:
+            force, moment = _wrench(parameters, found[row])
+            held = wrenches.setdefault(row, [0.0, 0.0])
             held[0], held[1] = held[0] + force, held[1] + moment
         for i in reversed(range(len(found))):  # children before their parents
             if i not in wrenches:
@@ -240,9 +256,11 @@ def torque(robot: Robot, pi, q, qd, qdd, *, gravity=None, deflection=None) -> np
 
 
 def _wrench(parameters, motion):
-    mass, h = parameters[0], parameters[1:4, None]
+    """Force and moment (3, n) about the origin of a body's frame."""
+    mass, h = parameters[0], parameters[1:4]
     xx, yy, zz, xy, yz, xz = parameters[4:]
     inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     w, alpha, a = motion.angular, motion.angular_acceleration, motion.acceleration
-    force = mass * a + _cross(alpha, h) + _cross(w, _cross(w, h))
-    return force, _cross(h, a) + inertia @ alpha + _cross(w, inertia @ w)
+    force = mass * a + w * (h @ w) - h[:, None] * np.einsum("in,in->n", w, w)  # w x (w x h)
+    force -= _skew(h) @ alpha
+    return force, _skew(h) @ a + inertia @ alpha + _cross(w, inertia @ w)

@@ -73,6 +73,17 @@ class Robot:
         """Number of joints that move."""
         return len(self.joints)
 
+    def carried(self, joint: int) -> np.ndarray:
+        """(bodies,) bool: those that hang on a joint's link, itself among them: its own rotor stays with the motor."""
+        on = np.zeros(len(self.parents), dtype=bool)
+        for row, parent in enumerate(self.parents):  # parents first
+            on[row] = row == self.bodies[joint].row or (parent >= 0 and on[parent])
+        return on[[body.row for body in self.bodies]]
+
+    def turned(self, joint: int) -> np.ndarray:
+        """(bodies,) bool: the rotors that a joint turns."""
+        return np.array([body.kind == "rotor" and self.transmission[body.row, joint] != 0.0 for body in self.bodies])
+
     def with_inertias(self, pi) -> pin.Model:
         """The full tree as a Pinocchio model with the inertias pi (bodies, 10)."""
         model = self.model.copy()

@@ -164,30 +164,21 @@ class Bent:
     seen: Piece
 
 
-def unbent(model: Model, motion: Motion, x) -> list[tuple[Piece, np.ndarray]]:
-    """Each whole piece as effects see it, and the torque (n, dof) of the bodies of parameters x (size,) there."""
-    parts = seen(model, motion)
-    return [(part, _bodies_torque(model, x, part, part.deflection)) for part in parts]
-
-
-def _bodies_torque(model: Model, x, part: Piece, behind) -> np.ndarray:
-    pi = np.asarray(x)[: 10 * model.bodies].reshape(-1, 10)
-    return regressor.torque(model.robot, pi, part.q, part.qd, part.qdd, gravity=part.gravity, deflection=behind)
-
-
-def bent(model: Model, motion: Motion, x, joint: int, before: list[tuple[Piece, np.ndarray]] | None = None) -> list[Bent]:
-    """Of each piece, at parameters x (size,).
+def bent(model: Model, motion: Motion, x, joint: int, pieces: list | None = None) -> list[Bent]:
+    """Of each piece, at parameters x (size,): what changes is the torque of what the link carries.
 
     Args:
-        before: `unbent(model, motion, x)`, where it is at hand.
+        pieces: `seen(model, motion)`, where it is at hand.
     """
     pi, out = np.asarray(x)[: 10 * model.bodies].reshape(-1, 10), []
-    for part, base in unbent(model, motion, x) if before is None else before:
-        slopes = []
+    own = np.where(model.robot.carried(joint)[:, None], pi, 0.0)
+    for part in seen(model, motion) if pieces is None else pieces:
+        needed = lambda behind: regressor.torque(model.robot, own, part.q, part.qd, part.qdd, gravity=part.gravity, deflection=behind)  # noqa: B023, E731
+        base, slopes = needed(part.deflection), []
         for order, nudge in enumerate(NUDGES):
             behind = np.zeros((3, *part.q.shape)) if part.deflection is None else part.deflection.copy()
             behind[order, :, joint] += nudge
-            slopes.append((_bodies_torque(model, x, part, behind) - base).T / nudge)
+            slopes.append((needed(behind) - base).T / nudge)
         inertia = -slopes[-1][joint]  # of the link alone: its rotor stays with the motor
         out.append(Bent(np.stack(slopes), link_load(model.robot, pi, part, joint), inertia, part))
     return out

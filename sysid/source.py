@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from . import rows as row
-from .effect import SensorEffect
+from .effect import MotionEffect, SensorEffect
 from .model import Model
 from .motion import Motion, Piece
 
@@ -41,8 +41,8 @@ class Source:
         return self.model.with_reference(self.x[: 10 * self.model.bodies].reshape(-1, 10))
 
     @cached_property
-    def _unbent(self) -> list:
-        return row.unbent(self.model, self.motion, self.x)
+    def _seen(self) -> list:
+        return row.seen(self.model, self.motion)
 
     @cached_property
     def _bent(self) -> dict:
@@ -52,7 +52,7 @@ class Source:
         """What a joint's link would change if it stood apart from its motor: the same for whatever
         parts them."""
         if joint not in self._bent:
-            self._bent[joint] = row.bent(self.model, self.motion, self.x, joint, self._unbent)
+            self._bent[joint] = row.bent(self.model, self.motion, self.x, joint, self._seen)
         return self._bent[joint]
 
     @cached_property
@@ -63,14 +63,21 @@ class Source:
         """Of each whole piece, slopes (3, dof, n) of the torque before sensors in the angle, speed and
         acceleration of a joint as measured: the same for whatever says that it moved otherwise."""
         if joint not in self._shifted:
-            out, model = [], self._unsensed
-            for piece, base in zip(self._whole, self._base):
-                slopes = []
-                for name, nudge in zip(("q", "qd", "qdd"), row.NUDGES):
+            out, model, x = [], self._unsensed, self.x
+            own = model.robot.turned(joint)
+            moves = any(isinstance(effect, MotionEffect) for effect, _ in model.terms)
+            # what the link carries is known: it moves as if behind its motor, the other way
+            if apart := not moves and not (own & model.robot.carried(joint)).any():
+                bodies, rest = np.split(x, [10 * model.bodies])
+                x = np.concatenate([np.where(own.repeat(10), bodies, 0.0), rest])
+            for piece, known in zip(self._whole, self.bent(joint)):
+                base = self._torque(model, piece, x)
+                slopes = -known.slopes if apart else np.zeros_like(known.slopes)
+                for k, (name, nudge) in enumerate(zip(("q", "qd", "qdd"), row.NUDGES)):
                     moved = {"q": piece.q.copy(), name: getattr(piece, name).copy()}
                     moved[name][:, joint] += nudge
-                    slopes.append((self._torque(model, replace(piece, **moved)) - base) / nudge)
-                out.append(np.stack(slopes))
+                    slopes[k] += (self._torque(model, replace(piece, **moved), x) - base) / nudge
+                out.append(slopes)
             self._shifted[joint] = out
         return self._shifted[joint]
 
@@ -109,7 +116,7 @@ class Source:
     @cached_property
     def unfiltered(self) -> list[np.ndarray]:
         """Torque (dof, n) over whole pieces as sensors show it, before the low-pass."""
-        return [self._torque(self.model, piece) for piece in self._whole]
+        return [self._torque(self.model, piece, self.x) for piece in self._whole]
 
     @cached_property
     def _unsensed(self) -> Model:
@@ -120,13 +127,8 @@ class Source:
                 model = model.without(effect.name, joint)
         return model
 
-    @cached_property
-    def _base(self) -> list[np.ndarray]:
-        plain = self._unsensed is self.model
-        return self.unfiltered if plain else [self._torque(self._unsensed, p) for p in self._whole]
-
-    def _torque(self, model: Model, piece: Piece) -> np.ndarray:
-        bodies, rest = np.split(self.x, [10 * self.model.bodies])
+    def _torque(self, model: Model, piece: Piece, x: np.ndarray) -> np.ndarray:
+        bodies, rest = np.split(x, [10 * model.bodies])
         return model.torque(piece, bodies.reshape(-1, 10), rest).T
 
     @cached_property

@@ -41,12 +41,8 @@ def link_load(robot: Robot, pi, motion: Piece, joint: int) -> np.ndarray:
 
 
 def _carried(robot: Robot, pi, joint: int) -> np.ndarray:
-    """Bodies (bodies, 10) without a joint's own rotor."""
-    out = np.array(pi, dtype=float)
-    for b, body in enumerate(robot.bodies):
-        if body.kind == "rotor" and robot.transmission[body.row, joint]:
-            out[b] = 0.0
-    return out
+    """Bodies (bodies, 10) that a joint's drive carries: what hangs on its link, without what its own motor turns."""
+    return np.where((robot.carried(joint) & ~robot.turned(joint))[:, None], np.asarray(pi, dtype=float), 0.0)
 
 
 def sprung(load, inertia, step: float, *, compliance: float, damping: float) -> np.ndarray:
@@ -148,26 +144,26 @@ def flown(load, inertia, step: float, *, b, teeth) -> np.ndarray:
     driven, half, omega = (load[own] / inertia[own]).T, half[own, 0], 2.0 * math.pi * teeth[own]
     fine = max(1, math.ceil(step * omega.max() / _TURN))
     h = step / fine
-    spring, damper = h * omega**2, h * omega
-    d, v = half * np.where(driven[0] < 0.0, -1.0, 1.0) + driven[0] / omega**2, np.zeros(len(own))
-    into, held, change = np.empty_like(d), np.empty_like(d), np.empty_like(d)
+    both = np.stack([(h * omega) ** 2, h * omega])  # of the teeth, of their damping
+    d = half * np.where(driven[0] < 0.0, -1.0, 1.0) + driven[0] / omega**2
+    least, state, held = -half, np.zeros((2, len(own))), np.empty((2, len(own)))
+    into, v = state  # how far into the teeth, zero between; how far a step goes
     found = np.empty_like(driven)
     found[0] = d
-    for k, (first, more) in enumerate(zip(h * driven[:-1], (h / fine) * np.diff(driven, axis=0)), 1):
-        push = first.copy()
-        for _ in range(fine):
-            np.maximum(d, -half, out=into)
+    driven *= h**2
+    part = np.arange(fine)[:, None] / fine
+    for k, (first, more) in enumerate(zip(driven[:-1], np.diff(driven, axis=0)), 1):
+        for push in first + part * more:
+            np.maximum(d, least, out=into)
             np.minimum(into, half, out=into)
-            np.subtract(d, into, out=into)  # how far into the teeth, zero between
-            np.multiply(into, spring, out=held)
-            np.multiply(v, damper, out=change)
-            held += change
-            held *= held * into > 0.0  # teeth never pull
+            np.subtract(d, into, out=into)
+            np.multiply(state, both, out=held)
+            force = held[0]
+            force += held[1]
+            force *= force * into > 0.0  # teeth never pull
             v += push
-            v -= held
-            np.multiply(v, h, out=change)
-            d += change
-            push += more
+            v -= force
+            d += v
         found[k] = d
     out[own] = found.T
     return out

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import json
 import os
 import sys
@@ -122,6 +123,7 @@ def progress_of(silent: bool, fits: int = 1, *, asks: bool = False):
     Args:
         fits, asks: what the command does, as far as is known; see `progress.Course`.
     """
+    gc.freeze()  # what is imported stays: to look through it again and again is a twentieth of a diagnosis
     if silent or sys.stderr is None:
         yield None
         return

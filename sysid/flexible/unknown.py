@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .. import blocks
+from ..running import running
 from .functions import groups
 from .ridge import predicted, stretches
 
@@ -110,12 +111,10 @@ def _tone(residual, step: float) -> tuple[float, float]:
     """The share of a residual's square that its strongest line holds, and the probability of such a
     line above the spectrum about it, were it noise of any smooth colour (Fisher 1929, against a
     local median)."""
-    from scipy.ndimage import median_filter
-
     n = len(residual)
     power = np.abs(np.fft.rfft(residual * np.hanning(n))) ** 2
     width = max(9, int(2.0 * n * step) | 1)  # two hertz
-    level = median_filter(power, width) / np.log(2.0)
+    level = running(power, width, "median") / np.log(2.0)
     ratio = np.where(
         np.arange(len(power)) > n * step, power / np.maximum(level, 1e-300), 0.0
     )  # slower than 1 Hz is drift

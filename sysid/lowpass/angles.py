@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..gaussian import HIGHEST, Gaussian
+from ..running import running
 
 _WINDOW = 0.1  # s
 _BAND = 4.0  # the angles' own low-pass, as a multiple of the cutoff
@@ -76,10 +77,8 @@ def rougher(segment, noise, cutoff: float, rng: np.random.Generator) -> np.ndarr
     Args:
         cutoff: [Hz] above which the angle holds no motion.
     """
-    from scipy.ndimage import median_filter
-
     q = segment.q
-    local = median_filter(_by_window(_third(q), segment.step), size=(5, 1), mode="nearest")
+    local = running(_by_window(_third(q), segment.step), 5, "median", "edge")
     middle = _usual(local, _HELD * np.ptp(q, axis=0))
     at = np.linspace(0, len(q) - 1, len(local) + 1)
     at = 0.5 * (at[1:] + at[:-1])

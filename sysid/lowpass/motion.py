@@ -14,6 +14,7 @@ from ..log import Log
 from ..motion import Motion, Piece
 from ..nonnegative import least_squares
 from ..preprocess import assembled, share_left_out, unused_of, without_events
+from ..running import running
 from ..smoother import differences
 from ..standstill import standstill_speed, turns, without_standstill
 from .angles import noise_of
@@ -103,14 +104,12 @@ def _without_noise(power: np.ndarray) -> np.ndarray:
     on the angle grows with the square of frequency, stamps that jitter make white noise of the
     speed. The upper half of the band, where no arm moves, tells. Nothing is left beyond the first
     octave in which noise is all there is: the lumps that rounding makes far above are no motion."""
-    from scipy.ndimage import uniform_filter1d
-
     angle = np.sin(0.5 * np.pi * np.linspace(0.0, 1.0, len(power))) ** 2
     shape = np.stack([np.ones(len(power)), angle], axis=1)
     upper = slice(len(power) // 2, None)
     scale = max(float(power[upper].max()), 1e-300)
     noise = shape @ least_squares(shape[upper], power[upper] / scale) * scale
-    stands = np.concatenate([[0], np.cumsum(uniform_filter1d(power, _TOGETHER) > _ABOVE * noise)])
+    stands = np.concatenate([[0], np.cumsum(running(power, _TOGETHER, "mean") > _ABOVE * noise)])
     first = np.arange(max(1, int(np.argmax(power))), len(power) // 2)
     quiet = np.flatnonzero(stands[2 * first] - stands[first] < _SELDOM * first)
     return (power - noise)[: first[quiet[0]]] if len(quiet) else power - noise

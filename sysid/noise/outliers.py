@@ -12,6 +12,7 @@ import math
 import numpy as np
 
 from ..nonnegative import least_squares
+from ..running import running
 from .stretches import Run, bridged, moving
 
 _OUTLYING = 5.0  # robust standard deviations: a Gaussian does that once in two million
@@ -81,10 +82,8 @@ def usual(values, drawn, steps, bandwidth: float):
 
 def _local(values: np.ndarray, samples: float) -> np.ndarray:
     """RMS (n,) of values over so many samples about each, nan counting for nothing."""
-    from scipy.ndimage import uniform_filter1d
-
     size = max(3, 2 * round(0.5 * samples) + 1)
-    square = uniform_filter1d(np.nan_to_num(values) ** 2, size, mode="nearest")
+    square = running(np.nan_to_num(values) ** 2, size, "mean", "edge")
     return np.sqrt(np.maximum(square, 0.0))
 
 
