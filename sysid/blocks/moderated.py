@@ -67,11 +67,10 @@ def believed(seen, foreseen, own, most: float = _MOST) -> Belief:
     ratio = seen / foreseen
     own, which = np.unique(np.round(own), return_inverse=True)
     own = np.maximum(own, 1.0)
-    grid, scales, inside = np.geomspace(_LEAST, most, 30), [], []
-    for d0 in grid:
+    for d0 in np.geomspace(_LEAST, most, 30):
         low, middle, high = (fdtri(own, d0, p)[which] for p in (0.25, 0.5, 0.75))
-        scales.append(float(np.median(ratio / middle)))
-        inside.append(np.mean((ratio > scales[-1] * low) & (ratio < scales[-1] * high)))
-    # the more d0, the narrower F, and the fewer ratios stand between its quartiles
-    k = int(np.argmin(np.minimum.accumulate(inside) >= 0.5)) if min(inside) < 0.5 else len(grid) - 1
-    return Belief(scales[k], float(grid[k]))
+        scale = float(np.median(ratio / middle))
+        # the more d0, the narrower F, and the fewer ratios stand between its quartiles
+        if np.mean((ratio > scale * low) & (ratio < scale * high)) < 0.5:
+            break
+    return Belief(scale, float(d0))

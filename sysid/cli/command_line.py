@@ -123,7 +123,9 @@ def progress_of(silent: bool, fits: int = 1, *, asks: bool = False):
     Args:
         fits, asks: what the command does, as far as is known; see `progress.Course`.
     """
-    gc.freeze()  # what is imported stays: to look through it again and again is a twentieth of a diagnosis
+    # what is imported stays, and little of the rest refers to itself: to look for it is a twentieth of a diagnosis
+    gc.freeze()
+    gc.set_threshold(20_000, 20)
     if silent or sys.stderr is None:
         yield None
         return

@@ -53,9 +53,9 @@ def of_unit_size(values: np.ndarray, use) -> tuple[np.ndarray, np.ndarray]:
     """Functions (n, k) at rows that count (n,), zero at others, each with a mean square of one; and
     which they are, without those that say nothing there."""
     kept = np.where(use[:, None], values, 0.0)
-    which = np.flatnonzero(kept.std(0) > 1e-9)
-    kept = kept[:, which]
-    return kept / np.sqrt(np.mean(kept**2, axis=0)), which
+    square = np.einsum("nk,nk->k", kept, kept) / len(kept)
+    which = np.flatnonzero(square - kept.mean(0) ** 2 > 1e-12 * square)
+    return kept[:, which] / np.sqrt(square[which]), which
 
 
 def _both_ways(values: np.ndarray, direction: np.ndarray) -> np.ndarray:
