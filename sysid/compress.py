@@ -14,6 +14,7 @@ from .linearised import Linearised
 from .model import Model
 from .motion import Motion, Piece
 from .reduction import Reduction
+from .slides import counted
 from .triangles import Compressed, Factor
 
 # samples: with fewer rows than columns a triangle would be no smaller than they are
@@ -94,7 +95,7 @@ def _of_piece(piece: Piece, model: Model | Linearised, supports: Sequence[np.nda
         thin: as of `compress`. done: is told how many rows more are done.
     """
     joints, factors = range(model.robot.dof), []
-    remembered, filtered = model.remembered(piece), piece.smoother is not None
+    remembered, filtered, use = model.remembered(piece), piece.smoother is not None, counted(model, piece)
     # of the rows that a low-pass makes alike, one stands for `every`
     every = piece.smoother.every if filtered and thin == 1 else 1
     # rows that are not wanted need no columns, unless a filter or an effect looks at them
@@ -110,7 +111,7 @@ def _of_piece(piece: Piece, model: Model | Linearised, supports: Sequence[np.nda
             own = slice(at, at + count) if sparse else slice((rows.start - from_) // every, (rows.stop - 1 - from_) // every + 1, thin)
             at, begun = at + count, begun or [Reduction() for _ in joints]
             for joint, values in enumerate(columns):
-                begun[joint].add(_counted(values, own, piece.tau[rows, joint], None if piece.use is None else piece.use[rows, joint]))
+                begun[joint].add(_counted(values, own, piece.tau[rows, joint], None if use is None else use[rows, joint]))
             if stop == edges[block + 1]:
                 factors += [Factor(j, block, supports[j], np.sqrt(every) * one.triangle(), every * one.rows) for j, one in enumerate(begun)]
                 begun = []

@@ -152,6 +152,11 @@ class TorqueEffect(Effect):
             shapes: its shape values by name.
         """
 
+    def slides_over(self, joint: int, dof: int) -> np.ndarray:
+        """The speeds (k, dof), as sums of the joints', with whose signs the torque of a joint changes, beside its own: where one of
+        them is none, friction may have any value up to its greatest, and such rows say nothing of it."""
+        return np.zeros((0, dof))
+
     def columns_at(self, motion: Piece, joint: int, tried: list[dict[str, float]]) -> list[np.ndarray]:
         """`columns` at several sets of shape values."""
         return [self.columns(motion, joint, **shapes) for shapes in tried]

@@ -39,6 +39,11 @@ class Linearised:
         """The model's."""
         return self.model.reach
 
+    @property
+    def terms(self):
+        """The model's."""
+        return self.model.terms
+
     def support(self, joint: int, piece: Piece | None = None) -> np.ndarray:
         """The model's, and every slope of values that are there."""
         slopes = [self.model.size + n for n, k in enumerate(self.free) if piece is None or self._there(k, piece)]

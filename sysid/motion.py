@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,6 +15,15 @@ from .workers import Mapped
 _NO_WEIGHT = 1e-9
 # A joint never moves where its filtered angle travels less than its own noise would make it, or than this [rad or m].
 _NEVER_MOVES, NOISE_TRAVEL = 1e-6, 6.0
+
+
+class Blur(NamedTuple):
+    """What a filter makes of a joint's reversal, as of `Smoother.smear`: it carries it `reach` samples far, a stop becomes a speed of
+    `stop` [s] times the acceleration about it, and it looks at `look` samples to either side."""
+
+    reach: int
+    stop: float
+    look: int
 
 
 @dataclass(frozen=True)
@@ -27,6 +37,8 @@ class Piece:
     estimate of their noise from that. `sight` is the filter that the angles were seen through, where it matters: torque was not.
 
     `weight` (n, dof) is what each row counts in the filter of both sides, None where all count alike: an average over what counts.
+
+    `blur` is what the filter makes of reversals, where rows about them are left out for it.
 
     `kept` is for what is made of these rows once for all who ask; it goes with the piece.
 
@@ -55,6 +67,7 @@ class Piece:
     gravity: np.ndarray | None = None
     deflection: np.ndarray | None = None
     weight: np.ndarray | None = None
+    blur: Blur | None = None
     kept: dict = field(init=False, default_factory=dict, repr=False, compare=False)
 
     def direction(self, joint: int) -> np.ndarray:

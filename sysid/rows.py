@@ -14,6 +14,7 @@ from . import regressor
 from .effect import NotFinite, TorqueEffect
 from .model import Model, chunks
 from .motion import Motion, Piece
+from .slides import counted
 from .two_masses import link_load
 
 _STRETCH = 16384  # samples whose columns are computed at once
@@ -71,9 +72,19 @@ def measured(motion: Motion, stride: int) -> Rows:
     )  # fmt: skip
 
 
+def _counted(model: Model, motion: Motion, found: Rows) -> Rows:
+    """Measured rows of which those count that say something of a model."""
+    uses = [counted(model, piece) for piece in motion.pieces]
+    if all(use is piece.use for use, piece in zip(uses, motion.pieces)):
+        return found
+    kept = [use[found.index[found.piece == k]] for k, use in enumerate(uses)]
+    use = found.use & np.concatenate(kept)
+    return replace(found, use=use, tau=np.where(use, found.tau, 0.0))
+
+
 def stack(model: Model, motion: Motion, stride: int) -> Rows:
     """The rows of a motion under a model."""
-    found = measured(motion, stride)
+    found = _counted(model, motion, measured(motion, stride))
     n, dof = len(found.tau), model.robot.dof
     columns = np.zeros((dof, n, model.size))
     at = 0

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from .jumps import jumps
-from .motion import NOISE_TRAVEL, Piece
+from .motion import NOISE_TRAVEL, Blur, Piece
 from .smoother import Smoother
 from .specs import PreprocessSpec
 
@@ -19,11 +19,7 @@ def without_standstill(piece: Piece, threshold, reach: int) -> Piece:
 
     A filter that sees so far carries standstill into them.
     """
-    still = np.abs(piece.qd) < threshold
-    count = np.cumsum(np.concatenate([np.zeros((1, still.shape[1])), still]), axis=0)
-    rows = np.arange(len(still))
-    low, high = np.maximum(rows - reach, 0), np.minimum(rows + reach + 1, len(still))
-    use = count[high] == count[low]
+    use = _apart(np.abs(piece.qd) < threshold, reach)
     return replace(piece, use=use if piece.use is None else use & piece.use)
 
 
@@ -41,12 +37,36 @@ def clear_of_reversals(pieces, spec: PreprocessSpec) -> list[Piece]:
     out = []
     for piece in pieces:
         smoother = Smoother(spec, piece.step)
-        reach, stop = smoother.smear(piece.smoother is not None)
-        seen = (2 * smoother.reach + 1) * piece.step
-        threshold = np.maximum(stop * _largest_about(piece.qdd, smoother.reach), NOISE_TRAVEL * piece.noise / seen)
-        bent = turns(piece.qd) | jumps(piece.measured, smoother.reach)
-        out.append(without_standstill(piece, np.where(bent, np.inf, threshold), reach))
+        piece = replace(piece, blur=Blur(*smoother.smear(piece.smoother is not None), smoother.reach))
+        still = _may_stand(piece, piece.qd, piece.qdd, piece.noise) | jumps(piece.measured, smoother.reach)
+        use = _apart(still, piece.blur.reach)
+        out.append(replace(piece, use=use if piece.use is None else use & piece.use))
     return out
+
+
+def sliding(piece: Piece, over: np.ndarray) -> np.ndarray:
+    """(n,) bool: the rows on which none of the speeds that are sums `over` (k, dof) of the joints' may be none, and about which the
+    filter has not bent what changes with its sign. All of them where none were left out about the joints' own reversals.
+    """
+    if piece.blur is None:
+        return np.ones(len(piece.t), dtype=bool)
+    sums = (piece.qd @ over.T, piece.qdd @ over.T, np.abs(over) @ piece.noise)
+    return _apart(_may_stand(piece, *sums), piece.blur.reach).all(axis=1)
+
+
+def _may_stand(piece: Piece, qd, qdd, noise) -> np.ndarray:
+    """(n, k) bool: where speeds (n, k), of such accelerations and noise (k,) of the angle, may be none."""
+    seen = (2 * piece.blur.look + 1) * piece.step
+    threshold = np.maximum(piece.blur.stop * _largest_about(qdd, piece.blur.look), NOISE_TRAVEL * noise / seen)
+    return turns(qd) | (np.abs(qd) < threshold)
+
+
+def _apart(still: np.ndarray, reach: int) -> np.ndarray:
+    """(n, k) bool: the rows without one of `still` within `reach` rows."""
+    count = np.cumsum(np.concatenate([np.zeros((1, still.shape[1]), dtype=int), still]), axis=0)
+    rows = np.arange(len(still))
+    low, high = np.maximum(rows - reach, 0), np.minimum(rows + reach + 1, len(still))
+    return count[high] == count[low]
 
 
 def turns(qd) -> np.ndarray:

@@ -11,7 +11,9 @@ _SAID = {"compliance": lambda hidden: 1.0 / hidden["K"]}
 
 def distances(record: dict) -> list[dict]:
     """How many stated deviations each parameter of an effect that was hidden and heads a step of the
-    first diagnosis is from the truth; those that the simulator does not have are passed over."""
+    first diagnosis is from the truth; those that the simulator does not have are passed over, and those
+    of a sum of fewer terms than what was hidden: its terms stand for the others as well, and are no
+    estimates of the same numbers."""
     if record["error"] is not None or record["kind"] not in ("one", "two"):
         return []
     out = []
@@ -23,6 +25,8 @@ def distances(record: dict) -> list[dict]:
         for name, deviation in (own[0].get("deviations") or {}).items() if own else ():
             word, found = name.rpartition(".")[2], own[0]["parameters"][name]
             truth = _truth(hidden.get("values") or {}, word)
+            if _shorter(own[0]["parameters"], hidden.get("values") or {}, word):
+                continue
             if truth is not None and found is not None and deviation:
                 z = (found - truth) / deviation
                 out.append(
@@ -35,6 +39,12 @@ def _truth(values: dict, word: str) -> float | None:
     if word in values:
         return float(values[word])
     return _SAID[word](values) if word in _SAID and "K" in values else None
+
+
+def _shorter(found: dict, hidden: dict, word: str) -> bool:
+    """Whether what was hidden has more of the numbered terms that a word is one of."""
+    terms = lambda names: {n for n in names if n[-1:].isdigit() and n.rstrip("0123456789") == word.rstrip("0123456789")}  # noqa: E731
+    return word[-1:].isdigit() and bool(terms(hidden) - terms(name.rpartition(".")[2] for name in found))
 
 
 def covered(records: list[dict]) -> tuple[int, int]:

@@ -40,8 +40,15 @@ class JointCoupling(TorqueEffect):
     def variants(self, robot, joint):
         return [{"other": name} for k, name in enumerate(robot.joints) if k != joint]
 
+    def _beside(self, joint):
+        return self.joints.index(self.other) if self.other is not None else joint - 1 if joint else 1
+
+    def slides_over(self, joint, dof):
+        own, other = np.eye(dof)[[joint, self._beside(joint)]]
+        return np.stack([other + own, other - own])
+
     def columns(self, motion, joint):
-        i = self.joints.index(self.other) if self.other is not None else joint - 1 if joint else 1
+        i = self._beside(joint)
         qd, rest = motion.qd, motion.rest[i] + motion.rest[joint]
         signs = [np.where(np.abs(speed) > rest, np.sign(speed), 0.0) for speed in (qd[:, i] + qd[:, joint], qd[:, i] - qd[:, joint])]
         return np.stack([motion.qdd[:, i], qd[:, i], *signs])
