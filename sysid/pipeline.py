@@ -38,7 +38,7 @@ from .plausible import implausible
 from .prediction import Prediction, predict
 from .prior_weight import PriorWeight, with_weight
 from .robot import Robot
-from .shape_refinement import refined
+from .shape_refinement import refined, scattered
 from .spec_values import AUTO
 from .specs import Experiment
 from .threads import single_threaded
@@ -126,7 +126,7 @@ def _fit(experiment: Experiment, filters: dict | None, strength: PriorWeight | N
             weight = weight or prior_strength(experiment, structure, motion, compressed, prior)
         with _timed(seconds, "solve", tell):
             found = identify(with_weight(experiment, weight.value), structure, motion, compressed, prior)
-            found = replace(found, strength=strength or weight)
+            found = scattered(replace(found, strength=strength or weight), motion)
         if not found.physically_consistent:
             names = [body.name for body, possible in zip(machine.bodies, is_consistent(found.pi)) if not possible]
             warnings.warn(SysidWarning(f"impossible bodies: {', '.join(names)}; identified.urdf will not serve a simulator. model.inertia: log-cholesky keeps them possible"), stacklevel=2)

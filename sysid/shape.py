@@ -16,6 +16,7 @@ import numpy as np
 
 from . import multistart
 from . import rows as row
+from .blows import striking, struck
 from .deflection import Deflection
 from .effect import NotFinite
 from .estimate import Fit
@@ -36,6 +37,7 @@ from .triangles import Compressed, Factor
 _MOST_ROWS, _STEPS, _TRIES, _SETTLED = 6000, 12, 6, 1e-7
 _ROUNDING = 1e-14  # share of the greatest
 _LEAST_SHARE = 0.25  # of the way to another load
+_AGAIN = 3  # searches of what strikes
 
 
 @dataclass(frozen=True)
@@ -67,7 +69,7 @@ def condensed(model: Model, rows: row.Rows) -> Compressed:
 
 def settle(
     experiment: Experiment, model: Model, motion: Motion, prior: np.ndarray, *, weights=None, stride: int | None = None, grid: bool = True,
-    hold: bool = False, profile: bool = False, tolerance: float = _SETTLED,
+    hold: bool = False, profile: bool = False, strikes: bool = False, tolerance: float = _SETTLED,
 ) -> Settled:  # fmt: skip
     """Find a model's shape values and its load on a motion.
 
@@ -77,6 +79,7 @@ def settle(
         grid: start values that have no start of their own from many places; without it the model's own are where the search begins.
         hold: leave the shape values and the load as the model has them.
         profile: check the objective's profile over each value.
+        strikes: look all about the values of effects by which a link strikes.
         tolerance: share of the objective by which a step must lower it for another to follow.
 
     Raises:
@@ -119,6 +122,13 @@ def settle(
                 if tried is not None:
                     best = min(best, solved(tried), key=lambda s: s.objective)
     best = search.descended(best)
+    for again in range(_AGAIN if strikes and striking(best.model) else 0):  # the bodies found with other blows have another load
+        before = best.objective
+        best, more = struck(best, motion, weights, attempted, wide=not again)
+        tally |= {place: count + tally.get(place, 1) for place, count in more.items()}
+        best = search.descended(best)
+        if not before - best.objective > tolerance * abs(before):
+            break
     if profile:
         best, searched = search.profiled(best, tally)
         best = replace(best, searched=searched)

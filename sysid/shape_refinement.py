@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from . import shape
+from .blows import scatter, striking
 from .compress import compress
 from .drives import rescaled
 from .effect import NotFinite
-from .estimate import identify
+from .estimate import Fit, identify
 from .held_apart import prior_strength
 from .linearised import Linearised
 from .model import Model
@@ -38,9 +41,9 @@ def refined(experiment: Experiment, structure: Model, motion: Motion, prior, nea
         strength = prior_strength(experiment, structure, motion, compress(begun if structure.gains else structure, motion), prior)
     weighed = experiment if strength is None else with_weight(experiment, strength.value)
     if near is None:
-        found = shape.settle(weighed, structure, motion, prior, profile=True)
+        found = shape.settle(weighed, structure, motion, prior, profile=True, strikes=True)
     else:  # the search has been made
-        found = shape.settle(weighed, structure.with_shapes(near.shapes), motion, prior, grid=False)
+        found = shape.settle(weighed, structure.with_shapes(near.shapes), motion, prior, grid=False, strikes=True)
     bodies, searched = found.x[: 10 * structure.bodies].reshape(-1, 10), found.searched
     if (scaled := rescaled(found.model, weighed, bodies, prior)) is not found.model:
         found = shape.settle(weighed, scaled, motion, prior, grid=False)
@@ -81,3 +84,17 @@ def refined(experiment: Experiment, structure: Model, motion: Motion, prior, nea
         if not np.any(np.abs(change) > _NEAR * np.where(np.isfinite(std), std, np.inf)):
             break
     return structure, slopes, searched, strength
+
+
+def scattered(fit: Fit, motion: Motion) -> Fit:
+    """A fit that says of what strikes how far it scatters: slopes there say how far the next hollow is."""
+    if not striking(fit.model):
+        return fit
+    found = shape.settle(fit.experiment, fit.model, motion, fit.prior, weights=fit.weights, hold=True)
+    std, covariance = fit.shape_std.copy(), fit.shape_covariance.copy()
+    for k, spread in scatter(found, motion, fit.weights).items():
+        if np.isfinite(std[k]) and spread > std[k]:
+            covariance[k] *= spread / std[k]
+            covariance[:, k] *= spread / std[k]
+            std[k] = spread
+    return replace(fit, shape_std=std, shape_covariance=covariance)

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from . import multistart
+from .blows import striking
 from .effect import SensorEffect, TorqueEffect
 from .landscape import at_zero, landscape
 from .model import Model
@@ -73,7 +74,7 @@ class Search:
         where one is lower, and what was done about each value."""
         lower, points = set(), {}
         for _ in range(_ROUNDS):
-            before, free = best, blocks(best.model, self.motion)
+            before, free, strikes = best, blocks(best.model, self.motion), striking(best.model)
             for block in free:
                 own = _own(best.model, block)
                 further, counts = self._along_block(best, block, own)
@@ -83,8 +84,8 @@ class Search:
             for k, value in enumerate(best.model.shape_values):
                 effect = best.model.terms[value.term][0]
                 factor = isinstance(effect, SensorEffect) and effect.constant_gain
-                if value.held or factor or (value.term, value.joint) in free:
-                    continue  # over a factor the objective has one hollow
+                if value.held or factor or (value.term, value.joint) in (*free, *strikes):
+                    continue  # over a factor the objective has one hollow, and what strikes was looked at all about
                 further, points[k] = self._along_value(best, k, value)
                 lower |= {k} if further is not best else set()
                 best = further

@@ -1,0 +1,136 @@
+"""The shape values of an effect by which a link strikes.
+
+With the next value it strikes at other times, so that slopes lead to the next hollow at most: many values about those that
+were found are tried together, as torque's slopes in where the link stands have it. How sure they are, slopes do not say
+either: the best of all that were tried is asked for again with blocks of time drawn anew.
+"""
+
+from __future__ import annotations
+
+from itertools import product
+
+import numpy as np
+
+from . import rows as row
+from .deflection import Deflection
+from .model import Model
+from .projection import inverted, prior_hessian
+
+# How far about what was found, by how many values, and how far the other values: from one to the next of the first it is as far as
+# from end to end of the next.
+_STAGES = ((2.5, 41, np.inf), (1.08, 21, 1.5), (1.008, 9, 1.1))
+_OTHERS = 7  # values of each of the others
+_LEAST = 500.0  # times less than the most it may be: what a first value begins with where it does nothing yet
+_TOGETHER = 64  # sets whose torque is made at once
+_SOLVED = 4  # of the best values, which are solved with every bound kept
+_BLOCKS, _DRAWS = 40, 200
+
+
+def striking(model: Model) -> dict[tuple[int, int], list[int]]:
+    """The free shape values of effects by which a link strikes, by term and joint."""
+    out: dict[tuple[int, int], list[int]] = {}
+    for k, value in enumerate(model.shape_values):
+        effect = model.terms[value.term][0]
+        if isinstance(effect, Deflection) and effect.blows and effect.encoder == "motor" and not value.held:
+            out.setdefault((value.term, value.joint), []).append(k)
+    return out
+
+
+def struck(found, motion, weights, solved, *, wide: bool):
+    """What settled, or what settles lower from other values of what strikes; and {(term, joint): how many were tried}.
+
+    Args:
+        found: a `shape.Settled`. weights: (joints,) or None. solved: a model with everything linear solved for, None where it has no
+            torque. wide: whether to look far about the values that were found.
+    """
+    tally: dict[tuple[int, int], int] = {}
+    for place, own in striking(found.model).items():
+        known = _link(found, motion, place, own)
+        for stage in _STAGES[0 if wide else 1 :]:
+            if (sets := _sets(found.model, own, *stage)) is None:
+                continue
+            gains = _tried(found, motion, weights, place, own, sets, known).sum(axis=1)
+            tally[place] = tally.get(place, 0) + len(sets)
+            model = found.model
+            for at in _highest(gains, len(sets) // _OTHERS ** (len(own) - 1)):  # slopes have it nearly as it is
+                moved = solved(_with(model, own, sets[at]))
+                if moved is not None and moved.objective < found.objective:
+                    found = moved
+    return found, tally
+
+
+def _highest(gains: np.ndarray, values: int) -> list[int]:
+    """The sets that gain most, each with another one of so many first values; none that gains nothing."""
+    each = len(gains[1:]) // values
+    best = 1 + np.argmax(gains[1:].reshape(values, each), axis=1) + each * np.arange(values)
+    order = best[np.argsort(-gains[best])][:_SOLVED]
+    return [int(k) for k in order if gains[k] > 0.0]
+
+
+def scatter(found, motion, weights) -> dict[int, float]:
+    """How far the shape values of what strikes scatter, {number: standard deviation}, if blocks of time are drawn anew (bootstrap)."""
+    out: dict[int, float] = {}
+    for place, own in striking(found.model).items():
+        stages = [sets for stage in _STAGES if (sets := _sets(found.model, own, *stage)) is not None]
+        if not stages:
+            continue
+        known = _link(found, motion, place, own)
+        tried = _tried(found, motion, weights, place, own, np.concatenate(stages), known)
+        edges = np.linspace(0, tried.shape[1], _BLOCKS + 1).astype(int)[:-1]
+        by_block = np.add.reduceat(tried, edges, axis=1)
+        drawn = np.random.default_rng(0).multinomial(_BLOCKS, np.full(_BLOCKS, 1.0 / _BLOCKS), _DRAWS)
+        best = np.concatenate(stages)[np.argmax(by_block @ drawn.T, axis=0)]
+        spread = np.sqrt(np.mean((best - np.array(found.model.shapes)[own]) ** 2, axis=0))
+        out |= dict(zip(own, spread.tolist()))
+    return out
+
+
+def _with(model: Model, own: list[int], values) -> Model:
+    at = dict(zip(own, map(float, values)))
+    return model.with_shapes([at.get(k, s) for k, s in enumerate(model.shapes)])
+
+
+def _sets(model: Model, own: list[int], far: float, count: int, others: float) -> np.ndarray | None:
+    """Sets (sets, own) of values about those of the model, these first; of what does not strike yet from the least on that it may be,
+    or None where only its neighbourhood is asked for."""
+    lists = []
+    for k in own:
+        value, at = model.shape_values[k], model.shapes[k]
+        first = value.shape.start is not None
+        if begins := first and at == value.shape.start:
+            if np.isfinite(others):
+                return None
+            at = value.high
+        wide = _LEAST if begins else far if first else others
+        low, high = max(value.low, at / wide), min(value.high, at * wide)
+        lists.append(np.geomspace(low, high, count if first else _OTHERS))
+    return np.array([[model.shapes[k] for k in own], *product(*lists)])
+
+
+def _link(found, motion, place: tuple[int, int], own: list[int]) -> tuple:
+    """The model where the link follows its motor, and what the link would change if it stood apart from it."""
+    model = found.model
+    idle = [v.shape.start if k in own and v.shape.start is not None else model.shapes[k] for k, v in enumerate(model.shape_values)]
+    idle = model.with_shapes(idle)
+    return idle, row.bent(idle, motion, found.x, place[1])
+
+
+def _tried(found, motion, weights, place: tuple[int, int], own: list[int], sets: np.ndarray, link: tuple) -> np.ndarray:
+    """Gains (sets, rows), whose sum over rows is what the objective falls by where values stand in the place of the first ones, which
+    are the model's, everything linear solved for."""
+    model, rows, (term, joint) = found.model, found.rows, place
+    scale = 2.0 * (np.ones(model.robot.dof) if weights is None else np.asarray(weights, dtype=float)) ** 2
+    names, held = [model.shape_values[k].shape.name for k in own], model.shapes_of(term, joint)
+    asked = [{**held, **dict(zip(names, map(float, at)))} for at in sets]
+    (idle, known), effect = link, model.terms[term][0]
+    residual = rows.residual(found.x).T
+    inverse = inverted(sum(w * a.T @ a for w, a in zip(scale, rows.columns)) + prior_hessian(found))
+    gains, here = [], None
+    for some in np.array_split(np.arange(len(asked)), -(-len(asked) // _TOGETHER)):  # alike: of few each would be made by itself
+        change = row.secants(idle, motion, known, effect, [asked[k] for k in some], found.stride, rows.use)
+        here = change[0] if here is None else here
+        change = change - here
+        absorbed = np.einsum("j,jnk,tjn->tk", scale, rows.columns, change, optimize=True) @ inverse
+        left = change - np.einsum("jnk,tk->tjn", rows.columns, absorbed, optimize=True)
+        gains.append(np.einsum("j,tjn->tn", scale, change * (residual - 0.5 * left)))
+    return np.concatenate(gains)

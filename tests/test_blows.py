@@ -1,0 +1,56 @@
+"""Play between teeth: blows come at other times for the next width, and slopes say neither where the best one is nor how sure it is."""
+
+import json
+
+import numpy as np
+import pytest
+
+from sysid import pipeline, shape
+from sysid.blows import scatter, striking, struck
+from sysid.config import load
+
+from .test_select import edited
+
+HIDDEN = "backlash:elbow:b=0.012"
+
+
+@pytest.fixture(scope="module")
+def fitted(simulated):
+    folder = simulated("play", HIDDEN, seed=6, duration=15.0)
+    file = edited(folder, "with", model={"effects": ["viscous", "coulomb", {"backlash": {"joints": ["elbow"]}}]})
+    (truth,) = json.loads((folder / "truth.json").read_text())["hidden"]
+    return pipeline.fit(load(file)), truth["values"]["b"]
+
+
+def test_the_width_of_play_is_within_its_deviation(fitted):
+    fit, truth = fitted
+    value, std, _ = fit.parameters_of("backlash", 1)["backlash.elbow.b"]
+    assert abs(value - truth) < 3.0 * std and std < 0.2 * truth
+    # slopes between two blows would have it sure to a thousandth
+    assert std > 0.003 * truth
+
+
+def test_a_wrong_hollow_is_left(fitted):
+    fit, _ = fitted
+    motion = pipeline.prepare(pipeline.read(fit.experiment, fit.model.robot, fit.experiment.data.train), fit.experiment.preprocess, fit.joints)
+    (own,) = striking(fit.model).values()
+    off = fit.model.with_shapes([s * (1.3 if k == own[0] else 1.0) for k, s in enumerate(fit.model.shapes)])
+    held = shape.settle(fit.experiment, off, motion, fit.prior, hold=True)
+    problems = []
+
+    def solved(model):
+        problems.append(model.shapes)
+        return shape.settle(fit.experiment, model, motion, fit.prior, hold=True)
+
+    found, tally = struck(held, motion, None, solved, wide=True)
+    assert found.objective < 0.95 * held.objective and 0 < len(problems) < 30
+    assert sum(tally.values()) > 400
+    assert found.model.shapes[own[0]] == pytest.approx(fit.model.shapes[own[0]], rel=0.1)
+    spread = scatter(found, motion, None)
+    assert set(spread) == set(own) and all(np.isfinite(list(spread.values())))
+
+
+def test_only_what_strikes_is_looked_at(fitted):
+    fit, _ = fitted
+    assert list(striking(fit.model)) == [(2, 1)]
+    assert striking(fit.model.without("backlash", 1)) == {}
