@@ -23,6 +23,7 @@ _OTHERS = 7  # values of each of the others
 _LEAST = 500.0  # times less than the most it may be: what a first value begins with where it does nothing yet
 _TOGETHER = 64  # sets whose torque is made at once
 _SOLVED = 4  # of the best values, which are solved with every bound kept
+_AGAIN = 3  # searches, one after the other
 _BLOCKS, _DRAWS = 40, 200
 
 
@@ -34,6 +35,25 @@ def striking(model: Model) -> dict[tuple[int, int], list[int]]:
         if isinstance(effect, Deflection) and effect.blows and effect.encoder == "motor" and not value.held:
             out.setdefault((value.term, value.joint), []).append(k)
     return out
+
+
+def searched(found, motion, weights, solved, descended, tolerance: float):
+    """What settles lowest of what was found all about, time after time, as the bodies found with other blows have another load; and
+    {(term, joint): how many sets of values were tried}.
+
+    Args:
+        descended: what is found with all shape values gone downhill. tolerance: share of the objective that is lower. Others: as of
+            `struck`.
+    """
+    tally: dict[tuple[int, int], int] = {}
+    for again in range(_AGAIN if striking(found.model) else 0):
+        before = found.objective
+        found, more = struck(found, motion, weights, solved, wide=not again)
+        tally |= {place: count + tally.get(place, 0) for place, count in more.items()}
+        found = descended(found)
+        if not before - found.objective > tolerance * abs(before):
+            break
+    return found, tally
 
 
 def struck(found, motion, weights, solved, *, wide: bool):

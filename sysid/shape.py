@@ -14,9 +14,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from . import multistart
+from . import blows, multistart
 from . import rows as row
-from .blows import striking, struck
 from .deflection import Deflection
 from .effect import NotFinite
 from .estimate import Fit
@@ -37,7 +36,6 @@ from .triangles import Compressed, Factor
 _MOST_ROWS, _STEPS, _TRIES, _SETTLED = 6000, 12, 6, 1e-7
 _ROUNDING = 1e-14  # share of the greatest
 _LEAST_SHARE = 0.25  # of the way to another load
-_AGAIN = 3  # searches of what strikes
 
 
 @dataclass(frozen=True)
@@ -122,13 +120,9 @@ def settle(
                 if tried is not None:
                     best = min(best, solved(tried), key=lambda s: s.objective)
     best = search.descended(best)
-    for again in range(_AGAIN if strikes and striking(best.model) else 0):  # the bodies found with other blows have another load
-        before = best.objective
-        best, more = struck(best, motion, weights, attempted, wide=not again)
+    if strikes:
+        best, more = blows.searched(best, motion, weights, attempted, search.descended, tolerance)
         tally |= {place: count + tally.get(place, 1) for place, count in more.items()}
-        best = search.descended(best)
-        if not before - best.objective > tolerance * abs(before):
-            break
     if profile:
         best, searched = search.profiled(best, tally)
         best = replace(best, searched=searched)
