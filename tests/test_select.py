@@ -13,8 +13,9 @@ import numpy as np
 import pytest
 from ruamel.yaml import YAML
 
-from sysid import effect_entry, fit_document, loop, pipeline, results, simulate
+from sysid import effect_entry, fit_document, loop, pipeline, results, simulate, vocabulary
 from sysid.addition import command, grown, spelled
+from sysid.candidates import Candidate
 from sysid.diagnose import select
 from sysid.diagnose.diagnosis import diagnose
 from sysid.diagnose.select import LEVEL, WORTH, search
@@ -365,3 +366,26 @@ def test_two_effects_that_hide_each_other_are_both_named(simulated, monkeypatch,
 def test_the_clearest_of_what_takes_about_as_much_says_that_it_is_there(gains, statistics, clearest):
     asked = SimpleNamespace(gains=np.array(gains), statistics=np.array(statistics))
     assert select._clearest(asked, [0, 1, 2]) == clearest
+
+
+def test_more_terms_are_asked_for_only_where_the_log_tells_each():
+    """Of a short travel six harmonics are nearly one curve: their coefficients would be millions of either sign."""
+    rng = np.random.default_rng(0)
+
+    def group(directions: int, begins, harmonics: int):
+        effect = vocabulary.find("position_friction").given(harmonics=harmonics)
+        candidate = Candidate(effect, 0, (("harmonics", harmonics),), begins)
+        made = {"candidate": candidate, "c": np.ones(directions), "sizes": np.ones(2 * harmonics), "signed": True, "testable": True}
+        return SimpleNamespace(**made, numbers=directions, either=directions, moves=np.ones(directions), shapes={})
+
+    def rivals(*groups):
+        asked = SimpleNamespace(groups=list(groups), statistics=np.full(len(groups), 9.0), gains=np.arange(50.0, 50.0 + len(groups)))
+        view = SimpleNamespace(
+            design=SimpleNamespace(residual=rng.normal(size=(100, 1))), model=SimpleNamespace(robot=SimpleNamespace(dof=1)), cutoff=10.0, step=0.01,
+            rows=SimpleNamespace(use=np.ones((100, 1), dtype=bool)),
+        )  # fmt: skip
+        return set(select._rivals(view, asked, 0.03))
+
+    assert rivals(group(6, ((),), 3)) == {0}  # takes the place of what is there, and the log tells all six
+    assert rivals(group(3, ((),), 3)) == set()
+    assert rivals(group(3, (), 3)) == {0}  # nothing of it is there yet

@@ -96,8 +96,10 @@ def _rivals(view: View, asked: Asked, worth: float) -> dict[int, tuple[int, floa
     # what rests on few blocks stands out of none, and may be what another one speaks for
     few = np.array([not group.testable for group in asked.groups], dtype=bool)
     for k in np.flatnonzero((~(asked.statistics <= _ALONE) | few) & (asked.gains > 0)):
-        if asked.groups[k].signed:
-            own.setdefault(asked.groups[k].candidate.kind, []).append(k)
+        group = asked.groups[k]
+        # more terms in the place of fewer: only where the log tells each of them
+        if group.signed and not (group.candidate.begins and len(group.c) < len(group.sizes)):
+            own.setdefault(group.candidate.kind, []).append(k)
     loss, dof, out = np.sum(view.design.residual**2, axis=0), view.model.robot.dof, {}
     for ks in own.values():
         # of those with more terms and with fewer, who takes most once its numbers are paid for
@@ -112,8 +114,7 @@ def _rivals(view: View, asked: Asked, worth: float) -> dict[int, tuple[int, floa
 
 
 def _pair(view: View, asked: Asked, level: float, worth: float, asked_with) -> list[Step] | None:
-    """Two effects each of which stands out with the other in the model, first what takes more; None
-    where there are no such two."""
+    """Two effects each of which stands out with the other in the model, first what takes more."""
     trials = [k for k, (_, share) in _rivals(view, asked, worth).items() if share > _HIDES]
     for k in trials[:_TRIALS]:
         found = chosen(view, [asked.groups[k]], np.random.default_rng(1))
