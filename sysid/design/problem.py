@@ -143,6 +143,9 @@ def shrunk(problem: Problem, z) -> np.ndarray | None:
     still[:, 0] = z[:, 0]
     if np.any(np.abs(z[:, 0] - problem.limits.middle) > problem.limits.half):
         return None
+    first = np.zeros(1, dtype=int)
+    if any(map(len, _over(problem, still, first, first))):
+        return None
     share = _kinematic(problem, z)
     whole = np.arange(len(problem.checked)), np.arange(0, len(problem.checked), _CLOSE)
     while True:

@@ -121,7 +121,6 @@ def deviations(fit: Fit, old: Motion, new: Motion, heard: Heard) -> dict[str, di
     units = (*fit.model.units, *(fit.model.shape_values[k].unit for k in model.free))
     free, count = np.isfinite(std), len(std)
     weights = np.ones(len(fit.joints)) if fit.weights is None else fit.weights
-    own, more = (_gram(model, motion, weights, count) for motion in (old, new))
     beside, (variance, claim) = _beside(fit, count), _claim(fit, weights)
     noises = _noises(fit, model, heard, beside / (variance * claim))
 
@@ -133,7 +132,9 @@ def deviations(fit: Fit, old: Motion, new: Motion, heard: Heard) -> dict[str, di
         spread = np.diagonal(inverse @ (noise + variance * honest) @ inverse)
         return np.sqrt(np.maximum(spread, 0.0))
 
-    first, then = (_scatter(model, motion, weights, noises, count) for motion in (old, new))
+    (own, first), (more, then) = (
+        _told(model, motion, weights, noises, count) for motion in (old, new)
+    )
     # what the poor log's noise held at a bound the next fit may set free
     later, coefficients = free.copy(), slice(10 * fit.model.bodies, fit.model.size)
     later[coefficients] |= np.diagonal(own + more)[coefficients] > 0.0
@@ -143,22 +144,15 @@ def deviations(fit: Fit, old: Motion, new: Motion, heard: Heard) -> dict[str, di
     return {names[k]: {**own, "unit": units[k]} for k, own in told.items()}
 
 
-def _scatter(model, motion: Motion, weights, noises, size: int) -> np.ndarray:
-    """(size, size) covariance of C'e of a motion's rows, each joint's with its weight."""
-    out = np.zeros((size, size))
+def _told(model, motion: Motion, weights, noises, size: int) -> tuple[np.ndarray, np.ndarray]:
+    """C'C and the covariance of C'e, both (size, size), of a motion's rows that count, each joint's with
+    its weight."""
+    gram, spread = np.zeros((2, size, size))
     for part in stretches(model, motion):
-        at = np.ix_(part.support, part.support)
-        out[at] += weights[part.joint] ** 4 * scatter(part, noises[part.joint])
-    return out
-
-
-def _gram(model, motion: Motion, weights, size: int) -> np.ndarray:
-    """(size, size) C'C of a motion's rows that count, each joint's with its weight."""
-    out = np.zeros((size, size))
-    for part in stretches(model, motion):
-        rows = weights[part.joint] * part.columns
-        out[np.ix_(part.support, part.support)] += rows @ rows.T
-    return out
+        at, weight = np.ix_(part.support, part.support), weights[part.joint]
+        gram[at] += weight**2 * part.columns @ part.columns.T
+        spread[at] += weight**4 * scatter(part, noises[part.joint])
+    return gram, spread
 
 
 def _noises(fit: Fit, model, heard: Heard, claimed) -> list[Noise]:
@@ -172,10 +166,12 @@ def _noises(fit: Fit, model, heard: Heard, claimed) -> list[Noise]:
     """
     free = np.ones(len(claimed), dtype=bool)
     left, even = heard.left, _over(fit.predictions["train"].errors()["rms"])
-    inverse = _inverse(_gram(model, heard.motion, even, len(free)) + claimed, free)
-    pull = np.zeros(len(free))
+    gram, pull = np.array(claimed), np.zeros(len(free))
     for part in stretches(model, heard.motion):
-        pull[part.support] += even[part.joint] ** 2 * part.columns @ left[part.rows, part.joint]
+        rows = even[part.joint] ** 2 * part.columns
+        gram[np.ix_(part.support, part.support)] += rows @ part.columns.T
+        pull[part.support] += rows @ left[part.rows, part.joint]
+    inverse = _inverse(gram, free)
 
     def takes(part, seen):
         at = np.ix_(part.support, part.support)
