@@ -23,12 +23,12 @@ from ..errors import SysidWarning
 from ..threads import single_threaded
 from . import solve
 from .fourier import Fourier
-from .problem import Problem, drawn
+from .problem import Problem, drawn, rests
 from .solve import Climb, Found
 
 _ROUNDS = (1, 2, 4, 8)  # of the slowest harmonic
 DRAWN = 4  # random motions for each number of rounds
-_DRAWS = 20  # more for each where links touch in the pose that it is about
+_DRAWS = 20  # more for each, where links touch in the pose that it is about
 MANEUVERS = 0.4  # of the time: what maneuvers have where they are tried
 _OF_EACH = 2  # of which so many begin a search
 _GO_ON = (4, 2, 1)  # searches that go on after one slice, two, three: the last to its end
@@ -132,12 +132,12 @@ def start(problem: Problem, pose, seed: tuple[int, int, int]) -> Found:
     """A random motion of seed[1] rounds that keeps to the limits, as large as they let it: of the poses that
     an arm may be drawn about, links touch in two of three."""
     posed, rng = problem.with_rounds(seed[1]), np.random.default_rng(seed)
-    found = Found.of(posed, drawn(posed, pose, rng))
+    z = drawn(posed, pose, rng)
     for _ in range(_DRAWS):
-        if np.isfinite(found.value):
+        if rests(posed, z):
             break
-        found = Found.of(posed, drawn(posed, pose, rng))
-    return found
+        z = drawn(posed, pose, rng)
+    return Found.of(posed, z)
 
 
 def _shared(processes: int) -> Callable[[Callable, list[tuple]], list]:
