@@ -24,9 +24,9 @@ def test_a_search_begins_with_the_best_of_each_number_of_rounds():
     starts = [_found(value, rounds) for rounds in (1, 2) for value in (3.0 * rounds, 2.0, 9.0 - rounds, 0.5)]
     chosen = search.promising(starts)
     assert [(one.family.rounds, one.value) for one in chosen] == [(1, 8.0), (2, 7.0), (2, 6.0), (1, 3.0)]
-    # maneuvers tell little until they have found their sizes: the best of them begins, however small
-    chosen = search.promising([*starts, _found(-5.0, 1, LADDER), _found(-4.0, 2, LADDER)])
-    assert len(chosen) == 5 and chosen[-1].value == -4.0
+    # maneuvers tell little until they have found their sizes: where they are asked for, two of each begin, however small
+    chosen = search.promising([*starts, *(_found(value, 2, LADDER) for value in (-5.0, -4.0, -6.0))])
+    assert [one.value for one in chosen] == [8.0, 7.0, -4.0, -5.0]
     assert search.promising([]) == []
 
 

@@ -72,15 +72,14 @@ def searched(
 
 
 def promising(starts: list[Found]) -> list[Found]:
-    """The best random motions of each number of rounds, the best first: what a start is worth says little of
-    where it leads, how often it goes round says much. And the best with maneuvers where any has."""
-    ordered = sorted(starts, key=lambda found: -found.value)
-    plain, more = [], [one for one in ordered if one.family.maneuvers]
-    for one in ordered:
-        beside = [other for other in plain if other.family == one.family]
-        if not one.family.maneuvers and len(beside) < _OF_EACH:
-            plain.append(one)
-    return plain + more[:1]
+    """The best random motions of each number of rounds: what a start is worth says little of where it leads,
+    how often it goes round says much. Where some have maneuvers, which are asked for, fewer without."""
+    asked, out = any(one.family.maneuvers for one in starts), []
+    for one in sorted(starts, key=lambda found: -found.value):
+        count = _OF_EACH if bool(one.family.maneuvers) == asked else 1
+        if sum(other.family == one.family for other in out) < count:
+            out.append(one)
+    return out
 
 
 def raced(
@@ -110,11 +109,13 @@ def raced(
 
 
 def _leading(climbs: list[Climb], count: int) -> list[Climb]:
-    """The best of them, the best first, and those with maneuvers, which tell little until they have found
-    their sizes."""
-    ordered = sorted(climbs, key=lambda climb: -climb.merit)
-    plain = [climb for climb in ordered if not climb.family.maneuvers]
-    return plain[:count] + [climb for climb in ordered if climb.family.maneuvers]
+    """The best without maneuvers and with them, which tell little until they have found their sizes."""
+    out: list[Climb] = []
+    for one in sorted(climbs, key=lambda climb: -climb.merit):
+        alike = sum(bool(other.family.maneuvers) == bool(one.family.maneuvers) for other in out)
+        if alike < count:
+            out.append(one)
+    return out
 
 
 def _starts(problem: Problem, pose, fastest: float, seed: int) -> list[tuple]:
