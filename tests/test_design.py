@@ -7,7 +7,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from scripts.design_parts.limits import summed
+from scripts.design_parts.limits import along, summed
 from sysid import config, listed_effects, pipeline, robot
 from sysid.design import basis, design, document, folder, limits, links, problem, promise, search, solve
 from sysid.design import designed as designing
@@ -182,7 +182,7 @@ def test_a_design_keeps_to_every_limit_as_an_independent_check_sees_it(poor, des
     """Positions, speeds, torque by Pinocchio and friction by hand, at a kilohertz."""
     machine = poor[1]
     t = np.arange(0.0, 8.0, 1e-3)
-    q, qd, qdd = summed(designed, t)
+    q, qd, qdd = along(designed, t)
     own = [machine.source.joints[j] for j in machine.joints]
     assert (np.abs(q) <= [0.95 * j.limits[1] + 1e-9 for j in own]).all()
     assert (np.abs(qd) <= [0.95 * j.velocity + 1e-9 for j in own]).all()
