@@ -5,12 +5,15 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.linalg import block_diag
+from scipy.stats import multivariate_normal
 
 from sysid import config
-from sysid.design import basis, promise, spectrum, suspects
+from sysid.design import basis, likely_prior, promise, spectrum, suspects
 from sysid.design.columns import columns
 from sysid.design.spectrum import Noise, Stretch, noise_left, scatter, white
 from sysid.errors import SysidWarning
+from sysid.reduction import triangle
 from tests.conftest import URDF
 
 
@@ -149,3 +152,24 @@ def test_columns_come_in_stretches_of_rows_that_count(monkeypatch):
     first = np.concatenate([p.columns[0] for p in found if p.joint == 1][:2])
     np.testing.assert_array_equal(first, np.where(piece.use[10:1010, 1], piece.q[10:1010, 1], 0.0))
     assert replace(found[0], count=1).frequency[1] == pytest.approx(1.0 / 5.0)
+
+
+def test_the_likelihood_of_how_near_bodies_are_is_that_of_all_rows():
+    """Of 120 rows under a dense covariance in which coefficients are as good as unknown; one has no column."""
+    rng = np.random.default_rng(3)
+    n, k = 120, 3
+    bodies, own = rng.standard_normal((n, 20)) * np.geomspace(0.1, 10.0, 20), rng.standard_normal((n, k))
+    own[:, 1] = 0.0
+    half = rng.standard_normal((2, 10, 10))
+    metric = half @ np.swapaxes(half, 1, 2) + 0.1 * np.eye(10)
+    prior = rng.standard_normal(20)
+    torque = bodies @ (prior + 0.3 * rng.standard_normal(20)) + own @ [5.0, 0.0, -2.0] + rng.standard_normal(n)
+    rows = np.column_stack([bodies, own, torque])
+    asked = np.array([0.1, 3.0, 100.0])
+    told = likely_prior.log_likelihood(*likely_prior.seen_of_bodies(triangle(rows), prior, metric), asked)
+    wide = block_diag(*np.linalg.inv(metric))
+    dense = [
+        multivariate_normal(bodies @ prior, np.eye(n) + bodies @ wide @ bodies.T / one + 1e6 * own @ own.T).logpdf(torque) for one in asked
+    ]
+    np.testing.assert_allclose(told - told[0], np.array(dense) - dense[0], rtol=1e-4)
+    assert np.ptp(told) > 10.0

@@ -70,7 +70,7 @@ def checked(experiment, found, case: dict) -> dict:
     machine = robots.load(experiment.robot, experiment.folder)
     family = found.family
     t = np.arange(0.0, family.duration + 5e-4, 1e-3)
-    q, qd, qdd = _played(found, t) if family.maneuvers else summed(found, t)
+    q, qd, qdd = along(found, t)
     kept = 1.0 - case["margin"]
     own, shares = [machine.source.joints[j] for j in machine.joints], {}
     low, high = np.array([j.limits for j in own]).T
@@ -90,6 +90,11 @@ def checked(experiment, found, case: dict) -> dict:
     if np.isfinite(least):  # two links have none that are no neighbours
         told |= {"least": least, "distance": least - clearance}
     return told
+
+
+def along(found, t):
+    """q, qd, qdd (n, dof) of a design at times t (n,) [s], without the design's own code."""
+    return _played(found, t) if found.family.maneuvers else summed(found, t)
 
 
 def summed(found, t):

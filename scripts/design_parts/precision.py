@@ -129,14 +129,11 @@ def _condition(problem, pose, rounds, seed: int, base):
     starts = [
         search.start(problem, pose, (seed, r, k)) for r in rounds for k in range(search.DRAWN)
     ]
-    starts = sorted((one for one in starts if np.isfinite(one.value)), key=kappa)
-    ended = []
+    starts = [replace(one, value=-kappa(one)) for one in starts if np.isfinite(one.value)]
+    climbs = [solve.Climb(one.family, one.z) for one in search.promising(starts)]
     with _least_condition(problem, base):
-        for one in starts[: search.IMPROVED]:
-            climb = solve.Climb(one.family, one.z)
-            while not climb.over:
-                climb = solve.climbed(problem, climb, 100)
-            ended.append(solve.Found.of(problem.of(climb.family), climb.z))
+        *_, climbs = search.raced(problem, climbs, processes=1)
+    ended = [solve.ended(problem, climb) for climb in climbs]
     return min((one for one in ended if np.isfinite(one.value)), key=kappa)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import json
 from pathlib import Path
 
 import numpy as np
@@ -62,23 +63,23 @@ def _csv(found: Design) -> str:
 
 
 def _ros(found: Design) -> str:
-    from ruamel.yaml import YAML
-
+    """The YAML of a JointTrajectory, written as it is: a YAML library takes seconds for long motions."""
     every = max(1, int(round((found.t[1] - found.t[0]) ** -1 / _POINTS)))
     rows = np.unique(np.append(np.arange(0, len(found.t), every), len(found.t) - 1))
-    points = [
-        {
-            "positions": found.q[k].tolist(),
-            "velocities": found.qd[k].tolist(),
-            "accelerations": found.qdd[k].tolist(),
-            "time_from_start": {
-                "sec": int(found.t[k]), "nanosec": int(round(1e9 * (found.t[k] % 1.0))),
-            },
-        }
-        for k in rows
-    ]  # fmt: skip
-    stream, writer = io.StringIO(), YAML()
-    writer.default_flow_style = None
-    writer.width = 4096
-    writer.dump({"joint_names": list(found.joints), "points": points}, stream)
-    return stream.getvalue()
+    lines = [f"joint_names: {json.dumps(list(found.joints), ensure_ascii=False)}", "points:"]
+    for k in rows:
+        second, nanosecond = divmod(int(round(1e9 * found.t[k])), 1_000_000_000)
+        lines += [
+            f"- positions: {_numbers(found.q[k])}",
+            f"  velocities: {_numbers(found.qd[k])}",
+            f"  accelerations: {_numbers(found.qdd[k])}",
+            f"  time_from_start: {{sec: {second}, nanosec: {nanosecond}}}",
+        ]
+    return "\n".join(lines) + "\n"
+
+
+def _numbers(values: np.ndarray) -> str:
+    """A list of numbers (n,) that YAML 1.1, which ROS reads, takes for numbers, too: a point before an
+    exponent."""
+    told = (repr(value) for value in values.tolist())
+    return f"[{', '.join(n if '.' in n else n.replace('e', '.0e') for n in told)}]"

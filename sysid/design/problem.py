@@ -139,9 +139,8 @@ def _peaks(share) -> np.ndarray:
 def shrunk(problem: Problem, z) -> np.ndarray | None:
     """The largest share of a motion about its middle pose that keeps to the limits; None where not
     even the pose does."""
-    still = np.zeros_like(z)
-    still[:, 0] = z[:, 0]
-    if np.any(np.abs(z[:, 0] - problem.limits.middle) > problem.limits.half):
+    still = _still(z)
+    if not rests(problem, z):
         return None
     share = _kinematic(problem, z)
     whole = np.arange(len(problem.checked)), np.arange(0, len(problem.checked), _CLOSE)
@@ -159,6 +158,20 @@ def shrunk(problem: Problem, z) -> np.ndarray | None:
             low, high = (low, middle) if passes else (middle, high)
         # the others may still pass theirs; a motion that has all but gone is none
         share = low if low > _SMALLEST else 0.0
+
+
+def rests(problem: Problem, z) -> bool:
+    """Whether a robot that stands in a motion's middle pose keeps to the limits."""
+    if np.any(np.abs(z[:, 0] - problem.limits.middle) > problem.limits.half):
+        return False
+    first = np.zeros(1, dtype=int)
+    return not any(map(len, _over(problem, _still(z), first, first)))
+
+
+def _still(z) -> np.ndarray:
+    still = np.zeros_like(z)
+    still[:, 0] = z[:, 0]
+    return still
 
 
 def _kinematic(problem: Problem, z) -> float:

@@ -5,10 +5,11 @@ Standard deviations are what noise makes of the fit's own estimate, to first ord
     cov = H^-1 (sum_j w_j^4 C_j' N_j C_j + s^2 prior) H^-1,    H = sum_j w_j^2 C_j' C_j + prior,
 
 over the rows of the old logs and of the new one, filtered as a fit filters them, with those left out
-that it leaves out; the prior says that bodies are within a factor of the URDF's, whatever weight the poor
-log was fitted under; N_j is the covariance of joint j's noise, whose spectrum the first fit's residual
-of all logs tells (`spectrum`). What a fit of few blocks states of its own deviations, from their spread, is uncertain
-by a third: it allows for noise of any kind, and for what a model lacks.
+that it leaves out. The prior says that bodies are as near the URDF's as makes the old logs likeliest
+(`likely_prior`), whatever weight the poor log was fitted under. N_j is the covariance of joint j's
+noise, whose spectrum the first fit's residual of all logs tells (`spectrum`). What a fit of few blocks
+states of its own deviations, from their spread, is uncertain by a third: it allows for noise of any
+kind, and for what a model lacks.
 
 A suspect a that is true leaves, of its torque s_a, what the model and its rival b cannot make
 between them, lambda = min_x |s_a - X x|^2 over the noise, on the new log alone and as a diagnosis sees it:
@@ -33,6 +34,7 @@ from ..linearised import Linearised
 from ..motion import Motion
 from ..prior_weight import weakest
 from .information import own_size
+from .likely_prior import likeliest
 from .noise import size_of
 from .spectrum import Noise, noise_left, scatter, stretches
 from .suspects import Seen, Suspect, solved
@@ -121,19 +123,19 @@ def deviations(fit: Fit, old: Motion, new: Motion, heard: Heard) -> dict[str, di
     units = (*fit.model.units, *(fit.model.shape_values[k].unit for k in model.free))
     free, count = np.isfinite(std), len(std)
     weights = np.ones(len(fit.joints)) if fit.weights is None else fit.weights
-    own, more = (_gram(model, motion, weights, count) for motion in (old, new))
     beside, (variance, claim) = _beside(fit, count), _claim(fit, weights)
     noises = _noises(fit, model, heard, beside / (variance * claim))
 
-    # a poor log lets a strong prior be chosen, which the next one will not: it claims what it knows
-    honest = beside / claim
+    honest = beside / claim * _nearness(fit, variance)
 
     def deviation(hessian, noise, free):
         inverse = _inverse(hessian + honest, free)
         spread = np.diagonal(inverse @ (noise + variance * honest) @ inverse)
         return np.sqrt(np.maximum(spread, 0.0))
 
-    first, then = (_scatter(model, motion, weights, noises, count) for motion in (old, new))
+    (own, first), (more, then) = (
+        _told(model, motion, weights, noises, count) for motion in (old, new)
+    )
     # what the poor log's noise held at a bound the next fit may set free
     later, coefficients = free.copy(), slice(10 * fit.model.bodies, fit.model.size)
     later[coefficients] |= np.diagonal(own + more)[coefficients] > 0.0
@@ -143,22 +145,15 @@ def deviations(fit: Fit, old: Motion, new: Motion, heard: Heard) -> dict[str, di
     return {names[k]: {**own, "unit": units[k]} for k, own in told.items()}
 
 
-def _scatter(model, motion: Motion, weights, noises, size: int) -> np.ndarray:
-    """(size, size) covariance of C'e of a motion's rows, each joint's with its weight."""
-    out = np.zeros((size, size))
+def _told(model, motion: Motion, weights, noises, size: int) -> tuple[np.ndarray, np.ndarray]:
+    """C'C and the covariance of C'e, both (size, size), of a motion's rows that count, each joint's with
+    its weight."""
+    gram, spread = np.zeros((2, size, size))
     for part in stretches(model, motion):
-        at = np.ix_(part.support, part.support)
-        out[at] += weights[part.joint] ** 4 * scatter(part, noises[part.joint])
-    return out
-
-
-def _gram(model, motion: Motion, weights, size: int) -> np.ndarray:
-    """(size, size) C'C of a motion's rows that count, each joint's with its weight."""
-    out = np.zeros((size, size))
-    for part in stretches(model, motion):
-        rows = weights[part.joint] * part.columns
-        out[np.ix_(part.support, part.support)] += rows @ rows.T
-    return out
+        at, weight = np.ix_(part.support, part.support), weights[part.joint]
+        gram[at] += weight**2 * part.columns @ part.columns.T
+        spread[at] += weight**4 * scatter(part, noises[part.joint])
+    return gram, spread
 
 
 def _noises(fit: Fit, model, heard: Heard, claimed) -> list[Noise]:
@@ -172,10 +167,12 @@ def _noises(fit: Fit, model, heard: Heard, claimed) -> list[Noise]:
     """
     free = np.ones(len(claimed), dtype=bool)
     left, even = heard.left, _over(fit.predictions["train"].errors()["rms"])
-    inverse = _inverse(_gram(model, heard.motion, even, len(free)) + claimed, free)
-    pull = np.zeros(len(free))
+    gram, pull = np.array(claimed), np.zeros(len(free))
     for part in stretches(model, heard.motion):
-        pull[part.support] += even[part.joint] ** 2 * part.columns @ left[part.rows, part.joint]
+        rows = even[part.joint] ** 2 * part.columns
+        gram[np.ix_(part.support, part.support)] += rows @ part.columns.T
+        pull[part.support] += rows @ left[part.rows, part.joint]
+    inverse = _inverse(gram, free)
 
     def takes(part, seen):
         at = np.ix_(part.support, part.support)
@@ -208,6 +205,16 @@ def _claim(fit: Fit, weights) -> tuple[float, float]:
     least = weakest(variance) if relative else np.inf
     share = fit.experiment.prior.weight / least if least > 0.0 else 1.0
     return max(variance, 1e-300), max(1.0, share)
+
+
+def _nearness(fit: Fit, variance: float) -> float:
+    """The weight of the prior that the next fit is expected to choose, over that of one that claims the
+    least; one where it is given."""
+    relative = DIVERGENCES[fit.experiment.prior.divergence](fit.prior).relative
+    if not (fit.strength.auto and relative):
+        return 1.0
+    least = weakest(variance)
+    return likeliest(fit, _over(fit.predictions["train"].errors()["rms"]), variance, least) / least
 
 
 def _inverse(gram, free) -> np.ndarray:

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..picture import Picture
 from .fourier import Fourier
 from .limits import Limits
 from .promise import Pair
@@ -57,6 +56,8 @@ class Design:
     def plot(self):
         """Position, velocity and torque of every joint against their limits (dashed), as a
         Matplotlib figure."""
+        from ..picture import Picture  # Matplotlib takes as long as a tenth of a design
+
         own = self.limits
         shown = (
             ("position", self.q, own.position), ("velocity", self.qd, _both(own.velocity)),

@@ -1,8 +1,10 @@
 """Many starts, in several processes: random motions, and searches from the best of them.
 
-Each start has a random stream of its own, and searches go on in slices that all of them share out:
-the same seed gives the same motion whatever the number of processes, and Ctrl-C keeps the best
-motion of the slices that have ended.
+Each start has a random stream of its own, and searches go on in slices that all of them share out, those
+that are behind no further: the same seed gives the same motion whatever the number of processes, and
+Ctrl-C keeps the best motion of the slices that have ended.
+
+Source: Karnin, Koren & Somekh 2013 (successive halving).
 """
 
 from __future__ import annotations
@@ -11,7 +13,8 @@ import os
 import signal
 import time
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from itertools import chain, repeat
 
 import numpy as np
 from joblib import Parallel, cpu_count, delayed
@@ -20,13 +23,15 @@ from ..errors import SysidWarning
 from ..threads import single_threaded
 from . import solve
 from .fourier import Fourier
-from .problem import Problem, drawn
+from .problem import Problem, drawn, rests
 from .solve import Climb, Found
 
 _ROUNDS = (1, 2, 4, 8)  # of the slowest harmonic
 DRAWN = 4  # random motions for each number of rounds
+_DRAWS = 20  # more for each, where links touch in the pose that it is about
 MANEUVERS = 0.4  # of the time: what maneuvers have where they are tried
-IMPROVED = 4  # starts of a search: the best of them
+_OF_EACH = 2  # of which so many begin a search
+_GO_ON = (4, 2, 1)  # searches that go on after one slice, two, three: the last to its end
 _CLEAR = 1.0  # of its worth: less is what one start is above another
 _WORTH = 8.0  # s of work from which others help: a process takes two to begin
 _SLICE = 12  # linear programs, less than a second or two
@@ -51,24 +56,14 @@ def searched(
         family = problem.family.followed_by(kinds, problem.known.joints, MANEUVERS, fastest)
         asked = _starts(problem.of(family), pose, fastest, seed)
         starts += [found for found in work(start, asked) if np.isfinite(found.value)]
-    starts = _improved(starts)
-    climbs = [Climb(found.family, found.z) for found in starts]
+    climbs = begun = [Climb(found.family, found.z) for found in promising(starts)]
     try:
-        if climbs:
-            begun = time.perf_counter()
-            climbs[:1] = work(solve.climbed, [(problem, climbs[0], _SLICE)])
-            left = (time.perf_counter() - begun) * len(climbs) * sum(solve.STEPS) / _SLICE
-            if left > _WORTH:
-                work = _shared(min(cpu_count() if processes is None else processes, len(climbs)))
-        while not all(climb.over for climb in climbs):
-            climbs = work(solve.climbed, [(problem, climb, _SLICE) for climb in climbs])
+        for climbs in raced(problem, begun, processes):
             tell("design", float(np.mean([climb.share for climb in climbs])))
     except KeyboardInterrupt:
         said = "stopped before the search had ended: this is the best motion so far"
         warnings.warn(SysidWarning(said), stacklevel=2)
-        work = _shared(1)
-    if climbs:
-        starts += work(solve.ended, [(problem, climb) for climb in climbs])
+    starts += work(solve.ended, [(problem, climb) for climb in climbs])
     plain = [found for found in starts if not found.family.maneuvers]
     best = max(starts, key=lambda found: found.value, default=None)
     simple = max(plain, key=lambda found: found.value, default=best)
@@ -76,14 +71,51 @@ def searched(
     return (best if best is None or best.value > simple.value + _CLEAR else simple), random_best
 
 
-def _improved(starts: list[Found]) -> list[Found]:
-    """The best of the random motions; one of them has maneuvers where any has: these tell little until
-    they have found their sizes."""
-    ordered = sorted(starts, key=lambda found: -found.value)
-    best, more = ordered[:IMPROVED], [one for one in ordered if one.family.maneuvers]
-    if more and not any(one.family.maneuvers for one in best):
-        best[-1:] = more[:1]
-    return best
+def promising(starts: list[Found]) -> list[Found]:
+    """The best random motions of each number of rounds: what a start is worth says little of where it leads,
+    how often it goes round says much. Where some have maneuvers, which are asked for, fewer without."""
+    asked, out = any(one.family.maneuvers for one in starts), []
+    for one in sorted(starts, key=lambda found: -found.value):
+        count = _OF_EACH if bool(one.family.maneuvers) == asked else 1
+        if sum(other.family == one.family for other in out) < count:
+            out.append(one)
+    return out
+
+
+def raced(
+    problem: Problem, climbs: list[Climb], processes: int | None = None
+) -> Iterator[list[Climb]]:
+    """Searches that go on slice by slice, fewer and fewer: those that are worth most by then.
+
+    Args:
+        processes: that share them, as many as there are cores where it is None.
+    """
+    work, slices = _shared(1), sum(solve.STEPS) / _SLICE
+    if climbs:
+        begun = time.perf_counter()
+        first = work(solve.climbed, [(problem, climbs[0], _SLICE)])
+        more = len(climbs) + sum(_GO_ON[:-1]) + slices * _GO_ON[-1]
+        if (time.perf_counter() - begun) * more > _WORTH:
+            work = _shared(min(cpu_count() if processes is None else processes, len(climbs)))
+        rest = work(solve.climbed, [(problem, climb, _SLICE) for climb in climbs[1:]])
+        climbs = _leading(first + rest, _GO_ON[0])
+        yield climbs
+    for count in chain(_GO_ON[1:], repeat(_GO_ON[-1])):
+        if all(climb.over for climb in climbs):
+            return
+        climbs = work(solve.climbed, [(problem, climb, _SLICE) for climb in climbs])
+        climbs = _leading(climbs, count)
+        yield climbs
+
+
+def _leading(climbs: list[Climb], count: int) -> list[Climb]:
+    """The best without maneuvers and with them, which tell little until they have found their sizes."""
+    out: list[Climb] = []
+    for one in sorted(climbs, key=lambda climb: -climb.merit):
+        alike = sum(bool(other.family.maneuvers) == bool(one.family.maneuvers) for other in out)
+        if alike < count:
+            out.append(one)
+    return out
 
 
 def _starts(problem: Problem, pose, fastest: float, seed: int) -> list[tuple]:
@@ -98,9 +130,15 @@ def rounds(family: Fourier, fastest: float) -> list[int]:
 
 
 def start(problem: Problem, pose, seed: tuple[int, int, int]) -> Found:
-    """A random motion of seed[1] rounds that keeps to the limits, as large as they let it."""
-    posed = problem.with_rounds(seed[1])
-    return Found.of(posed, drawn(posed, pose, np.random.default_rng(seed)))
+    """A random motion of seed[1] rounds that keeps to the limits, as large as they let it: of the poses that
+    an arm may be drawn about, links touch in two of three."""
+    posed, rng = problem.with_rounds(seed[1]), np.random.default_rng(seed)
+    z = drawn(posed, pose, rng)
+    for _ in range(_DRAWS):
+        if rests(posed, z):
+            break
+        z = drawn(posed, pose, rng)
+    return Found.of(posed, z)
 
 
 def _shared(processes: int) -> Callable[[Callable, list[tuple]], list]:

@@ -57,7 +57,7 @@ class Found:
 class Climb:
     """Where a search stands: coordinates z (dof, size) of a motion of a family, the trust
     region's radius, times (n,) [s] beside the nodes at which limits are looked at, how often these
-    have grown, and the linear programs since."""
+    have grown, and the linear programs since; merit: what it is worth less what goes beyond limits."""
 
     family: Fourier
     z: np.ndarray
@@ -65,6 +65,7 @@ class Climb:
     extra: np.ndarray = field(default_factory=lambda: np.zeros(0))
     stage: int = 0
     steps: int = 0
+    merit: float = -np.inf
 
     @property
     def over(self) -> bool:
@@ -90,7 +91,7 @@ def climbed(problem: Problem, climb: Climb, steps: int) -> Climb:
             done, steps = done + 1, steps - 1
             if new is not at:
                 at, near = new, _nearby(problem, new, grid, near.back)
-        climb = replace(climb, z=at.z, radius=radius, steps=done)
+        climb = replace(climb, z=at.z, radius=radius, steps=done, merit=at.merit)
         if settled or done >= STEPS[climb.stage]:
             times = passed(problem, climb.z)
             # between the nodes a limit is passed: these times are looked at, too

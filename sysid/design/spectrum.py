@@ -19,6 +19,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.fft import next_fast_len
 
 from ..motion import Motion
 
@@ -130,14 +131,18 @@ class Stretch:
     rows: slice
 
     @property
-    def frequency(self) -> np.ndarray:
-        """(m,) [Hz] of the ordinates of a real spectrum."""
-        return np.fft.rfftfreq(self.columns.shape[1], self.step)
+    def period(self) -> int:
+        """Rows that a spectrum is taken of, the last ones zero: a length whose transform is quick."""
+        return next_fast_len(self.columns.shape[1], real=True)
 
     @property
-    def spectrum(self) -> np.ndarray:
-        """(k, m) of the columns."""
-        return np.fft.rfft(self.columns, axis=1)
+    def frequency(self) -> np.ndarray:
+        """(m,) [Hz] of the ordinates of a real spectrum."""
+        return np.fft.rfftfreq(self.period, self.step)
+
+    def spectrum(self, values) -> np.ndarray:
+        """(..., m) of values (..., n) of the rows."""
+        return np.fft.rfft(values, self.period)
 
 
 def stretches(model, motion: Motion) -> Iterator[Stretch]:
@@ -175,11 +180,9 @@ def noise_left(parts: Iterable[Stretch], residual, change, made, takes: Callable
         # the mean is a column of its own at most: the first ordinate says little
         at = slice(1, None)
         rest = residual[part.rows, part.joint] - change[part.support] @ part.columns
-        left = np.abs(np.fft.rfft(rest)[at]) ** 2 / part.count
-        kept = 1.0 - takes(part, part.spectrum[:, at]) / part.count
-        angles = np.abs(np.fft.rfft(made[part.rows, part.joint])[at]) ** 2 / (
-            part.rows.stop - part.rows.start
-        )
+        left = np.abs(part.spectrum(rest)[at]) ** 2 / part.count
+        kept = 1.0 - takes(part, part.spectrum(part.columns)[:, at]) / part.count
+        angles = np.abs(part.spectrum(made[part.rows, part.joint])[at]) ** 2 / len(rest)
         heaps[part.joint].append((part.frequency[at], left, np.clip(kept, 0.0, 1.0), angles))
     none = white(0.0)
     return [noise_of_periodograms(*map(np.concatenate, zip(*h))) if h else none for h in heaps]
@@ -187,8 +190,7 @@ def noise_left(parts: Iterable[Stretch], residual, change, made, takes: Callable
 
 def scatter(part: Stretch, noise: Noise) -> np.ndarray:
     """(k, k) covariance of columns' products with the noise of their rows."""
-    found, n = part.spectrum, part.columns.shape[1]
     f = part.frequency
     each = noise.density(f) * np.where((f == 0) | (2 * f * part.step == 1), 1, 2)
-    scaled = found * np.sqrt(each / n)
+    scaled = part.spectrum(part.columns) * np.sqrt(each / part.period)
     return (scaled @ scaled.conj().T).real
