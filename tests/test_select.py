@@ -378,14 +378,16 @@ def test_more_terms_are_asked_for_only_where_the_log_tells_each():
         made = {"candidate": candidate, "c": np.ones(directions), "sizes": np.ones(2 * harmonics), "signed": True, "testable": True}
         return SimpleNamespace(**made, numbers=directions, either=directions, moves=np.ones(directions), shapes={})
 
+    own = SimpleNamespace(effect="position_friction", joint=0)  # the model has one harmonic, two terms
+
     def rivals(*groups):
         asked = SimpleNamespace(groups=list(groups), statistics=np.full(len(groups), 9.0), gains=np.arange(50.0, 50.0 + len(groups)))
         view = SimpleNamespace(
-            design=SimpleNamespace(residual=rng.normal(size=(100, 1))), model=SimpleNamespace(robot=SimpleNamespace(dof=1)), cutoff=10.0, step=0.01,
+            design=SimpleNamespace(residual=rng.normal(size=(100, 1))), model=SimpleNamespace(robot=SimpleNamespace(dof=1), coefficients=[own, own]), cutoff=10.0, step=0.01,
             rows=SimpleNamespace(use=np.ones((100, 1), dtype=bool)),
         )  # fmt: skip
         return set(select._rivals(view, asked, 0.03))
 
-    assert rivals(group(6, ((),), 3)) == {0}  # takes the place of what is there, and the log tells all six
+    assert rivals(group(4, ((),), 3)) == {0}  # what is there takes two of six directions, and the log tells the other four
     assert rivals(group(3, ((),), 3)) == set()
     assert rivals(group(3, (), 3)) == {0}  # nothing of it is there yet

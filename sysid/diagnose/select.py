@@ -21,9 +21,8 @@ from .ties import NEAR, Choice, alike, chosen, price_of
 LEVEL = 0.01  # family-wise: how often anything is accused where nothing is there
 WORTH = 0.03  # of a joint's squared residual under the low-pass: 1.5 % of its root mean square
 _ALONE = 1.645  # standard errors: five per cent, were it the only question
-_MOST_STEPS, _SHORTLIST = 8, 8
+_MOST_STEPS, _SHORTLIST, _TRIALS = 8, 8, 2
 _HIDES = 0.25  # of a joint's squared residual: without less, statistics grow by less than a seventh
-_TRIALS = 2
 
 
 def search(
@@ -92,13 +91,14 @@ def _beside(view: View, one: Group, other: Group) -> bool:
 def _rivals(view: View, asked: Asked, worth: float) -> dict[int, tuple[int, float]]:
     """Of each candidate that may be worth having, the shape values that take most, by falling gain:
     with those that say best that it is there, and the share taken of a joint that it acts on."""
-    own: dict[tuple, list[int]] = {}
+    own, known = dict[tuple, list[int]](), [(c.effect, c.joint) for c in view.model.coefficients]
     # what rests on few blocks stands out of none, and may be what another one speaks for
     few = np.array([not group.testable for group in asked.groups], dtype=bool)
     for k in np.flatnonzero((~(asked.statistics <= _ALONE) | few) & (asked.gains > 0)):
         group = asked.groups[k]
-        # more terms in the place of fewer: only where the log tells each of them
-        if group.signed and not (group.candidate.begins and len(group.c) < len(group.sizes)):
+        # more terms in the place of the model's fewer: only where the log tells each of them
+        untold = len(group.sizes) - len(group.c) if group.candidate.begins else 0
+        if group.signed and untold <= known.count(group.candidate.key):
             own.setdefault(group.candidate.kind, []).append(k)
     loss, dof, out = np.sum(view.design.residual**2, axis=0), view.model.robot.dof, {}
     for ks in own.values():
