@@ -72,19 +72,18 @@ def struck(found, motion, weights, solved, *, wide: bool):
             gains = _tried(found, motion, weights, place, own, sets, known).sum(axis=1)
             tally[place] = tally.get(place, 0) + len(sets)
             model = found.model
-            for at in _highest(gains, len(sets) // _OTHERS ** (len(own) - 1)):  # slopes have it nearly as it is
+            for at in _highest(gains, sets):  # slopes have it nearly as it is
                 moved = solved(_with(model, own, sets[at]))
                 if moved is not None and moved.objective < found.objective:
                     found = moved
     return found, tally
 
 
-def _highest(gains: np.ndarray, values: int) -> list[int]:
-    """The sets that gain most, each with another one of so many first values; none that gains nothing."""
-    each = len(gains[1:]) // values
-    best = 1 + np.argmax(gains[1:].reshape(values, each), axis=1) + each * np.arange(values)
-    order = best[np.argsort(-gains[best])][:_SOLVED]
-    return [int(k) for k in order if gains[k] > 0.0]
+def _highest(gains: np.ndarray, sets: np.ndarray) -> list[int]:
+    """The sets that gain most, each with another first value; none that gains nothing."""
+    order = np.argsort(-gains, kind="stable")
+    _, best = np.unique(sets[order, 0], return_index=True)  # of each first value
+    return [int(k) for k in order[np.sort(best)][:_SOLVED] if gains[k] > 0.0]
 
 
 def scatter(found, motion, weights) -> dict[int, float]:

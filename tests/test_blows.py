@@ -50,6 +50,16 @@ def test_a_wrong_hollow_is_left(fitted):
     assert set(spread) == set(own) and all(np.isfinite(list(spread.values())))
 
 
+@pytest.mark.parametrize("held", [{"teeth": 30.0}, {"b": 0.012}])
+def test_one_value_is_looked_for_where_the_other_is_held(simulated, held):
+    folder = simulated("play", HIDDEN, seed=6, duration=15.0)
+    file = edited(folder, f"held_{next(iter(held))}", model={"effects": ["viscous", "coulomb", {"backlash": {"joints": ["elbow"], **held}}]})
+    fit = pipeline.fit(load(file))
+    assert len(striking(fit.model)[2, 1]) == 1
+    found = fit.model.shapes_of(2, 1)
+    assert held.items() <= found.items() and found["b"] == pytest.approx(0.012, rel=0.3) and 15.0 <= found["teeth"] <= 80.0
+
+
 def test_only_what_strikes_is_looked_at(fitted):
     fit, _ = fitted
     assert list(striking(fit.model)) == [(2, 1)]
