@@ -14,7 +14,7 @@ import numpy as np
 from . import rows as row
 from .deflection import Deflection
 from .model import Model
-from .projection import inverted, prior_hessian
+from .projection import Projection, prior_hessian
 
 # How far about what was found, by how many values, and how far the other values: from one to the next of the first it is as far as
 # from end to end of the next.
@@ -73,7 +73,7 @@ def struck(found, motion, weights, solved, *, wide: bool):
             tally[place] = tally.get(place, 0) + len(sets)
             model = found.model
             for at in _highest(gains, sets):  # slopes have it nearly as it is
-                moved = solved(_with(model, own, sets[at]))
+                moved = solved(model.with_some_shapes(dict(zip(own, sets[at]))))
                 if moved is not None and moved.objective < found.objective:
                     found = moved
     return found, tally
@@ -104,11 +104,6 @@ def scatter(found, motion, weights) -> dict[int, float]:
     return out
 
 
-def _with(model: Model, own: list[int], values) -> Model:
-    at = dict(zip(own, map(float, values)))
-    return model.with_shapes([at.get(k, s) for k, s in enumerate(model.shapes)])
-
-
 def _sets(model: Model, own: list[int], far: float, count: int, others: float) -> np.ndarray | None:
     """Sets (sets, own) of values about those of the model, these first; of what does not strike yet from the least on that it may be,
     or None where only its neighbourhood is asked for."""
@@ -129,8 +124,8 @@ def _sets(model: Model, own: list[int], far: float, count: int, others: float) -
 def _link(found, motion, place: tuple[int, int], own: list[int]) -> tuple:
     """The model where the link follows its motor, and what the link would change if it stood apart from it."""
     model = found.model
-    idle = [v.shape.start if k in own and v.shape.start is not None else model.shapes[k] for k, v in enumerate(model.shape_values)]
-    idle = model.with_shapes(idle)
+    starts = {k: start for k in own if (start := model.shape_values[k].shape.start) is not None}
+    idle = model.with_some_shapes(starts)
     return idle, row.bent(idle, motion, found.x, place[1])
 
 
@@ -138,12 +133,12 @@ def _tried(found, motion, weights, place: tuple[int, int], own: list[int], sets:
     """Gains (sets, rows), whose sum over rows is what the objective falls by where values stand in the place of the first ones, which
     are the model's, everything linear solved for."""
     model, rows, (term, joint) = found.model, found.rows, place
-    scale = 2.0 * (np.ones(model.robot.dof) if weights is None else np.asarray(weights, dtype=float)) ** 2
+    weights = np.ones(model.robot.dof) if weights is None else np.asarray(weights, dtype=float)
     names, held = [model.shape_values[k].shape.name for k in own], model.shapes_of(term, joint)
     asked = [{**held, **dict(zip(names, map(float, at)))} for at in sets]
     (idle, known), effect = link, model.terms[term][0]
     residual = rows.residual(found.x).T
-    inverse = inverted(sum(w * a.T @ a for w, a in zip(scale, rows.columns)) + prior_hessian(found))
+    inverse, scale = Projection(rows.columns, residual.T, prior_hessian(found), weights).inverse, 2.0 * weights**2
     gains, here = [], None
     for some in np.array_split(np.arange(len(asked)), -(-len(asked) // _TOGETHER)):  # alike: of few each would be made by itself
         change = row.secants(idle, motion, known, effect, [asked[k] for k in some], found.stride, rows.use)

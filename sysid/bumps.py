@@ -96,7 +96,6 @@ def _left(rows: Rows, kind: np.ndarray) -> np.ndarray:
 
 def _surprise(size, use, piece, step: float) -> np.ndarray:
     """How surprising (n,) sizes are among those that count; less than nothing where none does."""
-
     out = np.full(len(size), -1.0)
     if use.sum() < _FEWEST:
         return out

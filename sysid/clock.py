@@ -119,7 +119,6 @@ def _lowest(t, told: list[np.ndarray], bands: list[float], density: float, step:
 
     A short fast move, too seldom to count in the whole log, is told from the clock by its spectrum:
     the clock's is even, of `density` [s^2], a move's falls with frequency."""
-
     late, below = told[0], np.full(len(t), bands[0])
     to_end, still = np.minimum(t - t[0], t[-1] - t), np.ones(len(t), bool)
     for k, band in enumerate(bands[1:], 1):

@@ -24,7 +24,6 @@ def jumps(tau, reach: int) -> np.ndarray:
     the steps L rows earlier and later, which a torque that bends smoothly makes as well; out of
     the ordinary among all of its log.
     """
-
     out = np.zeros(tau.shape, dtype=bool)
     length = max(1, reach // 2)
     if len(tau) < 16 * length:

@@ -232,8 +232,7 @@ def _finite(model: Model, pieces: list, term: int, joint: int) -> Model:
     where, sets = _sets([values[k].shape.values(values[k].low, values[k].high) for k in own])
     nearest = sets[np.argsort(np.abs(where - np.median(where, axis=0)).sum(1), kind="stable")]
     for at in [[model.shapes[k] for k in own], *nearest]:
-        moved = dict(zip(own, map(float, at)))
-        tried = model.with_shapes([moved.get(k, s) for k, s in enumerate(model.shapes)])
+        tried = model.with_some_shapes(dict(zip(own, at)))
         try:
             for piece in pieces:
                 effect.columns(piece, joint, **tried.shapes_of(term, joint))

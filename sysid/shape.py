@@ -182,7 +182,7 @@ def _from_tries(found: Settled, motion: Motion, term: int, joint: int, weights) 
     if not max(gains) > 0:
         return None, len(tried)
     best = {own[name]: at for name, at in tried[int(np.argmax(gains))].items()}
-    return model.with_shapes([best.get(k, s) for k, s in enumerate(model.shapes)]), len(tried)
+    return model.with_some_shapes(best), len(tried)
 
 
 def _descended(best: Settled, motion: Motion, solved, weights, tolerance: float) -> Settled:

@@ -63,7 +63,7 @@ class Search:
             found, sets = multistart.places(rough, fine, tried, [fine.here, asked])
             count += sets
             for place in found[:_SOLVED]:
-                best = _lower(best, self.solved(_placed(best.model, own, place.values)), 0.0)
+                best = _lower(best, self.solved(best.model.with_some_shapes(dict(zip(own, place.values)))), 0.0)
         return best, count
 
     def _seen(self, best, block: Block, pinned: bool, rows: int | None = None):
@@ -103,12 +103,12 @@ class Search:
             seen = self._seen(best, block, pinned)
             place, counts = multistart.lower_on_profile(seen, _tried(best.model, own), _LOWER)
             if place is not None:
-                best = self._gone_on(best, self.solved(_placed(best.model, own, place.values)))
+                best = self._gone_on(best, self.solved(best.model.with_some_shapes(dict(zip(own, place.values)))))
         return best, counts
 
     def _along_value(self, best, k: int, value) -> tuple:
         values = np.linspace(value.low, value.high, _POINTS)
-        found = [self.solved(_placed(best.model, [k], [at])) for at in values]
+        found = [self.solved(best.model.with_some_shapes({k: at})) for at in values]
         lowest = min((f for f in found if f is not None), key=lambda f: f.objective, default=None)
         return self._gone_on(best, lowest), _POINTS
 
@@ -147,8 +147,3 @@ def _tried(model: Model, own: list[int]) -> list[np.ndarray]:
     values = [model.shape_values[k] for k in own]
     angle = None if model.scales is None else float(model.scales.angle[values[0].joint])
     return [np.asarray(v.shape.values(v.low, v.high, angle), dtype=float) for v in values]
-
-
-def _placed(model: Model, own: list[int], values) -> Model:
-    at = dict(zip(own, map(float, values)))
-    return model.with_shapes([at.get(k, s) for k, s in enumerate(model.shapes)])

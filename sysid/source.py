@@ -70,8 +70,8 @@ class Source:
             if apart := not moves and not (own & model.robot.carried(joint)).any():
                 bodies, rest = np.split(x, [10 * model.bodies])
                 x = np.concatenate([np.where(own.repeat(10), bodies, 0.0), rest])
-            for piece, known in zip(self._whole, self.bent(joint)):
-                base = self._torque(model, piece, x)
+            bases = [self._torque(model, p, x) for p in self._whole] if apart else self._base
+            for piece, base, known in zip(self._whole, bases, self.bent(joint)):
                 slopes = -known.slopes if apart else np.zeros_like(known.slopes)
                 for k, (name, nudge) in enumerate(zip(("q", "qd", "qdd"), row.NUDGES)):
                     moved = {"q": piece.q.copy(), name: getattr(piece, name).copy()}
@@ -126,6 +126,15 @@ class Source:
             for joint in joints if isinstance(effect, SensorEffect) else ():
                 model = model.without(effect.name, joint)
         return model
+
+    @cached_property
+    def _base(self) -> list[np.ndarray]:
+        plain = self._unsensed is self.model
+        return (
+            self.unfiltered
+            if plain
+            else [self._torque(self._unsensed, piece, self.x) for piece in self._whole]
+        )
 
     def _torque(self, model: Model, piece: Piece, x: np.ndarray) -> np.ndarray:
         bodies, rest = np.split(x, [10 * model.bodies])

@@ -19,8 +19,7 @@ def without_standstill(piece: Piece, threshold, reach: int) -> Piece:
 
     A filter that sees so far carries standstill into them.
     """
-    use = _apart(np.abs(piece.qd) < threshold, reach)
-    return replace(piece, use=use if piece.use is None else use & piece.use)
+    return _without(piece, np.abs(piece.qd) < threshold, reach)
 
 
 def clear_of_reversals(pieces, spec: PreprocessSpec) -> list[Piece]:
@@ -39,8 +38,7 @@ def clear_of_reversals(pieces, spec: PreprocessSpec) -> list[Piece]:
         smoother = Smoother(spec, piece.step)
         piece = replace(piece, blur=Blur(*smoother.smear(piece.smoother is not None), smoother.reach))
         still = _may_stand(piece, piece.qd, piece.qdd, piece.noise) | jumps(piece.measured, smoother.reach)
-        use = _apart(still, piece.blur.reach)
-        out.append(replace(piece, use=use if piece.use is None else use & piece.use))
+        out.append(_without(piece, still, piece.blur.reach))
     return out
 
 
@@ -59,6 +57,11 @@ def _may_stand(piece: Piece, qd, qdd, noise) -> np.ndarray:
     seen = (2 * piece.blur.look + 1) * piece.step
     threshold = np.maximum(piece.blur.stop * _largest_about(qdd, piece.blur.look), NOISE_TRAVEL * noise / seen)
     return turns(qd) | (np.abs(qd) < threshold)
+
+
+def _without(piece: Piece, still: np.ndarray, reach: int) -> Piece:
+    use = _apart(still, reach)
+    return replace(piece, use=use if piece.use is None else use & piece.use)
 
 
 def _apart(still: np.ndarray, reach: int) -> np.ndarray:

@@ -172,6 +172,10 @@ class Terms:
         """The model with other shape values."""
         return replace(self, shapes=tuple(float(v) for v in values))
 
+    def with_some_shapes(self, at: Mapping[int, float]) -> Self:
+        """The model with other values of some shape values, by their numbers."""
+        return self.with_shapes([at.get(k, s) for k, s in enumerate(self.shapes)])
+
     def with_reference(self, pi) -> Self:
         """The model with other bodies behind its `load`."""
         return replace(self, reference=np.array(pi), _links={})

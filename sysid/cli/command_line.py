@@ -123,9 +123,7 @@ def progress_of(silent: bool, fits: int = 1, *, asks: bool = False):
     Args:
         fits, asks: what the command does, as far as is known; see `progress.Course`.
     """
-    # what is imported stays, and little of the rest refers to itself: to look for it is a twentieth of a diagnosis
-    gc.freeze()
-    gc.set_threshold(20_000, 20)
+    gc.freeze()  # what is imported stays: to look through it again and again is a twentieth of a diagnosis
     if silent or sys.stderr is None:
         yield None
         return
