@@ -101,8 +101,7 @@ def columns_of(source, candidate: Candidate, shapes: list[dict[str, float]]) -> 
     if candidate.nonlinear:
         return _stacked([_moved(source, candidate, own) for own in shapes])
     asked = (source.model, source.motion, source.pieces, candidate.effect, candidate.joint, shapes)
-    found = row.signatures_where_finite(*asked, source.stride, source.use)
-    return _stacked([values[None] if values.ndim == 2 else values for values in found])
+    return row.signatures_where_finite(*asked, source.stride, source.use)
 
 
 def _stacked(found: Sequence[np.ndarray]) -> np.ndarray:

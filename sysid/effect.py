@@ -15,6 +15,7 @@ from __future__ import annotations
 import copy
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
+from functools import cache
 from types import MappingProxyType
 from typing import ClassVar
 
@@ -80,11 +81,11 @@ class Effect(ABC):
 
     def coefficients(self) -> tuple[Linear, ...]:
         """The linear coefficients, in the order of the columns."""
-        return self._declared(Linear)
+        return _declared(type(self), Linear)
 
     def shapes(self) -> tuple[Shape, ...]:
         """The values that it is not linear in."""
-        return self._declared(Shape)
+        return _declared(type(self), Shape)
 
     def sized(self, motion: Piece, rows: int, joint: int) -> tuple[Shape, ...] | None:
         """`shapes()` with the bounds that a motion gives them on a joint, in plain units; None where they say so themselves.
@@ -93,12 +94,6 @@ class Effect(ABC):
             motion: some rows of the motion, then as many, the rows after each. rows: how many it has in all.
         """
         return None
-
-    def _declared(self, what: type) -> tuple:
-        """What a class and those it derives from declare, these first."""
-        # copies: Python itself adds to a class that is asked for its annotations in another thread
-        found = {name: value for kind in reversed(type(self).__mro__) for name, value in dict(vars(kind)).items()}
-        return tuple(value for value in found.values() if isinstance(value, what))
 
     def given(self, **options) -> Effect:
         """This effect with the options that an experiment file gives it.
@@ -139,6 +134,14 @@ class Effect(ABC):
         return []
 
 
+@cache
+def _declared(kind: type[Effect], what: type) -> tuple:
+    """What a class and those it derives from declare, these first."""
+    # copies: Python itself adds to a class that is asked for its annotations in another thread
+    found = {name: value for one in reversed(kind.__mro__) for name, value in dict(vars(one)).items()}
+    return tuple(value for value in found.values() if isinstance(value, what))
+
+
 class TorqueEffect(Effect):
     """An effect that adds torque to one joint."""
 
@@ -157,9 +160,9 @@ class TorqueEffect(Effect):
         them is none, friction may have any value up to its greatest, and such rows say nothing of it."""
         return np.zeros((0, dof))
 
-    def columns_at(self, motion: Piece, joint: int, tried: list[dict[str, float]]) -> list[np.ndarray]:
-        """`columns` at several sets of shape values."""
-        return [self.columns(motion, joint, **shapes) for shapes in tried]
+    def columns_at(self, motion: Piece, joint: int, tried: list[dict[str, float]]) -> np.ndarray:
+        """`columns` (tried, k, n) at several sets of shape values."""
+        return np.stack([self.columns(motion, joint, **shapes) for shapes in tried])
 
 
 class WrenchEffect(Effect):

@@ -231,32 +231,34 @@ def signature(model: Model, motion: Motion, pieces: list, effect, joint: int, sh
         pieces: `seen(model, motion)`. joint: its joint, -1 for the robot. use: (n, dof) bool.
     """
     (out,) = signatures(model, motion, pieces, effect, joint, [shapes], stride, use)
-    return out
+    return out[0] if joint >= 0 else out
 
 
-def signatures(model: Model, motion: Motion, pieces: list, effect, joint: int, tried: list[dict], stride: int, use: np.ndarray) -> list[np.ndarray]:
-    """`signature` at several shape values at once."""
-    out = []
+def signatures(model: Model, motion: Motion, pieces: list, effect, joint: int, tried: list[dict], stride: int, use: np.ndarray) -> np.ndarray:
+    """`signature` at several shape values at once, (tried, joints, n, k): its own joint's or every joint's. In memory samples come last,
+    as a product with them wants it."""
+    out, joints = [], range(model.robot.dof) if joint < 0 else [joint]
     for piece, part, rows in zip(motion.pieces, pieces, starts(motion, stride)):
-        # (joints, tried k, n): everything that follows is linear and the same for each
-        values = [effect.columns(part, model.robot, **shapes) for shapes in tried] if joint < 0 else effect.columns_at(part, joint, tried)
-        stacked = np.concatenate([v if v.ndim == 3 else v[None] for v in values], axis=1)
-        joints = range(model.robot.dof) if joint < 0 else [joint]
-        read = [model.sensed(entry, piece, j) for entry, j in zip(stacked, joints)]
-        out.append(np.stack([piece.settled(entry, rows, j) for j, entry in zip(joints, read)]))
-    joined = np.concatenate(out, axis=-1)  # samples stay last in memory, as a product with them wants it
-    joined *= use[:, joint] if joint >= 0 else use.T[:, None]
-    joined = np.swapaxes(joined, 1, 2)
-    k = joined.shape[2] // len(tried)
-    return [joined[0, :, i : i + k] if joint >= 0 else joined[:, :, i : i + k] for i in range(0, k * len(tried), k)] if k else [joined] * len(tried)
+        if joint < 0:
+            values = np.stack([effect.columns(part, model.robot, **shapes) for shapes in tried], axis=1)
+        else:
+            values = effect.columns_at(part, joint, tried)[None]
+        # (joints, tried, k, n): everything that follows is linear and the same for each
+        sets, count = values.shape[1:3], values.shape[-1]
+        read = [model.sensed(own.reshape(-1, count), piece, j) for j, own in zip(joints, values)]
+        kept = [piece.settled(own, rows, j) for j, own in zip(joints, read)]
+        out.append((np.stack(kept) if len(kept) > 1 else kept[0]).reshape(len(kept), *sets, kept[0].shape[-1]))
+    joined = np.concatenate(out, axis=-1) if len(out) > 1 else out[0]
+    counts = use[:, joints].T[:, None, None]
+    return np.transpose(joined if counts.all() else joined * counts, (1, 0, 3, 2))
 
 
-def signatures_where_finite(model: Model, motion: Motion, pieces: list, effect, joint: int, tried: list[dict], stride: int, use: np.ndarray) -> list[np.ndarray]:
+def signatures_where_finite(model: Model, motion: Motion, pieces: list, effect, joint: int, tried: list[dict], stride: int, use: np.ndarray) -> np.ndarray:
     """`signatures`, NaN at shape values where the effect is no finite number."""
     try:
         return signatures(model, motion, pieces, effect, joint, tried, stride, use)
     except NotFinite:
         if len(tried) > 1:
-            return [own for at in tried for own in signatures_where_finite(model, motion, pieces, effect, joint, [at], stride, use)]
-        size = len(use), len(effect.coefficients())
-        return [np.full(size if joint >= 0 else (model.robot.dof, *size), np.nan)]
+            return np.concatenate([signatures_where_finite(model, motion, pieces, effect, joint, [at], stride, use) for at in tried])
+        size = model.robot.dof if joint < 0 else 1, len(use), len(effect.coefficients())
+        return np.full((1, *size), np.nan)

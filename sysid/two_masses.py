@@ -152,14 +152,14 @@ def flown(load, inertia, step: float, *, b, teeth) -> np.ndarray:
     found[0] = d
     driven *= h**2
     part = np.arange(fine)[:, None] / fine
-    for k, (first, more) in enumerate(zip(driven[:-1], np.diff(driven, axis=0)), 1):
-        for push in first + part * more:
+    force, drag = held
+    for k, pushes in enumerate(driven[:-1, None] + part * np.diff(driven, axis=0)[:, None], 1):
+        for push in pushes:
             np.maximum(d, least, out=into)
             np.minimum(into, half, out=into)
             np.subtract(d, into, out=into)
             np.multiply(state, both, out=held)
-            force = held[0]
-            force += held[1]
+            force += drag
             force *= force * into > 0.0  # teeth never pull
             v += push
             v -= force

@@ -157,7 +157,7 @@ def test_columns_that_are_mostly_noise_make_no_group():
     view = viewed(p)
     own = rng.normal(size=(1, 2, 240, 1))
     candidate = grouped(view, own)[0].candidate
-    group = lambda share: projected._made(view, [(candidate, {})], [0, 1], own, own + share * rng.normal(size=own.shape))  # noqa: E731
+    group = lambda share: projected.made(view, [(candidate, {})], [0, 1], own, own + share * rng.normal(size=own.shape))  # noqa: E731
     assert len(group(0.3)) == 1 and group(0.8) == []
 
 

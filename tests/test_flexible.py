@@ -12,7 +12,7 @@ from scipy.stats import binom
 from sysid import blocks
 from sysid.diagnose.functions import law
 from sysid.diagnose.select import LEVEL, WORTH
-from sysid.flexible import Law, Unknown, pasts, products, unknown
+from sysid.flexible import Law, Unknown, functions, pasts, products, ridge, unknown
 from sysid.statement.document import dependences
 from sysid.statement.words import followed, quantity
 from tests.evidences import viewed
@@ -295,3 +295,18 @@ def test_a_function_alone_is_said_with_its_variables():
     (entry,) = dependences(seen)
     assert entry == {"variable": "q_elbow", "with": "q_shoulder", "share": pytest.approx(0.4)}
     assert followed(entry, quantity) == "the position of elbow with the position of shoulder"
+
+
+@pytest.mark.parametrize("law", ["an angle", "the past speed", "noise"])
+def test_ridges_are_climbed_to_the_one_that_a_look_at_all_of_them_finds(law, monkeypatch):
+    rng = np.random.default_rng(4)
+    y = rng.normal(size=N) + (0.0 if law == "noise" else LAWS[law][0](KNOWN) / np.std(LAWS[law][0](KNOWN)))
+    use, spans = np.ones(N, bool), ridge.stretches(FOLD, KNOWN["time"], np.zeros(N, int))
+    every = functions.groups(KNOWN, "elbow", np.zeros(N, int), STEP, rng)["*"]
+    asked, solved = [], ridge._solved
+    monkeypatch.setattr(ridge, "_solved", lambda system, ridges, right: asked.append(len(ridges)) or solved(system, ridges, right))
+    climbed, few = ridge.predicted(every, y, use, spans), sum(asked)
+    monkeypatch.setattr(ridge, "_FIRST", tuple(range(len(ridge._RIDGES))))
+    for found, best in zip(climbed, ridge.predicted(every, y, use, spans)):
+        np.testing.assert_allclose(found, best, atol=1e-9 * N)
+    assert few <= 0.7 * len(ridge._RIDGES) * len(spans)

@@ -29,27 +29,26 @@ def groups(view: View, candidates: Sequence[Candidate]) -> list[Group]:
 def groups_at(view: View, asked: Sequence[Asked]) -> list[Group]:
     """The groups of candidates at shape values; those on the same joints with as many columns are
     made together."""
-    dof, alike = view.model.robot.dof, {}
+    sources, alike, out = (view.rough_source, view.source), {}, []
+
+    def together(key) -> list[Group]:
+        names, *values = zip(*alike.pop(key))
+        return made(view, sum(names, []), key[0], *map(np.concatenate, values[::-1]))
+
     for candidate, found in groupby(asked, key=lambda one: one[0]):
-        own = [shapes for _, shapes in found]
-        # the rough one first: what it integrates step by step it does for both
-        rough, plain = (columns_of(s, candidate, own) for s in (view.rough_source, view.source))
-        key = (tuple(candidate.touches(dof)), plain.shape[3])
-        alike.setdefault(key, []).append(([(candidate, shapes) for shapes in own], plain, rough))
-    out = []
-    for (joints, _), parts in alike.items():
-        names = [one for part in parts for one in part[0]]
-        out += made(view, names, joints, *(np.concatenate([p[i] for p in parts]) for i in (1, 2)))
-    return out
+        every = list(found)
+        for own in (every[some : some + _BATCH] for some in range(0, len(every), _BATCH)):
+            # the rough one first: what it integrates step by step it does for both
+            rough, plain = (columns_of(s, candidate, [at for _, at in own]) for s in sources)
+            key = tuple(candidate.touches(view.model.robot.dof)), plain.shape[3]
+            alike.setdefault(key, []).append((own, rough, plain))
+            if sum(len(part[0]) for part in alike[key]) >= _BATCH:
+                out += together(key)
+    return out + [group for key in list(alike) for group in together(key)]
 
 
-def made(view: View, asked: Sequence, joints: Sequence[int], plain, rough) -> list[Group]:
+def made(view: View, asked, joints: Sequence[int], plain: np.ndarray, rough) -> list[Group]:
     """Groups of columns (asked, joints, n, k) on the motion, and on the rough one."""
-    parts = [slice(some, some + _BATCH) for some in range(0, len(asked), _BATCH)]
-    return [g for p in parts for g in _made(view, asked[p], joints, plain[p], rough[p])]
-
-
-def _made(view: View, asked, joints, plain: np.ndarray, rough: np.ndarray) -> list[Group]:
     design, sums, spans = view.design, view.sums, by_block(view.blocks)
     count, _, n, k = plain.shape
     size, kk, parts = design.columns.shape[2], count * k, len(sums.scores)  # a prior has no columns

@@ -1,7 +1,5 @@
 """Torque ripple over the angle."""
 
-import math
-
 import numpy as np
 
 from ..effect import TorqueEffect
@@ -57,10 +55,12 @@ class Cogging(TorqueEffect):
 
     def columns_at(self, motion, joint, tried):
         k = np.array([shapes["k"] for shapes in tried])
-        size = math.isqrt(len(k))
-        if self.lines > 1 or size < 2 or np.ptp(np.diff(k)) > _EVEN * np.ptp(k):
+        if self.lines > 1 or len(k) < 3 or np.ptp(np.diff(k)) > _EVEN * np.ptp(k):
             return super().columns_at(motion, joint, tried)
-        # each of an even grid is a coarse step and a fine one, whose turns multiply
-        turned = lambda values: np.exp(1j * values[:, None] * motion.q[:, joint])  # noqa: E731
-        coarse, fine = turned(k[::size]), turned(k[:size] - k[0])
-        return [np.stack([turn.imag, turn.real]) for one in coarse for turn in one * fine][: len(k)]
+        # each of an even grid is the one before, turned further
+        turn, further = (np.exp(1j * by * motion.q[:, joint]) for by in (k[0], np.ptp(k) / (len(k) - 1)))
+        out = np.empty((len(k), 2, len(turn)))
+        for own in out:
+            own[0], own[1] = turn.imag, turn.real
+            turn *= further
+        return out

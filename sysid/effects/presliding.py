@@ -25,20 +25,26 @@ class Presliding(TorqueEffect):
     x0 = Shape("rad", 0.0005, 0.1, of="angle", says="angle over which friction builds up")
 
     def columns(self, motion, joint, x0):
+        return self.columns_at(motion, joint, [{"x0": x0}])[0]
+
+    def columns_at(self, motion, joint, tried):
         moves = np.diff(motion.q[:, joint], prepend=motion.q[:1, joint])
         way = np.sign(moves)
         # a sample that stands still belongs to the stretch before it
         moving = np.flatnonzero(way)
         if not len(moving):
-            return np.zeros((1, len(way)))
+            return np.zeros((len(tried), 1, len(way)))
         way = way[moving[np.maximum(np.searchsorted(moving, np.arange(len(way)), side="right") - 1, 0)]]
         first = np.flatnonzero(np.diff(way, prepend=0.0))
         travelled = np.cumsum(np.abs(moves))
         begun = np.concatenate([[0.0], travelled[first[1:] - 1]])
-        z, starts = 0.0, []
-        for direction, kept in zip(way[first].tolist(), np.exp(-np.diff(begun, append=travelled[-1]) / x0).tolist()):
-            starts.append(z)
-            z = direction + (z - direction) * kept
-        count = np.diff(first, append=len(way))
-        start, since = np.repeat(starts, count), travelled - np.repeat(begun, count)
-        return (way + (start - way) * np.exp(-since / x0))[None]
+        strokes, count = np.diff(begun, append=travelled[-1]), np.diff(first, append=len(way))
+        since, ways, out = travelled - np.repeat(begun, count), way[first].tolist(), []
+        for x0 in (shapes["x0"] for shapes in tried):
+            z, starts = 0.0, []
+            for direction, kept in zip(ways, np.exp(-strokes / x0).tolist()):
+                starts.append(z)
+                z = direction + (z - direction) * kept
+            start = np.repeat(starts, count)
+            out.append((way + (start - way) * np.exp(-since / x0))[None])
+        return np.stack(out)

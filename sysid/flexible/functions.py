@@ -55,7 +55,9 @@ def of_unit_size(values: np.ndarray, use) -> tuple[np.ndarray, np.ndarray]:
     kept = np.where(use[:, None], values, 0.0)
     square = np.einsum("nk,nk->k", kept, kept) / len(kept)
     which = np.flatnonzero(square - kept.mean(0) ** 2 > 1e-12 * square)
-    return kept[:, which] / np.sqrt(square[which]), which
+    kept = kept if len(which) == len(square) else kept[:, which]
+    kept /= np.sqrt(square[which])
+    return kept, which
 
 
 def _both_ways(values: np.ndarray, direction: np.ndarray) -> np.ndarray:

@@ -11,8 +11,8 @@ _APART = (
     0.15  # s, several memories of the filters: what is predicted, and what it is predicted from
 )
 _RIDGES = np.geomspace(1e-3, 30.0, 10)
+_FIRST = (1, 4, 7)  # of these: each of the others stands beside one that is tried, or beyond
 _MANY = 64  # columns from which on a factor for each ridge costs less than the eigenvalues for all
-_LEAST = 0.1  # of the least ridge: a direction with less is a tenth at most of what it would be
 
 
 def stretches(fold, t, piece) -> list[tuple[np.ndarray, np.ndarray]]:
@@ -37,23 +37,33 @@ def predicted(features, y, use, spans) -> tuple[np.ndarray, np.ndarray]:
     if not scaled.shape[1]:
         return np.zeros(len(y)), np.zeros(len(spans))
     ridges = _RIDGES * len(y) / len(_RIDGES)
-    values, vectors = np.linalg.eigh(scaled.T @ scaled)
-    large = values > _LEAST * ridges[0]
-    scaled = scaled @ vectors[:, large]
-    system, right = np.diag(values[large]), scaled.T @ y
-    gains, all_told = np.zeros((len(ridges), len(spans))), np.zeros((len(ridges), len(y)))
-    for f, (rows, near) in enumerate(spans):
-        here = scaled[near]
-        own, pull = system - here.T @ here, right - here.T @ y[near]
-        told = (scaled[rows] @ _solved(own, ridges, pull)).T
-        all_told[:, rows] = told
-        gains[:, f] = np.sum(2.0 * told * y[rows] - told**2, axis=1)
-    # the ridge of a fold is the one that serves the other folds best
-    chosen = [int(np.argmax(gains.sum(1) - gains[:, f])) for f in range(len(spans))]
+    whole, right = scaled.T @ scaled, scaled.T @ y
+    folds = [
+        (whole - (here := scaled[near]).T @ here, right - here.T @ y[near], scaled[rows])
+        for rows, near in spans
+    ]
+    gains, all_told = np.full((len(ridges), len(spans)), -np.inf), np.zeros((len(ridges), len(y)))
+
+    def tell(which: list[int]):
+        for f, ((rows, _), (system, pull, own)) in enumerate(zip(spans, folds)):
+            told = (own @ _solved(system, ridges[which], pull)).T
+            all_told[np.ix_(which, rows)] = told
+            gains[which, f] = np.sum(2.0 * told * y[rows] - told**2, axis=1)
+
+    # more ridge serves better up to some, and worse from there: up the hill from several
+    more, known = list(_FIRST) if len(whole) >= _MANY else list(range(len(ridges))), set()
+    while more:
+        tell(more)
+        known |= set(more)
+        # the ridge of a fold is the one that serves the other folds best
+        others = gains.sum(1)[:, None] - np.where(np.isfinite(gains), gains, 0.0)
+        chosen = np.argmax(others, axis=0)
+        beside = {int(at) + step for at in chosen for step in (-1, 1)}
+        more = sorted(beside & set(range(len(ridges))) - known)
     told = np.zeros(len(y))
     for i, (rows, _) in zip(chosen, spans):
         told[rows] = all_told[i, rows]
-    return told, np.array([gains[i, f] for f, i in enumerate(chosen)])
+    return told, gains[chosen, np.arange(len(spans))]
 
 
 def _solved(system, ridges, right) -> np.ndarray:
