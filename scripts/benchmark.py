@@ -23,7 +23,7 @@ robots  A robot of a fleet with a long log of that arm, 0.3 and 0.9 million samp
         comes back of it; and the comparison of a thousand robots. What docs/scale.md counts a large fleet's cost by.
 peaks   Peak memory of `fit`, `compare`, `diagnose` and `check` on 0.7 million samples of that arm and on --samples.
 diagnose  The whole `sysid diagnose configs/cheetah3.yaml` process, the whole catalogue on every joint, over `sysid fit` on
-        the same experiment, in turns. At most 10 is the aim.
+        the same experiment, in turns. At most 3 is the aim.
 torque  `torque(q, qd, qdd)` of a seven-joint arm with viscous and Coulomb friction beside a bare `pin.rnea` of its bodies, one
         sample a call, in turns; and a million samples at once, per sample. Processor time of one thread.
 cpu     Processor time of `sysid.fit` and `sysid.write` in a Python process over that of the command `sysid fit`, with nothing

@@ -182,7 +182,8 @@ def bent(model: Model, motion: Motion, x, joint: int, pieces: list | None = None
         pieces: `seen(model, motion)`, where it is at hand.
     """
     pi, out = np.asarray(x)[: 10 * model.bodies].reshape(-1, 10), []
-    own = np.where(model.robot.carried(joint)[:, None], pi, 0.0)
+    carried = model.robot.carried(joint)
+    own, alone = np.where(carried[:, None], pi, 0.0), not (carried & model.robot.turned(joint)).any()
     for part in seen(model, motion) if pieces is None else pieces:
         needed = lambda behind: regressor.torque(model.robot, own, part.q, part.qd, part.qdd, gravity=part.gravity, deflection=behind)  # noqa: B023, E731
         base, slopes = needed(part.deflection), []
@@ -191,7 +192,9 @@ def bent(model: Model, motion: Motion, x, joint: int, pieces: list | None = None
             behind[order, :, joint] += nudge
             slopes.append((needed(behind) - base).T / nudge)
         inertia = -slopes[-1][joint]  # of the link alone: its rotor stays with the motor
-        out.append(Bent(np.stack(slopes), link_load(model.robot, pi, part, joint), inertia, part))
+        plain = alone and part.deflection is None and part.gravity is None
+        load = base[:, joint] if plain else link_load(model.robot, pi, part, joint)
+        out.append(Bent(np.stack(slopes), load, inertia, part))
     return out
 
 

@@ -10,11 +10,12 @@ from .effect import Effect, kind
 from .errors import ConfigError
 
 
-def vocabulary() -> list[str]:
+@cache
+def vocabulary() -> tuple[str, ...]:
     """The names of all effects: the modules of `effects/`."""
     from . import effects
 
-    return sorted(module.name for module in iter_modules(effects.__path__))
+    return tuple(sorted(module.name for module in iter_modules(effects.__path__)))
 
 
 @cache

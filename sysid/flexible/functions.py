@@ -52,12 +52,17 @@ def groups(
 def of_unit_size(values: np.ndarray, use) -> tuple[np.ndarray, np.ndarray]:
     """Functions (n, k) at rows that count (n,), zero at others, each with a mean square of one; and
     which they are, without those that say nothing there."""
-    kept = np.where(use[:, None], values, 0.0)
+    kept, which, size = that_say_something(values, use)
+    return kept[:, which] / size, which
+
+
+def that_say_something(values: np.ndarray, use) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Functions (n, k) at rows that count (n,), zero at others; which of them are no constant
+    there, and the root of the mean square of each of these."""
+    kept = values if use.all() else np.where(use[:, None], values, 0.0)
     square = np.einsum("nk,nk->k", kept, kept) / len(kept)
     which = np.flatnonzero(square - kept.mean(0) ** 2 > 1e-12 * square)
-    kept = kept if len(which) == len(square) else kept[:, which]
-    kept /= np.sqrt(square[which])
-    return kept, which
+    return kept, which, np.sqrt(square[which])
 
 
 def _both_ways(values: np.ndarray, direction: np.ndarray) -> np.ndarray:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.linalg.lapack import dposv
 
-from .functions import of_unit_size
+from .functions import that_say_something
 
 _APART = (
     0.15  # s, several memories of the filters: what is predicted, and what it is predicted from
@@ -33,20 +33,26 @@ def stretches(fold, t, piece) -> list[tuple[np.ndarray, np.ndarray]]:
 def predicted(features, y, use, spans) -> tuple[np.ndarray, np.ndarray]:
     """What ridge regression predicts (n,) of the rows of each fold from rows apart from it, and its
     gain (folds,)."""
-    scaled, _ = of_unit_size(features, use)
-    if not scaled.shape[1]:
+    kept, which, size = that_say_something(features, use)
+    if not len(which):
         return np.zeros(len(y)), np.zeros(len(spans))
+    kept = kept if len(which) == kept.shape[1] else kept[:, which]
     ridges = _RIDGES * len(y) / len(_RIDGES)
-    whole, right = scaled.T @ scaled, scaled.T @ y
+    whole, right = kept.T @ kept, kept.T @ y
+    sizes = np.outer(size, size)  # in functions of unit size a ridge is the same for all
     folds = [
-        (whole - (here := scaled[near]).T @ here, right - here.T @ y[near], scaled[rows])
+        (
+            (whole - (here := kept[near]).T @ here) / sizes,
+            (right - here.T @ y[near]) / size,
+            kept[rows],
+        )
         for rows, near in spans
     ]
     gains, all_told = np.full((len(ridges), len(spans)), -np.inf), np.zeros((len(ridges), len(y)))
 
     def tell(which: list[int]):
         for f, ((rows, _), (system, pull, own)) in enumerate(zip(spans, folds)):
-            told = (own @ _solved(system, ridges[which], pull)).T
+            told = (own @ (_solved(system, ridges[which], pull) / size[:, None])).T
             all_told[np.ix_(which, rows)] = told
             gains[which, f] = np.sum(2.0 * told * y[rows] - told**2, axis=1)
 

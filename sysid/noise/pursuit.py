@@ -47,11 +47,10 @@ class Functions:
         target = np.concatenate([block(v * k, m) for v, k, m in zip(y, kept, self.thin)])
         target /= np.maximum(weight, _TINY)
         waves = ripples(self.coarse.q[:, self.joint], target * weight)
-        x = np.stack([f() for f in functions(self.coarse, self.joint, waves)], axis=1)
-        root = np.sqrt(weight)[:, None]
-        x, target = x * root, target * root[:, 0]
-        norm = np.sqrt(np.mean(x**2, axis=0)) + _TINY
-        chosen, weights = _pursuit(x / norm, target, self.most)
+        root = np.sqrt(weight)
+        x = root * [f() for f in functions(self.coarse, self.joint, waves)]
+        norm = np.sqrt(np.mean(x**2, axis=1)) + _TINY
+        chosen, weights = _pursuit((x / norm[:, None]).T, root * target, self.most)
         if not chosen:
             return y, 0, 0.0
         every = functions(self.motion, self.joint, waves)
