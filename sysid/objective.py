@@ -78,7 +78,7 @@ class Objective:
 
 
 # Of the stiffest direction in which data pull a body: a known one gives way by 1e-8 of what a free one would.
-_STIFF = 1e8
+STIFF = 1e8
 
 
 def posed(triangle: np.ndarray, divergence: Divergence, weight: float, known: Sequence[int] = ()) -> Objective:
@@ -97,7 +97,7 @@ def posed(triangle: np.ndarray, divergence: Divergence, weight: float, known: Se
     stiff = np.zeros_like(metric)
     rows = np.zeros((10 * len(known), triangle.shape[1]))
     for k, b in enumerate(known):
-        own = np.sqrt(_STIFF * max(stiffest, np.finfo(float).tiny)) * factors[b].T
+        own = np.sqrt(STIFF * max(stiffest, np.finfo(float).tiny)) * factors[b].T
         rows[10 * k : 10 * k + 10, 10 * b : 10 * b + 10], rows[10 * k : 10 * k + 10, -1] = own, own @ prior[b]
         stiff[b] = 2.0 * own.T @ own
     merged = np.linalg.qr(np.concatenate([triangle, rows]), mode="r")

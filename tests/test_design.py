@@ -316,6 +316,29 @@ def test_what_a_poor_log_held_at_a_bound_the_next_fit_sets_free(poor, designed):
     assert told["coulomb.shoulder.Fc"]["now"] < 0.9 * whole["coulomb.shoulder.Fc"]["now"]
 
 
+def test_a_body_that_is_known_stays_so(poor, designed, monkeypatch):
+    """It has no deviation to lose, and what else is fitted is as sure as with its columns left out."""
+    plain = pipeline.load(poor[0])
+    known = plain.model_copy(update={"prior": plain.prior.model_copy(update={"known": ["lower"]})})
+    base, free = (basis.basis(one, [], lambda stage, share: None) for one in (known, plain))
+    new, heard = designing._fitted(base, designing._log(base, designed.t, designed.q, designed.torque)), designing._heard(base)
+    noises = []
+    hear = promise._noises  # the same noise: a body that is known wrongly leaves more
+    monkeypatch.setattr(promise, "_noises", lambda *how: (noises or noises.append(hear(*how)), noises[0])[1])
+    told = promise.deviations(base.fit, base.motion, new, heard)
+    own = {name for name in told if name.startswith("lower.")}
+    assert all(told[name]["after"] < 1e-3 * designed.deviations[name]["after"] for name in own & set(designed.deviations))
+    std = np.array([np.nan if name.startswith("lower.") else s for name, s in zip(base.fit.model.names, base.fit.uncertainty.std)])
+    without = replace(base.fit, known=None, uncertainty=replace(base.fit.uncertainty, std=std))
+    others = promise.deviations(without, base.motion, new, heard)
+    assert set(others) == set(told) - own and len(others) > 5
+    for name, s in others.items():
+        assert s["after"] == pytest.approx(told[name]["after"], rel=0.02), name
+    # nor does a motion that shows it count for more
+    first = base.fit.model.names.index("lower.m")
+    assert base.known.alone[first, first] == pytest.approx(1e8 * free.known.alone[first, first])
+
+
 def test_noise_is_heard_in_the_test_logs_too(poor):
     base = basis.basis(pipeline.load(poor[0]), [], lambda stage, share: None)
     heard, train = designing._heard(base), base.fit.predictions["train"]

@@ -154,7 +154,8 @@ def test_columns_come_in_stretches_of_rows_that_count(monkeypatch):
     assert replace(found[0], count=1).frequency[1] == pytest.approx(1.0 / 5.0)
 
 
-def test_the_likelihood_of_how_near_bodies_are_is_that_of_all_rows():
+@pytest.mark.parametrize("known", [[], [1]])
+def test_the_likelihood_of_how_near_bodies_are_is_that_of_all_rows(known):
     """Of 120 rows under a dense covariance in which coefficients are as good as unknown; one has no column."""
     rng = np.random.default_rng(3)
     n, k = 120, 3
@@ -166,8 +167,8 @@ def test_the_likelihood_of_how_near_bodies_are_is_that_of_all_rows():
     torque = bodies @ (prior + 0.3 * rng.standard_normal(20)) + own @ [5.0, 0.0, -2.0] + rng.standard_normal(n)
     rows = np.column_stack([bodies, own, torque])
     asked = np.array([0.1, 3.0, 100.0])
-    told = likely_prior.log_likelihood(*likely_prior.seen_of_bodies(triangle(rows), prior, metric), asked)
-    wide = block_diag(*np.linalg.inv(metric))
+    told = likely_prior.log_likelihood(*likely_prior.seen_of_bodies(triangle(rows), prior, metric, known), asked)
+    wide = block_diag(*(np.zeros((10, 10)) if b in known else np.linalg.inv(own) for b, own in enumerate(metric)))
     dense = [
         multivariate_normal(bodies @ prior, np.eye(n) + bodies @ wide @ bodies.T / one + 1e6 * own @ own.T).logpdf(torque) for one in asked
     ]

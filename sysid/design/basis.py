@@ -18,6 +18,7 @@ from ..log import Log
 from ..model import Model
 from ..model_parameters import ROBOT
 from ..motion import Motion
+from ..posed_problem import known_bodies
 from ..preprocess import prepare
 from ..projection import inverted
 from ..robot import Robot
@@ -93,7 +94,7 @@ def basis(
         pose = np.clip(np.zeros(machine.dof), 0.9 * low + 0.1 * high, 0.1 * low + 0.9 * high)
         rate, window = experiment.data.rate or _RATE, _WINDOW
     asked = _suspects(experiment, structure, separate)
-    known = _known(structure, levels, fit, x, noise, prior, asked, motion)
+    known = _known(experiment, structure, levels, fit, x, noise, prior, asked, motion)
     known = replace(known, **_left_out(machine, experiment, fit, rate, window))
     return Basis(machine, fit, motion, known, pose, rate, window, levels, logs, test)
 
@@ -159,13 +160,14 @@ def _suspects(experiment: Experiment, model: Model, separate) -> list[Candidate]
 
 
 def _known(
-    model: Model, levels, fit: Fit | None, x, noise, prior, asked, motion: Motion | None
+    experiment: Experiment, model: Model, levels, fit: Fit | None, x, noise, prior, asked, motion
 ) -> Known:
     """What a design asks of: the model's instant, and the suspects."""
     instant, places = instant_of(model, levels)
     own = np.asarray(x)[places]
     typical = np.maximum(20.0 * noise, 1e-6) if fit is None else size_of(fit)
-    before = alone = own_size(instant, prior, own, typical)
+    sure = known_bodies(experiment, model)
+    before = alone = own_size(instant, prior, own, typical, sure)
     if not asked:
         if fit is not None:
             before = before + _told(fit, levels, places, noise)
@@ -182,7 +184,7 @@ def _known(
     else:
         instant = instant.scaled_by(motion)
         seen = Seen.of(fit, motion, motion.samples)
-        wide = own_size(fit.model, fit.prior, fit.x, typical)
+        wide = own_size(fit.model, fit.prior, fit.x, typical, sure)
         suspects = tuple(suspected(seen, fit, wide, one) for one in asked)
         columns = np.concatenate([seen.columns(one) for one in suspects], axis=2)
         each, more = np.sqrt(np.mean(columns**2, axis=(0, 1))), seen

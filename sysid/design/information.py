@@ -18,6 +18,7 @@ metric of P.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -26,6 +27,7 @@ import numpy as np
 from ..inertia import DIVERGENCES
 from ..model import Model
 from ..model_parameters import ROBOT
+from ..objective import STIFF
 from .columns import columns
 from .suspects import Suspect, along
 
@@ -109,17 +111,19 @@ class Known:
 _ENOUGH = 100.0  # of lambda: ten standard deviations
 
 
-def own_size(model: Model, prior, x, torque) -> np.ndarray:
+def own_size(model: Model, prior, x, torque, known: Sequence[int] = ()) -> np.ndarray:
     """(size, size) information that bodies are about as the prior, and coefficients about as large
     as would make the joint's torque: nobody expects more.
 
     Args:
-        prior: (bodies, 10). torque: (dof,) size of each joint's torque [N m].
+        prior: (bodies, 10). torque: (dof,) size of each joint's torque [N m]. known: bodies that are
+            their prior.
     """
     metric = np.asarray(DIVERGENCES["log-det"](prior).hessian(prior))
     out = np.zeros((model.size, model.size))
     for b, block in enumerate(metric):
-        out[10 * b : 10 * b + 10, 10 * b : 10 * b + 10] = block
+        sure = STIFF if b in known else 1.0
+        out[10 * b : 10 * b + 10, 10 * b : 10 * b + 10] = sure * block
     count = 10 * model.bodies
     for k, c in enumerate(model.coefficients):
         typical = abs(x[count + k]) or (torque.max() if c.joint < 0 else torque[c.joint])

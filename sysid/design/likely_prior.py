@@ -16,10 +16,13 @@ Source: MacKay 1992 (the evidence for a regulariser).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from ..estimate import Fit
 from ..inertia import DIVERGENCES
+from ..posed_problem import known_bodies
 from ..reduction import triangle
 
 _DECADES, _STEPS = 6, 8  # above the least weight, and steps of each: beyond, data change nothing
@@ -35,7 +38,8 @@ def likeliest(fit: Fit, over, variance: float, least: float) -> float:
     size = fit.model.size
     data = fit.compressed if fit.compressed.size == size else fit.compressed.first(size)
     metric = DIVERGENCES[fit.experiment.prior.divergence](fit.prior).hessian(fit.prior)
-    found, told = seen_of_bodies(data.total(over), fit.prior.ravel(), np.asarray(metric))
+    sure = known_bodies(fit.experiment, fit.model)
+    found, told = seen_of_bodies(data.total(over), fit.prior.ravel(), np.asarray(metric), sure)
     asked = least * np.logspace(0.0, _DECADES, _DECADES * _STEPS + 1)
     return float(asked[np.argmax(log_likelihood(found, told, 0.5 * asked / variance))])
 
@@ -47,12 +51,15 @@ def log_likelihood(found, told, precision) -> np.ndarray:
     return -0.5 * (np.log(spread) + told**2 / spread).sum(axis=1)
 
 
-def seen_of_bodies(whole, prior, metric) -> tuple[np.ndarray, np.ndarray]:
+def seen_of_bodies(
+    whole, prior, metric, known: Sequence[int] = ()
+) -> tuple[np.ndarray, np.ndarray]:
     """What a triangle (size + 1, size + 1) tells of bodies once coefficients have taken theirs: singular
     values (k,) of their columns, and what lies in these directions (k,) beyond a prior (10 bodies,).
 
     Args:
-        metric: (bodies, 10, 10), whose units of bodies these are in.
+        metric: (bodies, 10, 10), whose units of bodies these are in. known: bodies that are their
+            prior.
     """
     count = len(prior)
     beyond = whole[:, -1] - whole[:, :count] @ prior
@@ -63,5 +70,6 @@ def seen_of_bodies(whole, prior, metric) -> tuple[np.ndarray, np.ndarray]:
     for b, block in enumerate(metric):
         own = slice(10 * b, 10 * b + 10)
         columns[:, own] = np.linalg.solve(np.linalg.cholesky(block), columns[:, own].T).T
+        columns[:, own] *= b not in known
     u, found, _ = np.linalg.svd(columns, full_matrices=False)
     return found, u.T @ y

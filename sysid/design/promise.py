@@ -32,6 +32,8 @@ from ..estimate import Fit
 from ..inertia import DIVERGENCES
 from ..linearised import Linearised
 from ..motion import Motion
+from ..objective import add_blocks
+from ..posed_problem import known_bodies
 from ..prior_weight import weakest
 from .information import own_size
 from .likely_prior import likeliest
@@ -65,7 +67,8 @@ def pairs(
     weigh = lambda columns: (columns * seen.weights[:, None, None]).reshape(-1, columns.shape[2])  # noqa: E731
     base = weigh(seen.rows.columns)
     own = [weigh(seen.columns(one)) for one in suspects]
-    prior = own_size(fit.model, fit.prior, fit.x, size_of(fit))
+    sure = known_bodies(fit.experiment, fit.model)
+    prior = own_size(fit.model, fit.prior, fit.x, size_of(fit), sure)
     named = [_named(_left(base, prior, a @ one.size, a[:, :0]), asked) for a, one in zip(own, suspects)]
     out = []
     for i, a in enumerate(suspects):
@@ -124,12 +127,13 @@ def deviations(fit: Fit, old: Motion, new: Motion, heard: Heard) -> dict[str, di
     free, count = np.isfinite(std), len(std)
     weights = np.ones(len(fit.joints)) if fit.weights is None else fit.weights
     beside, (variance, claim) = _beside(fit, count), _claim(fit, weights)
-    noises = _noises(fit, model, heard, beside / (variance * claim))
+    held = np.zeros((count, count)) if fit.known is None else _of_bodies(0.5 * fit.known, count)
+    noises = _noises(fit, model, heard, beside / (variance * claim) + held)
 
     honest = beside / claim * _nearness(fit, variance)
 
     def deviation(hessian, noise, free):
-        inverse = _inverse(hessian + honest, free)
+        inverse = _inverse(hessian + honest + held, free)
         spread = np.diagonal(inverse @ (noise + variance * honest) @ inverse)
         return np.sqrt(np.maximum(spread, 0.0))
 
@@ -188,12 +192,15 @@ def _over(size) -> np.ndarray:
 
 def _beside(fit: Fit, size: int) -> np.ndarray:
     """(size, size) what the prior adds to C'C: half its Hessian."""
-    out = np.zeros((size, size))
-    if weight := fit.experiment.prior.weight:
-        divergence = DIVERGENCES[fit.experiment.prior.divergence](fit.prior)
-        for b, block in enumerate(np.asarray(divergence.hessian(fit.pi))):
-            out[10 * b : 10 * b + 10, 10 * b : 10 * b + 10] = 0.5 * weight * block
-    return out
+    if not (weight := fit.experiment.prior.weight):
+        return np.zeros((size, size))
+    divergence = DIVERGENCES[fit.experiment.prior.divergence](fit.prior)
+    return _of_bodies(0.5 * weight * np.asarray(divergence.hessian(fit.pi)), size)
+
+
+def _of_bodies(blocks, size: int) -> np.ndarray:
+    """(size, size) of what is told of bodies (bodies, 10, 10)."""
+    return add_blocks(np.zeros((size, size)), blocks)
 
 
 def _claim(fit: Fit, weights) -> tuple[float, float]:
