@@ -214,7 +214,7 @@ def _descended(best: Settled, motion: Motion, solved, weights, tolerance: float)
                     kept = (best.objective - tried.objective) / promised if promised > 0 else 1.0
                     best, damping, growth = tried, max(damping * max(1.0 / 3.0, 1.0 - (2.0 * kept - 1.0) ** 3), 1e-9), 2.0
                     break
-                damping, growth = damping * growth, 2.0 * growth
+                damping, growth = min(damping * growth, 1.0 / _ROUNDING), 2.0 * growth
         if not abs(before - best.objective) > tolerance * abs(before):
             break
     return best

@@ -346,7 +346,7 @@ def test_a_formula_goes_into_the_file(opened):
 
 def test_an_effect_that_is_no_suspect_goes_into_the_file(opened):
     known = {e["effect"]: e for e in opened.get("/api/view", sha=opened.sha).json()["vocabulary"]}
-    assert list(known) == vocabulary() and known["payload"]["scope"] == "robot" and all(e["says"] and "`" not in e["says"] for e in known.values())
+    assert tuple(known) == vocabulary() and known["payload"]["scope"] == "robot" and all(e["says"] and "`" not in e["says"] for e in known.values())
     opened.post("/api/add", sha=opened.sha, effect="quadratic_drag", joint="elbow")
     opened.wait()
     opened.post("/api/add", sha=opened.sha, effect="gravity_tilt", joint=None)

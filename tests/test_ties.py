@@ -82,6 +82,20 @@ def test_the_set_holds_the_truth_and_its_twin_and_not_the_rest(biased):
     assert found.gain.sum() == pytest.approx((base - found.head.losses).sum())
 
 
+@pytest.mark.parametrize(("likelier", "kept"), [(0.98, [2, 2]), (0.995, [1, 2])])
+def test_who_is_hardly_ever_the_best_is_none_of_the_explanations(biased, monkeypatch, likelier, kept):
+    """But for the head, the simplest of two that are the same: it stays whichever of them is said to be the likelier one."""
+    view, groups = biased
+    asked, found = [of(groups, *key) for key in (("torque_bias", 1), ("asymmetric_coulomb", 1))], []
+    for chances in ([likelier, 1.0 - likelier], [1.0 - likelier, likelier]):
+        monkeypatch.setattr(blocks, "chances", lambda losses, rng: np.array(chances))  # noqa: B023
+        found.append(chosen(view, asked, np.random.default_rng(0)))
+    assert sorted(len(one.members) for one in found) == kept
+    for one in found:
+        assert one.head.candidate.name == "torque_bias"
+        assert {m.candidate.name for m in one.close} == {"torque_bias", "asymmetric_coulomb"}
+
+
 def test_what_only_adds_freedom_is_told(biased):
     """A spring is a bias and a slope, and holds a bias; the other way round it does not, and of twins neither does."""
     view, groups = biased

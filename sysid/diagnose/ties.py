@@ -2,7 +2,7 @@
 the best.
 
 The set of explanations is the model confidence set of their losses over blocks held apart; who
-heads it is told by these losses and by how many numbers each one needs.
+heads it, or hardly ever would, is told by these losses and by how many numbers each one needs.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from .evidence import Group
 from .projected import groups_at
 from .refits import COMPARED, Member, refitted, weighed
 
-_OUTSIDE = 0.10  # a model is outside the set of 90 % where its p-value is below
+_OUTSIDE, _HARDLY = 0.10, 0.01  # outside the set of 90 %: p-value; chance of all such together
 _UNEVEN = 0.35  # logarithm: two joints count half as much against each other, in power
 NEAR = 0.4  # of what the best takes, as all are asked at once: by less no refit makes it the best
 _CLOSE = 0.1  # of what the head takes: by less another may have lost to what still acted then
@@ -91,11 +91,12 @@ def chosen(view: View, groups: list[Group], rng: np.random.Generator) -> Choice 
     inside = [k for k in inside if k == head or not holds(view, members[k], members[head])]
     chance = dict(zip(inside, blocks.chances(priced[:, inside], rng)))
     order = sorted(inside, key=lambda k: (k != head, -chance[k]))
+    order = [k for n, k in enumerate(order) if not n or sum(map(chance.get, order[n:])) > _HARDLY]
     return Choice(
         members[head],
         tuple((members[k], float(chance[k])) for k in order),
         base.sum(1) - table[:, head],
-        tuple(m for k, m in enumerate(members) if k not in inside),
+        tuple(m for k, m in enumerate(members) if k not in order),
         taken(view, base, members[head].losses),
     )
 
