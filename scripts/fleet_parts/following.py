@@ -77,16 +77,17 @@ def _payload(seed: int, folder: Path) -> dict:
         online.clear()
         began = online.time
         early = online.add(*(v[:10_000] for v in both))
-        told = None
+        told = named = None
         for at in range(10_000, 17_000, 20):
             told = online.add(*(v[at : at + 20] for v in both)) or told
+            named = online.change if at == 12_000 - 20 else named
             if at >= 15_000 - 20:
                 break
         said = online.change
         mass = said.parameters.get("payload.*.m") if said else None
         found.append({
             "early": early is not None, "after": told.time - began - 10.0 if told else None,
-            "told": told.effect if told else None, "mass": mass and mass[:2],
+            "told": named.effect if named else None, "mass": mass and mass[:2],
         })  # fmt: skip
     return {"found": found}
 

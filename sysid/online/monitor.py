@@ -27,6 +27,7 @@ from scipy import stats
 from .whitening import Whitening
 
 WINDOWS = (1.0, 4.0)  # s
+PER_TICK = 8  # averages
 PER_JOINT = ("coulomb", "viscous", "torque_bias")
 PAYLOAD = "payload"
 _TOLD = 1e-10  # of the largest eigenvalue: below, no motion shows a direction
@@ -113,6 +114,13 @@ def worth(sums: Ticks) -> tuple[np.ndarray, np.ndarray]:
     body = np.where(kept, along**2 / np.where(kept, values, 1.0), 0.0).sum(axis=1)
     freedom = np.append(np.ones(own.shape[1]), 10.0)
     return np.column_stack([own, body]) / freedom, freedom
+
+
+def explained(ticks: Ticks) -> np.ndarray:
+    """(changes,) what each explains of all ticks, less what so many free parameters explain by
+    chance (Schwarz 1978)."""
+    found, freedom = worth(windows_of(ticks, len(ticks.t)))
+    return found[0] * freedom - freedom * np.log(1.0 + len(ticks.t) * PER_TICK)
 
 
 def calibrated(ticks: Ticks, lengths, rate: float, tick: float) -> Level:

@@ -108,8 +108,8 @@ class Online:
 
     @property
     def change(self) -> Change | None:
-        """What changed since the alarm, by all rows since it began; None without an alarm, and in
-        its first moment."""
+        """What changed since the alarm, by all rows since it began, which may speak for another
+        change than its first ones did; None without an alarm, and in its first moment."""
         return None if self._watch is None else self._watch.change
 
     def add(self, q, tau) -> Alarm | None:

@@ -12,11 +12,10 @@ from ..effect import last_link
 from ..model import Model
 from . import monitor
 from .change import Change, settled
-from .monitor import Ticks
+from .monitor import PER_TICK, Ticks
 from .stream import Rows
 from .whitening import whitening
 
-PER_TICK = 8  # averages
 _MEMORY = 30.0  # s: of how large noise is; it tells it to a few per cent
 
 
@@ -90,13 +89,13 @@ class Watch:
 
     @property
     def change(self) -> Change | None:
-        """What changed since the alarm, by all rows since it began."""
+        """What changed since the alarm, by all rows since it began: what it is, too, as the first
+        rows may have spoken for something else."""
         if self.alarm is None or not len(self._since.t):
             return None
-        robot, key = self.model.robot, (self.alarm.effect, self.alarm.joint)
-        which = monitor.names(robot.joints).index(key)
+        robot, which = self.model.robot, int(np.argmax(monitor.explained(self._since)))
         wide = float(np.sqrt(self._level.inflation[:, which].max()))
-        return settled(*key, robot, self._since, wide)
+        return settled(*monitor.names(robot.joints)[which], robot, self._since, wide)
 
     def add(self, rows: Rows) -> Alarm | None:
         """Take rows in; the alarm where they raise one."""
@@ -167,12 +166,9 @@ class Watch:
         return self._named(known[known.t <= here], float(np.exp(logs.min())))
 
     def _named(self, known: Ticks, p: float) -> Alarm:
-        """What changed, and since when: the onset and the change that explain most, less what so
-        many free parameters explain by chance (Schwarz 1978)."""
-        chances = []
-        for length in range(1, min(len(known.t), max(self._lengths)) + 1):
-            found, freedom = monitor.worth(monitor.windows_of(known, length)[-1:])
-            chances.append(found[0] * freedom - freedom * np.log(1.0 + length * PER_TICK))
+        """What changed, and since when: the onset and the change that explain most."""
+        longest = min(len(known.t), max(self._lengths))
+        chances = [monitor.explained(known[-length:]) for length in range(1, longest + 1)]
         length, change = np.unravel_index(np.argmax(chances), np.shape(chances))
         effect, joint = monitor.names(self.model.robot.joints)[int(change)]
         end = float(known.t[-1])
