@@ -61,7 +61,7 @@ class _AddsTorque(AtLevel):
     def columns_at(self, motion, joint, tried):
         if self.present(motion):
             return super().columns_at(motion, joint, tried)
-        return np.stack([self.columns(motion, joint, **shapes) for shapes in tried])
+        return TorqueEffect.columns_at(self, motion, joint, tried)
 
 
 class _Moves(AtLevel):

@@ -129,12 +129,9 @@ class Source:
 
     @cached_property
     def _base(self) -> list[np.ndarray]:
-        plain = self._unsensed is self.model
-        return (
-            self.unfiltered
-            if plain
-            else [self._torque(self._unsensed, piece, self.x) for piece in self._whole]
-        )
+        if self._unsensed is self.model:
+            return self.unfiltered
+        return [self._torque(self._unsensed, piece, self.x) for piece in self._whole]
 
     def _torque(self, model: Model, piece: Piece, x: np.ndarray) -> np.ndarray:
         bodies, rest = np.split(x, [10 * model.bodies])

@@ -152,8 +152,9 @@ def flown(load, inertia, step: float, *, b, teeth) -> np.ndarray:
     found[0] = d
     driven *= h**2
     part = np.arange(fine)[:, None] / fine
+    between = (first + part * more for first, more in zip(driven[:-1], np.diff(driven, axis=0)))
     force, drag = held
-    for k, pushes in enumerate(driven[:-1, None] + part * np.diff(driven, axis=0)[:, None], 1):
+    for k, pushes in enumerate(between if fine > 1 else driven[:-1, None], 1):
         for push in pushes:
             np.maximum(d, least, out=into)
             np.minimum(into, half, out=into)

@@ -27,7 +27,7 @@ import numpy as np
 from ..inertia import DIVERGENCES
 from ..model import Model
 from ..model_parameters import ROBOT
-from ..objective import STIFF
+from ..objective import STIFF, add_blocks
 from .columns import columns
 from .suspects import Suspect, along
 
@@ -119,11 +119,9 @@ def own_size(model: Model, prior, x, torque, known: Sequence[int] = ()) -> np.nd
         prior: (bodies, 10). torque: (dof,) size of each joint's torque [N m]. known: bodies that are
             their prior.
     """
-    metric = np.asarray(DIVERGENCES["log-det"](prior).hessian(prior))
-    out = np.zeros((model.size, model.size))
-    for b, block in enumerate(metric):
-        sure = STIFF if b in known else 1.0
-        out[10 * b : 10 * b + 10, 10 * b : 10 * b + 10] = sure * block
+    metric = np.array(DIVERGENCES["log-det"](prior).hessian(prior))
+    metric[list(known)] *= STIFF
+    out = add_blocks(np.zeros((model.size, model.size)), metric)
     count = 10 * model.bodies
     for k, c in enumerate(model.coefficients):
         typical = abs(x[count + k]) or (torque.max() if c.joint < 0 else torque[c.joint])

@@ -58,7 +58,7 @@ class Cogging(TorqueEffect):
         if self.lines > 1 or len(k) < 3 or np.ptp(np.diff(k)) > _EVEN * np.ptp(k):
             return super().columns_at(motion, joint, tried)
         # each of an even grid is the one before, turned further
-        turn, further = (np.exp(1j * by * motion.q[:, joint]) for by in (k[0], np.ptp(k) / (len(k) - 1)))
+        turn, further = (np.exp(1j * by * motion.q[:, joint]) for by in (k[0], (k[-1] - k[0]) / (len(k) - 1)))
         out = np.empty((len(k), 2, len(turn)))
         for own in out:
             own[0], own[1] = turn.imag, turn.real

@@ -53,15 +53,16 @@ def of_unit_size(values: np.ndarray, use) -> tuple[np.ndarray, np.ndarray]:
     """Functions (n, k) at rows that count (n,), zero at others, each with a mean square of one; and
     which they are, without those that say nothing there."""
     kept, which, size = that_say_something(values, use)
-    return kept[:, which] / size, which
+    return kept / size, which
 
 
 def that_say_something(values: np.ndarray, use) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Functions (n, k) at rows that count (n,), zero at others; which of them are no constant
-    there, and the root of the mean square of each of these."""
+    """Of functions (n, k) those that are no constant at rows that count (n,), zero at others; which
+    they are, and the root of the mean square of each."""
     kept = values if use.all() else np.where(use[:, None], values, 0.0)
     square = np.einsum("nk,nk->k", kept, kept) / len(kept)
     which = np.flatnonzero(square - kept.mean(0) ** 2 > 1e-12 * square)
+    kept = kept if len(which) == len(square) else kept[:, which]
     return kept, which, np.sqrt(square[which])
 
 

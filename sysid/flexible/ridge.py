@@ -33,10 +33,9 @@ def stretches(fold, t, piece) -> list[tuple[np.ndarray, np.ndarray]]:
 def predicted(features, y, use, spans) -> tuple[np.ndarray, np.ndarray]:
     """What ridge regression predicts (n,) of the rows of each fold from rows apart from it, and its
     gain (folds,)."""
-    kept, which, size = that_say_something(features, use)
-    if not len(which):
+    kept, _, size = that_say_something(features, use)
+    if not len(size):
         return np.zeros(len(y)), np.zeros(len(spans))
-    kept = kept if len(which) == kept.shape[1] else kept[:, which]
     ridges = _RIDGES * len(y) / len(_RIDGES)
     whole, right = kept.T @ kept, kept.T @ y
     sizes = np.outer(size, size)  # in functions of unit size a ridge is the same for all
@@ -50,11 +49,11 @@ def predicted(features, y, use, spans) -> tuple[np.ndarray, np.ndarray]:
     ]
     gains, all_told = np.full((len(ridges), len(spans)), -np.inf), np.zeros((len(ridges), len(y)))
 
-    def tell(which: list[int]):
+    def tell(some: list[int]):
         for f, ((rows, _), (system, pull, own)) in enumerate(zip(spans, folds)):
-            told = (own @ (_solved(system, ridges[which], pull) / size[:, None])).T
-            all_told[np.ix_(which, rows)] = told
-            gains[which, f] = np.sum(2.0 * told * y[rows] - told**2, axis=1)
+            told = (own @ (_solved(system, ridges[some], pull) / size[:, None])).T
+            all_told[np.ix_(some, rows)] = told
+            gains[some, f] = np.sum(2.0 * told * y[rows] - told**2, axis=1)
 
     # more ridge serves better up to some, and worse from there: up the hill from several
     more, known = list(_FIRST) if len(whole) >= _MANY else list(range(len(ridges))), set()

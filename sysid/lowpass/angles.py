@@ -51,9 +51,8 @@ def _third(q) -> np.ndarray:
 def _by_window(values, step: float) -> np.ndarray:
     """RMS (windows, dof) of values (n, dof) in windows of time."""
     parts = max(1, len(values) // max(8, round(_WINDOW / step)))
-    number = np.arange(
-        parts + 1
-    )  # the first ones have a sample more, where the last would have less
+    # the first ones have a sample more, where the last would have less
+    number = np.arange(parts + 1)
     ends = number * (len(values) // parts) + np.minimum(number, len(values) % parts)
     return np.sqrt(np.add.reduceat(values**2, ends[:-1], axis=0) / np.diff(ends)[:, None])
 
