@@ -630,7 +630,7 @@ def test_what_a_person_sees(experiment, cli):
 # ---- robots of other people
 
 
-REAL = Path(os.environ.get("SYSID_DATA_DIR", "nowhere"))
+REAL = Path(os.environ.get("SYSID_DATA_DIR", "nowhere")).resolve()  # tests work elsewhere
 
 
 @pytest.mark.parametrize(

@@ -250,6 +250,8 @@ def test_a_full_disk_under_the_output_is_said(words):
 
 
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="no full device here")
-def test_where_nobody_can_be_told_the_status_tells():
+@pytest.mark.parametrize("unbuffered", ["1", ""])
+def test_where_nobody_can_be_told_the_status_tells(unbuffered):
+    how = {"cwd": ROOT, "env": os.environ | {"PYTHONUNBUFFERED": unbuffered}}
     with open("/dev/full", "w") as full:
-        assert subprocess.run([sys.executable, "-m", "sysid", "fit", "nothing"], stderr=full, cwd=ROOT).returncode == 2
+        assert subprocess.run([sys.executable, "-m", "sysid", "fit", "nothing"], stderr=full, **how).returncode == 2

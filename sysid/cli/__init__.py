@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from contextlib import suppress
+from typing import NoReturn
 
 import typer
 
@@ -40,10 +41,10 @@ def main() -> None:
     except (KeyboardInterrupt, typer.Abort):
         status = _INTERRUPTED
     except BrokenPipeError:
-        _drop_output()
+        _drop(sys.stdout)
         status = 1
     except OSError as error:  # a full disk under the output, or under a file that nobody minds
-        _drop_output()
+        _drop(sys.stdout)
         _fail(f"{error.filename or 'the output'} cannot be written or read ({error.strerror or error})", 1)
     except MemoryError:
         _fail("out of memory", 1)
@@ -58,7 +59,7 @@ def main() -> None:
         _fail(f"internal error, {type(error).__name__}: {error}; SYSID_DEBUG=1 shows where", 1)
     if status == _INTERRUPTED:  # typer makes an exit of Ctrl-C and says nothing
         _fail(f"interrupted; {_kept(sys.argv[1:])}", _INTERRUPTED)
-    sys.exit(status if isinstance(status, int) else 0)
+    _end(status if isinstance(status, int) else 0)
 
 
 def _allowed(untrusted) -> bool:
@@ -79,13 +80,23 @@ def _kept(words: list[str]) -> str:
     }.get(command, "nothing was written")  # fmt: skip
 
 
-def _drop_output() -> None:
-    """Let nothing more be written to standard output: Python would try again when it ends."""
+def _drop(stream) -> None:
+    """Let nothing more be written to a standard stream: Python would try again when it ends."""
     with suppress(OSError, ValueError):
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
 def _fail(message: str, status: int) -> None:
     with suppress(OSError):  # nobody can be told
         print("sysid: " + " ".join(str(message).split()), file=sys.stderr)
+    _end(status)
+
+
+def _end(status: int) -> NoReturn:
+    """Leave with a status, also where what is still to be said cannot be written: Python would leave with its own."""
+    try:
+        if sys.stderr is not None:  # closed
+            sys.stderr.flush()
+    except OSError:  # nobody can be told
+        _drop(sys.stderr)
     sys.exit(status)
