@@ -47,7 +47,7 @@ def bumps(robot: Robot, logs: Sequence[Log], *, among: int = 1) -> list[Event]:
         return []
     model = build(robot, [EffectSpec(name=name) for name in _EFFECTS])
     stride = stride_of(motion, cutoff)
-    rows = stack(model, motion, stride)
+    rows = stack(model, motion, stride, keep=False)
     step = stride * motion.pieces[0].step
     size = np.abs(_left(rows, _kinds(motion)[rows.piece]))
     own = np.stack([_surprise(a, u, rows.piece, step) for a, u in zip(size.T, rows.use.T)], axis=1)

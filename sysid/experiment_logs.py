@@ -68,12 +68,17 @@ def with_events(machine: Robot, read: list[logs.Log], *, among: int = 1) -> list
 def _with_events_of_spans(machine: Robot, log: logs.Log) -> logs.Log:
     found, step = [], 0.0
     for number in range(len(log.segments)):
-        released()
-        span = log.segments.around(number, _BESIDE)
-        (own,) = with_events(machine, [replace(log, segments=(replace(span, core=None),))], among=len(log.segments))
-        found += events.clipped(own.events, *span.t[[span.core.start, span.core.stop - 1]])
-        step = span.step
+        own, step = _of_span(machine, log, number)
+        found += own
     return replace(log, events=events.joined(found, step))
+
+
+def _of_span(machine: Robot, log: logs.Log, number: int) -> tuple[list[events.Event], float]:
+    """Events of a span of a log, and its step [s]; nothing of it stays in memory."""
+    released()
+    span = log.segments.around(number, _BESIDE)
+    (own,) = with_events(machine, [replace(log, segments=(replace(span, core=None),))], among=len(log.segments))
+    return events.clipped(own.events, *span.t[[span.core.start, span.core.stop - 1]]), span.step
 
 
 @dataclass(frozen=True)

@@ -24,25 +24,29 @@ def jumps(tau, reach: int) -> np.ndarray:
     the steps L rows earlier and later, which a torque that bends smoothly makes as well; out of
     the ordinary among all of its log.
     """
-    out = np.zeros(tau.shape, dtype=bool)
     length = max(1, reach // 2)
+    out = np.zeros(tau.shape, dtype=bool)
     if len(tau) < 16 * length:
         return out
-    # a spike comes back, a jump does not
-    # column by column: the filter of one axis is several times as fast as that of two
-    level = np.empty(tau.shape)
-    for j, own in enumerate((tau - tau.mean(axis=0)).T):
-        level[:, j] = running(own, 2 * SPIKE + 1, "median", "edge")
-    total = np.concatenate([np.zeros((1, tau.shape[1])), np.cumsum(level, axis=0)])
-    mean = (total[length:] - total[:-length]) / length  # of the rows from k on
-    step = mean[length:] - mean[:-length]  # at row k + length
-    bent = 0.5 * (step[: -2 * length] + step[2 * length :])
-    sizes = np.abs(step[length:-length] - bent)  # at row k + 2 length
-    least_said = np.log(sizes.size / CHANCE)
-    for j, size in enumerate(sizes.T):
-        least = max(np.median(size), quantum(tau[:, j]), NOTHING * np.std(tau[:, j]))
+    least_said = np.log(tau.shape[1] * (len(tau) - 4 * length + 1) / CHANCE)
+    # joint by joint: a long log's torques fill memory, and the filter of one axis is several times
+    # as fast as that of two
+    for torque, own in zip(tau.T, out.T):
+        size = _sizes(torque, length)
+        least = max(np.median(size), quantum(torque), NOTHING * np.std(torque))
         if least > 0.0:
             top = size > _TOP * running(size, 2 * length + 1, "max")
             found = top & (surprise(size / least, _WHITE) > least_said)
-            out[2 * length : 2 * length + len(size), j] = found
+            own[2 * length : 2 * length + len(size)] = found
     return out
+
+
+def _sizes(torque: np.ndarray, length: int) -> np.ndarray:
+    """Of the steps of a torque (n,) at row 2 length and those after it (n - 4 length + 1,)."""
+    # a spike comes back, a jump does not
+    level = running(torque - torque.mean(), 2 * SPIKE + 1, "median", "edge")
+    total = np.concatenate([[0.0], np.cumsum(level)])
+    mean = (total[length:] - total[:-length]) / length  # of the rows from k on
+    step = mean[length:] - mean[:-length]  # at row k + length
+    bent = 0.5 * (step[: -2 * length] + step[2 * length :])
+    return np.abs(step[length:-length] - bent)  # at row k + 2 length

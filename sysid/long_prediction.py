@@ -165,18 +165,22 @@ def _part(
     piece: Piece, model: Model, x, motion: Motion, first: int, samples: int, path: Path
 ) -> _Part:
     found = predict(model, x, replace(motion, pieces=(piece,)))
-    table, content = found.to_dataframe(), None
-    how = {"compression": "uncompressed", "statistics": False}
-    if path.parent.is_dir():
-        # under a name of its own: a worker that was given up may still be at the same part
-        own = beside(path)
-        _written(path, lambda: (table.write_parquet(own, **how), os.replace(own, path)))
-    else:  # another machine
-        stream = io.BytesIO()
-        table.write_parquet(stream, **how)
-        content = stream.getvalue()
+    content = _put(found.to_dataframe(), path)
     where = states(piece, first, samples)
     return _Part(found.sums(), found.greatest(_GREATEST), where, len(found.t), content)
+
+
+def _put(table, path: Path) -> bytes | None:
+    """Write a part to its file; its content where that is on another machine."""
+    how = {"compression": "uncompressed", "statistics": False}
+    if not path.parent.is_dir():
+        stream = io.BytesIO()
+        table.write_parquet(stream, **how)
+        return stream.getvalue()
+    # under a name of its own: a worker that was given up may still be at the same part
+    own = beside(path)
+    _written(path, lambda: (table.write_parquet(own, **how), os.replace(own, path)))
+    return None
 
 
 def _written(path: Path, write: Callable[[], object]) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import starmap
 from typing import NamedTuple
 
 import numpy as np
@@ -153,10 +154,10 @@ class Motion:
     def each(self, work: Callable, arguments: Iterable[tuple]) -> Iterator:
         """`work(piece, *own)` of every piece with its own arguments, in order; in other processes, where there are any. What it
         gives does not depend on that."""
-        if self.mapped is None:
-            return (work(piece, *own) for piece, own in zip(self.pieces, arguments))
         makers = self.pieces.makers if isinstance(self.pieces, Pieces) else [_There(piece) for piece in self.pieces]
-        return self.mapped(_made, ((maker, work, own) for maker, own in zip(makers, arguments)))
+        tasks = ((maker, work, own) for maker, own in zip(makers, arguments))
+        # nothing here holds a piece while the next is made
+        return starmap(_made, tasks) if self.mapped is None else self.mapped(_made, tasks)
 
     @property
     def samples(self) -> int:
@@ -181,7 +182,7 @@ class Motion:
 
 @dataclass(frozen=True)
 class _There:
-    """A piece that is in memory, for another process."""
+    """Makes a piece that is in memory."""
 
     piece: Piece
 

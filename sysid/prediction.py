@@ -112,13 +112,19 @@ class Prediction:
 
     @cached_property
     def _sums(self) -> Sums:
-        kept = self.measured if self.use is None else np.where(self.use, self.measured, 0.0)
-        return Sums(_sum(self.residual**2), _sum(kept**2), _sum(kept), self.counts)
+        # joint by joint: copies of all torques of a long log's span would stand beside it
+        found = []
+        for joint in range(self.measured.shape[1]):
+            measured, predicted, use = self._columns(joint)
+            kept, left = (v if use is None else np.where(use, v, 0.0) for v in (measured, measured - predicted))
+            found.append((left @ left, kept @ kept, kept.sum()))
+        return Sums(*np.array(found).T, self.counts)
 
     def greatest(self, count: int) -> np.ndarray:
         """(count, dof) the greatest sizes of each joint's measured torque, falling; fewer where there are fewer rows."""
-        size, count = np.abs(self.measured), min(count, len(self.measured))
-        return -np.sort(-np.partition(size, len(size) - count, axis=0)[len(size) - count :], axis=0)
+        least = len(self.measured) - min(count, len(self.measured))
+        falling = lambda size: -np.sort(-np.partition(size, least)[least:])  # noqa: E731
+        return np.stack([falling(np.abs(own)) for own in self.measured.T], axis=1)
 
     def told(self) -> list[float | None]:
         """RMS [N m] of each joint, None where no row of it counts."""
@@ -161,10 +167,6 @@ class Prediction:
 def units(robot: Robot) -> tuple[str, ...]:
     """The unit of each joint's torque."""
     return tuple("N" if slides else "N m" for slides in robot.prismatic)
-
-
-def _sum(values):
-    return values.sum(axis=0)
 
 
 def predict(model: Model, x, motion: Motion) -> Prediction:

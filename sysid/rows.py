@@ -18,6 +18,7 @@ from .slides import counted
 from .two_masses import link_load
 
 _STRETCH = 16384  # samples whose columns are computed at once
+_PASSING = 4096  # and where nobody asks for them again
 
 
 @dataclass(frozen=True)
@@ -82,8 +83,13 @@ def _counted(model: Model, motion: Motion, found: Rows) -> Rows:
     return replace(found, use=use, tau=np.where(use, found.tau, 0.0))
 
 
-def stack(model: Model, motion: Motion, stride: int) -> Rows:
-    """The rows of a motion under a model."""
+def stack(model: Model, motion: Motion, stride: int, *, keep: bool = True) -> Rows:
+    """The rows of a motion under a model.
+
+    Args:
+        keep: as of `Model.columns`.
+    """
+    stretch = _STRETCH if keep else _PASSING
     found = _counted(model, motion, measured(motion, stride))
     n, dof = len(found.tau), model.robot.dof
     columns = np.zeros((dof, n, model.size))
@@ -91,8 +97,8 @@ def stack(model: Model, motion: Motion, stride: int) -> Rows:
     for piece in motion.pieces:
         remembered, supports = model.remembered(piece), [model.support(joint, piece) for joint in range(dof)]
         # a stretch holds a whole number of strides, so that the kept rows go on where the last stretch ended
-        for rows in chunks(piece, stride * max(1, _STRETCH // stride)):
-            parts = model.columns(piece, slice(rows.start, rows.stop, stride), remembered, keep=True)
+        for rows in chunks(piece, stride * max(1, stretch // stride)):
+            parts = model.columns(piece, slice(rows.start, rows.stop, stride), remembered, keep=keep)
             size = parts[0].shape[-1]
             for joint, (values, support) in enumerate(zip(parts, supports)):
                 columns[joint, at : at + size, support] = values
