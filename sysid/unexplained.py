@@ -115,10 +115,17 @@ def explains(before: float, after: float, floor: float) -> float:
     return (before**2 - after**2) / misfit if misfit > 0 else float("nan")
 
 
-def mostly_noise(error: float, floor) -> bool:
-    """Whether most of an error's square is noise, as its NoiseFloor has it; not where that is not
-    known."""
-    return floor.rms is not None and _MOST * error**2 <= floor.rms**2
+def may_be_noise(before: float, after: float, floor) -> bool:
+    """Whether what an effect leaves may be noise, by a NoiseFloor that is known: most of the error's
+    square with it is, and there is no more above it than the effect took, or no more than the
+    floor's doubt.
+
+    Args:
+        before, after: errors on the same logs without it and with it.
+    """
+    if floor.rms is None or _MOST * after**2 > floor.rms**2:
+        return False
+    return explains(before, after, floor.rms) >= _MOST or floor.reached(after)
 
 
 def by_weights(fit, joint: str, floor: float | None, weighed: dict[str, float]) -> bool:

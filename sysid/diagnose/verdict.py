@@ -10,7 +10,7 @@ from ..estimate import Fit
 from ..flexible import Law, Unknown
 from ..noise import DOUBT
 from ..transfer import Transfer
-from ..unexplained import by_weights, explains, loudest, mostly_noise, told_in_vain, unexplained
+from ..unexplained import by_weights, explains, loudest, may_be_noise, told_in_vain, unexplained
 from .ask import HALF
 from .claims import Claim
 from .select import LEVEL, WORTH
@@ -72,17 +72,18 @@ def verdicts(
     out = []
     for j, joint in enumerate(fit.joints):
         taking = [c for c in claims if c.head.joint == joint or c.step.shares[j] >= WORTH]
-        first, then, floor = fit.rms("test")[joint], last.rms("test")[joint], floors[j].rms
+        pairs = [(fit.rms(part)[joint], last.rms(part)[joint]) for part in ("train", "test")]
+        first, then, floor = *pairs[1], floors[j].rms
+        both = [after for _, after in pairs]
         # what does not lower the joint's error on the test logs is no name for it
         own = tuple(c for c in taking if c.head.joint in (joint, "*") and then < first)
         others = tuple(c for c in taking if c.head.joint not in (joint, "*"))
-        both = [e[joint] for e in errors]
         low, noise = (floor or unsure or 0.0 for unsure in (floors[j].low, floors[j].about))
         explained = explains(first, then, low) if claims else float("nan")
         # who leaves more that is no noise is no name for what is missing; in no log is there more
         # noise than an error of another, so that what does not carry over is no noise
         whole = (1.0 + _LEFT) * explains(first, then, min(*both, noise)) >= 1.0
-        whole |= any(mostly_noise(error, floors[j]) for error in both)
+        whole |= any(may_be_noise(*pair, floors[j]) for pair in pairs)
         seen, among = left[j], sum(asked) if asked[j] else len(left)
         if law and asked[j] and then > 0.0 and not seen.predictable(among, WORTH):
             seen = seen.with_law(law(j))
@@ -104,8 +105,7 @@ def verdicts(
             effect, p = looks or (None, 1.0)
             may = effect if p > LEVEL else None  # what stands above the level was fitted, in vain
             why = unexplained(both, floors[j], effect, may, without, louder)
-            said_of = {r.effect: f"; {r.told}" for r in refused if r.joint == joint}
-            why += "".join(said_of.values())
+            why += "".join({r.effect: f"; {r.told}" for r in refused if r.joint == joint}.values())
             told = ("unresolved", others, explained, remains, why, may, evens[j])
         elif floors[j].reached(first) or not claims:
             told = ("complete",)
