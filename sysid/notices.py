@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from contextlib import contextmanager
+from dataclasses import replace
 
 import numpy as np
 
@@ -13,6 +14,8 @@ from .errors import LogError, SysidWarning
 from .estimate import Fit
 from .model import moving_coefficients
 from .motion import Motion
+from .same_samples import Sampled, same, sampled, told
+from .spans import Spans
 from .specs import Experiment
 
 
@@ -73,6 +76,23 @@ def tell_overlap(experiment: Experiment, found: list[dict]) -> None:
                 warnings.warn(SysidWarning(f"test log {test.name} is the training log {train.name} under another name; its error is not held out"), stacklevel=2)
             else:
                 warnings.warn(SysidWarning(f"test log {test.name} overlaps a training log; its error is not held out"), stacklevel=2)
+
+
+def samples_of(part: str, read: list[logs.Log]) -> list[Sampled]:
+    """What tells whether logs hold what others do; of long ones nothing."""
+    short = [(log, log.segments) for log in read if not isinstance(log.segments, Spans)]
+    joined = lambda name, segments: np.concatenate([getattr(s, name) for s in segments])  # noqa: E731
+    return [sampled(log.name, part, *(joined(name, own) for name in ("t", "q", "tau"))) for log, own in short]
+
+
+def tell_same(read: list[Sampled], experiment: Experiment, provenance: list[dict]) -> None:
+    """Logs that hold samples of others; what `tell_overlap` says is not said again."""
+    whole = [log["sha256"] for log in provenance]
+    files = {log.name: sha for log, sha in zip((*experiment.data.train, *experiment.data.test), whole)}
+    for found in same(read) if len(read) > 1 else ():
+        others = tuple(one for one in found.others if files.get(one.name) != files.get(found.first.name))
+        if others:
+            warnings.warn(SysidWarning(told(replace(found, others=others))), stacklevel=2)
 
 
 @contextmanager

@@ -33,7 +33,17 @@ from .long_motion import prepare
 from .long_prediction import predicted
 from .model import Model
 from .motion import Motion
-from .notices import noticed, refuse_no_torque, tell_events, tell_left_out, tell_overlap, tell_still, tell_undetermined
+from .notices import (
+    noticed,
+    refuse_no_torque,
+    samples_of,
+    tell_events,
+    tell_left_out,
+    tell_overlap,
+    tell_same,
+    tell_still,
+    tell_undetermined,
+)  # fmt: skip
 from .plausible import implausible
 from .prediction import Prediction, predict
 from .prior_weight import PriorWeight, with_weight
@@ -103,6 +113,7 @@ def _fit(experiment: Experiment, filters: dict | None, strength: PriorWeight | N
         with _timed(seconds, "read", tell):
             train = measured.train if measured else read(experiment, machine, experiment.data.train, structure=structure, mapped=mapped)
         refuse_no_torque(train)
+        seen = samples_of("train", train) if filters is None else []
         provenance = [_provenance("train", log, spec) for log, spec in zip(train, experiment.data.train)]
         with _timed(seconds, "filters", tell):
             how = {"progress": None if mapped else lambda share: tell("filters", share), "mapped": mapped}
@@ -143,6 +154,7 @@ def _fit(experiment: Experiment, filters: dict | None, strength: PriorWeight | N
             held_out = measured.test if measured else read(experiment, machine, experiment.data.test, structure=structure, mapped=mapped)
             provenance += [_provenance("test", log, spec) for log, spec in zip(held_out, experiment.data.test)]
             tell_overlap(experiment, provenance)
+            tell_same(seen and [*seen, *samples_of("test", held_out)], experiment, provenance)
             motion = prepare(held_out, preprocess, machine.joints, mapped)
             del held_out
             disturbed += tell_events("test", motion)
