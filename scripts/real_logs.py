@@ -33,7 +33,7 @@ ROBOTS = (
     ("Kinova Gen3", "kinova", "seven joints, motor currents that spike for a sample or a few every 0.3 s; runs of 2 to 5 s"),
     ("KUKA KR300", "kr300", "six joints, strong pre-sliding and Stribeck friction, backlash, a counterbalance; stands much of the time"),
     ("Rokae xMate3Pro", "rokae", "seven joints, knocked at about 4.1, 8.2 and 16.5 s"),
-    ("Schunk LWA4P", "schunk", "six joints, fifteen runs of 2 to 4 s; brakes close at rest, where the torque reads 0"),
+    ("Schunk LWA4P", "schunk", "six joints, fifteen runs of 2 to 4 s; brakes close at rest, where the torque reads 0; all have pieces of one torque, sample by sample, under motions of their own"),
     ("ODrive motor", "odrive", "one bare motor turning slowly; static maps know a ripple of 7, 14 and 28 periods a turn"),
 )
 

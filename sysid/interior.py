@@ -26,6 +26,7 @@ from .symmetric_matrices import BASIS, coordinates, packed, unpacked
 _LEAVE, _LEAST, _PER_GAP = 1e-2, 1e-6, 1e4
 _POOR = 0.5  # a step of less than this share of its length is tried again without its bend
 _NEARLY = 1e-9  # the same, where the next step breaks down
+_FAINT = 1e-9  # of the torque: what a coefficient at nought may make of it where a search begins
 _NOTHING = 1e-12  # share of the objective that complementarity may leave at a bound
 
 _DIAGONAL = np.arange(4)
@@ -88,7 +89,7 @@ def minimise(objective: Objective, positive: np.ndarray, held: np.ndarray, start
     free, bound = ~held, positive & ~held
     rows, target = objective.triangle[:, :-1], objective.triangle[:, -1]
     linear, quadratic, barrier = _prior_parts(objective)
-    x = np.array(start, dtype=float)
+    x = _inside(start, rows, target, bound, count)
     iterates, values, best, near = [x], [objective.value(x)], np.inf, False
     mu = max(0.01 * values[0] / len(x), barrier)
     z = mu * np.linalg.inv(to_pseudo(x[:count].reshape(-1, 10)))
@@ -159,6 +160,16 @@ def minimise(objective: Objective, positive: np.ndarray, held: np.ndarray, start
     # not converged: what was best stands last
     last = int(np.argmin(values))
     return iterates[: last + 1], values[: last + 1], False
+
+
+def _inside(start, rows, target, bound, count: int) -> np.ndarray:
+    """A start whose bounded coefficients are not nought, to the last digit that tells anything of the torque: where a search in
+    logarithms ends, there is no multiplier that belongs to nought."""
+    x = np.array(start, dtype=float)
+    size, column = np.linalg.norm(target), np.linalg.norm(rows[:, count:], axis=0)
+    least = _FAINT * np.where(column > 0.0, size / np.where(column > 0.0, column, 1.0), 1.0)
+    x[count:] = np.where(bound, np.maximum(x[count:], np.maximum(least, np.finfo(float).tiny)), x[count:])
+    return x
 
 
 def _prior_parts(objective: Objective):

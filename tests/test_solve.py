@@ -167,6 +167,20 @@ def test_interior_point_alone_from_anywhere():
     np.testing.assert_allclose(ends, ends[0], rtol=1e-12)
 
 
+@pytest.mark.parametrize("nought", [0.0, 1e-320, 1e-200])
+def test_interior_point_from_a_coefficient_at_nought(nought):
+    """Where a search in logarithms sent it there, no multiplier belongs to it: the same optimum all the same."""
+    _, problem = posed(leg())
+    x = problem.coordinates.physical(problem.start)
+    how = problem.objective, problem.coordinates.positive, problem.coordinates.held
+    best = problem.objective.value(interior.minimise(*how, x, tolerance=1e-8)[0][-1])
+    for k in np.flatnonzero(problem.coordinates.positive):
+        x[10 * problem.objective.bodies + k] = nought
+    iterates, _, converged = interior.minimise(*how, x, tolerance=1e-8)
+    assert converged and all(np.isfinite(at).all() for at in iterates)
+    np.testing.assert_allclose(problem.objective.value(iterates[-1]), best, rtol=1e-10)
+
+
 def test_one_iteration_is_not_convergence():
     experiment, problem = posed(leg(), solver={"max_iterations": 1})
     assert not problem.solve(experiment).converged
