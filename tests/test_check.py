@@ -4,6 +4,7 @@ import json
 import shutil
 
 import numpy as np
+import polars as pl
 import pytest
 
 from scripts.blind_parts.robots import experiment_of
@@ -78,6 +79,28 @@ def test_a_wrong_unit_is_said_once_and_nothing_that_follows_from_it(what, made, 
     found = check.check(pipeline.load(logs))
     assert {f.fault for f in found if f.severity == "error"} == {"wrong_unit"}
     assert not {f.fault for f in found} & {"joint_order", "sign_flipped", "mass_implausible", "not_excited"}
+
+
+def test_one_torque_in_another_unit_is_no_mass(made, tmp_path):
+    """No link is off by a thousand; the others' torques are as they were."""
+    logs = shutil.copytree(made(), tmp_path / "logs")
+    spoiled = faults.Planted(logs, ("shoulder", "elbow"), np.random.default_rng(0))
+    spoiled.column("tau_elbow", lambda tau: 1000.0 * tau)
+    spoiled.save()
+    errors = [f for f in check.check(pipeline.load(logs)) if f.severity == "error"]
+    assert [(f.fault, f.joint) for f in errors] == [("wrong_unit", "elbow")] and "mN m" in errors[0].do
+
+
+def test_a_log_in_which_nothing_moves_accuses_no_column(made, tmp_path):
+    """Columns that are exchanged cannot be told in it, nor that they are not, nor that a torque is late."""
+    logs = shutil.copytree(made(), tmp_path / "logs")
+    for file in (logs / "train.csv", logs / "test.csv"):
+        table = pl.read_csv(file)
+        speed = sum(table[f"q_{joint}"].diff().abs().fill_null(0.0) for joint in ("shoulder", "elbow")).to_numpy()
+        first = int(np.argmin(np.convolve(speed, np.ones(100), "valid")))
+        table[first : first + 100].write_csv(file)
+    found = check.check(pipeline.load(logs))
+    assert {f.joint for f in found if f.fault == "not_excited"} and not {f.fault for f in found} & {"joint_order", "sign_flipped", "delayed_signal"}
 
 
 @pytest.mark.parametrize(("column", "word"), [("q", "angle"), ("tau", "torque")])

@@ -268,6 +268,35 @@ def test_small_angles_in_degrees(experiment, cli):
         assert made.data.units.position == unit
 
 
+def test_one_joint_in_degrees_is_read_so_alone(experiment, cli):
+    """Its size says that it may be, the torques that it is; where all are, all are read so."""
+
+    def one(columns, joints=JOINTS[1:2]):
+        angles = {f"q_{joint}" for joint in joints}
+        return {n: v * 180.0 / np.pi if n in angles else v for n, v in columns.items()}
+
+    folder = experiment(train=one, test=one)
+    _, made = begun(cli, folder, [folder / "train.csv", folder / "test.csv"])
+    column = f"q_{JOINTS[1]}"
+    assert made.data.units.position == "rad"
+    assert made.data.position == {JOINTS[1]: {column: 0.01745329}}
+    every = lambda columns: one(columns, JOINTS)
+    folder = experiment(train=every, test=every, name="every")
+    _, made = begun(cli, folder, [folder / "train.csv", folder / "test.csv"])
+    assert made.data.units.position == "deg" and not made.data.position
+
+
+def test_logs_in_different_units_are_to_be_looked_at(experiment, cli):
+    folder = experiment(test=degrees)
+    said, _ = begun(cli, folder, [folder / "train.csv", folder / "test.csv"])
+    assert "if these are in rad, bring all logs to one unit" in json.dumps(said)
+
+
+def test_a_clock_that_counts_samples_is_to_be_looked_at():
+    counted, timed = (units.time_unit(np.arange(50) * step, "t") for step in (1.0, 0.001))
+    assert "samples' numbers" in counted.doubt and timed.doubt == ""
+
+
 def test_the_rate_of_logs_without_a_clock(experiment, cli, arm_logs):
     bare = lambda c: {n: v for n, v in c.items() if n != "t"}
     folder = experiment(train=bare, test=bare)

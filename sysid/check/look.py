@@ -58,6 +58,15 @@ class Look:
         """The logs of "train" or "test"."""
         return [log for log in self.logs if log.part == name]
 
+    def column(self, key: str, joint: str) -> str | None:
+        """The name of a joint's column of data.columns' `position` or `torque`, None where it goes
+        by a number or stands in a matrix."""
+        given = getattr(self.experiment.data.columns, key)
+        if isinstance(given, str):
+            return given.replace("{joint}", joint) if "{joint}" in given else None
+        own = given[self.robot.joints.index(joint)]
+        return own if isinstance(own, str) else None
+
     @cached_property
     def seen(self) -> Seen | None:
         """The training motion under a low-pass, with the columns of rigid bodies and of what any

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -73,7 +73,10 @@ def _moved(reference: str, folder: Path) -> str:
 
 def _angles(data: list[Logged], found: Signals, robot) -> Guess:
     q = {joint: np.concatenate([one.q[joint] for one in data]) for joint in found.joints}
-    return units.position_unit(q, _sliding(robot), found.position.meaning.unit)
+    slides = _sliding(robot)
+    guess = units.position_unit(q, slides, found.position.meaning.unit)
+    doubt = units.mixed(data, [joint for joint in found.joints if not slides[joint]])
+    return replace(guess, doubt=doubt) if doubt else guess
 
 
 def _sliding(robot) -> dict[str, bool]:

@@ -9,12 +9,14 @@ from typing import Any
 @dataclass(frozen=True)
 class Guess:
     """One entry of the experiment: its key ("data.units.time"), its value, and why. doubt: what to
-    look at where it may well be wrong, "" where it is as good as stated."""
+    look at where it may well be wrong, "" where it is as good as stated. alone: of a unit, the one
+    joint that may have another."""
 
     key: str
     value: Any
     why: str
     doubt: str = ""
+    alone: str = ""
 
     def __str__(self) -> str:
         return self.why + (f"; LOOK: {self.doubt}" if self.doubt else "")

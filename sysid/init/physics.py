@@ -24,27 +24,35 @@ _BETTER = 1.0  # log of the squares a joint: what is left falls to a third of it
 _TAKES = 0.01  # of a joint's torque squared: less of the URDF's torque tells no factor
 
 
-def in_degrees(look: Look, *, currents: bool) -> bool:
-    """Whether the angles, taken for rad, explain the torque as degrees, and not as they are.
+def in_degrees(look: Look, *, currents: bool, alone: str = "") -> list[str]:
+    """The joints whose angles, taken for rad, explain the torque as degrees, and not as they are:
+    all that turn, or none.
 
     Args:
         currents: the torques may have any factor. Otherwise the URDF's robot must also need more
         torque than there
             is at all, were the angles rad.
+        alone: a joint that may be the only one in degrees.
     """
     equations = look.equations
     if equations is None:
-        return False
+        return []
     plain = Reading.plain(look.robot.dof)
     turning = ~np.asarray(look.robot.prismatic)
-    turned = replace(plain, angle_factor=tuple(np.where(turning, np.pi / 180.0, 1.0)))
-    as_rad, as_deg = (equations.scored(reading, free=currents) for reading in (plain, turned))
+    joints = np.array(look.robot.joints)
+    turned = [
+        replace(plain, angle_factor=tuple(np.where(own, np.pi / 180.0, 1.0)))
+        for own in (turning, joints == alone)
+    ]
+    as_rad, as_deg, one = (equations.scored(reading, free=currents) for reading in (plain, *turned))
+    if alone and one.loss < min(as_deg.loss, as_rad.loss - _BETTER):
+        return [alone]
     known = as_rad.known & as_deg.known & turning
     gain = np.log(as_rad.left / as_deg.left)[known]
     impossible = (as_rad.left > as_rad.whole)[known]
     if not known.any() or not (currents or np.mean(impossible) > 0.5):
-        return False
-    return bool(gain.sum() > _BETTER * known.sum())
+        return []
+    return joints[turning].tolist() if gain.sum() > _BETTER * known.sum() else []
 
 
 def factors(look: Look, *, certain: bool) -> dict[str, float] | None:
@@ -84,9 +92,9 @@ def held_against(out: Draft, found: Signals, folder: Path) -> Draft:
         look = looked(config.experiment(out.tree, path))
         angles = out.guesses["data.units.position"]
         small = angles.value == "rad" and not found.position.meaning.unit
-        if small and in_degrees(look, currents=amperes is not None or servos):
-            why = "only as degrees do such angles go with the torques of the URDF's robot"
-            out = out.having(Guess(angles.key, "deg", f"{angles.why}, and {why}"))
+        how = {"currents": amperes is not None or servos, "alone": angles.alone}
+        if small and (turned := in_degrees(look, **how)):
+            out = out.having(replace(angles, doubt=""), _turned(look, angles, turned))
             look = looked(config.experiment(out.tree, path))
         scales = None if servos else factors(look, certain=amperes is not None)
         if scales:
@@ -100,6 +108,15 @@ def held_against(out: Draft, found: Signals, folder: Path) -> Draft:
             do="log torques, or write data.units.torque_constant into an experiment file",
         )
     return replace(out, notes=(*out.notes, *dict.fromkeys(f"{f.says}: {f.do}" for f in faults)))
+
+
+def _turned(look: Look, angles: Guess, joints: list[str]) -> Guess:
+    """That angles are in degrees: all of them, or one joint's."""
+    why = "only as degrees do such angles go with the torques of the URDF's robot"
+    if len(joints) > 1 or (column := look.column("position", joints[0])) is None:
+        return Guess(angles.key, "deg", f"{angles.why}, and {why}")
+    doubt = f"{angles.why}; the others' stay as they are"
+    return Guess("data.position", {joints[0]: {column: 0.01745329}}, why, doubt)
 
 
 def _scaled(amperes: Guess | None, scales: dict[str, float], joints: list[str]) -> list[Guess]:

@@ -19,6 +19,11 @@ _EPOCH = (0.9e9, 4.2e9)  # s since 1970: the years 1998 to 2103
 _TURN = 2.0 * np.pi
 _DIGITS = 3  # of a rate that speeds tell
 _ALOHA, _ALOHA_RATE = "observations/qpos", 50.0  # Hz: DT = 0.02 s in ALOHA's constants
+_COUNTS = (
+    "0, 1, 2 ... may be the samples' numbers: then state their rate, `sysid init --rate HZ`, or write "
+    "data.rate in place of data.columns.time"
+)
+_OFTEN = 15.0  # times the angles of another log, as degrees are 57 times rad
 _WHOLE = 50.0  # counts: angles in degrees that are whole numbers by chance reach no more values
 
 
@@ -35,8 +40,14 @@ def time_unit(t, column: str) -> Guess:
             return Guess(key, unit, f"the stamps count {unit} from 1970")
     for unit, per in _PER_SECOND.items():
         if _STEPS[0] <= step / per < _STEPS[1]:
-            return Guess(key, unit, f"steps of {step:.6g} {unit}, {per / step:.4g} Hz")
+            why = f"steps of {step:.6g} {unit}, {per / step:.4g} Hz"
+            return Guess(key, unit, why, _COUNTS if _counted(t) else "")
     return Guess(key, "s", f"steps of {step:.6g}", "no unit makes a robot's rate of that")
+
+
+def _counted(t) -> bool:
+    """Whether a clock counts samples: 0, 1, 2 ..."""
+    return bool(t[0] in (0.0, 1.0) and np.all(np.diff(t) == 1.0))
 
 
 def seconds(t, samples: int, clock: str | None, said: dict) -> float:
@@ -84,8 +95,31 @@ def position_unit(q: dict[str, np.ndarray], slides: dict[str, bool], named: str)
     if largest[joint] > DEGREES:
         turns = largest[joint] / _TURN
         why = f"{joint} reaches {largest[joint]:.4g}, which in rad would be {turns:.2g} turns"
+        far = [own for own, size in largest.items() if size > DEGREES]
+        moving = [own for own, values in turning.items() if np.ptp(values) > 0.0]
+        if len(moving) > 1 and len(far) == 1:  # of an arm in degrees more go so far
+            doubt = "it alone: if its angle is in degrees, and the others' are in rad, write "
+            doubt += f"{{{joint}: {{ITS COLUMN: 0.01745329}}}} as data.position; deg if all are"
+            return Guess(key, "rad", why, doubt, joint)
         return Guess(key, "deg", why, "write rad if a joint really makes many turns")
     return Guess(key, "rad", f"the largest angle is {largest[joint]:.3g}")
+
+
+def mixed(data: list[Logged], turning: list[str]) -> str:
+    """What to say where some logs' angles seem to be in degrees and others' in rad; else nothing."""
+    sizes = {one.name: np.array([np.abs(one.q[j]).max() for j in turning]) for one in data}
+    far = {name: size for name, size in sizes.items() if size.max(initial=0.0) > DEGREES}
+    near = {name: size for name, size in sizes.items() if name not in far}
+    if not far or not near:
+        return ""
+    usual = [np.median(list(part.values()), axis=0) for part in (far, near)]
+    moves = usual[1] > 0.0
+    if not moves.any() or np.median(usual[0][moves] / usual[1][moves]) < _OFTEN:
+        return ""
+    return (
+        f"the angles of {', '.join(far)} are many times those of {', '.join(near)}: if these are "
+        "in rad, bring all logs to one unit"
+    )
 
 
 def _counts(values) -> bool:

@@ -27,7 +27,7 @@ def find(look: Look) -> Iterator[Fault]:
                 wrong |= fault.severity == ERROR
                 yield fault
         if not wrong:
-            yield from _of_training(look, j, joint, slides)
+            yield from _of_training(look, j, joint)
 
 
 def _of_log(look: Look, log: Logged, j: int, joint: str, slides: bool) -> Iterator[Fault]:
@@ -53,7 +53,7 @@ def _of_log(look: Look, log: Logged, j: int, joint: str, slides: bool) -> Iterat
             "wrong_unit",
             ERROR,
             (f"{joint} reaches {own.far.most:.4g} rad in {name}, {own.far.most / TURN:.2g} turns"),
-            "if that is degrees set data.units.position: deg",
+            _degrees(look, log, joint),
             joint,
             name,
             (own.far.at,),
@@ -103,13 +103,36 @@ def _of_log(look: Look, log: Logged, j: int, joint: str, slides: bool) -> Iterat
         )
 
 
-def _of_training(look: Look, j: int, joint: str, slides: bool) -> Iterator[Fault]:
-    own = look.part("train")
-    travel = max(float(log.tally.travel[j]) for log in own)
-    long = [log for log in own if log.samples > 2.0 * SPAN / log.step]
+def _degrees(look: Look, log: Logged, joint: str) -> str:
+    """What to write where a joint's angle is in degrees: as all are, or as it alone."""
+    far = [one for one, own in zip(look.robot.joints, log.tally.joints) if own.far.count]
+    column = look.column("position", joint)
+    if len(far) > 1 or column is None or look.robot.dof < 2:
+        return "if that is degrees set data.units.position: deg"
+    alone = f"{{{joint}: {{{column}: 0.01745329}}}}"
+    return f"if it alone is in degrees write data.position: {alone}; if all are, data.units.position: deg"
+
+
+def _long(look: Look) -> list[Logged]:
+    """The training logs that have speeds."""
+    return [log for log in look.part("train") if log.samples > 2.0 * SPAN / log.step]
+
+
+def excited(look: Look, j: int) -> tuple[bool, float, float, np.ndarray]:
+    """Whether a joint moves enough in the training logs to tell of what it carries; how far it
+    travels, its top speed and its speeds (n,), a second."""
+    long, slides = _long(look), bool(look.robot.prismatic[j])
+    travel = max(float(log.tally.travel[j]) for log in look.part("train"))
     speed = np.concatenate([log.speeds(j) for log in long]) if long else np.zeros(1)
     top = float(np.quantile(speed, 0.99))
-    if travel < _TRAVELS[slides] or top < _MOVES * (1.0 if not slides else 0.2):
+    enough = travel >= _TRAVELS[slides] and top >= _MOVES * (1.0 if not slides else 0.2)
+    return enough, travel, top, speed
+
+
+def _of_training(look: Look, j: int, joint: str) -> Iterator[Fault]:
+    own, long = look.part("train"), _long(look)
+    enough, travel, top, speed = excited(look, j)
+    if not enough:
         yield Fault(
             "not_excited",
             WARNING,

@@ -11,6 +11,7 @@ import numpy as np
 from ..equations import LIKELY, Equations, Reading, Scored
 from ..fault import ERROR, Fault
 from ..look import Look
+from .angles import excited
 
 AFTER, SENSELESS = 2, ("wrong_unit", "angle_wrap")
 # Log of squares that another reading must take off, in all and of each joint whose column it reads
@@ -30,8 +31,11 @@ def find(look: Look) -> Iterator[Fault]:
         return
     reading = Reading.plain(look.robot.dof)
     scored = equations.scored(reading)
+    moves = [excited(look, j)[0] for j in range(look.robot.dof)]
     for _ in range(_ROUNDS):
-        tried = [(made, told, equations.scored(made)) for made, told in _others(reading, look)]
+        # of joints that hardly move any reading of the columns tells as little
+        others = [own for own in _others(reading, look) if any(moves[j] for j in own[1][1])]
+        tried = [(made, told, equations.scored(made)) for made, told in others]
         tried = [(s.loss, made, told, s) for made, told, s in tried if _clear(scored, s, told[1])]
         # as it is, and in another unit, it may leave the least
         if not tried or equations.scored(reading, free=True).loss < min(loss for loss, *_ in tried):
@@ -93,18 +97,9 @@ def _told(look: Look, kind: str, joints, word: str) -> Iterator[Fault]:
         yield Fault(kind, ERROR, says, f"{do}; {_OUT_OF}", name)
 
 
-def _column(look: Look, key: str, joint: str) -> str | None:
-    """The name of a joint's column, None where it goes by a number or stands in a matrix."""
-    given = getattr(look.experiment.data.columns, key)
-    if isinstance(given, str):
-        return given.replace("{joint}", joint) if "{joint}" in given else None
-    own = given[look.robot.joints.index(joint)]
-    return own if isinstance(own, str) else None
-
-
 def _exchanged(look: Look, key: str, names: list[str]) -> str:
-    found = [_column(look, key, joint) for joint in names]
-    every = [_column(look, key, joint) for joint in look.robot.joints]
+    found = [look.column(key, joint) for joint in names]
+    every = [look.column(key, joint) for joint in look.robot.joints]
     if None in every:
         return f"exchange the two in data.columns.{key}"
     other = dict(zip(found, reversed(found)))
@@ -113,7 +108,7 @@ def _exchanged(look: Look, key: str, names: list[str]) -> str:
 
 def _negated(look: Look, key: str, joint: str) -> str:
     """How an experiment says that a column has the other sign."""
-    column = _column(look, key, joint)
+    column = look.column(key, joint)
     if column is None or joint in getattr(look.experiment.data, key):
         return f"log the {key} with the other sign"
     return f"write data.{key}: {{{joint}: {{{column}: -1}}}}"
@@ -128,13 +123,14 @@ def _factors(look: Look, equations: Equations, reading: Reading, scored: Scored)
         & ((free.factor < LIKELY[0]) | (free.factor > LIKELY[1]))
         & (np.log(scored.left / free.left) > 0.1)
     )
-    # one link's mass may be anything; that of all is a unit
-    if off.sum() <= 0.5 * tells.sum():
-        return
-    for j in np.flatnonzero(tells):
+    # one link's mass may be anything; that of all is a unit, and no link is off by a thousand
+    every = off.sum() > 0.5 * tells.sum()
+    for j in np.flatnonzero(tells if every else off):
         name, own = look.robot.joints[j], float(free.factor[j])
         says = f"the torque of {name} is {_times(own)} what the URDF's masses need"
         thousand = _THOUSAND[0] < max(own, 1.0 / own) < _THOUSAND[1]
+        if not (every or thousand):
+            continue
         if thousand:
             yield Fault("wrong_unit", ERROR, says, "is it in mN m, or kN m? give it in N m", name)
         elif own < 1.0:
