@@ -36,7 +36,7 @@ def find(look: Look) -> Iterator[Fault]:
         # of joints that hardly move any reading of the columns tells as little
         others = [own for own in _others(reading, look) if any(moves[j] for j in own[1][1])]
         tried = [(made, told, equations.scored(made)) for made, told in others]
-        tried = [(s.loss, made, told, s) for made, told, s in tried if _clear(scored, s, told[1])]
+        tried = [(s.loss, made, told, s) for made, told, s in tried if _clear(scored, s, *told[1:])]
         # as it is, and in another unit, it may leave the least
         if not tried or equations.scored(reading, free=True).loss < min(loss for loss, *_ in tried):
             break
@@ -71,7 +71,10 @@ def _turned(factors, j: int) -> tuple:
     return tuple(-f if k == j else f for k, f in enumerate(factors))
 
 
-def _clear(before: Scored, after: Scored, joints) -> bool:
+def _clear(before: Scored, after: Scored, joints, word: str) -> bool:
+    # with both signs turned friction is as it was: masses alone tell, where they explain torque
+    if word == "angle and torque" and not np.all(after.taken[list(joints)] > _EXPLAINS):
+        return False
     known = before.known & after.known
     gain = np.log(before.left / after.left) * known
     return bool(gain.sum() > _BETTER * len(joints) and np.all(gain[list(joints)] > 0.0))
