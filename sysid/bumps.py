@@ -15,13 +15,15 @@ from .events import Event
 from .listed_effects import build
 from .log import Log
 from .lowpass import band, lowpassed, stride_of, widest
+from .model import Model
 from .motion import Motion
 from .outliers import BURST, CHANCE, bursts, ratio, surprise
 from .projection import inverted
 from .robot import Robot
-from .rows import Rows, stack
+from .rows import Rows, measured, telling
 from .running import running
 from .specs import EffectSpec
+from .stretches import stretches
 
 _EFFECTS = ("viscous", "coulomb", "torque_bias")  # what any joint has
 _NEARBY = 0.5  # s to either side whose median a burst must exceed
@@ -47,9 +49,10 @@ def bumps(robot: Robot, logs: Sequence[Log], *, among: int = 1) -> list[Event]:
         return []
     model = build(robot, [EffectSpec(name=name) for name in _EFFECTS])
     stride = stride_of(motion, cutoff)
-    rows = stack(model, motion, stride, keep=False)
+    rows, columns = apart(model, motion, stride)
+    supports = [model.support(joint) for joint in range(robot.dof)]
     step = stride * motion.pieces[0].step
-    size = np.abs(_left(rows, _kinds(motion)[rows.piece]))
+    size = np.abs(_left(rows, columns, supports, _kinds(motion)[rows.piece]))
     own = np.stack([_surprise(a, u, rows.piece, step) for a, u in zip(size.T, rows.use.T)], axis=1)
     span = len(own) * step
     level = np.log(span / BURST * robot.dof * among / CHANCE)
@@ -66,6 +69,20 @@ def bumps(robot: Robot, logs: Sequence[Log], *, among: int = 1) -> list[Event]:
     return found if len(found) * _OFTEN <= span else []
 
 
+def apart(model: Model, motion: Motion, stride: int) -> tuple[Rows, list[np.ndarray]]:
+    """The rows of a motion without columns, and of each joint those (support, n) that
+    `model.support` numbers, in less memory than all that it has."""
+    found = telling(model, motion, measured(motion, stride))
+    sizes = [len(model.support(joint)) for joint in range(model.robot.dof)]
+    columns = [np.zeros((size, len(found.tau))) for size in sizes]
+    for _, here, parts in stretches(model, motion, stride, keep=False):
+        for own, values in zip(columns, parts):
+            own[:, here] = values
+    for own, use in zip(columns, found.use.T):
+        own *= use
+    return found, columns
+
+
 def _kinds(motion: Motion) -> np.ndarray:
     """(pieces,) number of the levels at which each piece's log is: where these differ, robots may,
     and each has an equation of its own."""
@@ -73,22 +90,29 @@ def _kinds(motion: Motion) -> np.ndarray:
     return np.array([[*dict.fromkeys(each)].index(own) for own in each])
 
 
-def _left(rows: Rows, kind: np.ndarray) -> np.ndarray:
+def _left(rows: Rows, columns, supports, kind: np.ndarray) -> np.ndarray:
     """What least squares leave (n, dof), every joint in units of its median; of rows of each kind
-    (n,) by itself."""
+    (n,) by itself.
+
+    Args:
+        columns, supports: of each joint (support, n) and which parameters they are.
+    """
     weights, left = np.ones(rows.tau.shape[1]), np.zeros(rows.tau.shape)
     every, parts = slice(None), []
+    size = 1 + max(int(own.max(initial=-1)) for own in supports)
     for own in (kind == number for number in np.unique(kind)):
         own = every if own.all() else own
-        tau = rows.tau[own]
-        columns = [values[own] for values in rows.columns]
-        squares = np.stack([values.T @ values for values in columns])
-        along = np.stack([values.T @ torque for values, torque in zip(columns, tau.T)])
-        parts.append((own, tau, columns, squares, along))
+        squares, along = np.zeros((len(supports), size, size)), np.zeros((len(supports), size))
+        for j, (values, at) in enumerate(zip(columns, supports)):
+            values = values[:, own]
+            squares[j][np.ix_(at, at)] = values @ values.T
+            along[j, at] = values @ rows.tau[own, j]
+        parts.append((own, squares, along))
     for _ in range(_PASSES):
-        for own, tau, columns, squares, along in parts:
+        for own, squares, along in parts:
             x = inverted(np.tensordot(weights**2, squares, 1)) @ (weights**2 @ along)
-            left[own] = tau - np.stack([values @ x for values in columns], axis=1)
+            for j, (values, at) in enumerate(zip(columns, supports)):
+                left[own, j] = rows.tau[own, j] - x[at] @ values[:, own]
         usual = [np.median(np.abs(e[u])) if u.any() else 0.0 for e, u in zip(left.T, rows.use.T)]
         weights = ratio(np.ones(len(usual)), np.array(usual))
     return left * weights

@@ -12,13 +12,11 @@ import numpy as np
 
 from . import regressor
 from .effect import NotFinite, TorqueEffect
-from .model import Model, chunks
+from .model import Model
 from .motion import Motion, Piece
 from .slides import counted
+from .stretches import stretches
 from .two_masses import link_load
-
-_STRETCH = 16384  # samples whose columns are computed at once
-_PASSING = 4096  # and where nobody asks for them again
 
 
 @dataclass(frozen=True)
@@ -73,7 +71,7 @@ def measured(motion: Motion, stride: int) -> Rows:
     )  # fmt: skip
 
 
-def _counted(model: Model, motion: Motion, found: Rows) -> Rows:
+def telling(model: Model, motion: Motion, found: Rows) -> Rows:
     """Measured rows of which those count that say something of a model."""
     uses = [counted(model, piece) for piece in motion.pieces]
     if all(use is piece.use for use, piece in zip(uses, motion.pieces)):
@@ -83,26 +81,14 @@ def _counted(model: Model, motion: Motion, found: Rows) -> Rows:
     return replace(found, use=use, tau=np.where(use, found.tau, 0.0))
 
 
-def stack(model: Model, motion: Motion, stride: int, *, keep: bool = True) -> Rows:
-    """The rows of a motion under a model.
-
-    Args:
-        keep: as of `Model.columns`.
-    """
-    stretch = _STRETCH if keep else _PASSING
-    found = _counted(model, motion, measured(motion, stride))
-    n, dof = len(found.tau), model.robot.dof
-    columns = np.zeros((dof, n, model.size))
-    at = 0
-    for piece in motion.pieces:
-        remembered, supports = model.remembered(piece), [model.support(joint, piece) for joint in range(dof)]
-        # a stretch holds a whole number of strides, so that the kept rows go on where the last stretch ended
-        for rows in chunks(piece, stride * max(1, stretch // stride)):
-            parts = model.columns(piece, slice(rows.start, rows.stop, stride), remembered, keep=keep)
-            size = parts[0].shape[-1]
-            for joint, (values, support) in enumerate(zip(parts, supports)):
-                columns[joint, at : at + size, support] = values
-            at += size
+def stack(model: Model, motion: Motion, stride: int) -> Rows:
+    """The rows of a motion under a model."""
+    found = telling(model, motion, measured(motion, stride))
+    dof = model.robot.dof
+    columns = np.zeros((dof, len(found.tau), model.size))
+    for piece, here, parts in stretches(model, motion, stride):
+        for joint, values in enumerate(parts):
+            columns[joint, here, model.support(joint, piece)] = values
     columns *= found.use.T[:, :, None]
     return replace(found, columns=columns)
 

@@ -7,10 +7,14 @@ import numpy as np
 import pytest
 
 from sysid import experiment_logs, pipeline
-from sysid.bumps import bumps
+from sysid import rows as rows_of
+from sysid.bumps import apart, bumps
 from sysid.events import Event
+from sysid.listed_effects import build
+from sysid.lowpass import lowpassed
 from sysid.notices import noticed
 from sysid.simulate import hidden, load, simulate, write
+from sysid.specs import EffectSpec
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -102,3 +106,17 @@ def test_a_push_stands_on_two_joints_within_a_burst(pushed, monkeypatch, apart, 
 
     monkeypatch.setattr(module, "_surprise", surprise)
     assert len(bumps(machine, [replace(log, events=()) for log in logs])) == found
+
+
+def test_columns_apart_are_those_of_the_rows(pushed):
+    """In less memory: without the parameters that cannot enter a joint's torque; and pieces hold no sample that is none of theirs."""
+    experiment, _ = pushed
+    machine, logs = read(experiment)
+    motion = lowpassed(logs, machine.joints, 8.0)
+    assert all(getattr(piece, name).base is None for piece in motion.pieces for name in ("q", "qd", "qdd"))
+    model = build(machine, [EffectSpec(name=name) for name in ("viscous", "coulomb", "torque_bias")])
+    whole, (rows, columns) = rows_of.stack(model, motion, 3), apart(model, motion, 3)
+    np.testing.assert_array_equal(rows.tau, whole.tau)
+    for joint, own in enumerate(columns):
+        np.testing.assert_allclose(own.T, whole.columns[joint][:, model.support(joint)], rtol=1e-12, atol=1e-14)
+        assert np.count_nonzero(whole.columns[joint]) == np.count_nonzero(own)

@@ -20,8 +20,8 @@ _TURN = 2.0 * np.pi
 _DIGITS = 3  # of a rate that speeds tell
 _ALOHA, _ALOHA_RATE = "observations/qpos", 50.0  # Hz: DT = 0.02 s in ALOHA's constants
 _COUNTS = (
-    "0, 1, 2 ... may be the samples' numbers: then state their rate, `sysid init --rate HZ`, or write "
-    "data.rate in place of data.columns.time"
+    "0, 1, 2 ... may be the samples' numbers: then state their rate, `sysid init --rate HZ`, or "
+    "write data.rate in place of data.columns.time"
 )
 _OFTEN = 15.0  # times the angles of another log, as degrees are 57 times rad
 _WHOLE = 50.0  # counts: angles in degrees that are whole numbers by chance reach no more values
@@ -106,7 +106,7 @@ def position_unit(q: dict[str, np.ndarray], slides: dict[str, bool], named: str)
 
 
 def mixed(data: list[Logged], turning: list[str]) -> str:
-    """What to say where some logs' angles seem to be in degrees and others' in rad; else nothing."""
+    """What to say where the angles of some logs seem to be in degrees and others' in rad."""
     sizes = {one.name: np.array([np.abs(one.q[j]).max() for j in turning]) for one in data}
     far = {name: size for name, size in sizes.items() if size.max(initial=0.0) > DEGREES}
     near = {name: size for name, size in sizes.items() if name not in far}

@@ -165,13 +165,16 @@ def _piece(number: int, log: Log, segment, cutoff: float) -> Piece | None:
     qd, qdd = differences(smooth, segment.step)
     # what these take of fast motion, and torque kept, would look like a joint that gives
     tau = both.at(angles(_as_seen(segment.tau), axis=0).T, rows).T
+    noise = noise_of(segment.q[edge:-edge], smooth[edge:-edge], angles.taken_of_noise, segment.step)
+    # copies: views would hold what was made of every sample
+    q, qd, qdd = (values[rows].copy(order="K") for values in (smooth, qd, qdd))
     return Piece(
         log=number,
         step=every * segment.step,
         t=segment.t[rows],
-        q=smooth[rows],
-        qd=qd[rows],
-        qdd=qdd[rows],
+        q=q,
+        qd=qd,
+        qdd=qdd,
         tau=tau,
         measured=segment.tau[rows],
         signals={name: values[rows] for name, values in segment.signals.items()},
@@ -179,9 +182,7 @@ def _piece(number: int, log: Log, segment, cutoff: float) -> Piece | None:
         smoother=settling,
         core=slice(settling.reach, n - settling.reach),
         rest=np.zeros(smooth.shape[1]),
-        noise=noise_of(
-            segment.q[edge:-edge], smooth[edge:-edge], angles.taken_of_noise, segment.step
-        ),
+        noise=noise,
         source=log.name,
         levels=log.levels,
     )
