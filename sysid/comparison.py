@@ -92,6 +92,12 @@ def together(first: Fit, second: Fit, *, weighed: bool = False) -> Difference:
     return Difference("before", "after", "*", *_jackknife(*((s[both], n[both]) for s, n in totals)))
 
 
+def falls(first: Fit, second: Fit, least: float) -> bool:
+    """Whether the held-out error over all joints together, in units of their own, falls by more than its standard error and such a share."""
+    change = together(first, second)
+    return bool(change.delta_rms < -max(change.se, least))
+
+
 def rises(first: Fit, second: Fit, joints: list[str] | None) -> tuple[Difference, ...]:
     """Where the held-out error of some joints (None: over all together) rises by more than its
     standard error, and by more than rounding."""

@@ -66,7 +66,7 @@ class Masses:
                 "no effect that can hide in them brings them back: columns or units may be wrong "
                 "(`sysid check` says), or the logs do not tell them (a larger prior.weight)"
             )
-        effect = f"the effect {self.effect}{where}, which the model lacks," if self.effect else ""
+        effect = f"the effect {self.effect}{where}" if self.effect else ""
         what = f"{effect} with {auto}" if effect and auto else effect or auto
         typed = f": `{self.command}`" if self.command else ""
         return f"{what} brings them back at no larger error on data held apart{typed}"

@@ -25,6 +25,7 @@ from sysid.flexible.unknown import LEVEL
 from sysid.noise import NoiseFloor
 from sysid.simulate import simulate, write
 from sysid.statement.document import _verdict, dependences
+from sysid.statement.words import elsewhere
 from sysid.transfer import Transfer
 from sysid.unexplained import changed
 from sysid.view import first_view
@@ -81,8 +82,28 @@ def test_what_is_nothing_in_size_and_error_is_not_claimed(monkeypatch, fall, tol
     monkeypatch.setattr(claims.comparison, "compare", falls)
     monkeypatch.setattr(claims.comparison, "together", lambda *_, **__: Difference("", "", "*", all_, 0.01))
     shown.parameters_of = lambda effect, joint: {"T": (size, 0.1, "s"), "k": (3.0, float("nan"), "1")}
-    member = SimpleNamespace(candidate=SimpleNamespace(joint=1, key=("delay", 1)))
+    member = SimpleNamespace(candidate=SimpleNamespace(joint=1, key=("delay", 1), touches=lambda dof: [1]))
     assert (claims._nothing(fitted(1.0, train=1.0), after, shown, member) is None) is stands
+
+
+@pytest.mark.parametrize(("touches", "all_", "stands"), [([0, 1], -0.03, True), ([0, 1], -0.008, False), ([0, 1], 0.0, False), ([1], -0.03, False)])
+def test_what_moves_a_joint_may_show_in_the_torque_of_another(monkeypatch, touches, all_, stands):
+    """The error of its own joint hardly falls, that of all together by three standard errors, or less than one."""
+    monkeypatch.setattr(claims.comparison, "compare", lambda *_: [Difference("", "", "elbow", -0.001, 0.01)])
+    monkeypatch.setattr(claims.comparison, "together", lambda *_, **__: Difference("", "", "*", all_, 0.01))
+    after = fitted(1.0, train=0.9)
+    after.parameters_of = lambda effect, joint: {"d": (0.5, 0.1, "rad")}
+    member = SimpleNamespace(candidate=SimpleNamespace(joint=1, key=("encoder_offset", 1), touches=lambda dof: touches))
+    assert (claims._nothing(fitted(1.0, train=1.0), after, after, member) is None) is stands
+
+
+@pytest.mark.parametrize(
+    ("elbow", "wrist", "said"),
+    [(0.999, 1.8, ", that of wrist from 2 to 1.8 N m"), (0.9, 1.8, ""), (0.999, 1.999, ""), (0.999, 2.1, "")],
+)  # fmt: skip
+def test_the_joint_whose_error_falls_in_its_place_is_told(elbow, wrist, said):
+    joints = {joint: {"rms": {"test": rms}} for joint, rms in (("elbow", 1.0), ("wrist", 2.0), ("still", None))}
+    assert elsewhere("elbow", joints, {"elbow": elbow, "wrist": wrist, "still": None}, {"wrist": "N m"}) == said
 
 
 @pytest.mark.parametrize(

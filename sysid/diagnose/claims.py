@@ -97,7 +97,9 @@ def _nothing(before: Fit, after: Fit, told: Fit, member: Member) -> str | None:
         still = any(-d.delta_rms < d.se for d in (change, shown))
         if still and nought(told.parameters_of(*member.candidate.key)):
             return "its size is nothing beside its deviation, and the test error hardly falls"
-    if change.delta_rms > -_NOTHING * unit:
+    # what moves a joint may show in the torque of those that it carries, or that carry it
+    wide = len(member.candidate.touches(2)) > 1 and comparison.falls(before, after, _NOTHING)
+    if change.delta_rms > -_NOTHING * unit and not wide:
         falls = "hardly falls" if change.delta_rms < 0.0 else "does not fall"
         return f"with it the error on the test logs {falls} ({rise})"
     # as the fit weighs them: it trades what a quiet joint loses for what a loud one gains
@@ -109,8 +111,6 @@ def _nothing(before: Fit, after: Fit, told: Fit, member: Member) -> str | None:
 def undecided(choice: Choice, fit: Fit) -> Refused:
     """What is there and cannot be told from effects on other joints."""
     likely = [(m, chance) for m, chance in choice.members if chance >= 0.05]
-    names = [
-        f"{m.candidate.name} on {where(m, fit)} ({100 * chance:.0f} %)" for m, chance in likely
-    ]
+    names = [f"{m.candidate.name} on {where(m, fit)} ({100 * c:.0f} %)" for m, c in likely]
     why = f"something is there, and these logs cannot tell which: {', '.join(names)}"
     return Refused(choice.head.candidate.name, where(choice.head, fit), why)

@@ -94,5 +94,3 @@ def possible(d: dict) -> bool:
 def size(value: float) -> str:
     """Two digits, without an exponent where that is short."""
     return f"{value:.2g}" if not 10 <= abs(value) < 1e5 else f"{float(f'{value:.2g}'):.0f}"
-
-

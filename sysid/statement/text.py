@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from ..addition import LIKELY, designs, likely
-from .words import followed, listed, percent, placed, quantity, untold, valued, wrapped
+from .words import elsewhere, followed, listed, percent, placed, quantity, untold, valued, wrapped
 
 if TYPE_CHECKING:
     from ..diagnose.diagnosis import Diagnosis
@@ -128,7 +128,8 @@ def _fall(v: dict, of: Told) -> str:
     """Which share of the misfit all that is named explains, and what the held-out error does."""
     joint, entry = v["joint"], of.document["joints"][v["joint"]]
     error = f"{entry['rms']['test']:.4g} to {of.after[joint]:.4g} {of.units[joint]}"
-    fall = f"the held-out error goes from {error}"
+    also = elsewhere(joint, of.document["joints"], of.after, of.units) if "commands" in v else ""
+    fall = f"the held-out error goes from {error}{also}"
     it = together(v, of.document)
     if entry["noise_floor"] is None or v.get("explained") is None:
         return f"{it} {fall}"

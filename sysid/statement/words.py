@@ -6,6 +6,8 @@ import re
 import textwrap
 from collections.abc import Callable, Sequence
 
+_HARDLY = 0.01  # of an error
+
 
 def followed(entry: dict, word: Callable[[str], str]) -> str:
     """What a residual follows, alone or with a second variable, in words."""
@@ -72,3 +74,18 @@ def wrapped(words: str, width: int, indent: str) -> list[str]:
         break_on_hyphens=False,
     )
     return [line.replace("\u00a0", " ") for line in lines]
+
+
+def elsewhere(joint: str, joints: dict[str, dict], after: dict[str, float], units) -> str:
+    """The joint whose held-out error falls most with an effect on another, where that one's own
+    hardly does: what moves a joint may show in the torque of those that it carries.
+
+    Args:
+        joints: the document's. after: {joint: held-out RMS with it}. units: {joint: N m or N}.
+    """
+    before = {j: entry["rms"]["test"] for j, entry in joints.items() if entry["rms"]["test"]}
+    falls = {j: 1.0 - after[j] / rms for j, rms in before.items()}
+    most = max(falls, key=falls.get, default=joint)
+    if most == joint or falls[most] < _HARDLY or falls.get(joint, 0.0) >= _HARDLY:
+        return ""
+    return f", that of {most} from {before[most]:.4g} to {after[most]:.4g} {units[most]}"

@@ -45,14 +45,15 @@ def _show_warnings(document: dict) -> None:
 
 
 def _after_diagnosis(found, document: dict, experiment) -> None:
-    """What is typed next: what mends numbers that cannot be meant, the first addition, what may be it, how joints are weighed, or the
+    """What is typed next: the first addition, what mends numbers that cannot be meant, what may be it, how joints are weighed, or the
     page with all of it."""
     commands = [c for v in document["verdict"] for c in v.get("commands", ())]
     first = min((f for f in document["findings"] if f["command"] in commands and f["joins_as_step"]), key=lambda f: f["joins_as_step"], default=None)
     may = [v["may_be"]["command"] for v in document["verdict"] if "may_be" in v]
     even = [v["joint"] for v in document["verdict"] if "weighting" in v]
     target, out = typed(experiment.path), out_of(experiment, document["run"])
-    if mended_first(document, experiment, found.fit.masses):
+    # what the evidence names comes first: it is told with the masses as they are, and may be what bends them
+    if first is None and mended_first(document, experiment, found.fit.masses):
         return
     if first is not None or may:
         next_line(first["command"] if first else may[0], out=out)
