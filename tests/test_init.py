@@ -292,6 +292,18 @@ def test_logs_in_different_units_are_to_be_looked_at(experiment, cli):
     assert "if these are in rad, bring all logs to one unit" in json.dumps(said)
 
 
+@pytest.mark.parametrize("column", [f"q_{JOINTS[0]}", f"tau_{JOINTS[1]}", "t"])
+def test_what_is_no_number_is_said_with_its_row(column, experiment, cli):
+    def gap(columns):
+        return {n: np.where((np.arange(len(v)) == 7) & (n == column), np.nan, v) for n, v in columns.items()}
+
+    folder = experiment(train=gap)
+    logs = [folder / "train.csv", folder / "test.csv"]
+    said = cli("init", folder / "robot.urdf", *logs, out=folder / "mine")
+    said.complains(f"{column} is nan", "row 7", "leave the row out")
+    assert not (folder / "mine").exists()
+
+
 def test_a_clock_that_counts_samples_is_to_be_looked_at():
     counted, timed = (units.time_unit(np.arange(50) * step, "t") for step in (1.0, 0.001))
     assert "samples' numbers" in counted.doubt and timed.doubt == ""
