@@ -18,6 +18,7 @@ from .errors import SysidError
 from .model import Model
 from .motion import Motion, Piece, Pieces
 from .prediction import Prediction, States, Sums, joined_states, predict, states, units
+from .spans import released
 from .unfinished import beside, temporary_folder
 
 _ARRAYS = ("log", "t", "measured", "predicted", "use")
@@ -165,6 +166,7 @@ def _part(
     piece: Piece, model: Model, x, motion: Motion, first: int, samples: int, path: Path
 ) -> _Part:
     found = predict(model, x, replace(motion, pieces=(piece,)))
+    released()  # what filters and the regressor left free between what is held
     content = _put(found.to_dataframe(), path)
     where = states(piece, first, samples)
     return _Part(found.sums(), found.greatest(_GREATEST), where, len(found.t), content)
