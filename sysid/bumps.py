@@ -49,10 +49,9 @@ def bumps(robot: Robot, logs: Sequence[Log], *, among: int = 1) -> list[Event]:
         return []
     model = build(robot, [EffectSpec(name=name) for name in _EFFECTS])
     stride = stride_of(motion, cutoff)
-    rows, columns = apart(model, motion, stride)
-    supports = [model.support(joint) for joint in range(robot.dof)]
+    rows, parts = apart(model, motion, stride)
     step = stride * motion.pieces[0].step
-    size = np.abs(_left(rows, columns, supports, _kinds(motion)[rows.piece]))
+    size = np.abs(_left(rows, parts, _kinds(motion)[rows.piece]))
     own = np.stack([_surprise(a, u, rows.piece, step) for a, u in zip(size.T, rows.use.T)], axis=1)
     span = len(own) * step
     level = np.log(span / BURST * robot.dof * among / CHANCE)
@@ -69,18 +68,18 @@ def bumps(robot: Robot, logs: Sequence[Log], *, among: int = 1) -> list[Event]:
     return found if len(found) * _OFTEN <= span else []
 
 
-def apart(model: Model, motion: Motion, stride: int) -> tuple[Rows, list[np.ndarray]]:
-    """The rows of a motion without columns, and of each joint those (support, n) that
-    `model.support` numbers, in less memory than all that it has."""
+def apart(model: Model, motion: Motion, stride: int) -> tuple[Rows, list[tuple]]:
+    """The rows of a motion without columns, and of each joint the parameters that can enter its
+    torque and their columns (support, n), in less memory than all that it has."""
     found = telling(model, motion, measured(motion, stride))
-    sizes = [len(model.support(joint)) for joint in range(model.robot.dof)]
-    columns = [np.zeros((size, len(found.tau))) for size in sizes]
-    for _, here, parts in stretches(model, motion, stride, keep=False):
-        for own, values in zip(columns, parts):
+    supports = [model.support(joint) for joint in range(model.robot.dof)]
+    columns = [np.zeros((len(support), len(found.tau))) for support in supports]
+    for here, parts in stretches(model, motion, stride, keep=False):
+        for own, (_, values) in zip(columns, parts):
             own[:, here] = values
     for own, use in zip(columns, found.use.T):
         own *= use
-    return found, columns
+    return found, list(zip(supports, columns))
 
 
 def _kinds(motion: Motion) -> np.ndarray:
@@ -90,20 +89,20 @@ def _kinds(motion: Motion) -> np.ndarray:
     return np.array([[*dict.fromkeys(each)].index(own) for own in each])
 
 
-def _left(rows: Rows, columns, supports, kind: np.ndarray) -> np.ndarray:
+def _left(rows: Rows, joints: list[tuple], kind: np.ndarray) -> np.ndarray:
     """What least squares leave (n, dof), every joint in units of its median; of rows of each kind
     (n,) by itself.
 
     Args:
-        columns, supports: of each joint (support, n) and which parameters they are.
+        joints: of each, its parameters and their columns (support, n).
     """
     weights, left = np.ones(rows.tau.shape[1]), np.zeros(rows.tau.shape)
     every, parts = slice(None), []
-    size = 1 + max(int(own.max(initial=-1)) for own in supports)
+    size = 1 + max(int(at.max(initial=-1)) for at, _ in joints)
     for own in (kind == number for number in np.unique(kind)):
         own = every if own.all() else own
-        squares, along = np.zeros((len(supports), size, size)), np.zeros((len(supports), size))
-        for j, (values, at) in enumerate(zip(columns, supports)):
+        squares, along = np.zeros((len(joints), size, size)), np.zeros((len(joints), size))
+        for j, (at, values) in enumerate(joints):
             values = values[:, own]
             squares[j][np.ix_(at, at)] = values @ values.T
             along[j, at] = values @ rows.tau[own, j]
@@ -111,7 +110,7 @@ def _left(rows: Rows, columns, supports, kind: np.ndarray) -> np.ndarray:
     for _ in range(_PASSES):
         for own, squares, along in parts:
             x = inverted(np.tensordot(weights**2, squares, 1)) @ (weights**2 @ along)
-            for j, (values, at) in enumerate(zip(columns, supports)):
+            for j, (at, values) in enumerate(joints):
                 left[own, j] = rows.tau[own, j] - x[at] @ values[:, own]
         usual = [np.median(np.abs(e[u])) if u.any() else 0.0 for e, u in zip(left.T, rows.use.T)]
         weights = ratio(np.ones(len(usual)), np.array(usual))

@@ -102,7 +102,7 @@ def measured(
     if log.start is not None or log.stop is not None:
         first, samples = _piece(samples, log)
     for name, values in samples.signals.items():
-        _check_finite(values, name, samples.t, joints, samples.where, first)
+        check_finite(values, name, samples.where, joints=joints, t=samples.t, first=first)
     _convert(samples.signals, data, joints, prismatic, samples.where, drives)
     for joint, own in drives.items():
         _driven(samples, joints.index(joint), joint, own)
@@ -139,14 +139,22 @@ def _piece(samples: Recording, log: LogSpec) -> tuple[int, Recording]:
     return int(first), samples.rows(int(first), int(last))
 
 
-def _check_finite(values, name: str, t, joints, where: str, first: int) -> None:
+def check_finite(values, name: str, where: str, *, joints=(), t=None, first: int = 0) -> None:
+    """Whether values (n,), or (n, dof) of joints, from row `first` of a log on, can be a measurement.
+
+    Args:
+        t: (n,) [s], where it is known by now.
+
+    Raises:
+        LogError: one is no number, or larger than any unit makes it.
+    """
     # only a bad log pays for the search; a NaN fails both comparisons
     if values.max() <= _LARGEST and values.min() >= -_LARGEST:
         return
     row, *column = (int(k) for k in np.argwhere(~(np.abs(values) <= _LARGEST))[0])
     joint = f" of joint {joints[column[0]]!r}" if column else ""
     raise LogError(
-        f"{name.removeprefix('signals.')}{joint} is {values[row, *column]:g}", where=f"{where} row {first + row} counted from 0, t = {t[row]:.6g} s",
+        f"{name.removeprefix('signals.')}{joint} is {values[row, *column]:g}", where=f"{where} row {first + row} counted from 0" + ("" if t is None else f", t = {t[row]:.6g} s"),
         allowed=f"finite numbers, at most {_LARGEST:g} in size", do="leave the row out; a gap is split there",
     )  # fmt: skip
 

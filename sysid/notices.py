@@ -80,9 +80,7 @@ def tell_overlap(experiment: Experiment, found: list[dict]) -> None:
 
 def samples_of(part: str, read: list[logs.Log]) -> list[Sampled]:
     """What tells whether logs hold what others do; of long ones nothing."""
-    short = [(log, log.segments) for log in read if not isinstance(log.segments, Spans)]
-    joined = lambda name, segments: np.concatenate([getattr(s, name) for s in segments])  # noqa: E731
-    return [sampled(log.name, part, *(joined(name, own) for name in ("t", "q", "tau"))) for log, own in short]
+    return [sampled(log.name, part, log.segments) for log in read if not isinstance(log.segments, Spans)]
 
 
 def tell_same(read: list[Sampled], experiment: Experiment, provenance: list[dict]) -> None:

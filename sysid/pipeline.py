@@ -43,7 +43,7 @@ from .notices import (
     tell_same,
     tell_still,
     tell_undetermined,
-)  # fmt: skip
+)
 from .plausible import implausible
 from .prediction import Prediction, predict
 from .prior_weight import PriorWeight, with_weight

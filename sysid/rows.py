@@ -84,11 +84,10 @@ def telling(model: Model, motion: Motion, found: Rows) -> Rows:
 def stack(model: Model, motion: Motion, stride: int) -> Rows:
     """The rows of a motion under a model."""
     found = telling(model, motion, measured(motion, stride))
-    dof = model.robot.dof
-    columns = np.zeros((dof, len(found.tau), model.size))
-    for piece, here, parts in stretches(model, motion, stride):
-        for joint, values in enumerate(parts):
-            columns[joint, here, model.support(joint, piece)] = values
+    columns = np.zeros((model.robot.dof, len(found.tau), model.size))
+    for here, parts in stretches(model, motion, stride):
+        for joint, (support, values) in enumerate(parts):
+            columns[joint, here, support] = values
     columns *= found.use.T[:, :, None]
     return replace(found, columns=columns)
 

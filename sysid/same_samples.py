@@ -44,14 +44,15 @@ class Same:
     since: float
 
 
-def sampled(name: str, part: str, t: np.ndarray, q: np.ndarray, tau: np.ndarray) -> Sampled:
+def sampled(name: str, part: str, stretches: Sequence) -> Sampled:
     """Samples of a log.
 
     Args:
-        t: (n,) [s]. q, tau: (n, dof).
+        stretches: each with t (n,) [s], q and tau (n, dof).
     """
+    t, q, tau = (np.concatenate([getattr(own, word) for own in stretches]) for word in ("t", "q", "tau"))
     once, at, count = np.unique(_numbers(tau), return_index=True, return_counts=True)
-    return Sampled(name, part, len(t), once[count == 1], at[count == 1], _numbers(q), np.asarray(t))
+    return Sampled(name, part, len(t), once[count == 1], at[count == 1], _numbers(q), t)
 
 
 def same(logs: Sequence[Sampled]) -> Iterator[Same]:

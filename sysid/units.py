@@ -4,6 +4,7 @@ import math
 import re
 
 TIME = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+DEGREE = round(math.pi / 180.0, 8)  # rad, as an experiment file says it
 POSITION = {"rad": 1.0, "m": 1.0, "deg": math.pi / 180.0, "mm": 1e-3}
 TORQUE = {"N m": 1.0, "N": 1.0, "A": 1.0}  # A is multiplied by the joint's torque constant
 

@@ -115,8 +115,9 @@ def test_columns_apart_are_those_of_the_rows(pushed):
     motion = lowpassed(logs, machine.joints, 8.0)
     assert all(getattr(piece, name).base is None for piece in motion.pieces for name in ("q", "qd", "qdd"))
     model = build(machine, [EffectSpec(name=name) for name in ("viscous", "coulomb", "torque_bias")])
-    whole, (rows, columns) = rows_of.stack(model, motion, 3), apart(model, motion, 3)
+    whole, (rows, parts) = rows_of.stack(model, motion, 3), apart(model, motion, 3)
     np.testing.assert_array_equal(rows.tau, whole.tau)
-    for joint, own in enumerate(columns):
+    for joint, (support, own) in enumerate(parts):
+        np.testing.assert_array_equal(support, model.support(joint))
         np.testing.assert_allclose(own.T, whole.columns[joint][:, model.support(joint)], rtol=1e-12, atol=1e-14)
         assert np.count_nonzero(whole.columns[joint]) == np.count_nonzero(own)

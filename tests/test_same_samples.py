@@ -7,6 +7,7 @@ import pytest
 import sysid
 from scripts.blind_parts.robots import experiment_of
 from sysid import pipeline
+from sysid.check.samples import Samples
 from sysid.same_samples import same, sampled, told
 from sysid.simulate import simulate, write
 
@@ -18,7 +19,8 @@ def measured(seed: int, rows: int = 600, joints: int = 3, *, grain: float = 0.0)
 
 
 def of(name, part, log, rows=slice(None)):
-    return sampled(name, part, *(values[rows] for values in log))
+    t, q, tau = (values[rows] for values in log)
+    return sampled(name, part, [Samples(t, q, tau)])
 
 
 def test_logs_of_their_own_share_nothing():

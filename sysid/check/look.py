@@ -21,7 +21,9 @@ from ..specs import EffectSpec, Experiment
 from ..trusted import Untrusted
 from .equations import FEWEST, Equations
 from .logged import Logged, read
+from .tally import SPAN
 
+_TRAVELS, _MOVES = (0.1, 0.02), 0.05  # rad, m; rad/s: less tells nothing of a body
 _HAS = ("armature", "viscous", "coulomb", "torque_bias")  # what any joint has
 
 
@@ -47,6 +49,17 @@ class Seen:
 
 
 @dataclass(frozen=True)
+class Moves:
+    """How a joint moves in the training logs: whether enough to tell of what it carries; how far it
+    travels, its top speed and its speeds (n,), a second."""
+
+    enough: bool
+    travel: float
+    top: float
+    speeds: np.ndarray
+
+
+@dataclass(frozen=True)
 class Look:
     """An experiment, its robot and all its logs."""
 
@@ -57,6 +70,24 @@ class Look:
     def part(self, name: str) -> list[Logged]:
         """The logs of "train" or "test"."""
         return [log for log in self.logs if log.part == name]
+
+    @property
+    def with_speeds(self) -> list[Logged]:
+        """The training logs that are long enough for speeds."""
+        return [log for log in self.part("train") if log.samples > 2.0 * SPAN / log.step]
+
+    @cached_property
+    def excited(self) -> list[Moves]:
+        """Of each joint."""
+        return [self._moves(j) for j in range(self.robot.dof)]
+
+    def _moves(self, j: int) -> Moves:
+        long, slides = self.with_speeds, bool(self.robot.prismatic[j])
+        travel = max(float(log.tally.travel[j]) for log in self.part("train"))
+        speeds = np.concatenate([log.speeds(j) for log in long]) if long else np.zeros(1)
+        top = float(np.quantile(speeds, 0.99))
+        enough = travel >= _TRAVELS[slides] and top >= _MOVES * (1.0 if not slides else 0.2)
+        return Moves(enough, travel, top, speeds)
 
     def column(self, key: str, joint: str) -> str | None:
         """The name of a joint's column of data.columns' `position` or `torque`, None where it goes

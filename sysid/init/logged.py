@@ -9,6 +9,7 @@ import numpy as np
 
 from .. import datasets
 from ..errors import LogError
+from ..log import check_finite
 from ..readers import listed, open_table
 from ..readers.table import Table
 from .columns import Found, found
@@ -159,7 +160,7 @@ def _one(name: str, table: Table, signals: Signals) -> Logged:
     names = [*time, *counted, *(c for columns in chosen.values() for c in columns.values())]
     values = table.load(list(dict.fromkeys(names)))
     for column in (*time, *chosen["q"].values(), *chosen["tau"].values()):
-        _refuse_gaps(values[column], column, table)
+        check_finite(values[column], column, str(table.path))  # as a fit would, before a guess
     of = {kind: {j: values[c] for j, c in columns.items()} for kind, columns in chosen.items()}
     for joint, column in signals.position.columns.items():
         if joint not in joints:
@@ -170,15 +171,3 @@ def _one(name: str, table: Table, signals: Signals) -> Logged:
     episodes = tuple(int(k) for k in np.unique(values[_EPISODE])) if counted else ()
     t = values[signals.time] if signals.time else None
     return Logged(name, table, t, of["q"], of["tau"], of.get("qd", {}), episodes)
-
-
-def _refuse_gaps(values, column: str, table: Table) -> None:
-    """What a fit would refuse is said before anything is guessed from it. Raises LogError."""
-    if not np.all(known := np.isfinite(values)):
-        row = int(np.argmin(known))
-        raise LogError(
-            f"{column} is {values[row]:g}",
-            where=f"{table.path} row {row} counted from 0",
-            allowed="finite numbers",
-            do="leave the row out; a gap is split there",
-        )

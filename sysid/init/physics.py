@@ -17,6 +17,7 @@ from ..check.equations import Equations, Reading
 from ..check.look import Look, looked
 from ..errors import LogError
 from ..notices import noticed
+from ..units import DEGREE
 from .guess import Draft, Guess
 from .logged import Signals
 
@@ -26,7 +27,7 @@ _TAKES = 0.01  # of a joint's torque squared: less of the URDF's torque tells no
 
 def in_degrees(look: Look, *, currents: bool, alone: str = "") -> list[str]:
     """The joints whose angles, taken for rad, explain the torque as degrees, and not as they are:
-    all that turn, or none.
+    all that turn, the one that may be so alone, or none.
 
     Args:
         currents: the torques may have any factor. Otherwise the URDF's robot must also need more
@@ -40,12 +41,10 @@ def in_degrees(look: Look, *, currents: bool, alone: str = "") -> list[str]:
     plain = Reading.plain(look.robot.dof)
     turning = ~np.asarray(look.robot.prismatic)
     joints = np.array(look.robot.joints)
-    turned = [
-        replace(plain, angle_factor=tuple(np.where(own, np.pi / 180.0, 1.0)))
-        for own in (turning, joints == alone)
-    ]
-    as_rad, as_deg, one = (equations.scored(reading, free=currents) for reading in (plain, *turned))
-    if alone and one.loss < min(as_deg.loss, as_rad.loss - _BETTER):
+    scored = lambda reading: equations.scored(reading, free=currents)  # noqa: E731
+    as_rad, as_deg = scored(plain), scored(_turned(plain, turning))
+    least = min(as_deg.loss, as_rad.loss - _BETTER)
+    if alone and scored(_turned(plain, joints == alone)).loss < least:
         return [alone]
     known = as_rad.known & as_deg.known & turning
     gain = np.log(as_rad.left / as_deg.left)[known]
@@ -53,6 +52,11 @@ def in_degrees(look: Look, *, currents: bool, alone: str = "") -> list[str]:
     if not known.any() or not (currents or np.mean(impossible) > 0.5):
         return []
     return joints[turning].tolist() if gain.sum() > _BETTER * known.sum() else []
+
+
+def _turned(plain: Reading, own: np.ndarray) -> Reading:
+    """The reading in which some joints' (dof,) angles are in degrees."""
+    return replace(plain, angle_factor=tuple(np.where(own, np.pi / 180.0, 1.0)))
 
 
 def factors(look: Look, *, certain: bool) -> dict[str, float] | None:
@@ -94,7 +98,7 @@ def held_against(out: Draft, found: Signals, folder: Path) -> Draft:
         small = angles.value == "rad" and not found.position.meaning.unit
         how = {"currents": amperes is not None or servos, "alone": angles.alone}
         if small and (turned := in_degrees(look, **how)):
-            out = out.having(replace(angles, doubt=""), _turned(look, angles, turned))
+            out = out.having(replace(angles, doubt=""), _degrees(look, angles, turned))
             look = looked(config.experiment(out.tree, path))
         scales = None if servos else factors(look, certain=amperes is not None)
         if scales:
@@ -110,13 +114,13 @@ def held_against(out: Draft, found: Signals, folder: Path) -> Draft:
     return replace(out, notes=(*out.notes, *dict.fromkeys(f"{f.says}: {f.do}" for f in faults)))
 
 
-def _turned(look: Look, angles: Guess, joints: list[str]) -> Guess:
+def _degrees(look: Look, angles: Guess, joints: list[str]) -> Guess:
     """That angles are in degrees: all of them, or one joint's."""
     why = "only as degrees do such angles go with the torques of the URDF's robot"
     if len(joints) > 1 or (column := look.column("position", joints[0])) is None:
         return Guess(angles.key, "deg", f"{angles.why}, and {why}")
     doubt = f"{angles.why}; the others' stay as they are"
-    return Guess("data.position", {joints[0]: {column: 0.01745329}}, why, doubt)
+    return Guess("data.position", {joints[0]: {column: DEGREE}}, why, doubt)
 
 
 def _scaled(amperes: Guess | None, scales: dict[str, float], joints: list[str]) -> list[Guess]:

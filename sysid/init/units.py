@@ -6,6 +6,7 @@ import numpy as np
 
 from ..errors import LogError
 from ..log import DEGREES
+from ..units import DEGREE
 from .guess import Guess
 from .logged import Logged, Signals
 from .words import UNITS, words
@@ -99,7 +100,7 @@ def position_unit(q: dict[str, np.ndarray], slides: dict[str, bool], named: str)
         moving = [own for own, values in turning.items() if np.ptp(values) > 0.0]
         if len(moving) > 1 and len(far) == 1:  # of an arm in degrees more go so far
             doubt = "it alone: if its angle is in degrees, and the others' are in rad, write "
-            doubt += f"{{{joint}: {{ITS COLUMN: 0.01745329}}}} as data.position; deg if all are"
+            doubt += f"{{{joint}: {{ITS COLUMN: {DEGREE}}}}} as data.position; deg if all are"
             return Guess(key, "rad", why, doubt, joint)
         return Guess(key, "deg", why, "write rad if a joint really makes many turns")
     return Guess(key, "rad", f"the largest angle is {largest[joint]:.3g}")

@@ -7,14 +7,14 @@ from collections.abc import Iterator
 import numpy as np
 
 from ...lowpass.angles import grains
+from ...units import DEGREE
 from ..fault import ERROR, WARNING, Fault
 from ..look import Logged, Look
-from ..tally import FASTER, SPAN, TURN, lag_of
+from ..tally import FASTER, TURN, lag_of
 
 AFTER, SENSELESS = 1, ("wrong_unit",)
 _COARSE = TURN / 2**12  # rad: a velocity by differences then is mostly steps
 _STILL, _MOSTLY = 0.01, 0.6  # of a joint's top speed; of the samples
-_TRAVELS, _MOVES = (0.1, 0.02), 0.05  # rad, m; rad/s: less tells nothing of a body
 
 
 def find(look: Look) -> Iterator[Fault]:
@@ -109,35 +109,19 @@ def _degrees(look: Look, log: Logged, joint: str) -> str:
     column = look.column("position", joint)
     if len(far) > 1 or column is None or look.robot.dof < 2:
         return "if that is degrees set data.units.position: deg"
-    alone = f"{{{joint}: {{{column}: 0.01745329}}}}"
+    alone = f"{{{joint}: {{{column}: {DEGREE}}}}}"
     return f"if it alone is in degrees write data.position: {alone}; if all are, data.units.position: deg"
 
 
-def _long(look: Look) -> list[Logged]:
-    """The training logs that have speeds."""
-    return [log for log in look.part("train") if log.samples > 2.0 * SPAN / log.step]
-
-
-def excited(look: Look, j: int) -> tuple[bool, float, float, np.ndarray]:
-    """Whether a joint moves enough in the training logs to tell of what it carries; how far it
-    travels, its top speed and its speeds (n,), a second."""
-    long, slides = _long(look), bool(look.robot.prismatic[j])
-    travel = max(float(log.tally.travel[j]) for log in look.part("train"))
-    speed = np.concatenate([log.speeds(j) for log in long]) if long else np.zeros(1)
-    top = float(np.quantile(speed, 0.99))
-    enough = travel >= _TRAVELS[slides] and top >= _MOVES * (1.0 if not slides else 0.2)
-    return enough, travel, top, speed
-
-
 def _of_training(look: Look, j: int, joint: str) -> Iterator[Fault]:
-    own, long = look.part("train"), _long(look)
-    enough, travel, top, speed = excited(look, j)
-    if not enough:
+    own, long = look.part("train"), look.with_speeds
+    moves = look.excited[j]
+    if not moves.enough:
         yield Fault(
             "not_excited",
             WARNING,
             (
-                f"{joint} travels {travel:.2g} at up to {top:.2g} a second in the "
+                f"{joint} travels {moves.travel:.2g} at up to {moves.top:.2g} a second in the "
                 "training logs: what it carries and its friction stay as the prior says"
             ),
             "log it moving, or leave it out with robot.lock",
@@ -145,7 +129,7 @@ def _of_training(look: Look, j: int, joint: str) -> Iterator[Fault]:
             rows=sum(log.samples for log in own),
         )
         return
-    still = speed < _STILL * top
+    still = moves.speeds < _STILL * moves.top
     if np.mean(still) > _MOSTLY:
         yield Fault(
             "standstill",

@@ -11,7 +11,6 @@ import numpy as np
 from ..equations import LIKELY, Equations, Reading, Scored
 from ..fault import ERROR, Fault
 from ..look import Look
-from .angles import excited
 
 AFTER, SENSELESS = 2, ("wrong_unit", "angle_wrap")
 # Log of squares that another reading must take off, in all and of each joint whose column it reads
@@ -31,10 +30,11 @@ def find(look: Look) -> Iterator[Fault]:
         return
     reading = Reading.plain(look.robot.dof)
     scored = equations.scored(reading)
-    moves = [excited(look, j)[0] for j in range(look.robot.dof)]
     for _ in range(_ROUNDS):
         # of joints that hardly move any reading of the columns tells as little
-        others = [own for own in _others(reading, look) if any(moves[j] for j in own[1][1])]
+        others = [
+            own for own in _others(reading, look) if any(look.excited[j].enough for j in own[1][1])
+        ]
         tried = [(made, told, equations.scored(made)) for made, told in others]
         tried = [(s.loss, made, told, s) for made, told, s in tried if _clear(scored, s, *told[1:])]
         # as it is, and in another unit, it may leave the least

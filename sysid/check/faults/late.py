@@ -10,7 +10,6 @@ from ... import blocks
 from ..equations import FEWEST
 from ..fault import WARNING, Fault
 from ..look import Look, Seen
-from .angles import excited
 
 AFTER, SENSELESS = 3, ("wrong_unit", "angle_wrap", "joint_order", "sign_flipped")
 _MOST, _LAGS = 0.1, 81  # s to either side, and how many of them are tried
@@ -31,7 +30,7 @@ def find(look: Look) -> Iterator[Fault]:
     for j, joint in enumerate(look.robot.joints):
         use = rows.use[:, j]
         told = use.sum() >= FEWEST and np.ptp(rows.tau[use, j]) > 0.0
-        if not told or not excited(look, j)[0]:
+        if not told or not look.excited[j].enough:
             continue
         left = _left(look.seen, j, lags)
         squares = np.sum(left**2, axis=1)

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-import numpy as np
-
 from ...log import overlapping
 from ...same_samples import Same, same, sampled, told
 from ..fault import ERROR, WARNING, Fault
-from ..look import Logged, Look
+from ..look import Look
 
 AFTER, SENSELESS = 0, ()
 _ANOTHER = "give data.test another recording, or another piece of this one"
@@ -41,14 +39,10 @@ def find(look: Look) -> Iterator[Fault]:
                 break
     # of a long log stretches alone stand in memory: those of two need not meet
     short = [log for log in look.logs if sum(len(own.t) for own in log.shown) == log.samples]
-    for found in same([_sampled(log) for log in short]) if len(short) > 1 else ():
+    samples = [sampled(log.log.name, log.part, log.shown) for log in short]
+    for found in same(samples) if len(short) > 1 else ():
         if not known.issuperset(one.name for one in found.others):
             yield _fault(found)
-
-
-def _sampled(log: Logged):
-    joined = (np.concatenate([getattr(s, name) for s in log.shown]) for name in ("t", "q", "tau"))
-    return sampled(log.log.name, log.part, *joined)
 
 
 def _fault(found: Same) -> Fault:
