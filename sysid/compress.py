@@ -115,6 +115,7 @@ def _of_piece(piece: Piece, model: Model | Linearised, supports: Sequence[np.nda
             if stop == edges[block + 1]:
                 factors += [Factor(j, block, supports[j], np.sqrt(every) * one.triangle(), every * one.rows) for j, one in enumerate(begun)]
                 begun = []
+        del columns, values  # or they stand beside the next ones
         if done:
             done(parts[-1][2] - parts[0][1])
     return factors

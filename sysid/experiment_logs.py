@@ -7,11 +7,12 @@ from dataclasses import dataclass, replace
 from . import events, long_log, masks, robot
 from . import log as logs
 from .bumps import bumps
+from .free_memory import released
 from .log_spec import LogSpec
 from .model import Model
 from .notices import noticed
 from .robot import Robot
-from .spans import Spans, released
+from .spans import Spans
 from .specs import Experiment
 from .workers import Mapped
 

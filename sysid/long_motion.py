@@ -18,10 +18,11 @@ import numpy as np
 from . import preprocess, standstill
 from .errors import LogError, SysidWarning
 from .extent import Extent, Reach, reach_of
+from .free_memory import released
 from .log import Log
 from .motion import Motion, Piece, Pieces, never_moved
 from .preprocess import ROUNDING, needs, on_both_sides, piece_of, under_lowpass
-from .spans import Spans, around, carried, released
+from .spans import Spans, around, carried
 from .specs import PreprocessSpec
 from .workers import Mapped
 
@@ -102,7 +103,9 @@ class _Place:
         segments = self.log.segments
         step = segments.step(self.k) if isinstance(segments, Spans) else segments[self.k].step
         own = around(segments, self.k, margin(self.spec, step))
-        return piece_of(self.number, self.log, own, self.spec, self.joints)
+        piece = piece_of(self.number, self.log, own, self.spec, self.joints)
+        released()
+        return piece
 
 
 def _place(log: Log, number: int, k: int, spec: PreprocessSpec, joints) -> _Place:

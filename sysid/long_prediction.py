@@ -15,13 +15,14 @@ from pathlib import Path
 import numpy as np
 
 from .errors import SysidError
+from .free_memory import released
 from .model import Model
 from .motion import Motion, Piece, Pieces
 from .prediction import Prediction, States, Sums, joined_states, predict, states, units
-from .spans import released
 from .unfinished import beside, temporary_folder
 
 _ARRAYS = ("log", "t", "measured", "predicted", "use")
+_ROWS = 2**15  # of a file that are read as one
 _GREATEST = 8  # torques of each joint that are remembered
 
 
@@ -70,7 +71,10 @@ class LongPrediction(Prediction):
         """As of `Prediction`."""
         import polars as pl
 
-        return (pl.read_parquet(path) for path in self.files)
+        for path in self.files:
+            part = pl.scan_parquet(path)
+            rows = part.select(pl.len()).collect().item()
+            yield from (part.slice(first, _ROWS).collect() for first in range(0, rows, _ROWS))
 
     def _read(self, paths: list[Path]) -> Prediction:
         import polars as pl
@@ -174,7 +178,7 @@ def _part(
 
 def _put(table, path: Path) -> bytes | None:
     """Write a part to its file; its content where that is on another machine."""
-    how = {"compression": "uncompressed", "statistics": False}
+    how = {"compression": "uncompressed", "statistics": False, "row_group_size": _ROWS}
     if not path.parent.is_dir():
         stream = io.BytesIO()
         table.write_parquet(stream, **how)

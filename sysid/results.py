@@ -20,7 +20,7 @@ from .differences import told
 from .estimate import Fit
 from .filters import settled
 from .fit_document import document
-from .spans import released
+from .free_memory import released
 from .specs import Experiment, is_own
 from .whole_files import folder, sunk, write_together
 

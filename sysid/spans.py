@@ -10,15 +10,15 @@ outside its `core`.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from ctypes import CDLL
 from dataclasses import dataclass, replace
-from functools import cache
 from itertools import pairwise
 
+from .free_memory import kept, released
 from .segment import Segment
 
 SPAN = 2**18  # rows; at 1 kHz four minutes
 _PARTS = 8  # of a span, where a log is looked at in parts: half a minute
+_FREE, _APART = 2**26, 2**23  # bytes: of signals of all joints over a span, an array is apart
 _SHORTEST = 64  # parts of a span: of one of very many logs, that are still four seconds
 
 #: (first, last) -> those rows of a stretch without a gap
@@ -33,6 +33,7 @@ class Spans(Sequence):
     """
 
     def __init__(self, stretches: Sequence[tuple[Rows, int]]) -> None:
+        kept(_FREE, _APART)
         self._spans = [
             (rows, first, last, n) for rows, n in stretches for first, last in pairwise(edges(n))
         ]
@@ -93,29 +94,23 @@ class Spans(Sequence):
         """A span with up to `margin` rows of what stands before and after it, outside its core."""
         rows, first, last, n = self._spans[number]
         begin, end = max(0, first - margin), min(n, last + margin)
-        return replace(rows(begin, end), core=slice(first - begin, last - begin))
+        read = rows(begin, end)
+        released()
+        return replace(read, core=slice(first - begin, last - begin))
 
 
 def edges(n: int, most: int | None = None) -> list[int]:
-    """Where the spans of n rows begin, and the end: as few as hold `most` rows at most (`SPAN`), of
-    equal length."""
-    count = -(-n // (most or SPAN))
-    return [n * k // count for k in range(count + 1)]
-
-
-@cache
-def _trim():
-    """The C library's way to give back what is free; nothing where it has none."""
-    try:
-        return CDLL(None).malloc_trim
-    except (AttributeError, OSError, TypeError):
-        return lambda _: None
-
-
-def released() -> None:
-    """Give the memory of a span that is done with back to the system: what the C library keeps is
-    in pieces, and would grow from span to span."""
-    _trim()(0)
+    """Where the spans of n rows begin, and the end: each has `most` rows (`SPAN`), but the last two,
+    which are of equal length, so that none is short. So what a span takes of memory is the same
+    whatever the log's length."""
+    most = most or SPAN
+    whole = max(-(-n // most) - 2, 0)
+    rest = n - whole * most
+    count = -(-rest // most)
+    return [
+        *(k * most for k in range(whole)),
+        *(whole * most + rest * k // count for k in range(count + 1)),
+    ]
 
 
 def carried(segments: Sequence[Segment], number: int, margin: int) -> tuple[Sequence[Segment], int]:

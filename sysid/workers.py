@@ -10,20 +10,20 @@ import logging
 import warnings
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager, suppress
-from ctypes import CDLL
-from functools import cache
+from contextlib import contextmanager
 from itertools import islice
 
 from .errors import SysidError
+from .free_memory import kept
 from .threads import single_threaded
 
 _DEATHS = 3  # of workers at one piece of work, after which it is given up
 _PATIENCE = 10  # s to find a scheduler
 _AHEAD = 4  # pieces of work for each thread of the workers that wait: none of them is ever idle
-# M_TRIM_THRESHOLD and M_MMAP_THRESHOLD of glibc's malloc.h [bytes]: where its own adjustment ends
-# (man mallopt)
-_MALLOC = {-1: 2**26, -3: 2**25}
+# Bytes: where the C library's own adjustment ends (man mallopt). Dask bids its workers give what is
+# free back at once, and to be given each array's pages again costs as much as what is done with
+# them.
+_FREE, _APART = 2**26, 2**25
 # Of processes that this one starts: one thread each; memory from one heap, which grows and stays,
 # where each thread's own would be given back and taken again; no sampling of where they are. And
 # they look after themselves by the second: at Dask's own fiftieth of one the command and two
@@ -137,21 +137,10 @@ def _gathered(client, work: Callable, arguments: Iterable[tuple]) -> Iterator:
     return results()
 
 
-@cache
-def _keeping_memory() -> None:
-    """Let the C library keep what is free, as it does where nobody says otherwise: Dask bids its
-    workers give it back at once, and to be given each array's pages again costs as much as what is
-    done with them."""
-    with suppress(AttributeError, OSError, TypeError):
-        library = CDLL(None)
-        for option, size in _MALLOC.items():
-            library.mallopt(option, size)
-
-
 @single_threaded
 def _worked(work: Callable, each: tuple) -> tuple:
     """What a piece of work gives, and the warnings that it gave."""
-    _keeping_memory()
+    kept(_FREE, _APART)
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always")
         result = work(*each)

@@ -13,6 +13,7 @@ from sysid import (
     config,
     events,
     experiment_logs,
+    free_memory,
     long_log,
     long_motion,
     long_prediction,
@@ -260,6 +261,46 @@ def test_models_are_compared_on_logs_in_spans_as_on_logs_as_one(monkeypatch):
     for one, other in zip(whole, sysid.compare(*found, ("less", "more")), strict=True):
         assert other.delta_rms == pytest.approx(one.delta_rms, rel=1e-9) and one.se > 0.0
         assert other.se == pytest.approx(one.se, rel=1e-9)
+
+
+@pytest.mark.parametrize("n", [1, 999, 1000, 1001, 2000, 2001, 2999, 7350, 50_000])
+def test_spans_are_whole_and_none_is_short(n):
+    """So that what a span takes of memory is the same of every long log."""
+    sizes = np.diff(spans.edges(n, 1000))
+    assert sizes.sum() == n and sizes.max() <= 1000
+    assert (sizes[:-2] == 1000).all() and np.ptp(sizes[-2:]) <= 1
+    assert n <= 1000 or sizes.min() >= 500
+    assert len(sizes) == -(-n // 1000)
+
+
+def test_predictions_in_files_are_told_in_few_rows(short_spans, monkeypatch):
+    monkeypatch.setattr(long_prediction, "_ROWS", 300)
+    fit = pipeline.fit(experiment())
+    prediction = fit.predictions["train"]
+    tables = list(prediction.tables())
+    assert max(table.height for table in tables) == 300
+    assert pl.concat(tables).equals(prediction.lazy().collect())
+
+
+def test_what_the_c_library_keeps_is_said_once(monkeypatch):
+    """Workers say it before a long log does, and otherwise."""
+    said = []
+
+    class Library:
+        def mallopt(self, *own):
+            said.append(own)
+
+    monkeypatch.setattr(free_memory, "_said", [])
+    monkeypatch.setattr(free_memory, "CDLL", lambda name: Library())
+    free_memory.kept(5, 6)
+    free_memory.kept(7, 8)
+    assert said == [(-1, 5), (-3, 6)]  # glibc's malloc.h: M_TRIM_THRESHOLD, M_MMAP_THRESHOLD
+
+
+def test_where_the_c_library_cannot_be_told_nothing_happens(monkeypatch):
+    monkeypatch.setattr(free_memory, "_said", [])
+    monkeypatch.setattr(free_memory, "CDLL", lambda name: object())
+    free_memory.kept(5, 6)
 
 
 def test_of_long_logs_stretches_spread_over_them_are_kept(monkeypatch):

@@ -16,10 +16,11 @@ import numpy as np
 
 from .. import experiment_logs, long_log
 from .. import log as logs
+from ..free_memory import released
 from ..log_spec import LogSpec
 from ..recording import Recording
 from ..robot import Robot
-from ..spans import Spans, edges, released
+from ..spans import Spans, edges
 from ..specs import Experiment
 from ..thinning import thinned
 from .samples import Samples

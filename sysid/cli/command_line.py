@@ -14,6 +14,7 @@ import typer
 import typer.core
 
 from ..errors import SysidError
+from ..free_memory import POLARS
 
 CORES = os.cpu_count() or 1
 
@@ -21,6 +22,8 @@ CORES = os.cpu_count() or 1
 # The matrices here are small: threads in the linear algebra cost more than they give, much more on a busy machine.
 # It must be said before NumPy is loaded; a user's own setting wins.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+for _name, _said in POLARS.items():
+    os.environ.setdefault(_name, _said)
 
 #: in the order of the work, each in a line that 80 columns hold
 _SHORT = {
