@@ -18,6 +18,8 @@ from .slides import counted
 from .stretches import stretches
 from .two_masses import link_load
 
+_ROUNDED = 1e-12  # of a torque: what rounding, and the third power of a step of 1e-4, leave of a difference
+
 
 @dataclass(frozen=True)
 class Rows:
@@ -102,7 +104,8 @@ def predicted(model: Model, motion: Motion, x, stride: int) -> np.ndarray:
 def tangents(model: Model, motion: Motion, x, stride: int, use: np.ndarray, middle: np.ndarray | None = None) -> np.ndarray:
     """d torque / d shape (dof, n, shapes) at parameters x: by differences, as an effect says what it does, not its slope.
 
-    A step is a small share of what the bounds span, towards the inside; zero for values that the user holds.
+    A step is a small share of what the bounds span, towards the inside; zero for values that the user holds. Where an effect of the
+    motion does nothing yet, on both sides: what is even in a value has no slope there.
 
     Args:
         middle: `predicted(model, motion, x, stride)`, where it is at hand.
@@ -133,8 +136,11 @@ def tangents(model: Model, motion: Motion, x, stride: int, use: np.ndarray, midd
         if (slope := model.gain_slope(k, step)) is not None:
             out[value.joint, :, k] = slope * middle[:, value.joint] * use[:, value.joint]
             continue
-        moved = model.with_shapes([s + step * (i == k) for i, s in enumerate(model.shapes)])
-        out[:, :, k] = ((predicted(moved, motion, x, stride) - middle) / step * use).T
+        moved = lambda h: predicted(model.with_shapes([s + h * (i == k) for i, s in enumerate(model.shapes)]), motion, x, stride)  # noqa: B023, E731
+        both = model.shapes[k] == value.shape.start and value.low <= model.shapes[k] - step <= value.high
+        change = 0.5 * (moved(step) - moved(-step)) if both else moved(step) - middle
+        if np.abs(change).max(initial=0.0) > _ROUNDED * np.abs(middle).max(initial=0.0):
+            out[:, :, k] = (change / step * use).T
     return out
 
 

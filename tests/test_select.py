@@ -83,6 +83,22 @@ def test_stribeck_friction_is_named_on_its_joint(diagnosed, simulated):
     assert {name: unit for name, (_, _, unit) in first.parameters.items()} == {"stribeck.shoulder.dF": "N m", "stribeck.shoulder.vs": "rad/s"}
 
 
+def test_a_tilt_that_one_joint_takes_for_an_offset_is_told_beside_it(diagnosed, simulated):
+    """Of an arm in one plane, turning the base in that plane is turning the first joint's zero; turning it out of the plane is
+    even: no torque says its sign, and a fit by slopes never moves it off nought."""
+    case = ("tilt", "gravity_tilt:*:roll=0,pitch=-0.1")
+    found, folder = diagnosed(*case), simulated(*case)
+    own = verdict(found, "shoulder").claims[0]
+    assert {(effect, joint) for effect, joint, _ in own.set} == {("encoder_offset", "shoulder"), ("gravity_tilt", "*")}
+    assert sum(chance for *_, chance in own.set) == pytest.approx(1.0) and min(chance for *_, chance in own.set) > 0.05
+    experiment = pipeline.load(folder)
+    before, after = pipeline.fit(experiment), pipeline.fit(grown(experiment, "gravity_tilt", None, {}))
+    noise = json.loads((folder / "truth.json").read_text())["logs"]["test"]["noise_rms"]["shoulder"]
+    assert before.rms("test")["shoulder"] > 1.1 * noise > after.rms("test")["shoulder"]
+    told = {p["name"]: p["value"] for p in fit_document.document(after, folder)["parameters"]}
+    assert told["gravity_tilt.*.pitch"] == pytest.approx(-0.1, rel=0.1)
+
+
 def test_a_bias_and_asymmetric_friction_cannot_be_told_apart(diagnosed, simulated):
     """With Coulomb friction in the model they are one column: both are said, the plainer first."""
     found = diagnosed(*BIAS)

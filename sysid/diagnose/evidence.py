@@ -144,7 +144,8 @@ class Group:
     def either(self) -> int:
         """How many of its numbers may have either sign."""
         shapes, own = self.candidate.effect.shapes(), self.candidate.effect.coefficients()
-        return sum(s.low < 0.0 < s.high for s in shapes) + sum(c.lower != 0 for c in own)
+        either = sum(s.low < 0.0 < s.high for s in shapes) + sum(c.lower != 0 for c in own)
+        return max(either - int(np.sum(self.sizes == 0.0)), 0)  # not of those that do nothing
 
     @property
     def coefficients(self) -> np.ndarray:
@@ -153,8 +154,7 @@ class Group:
 
 
 def gain(group: Group) -> np.ndarray:
-    """(folds,) what a group takes of the weighted squared residual of blocks that it was not fitted
-    on."""
+    """(folds,) what a group takes of the weighted squared residual of blocks held apart from it."""
     return blocks.gains(group.c, group.scores, group.squares)
 
 
