@@ -61,6 +61,8 @@ def with_events(machine: Robot, read: list[logs.Log], *, among: int = 1) -> list
     found = [
         replace(log, events=tuple(e for s in log.segments for e in events.find(s, machine.joints, log=log.name, among=among) if told(log, e))) for log in read
     ]  # fmt: skip
+    if among > 1:  # what is looked for in signals leaves half a span's memory free between what is held
+        released()
     felt = bumps(machine, found, among=among)
     more = [[e for e in felt if e.log == log.name] for log in found]
     return [replace(log, events=events.ordered([*log.events, *own])) if own else log for log, own in zip(found, more)]

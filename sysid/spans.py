@@ -18,7 +18,7 @@ from .segment import Segment
 
 SPAN = 2**18  # rows; at 1 kHz four minutes
 _PARTS = 8  # of a span, where a log is looked at in parts: half a minute
-_FREE, _APART = 2**26, 2**23  # bytes: of signals of all joints over a span, an array is apart
+_FREE, _APART = 2**24, 2**23  # bytes: of signals of all joints over a span, an array is apart
 _SHORTEST = 64  # parts of a span: of one of very many logs, that are still four seconds
 
 #: (first, last) -> those rows of a stretch without a gap
