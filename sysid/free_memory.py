@@ -11,7 +11,7 @@ _said = list[tuple[int, int]]()
 
 #: Before Polars is loaded: its own allocator (jemalloc) keeps what is free for ten seconds, of each
 #: of its arenas. What a span's columns took would stand beside what is made of them.
-POLARS = {"_RJEM_MALLOC_CONF": "narenas:1,dirty_decay_ms:5,muzzy_decay_ms:0"}
+POLARS = "_RJEM_MALLOC_CONF", "narenas:1,dirty_decay_ms:5,muzzy_decay_ms:0"
 
 
 def kept(free: int, apart: int) -> None:

@@ -100,6 +100,7 @@ class _Place:
     def filtered(self) -> Piece | None:
         """A piece whose rows all count but for those that events reach; None where it is too
         short."""
+        released()
         segments = self.log.segments
         step = segments.step(self.k) if isinstance(segments, Spans) else segments[self.k].step
         own = around(segments, self.k, margin(self.spec, step))
@@ -126,7 +127,6 @@ class _Made:
     rest: np.ndarray
 
     def __call__(self) -> Piece:
-        released()
         own, spec = self.place.filtered(), self.place.spec
         if spec.torque == "low-pass" and spec.filter != "none":
             own = under_lowpass(replace(own, use=_unpacked(self.before, own.q.shape)), spec)
@@ -153,7 +153,6 @@ def _standstill(spec: PreprocessSpec, places, share: Mapped) -> np.ndarray | flo
 
 def _speeds(place: _Place) -> tuple[np.ndarray, int] | None:
     """Sum (dof,) of squared speeds, and how many rows there are."""
-    released()
     if (piece := place.filtered()) is None:
         return None
     return np.sum(piece.qd[piece.core] ** 2, axis=0), piece.samples
@@ -182,7 +181,6 @@ class _Seen:
 def _seen(
     place: _Place, threshold, stuck: np.ndarray, counts: np.ndarray, stride: int
 ) -> _Seen | None:
-    released()
     if (piece := place.filtered()) is None:
         return None
     spec, rows = place.spec, piece.samples

@@ -20,9 +20,9 @@ from .model import Model
 from .motion import Motion, Piece, Pieces
 from .prediction import Prediction, States, Sums, joined_states, predict, states, units
 from .unfinished import beside, temporary_folder
+from .whole_files import ROWS
 
 _ARRAYS = ("log", "t", "measured", "predicted", "use")
-_ROWS = 2**15  # of a file that are read as one
 _GREATEST = 8  # torques of each joint that are remembered
 
 
@@ -72,9 +72,10 @@ class LongPrediction(Prediction):
         import polars as pl
 
         for path in self.files:
+            released()
             part = pl.scan_parquet(path)
             rows = part.select(pl.len()).collect().item()
-            yield from (part.slice(first, _ROWS).collect() for first in range(0, rows, _ROWS))
+            yield from (part.slice(first, ROWS).collect() for first in range(0, rows, ROWS))
 
     def _read(self, paths: list[Path]) -> Prediction:
         import polars as pl
@@ -178,7 +179,7 @@ def _part(
 
 def _put(table, path: Path) -> bytes | None:
     """Write a part to its file; its content where that is on another machine."""
-    how = {"compression": "uncompressed", "statistics": False, "row_group_size": _ROWS}
+    how = {"compression": "uncompressed", "statistics": False, "row_group_size": ROWS}
     if not path.parent.is_dir():
         stream = io.BytesIO()
         table.write_parquet(stream, **how)

@@ -20,7 +20,6 @@ from .differences import told
 from .estimate import Fit
 from .filters import settled
 from .fit_document import document
-from .free_memory import released
 from .specs import Experiment, is_own
 from .whole_files import folder, sunk, write_together
 
@@ -80,7 +79,6 @@ def _predictions(fit: Fit):
                 used = f"used_{joint}"
                 columns += [] if not masked else [pl.col(used) if used in told[part] else pl.lit(True).alias(used)]
             for table in prediction.tables():
-                released()
                 yield table.select(columns)
 
     return tables

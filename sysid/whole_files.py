@@ -73,7 +73,7 @@ def parquet(table) -> Callable[[Path], None]:
     return write
 
 
-_ROWS = 2**15  # of a table that are written as one: a few dozen such stand in memory meanwhile
+ROWS = 2**15  # of a table that are written as one: a few dozen such stand in memory meanwhile
 
 
 def sunk(tables: Callable[[], Iterator]) -> Callable[[Path], None]:
@@ -86,12 +86,12 @@ def sunk(tables: Callable[[], Iterator]) -> Callable[[Path], None]:
 
     def source(columns, *_) -> Iterator:
         for table in tables():
-            yield from (table if columns is None else table.select(columns)).iter_slices(_ROWS)
+            yield from (table if columns is None else table.select(columns)).iter_slices(ROWS)
 
     def write(path: Path) -> None:
         try:
             whole = register_io_source(source, schema=next(tables()).schema)
-            whole.sink_parquet(path, compression_level=1, row_group_size=_ROWS)  # of zstd: noise is no smaller at a higher one
+            whole.sink_parquet(path, compression_level=1, row_group_size=ROWS)  # of zstd: noise is no smaller at a higher one
         except pl.exceptions.PolarsError as error:
             raise OSError(str(error)) from None
 

@@ -274,7 +274,7 @@ def test_spans_are_whole_and_none_is_short(n):
 
 
 def test_predictions_in_files_are_told_in_few_rows(short_spans, monkeypatch):
-    monkeypatch.setattr(long_prediction, "_ROWS", 300)
+    monkeypatch.setattr(long_prediction, "ROWS", 300)
     fit = pipeline.fit(experiment())
     prediction = fit.predictions["train"]
     tables = list(prediction.tables())

@@ -22,8 +22,7 @@ CORES = os.cpu_count() or 1
 # The matrices here are small: threads in the linear algebra cost more than they give, much more on a busy machine.
 # It must be said before NumPy is loaded; a user's own setting wins.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-for _name, _said in POLARS.items():
-    os.environ.setdefault(_name, _said)
+os.environ.setdefault(*POLARS)
 
 #: in the order of the work, each in a line that 80 columns hold
 _SHORT = {
