@@ -8,6 +8,7 @@ import pytest
 
 from scripts.design_parts import capsules, limits, precision, promise, robots, solvers, ties
 from sysid import design
+from sysid.datasets import DATASETS
 
 
 @pytest.fixture(scope="module")
@@ -30,14 +31,21 @@ def test_a_motion_beyond_its_limits_is_seen(planar):
 
 
 @pytest.mark.filterwarnings("ignore::sysid.errors.SysidWarning")  # no log, no shapes
-def test_rods_by_hand_are_as_far_apart_as_coal_says():
-    """Of the UR10e, whose URDF has no shapes; and segments against a search along both."""
-    problem, pose, _ = robots.unlogged("ur10e")
+@pytest.mark.parametrize("name", ["leg", "ur10e"])
+def test_rods_by_hand_are_as_far_apart_as_coal_says(name):
+    """Of robots whose URDF has no shapes."""
+    if name in DATASETS and DATASETS[name].missing():
+        pytest.skip(f"{name} is not in the data folder; `sysid fetch {name}` brings it, or SYSID_DATA_DIR names where it is")
+    problem, pose, _ = robots.unlogged(name)
     rng = np.random.default_rng(0)
     poses = pose + rng.uniform(-1.5, 1.5, (40, len(pose)))
     looked = problem.geometry.at(pose[None])[0] > 0.0
     told = capsules.least(problem.known.model.robot, poses, pose, 0.0)
     assert told == pytest.approx(problem.geometry.at(poses)[:, looked].min(), abs=1e-6)
+
+
+def test_segments_are_as_far_apart_as_a_search_along_both_says():
+    rng = np.random.default_rng(0)
     ends = rng.normal(size=(4, 30, 3))
     share = np.linspace(0.0, 1.0, 201)[:, None, None]
     one, two = (a + share * (b - a) for a, b in (ends[:2], ends[2:]))
