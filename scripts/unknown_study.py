@@ -4,7 +4,7 @@
 
 Robots as in `evidence_study.py`, with nothing hidden, in motion without a stop and from point to point with brakes, in noise that is
 white or remembers up to 0.3 s. The diagnosis asks functions of the motion of joints alone that stand above their noise floors; here they
-are asked of every joint, one by one and all together, and the shares with a chance below 5 and 1 % are to be these.
+are asked of every joint, one by one (on training and test logs) and all together, and the shares with a chance below 5 and 1 % are to be these.
 
 Resumes: finished logs stand in a journal in --out, named after the seed and the state of the package's source.
 """
@@ -37,7 +37,8 @@ MOTIONS, SLOW, LEVELS = ("exciting", "moves"), 0.1, (0.05, 0.01)
 
 def one(case: dict) -> dict:
     """Of every joint, the chance of the function that stands out most, and that of all together."""
-    from sysid.diagnose.functions import law
+    from sysid.experiment_logs import read
+    from sysid.view import elsewhere, law
 
     with warnings.catch_warnings(), tempfile.TemporaryDirectory() as folder:
         warnings.simplefilter("ignore")
@@ -45,7 +46,8 @@ def one(case: dict) -> dict:
             view = view_of(case, Path(folder), motion=case["motion"], brakes=case["motion"] == "moves")
         except SysidError as error:  # this robot does not follow its reference
             return {**case, "impossible": str(error)[:120]}
-        single = [law(view, j).chance for j in range(view.model.robot.dof)]
+        more = elsewhere(view, read(view.experiment, view.model.robot, view.experiment.data.test))
+        single = [law(view, j, more).chance for j in range(view.model.robot.dof)]
     return {**case, "single": single, "together": [found.chance for found in view.unknown]}
 
 

@@ -11,7 +11,7 @@ from .objective import add_blocks
 FLAT = 1e-6  # share of a column's square: what the model leaves of it beyond that is rounding
 _TOLD = 1e-6  # of a direction's square: less than that the data say nothing
 DATA = 0.5  # of a direction's square must stand in the data; the prior may not tell most of it
-_NOISE = 0.25  # of a direction's square: noise to half of its size, it says nothing about a law
+NOISE = 0.25  # of a direction's square: noise to half of its size, it says nothing about a law
 
 
 def prior_hessian(found) -> np.ndarray:
@@ -151,7 +151,7 @@ def directions(plain, whole, data, rough):
     values, vectors = np.linalg.eigh(whole / np.outer(scale, scale))
     kept = values > FLAT
     turn = vectors[:, kept] / np.sqrt(values[kept]) / scale[:, None]
-    for matrix, good in ((data, lambda v: v > DATA), (rough, lambda v: v < _NOISE)):
+    for matrix, good in ((data, lambda v: v > DATA), (rough, lambda v: v < NOISE)):
         values, vectors = np.linalg.eigh(turn.T @ matrix @ turn)
         turn = turn @ vectors[:, good(values)]
         if not turn.shape[1]:
@@ -168,7 +168,7 @@ def directions_of(plain, whole, data, rough) -> list:
     values, turn = np.linalg.eigh(np.where(usual[:, None, None], system, 0.0))
     usual &= values[:, 0] > FLAT
     turn = turn / np.sqrt(np.where(usual[:, None], values, 1.0))[:, None] / scale[:, :, None]
-    for matrix, good in ((data, lambda v: v > DATA), (rough, lambda v: v < _NOISE)):
+    for matrix, good in ((data, lambda v: v > DATA), (rough, lambda v: v < NOISE)):
         inside = np.swapaxes(turn, 1, 2) @ matrix @ turn
         values, vectors = np.linalg.eigh(np.where(usual[:, None, None], inside, 0.0))
         usual &= good(values).all(axis=1)

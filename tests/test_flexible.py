@@ -10,11 +10,11 @@ from scipy.signal import lfilter
 from scipy.stats import binom
 
 from sysid import blocks
-from sysid.diagnose.functions import law
 from sysid.diagnose.select import LEVEL, WORTH
 from sysid.flexible import Law, Unknown, functions, pasts, products, ridge, unknown
 from sysid.statement.document import dependences
 from sysid.statement.words import followed, quantity
+from sysid.view import law
 from tests.evidences import viewed
 
 STEP, N = 0.01, 2500
@@ -210,7 +210,7 @@ def test_what_the_motion_was_stands_out(name):
     held = np.column_stack([KNOWN["qdd_elbow"], np.ones(N)])  # bodies and a bias, which the model has
     own = own(KNOWN) - held @ np.linalg.lstsq(held, own(KNOWN), rcond=None)[0]
     found = law(left_by(own / np.std(own) + 1.5 * coloured(3), columns=held), 1)
-    assert found.chance < 5e-3 and found.variables == variable and found.gain > 0.4 * N
+    assert found.chance < 5e-3 and found.variables == variable and found.share > 0.12
 
 
 def test_a_dragged_place_stands_until_the_width_is_taken_up():
@@ -259,10 +259,11 @@ def test_a_law_is_nearly_one_of_the_products_and_stands_out_of_noise_that_is_lar
     own = own(KNOWN) / np.std(own(KNOWN))
     alike = np.abs(own @ VALUES) / np.linalg.norm(own) / np.sqrt(N)
     assert alike.max() > 0.8, alike.max()
-    found = law(left_by(own + 1.5 * coloured(3)), 1)
+    view = left_by(own + 1.5 * coloured(3))
+    found = law(view, 1)
     assert found.chance < 2e-3
     assert variable is None or variable in found.variables
-    assert found.gain <= 1.3 * np.sum(own**2)  # of the law, not of the noise
+    assert found.share <= 1.3 * np.sum(own**2) / np.sum(view.design.residual[:, 1] ** 2)  # of the law, not of the noise
 
 
 def test_nothing_stands_out_of_noise():
@@ -278,7 +279,7 @@ def test_what_the_model_holds_is_nothing_that_stands_out():
     without = law(left_by(coloured(5), columns=own), 1)
     with_it = law(left_by(coloured(5) + own @ [30.0, 20.0], columns=own), 1)
     assert with_it.chance == pytest.approx(without.chance, rel=1e-6) and with_it.variables == without.variables
-    assert with_it.gain == pytest.approx(without.gain, rel=1e-3)
+    assert with_it.share == pytest.approx(without.share, rel=1e-3)
 
 
 def test_where_nothing_can_be_asked_nothing_is_there():
@@ -290,7 +291,7 @@ def test_where_nothing_can_be_asked_nothing_is_there():
 
 def test_a_function_alone_is_said_with_its_variables():
     found = asked(LAWS["a product of two angles"][0])
-    seen = replace(found, chance=0.5, gain=np.zeros(10), shares={}).with_law(Law(1e-3, "q_elbow and q_shoulder", 0.4 * found.total))
+    seen = replace(found, chance=0.5, gain=np.zeros(10), shares={}).with_law(Law(1e-3, "q_elbow and q_shoulder", 0.4))
     assert seen.predictable(2, WORTH) and seen.share == pytest.approx(0.4)
     (entry,) = dependences(seen)
     assert entry == {"variable": "q_elbow", "with": "q_shoulder", "share": pytest.approx(0.4)}

@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import norm
 
 from sysid.view import greatest
-from sysid.view.singles import _Asker, _beyond
+from sysid.view.singles import _Asker, _beyond, _draws
 from tests.evidences import grouped, posed, viewed
 
 N, BLOCKS = 400, 20
@@ -25,7 +25,7 @@ def problem(seed: int = 0):
 def test_single_columns_are_told_as_groups_are():
     p, columns = problem()
     view = viewed(p)
-    told = _Asker(view, 1, np.random.default_rng(0)).told_by(view.weights[1] * columns)
+    told = _Asker(view, 1, np.random.default_rng(0), 200).told_by(view.weights[1] * columns)
     groups = [g.tested for g in grouped(view, columns.T[:, None, :, None], joints=(1,))]
     assert told.kept.tolist() == list(range(6)) and all(g.testable for g in groups)
     for k, group in enumerate(groups):
@@ -38,7 +38,7 @@ def test_what_few_blocks_outweigh_is_told_as_the_group_is_tested():
     p, _ = problem()
     own = np.random.default_rng(3).normal(size=N) * np.where(p.number == 7, 30.0, 1.0)
     view = viewed(p)
-    told = _Asker(view, 0, np.random.default_rng(0)).told_by(view.weights[0] * own[:, None])
+    told = _Asker(view, 0, np.random.default_rng(0), 200).told_by(view.weights[0] * own[:, None])
     (group,) = grouped(view, own[None, None, :, None], joints=(0,))
     assert not group.testable and group.tested.testable
     assert told.seen[0, 0] == pytest.approx(np.sum(group.tested.moves**2), rel=1e-9)
@@ -50,7 +50,7 @@ def test_draws_are_fitted_by_the_model_as_the_residual_is():
     p, _ = problem()
     p.root = 0.0 * p.root
     view = viewed(p)
-    asker = _Asker(view, 1, np.random.default_rng(0))
+    asker = _Asker(view, 1, np.random.default_rng(0), 200)
     assert np.abs(asker.told[-1]).max() < 1e-3 * np.abs(asker.told[0]).max()
     assert asker.rows.shape == (N, 201) and np.std(asker.loss[1:]) < 0.3 * np.mean(asker.loss[1:])
 
@@ -63,10 +63,51 @@ def test_the_greatest_stands_out_as_often_as_its_chance_says():
         p.tau = rng.normal(size=(N, 2))
         view = viewed(p)
         many = rng.normal(size=(N, 80))
-        found = greatest(view, 1, lambda: [([str(k) for k in range(80)], many)], rng)  # noqa: B023
+        found = greatest([view], 1, lambda: [([str(k) for k in range(80)], many)], rng)  # noqa: B023
         chances.append(found.chance)
     # one in a thousand, each
     assert np.sum(np.array(chances) < 0.05) <= 10 and 0.25 < np.median(chances) < 0.75
+
+
+def test_the_greatest_of_two_logs_stands_out_as_often_as_its_chance_says():
+    chances = []
+    for seed in range(60):
+        rng, views = np.random.default_rng(300 + seed), []
+        for first in (0, 1):
+            p, _ = problem(first)
+            p.tau = rng.normal(size=(N, 2))
+            views.append(viewed(p))
+        many = rng.normal(size=(2 * N, 80))
+        many[N:, :20] = 0.0  # on the first log alone
+        many[:N, 60:] = 0.0
+        found = greatest(views, 1, lambda: [([str(k) for k in range(80)], many)], rng)  # noqa: B023
+        assert int(found.words) < 60  # what only the second has is not asked
+        chances.append(found.chance)
+    assert np.sum(np.array(chances) < 0.05) <= 10 and 0.25 < np.median(chances) < 0.75
+
+
+def two_logs(first: float, second: float):
+    """Chances of one column among 80 that acts so much on each of two logs: of the first alone, and of both."""
+    rng, views = np.random.default_rng(5), []
+    many = rng.normal(size=(2 * N, 80))
+    for k, size in enumerate((first, second)):
+        p, _ = problem(k)
+        p.tau[:, 1] += size * many[k * N : (k + 1) * N, 7]
+        views.append(viewed(p))
+    asked = lambda values: lambda: [([str(k) for k in range(80)], values)]  # noqa: E731
+    alone = greatest(views[:1], 1, asked(many[:N]), np.random.default_rng(0))
+    return alone, greatest(views, 1, asked(many), np.random.default_rng(0))
+
+
+def test_what_holds_on_other_logs_as_well_stands_out_more():
+    alone, both = two_logs(0.2, 0.2)
+    assert both.words == "7" and both.chance < 0.01 * alone.chance
+    assert both.column.shape == (2 * N,) and 0.01 < both.share < 0.08  # 0.2^2 of 1.04, less what its own doubt costs
+
+
+def test_what_has_the_other_sign_on_other_logs_is_no_law():
+    alone, both = two_logs(0.3, -0.3)
+    assert alone.words == "7" and alone.chance < 1e-3 and (both.words != "7" or both.chance > 0.2)
 
 
 def test_what_is_there_is_the_greatest_and_comes_back_whole():
@@ -74,7 +115,7 @@ def test_what_is_there_is_the_greatest_and_comes_back_whole():
     p.tau[:, 1] += 2.0 * columns[:, 2]
     words = list("abcdef")
     parts = lambda: iter([(words[:2], columns[:, :2]), (words[2:], columns[:, 2:])])  # noqa: E731
-    found = greatest(viewed(p), 1, parts, np.random.default_rng(0))
+    found = greatest([viewed(p)], 1, parts, np.random.default_rng(0))
     assert found.words == "c" and found.chance < 1e-4
     np.testing.assert_array_equal(found.column, columns[:, 2])
 
@@ -82,18 +123,18 @@ def test_what_is_there_is_the_greatest_and_comes_back_whole():
 def test_a_long_log_is_asked_beside_fewer_draws(monkeypatch):
     p, columns = problem()
     monkeypatch.setattr("sysid.view.singles._MOST", 60.0 * N)
-    assert _Asker(viewed(p), 1, np.random.default_rng(0)).rows.shape == (N, 61)
+    assert _draws(viewed(p)) == 60
     p.tau[:, 1] += 2.0 * columns[:, 2]
-    found = greatest(viewed(p), 1, lambda: [(list("abcdef"), columns)], np.random.default_rng(0))
+    found = greatest([viewed(p)], 1, lambda: [(list("abcdef"), columns)], np.random.default_rng(0))
     assert found.words == "c" and found.chance < 1e-4
 
 
 def test_nothing_to_ask_is_nothing():
     p, _ = problem()
     nothing = SimpleNamespace(**{**vars(viewed(p))})
-    assert greatest(nothing, 1, lambda: [], np.random.default_rng(0)) is None
+    assert greatest([nothing], 1, lambda: [], np.random.default_rng(0)) is None
     own = p.a[1][:, :1]  # the model has it
-    assert greatest(nothing, 1, lambda: [(["own"], 0.0 * own)], np.random.default_rng(0)) is None
+    assert greatest([nothing], 1, lambda: [(["own"], 0.0 * own)], np.random.default_rng(0)) is None
 
 
 @pytest.mark.parametrize("count,size", [(1, 1.0), (30, 1.0), (1000, 1.4)])

@@ -400,7 +400,7 @@ def asked_of_elbow(error: float, *, gain: float = 0.3, chance: float = 1e-3, nea
 
     def agreed(j: int) -> Law:
         seen.append(j)
-        return Law(chance, "q_elbow and qd_shoulder", gain * NOISE.total)
+        return Law(chance, "q_elbow and qd_shoulder", gain)
 
     found = verdicts(
         fitted(error), [], [NOISE, NOISE], [floor(), floor()], (), (), weighed, agreed, lambda j, own: near if own > 0 else None

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
@@ -28,13 +29,12 @@ from ..shown import ShownDiagnosis
 from ..specs import Experiment
 from ..transfer import transfers
 from ..unexplained import hidden_by_weights
-from ..view import View, first_view, too_short
+from ..view import View, elsewhere, first_view, law, too_short
 from . import claims as claiming
 from . import select
 from .claims import Claim, Refused
 from .detectable import Detectable, detectable
 from .findings import Finding
-from .functions import law
 from .verdict import Verdict, verdicts
 
 
@@ -92,7 +92,9 @@ def diagnose(
         x = after.settled.x + after.design.change[: after.model.size]
         parts = measured.train, measured.test
         found, weighed = floors_of_fit(experiment, last, after.model, x, parts)
-        more = refused, transfers(last), weighed, lambda j: law(after, j), then_asked.near
+        again = cache(lambda: elsewhere(after, measured.test))
+        law_of = lambda j: law(after, j, again())  # noqa: E731
+        more = refused, transfers(last), weighed, law_of, then_asked.near
         said = verdicts(fit, claims, after.unknown, found, *more)
         errors = last.rms("test").values()
         levels = np.array([e if f.rms is None else f.rms for f, e in zip(found, errors)])

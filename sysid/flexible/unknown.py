@@ -18,12 +18,12 @@ LEVEL = 0.02  # family-wise: how often a law is said to be missing where none is
 @dataclass(frozen=True)
 class Law:
     """The function of the motion, alone, that stands out most of a residual: `chance` of one that
-    stands out as much, were nothing there; the `variables` that it is of; `gain`: what it takes of
+    stands out as much, were nothing there; the `variables` that it is of; `share`: what it takes of
     the squared residual of blocks that it was not fitted on."""
 
     chance: float
     variables: str
-    gain: float
+    share: float
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ class Unknown:
 
     def with_law(self, found: Law) -> Unknown:
         """This and the function that stands out most; the chance is the smaller one of the two."""
-        share = min(found.gain / self.total, 1.0)
+        share = min(found.share, 1.0)
         shares = self.shares | {found.variables: max(share, self.shares.get(found.variables, 0.0))}
         return replace(self, chance=min(self.chance, found.chance), shares=shares, single=share)
 

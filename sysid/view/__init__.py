@@ -1,9 +1,10 @@
 """What a diagnosis looks at: a model settled on the training motion, and its least squares."""
 
 from .design import Design, Sums, by_block, designed, instrumented, summed
+from .laws import law
 from .losses import losses, taken
 from .singles import greatest
-from .view import View, first_view, looked_at, too_short
+from .view import View, elsewhere, first_view, looked_at, too_short
 
 __all__ = [
     "Design",
@@ -11,9 +12,11 @@ __all__ = [
     "View",
     "by_block",
     "designed",
+    "elsewhere",
     "first_view",
     "greatest",
     "instrumented",
+    "law",
     "looked_at",
     "losses",
     "summed",

@@ -12,13 +12,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from itertools import islice
-from operator import attrgetter
 
 import numpy as np
-from scipy.special import ndtr, ndtri
+from scipy.special import log_ndtr, ndtr, ndtri
 
 from .. import blocks
-from ..projection import DATA, FLAT
+from ..projection import DATA, FLAT, NOISE
 from .design import by_block
 from .stationary import drawn
 
@@ -31,39 +30,76 @@ _MOST = 2e6  # draws times rows, up to where fewer draws are made
 
 @dataclass(frozen=True)
 class Single:
-    """The column (n,) that stands out most, its words, and the probability of a statistic as great
-    among all of them, were nothing there."""
+    """The column (n,) that stands out most, its words, the probability of a statistic as great among
+    all of them, were nothing there, and the share that it takes of the squared residual of blocks
+    that it was not fitted on."""
 
     words: str
     column: np.ndarray
     chance: float
+    share: float
 
 
-def greatest(view, j: int, asked: Columns, rng: np.random.Generator) -> Single | None:
+def greatest(views, j: int, asked: Columns, rng: np.random.Generator) -> Single | None:
     """Of the columns (n, k) of joint j that `asked()` brings, with words of each, some at a time;
-    None where none can be asked.
+    None where the first view can ask none.
 
     The probability goes on beyond the draws.
+
+    Args:
+        views: one, or one and the same model settled on other logs. The rows of columns are theirs,
+            one view's after the other's.
     """
-    asker = _Asker(view, j, rng)
-    found = [asker.told_by(view.weights[j] * values) for _, values in asked()]
-    places = [(part, k) for part, one in enumerate(found) for k in one.kept]
-    if not places:
+    draws = min(_draws(view) for view in views)
+    askers = [_Asker(view, j, rng, draws) for view in views]
+    ends = np.cumsum([len(asker.rows) for asker in askers])[:-1]
+    found: list[list[_Told]] = [[] for _ in views]
+    places = []
+    for part, (_, values) in enumerate(asked()):
+        places += [(part, k) for k in range(values.shape[1])]
+        for view, asker, own, told in zip(views, askers, np.split(values, ends), found):
+            told.append(asker.told_by(view.weights[j] * own))
+    scores, information = np.zeros((1 + draws, len(places))), np.zeros(len(places))
+    here = np.zeros(0, dtype=int)
+    for number, (asker, told) in enumerate(zip(askers, found)):
+        starts = np.cumsum([0, *(one.count for one in told)])
+        kept = np.concatenate([np.zeros(0, int), *(s + one.kept for s, one in zip(starts, told))])
+        here = here if number else kept
+        if len(kept):
+            scores[:, kept] += np.sqrt(own := _joined(told, "unit")) * asker.scores(told)
+            information[kept] += own
+    if not len(here):
         return None
-    joined = lambda pick: np.concatenate([pick(one) for one in found], axis=-1)  # noqa: E731
-    c, seen, own = (joined(attrgetter(name)) for name in ("c", "seen", "own"))
-    # noise as always, less what the column takes of it
-    left = 1.0 - np.minimum(c**2 / np.maximum(asker.loss[:, None], 1e-300), blocks.LEVERAGE)
-    foreseen = np.mean(c[1:] ** 2, axis=0) * left
-    belief = blocks.believed(seen[0], foreseen[0], own, len(view.sums.scores))
-    spread, rest = belief.moderated(seen, foreseen, own)
-    scores = blocks.normal_scores(c**2 / np.maximum(spread, 1e-300), 1.0, rest)
+    scores = _outlying(np.abs(scores[:, here] / np.sqrt(information[here])))
     best = int(np.argmax(scores[0]))
-    part, k = places[best]
+    part, k = places[here[best]]
     # made again, not kept: those of a long log fill the memory
     words, values = next(islice(asked(), part, None))
-    chance = _beyond(scores[0, best], scores[1:].max(axis=1))
-    return Single(words[k], np.ascontiguousarray(values[:, k]), chance)
+    column, chance = values[:, k].copy(), _beyond(scores[0, best], scores[1:].max(axis=1))
+    parts = zip(views, askers, np.split(column, ends))
+    share = _share([asker.apart(view.weights[j] * own) for view, asker, own in parts])
+    return Single(words[k], column, chance, share / max(sum(a.loss[0] for a in askers), 1e-300))
+
+
+def _share(told) -> float:
+    """What a column takes of the squared residual of blocks that it was not fitted on, by the
+    scores and squares (blocks + 1,) of each view, its prior's last."""
+    score, squares = (
+        np.concatenate([*(v[:-1] for v in s), [sum(v[-1] for v in s)]]) for s in zip(*told)
+    )
+    unit = squares.sum()
+    c, scores = score.sum() / np.sqrt(unit), score[:, None] / np.sqrt(unit)
+    return max(float(blocks.gains(np.array([c]), scores, squares[:, None, None] / unit).sum()), 0.0)
+
+
+def _outlying(size):
+    """The normal score of a size: how far out on one side it stands as often as on either."""
+    return -ndtri(np.exp(np.maximum(np.log(2.0) + log_ndtr(-size), -700.0)))
+
+
+def _sized(score):
+    """The size of a normal variable that stands as far out on either side as `score` does on one."""
+    return -ndtri(0.5 * np.exp(np.maximum(log_ndtr(-score), -700.0)))
 
 
 def _beyond(value: float, maxima: np.ndarray) -> float:
@@ -81,14 +117,25 @@ def _beyond(value: float, maxima: np.ndarray) -> float:
 
 @dataclass(frozen=True)
 class _Told:
-    """Of columns of unit size, those `kept` (k,) that rest on enough: their coefficients c and the
-    squared deviations `seen` (1 + draws, k) that blocks tell, with `own` (k,) degrees of freedom.
+    """Of so many columns, those `kept` (k,) that rest on enough: of unit size, which `unit` (k,) is
+    the square of, their coefficients c and the squared deviations `seen` (1 + draws, k) that blocks
+    tell, with `own` (k,) degrees of freedom.
     """
 
+    count: int
     kept: np.ndarray
+    unit: np.ndarray
     c: np.ndarray
     seen: np.ndarray
     own: np.ndarray
+
+
+def _joined(told: list[_Told], name: str) -> np.ndarray:
+    return np.concatenate([getattr(one, name) for one in told], axis=-1)
+
+
+def _draws(view) -> int:
+    return int(np.clip(_MOST / len(view.design.residual), _LEAST, _DRAWS))
 
 
 def _resting(squares: np.ndarray, size: np.ndarray):
@@ -104,10 +151,9 @@ class _Asker:
     """The residual of joint j, and draws of noise that the same model was fitted to, both with what
     each block tells of the model's own parameters."""
 
-    def __init__(self, view, j: int, rng: np.random.Generator):
+    def __init__(self, view, j: int, rng: np.random.Generator, draws: int):
         design, sums, self.spans = view.design, view.sums, by_block(view.blocks)
         size = len(design.residual)
-        draws = int(np.clip(_MOST / size, _LEAST, _DRAWS))
         told = np.zeros((len(self.spans), design.columns.shape[2], draws))
         for k, columns in enumerate(design.columns):
             noise = drawn(view.spectra[k], size, draws, rng) * view.rows.use[:, [k]]
@@ -120,13 +166,16 @@ class _Asker:
         told = told - sums.squares[:-1] @ change
         told = np.concatenate([told, -told.sum(0, keepdims=True)])
         self.columns, self.squares, self.freed = design.columns[j], sums.squares, sums.freed
+        self.rough = sums.rough_squares
         self.rows = np.column_stack([design.residual[:, j], fitted])
         self.loss = np.sum(self.rows**2, axis=0)
         first = (sums.scores - sums.rough_scores)[:, :, None]
         self.told = np.concatenate([first, told], axis=2)
 
-    def told_by(self, values: np.ndarray) -> _Told:
-        """Of weighted columns (n, k)."""
+    def _summed(self, values: np.ndarray):
+        """Over blocks, the prior's last, of weighted columns (n, k): squares of them, and off the
+        model; scores beside residual and draws; and what the model takes of them, of all and
+        mixed with its own."""
         parts, count = len(self.told), values.shape[1]
         cross = np.zeros((parts, self.columns.shape[1], count))
         own, score = np.zeros((parts, count)), np.zeros((parts, self.rows.shape[1], count))
@@ -137,8 +186,20 @@ class _Asker:
         absorbed = cross.sum(0)  # in the design's directions, in which the system is one
         mixed = cross - self.squares @ absorbed
         squares = own - np.einsum("bpk,pk->bk", cross + mixed, absorbed)
+        return own, squares, score, absorbed, mixed
+
+    def apart(self, column: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Scores and squares (blocks + 1,) of one weighted column (n,), off the model."""
+        _, squares, score, absorbed, _ = self._summed(column[:, None])
+        return score[:, 0, 0] - self.told[:, :, 0] @ absorbed[:, 0], squares[:, 0]
+
+    def told_by(self, values: np.ndarray) -> _Told:
+        """Of weighted columns (n, k)."""
+        own, squares, score, absorbed, mixed = self._summed(values)
         whole, data = squares.sum(0), squares[:-1].sum(0)
         known = (whole > FLAT * own.sum(0)) & (data > DATA * whole)
+        # the angles' noise stands in what the model takes of them, and so in what it leaves
+        known &= np.einsum("pk,pq,qk->k", absorbed, self.rough, absorbed) < NOISE * whole
         weight = np.ones_like(squares)
         rest, most = _resting(squares, np.where(known, data, np.inf))
         for k in np.flatnonzero(known & ((rest < blocks.RESTING) | (most > blocks.LEVERAGE))):
@@ -152,11 +213,23 @@ class _Asker:
         score = score[:, :, good] - back @ absorbed
         loud = score + back @ freed
         loud_squares = squares + np.einsum("bpk,bpk->bk", mixed, freed)
-        weight = weight[:, good]
+        count, weight = weight.shape[1], weight[:, good]
         unit = np.sum(weight * squares, axis=0)
         c = np.einsum("bg,bdg->dg", weight, score) / unit
         moves = loud - loud_squares[:, None] * c
         moves *= (weight / (unit - weight * squares))[:, None]
         # of a column of unit size
-        seen, root = unit * np.sum(moves**2, axis=0), np.sqrt(unit)
-        return _Told(np.flatnonzero(good), root * c, seen, np.maximum(rest[good] - 1.0, 1.0))
+        seen, freedom = unit * np.sum(moves**2, axis=0), np.maximum(rest[good] - 1.0, 1.0)
+        return _Told(count, np.flatnonzero(good), unit, np.sqrt(unit) * c, seen, freedom)
+
+    def scores(self, told: list[_Told]) -> np.ndarray:
+        """(1 + draws, k) of all columns that are kept, as normal variables with the sign of the
+        coefficient."""
+        c, seen, own = (_joined(told, name) for name in ("c", "seen", "own"))
+        # noise as always, less what the column takes of it
+        left = 1.0 - np.minimum(c**2 / np.maximum(self.loss[:, None], 1e-300), blocks.LEVERAGE)
+        foreseen = np.mean(c[1:] ** 2, axis=0) * left
+        belief = blocks.believed(seen[0], foreseen[0], own, len(self.squares))
+        spread, rest = belief.moderated(seen, foreseen, own)
+        far = blocks.normal_scores(c**2 / np.maximum(spread, 1e-300), 1.0, rest)
+        return np.sign(c) * _sized(far)

@@ -22,9 +22,12 @@ from ..shape import Settled, settle
 from ..source import Source
 from ..specs import Experiment
 from .design import Design, Sums, by_block, designed, instrumented, summed
-from .stationary import spectra
+from .stationary import resized, spectra
 
 _FOLDS = 10
+_APART = (
+    0.02  # of a step between two rows: what was a second ago is then taken for what was 0.98 s ago
+)
 
 
 @dataclass(frozen=True)
@@ -105,7 +108,8 @@ class View:
         predicts."""
         if self.inherited is not None:
             return self.inherited
-        return blocks.numbered(self.rows.t, self.rows.piece, memory=self._left[1])
+        memory = (self.like or self)._left[1]
+        return blocks.numbered(self.rows.t, self.rows.piece, memory=memory)
 
     @cached_property
     def _left(self) -> tuple[np.ndarray, float]:
@@ -119,7 +123,8 @@ class View:
         """(dof, frequencies) of what no function of the motion predicts, as noise that is always
         the same has it."""
         if self.like is not None:
-            return self.like.spectra * ((self.weights / self.like.weights) ** 2)[:, None]
+            own = self.like.spectra * ((self.weights / self.like.weights) ** 2)[:, None]
+            return resized(own, len(self.rows.t))
         left, memory = self._left
         return spectra(left, self.design.columns, self.rows.use, memory, self.step)
 
@@ -217,15 +222,34 @@ def _middle(values, use) -> np.ndarray:
 
 
 def _under(experiment: Experiment, fit: Fit, logs, cutoff: float, own: float) -> View | None:
-    motion = lowpassed(logs, fit.joints, cutoff, known=own)
+    if (motions := _motions(logs, fit.joints, cutoff, own)) is None:
+        return None
+    stride = stride_of(motions[0], cutoff)
+    return looked_at(experiment, fit.model, *motions, fit.prior, stride=stride)
+
+
+def _motions(logs, joints, cutoff: float, own: float) -> tuple[Motion, Motion] | None:
+    """Logs under one low-pass, and with the noise of their angles drawn once more."""
+    motion = lowpassed(logs, joints, cutoff, known=own)
     if motion is None or motion.samples < 50:
         return None
     rng, noise = np.random.default_rng(0), np.max([piece.noise for piece in motion.pieces], axis=0)
     drawn = lambda s: again(s, noise, cutoff, rng)  # noqa: E731
     noisy = [replace(log, segments=tuple(map(drawn, log.segments))) for log in logs]
-    rough = lowpassed(noisy, fit.joints, cutoff, known=own)
-    stride = stride_of(motion, cutoff)
-    return looked_at(experiment, fit.model, motion, rough, fit.prior, stride=stride)
+    return motion, lowpassed(noisy, joints, cutoff, known=own)
+
+
+def elsewhere(view: View, logs) -> View | None:
+    """The model of a view, settled anew on other logs of the same noise; None where these are too
+    short, or their rows are not as far apart."""
+    motions = _motions(logs, view.model.robot.joints, view.cutoff, view.motion.band)
+    if motions is None:
+        return None
+    step = view.step / motions[0].pieces[0].step
+    if abs(round(step) - step) > _APART * step or round(step) < 1:
+        return None
+    options = {"stride": round(step), "weights": view.weights, "grid": False, "like": view}
+    return looked_at(view.experiment, view.model, *motions, view.prior, **options)
 
 
 def too_short() -> LogError:

@@ -1,0 +1,68 @@
+"""A law that nobody thought of is to hold on the test logs as well: the same model, settled on these, is asked too."""
+
+import numpy as np
+import pytest
+
+from sysid import experiment_logs, pipeline
+from sysid.view import elsewhere, first_view, law
+
+
+def settling_contact(size: float):
+    """The elbow's friction rises again after each reversal, within half a second."""
+
+    def torque(q, qd, qdd, t, load, memory):
+        if np.sign(qd[1]) != memory.get("way"):
+            memory.update(way=np.sign(qd[1]), since=t)
+        return np.array([0.0, size * (1.0 - np.exp(-(t - memory["since"]) / 0.5)) * np.tanh(qd[1] / 0.02)])
+
+    return torque
+
+
+def both_views(folder):
+    """The first view of an experiment, and the same model on its test logs."""
+    experiment = pipeline.load(folder)
+    view = first_view(experiment, pipeline.fit(experiment))
+    return view, elsewhere(view, experiment_logs.read(experiment, view.model.robot, experiment.data.test))
+
+
+@pytest.fixture(scope="module")
+def quiet(simulated):
+    return both_views(simulated("laws-control", seed=4))
+
+
+def test_the_model_is_settled_anew_and_its_noise_is_the_same(quiet):
+    view, more = quiet
+    assert more.step == view.step and more.cutoff == view.cutoff and more.like is view
+    assert more.model.size == view.model.size and not np.allclose(more.settled.x, view.settled.x, rtol=1e-6)
+    np.testing.assert_allclose(more.rms(), view.rms(), rtol=0.25)
+    np.testing.assert_array_equal(more.weights, view.weights)
+    assert "unknown" not in vars(more)  # nobody asks ridges of it: the memory of the noise is that of the first
+    np.testing.assert_allclose(more.spectra.mean(1), view.spectra.mean(1), rtol=0.02)
+    count = [np.unique(one.blocks).size for one in quiet]
+    assert 0.7 < count[0] / count[1] < 1.4
+
+
+def test_a_longer_log_has_the_noise_of_a_short_one(simulated, quiet):
+    view, _ = quiet
+    experiment = pipeline.load(simulated("laws-longer", seed=5, duration=25.0))
+    more = elsewhere(view, experiment_logs.read(experiment, view.model.robot, experiment.data.test))
+    assert len(more.rows.t) > 1.8 * len(view.rows.t) and more.spectra.shape[1] > view.spectra.shape[1]
+    np.testing.assert_allclose(more.spectra.mean(1), view.spectra.mean(1), rtol=0.02)
+    assert 0.01 < law(view, 1, more).chance
+
+
+def test_logs_that_are_too_short_are_none(quiet):
+    view, _ = quiet
+    assert elsewhere(view, []) is None
+
+
+def test_nothing_stands_out_on_both_where_nothing_is(quiet):
+    view, more = quiet
+    assert min(law(view, j, more).chance for j in range(2)) > 0.01
+
+
+def test_a_law_with_a_past_stands_out_more_where_it_holds_on_test_logs_as_well(simulated):
+    view, more = both_views(simulated("laws-contact", settling_contact(0.09), seed=4))
+    alone, both = law(view, 1), law(view, 1, more)
+    assert both.chance < 0.1 * alone.chance and both.chance < 1e-3 and "qd_elbow" in both.variables
+    assert 0.0 < both.share < 1.0
