@@ -1,5 +1,6 @@
 """Groups of columns without a robot, for tests: a linear model with a prior, blocks of rows, and columns that could join it."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -44,7 +45,15 @@ def stacked(p, own, joints=(0, 1), keep=None):
     return m, np.concatenate([*(p.weights[j] * p.tau[keep, j] for j in range(dof)), p.root @ p.target])
 
 
-def grouped(view, sets, joints=(0, 1), blows=False):
-    """The groups of sets of columns (sets, joints, n, k)."""
+def roughened(p, rng: np.random.Generator, noise: float):
+    """The view of a problem whose columns and torque have noise of the angles, such a share of them, drawn once more."""
+    view = viewed(p)
+    drawn = lambda values: noise * np.std(values) * rng.normal(size=values.shape)  # noqa: E731
+    design = replace(view.design, rough_columns=drawn(view.design.columns), rough_residual=drawn(view.design.residual))
+    return SimpleNamespace(**{**vars(view), "design": design, "sums": summed(design, by_block(p.number))})
+
+
+def grouped(view, sets, joints=(0, 1), blows=False, rough=None):
+    """The groups of sets of columns (sets, joints, n, k); rough: the same with the angles' noise once more."""
     candidate = SimpleNamespace(name="made", joint=-1 if len(joints) > 1 else joints[0], blows=blows)
-    return made(view, [(candidate, {"at": float(s)}) for s in range(len(sets))], list(joints), sets, sets)
+    return made(view, [(candidate, {"at": float(s)}) for s in range(len(sets))], list(joints), sets, sets if rough is None else rough)

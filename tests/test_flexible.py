@@ -158,7 +158,7 @@ def left_by(values, *, columns=None, seconds: float = 0.5):
     )
     rows = SimpleNamespace(use=np.ones((N, 2), bool), piece=np.zeros(N, int))
     robot = SimpleNamespace(joints=("shoulder", "elbow"))
-    return SimpleNamespace(**{**vars(viewed(p)), "rows": rows}, variables=KNOWN, step=STEP, model=SimpleNamespace(robot=robot))
+    return SimpleNamespace(**{**vars(viewed(p)), "rows": rows}, variables=KNOWN, rough_variables=KNOWN, step=STEP, model=SimpleNamespace(robot=robot))
 
 
 def coloured(seed: int, memory: float = 0.04):
@@ -285,7 +285,7 @@ def test_what_the_model_holds_is_nothing_that_stands_out():
 def test_where_nothing_can_be_asked_nothing_is_there():
     still = {name: np.zeros(N) for name in KNOWN}
     view = left_by(coloured(1))
-    view.variables = still
+    view.variables = view.rough_variables = still
     assert law(view, 1) == Law(1.0, "", 0.0)
 
 

@@ -30,25 +30,12 @@ def quiet(simulated):
     return both_views(simulated("laws-control", seed=4))
 
 
-def test_the_model_is_settled_anew_and_its_noise_is_the_same(quiet):
+def test_the_model_is_settled_anew(quiet):
     view, more = quiet
-    assert more.step == view.step and more.cutoff == view.cutoff and more.like is view
+    assert more.step == view.step and more.cutoff == view.cutoff
     assert more.model.size == view.model.size and not np.allclose(more.settled.x, view.settled.x, rtol=1e-6)
     np.testing.assert_allclose(more.rms(), view.rms(), rtol=0.25)
     np.testing.assert_array_equal(more.weights, view.weights)
-    assert "unknown" not in vars(more)  # nobody asks ridges of it: the memory of the noise is that of the first
-    np.testing.assert_allclose(more.spectra.mean(1), view.spectra.mean(1), rtol=0.02)
-    count = [np.unique(one.blocks).size for one in quiet]
-    assert 0.7 < count[0] / count[1] < 1.4
-
-
-def test_a_longer_log_has_the_noise_of_a_short_one(simulated, quiet):
-    view, _ = quiet
-    experiment = pipeline.load(simulated("laws-longer", seed=5, duration=25.0))
-    more = elsewhere(view, experiment_logs.read(experiment, view.model.robot, experiment.data.test))
-    assert len(more.rows.t) > 1.8 * len(view.rows.t) and more.spectra.shape[1] > view.spectra.shape[1]
-    np.testing.assert_allclose(more.spectra.mean(1), view.spectra.mean(1), rtol=0.02)
-    assert 0.01 < law(view, 1, more).chance
 
 
 def test_logs_that_are_too_short_are_none(quiet):

@@ -7,8 +7,8 @@ import pytest
 from scipy.stats import norm
 
 from sysid.view import greatest
-from sysid.view.singles import _Asker, _beyond, _draws
-from tests.evidences import grouped, posed, viewed
+from sysid.view.singles import _Asker, _beyond, _draws, _share
+from tests.evidences import grouped, posed, roughened, viewed
 
 N, BLOCKS = 400, 20
 
@@ -22,10 +22,15 @@ def problem(seed: int = 0):
     return p, columns
 
 
+def twice(*columns) -> np.ndarray:
+    """Columns (n, k) of each log as they are asked: behind them the same with the angles' noise once more, which adds nothing."""
+    return np.concatenate([own for one in columns for own in (one, one)])
+
+
 def test_single_columns_are_told_as_groups_are():
     p, columns = problem()
     view = viewed(p)
-    told = _Asker(view, 1, np.random.default_rng(0), 200).told_by(view.weights[1] * columns)
+    told = _Asker(view, 1, np.random.default_rng(0), 200).told_by(view.weights[1] * columns, 0.0 * columns)
     groups = [g.tested for g in grouped(view, columns.T[:, None, :, None], joints=(1,))]
     assert told.kept.tolist() == list(range(6)) and all(g.testable for g in groups)
     for k, group in enumerate(groups):
@@ -34,11 +39,33 @@ def test_single_columns_are_told_as_groups_are():
         assert told.own[k] == pytest.approx(group.freedom[1] - 1.0, rel=1e-9)
 
 
+def test_the_noise_of_the_angles_is_taken_off_as_of_groups():
+    p, columns = problem()
+    columns = columns[:, :3] + 0.3 * p.a[1][:, :3]
+    p.tau[:, 1] += 0.5 * columns[:, 1]
+    rng = np.random.default_rng(4)
+    view, more = roughened(p, rng, 0.2), 0.2 * rng.normal(size=columns.shape)
+    asker = _Asker(view, 1, np.random.default_rng(0), 200)
+    told = asker.told_by(view.weights[1] * columns, view.weights[1] * more)
+    sets = lambda values: values.T[:, None, :, None]  # noqa: E731
+    groups = [g.tested for g in grouped(view, sets(columns), joints=(1,), rough=sets(columns + more))]
+    assert told.kept.tolist() == [0, 1, 2]
+    for k, group in enumerate(groups):
+        assert told.c[0, k] ** 2 == pytest.approx(group.c @ group.c, rel=1e-9)
+        assert told.seen[0, k] == pytest.approx(np.sum(group.moves**2), rel=1e-9)
+        score, squares = asker.apart(view.weights[1] * columns[:, [k]], view.weights[1] * more[:, [k]])
+        assert _share([(score, squares)]) == pytest.approx(max(group.taken, 0.0), rel=1e-9)
+    assert groups[1].taken > 5.0
+    # with more of it they are not asked at all, neither as groups
+    loud = asker.told_by(view.weights[1] * columns, view.weights[1] * 4.0 * more)
+    assert not len(loud.kept) and not grouped(view, sets(columns), joints=(1,), rough=sets(columns + 4.0 * more))
+
+
 def test_what_few_blocks_outweigh_is_told_as_the_group_is_tested():
     p, _ = problem()
     own = np.random.default_rng(3).normal(size=N) * np.where(p.number == 7, 30.0, 1.0)
     view = viewed(p)
-    told = _Asker(view, 0, np.random.default_rng(0), 200).told_by(view.weights[0] * own[:, None])
+    told = _Asker(view, 0, np.random.default_rng(0), 200).told_by(view.weights[0] * own[:, None], np.zeros((N, 1)))
     (group,) = grouped(view, own[None, None, :, None], joints=(0,))
     assert not group.testable and group.tested.testable
     assert told.seen[0, 0] == pytest.approx(np.sum(group.tested.moves**2), rel=1e-9)
@@ -63,7 +90,7 @@ def test_the_greatest_stands_out_as_often_as_its_chance_says():
         p.tau = rng.normal(size=(N, 2))
         view = viewed(p)
         many = rng.normal(size=(N, 80))
-        found = greatest([view], 1, lambda: [([str(k) for k in range(80)], many)], rng)  # noqa: B023
+        found = greatest([view], 1, lambda: [([str(k) for k in range(80)], twice(many))], rng)  # noqa: B023
         chances.append(found.chance)
     # one in a thousand, each
     assert np.sum(np.array(chances) < 0.05) <= 10 and 0.25 < np.median(chances) < 0.75
@@ -77,10 +104,10 @@ def test_the_greatest_of_two_logs_stands_out_as_often_as_its_chance_says():
             p, _ = problem(first)
             p.tau = rng.normal(size=(N, 2))
             views.append(viewed(p))
-        many = rng.normal(size=(2 * N, 80))
-        many[N:, :20] = 0.0  # on the first log alone
-        many[:N, 60:] = 0.0
-        found = greatest(views, 1, lambda: [([str(k) for k in range(80)], many)], rng)  # noqa: B023
+        many = rng.normal(size=(2, N, 80))
+        many[1, :, :20] = 0.0  # on the first log alone
+        many[0, :, 60:] = 0.0
+        found = greatest(views, 1, lambda: [([str(k) for k in range(80)], twice(*many))], rng)  # noqa: B023
         assert int(found.words) < 60  # what only the second has is not asked
         chances.append(found.chance)
     assert np.sum(np.array(chances) < 0.05) <= 10 and 0.25 < np.median(chances) < 0.75
@@ -89,20 +116,20 @@ def test_the_greatest_of_two_logs_stands_out_as_often_as_its_chance_says():
 def two_logs(first: float, second: float):
     """Chances of one column among 80 that acts so much on each of two logs: of the first alone, and of both."""
     rng, views = np.random.default_rng(5), []
-    many = rng.normal(size=(2 * N, 80))
+    many = rng.normal(size=(2, N, 80))
     for k, size in enumerate((first, second)):
         p, _ = problem(k)
-        p.tau[:, 1] += size * many[k * N : (k + 1) * N, 7]
+        p.tau[:, 1] += size * many[k, :, 7]
         views.append(viewed(p))
-    asked = lambda values: lambda: [([str(k) for k in range(80)], values)]  # noqa: E731
-    alone = greatest(views[:1], 1, asked(many[:N]), np.random.default_rng(0))
-    return alone, greatest(views, 1, asked(many), np.random.default_rng(0))
+    asked = lambda *values: lambda: [([str(k) for k in range(80)], twice(*values))]  # noqa: E731
+    alone = greatest(views[:1], 1, asked(many[0]), np.random.default_rng(0))
+    return alone, greatest(views, 1, asked(*many), np.random.default_rng(0))
 
 
 def test_what_holds_on_other_logs_as_well_stands_out_more():
     alone, both = two_logs(0.2, 0.2)
     assert both.words == "7" and both.chance < 0.01 * alone.chance
-    assert both.column.shape == (2 * N,) and 0.01 < both.share < 0.08  # 0.2^2 of 1.04, less what its own doubt costs
+    assert both.column.shape == (4 * N,) and 0.01 < both.share < 0.08  # 0.2^2 of 1.04, less what its own doubt costs
 
 
 def test_what_has_the_other_sign_on_other_logs_is_no_law():
@@ -114,10 +141,10 @@ def test_what_is_there_is_the_greatest_and_comes_back_whole():
     p, columns = problem()
     p.tau[:, 1] += 2.0 * columns[:, 2]
     words = list("abcdef")
-    parts = lambda: iter([(words[:2], columns[:, :2]), (words[2:], columns[:, 2:])])  # noqa: E731
+    parts = lambda: iter([(words[:2], twice(columns[:, :2])), (words[2:], twice(columns[:, 2:]))])  # noqa: E731
     found = greatest([viewed(p)], 1, parts, np.random.default_rng(0))
     assert found.words == "c" and found.chance < 1e-4
-    np.testing.assert_array_equal(found.column, columns[:, 2])
+    np.testing.assert_array_equal(found.column, twice(columns[:, [2]])[:, 0])
 
 
 def test_a_long_log_is_asked_beside_fewer_draws(monkeypatch):
@@ -125,7 +152,7 @@ def test_a_long_log_is_asked_beside_fewer_draws(monkeypatch):
     monkeypatch.setattr("sysid.view.singles._MOST", 60.0 * N)
     assert _draws(viewed(p)) == 60
     p.tau[:, 1] += 2.0 * columns[:, 2]
-    found = greatest([viewed(p)], 1, lambda: [(list("abcdef"), columns)], np.random.default_rng(0))
+    found = greatest([viewed(p)], 1, lambda: [(list("abcdef"), twice(columns))], np.random.default_rng(0))
     assert found.words == "c" and found.chance < 1e-4
 
 
@@ -134,7 +161,7 @@ def test_nothing_to_ask_is_nothing():
     nothing = SimpleNamespace(**{**vars(viewed(p))})
     assert greatest([nothing], 1, lambda: [], np.random.default_rng(0)) is None
     own = p.a[1][:, :1]  # the model has it
-    assert greatest([nothing], 1, lambda: [(["own"], 0.0 * own)], np.random.default_rng(0)) is None
+    assert greatest([nothing], 1, lambda: [(["own"], twice(0.0 * own))], np.random.default_rng(0)) is None
 
 
 @pytest.mark.parametrize("count,size", [(1, 1.0), (30, 1.0), (1000, 1.4)])

@@ -17,12 +17,15 @@ def law(view: View, j: int, more: View | None = None) -> flexible.Law:
         more: the same model on other logs, where the function must hold as well.
     """
     views = [one for one in (view, more) if one is not None]
-    over = lambda pick: np.concatenate([pick(one) for one in views])  # noqa: E731
-    last = view.rows.piece.max(initial=0)
-    piece = np.concatenate([one.rows.piece + k * (last + 1) for k, one in enumerate(views)])
-    known = {name: over(lambda one: one.variables[name]) for name in view.variables}  # noqa: B023
-    rest = view.model.robot.joints[j], over(lambda one: one.rows.use[:, j]).astype(bool), piece
-    asked = lambda: flexible.products(known, *rest, view.step)  # noqa: E731
+    # behind the rows of each view those of its motion with the angles' noise once more
+    motions = [own for one in views for own in (one.variables, one.rough_variables)]
+    each = lambda pick: [pick(one) for one in views for _ in range(2)]  # noqa: E731
+    last = view.rows.piece.max(initial=0) + 1
+    pieces = [own + k * last for k, own in enumerate(each(lambda one: one.rows.piece))]
+    use = np.concatenate(each(lambda one: one.rows.use[:, j].astype(bool)))
+    known = {name: np.concatenate([own[name] for own in motions]) for name in view.variables}
+    rest = view.model.robot.joints[j], use, np.concatenate(pieces), view.step
+    asked = lambda: flexible.products(known, *rest)  # noqa: E731
     found = greatest(views, j, asked, np.random.default_rng(j))
     if found is None:
         return flexible.Law(1.0, "", 0.0)

@@ -9,7 +9,7 @@ fitted by the same model, and asked by the same columns, it has both.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from itertools import islice
 
@@ -48,17 +48,17 @@ def greatest(views, j: int, asked: Columns, rng: np.random.Generator) -> Single 
 
     Args:
         views: one, or one and the same model settled on other logs. The rows of columns are theirs,
-            one view's after the other's.
+            one view's after the other's, behind each those of its rough motion.
     """
     draws = min(_draws(view) for view in views)
     askers = [_Asker(view, j, rng, draws) for view in views]
-    ends = np.cumsum([len(asker.rows) for asker in askers])[:-1]
+    ends = np.cumsum([len(asker.rows) for asker in askers for _ in range(2)])[:-1]
     found: list[list[_Told]] = [[] for _ in views]
     places = []
     for part, (_, values) in enumerate(asked()):
         places += [(part, k) for k in range(values.shape[1])]
-        for view, asker, own, told in zip(views, askers, np.split(values, ends), found):
-            told.append(asker.told_by(view.weights[j] * own))
+        for view, asker, own, told in zip(views, askers, _parted(values, ends), found):
+            told.append(asker.told_by(*(view.weights[j] * one for one in own)))
     scores, information = np.zeros((1 + draws, len(places))), np.zeros(len(places))
     here = np.zeros(0, dtype=int)
     for number, (asker, told) in enumerate(zip(askers, found)):
@@ -76,9 +76,16 @@ def greatest(views, j: int, asked: Columns, rng: np.random.Generator) -> Single 
     # made again, not kept: those of a long log fill the memory
     words, values = next(islice(asked(), part, None))
     column, chance = values[:, k].copy(), _beyond(scores[0, best], scores[1:].max(axis=1))
-    parts = zip(views, askers, np.split(column, ends))
-    share = _share([asker.apart(view.weights[j] * own) for view, asker, own in parts])
+    parts = zip(views, askers, _parted(column[:, None], ends))
+    told = [asker.apart(*(view.weights[j] * one for one in own)) for view, asker, own in parts]
+    share = _share(told)
     return Single(words[k], column, chance, share / max(sum(a.loss[0] for a in askers), 1e-300))
+
+
+def _parted(values, ends) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Of each view its rows of columns, and what the angles' noise, once more, adds to them."""
+    parts = iter(np.split(values, ends))
+    return ((plain, rough - plain) for plain, rough in zip(parts, parts))
 
 
 def _share(told) -> float:
@@ -166,16 +173,17 @@ class _Asker:
         told = told - sums.squares[:-1] @ change
         told = np.concatenate([told, -told.sum(0, keepdims=True)])
         self.columns, self.squares, self.freed = design.columns[j], sums.squares, sums.freed
-        self.rough = sums.rough_squares
+        self.rough_columns, self.rough_squares = design.rough_columns[j], sums.rough_squares
+        self.noise = design.rough_residual[:, j]
         self.rows = np.column_stack([design.residual[:, j], fitted])
         self.loss = np.sum(self.rows**2, axis=0)
         first = (sums.scores - sums.rough_scores)[:, :, None]
         self.told = np.concatenate([first, told], axis=2)
 
-    def _summed(self, values: np.ndarray):
+    def _summed(self, values: np.ndarray, more: np.ndarray):
         """Over blocks, the prior's last, of weighted columns (n, k): squares of them, and off the
-        model; scores beside residual and draws; and what the model takes of them, of all and
-        mixed with its own."""
+        model; scores beside residual and draws; what the model takes of them, of all and mixed with
+        its own; and the squares of what the angles' noise adds to what is left of them."""
         parts, count = len(self.told), values.shape[1]
         cross = np.zeros((parts, self.columns.shape[1], count))
         own, score = np.zeros((parts, count)), np.zeros((parts, self.rows.shape[1], count))
@@ -183,23 +191,26 @@ class _Asker:
             cross[b] = self.columns[rows].T @ values[rows]
             own[b] = np.sum(values[rows] ** 2, axis=0)
             score[b] = self.rows[rows].T @ values[rows]
+            score[b, 0] -= self.noise[rows] @ more[rows]
         absorbed = cross.sum(0)  # in the design's directions, in which the system is one
         mixed = cross - self.squares @ absorbed
         squares = own - np.einsum("bpk,pk->bk", cross + mixed, absorbed)
-        return own, squares, score, absorbed, mixed
+        noisy = self.rough_columns.T @ more
+        noise = 2.0 * noisy - self.rough_squares @ absorbed
+        rough = np.sum(more**2, axis=0) - np.sum(absorbed * noise, axis=0)
+        return own, squares, score, absorbed, mixed, rough
 
-    def apart(self, column: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Scores and squares (blocks + 1,) of one weighted column (n,), off the model."""
-        _, squares, score, absorbed, _ = self._summed(column[:, None])
+    def apart(self, column: np.ndarray, more: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Scores and squares (blocks + 1,) of one weighted column (n, 1), off the model."""
+        _, squares, score, absorbed, *_ = self._summed(column, more)
         return score[:, 0, 0] - self.told[:, :, 0] @ absorbed[:, 0], squares[:, 0]
 
-    def told_by(self, values: np.ndarray) -> _Told:
-        """Of weighted columns (n, k)."""
-        own, squares, score, absorbed, mixed = self._summed(values)
+    def told_by(self, values: np.ndarray, more: np.ndarray) -> _Told:
+        """Of weighted columns (n, k), with what the angles' noise, once more, adds to them."""
+        own, squares, score, absorbed, mixed, rough = self._summed(values, more)
         whole, data = squares.sum(0), squares[:-1].sum(0)
         known = (whole > FLAT * own.sum(0)) & (data > DATA * whole)
-        # the angles' noise stands in what the model takes of them, and so in what it leaves
-        known &= np.einsum("pk,pq,qk->k", absorbed, self.rough, absorbed) < NOISE * whole
+        known &= rough < NOISE * whole
         weight = np.ones_like(squares)
         rest, most = _resting(squares, np.where(known, data, np.inf))
         for k in np.flatnonzero(known & ((rest < blocks.RESTING) | (most > blocks.LEVERAGE))):

@@ -36,15 +36,6 @@ def spectra(values, columns, use, memory: float, step: float) -> np.ndarray:
     return smoothed(square(np.where(use, values, 0.0))) / np.maximum(left, _LEAST)
 
 
-def resized(spectra, n: int) -> np.ndarray:
-    """Spectra (..., frequencies) as noise of n samples has them; no shorter than they were."""
-    count = max(spectra.shape[-1], fft.next_fast_len((n + 1) // 2, real=True) + 1)
-    if count == spectra.shape[-1]:
-        return spectra
-    at, known = (np.linspace(0.0, 1.0, size) for size in (count, spectra.shape[-1]))
-    return np.stack([np.interp(at, known, own) for own in spectra])
-
-
 def drawn(spectrum, n: int, draws: int, rng: np.random.Generator) -> np.ndarray:
     """Normal noise (n, draws) of a power spectrum as `spectra` tells it; in single precision."""
     size = 2 * (len(spectrum) - 1)

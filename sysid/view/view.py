@@ -22,7 +22,7 @@ from ..shape import Settled, settle
 from ..source import Source
 from ..specs import Experiment
 from .design import Design, Sums, by_block, designed, instrumented, summed
-from .stationary import resized, spectra
+from .stationary import spectra
 
 _FOLDS = 10
 _APART = (
@@ -74,8 +74,16 @@ class View:
     def variables(self) -> dict[str, np.ndarray]:
         """{q_joint, qd_joint, qdd_joint, load_joint, time: (n,)} on the rows, without the noise of
         the angles."""
-        known = {name: self.rows.of(self.motion, name) for name in ("q", "qd", "qdd")}
-        known["load"] = self.source.predicted
+        return self._variables(self.source)
+
+    @cached_property
+    def rough_variables(self) -> dict[str, np.ndarray]:
+        """The same of the motion with the angles' noise once more: what is left of it there."""
+        return self._variables(self.rough_source)
+
+    def _variables(self, source: Source) -> dict[str, np.ndarray]:
+        known = {name: self.rows.of(source.motion, name) for name in ("q", "qd", "qdd")}
+        known["load"] = source.predicted
         piece, band = self.rows.piece, self.motion.band
         known = {name: calm(v, piece, band, self.step) for name, v in known.items()}
         joints = self.model.robot.joints
@@ -108,8 +116,7 @@ class View:
         predicts."""
         if self.inherited is not None:
             return self.inherited
-        memory = (self.like or self)._left[1]
-        return blocks.numbered(self.rows.t, self.rows.piece, memory=memory)
+        return blocks.numbered(self.rows.t, self.rows.piece, memory=self._left[1])
 
     @cached_property
     def _left(self) -> tuple[np.ndarray, float]:
@@ -123,8 +130,7 @@ class View:
         """(dof, frequencies) of what no function of the motion predicts, as noise that is always
         the same has it."""
         if self.like is not None:
-            own = self.like.spectra * ((self.weights / self.like.weights) ** 2)[:, None]
-            return resized(own, len(self.rows.t))
+            return self.like.spectra * ((self.weights / self.like.weights) ** 2)[:, None]
         left, memory = self._left
         return spectra(left, self.design.columns, self.rows.use, memory, self.step)
 
@@ -240,15 +246,15 @@ def _motions(logs, joints, cutoff: float, own: float) -> tuple[Motion, Motion] |
 
 
 def elsewhere(view: View, logs) -> View | None:
-    """The model of a view, settled anew on other logs of the same noise; None where these are too
-    short, or their rows are not as far apart."""
+    """The model of a view, settled anew on other logs; None where these are too short, or their
+    rows are not as far apart."""
     motions = _motions(logs, view.model.robot.joints, view.cutoff, view.motion.band)
     if motions is None:
         return None
     step = view.step / motions[0].pieces[0].step
     if abs(round(step) - step) > _APART * step or round(step) < 1:
         return None
-    options = {"stride": round(step), "weights": view.weights, "grid": False, "like": view}
+    options = {"stride": round(step), "weights": view.weights, "grid": False}
     return looked_at(view.experiment, view.model, *motions, view.prior, **options)
 
 
