@@ -42,7 +42,7 @@ class Refused:
         return said + low * bool(share >= _MOST)
 
 
-def told_in_vain(refused: Sequence[Refused], joints, j: int, least: float):
+def in_vain(refused: Sequence[Refused], joints, j: int, least: float):
     """The Candidate on joint j, with its p-value, that takes at least such a share of its squared
     residual on the test logs, under the low-pass, and which no fit bore out; None where there is
     none."""
@@ -101,6 +101,14 @@ def unexplained(
     return (
         f"its error{where} is {_times(error, floor)}, and nothing in the motion of these logs "
         "predicts the rest"
+    )
+
+
+def not_all(effect: str) -> str:
+    """What an effect that may be there is beside a law that stands out with it in the model too."""
+    return (
+        f"{effect} may be a part of it and is not all of it: with it in the model the motion still "
+        "predicts what is left"
     )
 
 

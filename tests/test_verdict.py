@@ -394,7 +394,7 @@ def test_twice_the_size_is_found_and_a_fifth_is_not(control, simulated, effect, 
 # ---- asked once more, of joints above their floors
 
 
-def asked_of_elbow(error: float, *, gain: float = 0.3, chance: float = 1e-3, near=None, weighed=None):
+def asked_of_elbow(error: float, *, gain: float = 0.3, chance: float = 1e-3, near=None, weighed=None, beyond=None):
     """The elbow's verdict where ridge regression says nothing; the joints that were asked what their blocks agree on."""
     seen = []
 
@@ -403,7 +403,7 @@ def asked_of_elbow(error: float, *, gain: float = 0.3, chance: float = 1e-3, nea
         return Law(chance, "q_elbow and qd_shoulder", gain)
 
     found = verdicts(
-        fitted(error), [], [NOISE, NOISE], [floor(), floor()], (), (), weighed, agreed, lambda j, own: near if own > 0 else None
+        fitted(error), [], [NOISE, NOISE], [floor(), floor()], (), (), weighed, agreed, lambda j, own: near if own > 0 else None, beyond
     )
     return found[1], seen
 
@@ -432,6 +432,26 @@ def test_the_catalogue_is_not_said_to_lack_what_an_effect_of_it_may_be():
     found, _ = asked_of_elbow(3.0, near=(SimpleNamespace(name="warmup"), 0.004))
     assert found.status == "unresolved" and found.may is None
     assert "may be warmup, though no fit with it bore that out, or a law" in found.says
+
+
+@pytest.mark.parametrize(
+    ("further", "status"), [(Law(1e-6, "q_elbow", 0.2), "unknown"), (Law(0.2, "q_elbow", 0.2), "unresolved"), (Law(1e-6, "q_elbow", 0.01), "unresolved"), (None, "unresolved")]
+)  # fmt: skip
+def test_where_a_law_stands_out_with_the_effect_in_the_model_too_the_effect_is_not_all(further, status):
+    """None: the effect cannot join at all, by its sign. Nothing is said of the effect, but that it is not all."""
+    stribeck, asked = SimpleNamespace(name="stribeck"), []
+
+    def beyond(j, candidate):
+        asked.append((j, candidate))
+        return further
+
+    found, _ = asked_of_elbow(3.0, near=(stribeck, 0.02), beyond=beyond)
+    assert found.status == status and asked == [(1, stribeck)]
+    assert ("stribeck may be a part of it and is not all of it" in found.says) is (status == "unknown")
+    assert (found.may is None) is (status == "unknown") and found.left.single == pytest.approx(0.3)
+    # where no law stands out without it, nobody looks for one with it
+    asked_of_elbow(3.0, chance=0.5, near=(stribeck, 0.02), beyond=beyond)
+    assert len(asked) == 1
 
 
 def test_an_effect_that_may_be_there_is_told_where_nothing_else_predicts_the_rest():

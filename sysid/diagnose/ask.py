@@ -58,6 +58,11 @@ class Asked:
         p = 1.0 if best is None else null.chance(statistics[best], self.maxima)
         return (found[best].candidate, p) if p <= _MAY_BE else None
 
+    def of(self, candidate: Candidate) -> Group | None:
+        """The group of a candidate that takes most, None where it was not asked."""
+        own = [group for group in self.groups if group.candidate == candidate]
+        return max(own, key=lambda group: group.taken, default=None)
+
 
 def ask(view: View, extra=(), tell=lambda share: None, *, before=None, anew=()) -> Asked:
     """Every candidate that a view's model lacks.

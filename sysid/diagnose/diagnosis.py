@@ -19,9 +19,10 @@ from functools import cache
 import numpy as np
 
 from .. import pipeline, thinning
-from ..candidates import candidates, own_effects
+from ..candidates import Candidate, candidates, own_effects
 from ..estimate import Fit
 from ..failures import Failure, HeldOut, failures
+from ..flexible import Law
 from ..lowpass import lowpassed
 from ..noise import NoiseFloor, floors_of_fit
 from ..notices import noticed
@@ -35,6 +36,7 @@ from . import select
 from .claims import Claim, Refused
 from .detectable import Detectable, detectable
 from .findings import Finding
+from .refits import refitted
 from .verdict import Verdict, verdicts
 
 
@@ -93,9 +95,14 @@ def diagnose(
         parts = measured.train, measured.test
         found, weighed = floors_of_fit(experiment, last, after.model, x, parts)
         again = cache(lambda: elsewhere(after, measured.test))
-        law_of = lambda j: law(after, j, again())  # noqa: E731
-        more = refused, transfers(last), weighed, law_of, then_asked.near
-        said = verdicts(fit, claims, after.unknown, found, *more)
+
+        def beyond(j: int, candidate: Candidate) -> Law | None:
+            group = then_asked.of(candidate) or asked.of(candidate)
+            with_it = group and refitted(after, group)
+            return with_it and law(with_it.view, j, elsewhere(with_it.view, measured.test))
+
+        more = refused, transfers(last), weighed, lambda j: law(after, j, again())
+        said = verdicts(fit, claims, after.unknown, found, *more, then_asked.near, beyond)
         errors = last.rms("test").values()
         levels = np.array([e if f.rms is None else f.rms for f, e in zip(found, errors)])
         where = failures(first, fit.predictions["test"].thinned(thinning.MOST), levels)

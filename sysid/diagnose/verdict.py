@@ -10,7 +10,7 @@ from ..estimate import Fit
 from ..flexible import Law, Unknown
 from ..noise import DOUBT
 from ..transfer import Transfer
-from ..unexplained import by_weights, explains, loudest, may_be_noise, told_in_vain, unexplained
+from ..unexplained import by_weights, explains, in_vain, loudest, may_be_noise, not_all, unexplained
 from .ask import HALF
 from .claims import Claim
 from .select import LEVEL, WORTH
@@ -53,6 +53,7 @@ def verdicts(
     weighed: dict[str, float] | None = None,
     law: Callable[[int], Law] | None = None,
     near: Callable[[int, float], tuple[Candidate, float] | None] | None = None,
+    beyond: Callable[[int, Candidate], Law | None] | None = None,
 ) -> list[Verdict]:
     """The verdict on every joint.
 
@@ -61,7 +62,8 @@ def verdicts(
             in the model. floors: of each joint's noise. carried: whether the model with all claims
             carries over, of each joint. weighed: {joint: RMS where each counts by its noise}.
             law: the function that stands out most of what is left of a joint, asked where `left`
-            says nothing. near: the effect that may be what is left, or predicted of it.
+            says nothing. near: the effect that may be what is left, or predicted of it. beyond: the
+            function that stands out most with such an effect in the model.
     """
     last = claims[-1].after if claims else fit
     errors = last.rms("train"), last.rms("test")
@@ -90,7 +92,11 @@ def verdicts(
         remains = seen if seen.predictable(among, WORTH) else None
         most = remains.share if remains else 1.0
         looks = near(j, most * seen.total) if near else None
-        looks = looks or told_in_vain(refused, fit.joints, j, HALF * most)
+        looks = looks or in_vain(refused, fit.joints, j, HALF * most)
+        besides = ""
+        if looks and remains and beyond and (further := beyond(j, looks[0])):
+            if replace(seen, chance=1.0, tone=0.0).with_law(further).predictable(among, WORTH):
+                besides, looks = not_all(looks[0].name), None
         reached = reaches[j] and first > 0.0 and not _above(remains, then, floor)
         taken = sum(c.step.shares[j] for c in own)
         even = evens[j] and floors[j].reached(weighed[joint])  # it explains all
@@ -98,7 +104,7 @@ def verdicts(
         if own and (whole or evens[j]) and little:
             told = ("missing", own, explained, remains)
         elif own or (remains is not None and not looks and not reached and not even):
-            why = "" if remains else unexplained(both, floors[j])
+            why = besides if remains else unexplained(both, floors[j])
             told = ("unknown", own or others, explained, remains, why)
         elif not reached:
             without = weighed[joint] if evens[j] else None
