@@ -12,7 +12,7 @@ from .functions import groups
 from .ridge import predicted, stretches
 
 TONE = 1e-4  # probability of a line that strong by chance
-LEVEL = 0.02  # family-wise: how often a law is said to be missing where none is
+LEVEL = 0.05  # family-wise: how often a law is said to be missing where none is
 
 
 @dataclass(frozen=True)
