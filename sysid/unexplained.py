@@ -10,6 +10,7 @@ import numpy as np
 
 from .candidates import Candidate
 from .model_parameters import ROBOT
+from .noise import DOUBT
 
 _CLEAR = 2.0  # standard deviations
 _MOST = 0.5  # of what stands above a floor, or of a square
@@ -53,7 +54,7 @@ def in_vain(refused: Sequence[Refused], joints, j: int, least: float):
     return best and (best.candidate, best.p)
 
 
-def unexplained(
+def cause(
     errors: tuple[float, float],
     floor,
     looks=None,
@@ -123,7 +124,7 @@ def explains(before: float, after: float, floor: float) -> float:
     return (before**2 - after**2) / misfit if misfit > 0 else float("nan")
 
 
-def may_be_noise(before: float, after: float, floor) -> bool:
+def noisy(before: float, after: float, floor) -> bool:
     """Whether what an effect leaves may be noise, by a NoiseFloor that is known: most of the error's
     square with it is, and there is no more above it than the effect took, or no more than the
     floor's doubt.
@@ -134,6 +135,17 @@ def may_be_noise(before: float, after: float, floor) -> bool:
     if floor.rms is None or _MOST * after**2 > floor.rms**2:
         return False
     return explains(before, after, floor.rms) >= _MOST or floor.reached(after)
+
+
+def above(remains, error: float, floor: float) -> bool:
+    """Whether what the motion predicts stands above the floor: the error without it does, and it is
+    more than the floor's doubt lets pass.
+
+    Args:
+        remains: the `flexible.Unknown` that predicts it, None where nothing does.
+    """
+    left = 1.0 if remains is None else 1.0 - remains.share
+    return left < (1.0 + DOUBT) ** -2 and left * error**2 >= floor**2
 
 
 def by_weights(fit, joint: str, floor: float | None, weighed: dict[str, float]) -> bool:

@@ -96,6 +96,19 @@ def test_who_is_hardly_ever_the_best_is_none_of_the_explanations(biased, monkeyp
         assert {m.candidate.name for m in one.close} == {"torque_bias", "asymmetric_coulomb"}
 
 
+def test_a_sign_that_was_free_to_choose_halves_the_odds_and_no_more(biased, monkeypatch):
+    """Of two that leave the same, whatever their signs cost, the log says nothing: both are told."""
+    view, groups = biased
+    asked, found = [of(groups, *key) for key in (("torque_bias", 1), ("asymmetric_coulomb", 1))], {}
+    for signs in ((1, 1), (2, 1), (1, 3)):
+        either = dict(zip(("torque_bias", "asymmetric_coulomb"), signs))
+        monkeypatch.setattr(type(asked[0]), "either", property(lambda own: either[own.candidate.name]))  # noqa: B023
+        found[signs] = {m.candidate.name: p for m, p in chosen(view, asked, np.random.default_rng(0)).members}
+    for (one, other), odds in found.items():
+        assert odds["torque_bias"] / odds["asymmetric_coulomb"] == pytest.approx(2.0 ** (other - one), rel=0.05)
+        assert max(odds, key=odds.get) == next(iter(odds))  # the head
+
+
 def test_what_only_adds_freedom_is_told(biased):
     """A spring is a bias and a slope, and holds a bias; the other way round it does not, and of twins neither does."""
     view, groups = biased

@@ -214,7 +214,7 @@ def test_what_leaves_more_than_a_fifth_is_no_name_for_the_misfit(first, then, tr
 @pytest.mark.parametrize(
     ("about", "train", "status"), [(2.6, 2.5, "missing"), (2.4, 2.5, "missing"), (1.2, 2.5, "unknown"), (None, 2.5, "unknown"), (2.4, 1.0, "unknown")]
 )
-def test_what_may_be_noise_is_not_held_against_a_name(about, train, status):
+def test_what_noisy_is_not_held_against_a_name(about, train, status):
     """Where the floor is not known, the best estimate of it says how much of what an effect leaves is misfit; no noise is louder than what the training logs leave."""
     level = NoiseFloor(None, None, "none", "the log is too short", 0.5, 2.7, about)
     found = elbow(3.0, [claim("cogging", "elbow", [0.0, 0.3], fitted(2.5, train=train))], level=level)

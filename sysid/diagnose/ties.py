@@ -78,18 +78,22 @@ def chosen(view: View, groups: list[Group], rng: np.random.Generator) -> Choice 
     priced = table + np.array([price(member.group) for member in members]) / len(table)
     kept = _least(members, priced.sum(0))
     members, table, priced = [members[k] for k in kept], table[:, kept], priced[:, kept]
+    free = table + np.array([price(m.group, signs=0.0) for m in members]) / len(table)
     p = blocks.confidence_set(table, rng)
     # what is least once its numbers are paid for is no worse for predicting a little less
     least = int(np.argmin(priced.sum(0)))
     inside = [k for k in np.argsort(table.sum(0)) if p[k] >= _OUTSIDE or k == least]
     # the best, and of two that are the same the simplest: not what rounding left with less
-    best = priced[:, inside].sum(0).min() + blocks.SAME * np.abs(table).sum(0).min()
-    head = min(
-        (k for k in inside if priced[:, k].sum() <= best),
-        key=lambda k: members[k].candidate.simplicity,
-    )
+    same, lost = blocks.SAME * np.abs(table).sum(0).min(), priced.sum(0)
+    best = [k for k in inside if lost[k] <= lost[inside].min() + same]
+    head = min(best, key=lambda k: members[k].candidate.simplicity)
     inside = [k for k in inside if k == head or not holds(view, members[k], members[head])]
-    chance = dict(zip(inside, blocks.chances(priced[:, inside], rng)))
+    # no log tells that a sign was free to choose: it halves the odds
+    odds, lost = np.exp2([-members[k].group.either for k in inside]), free.sum(0)
+    odds = odds * blocks.chances(free[:, inside], rng)
+    chance = dict(zip(inside, odds / odds.sum()))
+    # whom only its fewer signs made the head may be less likely than another
+    head = max([head, *(k for k in inside if lost[k] < lost[head] - same)], key=chance.get)
     order = sorted(inside, key=lambda k: (k != head, -chance[k]))
     order = [k for n, k in enumerate(order) if not n or sum(map(chance.get, order[n:])) > _HARDLY]
     return Choice(
@@ -116,7 +120,7 @@ def _even(view: View, members: list[Member]) -> tuple[View, list[Member]]:
     return view, [Member(group, found, losses(found, view.blocks)) for group, found in even]
 
 
-def price_of(view: View, group: Group) -> Callable[[Group], float]:
+def price_of(view: View, group: Group) -> Callable[..., float]:
     """What the numbers of a candidate cost, of the loss of all blocks.
 
     Blocks held apart ask who predicts best, and what holds the truth and more predicts about as
@@ -129,7 +133,8 @@ def price_of(view: View, group: Group) -> Callable[[Group], float]:
     values = 2.0 * view.cutoff * view.step * float(np.mean(view.rows.use.sum(0)))
     one = np.sum(group.moves**2) / len(group.c)
     each = max(np.log(values) - 1.0, 0.0)
-    return lambda other: one * (each * other.numbers + 2.0 * np.log(2.0) * other.either)
+    sign = 2.0 * np.log(2.0)
+    return lambda other, signs=sign: one * (each * other.numbers + signs * other.either)
 
 
 def _least(members: list[Member], lost: np.ndarray) -> list[int]:

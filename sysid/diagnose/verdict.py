@@ -8,9 +8,8 @@ from dataclasses import dataclass, replace
 from ..candidates import Candidate
 from ..estimate import Fit
 from ..flexible import Law, Unknown
-from ..noise import DOUBT
 from ..transfer import Transfer
-from ..unexplained import by_weights, explains, in_vain, loudest, may_be_noise, not_all, unexplained
+from ..unexplained import above, by_weights, cause, explains, in_vain, loudest, noisy, not_all
 from .ask import HALF
 from .claims import Claim
 from .select import LEVEL, WORTH
@@ -85,7 +84,7 @@ def verdicts(
         # who leaves more that is no noise is no name for what is missing; in no log is there more
         # noise than an error of another, so that what does not carry over is no noise
         whole = (1.0 + _LEFT) * explains(first, then, min(*both, noise)) >= 1.0
-        whole |= any(may_be_noise(*pair, floors[j]) for pair in pairs)
+        whole |= any(noisy(*pair, floors[j]) for pair in pairs)
         seen, among = left[j], sum(asked) if asked[j] else len(left)
         if law and asked[j] and then > 0.0 and not seen.predictable(among, WORTH):
             seen = seen.with_law(law(j))
@@ -97,20 +96,20 @@ def verdicts(
         if looks and remains and beyond and (further := beyond(j, looks[0])):
             if replace(seen, chance=1.0, tone=0.0).with_law(further).predictable(among, WORTH):
                 besides, looks = not_all(looks[0].name), None
-        reached = reaches[j] and first > 0.0 and not _above(remains, then, floor)
+        reached = reaches[j] and first > 0.0 and not above(remains, then, floor)
         taken = sum(c.step.shares[j] for c in own)
         even = evens[j] and floors[j].reached(weighed[joint])  # it explains all
         little = remains is None or remains.share * max(1.0 - taken, 0.0) <= _LEFT * taken
         if own and (whole or evens[j]) and little:
             told = ("missing", own, explained, remains)
         elif own or (remains is not None and not looks and not reached and not even):
-            why = besides if remains else unexplained(both, floors[j])
+            why = besides if remains else cause(both, floors[j])
             told = ("unknown", own or others, explained, remains, why)
         elif not reached:
             without = weighed[joint] if evens[j] else None
             effect, p = looks or (None, 1.0)
             may = effect if p > LEVEL else None  # what stands above the level was fitted, in vain
-            why = unexplained(both, floors[j], effect, may, without, louder)
+            why = cause(both, floors[j], effect, may, without, louder)
             why += "".join({r.effect: f"; {r.told}" for r in refused if r.joint == joint}.values())
             told = ("unresolved", others, explained, remains, why, may, evens[j])
         elif floors[j].reached(first) or not claims:
@@ -121,10 +120,3 @@ def verdicts(
         out.append(Verdict(joint, *told))
     said = {found.joint: found.says for found in carried}
     return [replace(one, carries=said.get(one.joint, "")) for one in out]
-
-
-def _above(remains: Unknown | None, error: float, floor: float) -> bool:
-    """Whether what the motion predicts stands above the floor: the error without it does, and it is
-    more than the floor's doubt lets pass."""
-    left = 1.0 if remains is None else 1.0 - remains.share
-    return left < (1.0 + DOUBT) ** -2 and left * error**2 >= floor**2
