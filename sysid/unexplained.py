@@ -105,11 +105,12 @@ def cause(
     )
 
 
-def not_all(effect: str) -> str:
-    """What an effect that may be there is beside a law that stands out with it in the model too."""
+def not_all(effect: str, share: float) -> str:
+    """What an effect that may be there is beside a law that stands out with it in the model too,
+    and predicts such a share of what it leaves."""
     return (
-        f"{effect} may be a part of it and is not all of it: with it in the model the motion still "
-        "predicts what is left"
+        f"{effect} may be part of what is left, but not all: with {effect} in the model, the motion "
+        f"still predicts {share:.0%} of the rest"
     )
 
 

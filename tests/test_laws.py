@@ -1,9 +1,13 @@
 """A law that nobody thought of is to hold on the test logs as well: the same model, settled on these, is asked too."""
 
+from dataclasses import replace
+from unittest import mock
+
 import numpy as np
 import pytest
 
-from sysid import experiment_logs, pipeline
+from sysid import experiment_logs, flexible, pipeline
+from sysid.effect import NotFinite
 from sysid.view import elsewhere, first_view, law
 
 
@@ -30,6 +34,14 @@ def quiet(simulated):
     return both_views(simulated("laws-control", seed=4))
 
 
+@pytest.fixture(scope="module")
+def logs(simulated):
+    """The training log and the test log of the same."""
+    experiment = pipeline.load(simulated("laws-control", seed=4))
+    robot = pipeline.fit(experiment).model.robot
+    return [experiment_logs.read(experiment, robot, part)[0] for part in (experiment.data.train, experiment.data.test)]
+
+
 def test_the_model_is_settled_anew(quiet):
     view, more = quiet
     assert more.step == view.step and more.cutoff == view.cutoff
@@ -38,9 +50,54 @@ def test_the_model_is_settled_anew(quiet):
     np.testing.assert_array_equal(more.weights, view.weights)
 
 
-def test_logs_that_are_too_short_are_none(quiet):
-    view, _ = quiet
-    assert elsewhere(view, []) is None
+def test_the_noise_of_the_angles_is_drawn_anew_on_each_log(quiet):
+    view, more = quiet
+    one, other = ((v.rough.pieces[0].q - v.motion.pieces[0].q)[:500, 0] for v in (view, more))
+    assert abs(np.corrcoef(one, other)[0, 1]) < 0.3
+
+
+def cut(log, *slices, **changes):
+    """A log whose one segment is cut into several, a second apart."""
+    (own,) = log.segments
+    part = lambda k, s: replace(own, t=own.t[s] + k, q=own.q[s], tau=own.tau[s], signals={}, clock=None, **changes)  # noqa: E731
+    return replace(log, segments=tuple(part(k, s) for k, s in enumerate(slices)))
+
+
+def test_logs_that_cannot_be_asked_are_none(quiet, logs):
+    """Nothing; too short; as many rows, but another time apart; samples of the training log."""
+    view, (train, test) = quiet[0], logs
+    assert elsewhere(view, []) is None and elsewhere(view, [cut(test, slice(0, 120))]) is None
+    assert elsewhere(view, [cut(test, slice(None), step=1.5 * test.segments[0].step)]) is None
+    assert elsewhere(view, [train], [train]) is None and elsewhere(view, [cut(train, slice(500, 4000))], [train]) is None
+    assert elsewhere(view, [test], [train]) is not None
+
+
+@pytest.mark.parametrize("short", [2, 3, 20])
+def test_a_piece_of_a_few_samples_is_passed_over(quiet, logs, short):
+    """A gap may leave such a piece; the rest of the log is asked all the same."""
+    view, (_, test) = quiet[0], logs
+    more = elsewhere(view, [cut(test, slice(0, 2500), slice(2600, 2600 + short), slice(3000, None))])
+    assert len(more.motion.pieces) == 2
+    # every piece has a past of its own, of its motion and of that with the angles' noise again
+    seen = []
+    plain = flexible.products
+
+    def asked(known, joint, use, piece, step):
+        seen.append(piece)
+        return plain(known, joint, use, piece, step)
+
+    with mock.patch.object(flexible, "products", asked):
+        assert law(view, 1, more).chance > 0.01
+    cuts = np.flatnonzero(np.diff(seen[0])) + 1
+    assert np.array_equal([len(own) for own in np.split(seen[0], cuts)], [n for v in (view, more) for _ in range(2) for n in np.bincount(v.rows.piece)])
+
+
+def test_a_model_that_is_no_number_there_is_none(quiet, logs, monkeypatch):
+    def settle(*given, **how):
+        raise NotFinite("no finite number", where="t = 1 s", allowed="numbers", do="look")
+
+    monkeypatch.setattr("sysid.view.view.settle", settle)
+    assert elsewhere(quiet[0], [logs[1]]) is None
 
 
 def test_nothing_stands_out_on_both_where_nothing_is(quiet):

@@ -113,10 +113,12 @@ def test_the_greatest_of_two_logs_stands_out_as_often_as_its_chance_says():
     assert np.sum(np.array(chances) < 0.05) <= 10 and 0.25 < np.median(chances) < 0.75
 
 
-def two_logs(first: float, second: float):
-    """Chances of one column among 80 that acts so much on each of two logs: of the first alone, and of both."""
+def two_logs(first: float, second: float, visible: float = 1.0):
+    """Chances of one column among 80 that acts so much on each of two logs: of the first alone, and of both. visible: the size of the
+    column on the second one."""
     rng, views = np.random.default_rng(5), []
     many = rng.normal(size=(2, N, 80))
+    many[1, :, 7] *= visible
     for k, size in enumerate((first, second)):
         p, _ = problem(k)
         p.tau[:, 1] += size * many[k, :, 7]
@@ -130,6 +132,12 @@ def test_what_holds_on_other_logs_as_well_stands_out_more():
     alone, both = two_logs(0.2, 0.2)
     assert both.words == "7" and both.chance < 0.01 * alone.chance
     assert both.column.shape == (4 * N,) and 0.01 < both.share < 0.08  # 0.2^2 of 1.04, less what its own doubt costs
+
+
+def test_a_log_counts_by_what_it_can_say():
+    """A second log on which the column hardly acts takes nothing from what the first one says."""
+    alone, both = two_logs(0.3, 0.0, visible=1e-3)
+    assert both.words == "7" and both.chance < 10.0 * alone.chance < 1e-3
 
 
 def test_what_has_the_other_sign_on_other_logs_is_no_law():

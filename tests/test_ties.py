@@ -109,6 +109,26 @@ def test_a_sign_that_was_free_to_choose_halves_the_odds_and_no_more(biased, monk
         assert max(odds, key=odds.get) == next(iter(odds))  # the head
 
 
+def test_what_only_its_fewer_signs_made_the_head_is_none_where_another_is_likelier(biased, monkeypatch):
+    """Another that loses less, and only costs more for a sign, heads the set by its odds; with more than these odds it does not."""
+    view, groups = biased
+    asked = [of(groups, *key) for key in (("torque_bias", 1), ("asymmetric_coulomb", 1))]
+    monkeypatch.setattr(type(asked[0]), "either", property(lambda own: int(own.candidate.name == "asymmetric_coulomb")))
+    plain, less = losses, 0.3 * np.sum(asked[0].moves ** 2)  # of the price of a sign, 1.39 of this
+
+    def told(found, number):
+        out = plain(found, number)
+        mine = any(effect.name == "asymmetric_coulomb" for effect, _ in found.model.terms)
+        return out - less / out.size if mine else out
+
+    for where in ("refits", "ties"):
+        monkeypatch.setattr(f"sysid.diagnose.{where}.losses", told)
+    for likelier, head in ((0.9, "asymmetric_coulomb"), (0.6, "torque_bias")):
+        monkeypatch.setattr(blocks, "chances", lambda losses, rng: np.array([likelier, 1.0 - likelier]))  # noqa: B023
+        found = chosen(view, asked, np.random.default_rng(0))
+        assert found.head.candidate.name == head, likelier
+
+
 def test_what_only_adds_freedom_is_told(biased):
     """A spring is a bias and a slope, and holds a bias; the other way round it does not, and of twins neither does."""
     view, groups = biased

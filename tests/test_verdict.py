@@ -214,7 +214,7 @@ def test_what_leaves_more_than_a_fifth_is_no_name_for_the_misfit(first, then, tr
 @pytest.mark.parametrize(
     ("about", "train", "status"), [(2.6, 2.5, "missing"), (2.4, 2.5, "missing"), (1.2, 2.5, "unknown"), (None, 2.5, "unknown"), (2.4, 1.0, "unknown")]
 )
-def test_what_noisy_is_not_held_against_a_name(about, train, status):
+def test_what_may_be_noise_is_not_held_against_a_name(about, train, status):
     """Where the floor is not known, the best estimate of it says how much of what an effect leaves is misfit; no noise is louder than what the training logs leave."""
     level = NoiseFloor(None, None, "none", "the log is too short", 0.5, 2.7, about)
     found = elbow(3.0, [claim("cogging", "elbow", [0.0, 0.3], fitted(2.5, train=train))], level=level)
@@ -447,8 +447,12 @@ def test_where_a_law_stands_out_with_the_effect_in_the_model_too_the_effect_is_n
 
     found, _ = asked_of_elbow(3.0, near=(stribeck, 0.02), beyond=beyond)
     assert found.status == status and asked == [(1, stribeck)]
-    assert ("stribeck may be a part of it and is not all of it" in found.says) is (status == "unknown")
+    told = "stribeck may be part of what is left, but not all: with stribeck in the model, the motion still predicts 20% of the rest"
+    assert (found.says == told) is (status == "unknown")
     assert (found.may is None) is (status == "unknown") and found.left.single == pytest.approx(0.3)
+    # what ridges predicted without it is nothing that they predict with it
+    ridged = verdicts(fitted(3.0), [], [NOISE, left(0.5)], [floor(), floor()], near=lambda j, own: (stribeck, 0.02), beyond=lambda *_: Law(1e-6, "q", 0.001))
+    assert ridged[1].status == "unresolved"
     # where no law stands out without it, nobody looks for one with it
     asked_of_elbow(3.0, chance=0.5, near=(stribeck, 0.02), beyond=beyond)
     assert len(asked) == 1
@@ -467,6 +471,14 @@ def test_an_effect_that_may_be_there_is_told_where_nothing_else_predicts_the_res
         assert (found.status, found.may is not None) == (("unresolved", True) if says else ("complete", False))
         assert ("what is left may be torque_saturation or a law" in found.says) is says
     assert {own for _, own in asked} == {NOISE.total}
+
+
+def test_the_group_of_a_candidate_is_the_best_of_the_sign_it_may_have():
+    """Whoever asked: every `ask` makes candidates of its own."""
+    group = lambda kind, taken, signed=True: SimpleNamespace(candidate=SimpleNamespace(kind=kind), taken=taken, signed=signed)  # noqa: E731
+    groups = [group("spring", 1.0), group("spring", 3.0), group("spring", 5.0, signed=False), group("cable", 9.0)]
+    asked = Asked({0: (groups, np.zeros(4), np.zeros(4), np.zeros(3))}, Belief())
+    assert asked.of(SimpleNamespace(kind="spring")) is groups[1] and asked.of(SimpleNamespace(kind="lag")) is None
 
 
 def test_an_effect_is_near_that_stands_at_five_per_cent_and_takes_half():

@@ -59,8 +59,8 @@ class Asked:
         return (found[best].candidate, p) if p <= _MAY_BE else None
 
     def of(self, candidate: Candidate) -> Group | None:
-        """The group of a candidate that takes most, None where it was not asked."""
-        own = [group for group in self.groups if group.candidate == candidate]
+        """The group of a candidate, of the sign it may have, that takes most; None without one."""
+        own = [g for g in self.groups if g.candidate.kind == candidate.kind and g.signed]
         return max(own, key=lambda group: group.taken, default=None)
 
 

@@ -6,7 +6,7 @@ The whole loop on one page:
     training logs -> view: both sides under one low-pass, events and standstill left out
     view -> steps: every candidate asked at once, what is there and worth having joins, and again
     steps -> claims: each fitted as `sysid add` fits it, whose parameters and command are told
-    test logs, opened once -> errors, where the model fails
+    test logs, opened once -> errors, where the model fails, whether a law of no catalogue holds there
     claims + noise floors + what the motion still predicts -> the verdict on each joint
 """
 
@@ -94,11 +94,11 @@ def diagnose(
         x = after.settled.x + after.design.change[: after.model.size]
         parts = measured.train, measured.test
         found, weighed = floors_of_fit(experiment, last, after.model, x, parts)
-        again = cache(lambda: elsewhere(after, measured.test))
+        again = cache(lambda: elsewhere(after, measured.test, measured.train))
 
         def beyond(j: int, candidate: Candidate) -> Law | None:
             group = then_asked.of(candidate) or asked.of(candidate)
-            with_it = group and refitted(after, group)
+            with_it = group and again() and refitted(after, group)
             return with_it and law(with_it.view, j, elsewhere(with_it.view, measured.test))
 
         more = refused, transfers(last), weighed, lambda j: law(after, j, again())

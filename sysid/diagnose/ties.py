@@ -94,6 +94,7 @@ def chosen(view: View, groups: list[Group], rng: np.random.Generator) -> Choice 
     chance = dict(zip(inside, odds / odds.sum()))
     # whom only its fewer signs made the head may be less likely than another
     head = max([head, *(k for k in inside if lost[k] < lost[head] - same)], key=chance.get)
+    inside = [k for k in inside if k == head or not holds(view, members[k], members[head])]
     order = sorted(inside, key=lambda k: (k != head, -chance[k]))
     order = [k for n, k in enumerate(order) if not n or sum(map(chance.get, order[n:])) > _HARDLY]
     return Choice(

@@ -92,18 +92,19 @@ def verdicts(
         most = remains.share if remains else 1.0
         looks = near(j, most * seen.total) if near else None
         looks = looks or in_vain(refused, fit.joints, j, HALF * most)
-        besides = ""
-        if looks and remains and beyond and (further := beyond(j, looks[0])):
-            if replace(seen, chance=1.0, tone=0.0).with_law(further).predictable(among, WORTH):
-                besides, looks = not_all(looks[0].name), None
         reached = reaches[j] and first > 0.0 and not above(remains, then, floor)
         taken = sum(c.step.shares[j] for c in own)
         even = evens[j] and floors[j].reached(weighed[joint])  # it explains all
         little = remains is None or remains.share * max(1.0 - taken, 0.0) <= _LEFT * taken
-        if own and (whole or evens[j]) and little:
+        stands, further = bool(own) and (whole or evens[j]) and little, None
+        if looks and remains and beyond and not (own or reached or even):
+            further = beyond(j, looks[0])
+            further = further if further and further.predicts(among, WORTH) else None
+        if stands:
             told = ("missing", own, explained, remains)
-        elif own or (remains is not None and not looks and not reached and not even):
-            why = besides if remains else cause(both, floors[j])
+        elif own or (remains and not (reached or even) and (further or not looks)):
+            why = not_all(looks[0].name, further.share) if further else ""
+            why = why if remains else cause(both, floors[j])
             told = ("unknown", own or others, explained, remains, why)
         elif not reached:
             without = weighed[joint] if evens[j] else None

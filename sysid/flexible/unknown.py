@@ -12,7 +12,7 @@ from .functions import groups
 from .ridge import predicted, stretches
 
 TONE = 1e-4  # probability of a line that strong by chance
-LEVEL = 0.05  # family-wise: how often a law is said to be missing where none is
+LEVEL = 0.05  # family-wise and nominal: how often a law is said to be missing where none is
 
 
 @dataclass(frozen=True)
@@ -24,6 +24,11 @@ class Law:
     chance: float
     variables: str
     share: float
+
+    def predicts(self, joints: int, worth: float) -> bool:
+        """Whether it predicts a part worth having, as one of two questions asked of each of
+        `joints`."""
+        return self.chance < 0.5 * LEVEL / joints and self.share > worth
 
 
 @dataclass(frozen=True)

@@ -81,6 +81,8 @@ def rougher(segment, noise, cutoff: float, rng: np.random.Generator) -> np.ndarr
         cutoff: [Hz] above which the angle holds no motion.
     """
     q = segment.q
+    if len(q) < _FEWEST:
+        return q.copy()
     local = running(_by_window(_third(q), segment.step), 5, "median", "edge")
     middle = _usual(local, _HELD * np.ptp(q, axis=0))
     at = np.linspace(0, len(q) - 1, len(local) + 1)

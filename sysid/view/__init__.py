@@ -1,4 +1,4 @@
-"""What a diagnosis looks at: a model settled on the training motion, and its least squares."""
+"""What a diagnosis looks at: a model settled on the motion of logs, and its least squares."""
 
 from .design import Design, Sums, by_block, designed, instrumented, summed
 from .laws import law

@@ -20,7 +20,7 @@ def law(view: View, j: int, more: View | None = None) -> flexible.Law:
     # behind the rows of each view those of its motion with the angles' noise once more
     motions = [own for one in views for own in (one.variables, one.rough_variables)]
     each = lambda pick: [pick(one) for one in views for _ in range(2)]  # noqa: E731
-    last = view.rows.piece.max(initial=0) + 1
+    last = max(one.rows.piece.max(initial=0) for one in views) + 1
     pieces = [own + k * last for k, own in enumerate(each(lambda one: one.rows.piece))]
     use = np.concatenate(each(lambda one: one.rows.use[:, j].astype(bool)))
     known = {name: np.concatenate([own[name] for own in motions]) for name in view.variables}

@@ -1,5 +1,5 @@
-"""What a diagnosis looks at: a model settled on the training motion under one low-pass, and the
-same motion once more with the noise of its angles drawn again.
+"""What a diagnosis looks at: a model settled on the training motion (or on that of other logs) under
+one low-pass, and the same motion once more with the noise of its angles drawn again.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ import numpy as np
 
 from .. import blocks, experiment_logs, flexible
 from .. import rows as row
+from ..effect import NotFinite
 from ..errors import LogError
 from ..estimate import Fit
 from ..lowpass import again, band, calm, lowpassed, narrowed, stride_of, widest
@@ -18,6 +19,7 @@ from ..model import Model
 from ..motion import Motion
 from ..posed_problem import inverse
 from ..prior_weight import USUAL, with_weight
+from ..same_samples import same, sampled
 from ..shape import Settled, settle
 from ..source import Source
 from ..specs import Experiment
@@ -25,6 +27,7 @@ from .design import Design, Sums, by_block, designed, instrumented, summed
 from .stationary import spectra
 
 _FOLDS = 10
+_FEWEST = 50  # samples under the low-pass, or rows of other logs
 _APART = (
     0.02  # of a step between two rows: what was a second ago is then taken for what was 0.98 s ago
 )
@@ -234,28 +237,39 @@ def _under(experiment: Experiment, fit: Fit, logs, cutoff: float, own: float) ->
     return looked_at(experiment, fit.model, *motions, fit.prior, stride=stride)
 
 
-def _motions(logs, joints, cutoff: float, own: float) -> tuple[Motion, Motion] | None:
-    """Logs under one low-pass, and with the noise of their angles drawn once more."""
+def _motions(logs, joints, cutoff: float, own: float, seed: int = 0):
+    """Logs as a Motion under one low-pass, and with the noise of their angles drawn once more; None
+    where too little of them is left."""
     motion = lowpassed(logs, joints, cutoff, known=own)
-    if motion is None or motion.samples < 50:
+    if motion is None or motion.samples < _FEWEST:
         return None
-    rng, noise = np.random.default_rng(0), np.max([piece.noise for piece in motion.pieces], axis=0)
+    rng = np.random.default_rng(seed)
+    noise = np.max([piece.noise for piece in motion.pieces], axis=0)
     drawn = lambda s: again(s, noise, cutoff, rng)  # noqa: E731
     noisy = [replace(log, segments=tuple(map(drawn, log.segments))) for log in logs]
     return motion, lowpassed(noisy, joints, cutoff, known=own)
 
 
-def elsewhere(view: View, logs) -> View | None:
-    """The model of a view, settled anew on other logs; None where these are too short, or their
-    rows are not as far apart."""
-    motions = _motions(logs, view.model.robot.joints, view.cutoff, view.motion.band)
+def elsewhere(view: View, logs, but=()) -> View | None:
+    """The model of a view, settled anew on other logs; None where it cannot be: they are too short,
+    their rows are not as far apart, an effect is no finite number there, or they hold samples of
+    the logs `but`, and would say the same twice."""
+    parts = [("but", log) for log in but] + [("", log) for log in logs]
+    read = [sampled(log.name, part, log.segments) for part, log in parts]
+    if but and any(one.first.part and not one.others[0].part for one in same(read)):
+        return None
+    motions = _motions(logs, view.model.robot.joints, view.cutoff, view.motion.band, seed=1)
     if motions is None:
         return None
-    step = view.step / motions[0].pieces[0].step
-    if abs(round(step) - step) > _APART * step or round(step) < 1:
+    steps = view.step / np.array([piece.step for piece in motions[0].pieces])
+    stride = max(1, round(steps[0]))
+    if np.abs(steps - stride).max() > _APART * stride or motions[0].samples < _FEWEST * stride:
         return None
-    options = {"stride": round(step), "weights": view.weights, "grid": False}
-    return looked_at(view.experiment, view.model, *motions, view.prior, **options)
+    options = {"stride": stride, "weights": view.weights, "grid": False}
+    try:
+        return looked_at(view.experiment, view.model, *motions, view.prior, **options)
+    except NotFinite:
+        return None
 
 
 def too_short() -> LogError:
