@@ -6,7 +6,7 @@ The whole loop on one page:
     training logs -> view: both sides under one low-pass, events and standstill left out
     view -> steps: every candidate asked at once, what is there and worth having joins, and again
     steps -> claims: each fitted as `sysid add` fits it, whose parameters and command are told
-    test logs, opened once -> errors, where the model fails, whether a law of no catalogue holds there
+    test logs, opened once -> errors, where the model fails, laws of no catalogue that hold there
     claims + noise floors + what the motion still predicts -> the verdict on each joint
 """
 

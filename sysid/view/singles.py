@@ -30,9 +30,9 @@ _MOST = 2e6  # draws times rows, up to where fewer draws are made
 
 @dataclass(frozen=True)
 class Single:
-    """The column that stands out most, on all rows that were asked, its words, the probability of a statistic as great among
-    all of them, were nothing there, and the share that it takes of the squared residual of blocks
-    that it was not fitted on."""
+    """The column that stands out most, on all rows that were asked, its words, the probability of a
+    statistic as great among all of them, were nothing there, and the share that it takes of the
+    squared residual of blocks that it was not fitted on."""
 
     words: str
     column: np.ndarray
