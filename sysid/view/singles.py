@@ -105,7 +105,7 @@ def _outlying(size):
 
 
 def _sized(score):
-    """The size of a normal variable that stands as far out on either side as `score` does on one."""
+    """The size of a normal variable that stands as far out on either side as a score on one."""
     return -ndtri(0.5 * np.exp(np.maximum(log_ndtr(-score), -700.0)))
 
 
