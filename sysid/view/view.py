@@ -1,5 +1,5 @@
-"""What a diagnosis looks at: a model settled on the motion of training logs, or of others, under one
-low-pass, and the same motion once more with the noise of its angles drawn again.
+"""What a diagnosis looks at: a model settled on the motion of training logs, or of others, under
+one low-pass, and the same motion once more with the noise of its angles drawn again.
 """
 
 from __future__ import annotations
