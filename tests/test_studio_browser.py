@@ -111,12 +111,18 @@ def held_out(page, joint):
     return float(made[-1][column]), float(rows[-1][column].partition("±")[0])
 
 
+NAMED = "e => e.ariaLabel || e.textContent.trim()"
+
+
 def pressed(page, button):
-    """Press a button with the mouse; again where the press slipped off it, as something above it was drawn in that moment."""
-    page.evaluate("window.presses ??= (addEventListener('click', () => ++window.presses, true), 0)")
-    before = page.evaluate("window.presses")
+    """Press a button with the mouse; again where the press slipped off it, as something above it was drawn in that moment: it is then
+    a click on what is common to where it went down and where it came up."""
+    page.evaluate(
+        f"window.presses ??= (addEventListener('click', e => {{ const own = e.target.closest('button, a'); window.presses.push(own ? ({NAMED})(own) : '') }}, true), [])"
+    )
+    name, before = button.evaluate(NAMED), page.evaluate("window.presses.length")
     button.click()
-    if page.evaluate("window.presses") == before:
+    if name not in page.evaluate("window.presses")[before:]:
         button.click()
 
 
