@@ -158,7 +158,7 @@ def test_what_is_there_is_the_greatest_and_comes_back_whole():
 def test_a_long_log_is_asked_beside_fewer_draws(monkeypatch):
     p, columns = problem()
     monkeypatch.setattr("sysid.view.singles._MOST", 60.0 * N)
-    assert _draws(viewed(p)) == 60
+    assert _Asker(viewed(p), 1, np.random.default_rng(0), _draws(viewed(p))).rows.shape == (N, 61)
     p.tau[:, 1] += 2.0 * columns[:, 2]
     found = greatest([viewed(p)], 1, lambda: [(list("abcdef"), twice(columns))], np.random.default_rng(0))
     assert found.words == "c" and found.chance < 1e-4

@@ -93,8 +93,10 @@ def chosen(view: View, groups: list[Group], rng: np.random.Generator) -> Choice 
     odds = odds * blocks.chances(free[:, inside], rng)
     chance = dict(zip(inside, odds / odds.sum()))
     # whom only its fewer signs made the head may be less likely than another
-    head = max([head, *(k for k in inside if lost[k] < lost[head] - same)], key=chance.get)
-    inside = [k for k in inside if k == head or not holds(view, members[k], members[head])]
+    other = max([head, *(k for k in inside if lost[k] < lost[head] - same)], key=chance.get)
+    if other != head:
+        inside = [k for k in inside if k == other or not holds(view, members[k], members[other])]
+        head = other
     order = sorted(inside, key=lambda k: (k != head, -chance[k]))
     order = [k for n, k in enumerate(order) if not n or sum(map(chance.get, order[n:])) > _HARDLY]
     return Choice(

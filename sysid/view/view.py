@@ -17,9 +17,10 @@ from ..estimate import Fit
 from ..lowpass import again, band, calm, lowpassed, narrowed, stride_of, widest
 from ..model import Model
 from ..motion import Motion
+from ..notices import samples_of
 from ..posed_problem import inverse
 from ..prior_weight import USUAL, with_weight
-from ..same_samples import same, sampled
+from ..same_samples import same
 from ..shape import Settled, settle
 from ..source import Source
 from ..specs import Experiment
@@ -28,9 +29,8 @@ from .stationary import spectra
 
 _FOLDS = 10
 _FEWEST = 50  # samples under the low-pass, or rows of other logs
-_APART = (
-    0.02  # of a step between two rows: what was a second ago is then taken for what was 0.98 s ago
-)
+# of a step between two rows: what was a second ago is then taken for what was 0.98 s ago
+_APART = 0.02
 
 
 @dataclass(frozen=True)
@@ -254,9 +254,9 @@ def elsewhere(view: View, logs, but=()) -> View | None:
     """The model of a view, settled anew on other logs; None where it cannot be: they are too short,
     their rows are not as far apart, an effect is no finite number there, or they hold samples of
     the logs `but`, and would say the same twice."""
-    parts = [("but", log) for log in but] + [("", log) for log in logs]
-    read = [sampled(log.name, part, log.segments) for part, log in parts]
-    if but and any(one.first.part and not one.others[0].part for one in same(read)):
+    read = [*samples_of("train", but), *samples_of("test", logs)] if but else []
+    found = same(read) if len(read) > 1 else ()
+    if any((one.first.part, one.others[0].part) == ("train", "test") for one in found):
         return None
     motions = _motions(logs, view.model.robot.joints, view.cutoff, view.motion.band, seed=1)
     if motions is None:
