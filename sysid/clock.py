@@ -47,13 +47,15 @@ _ORDERED = 0.45  # of the way to a neighbour: samples keep their order
 @dataclass(frozen=True)
 class Clock:
     """When samples were taken: t (n,) [s]; off: RMS [s] by which their stamps were off, zero where
-    they were right; deviation [s] of one stamp's error; below (n,) [Hz]: the frequency above which
-    the errors about each sample were read off. What is slower than that is left in t, and of what
-    is faster the share `doubt` (n,) of its power: of slow joints no angle tells much."""
+    they were right; deviation [s] of one stamp's error; bands (m,) [Hz], falling: the frequencies
+    above which errors were read off; below (n,): of these, the one about each sample. What is
+    slower than that is left in t, and of what is faster, between each band and the one above it,
+    the share `doubt` (m, n) of its power: of slow joints no angle tells much."""
 
     t: np.ndarray
     off: float = 0.0
     deviation: float = 0.0
+    bands: tuple[float, ...] = ()
     below: np.ndarray | None = None
     doubt: np.ndarray | None = None
 
@@ -62,28 +64,32 @@ class Clock:
         if self.below is None:
             return None
         nearest = np.searchsorted(0.5 * (self.t[1:] + self.t[:-1]), t)
-        return Left(self.deviation, self.below[nearest], self.doubt[nearest], step)
+        doubt = self.doubt[:, nearest]
+        return Left(self.deviation, self.bands, self.below[nearest], doubt, step)
 
 
 @dataclass(frozen=True)
 class Left:
     """Errors of a clock that no angle told: those of stamps `step` [s] apart, white and of RMS
     `deviation` [s], as far as they stay below the frequencies `below` (n,) [Hz], and of what is
-    faster the share `doubt` (n,) of the power."""
+    faster, between each of `bands` (m,) [Hz] and the one above it, the share `doubt` (m, n) of the
+    power."""
 
     deviation: float
+    bands: tuple[float, ...]
     below: np.ndarray
     doubt: np.ndarray
     step: float
 
     def drawn(self, rng: np.random.Generator) -> np.ndarray:
         """Such errors (n,) [s], once more."""
-        errors = self.deviation * rng.standard_normal(len(self.below))
-        out = np.zeros(len(errors))
-        for frequency in np.unique(self.below):
-            here, slow = self.below == frequency, low(errors, frequency, self.step)
-            out[here] = (slow + np.sqrt(self.doubt) * (errors - slow))[here]
-        return out
+        faster = self.deviation * rng.standard_normal(len(self.below))
+        out = np.zeros(len(faster))
+        for band, doubt in zip(self.bands, self.doubt):
+            slower = low(faster, band, self.step)
+            out += np.where(self.below <= band, np.sqrt(doubt), 1.0) * (faster - slower)
+            faster = slower
+        return out + faster
 
 
 def corrected(t: np.ndarray, q: np.ndarray) -> Clock:
@@ -106,16 +112,26 @@ def corrected(t: np.ndarray, q: np.ndarray) -> Clock:
     for _ in range(_ROUNDS):
         even = _evenly(t + late, q)
         told = [_late(t, q, late, even, band) for band in bands]
-        (late, doubt), below = _lowest(t, told, bands, density, step)
+        late, below = _lowest(t, [found for found, _ in told], bands, density, step)
         late = np.clip(late, -room[:-1], room[1:])
         late[[0, -1]] = 0.0
-    return Clock(t + late, float(np.sqrt(np.mean(late**2))), float(np.sqrt(density)), below, doubt)
+    off, deviation = float(np.sqrt(np.mean(late**2))), float(np.sqrt(density))
+    doubt = _by_band([doubt for _, doubt in told], [_kept(band * step) for band in bands])
+    return Clock(t + late, off, deviation, tuple(bands), below, doubt)
+
+
+def _by_band(doubt: list[np.ndarray], kept: list[float]) -> np.ndarray:
+    """The share (m, n) of the errors' power that is in doubt between each band and the one above
+    it, of the shares (n,) of all that is above each: what is left of motion is slow."""
+    power = np.array(doubt) * np.array(kept)[:, None]
+    between = np.diff(kept, prepend=0.0)[:, None]
+    return np.clip(np.diff(power, axis=0, prepend=0.0) / between, 0.0, 1.0)
 
 
 def _lowest(t, told: list[np.ndarray], bands: list[float], density: float, step: float):
-    """How late samples were, with their doubt (2, n), and above which frequency (n,) [Hz] that was
-    read off: the lowest that has forgotten the log's ends and above which little moves near a
-    sample.
+    """How late samples were (n,) [s], of what each band told, and above which frequency (n,) [Hz]
+    that was read off: the lowest that has forgotten the log's ends and above which little moves
+    near a sample.
 
     A short fast move, too seldom to count in the whole log, is told from the clock by its spectrum:
     the clock's is even, of `density` [s^2], a move's falls with frequency."""
@@ -123,7 +139,7 @@ def _lowest(t, told: list[np.ndarray], bands: list[float], density: float, step:
     to_end, still = np.minimum(t - t[0], t[-1] - t), np.ones(len(t), bool)
     for k, band in enumerate(bands[1:], 1):
         width = max(3, round(2.0 / (band * step)))
-        power = running((told[k][0] - told[k - 1][0]) ** 2, width, "mean")
+        power = running((told[k] - told[k - 1]) ** 2, width, "mean")
         clock = density * (_kept(band * step) - _kept(bands[k - 1] * step))
         still &= (running(power > _MOTION * clock, width, "max") == 0.0) & (to_end >= 1.0 / band)
         late, below = np.where(still, told[k], late), np.where(still, band, below)

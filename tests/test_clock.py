@@ -119,6 +119,22 @@ def test_what_no_angle_told_of_the_clock_is_drawn_again():
         assert np.mean(np.array(drawn)[:, here]) == pytest.approx(np.mean(np.array(left)[:, here]), rel=0.5), (low, high)
 
 
+def test_what_the_angles_told_badly_is_drawn_again_where_it_stands():
+    """Motion that the low-pass leaves is slow: little of what is drawn beside it is fast."""
+    left, drawn = [], []
+    for seed in range(6):
+        instants = taken(seed)
+        t = instants - 1e-3 * np.random.default_rng(seed + 20).integers(0, 2, len(instants))
+        clock, even = corrected(instants, motion(t, seed)), STEP * np.arange(len(instants))
+        again = clock.at(even, STEP).drawn(np.random.default_rng(seed))
+        spectrum = lambda e: np.abs(np.fft.rfft((e - e.mean()) * np.hanning(len(e)))) ** 2  # noqa: E731
+        left.append(spectrum(clock.t - t)), drawn.append(spectrum(again))
+    frequency = np.fft.rfftfreq(len(instants), STEP)
+    for low, high in ((3.0, 5.0), (20.0, 30.0), (30.0, 48.0)):
+        here = (frequency > low) & (frequency < high)
+        assert 0.5 < np.mean(np.array(drawn)[:, here]) / np.mean(np.array(left)[:, here]) < 2.0, (low, high)
+
+
 def stopping(t, seed):
     """Angles (n, 3): moves of half a second to a second and a half, with stops in between."""
     rng = np.random.default_rng(seed)

@@ -20,6 +20,7 @@ from .stretches import (
     bridged,
     whole,
 )
+from .uneven import with_uneven
 
 #: standard error over RMS beyond which a floor is not given: two of them are the 25 % that one can
 #: judge an error by
@@ -142,8 +143,8 @@ def estimate(
         return _bounded(*found, "spectral", words, "the log is too short", own)
     drawn = None
     if angles is not None:
-        again = _of_joint(angles.torque, joint)
-        drawn = [run.of(again[run.stretch]) for run in runs]
+        columns = [again[:, :, joint] for again in angles.torque]
+        drawn = [np.stack([run.of(once) for once in columns[run.stretch]]) for run in runs]
         drawn = drawn if any(v.any() for v in drawn) else None
     rest, kept, number, removed = rest_of(shared, raw, torque, joint, drawn)
     if math.sqrt(max(np.mean(v**2) for v in rest)) <= 1e-12 * max(size, own):
@@ -160,11 +161,16 @@ def estimate(
     spectrum = spectrum_of(rest, kept, steps)
     made = None
     if drawn is not None:
-        made = spectrum_of([bridged(v, k) for v, k in zip(drawn, kept)], kept, steps).density
+        each = [[bridged(v, k) for v, k in zip(once, kept)] for once in zip(*drawn)]
+        made = np.mean([spectrum_of(once, kept, steps).density for once in each], axis=0)
     # what the functions took off was mostly in the band, noise as well as misfit
     freedom = 2.0 * bandwidth * sum(len(run.q) * run.step for run in runs)
     spectrum.density[spectrum.centre < bandwidth] /= 1.0 - min(0.5, number / max(freedom, 1.0))
     found = weighed(spectrum, bandwidth, min(steps), removed, made)
+    if drawn is not None:
+        counts = [run.counts for run in runs]
+        times = min(1.0, outliers.of_drawn(rest, kept, drawn, steps, bandwidth))
+        found = with_uneven(found, drawn, counts, times, float(made @ spectrum.width))
     words = f"residual above {bandwidth:.2g} Hz, {found.colour}"
     return _bounded(found.rms, found.std, "spectral", words, found.doubt, own, found.least)
 

@@ -12,11 +12,13 @@ from ..motion import Motion
 from ..prediction import Prediction, predict
 from ..preprocess import prepare
 
+_DRAWS = 8  # where stamps jitter: how large their errors are differs from row to row
+
 
 @dataclass(frozen=True)
 class OfAngles:
-    """torque (n, dof) [N m or N] over the core of each piece: what the angles' noise, drawn once
-    more, adds to the torque that a fit predicts, beside the measured one. band: [Hz] below which
+    """torque (draws, n, dof) [N m or N] over the core of each piece: what the angles' noise, drawn
+    again, adds to the torque that a fit predicts, beside the measured one. band: [Hz] below which
     the logs' motion stays."""
 
     torque: list[np.ndarray]
@@ -39,14 +41,19 @@ def of_angles(
     Source: Cook & Stefanski 1994 (simulation extrapolation).
     """
     rng, out, bands = np.random.default_rng(0), [], []
+    clocks = [s.clock for part in logs for log in part for s in log.segments]
+    draws = _DRAWS if any(clock is not None for clock in clocks) else 1
     for part, plain, known in zip(logs, motions, told):
         cutoff = widest(part, known=(own_band := band(part)))
         drawn = lambda s: again(s, angle_noise(s, cutoff), cutoff, rng)  # noqa: E731, B023
-        noisy = [replace(log, segments=tuple(map(drawn, log.segments))) for log in part]
-        found = predict(*of, prepare(noisy, spec, plain.joints))
+        made = []
+        for _ in range(draws):
+            noisy = [replace(log, segments=tuple(map(drawn, log.segments))) for log in part]
+            found = predict(*of, prepare(noisy, spec, plain.joints))
+            # a clock that is late shifts the measured torque as well
+            error = [one.predicted - one.measured for one in (known, found)]
+            made.append(error[1] - error[0])
         ends = np.cumsum([piece.samples for piece in plain.pieces])[:-1]
-        # a clock that is late shifts the measured torque as well
-        error = [one.predicted - one.measured for one in (known, found)]
-        out += np.split(error[1] - error[0], ends)
+        out += np.split(np.stack(made), ends, axis=1)
         bands.append(own_band)
     return OfAngles(out, max(bands))

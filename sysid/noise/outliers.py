@@ -8,6 +8,7 @@ out.
 """
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -34,7 +35,7 @@ def without(
     """Which rows (n,) of each run are kept, and the values with what is left out bridged.
 
     `digit` is the least difference of logged torques [N m or N]: that much is no outlier. `drawn`
-    (n,) is what the angles' noise makes of each run: where there is more of it, more is usual.
+    (draws, n) is what the angles' noise makes of each run: where there is more, more is usual.
     """
     shortest = min(steps)
     longest = max(1, int(_SHARE / (bandwidth * shortest))) if bandwidth > 0.0 else 1
@@ -49,9 +50,13 @@ def without(
         usual = [np.full(len(d), typical) for d in steps_of]
         if drawn is not None:
             spans = [0.5 / (bandwidth * step) for step in steps]
-            local = [_local(_step(v, k, width), n) for v, k, n in zip(drawn, kept, spans)]
+            local = [
+                _local([_step(v, k, width) for v in once], n)
+                for once, k, n in zip(drawn, kept, spans)
+            ]
             # so few independent values tell it: two standard errors of theirs are usual
-            unsure = [1.0 + 2.0 / math.sqrt(2.0 * max(n / (2 * width + 1), 1.0)) for n in spans]
+            number = [max(n / (2 * width + 1), len(v)) for v, n in zip(drawn, spans)]
+            unsure = [1.0 + 2.0 / math.sqrt(2.0 * n) for n in number]
             usual = _by_local(steps_of, local, typical, unsure)
         found = []
         for d, k, scale in zip(steps_of, kept, usual):
@@ -69,9 +74,17 @@ def without(
     return kept, values
 
 
+def of_drawn(values, kept, drawn, steps, bandwidth: float) -> float:
+    """How many times the power of `drawn` (draws, n) is in values (n,) of runs where they are
+    `kept` (n,): from medians, so that neither misfit nor a few rows say it."""
+    own = [np.where(k, v, np.nan) for v, k in zip(values, kept)]
+    local = [_local(v, 0.5 / (bandwidth * step)) for v, step in zip(drawn, steps)]
+    return _white_and_more(own, local, 1.0)[1]
+
+
 def usual(values, drawn, steps, bandwidth: float):
-    """The size (n,) of each run's noise where `drawn` (n,) says that it differs from row to row;
-    None where nothing is drawn."""
+    """The size (n,) of each run's noise where `drawn` (draws, n) says that it differs from row to
+    row; None where nothing is drawn."""
     if drawn is None:
         return None
     typical = float(np.median(np.abs(np.concatenate(values)))) / _NORMAL
@@ -80,10 +93,11 @@ def usual(values, drawn, steps, bandwidth: float):
     return found if found is not None and all((v > 0.0).all() for v in found) else None
 
 
-def _local(values: np.ndarray, samples: float) -> np.ndarray:
-    """RMS (n,) of values over so many samples about each, nan counting for nothing."""
-    size = max(3, 2 * round(0.5 * samples) + 1)
-    square = running(np.nan_to_num(values) ** 2, size, "mean", "edge")
+def _local(draws: Sequence[np.ndarray], samples: float) -> np.ndarray:
+    """RMS (n,) of values (n,) of draws, so many samples about each in all, nan counting for
+    nothing."""
+    size = max(3, 2 * round(0.5 * samples / len(draws)) + 1)
+    square = running(np.mean(np.nan_to_num(draws) ** 2, axis=0), size, "mean", "edge")
     return np.sqrt(np.maximum(square, 0.0))
 
 
@@ -91,22 +105,30 @@ def _by_local(
     values: list[np.ndarray], local: list[np.ndarray], typical: float, unsure: list[float]
 ) -> list[np.ndarray]:
     """The usual size (n,) of values that are white noise plus some multiple of noise whose size is
-    `local` (n,) of each run: from medians among values where it is alike. `unsure`: by how much
-    that of each run may be too small."""
+    `local` (n,) of each run. `unsure`: by how much that of each run may be too small."""
+    white, more = _white_and_more(values, local, typical)
+    return [np.sqrt(white * typical**2 + more * (u * own) ** 2) for own, u in zip(local, unsure)]
+
+
+def _white_and_more(
+    values: list[np.ndarray], local: list[np.ndarray], typical: float
+) -> tuple[float, float]:
+    """Multiples of `typical`^2 and of the square of `local` (n,) that values (n,), nan left aside,
+    are the sum of: from medians among values about which it is alike."""
     every, size = np.concatenate(values), np.concatenate(local)
     there = ~np.isnan(every)
     every, size = np.abs(every[there]), size[there]
     if len(every) < _ALIKE**2 or not size.any():
-        return [np.full(len(v), typical) for v in values]
+        return 1.0, 0.0
     ends = len(size) * np.arange(1, _ALIKE) // _ALIKE
     bins = np.split(np.argpartition(size, ends), ends)
     usual = np.array([np.median(every[own]) / _NORMAL for own in bins]) ** 2
-    square = np.array([np.mean(size[own] ** 2) for own in bins])
+    # the middle one here as well: at the ends of a log a few may be ten times as large
+    square = np.array([np.median(size[own]) for own in bins]) ** 2
     shape = np.stack([np.full(_ALIKE, typical**2), square], axis=1)
     weight = 1.0 / np.maximum(usual, 1e-6 * usual.max())  # each median is as sure as it is large
     white, more = least_squares(shape * weight[:, None], usual * weight)
-    more = min(more, _KNOWN)
-    return [np.sqrt(white * typical**2 + more * (u * own) ** 2) for own, u in zip(local, unsure)]
+    return white, min(more, _KNOWN)
 
 
 def _step(values: np.ndarray, counts: np.ndarray, width: int) -> np.ndarray:
