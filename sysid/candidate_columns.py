@@ -87,17 +87,22 @@ def grown(source, candidate: Candidate, shapes: dict[str, float]) -> Model:
     return model.with_shapes([*model.shapes[: own.start], *asked])
 
 
-def columns_of(source, candidate: Candidate, shapes: list[dict[str, float]]) -> np.ndarray:
+def columns_of(
+    source, candidate: Candidate, shapes: list[dict[str, float]], among: Sequence[int] = ()
+) -> np.ndarray:
     """Columns (shapes, joints, n, k) that a candidate would add to a source's rows, its own joint's
     or every joint's.
 
     Of an effect that is no column, the slopes of the predicted torque in its values; away from its
     start the change of the torque as a share of its first value. In memory samples come last.
+
+    Args:
+        among: joints that will be asked alike: what is integrated step by step is for all at once.
     """
     if isinstance(candidate.effect, SensorEffect):
         return _stacked([_sensed(source, candidate, own)[None] for own in shapes])
     if candidate.swings:
-        return _stacked(_changes(source, candidate, shapes))
+        return _stacked(_changes(source, candidate, shapes, among))
     if candidate.nonlinear:
         return _stacked([_moved(source, candidate, own) for own in shapes])
     asked = (source.model, source.motion, source.pieces, candidate.effect, candidate.joint, shapes)
@@ -109,18 +114,19 @@ def _stacked(found: Sequence[np.ndarray]) -> np.ndarray:
     return np.swapaxes(np.stack([np.swapaxes(values, 1, 2) for values in found]), 2, 3)
 
 
-def _changes(source, candidate: Candidate, shapes: list[dict[str, float]]) -> list[np.ndarray]:
+def _changes(source, candidate: Candidate, shapes: list[dict[str, float]], among) -> list:
     """Of each set (dof, n, 1); where the link does not stand apart yet, of its first step."""
     effect = candidate.effect
     leading = next(s.name for s in effect.shapes() if s.start is not None)
     begun = [_begun(source, candidate, leading, own) for own in shapes]
     known, apart = source.bent(candidate.joint), None
     if effect.blows and not candidate.begins and shapes == tried(source, candidate):
-        everywhere = [replace(candidate, joint=joint) for joint in range(source.model.robot.dof)]
-        tries = [
-            [_begun(source, one, leading, own) for own in tried(source, one)] for one in everywhere
-        ]
-        apart = source.flights((candidate.name, candidate.options), effect, tries)[candidate.joint]
+        tries = {}
+        for joint in {candidate.joint, *(j for j in among if j >= 0)}:
+            one = replace(candidate, joint=joint)
+            tries[joint] = [_begun(source, one, leading, own) for own in tried(source, one)]
+        key = candidate.name, candidate.options
+        apart = source.flights(key, effect, tries)[candidate.joint]
     found = row.secants(
         source.model, source.motion, known, effect, begun, source.stride, source.use, apart
     )

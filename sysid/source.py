@@ -85,28 +85,24 @@ class Source:
     def _flights(self) -> dict:
         return {}
 
-    def flights(self, key, effect, tries: list[list[dict]]) -> list[list]:
-        """How far each joint's link stands apart, of each piece (tried, 3, n), at sets of shape values
-        that are tried on each joint: all links at once, once for all who ask with a `key`."""
-        if key not in self._flights:
+    def flights(self, key, effect, tries: dict[int, list[dict]]) -> dict[int, list]:
+        """{joint: how far its link stands apart, of each piece (tried, 3, n)}, at sets of shape values that are tried on
+        joints: all these links at once, once for all who ask with a `key`."""
+        known = self._flights.setdefault(key, {})
+        if more := {joint: own for joint, own in tries.items() if joint not in known}:
             both = [self] if self.beside is None else [self, self.beside]
-            bent = [[source.bent(joint) for joint in range(len(tries))] for source in both]
-            found: list[list] = [[] for _ in both]
+            bent = [{joint: source.bent(joint) for joint in more} for source in both]
+            found = [{joint: [] for joint in more} for _ in both]
             for k in range(len(self.motion.pieces)):
-                cases = [
-                    (b[k].load, b[k].inertia, b[k].seen, s)
-                    for known in bent
-                    for b, own in zip(known, tries)
-                    for s in own
-                ]
+                parts = [(b[joint][k], own) for b in bent for joint, own in more.items()]
+                cases = [(b.load, b.inertia, b.seen, s) for b, own in parts for s in own]
                 each = iter(effect.several(cases))
                 for pieces in found:
-                    pieces.append([[next(each) for _ in own] for own in tries])
+                    for joint, own in more.items():
+                        pieces[joint].append([next(each) for _ in own])
             for source, pieces in zip(both, found):
-                source._flights[key] = [
-                    [piece[joint] for piece in pieces] for joint in range(len(tries))
-                ]
-        return self._flights[key]
+                source._flights.setdefault(key, {}).update(pieces)
+        return known
 
     @cached_property
     def predicted(self) -> np.ndarray:

@@ -323,6 +323,36 @@ def test_links_that_fly_are_integrated_for_both_motions_at_once(views):
         np.testing.assert_allclose(one, other, rtol=1e-9, atol=1e-12)
 
 
+def test_links_that_fly_are_those_of_the_joints_that_are_asked(views):
+    """Together or one joint after the other, the robot as a whole among them: of each the same flights."""
+    plays = [c for c in candidates(views[0].model) if (c.name, c.options) == ("backlash", (("encoder", "motor"),))]
+    assert len(plays) == 2
+    told = []
+    for among in ((), (-1, 0, 1)):
+        source = replace(views[0].source, beside=None)
+        told.append([columns_of(source, play, candidate_columns.tried(source, play), among) for play in plays])
+        assert [len(known) for known in source._flights.values()] == [2]
+    for one, other in zip(*told):
+        np.testing.assert_allclose(one, other, rtol=1e-9, atol=1e-12)
+
+
+def test_what_a_joint_was_asked_of_a_residual_stands_while_it_is_the_same(views):
+    """Of joints whose residual an effect did not change, in the units of the new weights; of others it is asked anew."""
+    view = views[0]
+    view.unknown  # noqa: B018 - asked
+    weights = view.weights * [2.0, 0.5]
+    grown = replace(view, grown=view, weights=weights)
+    for j, (one, other) in enumerate(zip(grown.unknown, view.unknown)):
+        unit = weights[j] / view.weights[j]
+        # other weights bend the model a little
+        np.testing.assert_allclose(one.told, unit * other.told, atol=1e-2 * unit * np.abs(other.told).max())
+        assert one.chance == other.chance and one.predicted == pytest.approx(other.predicted, rel=1e-2)
+    with_other = replace(view, grown=replace(views[1]))
+    views[1].unknown  # noqa: B018
+    vars(with_other.grown)["unknown"] = views[1].unknown
+    assert [one.chance for one in with_other.unknown] == [one.chance for one in view.unknown]
+
+
 @pytest.mark.parametrize("slow", [0.05, 0.3])
 def test_blocks_are_long_against_what_noise_remembers(planar, slow):
     """Four memories of a noise that no motion predicts, where half a second is less."""

@@ -97,6 +97,18 @@ def test_gain_is_what_the_prediction_takes():
     assert found.total == pytest.approx(np.sum(residual**2))
 
 
+def test_an_answer_is_that_of_the_same_residual_in_other_units():
+    """Of one that correlates by less than 0.99 it is none."""
+    found, rng = asked(LAWS["an angle"][0], seed=7), np.random.default_rng(1)
+    same = found.of(-3.0 * found.residual)
+    np.testing.assert_allclose(same.told, -3.0 * found.told)
+    assert same.gain.sum() == pytest.approx(9.0 * found.gain.sum()) and same.total == pytest.approx(9.0 * found.total)
+    assert same.predicted == pytest.approx(found.predicted) and same.chance == found.chance
+    noise = np.std(found.residual) * rng.normal(size=N)
+    assert found.of(found.residual + 0.1 * noise) is not None
+    assert found.of(found.residual + 0.2 * noise) is None and found.of(found.residual[1:]) is None
+
+
 def test_nothing_is_predicted_of_noise():
     """Over noises of some colour the gain stands about zero or below it, and as few are called predictable as the level says."""
     draws = 24

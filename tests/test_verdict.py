@@ -33,13 +33,13 @@ from sysid.view import first_view
 # ---- verdicts, by hand
 
 JOINTS = ("shoulder", "elbow")
-NOISE = Unknown(np.array([3.0, -4.0, 1.0, -2.0, 2.0, -3.0, 1.0, -1.0, 0.0, 1.0]), np.zeros(0), {"q_elbow": 0.001}, 1000.0)
+NOISE = Unknown(np.array([3.0, -4.0, 1.0, -2.0, 2.0, -3.0, 1.0, -1.0, 0.0, 1.0]), np.zeros(0), {"q_elbow": 0.001}, np.full(10, 10.0))
 
 
 def left(share: float) -> Unknown:
     """Functions of the motion predict a share of what is left, evenly over folds."""
     gain = 100.0 * share * (1.0 + 0.1 * np.array([1, -1, 2, -2, 0, 1, -1, 0, 1, -1]))
-    return Unknown(gain, np.zeros(0), {"q_elbow": share, "time": 0.01}, 1000.0, chance=1e-6)
+    return Unknown(gain, np.zeros(0), {"q_elbow": share, "time": 0.01}, np.full(10, 10.0), chance=1e-6)
 
 
 def fitted(elbow: float, shoulder: float = 1.0, train: float | None = None):
@@ -298,9 +298,9 @@ def test_an_error_at_the_floor_on_test_logs_alone_is_not_complete():
 
 
 def test_dependences_are_sorted_and_say_something():
-    found = Unknown(np.full(10, 20.0), np.zeros(0), {"a": 0.05, "b": 0.3, "c": 0.01}, 1000.0)
+    found = Unknown(np.full(10, 20.0), np.zeros(0), {"a": 0.05, "b": 0.3, "c": 0.01}, np.full(10, 10.0))
     assert dependences(found) == [{"variable": "b", "share": 0.3}, {"variable": "a", "share": 0.05}]
-    alone = Unknown(np.full(10, 20.0), np.zeros(0), {"a": 0.0}, 1000.0)
+    alone = Unknown(np.full(10, 20.0), np.zeros(0), {"a": 0.0}, np.full(10, 10.0))
     assert dependences(alone) == [{"variable": "several variables together", "share": pytest.approx(0.2)}]
 
 

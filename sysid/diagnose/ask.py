@@ -75,15 +75,14 @@ def ask(view: View, extra=(), tell=lambda share: None, *, before=None, anew=()) 
     joints = sorted({c.joint for c in asked})
     out = {j: before.by_joint[j] for j in joints if before is not None and j not in anew}
     made = {joint: found for joint, (found, *_) in out.items()}
-    for number, joint in enumerate(joints):  # whose columns stand in memory together
-        if joint not in made:
-            made[joint] = groups(view, [c for c in asked if c.joint == joint])
-        tell((number + 1) / len(joints))
+    new = [joint for joint in joints if joint not in made]
+    for number, joint in enumerate(new):  # whose columns stand in memory together
+        made[joint] = groups(view, [c for c in asked if c.joint == joint], new)
+        tell((number + 1) / len(new))
     belief = null.believed([group for own in made.values() for group in own])
-    for joint, own in made.items():
-        if joint not in out:
-            gains = np.array([group.taken for group in own])
-            # draws of one residual, the joint's own
-            maxima = null.maxima(own, np.random.default_rng(joint + 1), belief)
-            out[joint] = own, null.statistics(own, belief), gains, maxima
+    for joint, own in ((joint, made[joint]) for joint in new):
+        gains = np.array([group.taken for group in own])
+        # draws of one residual, the joint's own
+        maxima = null.maxima(own, np.random.default_rng(joint + 1), belief)
+        out[joint] = own, null.statistics(own, belief), gains, maxima
     return Asked(out, belief)

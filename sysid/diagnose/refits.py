@@ -92,5 +92,5 @@ def weighed(view: View, weights=None) -> View:
 
 
 def _again(view: View, model, weights, **how) -> View:
-    how |= {"stride": view.stride, "weights": weights, "grid": False, "inherited": view.blocks}
+    how |= {"stride": view.stride, "weights": weights, "grid": False, "grown": view}
     return looked_at(view.experiment, model, view.motion, view.rough, view.prior, **how)

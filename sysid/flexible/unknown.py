@@ -12,6 +12,7 @@ from .functions import groups
 from .ridge import predicted, stretches
 
 TONE = 1e-4  # probability of a line that strong by chance
+_SAME = 0.02  # of a squared residual: two that differ by less correlate by 0.99
 LEVEL = 0.05  # family-wise and nominal: how often a law is said to be missing where none is
 
 
@@ -36,17 +37,32 @@ class Unknown:
     """What a flexible function takes of a joint: gain (folds,) of the weighted squared residual;
     told (n,) the torque that it predicts of folds that it was not fitted on, weighted; shares
     {variable: share of the squared residual that functions of it alone, and of the direction of
-    motion, predict}; total: the squared residual; chance: the probability of predictions as good as
-    these, were nothing there; tone: the share of a steady tone, zero where there is none; single:
-    the share that one function alone predicts, where these were asked one by one."""
+    motion, predict}; residual (n,): what was asked; chance: the probability of predictions as good
+    as these, were nothing there; tone: the share of a steady tone, zero where there is none;
+    single: the share that one function alone predicts, where these were asked one by one."""
 
     gain: np.ndarray
     told: np.ndarray
     shares: dict[str, float]
-    total: float
+    residual: np.ndarray
     chance: float = 1.0
     tone: float = 0.0
     single: float = 0.0
+
+    @property
+    def total(self) -> float:
+        """The squared residual."""
+        return max(float(np.sum(self.residual**2)), 1e-300)
+
+    def of(self, residual) -> Unknown | None:
+        """The same of another residual (n,) that is this one, in other units; None of any other."""
+        if len(residual) != len(self.residual):
+            return None
+        unit = float(residual @ self.residual) / self.total
+        own = unit * self.residual
+        if np.sum((residual - own) ** 2) > _SAME * np.sum(residual**2):
+            return None
+        return replace(self, gain=self.gain * unit**2, told=unit * self.told, residual=own)
 
     @property
     def predicted(self) -> float:
@@ -109,7 +125,7 @@ def unknown(
     share, by_chance = _tone(residual, step)
     if by_chance < TONE:
         shares["a steady tone"] = share
-    return Unknown(gain, told, shares, total, chance, tone=share if by_chance < TONE else 0.0)
+    return Unknown(gain, told, shares, residual, chance, tone=share if by_chance < TONE else 0.0)
 
 
 def _tone(residual, step: float) -> tuple[float, float]:

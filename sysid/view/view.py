@@ -38,9 +38,9 @@ class View:
     """A model settled on the training motion.
 
     motion: training logs under one low-pass; rough: the same with the angles' noise once more.
-    weights: (dof,) inverse RMS by which joints count. prior: (bodies, 10). inherited: (n,) blocks
-    of the model that this one grew from, so that both lose in the same blocks. like: a view of the
-    same motion whose noise is this one's.
+    weights: (dof,) inverse RMS by which joints count. prior: (bodies, 10). grown: the view whose
+    model this one grew from; both lose in the same blocks. like: a view of the same motion whose
+    noise is this one's.
     """
 
     experiment: Experiment
@@ -50,7 +50,7 @@ class View:
     stride: int
     weights: np.ndarray
     settled: Settled
-    inherited: np.ndarray | None = None
+    grown: View | None = None
     like: View | None = None
 
     @property
@@ -95,30 +95,34 @@ class View:
 
     @cached_property
     def unknown(self) -> tuple[flexible.Unknown, ...]:
-        """What a flexible function of the motion takes of each joint."""
+        """What a flexible function of the motion takes of each joint; where the residual is that of
+        the view that this one grew from, what it took there."""
         # three stretches a fold, so that what is left out is seldom where nothing else was
         rows = self.rows
         residual = instrumented(self.design, rows.use, rows.piece, self.motion.band, self.step)
         stretch = blocks.numbered(rows.t, rows.piece, shortest=np.inf, fewest=3 * _FOLDS)
         fold, names = stretch % _FOLDS, self.model.robot.joints
+        before = self._asked_before()
+        same = [before and before[j].of(residual[:, j]) for j in range(len(names))]
+        rest = fold, rows.piece, self.step
         take = lambda j, name: flexible.unknown(  # noqa: E731
-            self.variables,
-            name,
-            residual[:, j],
-            rows.use[:, j],
-            fold,
-            rows.piece,
-            self.step,
-            np.random.default_rng(j),
+            self.variables, name, residual[:, j], rows.use[:, j], *rest, np.random.default_rng(j)
         )
-        return tuple(take(j, name) for j, name in enumerate(names))
+        return tuple(same[j] or take(j, name) for j, name in enumerate(names))
+
+    def _asked_before(self) -> tuple[flexible.Unknown, ...] | None:
+        """The last that was asked of a view that this one grew from."""
+        one = self.grown
+        while one is not None and "unknown" not in vars(one):
+            one = one.grown
+        return one and one.unknown
 
     @cached_property
     def blocks(self) -> np.ndarray:
         """(n,) the block of each row, long against the memory of what no function of the motion
         predicts."""
-        if self.inherited is not None:
-            return self.inherited
+        if self.grown is not None:
+            return self.grown.blocks
         return blocks.numbered(self.rows.t, self.rows.piece, memory=self._left[1])
 
     @cached_property
@@ -173,7 +177,7 @@ def looked_at(
     weights=None,
     grid: bool = True,
     tolerance: float = 1e-7,
-    inherited=None,
+    grown: View | None = None,
     like: View | None = None,
 ) -> View:
     """Settle a model on a motion.
@@ -183,16 +187,14 @@ def looked_at(
         grid: search the grids of shape values; without it, from those that the model has.
         tolerance: share of the objective by which a step of the shape values must lower it for
             another to follow.
-        inherited: (n,) blocks, where the model grew from another one's. like: whose noise it has,
-            where that is known.
+        grown: the view whose model this one grew from. like: whose noise it has, where that is known.
     """
 
     def view(weights, model: Model, grid: bool) -> View:
         options = {"weights": weights, "stride": stride, "grid": grid, "tolerance": tolerance}
         found = settle(experiment, model, motion, prior, **options)
-        return View(
-            experiment, motion, rough, prior, stride, np.asarray(weights), found, inherited, like
-        )
+        own = stride, np.asarray(weights), found, grown, like
+        return View(experiment, motion, rough, prior, *own)
 
     model = model if model.scales else model.scaled_by(motion)
     if weights is not None:
