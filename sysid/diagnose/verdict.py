@@ -84,7 +84,7 @@ def verdicts(
         # who leaves more that is no noise is no name for what is missing; in no log is there more
         # noise than an error of another, so that what does not carry over is no noise
         whole = (1.0 + _LEFT) * explains(first, then, min(*both, noise)) >= 1.0
-        whole |= any(noisy(*pair, floors[j]) for pair in pairs)
+        whole |= noisy(*pairs[1], floors[j]) or floors[j].reached(both[0])
         seen, among = left[j], sum(asked) if asked[j] else len(left)
         if law and asked[j] and then > 0.0 and not seen.predictable(among, WORTH):
             seen = seen.with_law(law(j))
