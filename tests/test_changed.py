@@ -73,6 +73,10 @@ def test_a_payload_is_found_with_its_mass(fitted):
     for axis, true in zip("xz", (0.32, 0.02)):
         entry = values[f"payload.*.com_{axis}"]
         assert abs(entry["value"] - true) < 4.0 * entry["std"] + 0.01
+    # across the plane no torque shows where it is: the prior's value, and no deviation of it
+    untold = [name for name, entry in values.items() if entry["std"] is None]
+    assert {f"payload.*.{name}" for name in ("hy", "com_y", "Ixy", "Iyz")} <= set(untold), untold
+    assert not {f"payload.*.{name}" for name in ("m", "hx", "com_x", "com_z")} & set(untold)
     assert any("torque sensors" in notice for notice in said["notices"])
     assert {v["effect"] for v in said["verdict"]} == {"payload"}
     for entry in said["joints"].values():

@@ -12,7 +12,7 @@ from ..inertia import DIVERGENCES, PARAMETERIZATIONS, pseudo
 from ..model import Model
 from ..model_parameters import ROBOT
 from ..objective import Objective
-from ..projection import inverted, root
+from ..projection import DATA, inverted, root
 from ..solve import Coordinates, solve
 from ..vocabulary import find
 from .halves import Key, Question, least_squares
@@ -43,7 +43,9 @@ def together(model: Model, asked: Question, chosen) -> tuple[tuple[Change, ...],
     body = spans.get(("payload", ROBOT))
     whole = asked.by_block.sum(axis=0)
     c, around = possible(whole, places, body)
-    pull = whole[places, -1] - whole[np.ix_(places, places)] @ c
+    data = whole[np.ix_(places, places)]
+    pull, spread = whole[places, -1] - data @ c, inverted(data + around)
+    of_data = spread @ data @ spread, spread
     without = np.array([_nearby(whole - b, places, c, around, pull) for b in asked.by_block])
     with_all, out = asked.across(chosen), []
     for key, own in spans.items():
@@ -52,7 +54,13 @@ def together(model: Model, asked: Question, chosen) -> tuple[tuple[Change, ...],
         error = share / z if z else np.nan
         joint = "*" if key[1] == ROBOT else model.robot.joints[key[1]]
         out.append(
-            Change(key[0], joint, share, error, _parameters(model, key, c[own], without[:, own]))
+            Change(
+                key[0],
+                joint,
+                share,
+                error,
+                _parameters(model, key, c[own], without[:, own], *(v[own, own] for v in of_data)),
+            )
         )
     left = asked.squares(places, c).sum(axis=0)
     return tuple(sorted(out, key=lambda change: -change.removed)), left
@@ -88,14 +96,29 @@ def _nearby(products, places, c, around, pull) -> np.ndarray:
     return c + inverted(here + around) @ (products[places, -1] - here @ c - pull)
 
 
-def _parameters(model: Model, key: Key, c, without) -> dict[str, tuple[float, float, str]]:
+def _parameters(model: Model, key: Key, c, without, of_data, spread):
+    """{name: (value, std, unit)}: std is NaN where what is beside the data tells more of it than
+    they do.
+
+    Args:
+        c: (k,) coefficients. without: (blocks, k) with each block left out. of_data: (k, k) the
+            part of their `spread` (k, k) that is of the data.
+    """
     name, joint = key
     grown = model.with_effect(find(name).bound(model.robot, joint), (joint,))
     own = grown.coefficients[len(model.coefficients) :]
     listed = [*own, *grown.shape_values[grown.last_shapes]]
-    out = {p.name: (float(v), float(s), p.unit) for p, v, s in zip(listed, c, jackknife(without))}
+
+    def told(value: float, each, slope, unit: str) -> tuple[float, float, str]:
+        known = slope @ of_data @ slope >= DATA * (slope @ spread @ slope)
+        return float(value), float(jackknife(each)) if known else np.nan, unit
+
+    slopes = np.eye(len(c))
+    each = zip(listed, c, without.T, slopes)
+    out = {p.name: told(v, one, slope, p.unit) for p, v, one, slope in each}
     if name == "payload":
         for axis, word in enumerate("xyz"):
-            each = without[:, 1 + axis] / without[:, 0]
-            out[f"payload.*.com_{word}"] = (float(c[1 + axis] / c[0]), float(jackknife(each)), "m")
+            each, at = without[:, 1 + axis] / without[:, 0], c[1 + axis] / c[0]
+            slope = (slopes[1 + axis] - at * slopes[0]) / c[0]
+            out[f"payload.*.com_{word}"] = told(at, each, slope, "m")
     return out

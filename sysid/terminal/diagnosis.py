@@ -84,6 +84,6 @@ def show_changed(document: dict) -> None:
     for f in document["findings"]:
         print(f"{f['effect']} on {f['joint']}: removes {text.percent(max(f['misfit_removed'], 0.0))} of the squared residual")
         for name, p in f["parameters"].items():
-            print(f"  {text.valued(name, p)}")
+            print(f"  {text.valued(name, p)}" if p["std"] is not None else f"  {name}: this log does not tell it")
     show_notices(document)
     print(f"run folder: {document['run']}")
