@@ -203,7 +203,7 @@ def _segments(t, signals, where: str, breaks: Iterable[int] = ()):
             SysidWarning(f"{where}: {cuts.size} gap(s), the longest {longest:.4g} s, split the log into {cuts.size + breaks.size + 1} segments"), stacklevel=3
         )
     cuts = np.union1d(cuts, breaks).astype(int)
-    resampled, off = 0, 0.0
+    resampled, off, lost = 0, 0.0, 0.0
     bounds = [0, *cuts.tolist(), len(t)]
     for a, b in zip(bounds[:-1], bounds[1:]):
         part = {name: values[a:b] for name, values in signals.items()}
@@ -224,7 +224,9 @@ def _segments(t, signals, where: str, breaks: Iterable[int] = ()):
             clock, off = true.t, max(off, true.off)
         clock, part = _resampled(clock, part, own)
         if told:
-            left = true.at(clock, own)
+            rows = (left := true.at(clock, own)).inside
+            lost, left = max(lost, own * (len(clock) - rows.stop + rows.start)), left.of(rows)
+            clock, part = clock[rows], {name: values[rows] for name, values in part.items()}
         resampled += 1
         yield replace(segment(clock, own, part), clock=left)
     if resampled:
@@ -233,12 +235,9 @@ def _segments(t, signals, where: str, breaks: Iterable[int] = ()):
             stacklevel=3,
         )
     if off > 0.0:
-        warnings.warn(
-            SysidWarning(
-                f"{where}: the time stamps are off by {1e3 * off:.2g} ms (RMS), as the joints' angles show, and were corrected"
-            ),
-            stacklevel=3,
-        )
+        said = f"{where}: the time stamps are off by {1e3 * off:.2g} ms (RMS), as the joints' angles show, and were corrected"
+        ends = f"; of each end {0.5 * lost:.2g} s, where the angles do not show it, is left out" if lost > 0.0 else ""
+        warnings.warn(SysidWarning(said + ends), stacklevel=3)
 
 
 def segment(t, step, part) -> Segment:

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from sysid.clock import corrected
+from sysid.frequencies import low
 
 STEP = 0.01
 
@@ -114,9 +115,9 @@ def test_what_no_angle_told_of_the_clock_is_drawn_again():
         spectrum = lambda e: np.abs(np.fft.rfft((e - e.mean()) * np.hanning(len(e)))) ** 2  # noqa: E731
         left.append(spectrum(error)), drawn.append(spectrum(again))
     frequency = np.fft.rfftfreq(len(instants), STEP)
-    for low, high in ((0.5, 1.5), (1.5, 3.0)):
-        here = (frequency > low) & (frequency < high)
-        assert np.mean(np.array(drawn)[:, here]) == pytest.approx(np.mean(np.array(left)[:, here]), rel=0.5), (low, high)
+    for least, most in ((0.5, 1.5), (1.5, 3.0)):
+        here = (frequency > least) & (frequency < most)
+        assert np.mean(np.array(drawn)[:, here]) == pytest.approx(np.mean(np.array(left)[:, here]), rel=0.5), (least, most)
 
 
 def test_what_the_angles_told_badly_is_drawn_again_where_it_stands():
@@ -130,9 +131,24 @@ def test_what_the_angles_told_badly_is_drawn_again_where_it_stands():
         spectrum = lambda e: np.abs(np.fft.rfft((e - e.mean()) * np.hanning(len(e)))) ** 2  # noqa: E731
         left.append(spectrum(clock.t - t)), drawn.append(spectrum(again))
     frequency = np.fft.rfftfreq(len(instants), STEP)
-    for low, high in ((3.0, 5.0), (20.0, 30.0), (30.0, 48.0)):
-        here = (frequency > low) & (frequency < high)
-        assert 0.5 < np.mean(np.array(drawn)[:, here]) / np.mean(np.array(left)[:, here]) < 2.0, (low, high)
+    for least, most in ((3.0, 5.0), (20.0, 30.0), (30.0, 48.0)):
+        here = (frequency > least) & (frequency < most)
+        assert 0.5 < np.mean(np.array(drawn)[:, here]) / np.mean(np.array(left)[:, here]) < 2.0, (least, most)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_at_the_ends_of_a_log_its_clock_is_not_told(seed):
+    """What stays in the stamps there is fast, and makes several times the acceleration that it makes elsewhere: these rows are few."""
+    instants = taken(seed, 500)
+    t = instants - 1e-3 * np.random.default_rng(seed + 20).integers(0, 2, len(instants))
+    clock = corrected(instants, motion(t, seed))
+    left = clock.at(instants, STEP)
+    rows = left.inside
+    assert 5 <= rows.start <= 40 and 5 <= len(t) - rows.stop <= 40
+    bent = np.diff(low(clock.t - t, 15.0, STEP), 2)  # what a torque sees of it
+    assert rms(np.r_[bent[: rows.start], bent[rows.stop - 2 :]]) > 2.5 * rms(bent[rows.start : rows.stop - 2])
+    own = left.of(rows)
+    assert len(own.below) == own.doubt.shape[1] == rows.stop - rows.start and own.below[0] <= 2.0 * np.median(left.below)
 
 
 def stopping(t, seed):
@@ -153,8 +169,6 @@ def stopping(t, seed):
 def test_what_is_left_of_the_clock_is_foreseen_in_accelerations(moves):
     """Moves that the clock is not told from, and joints too slow to tell it, leave more of it: what is drawn again is about as large
     where it counts, below 15 Hz in accelerations."""
-    from sysid.frequencies import low
-
     left, drawn = [], []
     for seed in range(6):
         instants = taken(seed)
