@@ -20,7 +20,7 @@ from .multistart import Searched, finite
 from .prior_weight import PriorWeight, is_auto, with_weight
 from .specs import Experiment
 
-_PASSES, _NEAR = 3, 0.1  # refinements on all rows; of a standard deviation
+_PASSES, _NEAR = 3, 0.1  # refinements on all rows; of a standard deviation, or of a value's range
 _ROUNDS = 3  # of a prior's weight and the shape values under it
 
 
@@ -68,20 +68,27 @@ def refined(experiment: Experiment, structure: Model, motion: Motion, prior, nea
             structure, slopes = again.model, Linearised(again.model, again.x)
             data = compress(slopes, motion)
         fit = identify(weighed, structure, motion, data, prior, near=slopes.x)
-        # blows make valleys narrower than a step, and slopes say little at a corner: the last step is taken back
-        if best is not None and (structure.deflects or not structure.uses_load) and fit.objective > best[0]:
+        # blows make valleys narrower than a step, and slopes say little at a corner, or where others do nearly the same: the
+        # last step is taken back; not the load that was renewed with it, which may cost more than the one before
+        if best is not None and fit.objective > best[0]:
+            if structure.uses_load and not structure.deflects:
+                structure = structure.with_shapes(best[1].shapes)
+                return structure, Linearised(structure, best[2].x), searched, best[3]
             return best[1], best[2], searched, best[3]
         best = fit.objective, structure, slopes, strength
         change = shape.correction(fit, data)
         values = np.array(structure.shapes)
         low, high = (np.array([getattr(v, end) for v in structure.shape_values]) for end in ("low", "high"))
+        # of what slopes hardly tell no deviation is near: such a step is looked at as well
+        far = np.any(np.abs(change) > _NEAR * np.fmin(fit.shape_std, high - low)[slopes.free])
+        if far and number == _PASSES - 1:
+            break  # nobody would look where it leads
         values[slopes.free] += change
         structure = structure.with_shapes(np.clip(values, low, high))
         if structure.uses_load:
             structure = structure.with_reference(fit.pi)
         slopes = Linearised(structure, fit.x)
-        std = fit.shape_std[slopes.free]
-        if not np.any(np.abs(change) > _NEAR * np.where(np.isfinite(std), std, np.inf)):
+        if not far:
             break
     return structure, slopes, searched, strength
 

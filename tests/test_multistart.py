@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from sysid import config, multistart, pipeline, shape
+from sysid import config, multistart, pipeline, shape, shape_refinement
 from sysid.compress import compress
 from sysid.estimate import identify
 from sysid.landscape import Landscape, at_zero, landscape
@@ -198,6 +198,22 @@ def test_a_correction_on_all_rows_is_the_step_on_those_in_memory():
     fit = identify(experiment, model, motion, data, prior)
     assert fit.certificate.at_zero
     np.testing.assert_allclose(shape.correction(fit, data), right / system[0], rtol=1e-3)
+
+
+@pytest.mark.parametrize("effects", [[], [{"load_friction": {"joints": ["shoulder_pan_joint"]}}]])
+def test_a_correction_that_makes_it_worse_is_taken_back(effects, monkeypatch):
+    """Whether the model looks at the load or not: a step on all rows may be far too long."""
+    experiment, _, motion, prior = too_little_friction()
+    own = ["viscous", "coulomb", {"sublinear_viscous": {"joints": ["elbow_joint"]}}]
+    experiment = config.experiment({"robot": {"urdf": UR5}, "model": {"effects": [*own, *effects]}})
+    structure = pipeline.build(experiment)[1].measured_by(motion)
+    assert structure.uses_load == bool(effects)
+    monkeypatch.setattr(shape, "correction", lambda fit, data: np.array([0.4]))
+    model, slopes, _, _ = shape_refinement.refined(experiment, structure, motion, prior)
+    assert model.shapes[0] == pytest.approx(0.6, abs=0.15)
+    fit = identify(experiment, model, motion, compress(slopes, motion), prior, near=slopes.x)
+    worse = model.with_shapes([model.shapes[0] + 0.2])
+    assert fit.objective < identify(experiment, worse, motion, compress(Linearised(worse, fit.x), motion), prior).objective
 
 
 def test_damped_steps_stay_within_their_bounds():
