@@ -30,6 +30,8 @@ HIDDEN = (
     "directional_efficiency", "position_friction", "presliding", "encoder_offset", "warmup",
     "delay", "current_lag",
 )  # fmt: skip
+#: of an arm in one plane the offset of its first encoder is a tilt of its base: no motion tells them apart
+TWINS = {("planar", "encoder_offset:shoulder")}
 #: joints whose torque stands well above its noise in a poor log; of an arm's wrist none names anything
 LOADED = {robot: joints[:4] for robot, joints in JOINTS.items()}
 _SIZES = (1.0, 2.5)  # of the simulation's usual
@@ -65,6 +67,8 @@ def trial(case: dict, arms=ARMS) -> dict:
         for k in range(_TRIED):
             effect, joint = str(rng.choice(HIDDEN)), str(rng.choice(LOADED[case["robot"]]))
             own = f"{effect}:{joint}"
+            if (case["robot"], own) in TWINS:
+                continue
             asked = f"{own}:size={rng.choice(_SIZES):g}"
             first = FIRST[case["robot"]][int(rng.integers(len(FIRST[case["robot"]])))]
             told["tried"].append(asked)
@@ -121,7 +125,7 @@ def table(results: list[dict]) -> list[str]:
     """The share named alone, by arm and robot, and how the promise held."""
     from scipy.stats import binomtest
 
-    done = [r for r in results if r["tie"]]
+    done = [r for r in results if r["tie"] and (r["robot"], r.get("hidden")) not in TWINS]
     out = [f"{len(results)} robots, {len(done)} with a tie that holds what is hidden"]
     for arm in ARMS:
         own = [r for r in done if arm in r["arms"]]
