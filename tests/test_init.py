@@ -58,6 +58,24 @@ def begun(cli, folder, logs, *more, out="mine"):
     return json.loads(said.out), pipeline.load(out)
 
 
+@pytest.mark.parametrize("text", ["arm cold, first run", "day one, arm cold\nafter lunch, warm, and with the old gripper\n", ""])
+def test_notes_beside_the_logs_of_a_folder_are_passed_over(cli, tmp_path, arm_logs, text):
+    """And it is said; of a file that was named by itself what is wrong with it is said, as of one of a folder without a log."""
+    logs = tmp_path / "logs"
+    logs.mkdir()
+    (tmp_path / "robot.urdf").write_text(URDF)
+    (logs / "notes.txt").write_text(text)
+    said = cli("init", tmp_path / "robot.urdf", logs, out=tmp_path / "none")
+    assert said.status == 2 and "notes.txt" in said.err and "Traceback" not in said.err
+    for part, columns in zip(("train", "test"), arm_logs):
+        (logs / f"{part}.csv").write_text(csv(columns))
+    found, experiment = begun(cli, tmp_path, [logs])
+    assert len(experiment.data.train) + len(experiment.data.test) == 2
+    assert [note for note in found["look"] if "notes.txt" in note and "passed over" in note], found["look"]
+    said = cli("init", tmp_path / "robot.urdf", logs / "train.csv", logs / "notes.txt", out=tmp_path / "other")
+    assert said.status == 2 and "notes.txt" in said.err
+
+
 @pytest.fixture(scope="module")
 def from_csv():
     """The fit of the CSV logs, made once."""

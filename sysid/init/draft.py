@@ -14,7 +14,7 @@ from ..notices import noticed
 from ..robot_spec import RobotSpec
 from . import joints, physics, robots, units
 from .guess import Draft, Guess
-from .logged import Logged, Signals, opened, read, signals
+from .logged import Logged, Signals, logs_among, opened, read, signals
 from .split import split
 
 _COMMAND, _NONE = "command", "none"  # the signal; the column of a joint without one
@@ -51,13 +51,14 @@ def draft(reference: str, names: list[str], folder: Path, wishes: Wishes) -> Dra
         robot = machines.load(RobotSpec(urdf=urdf), folder)
     arm, hands = joints.arm_and_hands(robot, wishes.joints)
     with noticed() as mended:
-        tables = opened(names, wishes.topic)
+        tables, broken = opened(names, wishes.topic)
+        tables, passed = logs_among(tables, names, [*arm, *hands])
         found = signals(tables, [*arm, *hands], len(arm))
         data = read(tables, found)
     angles = _angles(data, found, robot)
     used, chosen = joints.chosen(robot, found, data, arm, angles.value)
     clock = units.clock(data, found, wishes.rate)
-    notes = (*machine.notes, *mended, *_wraps(data, used, robot, angles.value))
+    notes = (*machine.notes, *broken, *passed, *mended, *_wraps(data, used, robot, angles.value))
     out = Draft(urdf, {}, notes, found.rest)
     out = out.having(*machine.guesses, *chosen, *_parts(data, clock, folder, wishes))
     out = out.having(*clock, *_columns(found, used), angles, *_drive(found, used))
