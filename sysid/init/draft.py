@@ -13,8 +13,9 @@ from .. import robot as machines
 from ..notices import noticed
 from ..robot_spec import RobotSpec
 from . import joints, physics, robots, units
+from .files import logs_among, opened
 from .guess import Draft, Guess
-from .logged import Logged, Signals, logs_among, opened, read, signals
+from .logged import Logged, Signals, read, signals
 from .split import split
 
 _COMMAND, _NONE = "command", "none"  # the signal; the column of a joint without one
