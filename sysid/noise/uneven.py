@@ -25,5 +25,5 @@ def with_uneven(found: Weighed, drawn, counts, times: float, seen: float) -> Wei
         return found
     rms, std = math.sqrt(found.rms**2 + missed), 2.0 * found.rms * found.std
     most = std < (own := _HALF * missed)
-    doubt = "errors of the stamps make much of the noise in a few places" if most else found.doubt
+    doubt = "errors of stamps or angles are large in a few places" if most else found.doubt
     return replace(found, rms=rms, std=math.hypot(std, own) / (2.0 * rms), doubt=doubt)
