@@ -85,9 +85,12 @@ class Left:
     @property
     def inside(self) -> slice:
         """The rows between a log's ends, at which its motion is not told from its clock: the errors
-        that are left there are faster, and of torque there is by the fifth power of that more."""
-        known = np.flatnonzero(self.below <= _ENDS * np.median(self.below))
-        return slice(int(known[0]), int(known[-1]) + 1)
+        that are left there are faster, and of torque there is by the fifth power of that more. An
+        end is no longer than a period of the usual frequency: beyond that it is the motion that is
+        fast."""
+        usual, rows = float(np.median(self.below)), len(self.below)
+        known, most = np.flatnonzero(self.below <= _ENDS * usual), round(1.0 / (usual * self.step))
+        return slice(min(int(known[0]), most), max(int(known[-1]) + 1, rows - most))
 
     def of(self, rows: slice) -> Left:
         """Of some of the rows."""

@@ -225,7 +225,7 @@ def _segments(t, signals, where: str, breaks: Iterable[int] = ()):
         clock, part = _resampled(clock, part, own)
         if told:
             rows = (left := true.at(clock, own)).inside
-            lost, left = max(lost, own * (len(clock) - rows.stop + rows.start)), left.of(rows)
+            lost, left = max(lost, own * rows.start, own * (len(clock) - rows.stop)), left.of(rows)
             clock, part = clock[rows], {name: values[rows] for name, values in part.items()}
         resampled += 1
         yield replace(segment(clock, own, part), clock=left)
@@ -236,7 +236,7 @@ def _segments(t, signals, where: str, breaks: Iterable[int] = ()):
         )
     if off > 0.0:
         said = f"{where}: the time stamps are off by {1e3 * off:.2g} ms (RMS), as the joints' angles show, and were corrected"
-        ends = f"; of each end {0.5 * lost:.2g} s, where the angles do not show it, is left out" if lost > 0.0 else ""
+        ends = f"; at the ends, where these do not show it, up to {lost:.2g} s is left out" if lost > 0.0 else ""
         warnings.warn(SysidWarning(said + ends), stacklevel=3)
 
 

@@ -79,12 +79,14 @@ def refined(experiment: Experiment, structure: Model, motion: Motion, prior, nea
         change = shape.correction(fit, data)
         values = np.array(structure.shapes)
         low, high = (np.array([getattr(v, end) for v in structure.shape_values]) for end in ("low", "high"))
+        values[slopes.free] += change
+        values = np.clip(values, low, high)
         # of what slopes hardly tell no deviation is near: such a step is looked at as well
-        far = np.any(np.abs(change) > _NEAR * np.fmin(fit.shape_std, high - low)[slopes.free])
+        moved = np.abs(values - structure.shapes)[slopes.free]
+        far = np.any(moved > _NEAR * np.fmin(fit.shape_std, high - low)[slopes.free])
         if far and number == _PASSES - 1:
             break  # nobody would look where it leads
-        values[slopes.free] += change
-        structure = structure.with_shapes(np.clip(values, low, high))
+        structure = structure.with_shapes(values)
         if structure.uses_load:
             structure = structure.with_reference(fit.pi)
         slopes = Linearised(structure, fit.x)

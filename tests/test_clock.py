@@ -148,7 +148,18 @@ def test_at_the_ends_of_a_log_its_clock_is_not_told(seed):
     bent = np.diff(low(clock.t - t, 15.0, STEP), 2)  # what a torque sees of it
     assert rms(np.r_[bent[: rows.start], bent[rows.stop - 2 :]]) > 2.5 * rms(bent[rows.start : rows.stop - 2])
     own = left.of(rows)
-    assert len(own.below) == own.doubt.shape[1] == rows.stop - rows.start and own.below[0] <= 2.0 * np.median(left.below)
+    assert len(own.below) == own.doubt.shape[1] == rows.stop - rows.start
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_no_more_than_a_period_is_cut_off_where_a_log_begins_quickly(seed):
+    """Three seconds of 8 Hz at the start are motion, though its clock is read off what is faster there."""
+    instants = taken(seed)
+    t = instants - 1e-3 * np.random.default_rng(seed + 20).integers(0, 2, len(instants))
+    quick = 0.02 * np.sin(2.0 * np.pi * 8.0 * t) * np.clip((3.0 - t) / 0.3, 0.0, 1.0)
+    left = corrected(instants, motion(t, seed) + quick[:, None]).at(instants, STEP)
+    assert np.all(left.below[:200] > 2.0 * np.median(left.below))
+    assert left.inside.start * STEP <= 0.6 and (len(t) - left.inside.stop) * STEP <= 0.6
 
 
 def stopping(t, seed):

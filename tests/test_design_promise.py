@@ -45,8 +45,8 @@ def test_the_spectrum_of_noise_is_found_in_what_a_fit_leaves(true):
     for _ in range(25):
         noise = coloured(rng, n, step, true)
         change = noise @ hat
-        (own,) = noise_left([part], noise[:, None], change, np.zeros((n, 1)), takes)
-        (other,) = noise_left([part], noise[:, None], change, np.zeros((n, 1)), lambda part, seen: 0.0 * seen[0].real)
+        (own,) = noise_left([part], noise[:, None], change, np.zeros((n, 1, 1)), takes)
+        (other,) = noise_left([part], noise[:, None], change, np.zeros((n, 1, 1)), lambda part, seen: 0.0 * seen[0].real)
         found.append(np.log(own.density(ask)))
         naive.append(np.log(other.density(ask)))
     off = np.mean(found, axis=0) - np.log(true.density(ask))
@@ -76,7 +76,7 @@ def test_what_angles_make_is_told_from_torque_s_own_noise():
     hump = Noise(np.array([2.0, 8.0, 15.0, 30.0, 60.0]), np.log(np.array([1e-3, 1.0, 4.0, 1.0, 1e-3])))
     left = rng.standard_normal(n) + coloured(rng, n, step, hump)
     made = coloured(rng, n, step, hump)
-    (found,) = noise_left([part_of(np.zeros((1, n)))], left[:, None], np.zeros(1), made[:, None], lambda part, seen: 0.0 * seen[0].real)
+    (found,) = noise_left([part_of(np.zeros((1, n)))], left[:, None], np.zeros(1), made[:, None, None], lambda part, seen: 0.0 * seen[0].real)
     np.testing.assert_allclose(found.density(np.array([0.1, 1.0, 100.0])), 1.0, rtol=0.15)
     assert found.density(np.array([15.0]))[0] == pytest.approx(5.0, rel=0.3)
 
@@ -136,7 +136,7 @@ def test_a_small_delay_and_a_small_lag_are_told_apart_by_what_is_beyond_their_sl
 
 def test_nothing_left_is_no_noise():
     n = 500
-    (found,) = noise_left([part_of(np.ones((1, n)))], np.zeros((n, 1)), np.zeros(1), np.zeros((n, 1)), lambda part, seen: 0.0 * seen[0].real)
+    (found,) = noise_left([part_of(np.ones((1, n)))], np.zeros((n, 1)), np.zeros(1), np.zeros((n, 1, 1)), lambda part, seen: 0.0 * seen[0].real)
     assert found.density(np.array([1.0]))[0] < 1e-200
 
 

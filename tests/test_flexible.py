@@ -107,6 +107,11 @@ def test_an_answer_is_that_of_the_same_residual_in_other_units():
     noise = np.std(found.residual) * rng.normal(size=N)
     assert found.of(found.residual + 0.1 * noise) is not None
     assert found.of(found.residual + 0.2 * noise) is None and found.of(found.residual[1:]) is None
+    # an effect that takes a part of what was predicted is no other unit
+    small = asked(LAWS["an angle"][0], noise=4.0, seed=7)
+    law = LAWS["an angle"][0](KNOWN) / np.std(LAWS["an angle"][0](KNOWN))
+    assert 0.02 < small.predicted < 0.12
+    assert small.of(small.residual - 0.6 * law) is None and small.of(small.residual + 0.6 * law) is None
 
 
 def test_nothing_is_predicted_of_noise():

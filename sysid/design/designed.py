@@ -190,7 +190,7 @@ def _heard(base: Basis) -> promise.Heard:
             motions.append(prepare(base.test, spec, fit.joints))
         logs.append(base.test)
     known = [predict(*of, motion) for motion in motions]
-    made = of_angles(logs, motions, known, spec, of).torque
+    made = [np.moveaxis(own, 0, -1) for own in of_angles(logs, motions, known, spec, of).torque]
     pieces = [piece for motion in motions for piece in motion.pieces]
     left = np.concatenate([one.residual for one in known])
     return promise.Heard(replace(base.motion, pieces=pieces), left, np.concatenate(made))

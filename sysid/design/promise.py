@@ -105,8 +105,8 @@ def _named(left: float, asked: int) -> float:
 @dataclass(frozen=True)
 class Heard:
     """Where noise is heard: the motion of all logs, also of those that a fit does not use; what the fit
-    leaves of them, left (n, dof) [N m or N], zero where a row does not count; made (n, dof): what the
-    angles' noise, drawn once more, adds to their torque."""
+    leaves of them, left (n, dof) [N m or N], zero where a row does not count; made (n, dof,
+    draws): what the angles' noise, drawn again, adds to their torque."""
 
     motion: Motion
     left: np.ndarray

@@ -172,7 +172,7 @@ def noise_left(parts: Iterable[Stretch], residual, change, made, takes: Callable
 
     Args:
         residual (n, dof) [N m or N]: what is left of the rows, zero where one does not count, before
-            the parameters change by `change`; made (n, dof): what the noise of the angles makes, drawn once more.
+            the parameters change by `change`; made (n, dof, draws): what the noise of the angles makes, drawn again.
         takes: (stretch, its spectrum) -> h (m,) times the rows that count.
     """
     heaps: list[list] = [[] for _ in range(residual.shape[1])]
@@ -182,7 +182,8 @@ def noise_left(parts: Iterable[Stretch], residual, change, made, takes: Callable
         rest = residual[part.rows, part.joint] - change[part.support] @ part.columns
         left = np.abs(part.spectrum(rest)[at]) ** 2 / part.count
         kept = 1.0 - takes(part, part.spectrum(part.columns)[:, at]) / part.count
-        angles = np.abs(part.spectrum(made[part.rows, part.joint])[at]) ** 2 / len(rest)
+        drawn = np.abs(part.spectrum(made[part.rows, part.joint].T)[:, at]) ** 2
+        angles = drawn.mean(axis=0) / len(rest)
         heaps[part.joint].append((part.frequency[at], left, np.clip(kept, 0.0, 1.0), angles))
     none = white(0.0)
     return [noise_of_periodograms(*map(np.concatenate, zip(*h))) if h else none for h in heaps]

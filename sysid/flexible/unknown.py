@@ -12,7 +12,9 @@ from .functions import groups
 from .ridge import predicted, stretches
 
 TONE = 1e-4  # probability of a line that strong by chance
-_SAME = 0.02  # of a squared residual: two that differ by less correlate by 0.99
+# Of a squared residual: two that differ by less correlate by 0.99; and by how much their difference
+# may follow what was predicted, so that its share changes by a hundredth
+_SAME, _FOLLOWS = 0.02, 0.005
 LEVEL = 0.05  # family-wise and nominal: how often a law is said to be missing where none is
 
 
@@ -59,8 +61,9 @@ class Unknown:
         if len(residual) != len(self.residual):
             return None
         unit = float(residual @ self.residual) / self.total
-        own = unit * self.residual
-        if np.sum((residual - own) ** 2) > _SAME * np.sum(residual**2):
+        own, whole = unit * self.residual, float(np.sum(residual**2))
+        change = residual - own
+        if change @ change > _SAME * whole or abs(change @ self.told * unit) > _FOLLOWS * whole:
             return None
         return replace(self, gain=self.gain * unit**2, told=unit * self.told, residual=own)
 

@@ -33,7 +33,7 @@ def opened(names: list[str], topic: str | None) -> tuple[dict[str, Table], list[
                 if ending(Path(path)) != ".txt" or every == [path]:
                     raise
                 wrong = error
-                passed.append(f"{path}: no table; it was passed over")
+                passed.append(f"{error}; it was passed over")
     if wrong and not out:
         raise wrong
     return out, passed
@@ -48,7 +48,7 @@ def logs_among(
     Args:
         stated: names as given; a file that was named by itself is a log whatever it holds.
     """
-    alone = {str(Path(name).absolute()) for name in stated}
+    alone = {*stated, *(str(Path(name).absolute()) for name in stated)}
     logs = {
         name: table
         for name, table in tables.items()

@@ -8,7 +8,7 @@ without a perfect model.
     repeats.py           noise as the scatter between repeats of the motion
     spectrum.py          noise from the spectrum of the rest, weighed over models of its colour
     floor.py             all of it, and whether the answer is sure enough to be given
-    of_angles.py         what the noise of the angles makes of the torque, drawn once more
+    of_angles.py         what the noise of the angles makes of the torque, drawn again
     of_fit.py            the floors of a fit's joints
     of_pieces.py         the floors of a motion's pieces, and behind a fit's filter
 """

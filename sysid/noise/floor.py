@@ -85,7 +85,7 @@ def floor(
         joint: which column.
         use: (n,) or (n, dof) bool, rows that count; what stands in others is not looked at. None:
             all.
-        angles: what the noise of the angles, drawn once more, adds. None: nothing.
+        angles: what the noise of the angles, drawn again, adds. None: nothing.
     """
     return judged(estimate(residual, measured, q, step, joint, use=use, angles=angles))
 

@@ -13,6 +13,7 @@ from ..prediction import Prediction, predict
 from ..preprocess import prepare
 
 _DRAWS = 8  # where stamps jitter: how large their errors are differs from row to row
+_MOST = 1_000_000  # draws times rows, for memory
 
 
 @dataclass(frozen=True)
@@ -28,7 +29,7 @@ class OfAngles:
 def of_angles(
     logs: Sequence[Sequence[Log]], motions: Sequence[Motion], told: Sequence[Prediction], spec, of
 ) -> OfAngles:
-    """What the angles' noise, drawn once more, adds to each piece of the prepared logs.
+    """What the angles' noise, drawn again, adds to each piece of the prepared logs.
 
     Derivatives make what is white on an angle anything but white in the torque, stamps that jitter
     make it follow the speed, and a filter cuts it off: all of it is carried through as the log is.
@@ -40,20 +41,30 @@ def of_angles(
 
     Source: Cook & Stefanski 1994 (simulation extrapolation).
     """
-    rng, out, bands = np.random.default_rng(0), [], []
-    clocks = [s.clock for part in logs for log in part for s in log.segments]
-    draws = _DRAWS if any(clock is not None for clock in clocks) else 1
-    for part, plain, known in zip(logs, motions, told):
-        cutoff = widest(part, known=(own_band := band(part)))
-        drawn = lambda s: again(s, angle_noise(s, cutoff), cutoff, rng)  # noqa: E731, B023
-        made = []
-        for _ in range(draws):
-            noisy = [replace(log, segments=tuple(map(drawn, log.segments))) for log in part]
-            found = predict(*of, prepare(noisy, spec, plain.joints))
-            # a clock that is late shifts the measured torque as well
-            error = [one.predicted - one.measured for one in (known, found)]
-            made.append(error[1] - error[0])
+    rng, bands = np.random.default_rng(0), [band(part) for part in logs]
+    cutoffs = [widest(part, known=own) for part, own in zip(logs, bands)]
+    jitter = False
+
+    def made(number: int) -> np.ndarray:
+        nonlocal jitter
+        part, plain, cutoff = logs[number], motions[number], cutoffs[number]
+        noisy = []
+        for log in part:
+            segments = tuple(again(s, angle_noise(s, cutoff), cutoff, rng) for s in log.segments)
+            jitter |= any(s.clock is not None for s in segments)
+            noisy.append(replace(log, segments=segments))
+        found = predict(*of, prepare(noisy, spec, plain.joints))
+        # a clock that is late shifts the measured torque as well
+        before, after = (one.predicted - one.measured for one in (told[number], found))
+        return after - before
+
+    draws = [[made(number)] for number in range(len(logs))]
+    rows = sum(len(first) for (first,) in draws)
+    for _ in range(min(_DRAWS, _MOST // max(rows, 1)) - 1 if jitter else 0):
+        for number, own in enumerate(draws):
+            own.append(made(number))
+    out = []
+    for own, plain in zip(draws, motions):
         ends = np.cumsum([piece.samples for piece in plain.pieces])[:-1]
-        out += np.split(np.stack(made), ends, axis=1)
-        bands.append(own_band)
+        out += np.split(np.stack(own), ends, axis=1)
     return OfAngles(out, max(bands))
