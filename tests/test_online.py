@@ -125,6 +125,7 @@ def test_a_payload_is_told_at_once_and_sized(fitted, planar):
     value, std, unit = online.change.parameters["payload.*.m"]
     assert unit == "kg" and abs(value - 0.8) < 3.0 * std + 0.005 and std < 0.1
     assert "payload" in repr(online)
+    assert np.isinf(online.change.parameters["payload.*.hy"][1])  # across the plane no torque tells it
     # the rows of the alarm may have spoken for something else: all since it began say what changed
     online._watch.alarm = replace(alarm, effect="viscous", joint="elbow")
     assert online.change.effect == "payload" and online.change.parameters["payload.*.m"][:2] == (value, std)

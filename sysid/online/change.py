@@ -9,6 +9,7 @@ import numpy as np
 from .. import units
 from ..changes.fitted import possible
 from ..inertia import PARAMETERS, UNITS
+from ..projection import DATA
 from ..robot import Robot
 from ..vocabulary import find
 from .monitor import PAYLOAD, PER_JOINT, Ticks
@@ -16,8 +17,8 @@ from .monitor import PAYLOAD, PER_JOINT, Ticks
 
 @dataclass(frozen=True)
 class Change:
-    """What changed: effect and joint, and its parameters {name: (value, std, unit)}; seconds that
-    they rest on."""
+    """What changed: effect and joint, and its parameters {name: (value, std, unit)}, std
+    infinite of what the data do not tell; seconds that they rest on."""
 
     effect: str
     joint: str
@@ -46,7 +47,9 @@ def settled(effect: str, joint: str, robot: Robot, since: Ticks, wide: float) ->
     c, around = possible(products, list(range(10)), slice(0, 10))
     inverse, model = np.linalg.pinv(g + around, hermitian=True), since.body_a.sum(axis=0)
     covariance = inverse @ (g + model @ model.T) @ inverse
-    stds = wide * np.sqrt(np.maximum(np.diagonal(covariance), 0.0))
+    # what the prior tells rather than the data has no deviation that they know
+    known = np.diagonal(inverse @ g @ inverse) >= DATA * np.diagonal(inverse)
+    stds = np.where(known, wide * np.sqrt(np.maximum(np.diagonal(covariance), 0.0)), np.inf)
     own = {
         f"payload.*.{word}": (float(v), float(s), unit)
         for word, v, s, unit in zip(PARAMETERS, c, stds, UNITS)
