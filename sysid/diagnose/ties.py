@@ -103,7 +103,7 @@ def chosen(view: View, groups: list[Group], rng: np.random.Generator) -> Choice 
         members[head],
         tuple((members[k], float(chance[k])) for k in order),
         base.sum(1) - table[:, head],
-        tuple(m for k, m in enumerate(members) if k not in order),
+        tuple(replace(m, view=replace(m.view)) for k, m in enumerate(members) if k not in order),
         taken(view, base, members[head].losses),
     )
 

@@ -38,9 +38,9 @@ class View:
     """A model settled on the training motion.
 
     motion: training logs under one low-pass; rough: the same with the angles' noise once more.
-    weights: (dof,) inverse RMS by which joints count. prior: (bodies, 10). grown: the view whose
-    model this one grew from; both lose in the same blocks. like: a view of the same motion whose
-    noise is this one's.
+    weights: (dof,) inverse RMS by which joints count. prior: (bodies, 10). inherited: (n,) blocks
+    of the model that this one grew from, so that both lose in the same blocks; asked: what was
+    `unknown` of it. like: a view of the same motion whose noise is this one's.
     """
 
     experiment: Experiment
@@ -50,7 +50,8 @@ class View:
     stride: int
     weights: np.ndarray
     settled: Settled
-    grown: View | None = None
+    inherited: np.ndarray | None = None
+    asked: tuple[flexible.Unknown, ...] = ()
     like: View | None = None
 
     @property
@@ -102,27 +103,24 @@ class View:
         residual = instrumented(self.design, rows.use, rows.piece, self.motion.band, self.step)
         stretch = blocks.numbered(rows.t, rows.piece, shortest=np.inf, fewest=3 * _FOLDS)
         fold, names = stretch % _FOLDS, self.model.robot.joints
-        before = self._asked_before()
-        same = [before and before[j].of(residual[:, j]) for j in range(len(names))]
+        same = [one.of(residual[:, j]) for j, one in enumerate(self.asked)] or [None] * len(names)
         rest = fold, rows.piece, self.step
         take = lambda j, name: flexible.unknown(  # noqa: E731
             self.variables, name, residual[:, j], rows.use[:, j], *rest, np.random.default_rng(j)
         )
         return tuple(same[j] or take(j, name) for j, name in enumerate(names))
 
-    def _asked_before(self) -> tuple[flexible.Unknown, ...] | None:
-        """The last that was asked of a view that this one grew from."""
-        one = self.grown
-        while one is not None and "unknown" not in vars(one):
-            one = one.grown
-        return one and one.unknown
+    @property
+    def answers(self) -> tuple[flexible.Unknown, ...]:
+        """What is `unknown`, or was of the model that this one grew from, as far as it was asked."""
+        return vars(self).get("unknown", self.asked)
 
     @cached_property
     def blocks(self) -> np.ndarray:
         """(n,) the block of each row, long against the memory of what no function of the motion
         predicts."""
-        if self.grown is not None:
-            return self.grown.blocks
+        if self.inherited is not None:
+            return self.inherited
         return blocks.numbered(self.rows.t, self.rows.piece, memory=self._left[1])
 
     @cached_property
@@ -193,8 +191,9 @@ def looked_at(
     def view(weights, model: Model, grid: bool) -> View:
         options = {"weights": weights, "stride": stride, "grid": grid, "tolerance": tolerance}
         found = settle(experiment, model, motion, prior, **options)
-        own = stride, np.asarray(weights), found, grown, like
-        return View(experiment, motion, rough, prior, *own)
+        own = stride, np.asarray(weights), found
+        before = (grown.blocks, grown.answers) if grown else (None, ())
+        return View(experiment, motion, rough, prior, *own, *before, like)
 
     model = model if model.scales else model.scaled_by(motion)
     if weights is not None:
