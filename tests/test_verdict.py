@@ -86,6 +86,15 @@ def test_what_is_nothing_in_size_and_error_is_not_claimed(monkeypatch, fall, tol
     assert (claims._nothing(fitted(1.0, train=1.0), after, shown, member) is None) is stands
 
 
+@pytest.mark.parametrize(("under", "told", "stands"), [(0.2, -0.6, True), (-0.6, 0.2, True), (0.2, 0.1, False), (-0.6, -0.6, True)])
+def test_an_effect_of_the_whole_robot_stands_under_either_prior(monkeypatch, under, told, stands):
+    """A prior that held the bodies against what was missing may hold them against the effect: then what `sysid add` gives counts."""
+    before, after, shown = fitted(1.0, train=1.0), fitted(1.0, train=0.9), fitted(1.0, train=0.9)
+    monkeypatch.setattr(claims.comparison, "together", lambda _, one, **__: Difference("", "", "*", told if one is shown else under, 0.01))
+    member = SimpleNamespace(candidate=SimpleNamespace(joint=-1, key=("gravity_tilt", -1), touches=lambda dof: list(range(dof))))
+    assert (claims._nothing(before, after, shown, member) is None) is stands
+
+
 @pytest.mark.parametrize(("touches", "all_", "stands"), [([0, 1], -0.03, True), ([0, 1], -0.008, False), ([0, 1], 0.0, False), ([1], -0.03, False)])
 def test_what_moves_a_joint_may_show_in_the_torque_of_another(monkeypatch, touches, all_, stands):
     """The error of its own joint hardly falls, that of all together by three standard errors, or less than one."""

@@ -81,8 +81,7 @@ def ask(view: View, extra=(), tell=lambda share: None, *, before=None, anew=()) 
         tell((number + 1) / len(new))
     belief = null.believed([group for own in made.values() for group in own])
     for joint, own in ((joint, made[joint]) for joint in new):
-        gains = np.array([group.taken for group in own])
         # draws of one residual, the joint's own
         maxima = null.maxima(own, np.random.default_rng(joint + 1), belief)
-        out[joint] = own, null.statistics(own, belief), gains, maxima
+        out[joint] = own, null.statistics(own, belief), np.array([g.taken for g in own]), maxima
     return Asked(out, belief)

@@ -71,8 +71,7 @@ def claimed(
             refused.append(Refused(step.candidate.name, where(head[0], fit), why, *told))
             continue
         near = [(m, chance) for m, chance in tied[: _FITTED - 1] if chance >= _LIKELY]
-        rivals = ((*one, with_(pipeline.fit_grown, last, one[0])) for one in near)
-        found = [(*head, after), *rivals]
+        found = [(*head, after), *((*m, with_(pipeline.fit_grown, last, m[0])) for m in near)]
         findings = [finding(last, then, m, chance, step, len(claims)) for m, chance, then in found]
         named = [(m.candidate.name, where(m, fit), chance) for m, chance in step.choice.members]
         claims.append(Claim(step, tuple(findings), last, after, tuple(named)))
@@ -84,6 +83,8 @@ def _nothing(before: Fit, after: Fit, told: Fit, member: Member) -> str | None:
     """Why an effect that the search found is not claimed, None where it is. Both are fits with it:
     after under the prior of the one before, told as `sysid add` gives it."""
     own = judged_by(member, before)
+    if where(member, before) == "*":  # what held bodies against its lack may hold them against it
+        after = min((after, told), key=lambda one: comparison.together(before, one).delta_rms)
     if not any(after.rms("train")[joint] < before.rms("train")[joint] for joint in own):
         return "the fit's own error does not fall with it"
     if where(member, before) == "*":
@@ -112,5 +113,5 @@ def undecided(choice: Choice, fit: Fit) -> Refused:
     """What is there and cannot be told from effects on other joints."""
     likely = [(m, chance) for m, chance in choice.members if chance >= 0.05]
     names = [f"{m.candidate.name} on {where(m, fit)} ({100 * c:.0f} %)" for m, c in likely]
-    why = f"something is there, and these logs cannot tell which: {', '.join(names)}"
+    why = "something is there, and these logs cannot tell which: " + ", ".join(names)
     return Refused(choice.head.candidate.name, where(choice.head, fit), why)
