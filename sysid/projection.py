@@ -130,6 +130,14 @@ def told(data: np.ndarray, system: np.ndarray) -> np.ndarray:
     return free @ vectors[:, share > _TOLD]
 
 
+def of_data(share: np.ndarray, spread: np.ndarray, slopes: np.ndarray) -> np.ndarray:
+    """Which quantities of slopes (m, size) in parameters are told by the data rather than by what
+    is beside them, (m,) bool, by the `share` (size, size) of the parameters' `spread` (size, size)
+    that is of the data."""
+    told, whole = (np.einsum("mk,kl,ml->m", slopes, one, slopes) for one in (share, spread))
+    return told >= DATA * whole
+
+
 def root(products: np.ndarray) -> np.ndarray:
     """R (k, k) with R R' = a positive semidefinite matrix, whatever the units of its rows."""
     scale, values, vectors = spectrum(products)

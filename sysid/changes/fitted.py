@@ -12,7 +12,7 @@ from ..inertia import DIVERGENCES, PARAMETERIZATIONS, pseudo
 from ..model import Model
 from ..model_parameters import ROBOT
 from ..objective import Objective
-from ..projection import DATA, inverted, root
+from ..projection import inverted, of_data, root
 from ..solve import Coordinates, solve
 from ..vocabulary import find
 from .halves import Key, Question, least_squares
@@ -45,7 +45,7 @@ def together(model: Model, asked: Question, chosen) -> tuple[tuple[Change, ...],
     c, around = possible(whole, places, body)
     data = whole[np.ix_(places, places)]
     pull, spread = whole[places, -1] - data @ c, inverted(data + around)
-    of_data = spread @ data @ spread, spread
+    spreads = spread @ data @ spread, spread
     without = np.array([_nearby(whole - b, places, c, around, pull) for b in asked.by_block])
     with_all, out = asked.across(chosen), []
     for key, own in spans.items():
@@ -53,15 +53,9 @@ def together(model: Model, asked: Question, chosen) -> tuple[tuple[Change, ...],
         share, z = asked.taken(key, rest, with_all)
         error = share / z if z else np.nan
         joint = "*" if key[1] == ROBOT else model.robot.joints[key[1]]
-        out.append(
-            Change(
-                key[0],
-                joint,
-                share,
-                error,
-                _parameters(model, key, c[own], without[:, own], *(v[own, own] for v in of_data)),
-            )
-        )
+        by_data = [one[own, own] for one in spreads]
+        parameters = _parameters(model, key, c[own], without[:, own], *by_data)
+        out.append(Change(key[0], joint, share, error, parameters))
     left = asked.squares(places, c).sum(axis=0)
     return tuple(sorted(out, key=lambda change: -change.removed)), left
 
@@ -96,13 +90,13 @@ def _nearby(products, places, c, around, pull) -> np.ndarray:
     return c + inverted(here + around) @ (products[places, -1] - here @ c - pull)
 
 
-def _parameters(model: Model, key: Key, c, without, of_data, spread):
+def _parameters(model: Model, key: Key, c, without, told_by_data, spread):
     """{name: (value, std, unit)}: std is NaN where what is beside the data tells more of it than
     they do.
 
     Args:
-        c: (k,) coefficients. without: (blocks, k) with each block left out. of_data: (k, k) the
-            part of their `spread` (k, k) that is of the data.
+        c: (k,) coefficients. without: (blocks, k) with each block left out. told_by_data: (k, k)
+            the part of their `spread` (k, k) that is of the data.
     """
     name, joint = key
     grown = model.with_effect(find(name).bound(model.robot, joint), (joint,))
@@ -110,7 +104,7 @@ def _parameters(model: Model, key: Key, c, without, of_data, spread):
     listed = [*own, *grown.shape_values[grown.last_shapes]]
 
     def told(value: float, each, slope, unit: str) -> tuple[float, float, str]:
-        known = slope @ of_data @ slope >= DATA * (slope @ spread @ slope)
+        (known,) = of_data(told_by_data, spread, slope[None])
         return float(value), float(jackknife(each)) if known else np.nan, unit
 
     slopes = np.eye(len(c))

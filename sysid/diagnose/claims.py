@@ -113,5 +113,5 @@ def undecided(choice: Choice, fit: Fit) -> Refused:
     """What is there and cannot be told from effects on other joints."""
     likely = [(m, chance) for m, chance in choice.members if chance >= 0.05]
     names = [f"{m.candidate.name} on {where(m, fit)} ({100 * c:.0f} %)" for m, c in likely]
-    why = "something is there, and these logs cannot tell which: " + ", ".join(names)
+    why = f"something is there, and these logs cannot tell which: {', '.join(names)}"
     return Refused(choice.head.candidate.name, where(choice.head, fit), why)

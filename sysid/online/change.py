@@ -9,7 +9,7 @@ import numpy as np
 from .. import units
 from ..changes.fitted import possible
 from ..inertia import PARAMETERS, UNITS
-from ..projection import DATA
+from ..projection import of_data
 from ..robot import Robot
 from ..vocabulary import find
 from .monitor import PAYLOAD, PER_JOINT, Ticks
@@ -48,7 +48,7 @@ def settled(effect: str, joint: str, robot: Robot, since: Ticks, wide: float) ->
     inverse, model = np.linalg.pinv(g + around, hermitian=True), since.body_a.sum(axis=0)
     covariance = inverse @ (g + model @ model.T) @ inverse
     # what the prior tells rather than the data has no deviation that they know
-    known = np.diagonal(inverse @ g @ inverse) >= DATA * np.diagonal(inverse)
+    known = of_data(inverse @ g @ inverse, inverse, np.eye(10))
     stds = np.where(known, wide * np.sqrt(np.maximum(np.diagonal(covariance), 0.0)), np.inf)
     own = {
         f"payload.*.{word}": (float(v), float(s), unit)
