@@ -427,6 +427,15 @@ def test_blows_told_evenly_keep_the_level():
     assert all(chance(struck(seed, 0.3)) < 0.01 for seed in range(10))
 
 
+def test_noise_is_foreseen_without_what_a_blow_takes():
+    """A column in one block that makes nearly all of the residual raises the spectrum of the residual, not of the noise: what is
+    foreseen of the noise is what it would be without the column's effect."""
+    alone, beside = struck(3, 0.0).tested, struck(3, 0.7).tested
+    assert np.trace(beside.foreseen) > 10.0 * np.trace(alone.foreseen)
+    assert beside.spreads[1] == pytest.approx(alone.spreads[1], rel=0.5)
+    assert chance(struck(3, 0.7)) < 0.01
+
+
 def test_the_directions_that_data_tell_hold_all_that_a_fit_takes():
     """Columns of rank four in nine parameters of units far apart, beside a prior: what a fit takes of any torque stands in four directions."""
     rng = np.random.default_rng(3)

@@ -36,7 +36,7 @@ class Group:
     before the model's fit; `back` (k0, k) turns coefficients of these into the
     candidate's own; `sizes` (k0,) the weighted norm of what the model leaves of each own column;
     `foreseen` (k, k) the scores' covariance, were the noise always the same; `loss` the squared
-    residual of its joints."""
+    residual of its joints; `whole` the group that this one is a part of, None where it is all."""
 
     candidate: Candidate
     shapes: dict[str, float]
@@ -48,6 +48,7 @@ class Group:
     sizes: np.ndarray
     foreseen: np.ndarray
     loss: float
+    whole: Group | None = None
 
     @cached_property
     def c(self) -> np.ndarray:
@@ -69,7 +70,8 @@ class Group:
         """The moves' sum of squares, what it would be were the noise always the same (that of the
         residual without what the group takes; of the prior, its own move), and the first one's
         degrees of freedom."""
-        left = 1.0 - np.clip(self.taken / max(self.loss, 1e-300), 0.0, blocks.LEVERAGE)
+        whole = self.whole or self  # what it does not take, no part of it takes either
+        left = 1.0 - np.clip(whole.taken / max(self.loss, 1e-300), 0.0, blocks.LEVERAGE)
         directions, rest = self.freedom
         own, squared = directions * max(rest - 1.0, 1.0), np.sum(self.moves**2, axis=1)
         return float(squared.sum()), float(np.trace(self.foreseen) * left + squared[-1]), own
@@ -107,7 +109,8 @@ class Group:
             return self
         told = {"scores": w * group.scores, "loud": w * group.loud, "squares": squares}
         told["foreseen"] = group.foreseen * np.sum(weight**2 * share) / share.sum()
-        even = replace(group, **told, loud_squares=w[:, None] * group.loud_squares)
+        told |= {"loud_squares": w[:, None] * group.loud_squares, "whole": group.whole or self}
+        even = replace(group, **told)
         return even._turned(vectors / np.sqrt(values))
 
     def _turned(self, turn: np.ndarray) -> Group:
@@ -123,6 +126,7 @@ class Group:
             foreseen=turn.T @ self.foreseen @ turn,
             back=self.back @ turn,
             sizes=self.sizes * left / np.maximum(whole, 1e-300),
+            whole=self.whole or self,
         )
 
     @property
