@@ -60,7 +60,7 @@ def struck(found, motion, weights, solved, *, wide: bool):
     """What settled, or what settles lower from other values of what strikes; and {(term, joint): how many were tried}.
 
     Args:
-        found: a `shape.Settled`. weights: (joints,) or None. solved: a model with everything linear solved for, None where it has no
+        found: a `settled.Settled`. weights: (joints,) or None. solved: a model with everything linear solved for, None where it has no
             torque. wide: whether to look far about the values that were found.
     """
     tally: dict[tuple[int, int], int] = {}

@@ -163,7 +163,7 @@ def landscape(
     """The landscape of a torque effect of a model that is settled.
 
     Args:
-        found: a `shape.Settled`. weights: (joints,) or None.
+        found: a `settled.Settled`. weights: (joints,) or None.
         rows: on so many of the rows, drawn from all.
         pinned: what stands at its bound of zero stays there; otherwise it answers as if it had no
             bound.

@@ -10,7 +10,7 @@ place would bring its noise into the columns.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -21,48 +21,19 @@ from .effect import NotFinite
 from .estimate import Fit
 from .inertia import DIVERGENCES
 from .landscape import at_zero
-from .model import Model, moving_coefficients
+from .model import Model
 from .motion import Motion
-from .multistart import Searched
 from .objective import add_blocks
-from .posed_problem import Problem, pose
 from .prior_weight import number, with_weight
 from .projection import Projection, inverted, prior_hessian
-from .reduction import triangle
+from .settled import Settled, poses
 from .shape_search import Search
 from .specs import Experiment
-from .triangles import Compressed, Factor
+from .triangles import Compressed
 
 _MOST_ROWS, _STEPS, _TRIES, _SETTLED = 6000, 12, 6, 1e-7
 _ROUNDING = 1e-14  # share of the greatest
 _LEAST_SHARE = 0.25  # of the way to another load
-
-
-@dataclass(frozen=True)
-class Settled:
-    """A model with its shape values found, the linear parameters x there, and the rows that both were found on.
-
-    searched: what was done about the shape values, where they were searched.
-    """
-
-    model: Model
-    x: np.ndarray
-    problem: Problem
-    rows: row.Rows
-    stride: int
-    objective: float
-    searched: tuple[Searched, ...] = ()
-
-
-def condensed(model: Model, rows: row.Rows) -> Compressed:
-    """Rows as triangles, one a joint."""
-    factors = []
-    for joint in range(model.robot.dof):
-        support = model.support(joint)
-        kept = rows.use[:, joint]
-        stacked = np.concatenate([rows.columns[joint][kept][:, support], rows.tau[kept, joint, None]], axis=1)
-        factors.append(Factor(joint, 0, support, triangle(stacked), int(kept.sum())))
-    return Compressed(model.size, model.robot.dof, tuple(factors), len(rows.t))
 
 
 def settle(
@@ -85,13 +56,12 @@ def settle(
     """
     stride = stride or row.stride_for(motion, _MOST_ROWS)
     lighter = with_weight(experiment, number(experiment) / stride)
-    moving = moving_coefficients(model, motion)
+    posed = poses(lighter, model, motion, prior, weights, stride)
 
     last: list[np.ndarray] = []  # where the candidate before was least: the next is not far
 
     def solved(candidate: Model) -> Settled:
-        rows = row.stack(candidate, motion, stride)
-        problem = pose(lighter, candidate, condensed(candidate, rows), moving, prior, weights)
+        rows, problem = posed(candidate)
         x = problem.from_nearby(last[0], lighter.solver.tolerance) if last else None
         if x is None:
             x = problem.solve(lighter).x

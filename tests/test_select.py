@@ -16,7 +16,8 @@ from ruamel.yaml import YAML
 from sysid import effect_entry, fit_document, loop, pipeline, results, simulate, vocabulary
 from sysid.addition import command, grown, spelled
 from sysid.candidates import Candidate
-from sysid.diagnose import select
+from sysid.diagnose import claims, select
+from sysid.diagnose.ask import ask
 from sysid.diagnose.diagnosis import diagnose
 from sysid.diagnose.select import LEVEL, WORTH, search
 from sysid.statement.document import document
@@ -210,6 +211,39 @@ def test_what_the_test_logs_refuse_is_not_claimed(simulated, tmp_path):
     assert any(refused["why"] in notice for notice in found.said["notices"])
 
 
+def test_where_fits_refuse_the_head_the_next_of_its_set_is_claimed(simulated, monkeypatch):
+    """Logs that cannot tell a bias from friction that differs with the direction cannot refuse both by refusing one."""
+    real = claims.in_doubt
+    monkeypatch.setattr(claims, "in_doubt", lambda *given: "not it" if given[-1].name == "torque_bias" else real(*given))
+    experiment = pipeline.load(simulated(*BIAS))
+    found = diagnose(experiment)
+    (claim,) = found.claims
+    assert found.refused == () and [f.effect for f in claim.findings] == ["asymmetric_coulomb", "torque_bias"]
+    assert claim.head.command.split()[3] == "asymmetric_coulomb" and claim.after.parameters_of("asymmetric_coulomb", 1)
+    assert [name for name, *_ in claim.set] == ["asymmetric_coulomb", "torque_bias"]
+    monkeypatch.setattr(claims, "in_doubt", lambda *given: f"not {given[-1].name}")
+    (refused,) = diagnose(experiment).refused
+    assert (refused.effect, refused.why) == ("torque_bias", "not torque_bias")
+
+
+def test_what_is_refused_alone_is_asked_again_beside_what_stands(simulated, monkeypatch):
+    """The search found the first beside the second: fits may bear it out only with that one in the model."""
+    real, asked = claims.in_doubt, []
+
+    def in_doubt(before, after, told, candidate):
+        asked.append(candidate.name)
+        alone = candidate.name == asked[0] and not before.model.terms[-1][0].name == "load_friction"
+        return "too much else is missing" if alone else real(before, after, told, candidate)
+
+    monkeypatch.setattr(claims, "in_doubt", in_doubt)
+    found = diagnose(pipeline.load(simulated(*TWO)))
+    first, second = ("cogging", "load_friction")
+    assert asked == [first, second, first]
+    assert [c.head.effect for c in found.claims] == [second, first] and found.refused == ()
+    assert found.claims[1].before is found.claims[0].after
+    assert [{first, second} <= {effect.name for effect, _ in c.step.after.model.terms} for c in found.claims] == [False, True]
+
+
 def log_of(folder) -> str:
     """The name of the test log."""
     (name,) = pipeline.load(folder).data.test
@@ -365,7 +399,20 @@ def test_two_effects_that_hide_each_other_are_both_named(simulated, monkeypatch,
     keys = {("encoder_eccentricity", 0), ("torque_saturation", 1)}
     assert {step.candidate.key for step in search(view)[0]} == keys
     monkeypatch.setattr(select, "_pair", lambda *given: None)
+    monkeypatch.setattr(select, "settled", lambda *given: None)
     assert not keys <= {step.candidate.key for step in search(view)[0]}
+
+
+def test_what_takes_much_may_say_that_it_is_there_only_about_where_it_settled(simulated, monkeypatch):
+    """No statistic by slopes where nothing is done yet stands out; that of the delay where it settled does."""
+    experiment = pipeline.load(simulated("settled-delay", "delay:elbow:d=0.02"))
+    view = first_view(experiment, pipeline.fit(experiment))
+    asked = ask(view)
+    vars(asked).update(statistics=np.minimum(asked.statistics, 2.0))
+    given = view, asked, LEVEL, WORTH, []
+    assert select._next(*given).candidate.key == ("delay", 1)
+    monkeypatch.setattr(select, "settled", lambda *given: None)
+    assert select._next(*given) is None
 
 
 # ---- which of a candidate's shape values says that it is there

@@ -4,13 +4,14 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from ruamel.yaml import YAML
 
 from sysid import blocks, pipeline
 from sysid.diagnose.ask import ask
-from sysid.diagnose.refits import refitted, weighed
+from sysid.diagnose.refits import refitted, settled
 from sysid.diagnose.select import _beside
 from sysid.diagnose.ties import Choice, chosen, holds, price_of
-from sysid.view import first_view, losses
+from sysid.view import first_view, losses, weighed
 from tests.evidences import posed, stacked, viewed
 
 
@@ -69,6 +70,46 @@ def test_a_refit_has_the_effect_in_it_and_loses_less(biased):
     assert member.view.settled.x[own] == pytest.approx([0.4], rel=0.1)
     assert member.losses.sum() < 0.7 * losses(view, view.blocks).sum()
     assert member.losses.shape == (view.blocks.max() + 1, 2)
+
+
+@pytest.mark.parametrize(
+    ("hide", "key", "value"),
+    [("torque_bias:elbow:b=0.4", ("torque_bias", 1), 0.4), ("delay:elbow:d=0.02", ("delay", 1), 0.02), ("torque_saturation:elbow:limit=1.5", ("torque_saturation", 1), -1.0)],
+)  # fmt: skip
+def test_about_where_it_settled_a_candidate_s_slopes_tell_its_size(simulated, hide, key, value):
+    """What moves a joint does not grow as its slope at nothing says; what bends a torque takes all that stands above where it bends."""
+    name = "bias" if key[0] == "torque_bias" else f"settled-{key[0]}"
+    experiment = pipeline.load(simulated(name, hide))
+    view = first_view(experiment, pipeline.fit(experiment))
+    group = max((g for g in ask(view).groups if g.candidate.key == key), key=lambda g: g.taken)
+    again = settled(view, group)
+    assert again.coefficients[0] == pytest.approx(value, rel=0.05)
+    assert again.spreads[1] < 3.0 * again.spreads[0]  # what it takes is no noise
+
+
+def test_about_where_it_settled_bounds_and_prior_hold_what_they_held(simulated):
+    """Beside a missing delay, and a prior that holds against what it does: coefficients about where they settled are those that
+    settled, though an exponent stands at its bound, from which its slope points out."""
+    yaml = YAML(typ="safe", pure=True)
+    folder = simulated("settled-delay", "delay:elbow:d=0.02")
+    tree = yaml.load((folder / "config.yaml").read_text()) | {"prior": {"weight": 10.0}}
+    with (folder / "strong.yaml").open("w") as stream:
+        yaml.dump(tree, stream)
+    experiment = pipeline.load(folder / "strong.yaml")
+    view = first_view(experiment, pipeline.fit(experiment))
+    best, seen = {}, set()
+    for group in ask(view).groups:
+        if group.taken > best.get(group.candidate.key, group).taken - 1e-12:
+            best[group.candidate.key] = group
+    for name, joint in (("torque_bias", 0), ("torque_bias", 1), ("sublinear_viscous", 0), ("stribeck", 0), ("position_friction", 1)):
+        again, member = settled(view, best[name, joint]), refitted(view, best[name, joint])
+        if again is None or member is None:
+            continue
+        seen.add(name)
+        after = weighed(member.view)
+        own = after.settled.x[view.model.size :]
+        np.testing.assert_allclose(again.coefficients, own, rtol=2e-2, atol=1e-3 * np.abs(own).max())
+    assert {"torque_bias", "sublinear_viscous"} <= seen
 
 
 def test_the_set_holds_the_truth_and_its_twin_and_not_the_rest(biased):

@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 
 from scripts.blind_parts import cases, robots
-from sysid import pipeline
+from sysid import borne_out, pipeline
 from sysid.blocks import Belief
 from sysid.candidates import candidates
 from sysid.comparison import Difference
-from sysid.diagnose import claims
 from sysid.diagnose.ask import Asked, ask
 from sysid.diagnose.detectable import detectable
 from sysid.diagnose.diagnosis import diagnose
@@ -27,7 +26,7 @@ from sysid.simulate import simulate, write
 from sysid.statement.document import _verdict, dependences
 from sysid.statement.words import elsewhere
 from sysid.transfer import Transfer
-from sysid.unexplained import changed
+from sysid.unexplained import Refused, changed
 from sysid.view import first_view
 
 # ---- verdicts, by hand
@@ -79,31 +78,31 @@ def test_what_is_nothing_in_size_and_error_is_not_claimed(monkeypatch, fall, tol
     """
     after, shown = fitted(1.0, train=0.9), fitted(1.0, train=0.9)
     falls = lambda before, one: [Difference("", "", "elbow", -(told if one is shown else fall), 0.01)]  # noqa: E731
-    monkeypatch.setattr(claims.comparison, "compare", falls)
-    monkeypatch.setattr(claims.comparison, "together", lambda *_, **__: Difference("", "", "*", all_, 0.01))
+    monkeypatch.setattr(borne_out.comparison, "compare", falls)
+    monkeypatch.setattr(borne_out.comparison, "together", lambda *_, **__: Difference("", "", "*", all_, 0.01))
     shown.parameters_of = lambda effect, joint: {"T": (size, 0.1, "s"), "k": (3.0, float("nan"), "1")}
-    member = SimpleNamespace(candidate=SimpleNamespace(joint=1, key=("delay", 1), touches=lambda dof: [1]))
-    assert (claims._nothing(fitted(1.0, train=1.0), after, shown, member) is None) is stands
+    candidate = SimpleNamespace(joint=1, key=("delay", 1), touches=lambda dof: [1])
+    assert (borne_out.in_doubt(fitted(1.0, train=1.0), after, shown, candidate) is None) is stands
 
 
 @pytest.mark.parametrize(("under", "told", "stands"), [(0.2, -0.6, True), (-0.6, 0.2, True), (0.2, 0.1, False), (-0.6, -0.6, True)])
 def test_an_effect_of_the_whole_robot_stands_under_either_prior(monkeypatch, under, told, stands):
     """A prior that held the bodies against what was missing may hold them against the effect: then what `sysid add` gives counts."""
     before, after, shown = fitted(1.0, train=1.0), fitted(1.0, train=0.9), fitted(1.0, train=0.9)
-    monkeypatch.setattr(claims.comparison, "together", lambda _, one, **__: Difference("", "", "*", told if one is shown else under, 0.01))
-    member = SimpleNamespace(candidate=SimpleNamespace(joint=-1, key=("gravity_tilt", -1), touches=lambda dof: list(range(dof))))
-    assert (claims._nothing(before, after, shown, member) is None) is stands
+    monkeypatch.setattr(borne_out.comparison, "together", lambda _, one, **__: Difference("", "", "*", told if one is shown else under, 0.01))
+    candidate = SimpleNamespace(joint=-1, key=("gravity_tilt", -1), touches=lambda dof: list(range(dof)))
+    assert (borne_out.in_doubt(before, after, shown, candidate) is None) is stands
 
 
 @pytest.mark.parametrize(("touches", "all_", "stands"), [([0, 1], -0.03, True), ([0, 1], -0.008, False), ([0, 1], 0.0, False), ([1], -0.03, False)])
 def test_what_moves_a_joint_may_show_in_the_torque_of_another(monkeypatch, touches, all_, stands):
     """The error of its own joint hardly falls, that of all together by three standard errors, or less than one."""
-    monkeypatch.setattr(claims.comparison, "compare", lambda *_: [Difference("", "", "elbow", -0.001, 0.01)])
-    monkeypatch.setattr(claims.comparison, "together", lambda *_, **__: Difference("", "", "*", all_, 0.01))
+    monkeypatch.setattr(borne_out.comparison, "compare", lambda *_: [Difference("", "", "elbow", -0.001, 0.01)])
+    monkeypatch.setattr(borne_out.comparison, "together", lambda *_, **__: Difference("", "", "*", all_, 0.01))
     after = fitted(1.0, train=0.9)
     after.parameters_of = lambda effect, joint: {"d": (0.5, 0.1, "rad")}
-    member = SimpleNamespace(candidate=SimpleNamespace(joint=1, key=("encoder_offset", 1), touches=lambda dof: touches))
-    assert (claims._nothing(fitted(1.0, train=1.0), after, after, member) is None) is stands
+    candidate = SimpleNamespace(joint=1, key=("encoder_offset", 1), touches=lambda dof: touches)
+    assert (borne_out.in_doubt(fitted(1.0, train=1.0), after, after, candidate) is None) is stands
 
 
 @pytest.mark.parametrize(
@@ -233,16 +232,16 @@ def test_what_may_be_noise_is_not_held_against_a_name(about, train, status):
 def test_error_above_the_floor_that_nothing_predicts_is_unresolved():
     found = elbow(2.0)
     assert found.status == "unresolved" and "2 times the noise floor" in found.says
-    refused = claims.Refused(effect="backlash", joint="elbow", why="its parameters are nothing")
+    refused = Refused(effect="backlash", joint="elbow", why="its parameters are nothing")
     assert "backlash was looked at and is not claimed: its parameters are nothing" in elbow(2.0, refused=[refused]).says
-    assert "backlash" not in elbow(2.0, refused=[claims.Refused(effect="backlash", joint="shoulder", why="x")]).says
+    assert "backlash" not in elbow(2.0, refused=[Refused(effect="backlash", joint="shoulder", why="x")]).says
 
 
 @pytest.mark.parametrize(("joint", "share", "status"), [("elbow", 0.9, "unresolved"), ("*", 0.9, "unresolved"), ("elbow", 0.1, "unknown"), ("shoulder", 0.9, "unknown")])
 def test_what_test_logs_bear_out_under_the_low_pass_and_no_fit_does_is_not_called_a_law_that_nobody_knows(joint, share, status):
     """What functions of the motion predict then is that effect: half of it at least."""
     what = SimpleNamespace(name="elasticity", joint=1)
-    refused = claims.Refused("elasticity", joint, "the error on the test logs does not fall", what, 0.001, np.array([0.9, share]))
+    refused = Refused("elasticity", joint, "the error on the test logs does not fall", what, 0.001, np.array([0.9, share]))
     found = elbow(3.0, rest=left(0.5), refused=[refused])
     assert found.status == status and found.may is None
     assert ("takes 90%" in refused.told) is (share == 0.9)  # not what it takes of the other joint

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -49,6 +49,13 @@ class Asked:
     def p(self, k: int) -> float:
         """Family-wise p-value of a group."""
         return null.chance(self.statistics[k], self.maxima)
+
+    def told(self, k: int, settled: Group) -> Asked:
+        """The answers where the k-th group says what it says about where it has settled."""
+        out, statistics = replace(self), self.statistics.copy()
+        (statistics[k],) = null.statistics([settled], self.belief)
+        vars(out).update(statistics=statistics)
+        return out
 
     def near(self, joint: int, gain: float) -> tuple[Candidate, float] | None:
         """The effect on a joint that may be there and takes half of a gain: the likeliest."""

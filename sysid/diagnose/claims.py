@@ -1,29 +1,30 @@
 """What the search found, as `sysid add` gives it: each effect written into the experiment and
 fitted as the user's fit is.
 
-So what a diagnosis states is what comes of it. The test logs choose nothing; they may only refuse.
+So what a diagnosis states is what comes of it. The test logs may only refuse; where they refuse the
+likeliest of what the training logs cannot tell apart, the next one is fitted.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .. import comparison, pipeline
+from .. import pipeline
 from ..addition import grown, spelled
+from ..borne_out import in_doubt, where
 from ..estimate import Fit
 from ..experiment_logs import Read
 from ..failures import taken
 from ..motion import Motion
-from ..unexplained import Refused, changed, nought
-from .findings import Finding, finding, judged_by, where
+from ..unexplained import Refused
+from .findings import Finding, finding
 from .refits import Member
-from .steps import Step
+from .steps import Step, rejoined
 from .ties import Choice
 
-_NOTHING = 5e-3  # of an error: a hundredth of its square, the least that is told in per cent
 _FITTED, _LIKELY = 3, 0.1  # members of a set that are fitted, and how likely; the rest is named
 
 
@@ -56,62 +57,59 @@ def claimed(
     Args:
         fit: of the experiment as it is. measured: its logs; None: read anew. test: low-passed.
     """
+    stands, refused, last = dict[int, Claim](), dict[int, tuple[Fit, Refused]](), fit
 
-    def with_(how: Callable, last: Fit, member: Member):
-        name, joints, options = spelled(member.candidate, where(member, fit))
+    def with_(how: Callable, member: Member):
+        name, joints, options = spelled(member.candidate, where(member.candidate, fit))
         spec = grown(last.experiment, name, joints, options, every=fit.joints)
         return how(spec, last, filters=fit.filters, progress=tell, measured=measured)
 
-    claims, refused, last = list[Claim](), list[Refused](), fit
-    for step in steps:
-        head, *tied = step.choice.members
-        after, compared = with_(pipeline.refit, last, head[0])  # and under the last one's prior
-        if (why := _nothing(last, compared, after, head[0])) is not None:
-            told = step.candidate, step.p, taken(step.before.settled, step.after.settled, test)
-            refused.append(Refused(step.candidate.name, where(head[0], fit), why, *told))
+    heads = [step.candidate.key for step in steps]
+    # what was refused is asked once more with all that stand: the search found it beside them
+    for number, step in [*enumerate(steps), *enumerate(steps)]:
+        if number in stands or refused.get(number, (None,))[0] is last:
             continue
-        near = [(m, chance) for m, chance in tied[: _FITTED - 1] if chance >= _LIKELY]
-        found = [(*head, after), *((*m, with_(pipeline.fit_grown, last, m[0])) for m in near)]
-        findings = [finding(last, then, m, chance, step, len(claims)) for m, chance, then in found]
-        named = [(m.candidate.name, where(m, fit), chance) for m, chance in step.choice.members]
-        claims.append(Claim(step, tuple(findings), last, after, tuple(named)))
-        last = after
-    return claims, refused
+        there = {*heads, *(claim.step.candidate.key for claim in stands.values())}
+        own = [m for m in step.choice.members[:_FITTED] if m[0].candidate.key not in there]
+        near = [step.choice.members[0], *(m for m in own if m[1] >= _LIKELY)]
+        head, fits, why = _borne_out([m for m, _ in near], last, with_)
+        if head is None:
+            told = step.candidate, step.p, taken(step.before.settled, step.after.settled, test)
+            refused[number] = last, Refused(told[0].name, where(told[0], fit), why, *told)
+            continue
+        step = replace(step, choice=step.choice.headed(head))
+        near.sort(key=lambda one: one[0] is not head)
+        fits = [fits[id(m)] if id(m) in fits else with_(pipeline.fit_grown, m) for m, _ in near]
+        found = [finding(last, a, m, p, step, len(stands)) for a, (m, p) in zip(fits, near)]
+        named = [(m.candidate.name, where(m.candidate, fit), p) for m, p in step.choice.members]
+        stands[number] = Claim(step, tuple(found), last, fits[0], tuple(named))
+        refused.pop(number, None)
+        last = fits[0]
+    claims, own = list(stands.values()), [claim.step for claim in stands.values()]
+    if any(one.choice.head is not other.choice.head for one, other in zip(own, steps)):
+        own = rejoined(steps[0].before, own)  # without what is refused
+    claims = [replace(claim, step=step) for claim, step in zip(claims, own)]
+    return claims, [words for _, words in refused.values()]
 
 
-def _nothing(before: Fit, after: Fit, told: Fit, member: Member) -> str | None:
-    """Why an effect that the search found is not claimed, None where it is. Both are fits with it:
-    after under the prior of the one before, told as `sysid add` gives it."""
-    own = judged_by(member, before)
-    if where(member, before) == "*":  # what held bodies against its lack may hold them against it
-        after = min((after, told), key=lambda one: comparison.together(before, one).delta_rms)
-    if not any(after.rms("train")[joint] < before.rms("train")[joint] for joint in own):
-        return "the fit's own error does not fall with it"
-    if where(member, before) == "*":
-        change, unit = comparison.together(before, after), 1.0
-        rise = f"{changed(change.delta_rms)} over all joints"
-    else:
-        changes = [comparison.compare(before, one) for one in (after, told)]
-        change, shown = (next(d for d in one if d.joint == own[0]) for one in changes)
-        unit = before.rms("test")[own[0]]
-        rise = changed(change.delta_rms / max(unit, 1e-300))
-        still = any(-d.delta_rms < d.se for d in (change, shown))
-        if still and nought(told.parameters_of(*member.candidate.key)):
-            return "its size is nothing beside its deviation, and the test error hardly falls"
-    # what moves a joint may show in the torque of those that it carries, or that carry it
-    wide = len(member.candidate.touches(2)) > 1 and comparison.falls(before, after, _NOTHING)
-    if change.delta_rms > -_NOTHING * unit and not wide:
-        falls = "hardly falls" if change.delta_rms < 0.0 else "does not fall"
-        return f"with it the error on the test logs {falls} ({rise})"
-    # as the fit weighs them: it trades what a quiet joint loses for what a loud one gains
-    if (paid := comparison.together(before, after, weighed=True)).delta_rms > paid.se:
-        return "with it the test error of all joints together, as the fit weighs them, rises"
-    return None
+def _borne_out(near: list[Member], last: Fit, with_: Callable):
+    """The first that fits bear out, of those that logs cannot tell apart, and the fits by the id of
+    who is in them; or why they do not bear out the head."""
+    fits, whys = {}, []
+    for member in near:
+        after, compared = with_(pipeline.refit, member)  # and under the last one's prior
+        fits[id(member)] = after
+        whys.append(in_doubt(last, compared, after, member.candidate))
+        if whys[-1] is None:
+            return member, fits, ""
+    return None, fits, whys[0]
 
 
 def undecided(choice: Choice, fit: Fit) -> Refused:
     """What is there and cannot be told from effects on other joints."""
     likely = [(m, chance) for m, chance in choice.members if chance >= 0.05]
-    names = [f"{m.candidate.name} on {where(m, fit)} ({100 * c:.0f} %)" for m, c in likely]
+    names = [
+        f"{m.candidate.name} on {where(m.candidate, fit)} ({100 * c:.0f} %)" for m, c in likely
+    ]
     why = f"something is there, and these logs cannot tell which: {', '.join(names)}"
-    return Refused(choice.head.candidate.name, where(choice.head, fit), why)
+    return Refused(choice.head.candidate.name, where(choice.head.candidate, fit), why)

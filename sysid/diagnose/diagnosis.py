@@ -91,9 +91,8 @@ def diagnose(
         refused += [claiming.undecided(choice, fit) for choice in undecided[-1:]]
         after, last = (claims[-1].step.after, claims[-1].after) if claims else (view, fit)
         first, then = (HeldOut(one.settled, test) for one in (view, after))
-        x = after.settled.x + after.design.change[: after.model.size]
         parts = measured.train, measured.test
-        found, weighed = floors_of_fit(experiment, last, after.model, x, parts)
+        found, weighed = floors_of_fit(experiment, last, after.model, after.x, parts)
         again = cache(lambda: elsewhere(after, measured.test, measured.train))
 
         def beyond(j: int, candidate: Candidate) -> Law | None:

@@ -9,8 +9,8 @@ import numpy as np
 
 from .. import comparison
 from ..addition import command, spelled
+from ..borne_out import judged_by, where
 from ..estimate import Fit
-from ..model_parameters import ROBOT
 from .refits import Member
 from .steps import Step
 
@@ -49,17 +49,6 @@ class Finding:
         return self.candidate.name
 
 
-def where(member: Member, fit: Fit) -> str:
-    """The name of its joint, or `*`."""
-    return "*" if member.candidate.joint == ROBOT else fit.joints[member.candidate.joint]
-
-
-def judged_by(member: Member, fit: Fit) -> list[str]:
-    """The joints whose error an effect is judged by."""
-    joint = where(member, fit)
-    return list(fit.joints) if joint == "*" else [joint]
-
-
 def finding(
     before: Fit, after: Fit, member: Member, chance: float, step: Step, number: int
 ) -> Finding:
@@ -68,14 +57,19 @@ def finding(
     Args:
         number: of the step among those that stand.
     """
-    own, joint = judged_by(member, before), where(member, before)
+    candidate = member.candidate
+    own, joint = judged_by(candidate, before), where(candidate, before)
     square = lambda fit: np.mean([fit.rms("test")[j] ** 2 for j in own])  # noqa: E731
     errors = [float(np.sqrt(square(fit))) for fit in (before, after)]
     differences = {d.joint: d.se for d in comparison.compare(before, after, ("before", "after"))}
     se = float(np.sqrt(np.nansum([differences[j] ** 2 for j in own]) / len(own)))
-    tied = [(m.candidate.name, where(m, before)) for m, _ in step.choice.members if m is not member]
+    tied = [
+        (m.candidate.name, where(m.candidate, before))
+        for m, _ in step.choice.members
+        if m is not member
+    ]
     words = tuple(name if at in (joint, "*") else f"{name} on {at}" for name, at in tied)
     heads = number if member is step.choice.head else None
-    added = command(before.experiment.path, *spelled(member.candidate, joint))
-    numbers = after.parameters_of(*member.candidate.key)
+    added = command(before.experiment.path, *spelled(candidate, joint))
+    numbers = after.parameters_of(*candidate.key)
     return Finding(member, joint, step.p, chance, *errors, se, numbers, words, heads, added)

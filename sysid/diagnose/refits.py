@@ -8,13 +8,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..candidate_columns import at_start, bounds_of, grown
+from ..candidate_columns import at_start, bounds_of
 from ..candidates import Candidate
-from ..posed_problem import inverse
-from ..view import View, looked_at, losses
+from ..view import View, allowed, around, joined, losses, shapes_of, weighed
 from .evidence import Group
-
-COMPARED = 1e-4  # share of the objective: finer than rivals are ever told apart by
+from .projected import groups_at
 
 
 @dataclass(frozen=True)
@@ -39,8 +37,7 @@ class Member:
     @property
     def shapes(self) -> dict[str, float]:
         """Its shape values, refitted."""
-        model, own = self.view.model, self.view.model.last_shapes
-        return {v.shape.name: at for v, at in zip(model.shape_values[own], model.shapes[own])}
+        return shapes_of(self.view)
 
 
 def refitted(view: View, group: Group) -> Member | None:
@@ -54,43 +51,17 @@ def refitted(view: View, group: Group) -> Member | None:
         for shape, step in zip(free, group.coefficients):
             shapes[shape.name] = float(np.clip(shapes[shape.name] + step, *limits[shape.name]))
     found = joined(view, (candidate, shapes))
-    return Member(group, found, losses(found, view.blocks)) if _allowed(found, candidate) else None
+    return Member(group, found, losses(found, view.blocks)) if allowed(found, candidate) else None
 
 
-def joined(view: View, *added: tuple[Candidate, dict[str, float]], like: View | None = None):
-    """The view of a view's model with candidates, all settled again from their shape values on.
-
-    Args:
-        like: whose weights and noise it has, where these are not to be its own.
-    """
-    source = view.source
-    for candidate, shapes in added:
-        source = replace(source, model=grown(source, candidate, shapes))
-    return _again(view, source.model, (like or view).weights, tolerance=COMPARED, like=like)
-
-
-def _allowed(view: View, candidate: Candidate) -> bool:
-    """Whether the coefficients that may not be negative are not."""
-    model, first = view.model, 10 * view.model.bodies
-    x = view.settled.x + view.design.change[: model.size]
-    own = [k for k, c in enumerate(model.coefficients) if (c.effect, c.joint) == candidate.key]
-    if any(model.coefficients[k].positive and x[first + k] <= 0.0 for k in own):
-        return False
-    own = zip(model.shape_values[model.last_shapes], model.shapes[model.last_shapes])
-    starts = [(v.shape.start, at) for v, at in own if v.shape.start is not None]
-    return not starts or any(at != start for start, at in starts)
-
-
-def weighed(view: View, weights=None) -> View:
-    """The view with every joint weighted anew.
-
-    Args:
-        weights: (dof,), to compare it by, its noise as known; None: what it now leaves each joint.
-    """
-    how = {} if weights is None else {"tolerance": COMPARED, "like": view}
-    return _again(view, view.model, inverse(view.rms()) if weights is None else weights, **how)
-
-
-def _again(view: View, model, weights, **how) -> View:
-    how |= {"stride": view.stride, "weights": weights, "grid": False, "grown": view}
-    return looked_at(view.experiment, model, view.motion, view.rough, view.prior, **how)
+def settled(view: View, group: Group) -> Group | None:
+    """A group about where everything settles with its candidate, each joint weighed by what is left
+    of it there; None where it may not join, or stands in the place of what the model has of it."""
+    member = None if group.candidate.begins else refitted(view, group)
+    after = member and weighed(member.view)
+    if after is None or not allowed(after, member.candidate):
+        return None
+    seen = around(view, after, member.candidate)
+    found = groups_at(seen, [(member.candidate, shapes_of(after))])
+    # what it takes stands in the noise no more
+    return replace(found[0], loss=np.inf) if found else None

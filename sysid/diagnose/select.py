@@ -15,6 +15,7 @@ import numpy as np
 from ..view import View
 from .ask import Asked, ask
 from .evidence import Group
+from .refits import settled
 from .steps import Step, rejoined, revised, step_of
 from .ties import NEAR, Choice, alike, chosen, price_of
 
@@ -60,10 +61,33 @@ def search(
 
 
 def _next(view: View, asked: Asked, level: float, worth: float, open_: list[Choice]) -> Step | None:
-    """The candidate that joins next, None where none is there and worth having."""
+    """The candidate that joins next, None where none is there and worth having.
+
+    What takes much of a residual, by its slopes where it does nothing, under weights of joints that
+    lack it and a prior as strong as they ask for, may say so only about where it has settled.
+    """
     threshold = np.quantile(asked.maxima, 1.0 - level) if len(asked.groups) else np.inf
     rivals = _rivals(view, asked, worth)
     hopeful = [k for k, (clear, _) in rivals.items() if asked.statistics[clear] > threshold]
+    if step := _standing(view, asked, rivals, hopeful, worth, open_):
+        return step
+    for k in (k for k in _trials(rivals) if k not in hopeful):
+        found = settled(view, asked.groups[k])
+        told = found and asked.told(k, found)
+        if told and told.statistics[k] > threshold:
+            own = rivals | {k: (k, rivals[k][1])}
+            if step := _standing(view, told, own, [k], worth, open_):
+                return step
+    return None
+
+
+def _trials(rivals: dict[int, tuple[int, float]]) -> list[int]:
+    """Those that take much, first who takes most."""
+    return [k for k, (_, part) in rivals.items() if part > _HIDES][:_TRIALS]
+
+
+def _standing(view: View, asked: Asked, rivals, hopeful, worth: float, open_) -> Step | None:
+    """The first that joins of those that stand out, by falling gain, each beside its rivals."""
     while hopeful:
         top = hopeful[0]
         # whoever takes as much as one that is there may be what is there
@@ -115,8 +139,7 @@ def _rivals(view: View, asked: Asked, worth: float) -> dict[int, tuple[int, floa
 
 def _pair(view: View, asked: Asked, level: float, worth: float, asked_with) -> list[Step] | None:
     """Two effects each of which stands out with the other in the model, first what takes more."""
-    trials = [k for k, (_, share) in _rivals(view, asked, worth).items() if share > _HIDES]
-    for k in trials[:_TRIALS]:
+    for k in _trials(_rivals(view, asked, worth)):
         found = chosen(view, [asked.groups[k]], np.random.default_rng(1))
         trial = found and step_of(view, asked.p(k), found, worth)
         then = trial and asked_with(trial, trial.after, asked)

@@ -10,9 +10,8 @@ import numpy as np
 from .. import blocks
 from ..candidates import Candidate
 from ..model_parameters import ROBOT
-from ..view import View, losses, taken
+from ..view import View, joined, losses, taken, weighed
 from .projected import groups_at
-from .refits import joined, weighed
 from .ties import NEAR, Choice, chosen
 
 

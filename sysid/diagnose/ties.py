@@ -15,10 +15,10 @@ import numpy as np
 from .. import blocks
 from ..candidate_columns import columns_of
 from ..posed_problem import inverse
-from ..view import View, losses, taken
+from ..view import COMPARED, View, losses, taken, weighed
 from .evidence import Group
 from .projected import groups_at
-from .refits import COMPARED, Member, refitted, weighed
+from .refits import Member, refitted
 
 _OUTSIDE, _HARDLY = 0.10, 0.01  # outside the set of 90 %: p-value; chance of all such together
 _UNEVEN = 0.35  # logarithm: two joints count half as much against each other, in power
@@ -54,6 +54,11 @@ class Choice:
         """All members, and of the beaten those that took nearly as much as the head."""
         most = self.head.losses.sum() + _CLOSE * self.gain.sum()
         return [*(m for m, _ in self.members), *(m for m in self.beaten if m.losses.sum() <= most)]
+
+    def headed(self, head: Member) -> Choice:
+        """The choice with another of its members at the head."""
+        members = sorted(self.members, key=lambda one: one[0] is not head)
+        return replace(self, head=head, members=tuple(members))
 
     def without(self, there: set) -> Choice:
         """The choice without what is in the model anyway, as another step brings it."""

@@ -10,7 +10,7 @@ import numpy as np
 from .. import rows as row
 from ..model import Model
 from ..motion import Motion
-from ..shape import Settled
+from ..settled import Settled
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ import numpy as np
 from .. import rows as row
 from ..lowpass import calm
 from ..projection import prior_hessian, told
-from ..shape import Settled
+from ..settled import Settled
 from ..source import Source
 
 _FIRST = 1e-6  # share of a direction: less is none, and what is left of it rounding
@@ -48,11 +48,12 @@ class Sums:
     freed: np.ndarray
 
 
-def designed(found: Settled, weights, source: Source, rough: Source) -> Design:
+def designed(found: Settled, weights, source: Source, rough: Source, left=None) -> Design:
     """The design of a settled model.
 
     Args:
-        weights: (dof,). rough: the source with the angles' noise once more.
+        weights: (dof,). rough: the source with the angles' noise once more. left: (n, dof) what the
+            model leaves at its parameters, weighted, where that is not its own residual.
     """
     weighted = weights[:, None, None]
     columns = source.full(found.rows.columns) * weighted
@@ -65,6 +66,9 @@ def designed(found: Settled, weights, source: Source, rough: Source) -> Design:
     # what is held at zero, and what was settled to a tolerance only, takes its last step here
     slopes = np.einsum("jnk,nj->k", columns[:, :, own:], residual)
     change = np.append(-0.5 * found.problem.objective.gradient(found.x), slopes)
+    if left is not None:
+        change += np.einsum("jnk,nj->k", columns, left - residual)
+        residual = left
     change = turn @ (turn.T @ change)
     residual = residual - np.einsum("jnk,k->nj", columns, change)
     # near a reversal the noise, drawn again, would leave out other rows, and a row that is missing

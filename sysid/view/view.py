@@ -21,7 +21,8 @@ from ..notices import samples_of
 from ..posed_problem import inverse
 from ..prior_weight import USUAL, with_weight
 from ..same_samples import same
-from ..shape import Settled, settle
+from ..settled import Settled
+from ..shape import settle
 from ..source import Source
 from ..specs import Experiment
 from .design import Design, Sums, by_block, designed, instrumented, summed
@@ -58,6 +59,11 @@ class View:
     def model(self) -> Model:
         """The model, with its shape values found."""
         return self.settled.model
+
+    @property
+    def x(self) -> np.ndarray:
+        """The model's parameters at the design's optimum."""
+        return self.settled.x + self.design.change[: self.model.size]
 
     @property
     def rows(self) -> row.Rows:

@@ -1,0 +1,52 @@
+"""Whether fits bear out an effect that a search found."""
+
+from __future__ import annotations
+
+from . import comparison
+from .candidates import Candidate
+from .estimate import Fit
+from .model_parameters import ROBOT
+from .unexplained import changed, nought
+
+_NOTHING = 5e-3  # of an error: a hundredth of its square, the least that is told in per cent
+
+
+def where(candidate: Candidate, fit: Fit) -> str:
+    """The name of its joint, or `*`."""
+    return "*" if candidate.joint == ROBOT else fit.joints[candidate.joint]
+
+
+def judged_by(candidate: Candidate, fit: Fit) -> list[str]:
+    """The joints whose error an effect is judged by."""
+    joint = where(candidate, fit)
+    return list(fit.joints) if joint == "*" else [joint]
+
+
+def in_doubt(before: Fit, after: Fit, told: Fit, candidate: Candidate) -> str | None:
+    """Why fits do not bear out a candidate, None where they do. Both are fits with it: after under
+    the prior of the one before, told as `sysid add` gives it."""
+    own, whole = judged_by(candidate, before), candidate.joint == ROBOT
+    if whole:  # what held bodies against its lack may hold them against it
+        after = min((after, told), key=lambda one: comparison.together(before, one).delta_rms)
+    if not any(after.rms("train")[joint] < before.rms("train")[joint] for joint in own):
+        return "the fit's own error does not fall with it"
+    if whole:
+        change, unit = comparison.together(before, after), 1.0
+        rise = f"{changed(change.delta_rms)} over all joints"
+    else:
+        changes = [comparison.compare(before, one) for one in (after, told)]
+        change, shown = (next(d for d in one if d.joint == own[0]) for one in changes)
+        unit = before.rms("test")[own[0]]
+        rise = changed(change.delta_rms / max(unit, 1e-300))
+        still = any(-d.delta_rms < d.se for d in (change, shown))
+        if still and nought(told.parameters_of(*candidate.key)):
+            return "its size is nothing beside its deviation, and the test error hardly falls"
+    # what moves a joint may show in the torque of those that it carries, or that carry it
+    wide = len(candidate.touches(2)) > 1 and comparison.falls(before, after, _NOTHING)
+    if change.delta_rms > -_NOTHING * unit and not wide:
+        falls = "hardly falls" if change.delta_rms < 0.0 else "does not fall"
+        return f"with it the error on the test logs {falls} ({rise})"
+    # as the fit weighs them: it trades what a quiet joint loses for what a loud one gains
+    if (paid := comparison.together(before, after, weighed=True)).delta_rms > paid.se:
+        return "with it the test error of all joints together, as the fit weighs them, rises"
+    return None

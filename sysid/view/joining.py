@@ -1,0 +1,95 @@
+"""A view whose model grew by an effect, or whose joints count otherwise: everything is settled
+again.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..candidate_columns import columns_of, grown
+from ..candidates import Candidate
+from ..posed_problem import inverse
+from ..settled import placed
+from .design import designed
+from .view import View, looked_at
+
+COMPARED = 1e-4  # share of the objective: finer than rivals are ever told apart by
+
+
+def joined(view: View, *added: tuple[Candidate, dict[str, float]], like: View | None = None):
+    """The view of a view's model with candidates, all settled again from their shape values on.
+
+    Args:
+        like: whose weights and noise it has, where these are not to be its own.
+    """
+    source = view.source
+    for candidate, shapes in added:
+        source = replace(source, model=grown(source, candidate, shapes))
+    return _again(view, source.model, (like or view).weights, tolerance=COMPARED, like=like)
+
+
+def allowed(view: View, candidate: Candidate) -> bool:
+    """Whether the coefficients of a candidate that joined are not negative where they may not be,
+    and it does anything at all."""
+    model, first = view.model, 10 * view.model.bodies
+    x = view.x
+    own = [k for k, c in enumerate(model.coefficients) if (c.effect, c.joint) == candidate.key]
+    if any(model.coefficients[k].positive and x[first + k] <= 0.0 for k in own):
+        return False
+    starts = [(v.shape.start, at) for v, at in _own(view) if v.shape.start is not None]
+    return not starts or any(at != start for start, at in starts)
+
+
+def weighed(view: View, weights=None) -> View:
+    """The view with every joint weighted anew.
+
+    Args:
+        weights: (dof,), to compare it by, its noise as known; None: what it now leaves each joint.
+    """
+    how = {} if weights is None else {"tolerance": COMPARED, "like": view}
+    return _again(view, view.model, inverse(view.rms()) if weights is None else weights, **how)
+
+
+def around(view: View, after: View, candidate: Candidate) -> View:
+    """A view's model by its slopes about where everything settled with a candidate, `after`: what
+    is left there and what the candidate makes there, by its own slopes, is what it leaves, and the
+    noise is that view's.
+
+    From where an effect does nothing its slopes say little of what it does where it does much, and
+    what it left undone stood in the noise.
+    """
+    rest, last = after.model.without(*candidate.key), after.settled
+    x, values = np.split(last.x, [rest.size])
+    at = {"weights": after.weights, "stride": view.stride}
+    found = placed(view.experiment, rest, view.motion, view.prior, x, **at)
+    known = after.weights, found, view.blocks, (), after
+    out = View(view.experiment, view.motion, view.rough, view.prior, view.stride, *known)
+    columns = columns_of(out.source, candidate, [shapes_of(after)])[0]
+    if candidate.nonlinear:
+        # from where it does nothing; a value that only says how has no torque of its own
+        steps = [0.0 if v.shape.start is None else at - v.shape.start for v, at in _own(after)]
+        leading = [step for (v, _), step in zip(_own(after), steps) if v.shape.start is not None]
+        values = np.array(leading[:1] if candidate.swings else steps)
+    left = last.rows.residual(last.x) * after.weights
+    joints = candidate.touches(view.model.robot.dof)
+    left[:, joints] += (columns @ values).T * after.weights[joints] * last.rows.use[:, joints]
+    vars(out)["design"] = designed(found, after.weights, out.source, out.rough_source, left)
+    return out
+
+
+def shapes_of(view: View) -> dict[str, float]:
+    """The shape values of what joined last."""
+    return {v.shape.name: at for v, at in _own(view)}
+
+
+def _own(view: View):
+    """The shape values of what joined last, and where they stand."""
+    own = view.model.last_shapes
+    return list(zip(view.model.shape_values[own], view.model.shapes[own]))
+
+
+def _again(view: View, model, weights, **how) -> View:
+    how |= {"stride": view.stride, "weights": weights, "grid": False, "grown": view}
+    return looked_at(view.experiment, model, view.motion, view.rough, view.prior, **how)
