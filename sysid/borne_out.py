@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from . import comparison
 from .candidates import Candidate
 from .estimate import Fit
 from .model_parameters import ROBOT
-from .unexplained import changed, nought
+from .unexplained import Refused, changed, nought
 
+_LIKELY = 0.05  # less is not listed
 _NOTHING = 5e-3  # of an error: a hundredth of its square, the least that is told in per cent
 
 
@@ -50,3 +53,12 @@ def in_doubt(before: Fit, after: Fit, told: Fit, candidate: Candidate) -> str | 
     if (paid := comparison.together(before, after, weighed=True)).delta_rms > paid.se:
         return "with it the test error of all joints together, as the fit weighs them, rises"
     return None
+
+
+def undecided(members: Sequence[tuple[Candidate, float]], fit: Fit) -> Refused:
+    """What is there and cannot be told from effects on other joints, first the first: candidates
+    with their probabilities."""
+    likely = [(one, chance) for one, chance in members if chance >= _LIKELY]
+    names = [f"{one.name} on {where(one, fit)} ({100 * chance:.0f} %)" for one, chance in likely]
+    why = f"something is there, and these logs cannot tell which: {', '.join(names)}"
+    return Refused(members[0][0].name, where(members[0][0], fit), why)

@@ -57,7 +57,7 @@ def poses(lighter: Experiment, model: Model, motion: Motion, prior: np.ndarray, 
 
 
 def placed(experiment: Experiment, model: Model, motion: Motion, prior: np.ndarray, x: np.ndarray, *, weights, stride: int) -> Settled:
-    """A model at parameters x (size,) and its own shape values, wherever these are best.
+    """A model at parameters x (size,) and its own shape values, whether or not these are its best.
 
     Args:
         weights, stride: as of `settle`.

@@ -218,7 +218,9 @@ def test_where_fits_refuse_the_head_the_next_of_its_set_is_claimed(simulated, mo
     experiment = pipeline.load(simulated(*BIAS))
     found = diagnose(experiment)
     (claim,) = found.claims
-    assert found.refused == () and [f.effect for f in claim.findings] == ["asymmetric_coulomb", "torque_bias"]
+    (refused,) = found.refused
+    assert (refused.effect, refused.joint, refused.why) == ("torque_bias", "elbow", "not it")
+    assert [f.effect for f in claim.findings] == ["asymmetric_coulomb", "torque_bias"]
     assert claim.head.command.split()[3] == "asymmetric_coulomb" and claim.after.parameters_of("asymmetric_coulomb", 1)
     assert [name for name, *_ in claim.set] == ["asymmetric_coulomb", "torque_bias"]
     monkeypatch.setattr(claims, "in_doubt", lambda *given: f"not {given[-1].name}")

@@ -23,7 +23,6 @@ from ..unexplained import Refused
 from .findings import Finding, finding
 from .refits import Member
 from .steps import Step, rejoined
-from .ties import Choice
 
 _FITTED, _LIKELY = 3, 0.1  # members of a set that are fitted, and how likely; the rest is named
 
@@ -70,20 +69,25 @@ def claimed(
         if number in stands or refused.get(number, (None,))[0] is last:
             continue
         there = {*heads, *(claim.step.candidate.key for claim in stands.values())}
-        own = [m for m in step.choice.members[:_FITTED] if m[0].candidate.key not in there]
-        near = [step.choice.members[0], *(m for m in own if m[1] >= _LIKELY)]
+        # with the head refused the least likely member may be it
+        first, *other = step.choice.members[:_FITTED]
+        near = [first, *(m for m in other if m[0].candidate.key not in there)]
         head, fits, why = _borne_out([m for m, _ in near], last, with_)
+        own = step.candidate.name, where(step.candidate, fit), why
+        refused.pop(number, None)
         if head is None:
-            told = step.candidate, step.p, taken(step.before.settled, step.after.settled, test)
-            refused[number] = last, Refused(told[0].name, where(told[0], fit), why, *told)
+            shares = taken(step.before.settled, step.after.settled, test)
+            refused[number] = last, Refused(*own, step.candidate, step.p, shares)
             continue
+        if why:
+            refused[~number] = last, Refused(*own)
         step = replace(step, choice=step.choice.headed(head))
+        near = [one for one in near if one[1] >= _LIKELY or id(one[0]) in fits]
         near.sort(key=lambda one: one[0] is not head)
         fits = [fits[id(m)] if id(m) in fits else with_(pipeline.fit_grown, m) for m, _ in near]
         found = [finding(last, a, m, p, step, len(stands)) for a, (m, p) in zip(fits, near)]
         named = [(m.candidate.name, where(m.candidate, fit), p) for m, p in step.choice.members]
         stands[number] = Claim(step, tuple(found), last, fits[0], tuple(named))
-        refused.pop(number, None)
         last = fits[0]
     claims, own = list(stands.values()), [claim.step for claim in stands.values()]
     if any(one.choice.head is not other.choice.head for one, other in zip(own, steps)):
@@ -94,22 +98,12 @@ def claimed(
 
 def _borne_out(near: list[Member], last: Fit, with_: Callable):
     """The first that fits bear out, of those that logs cannot tell apart, and the fits by the id of
-    who is in them; or why they do not bear out the head."""
+    who is in them; and why they do not bear out the head, None where they do."""
     fits, whys = {}, []
     for member in near:
         after, compared = with_(pipeline.refit, member)  # and under the last one's prior
         fits[id(member)] = after
         whys.append(in_doubt(last, compared, after, member.candidate))
         if whys[-1] is None:
-            return member, fits, ""
+            return member, fits, whys[0]
     return None, fits, whys[0]
-
-
-def undecided(choice: Choice, fit: Fit) -> Refused:
-    """What is there and cannot be told from effects on other joints."""
-    likely = [(m, chance) for m, chance in choice.members if chance >= 0.05]
-    names = [
-        f"{m.candidate.name} on {where(m.candidate, fit)} ({100 * c:.0f} %)" for m, c in likely
-    ]
-    why = f"something is there, and these logs cannot tell which: {', '.join(names)}"
-    return Refused(choice.head.candidate.name, where(choice.head.candidate, fit), why)

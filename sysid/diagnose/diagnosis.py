@@ -18,7 +18,7 @@ from functools import cache
 
 import numpy as np
 
-from .. import pipeline, thinning
+from .. import borne_out, pipeline, thinning
 from ..candidates import Candidate, candidates, own_effects
 from ..estimate import Fit
 from ..failures import Failure, HeldOut, failures
@@ -88,7 +88,8 @@ def diagnose(
         if (test := lowpassed(measured.test, fit.joints, view.cutoff)) is None:
             raise too_short()
         claims, refused = claiming.claimed(steps, fit, whole, test, tell)
-        refused += [claiming.undecided(choice, fit) for choice in undecided[-1:]]
+        open_ = [[(m.candidate, p) for m, p in choice.members] for choice in undecided[-1:]]
+        refused += [borne_out.undecided(members, fit) for members in open_]
         after, last = (claims[-1].step.after, claims[-1].after) if claims else (view, fit)
         first, then = (HeldOut(one.settled, test) for one in (view, after))
         parts = measured.train, measured.test

@@ -62,8 +62,8 @@ def around(view: View, after: View, candidate: Candidate) -> View:
     """
     rest, last = after.model.without(*candidate.key), after.settled
     x, values = np.split(last.x, [rest.size])
-    at = {"weights": after.weights, "stride": view.stride}
-    found = placed(view.experiment, rest, view.motion, view.prior, x, **at)
+    how = {"weights": after.weights, "stride": view.stride}
+    found = placed(view.experiment, rest, view.motion, view.prior, x, **how)
     known = after.weights, found, view.blocks, (), after
     out = View(view.experiment, view.motion, view.rough, view.prior, view.stride, *known)
     columns = columns_of(out.source, candidate, [shapes_of(after)])[0]
