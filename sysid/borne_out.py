@@ -14,21 +14,10 @@ _LIKELY = 0.05  # less is not listed
 _NOTHING = 5e-3  # of an error: a hundredth of its square, the least that is told in per cent
 
 
-def where(candidate: Candidate, fit: Fit) -> str:
-    """The name of its joint, or `*`."""
-    return "*" if candidate.joint == ROBOT else fit.joints[candidate.joint]
-
-
-def judged_by(candidate: Candidate, fit: Fit) -> list[str]:
-    """The joints whose error an effect is judged by."""
-    joint = where(candidate, fit)
-    return list(fit.joints) if joint == "*" else [joint]
-
-
 def in_doubt(before: Fit, after: Fit, told: Fit, candidate: Candidate) -> str | None:
     """Why fits do not bear out a candidate, None where they do. Both are fits with it: after under
     the prior of the one before, told as `sysid add` gives it."""
-    own, whole = judged_by(candidate, before), candidate.joint == ROBOT
+    own, whole = candidate.judged_by(before.joints), candidate.joint == ROBOT
     if whole:  # what held bodies against its lack may hold them against it
         after = min((after, told), key=lambda one: comparison.together(before, one).delta_rms)
     if not any(after.rms("train")[joint] < before.rms("train")[joint] for joint in own):
@@ -58,7 +47,9 @@ def in_doubt(before: Fit, after: Fit, told: Fit, candidate: Candidate) -> str | 
 def undecided(members: Sequence[tuple[Candidate, float]], fit: Fit) -> Refused:
     """What is there and cannot be told from effects on other joints, first the first: candidates
     with their probabilities."""
-    likely = [(one, chance) for one, chance in members if chance >= _LIKELY]
-    names = [f"{one.name} on {where(one, fit)} ({100 * chance:.0f} %)" for one, chance in likely]
+    likely = [(one.name, one.where(fit.joints), chance) for one, chance in members]
+    names = [
+        f"{one} on {at} ({100 * chance:.0f} %)" for one, at, chance in likely if chance >= _LIKELY
+    ]
     why = f"something is there, and these logs cannot tell which: {', '.join(names)}"
-    return Refused(members[0][0].name, where(members[0][0], fit), why)
+    return Refused(*likely[0][:2], why)

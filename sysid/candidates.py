@@ -9,7 +9,7 @@ from .deflection import Deflection
 from .effect import Effect, MotionEffect, SensorEffect, WrenchEffect
 from .listed_effects import found as found_effect
 from .model import Model
-from .model_parameters import ROBOT
+from .model_parameters import ROBOT, place
 from .specs import Experiment, is_own
 from .vocabulary import find, vocabulary
 
@@ -47,6 +47,14 @@ class Candidate:
     def told(self, joints: Sequence[str]) -> str:
         """Its word, and the name of its joint where it has one."""
         return self.name if self.joint == ROBOT else f"{self.name} on {joints[self.joint]}"
+
+    def where(self, joints: Sequence[str]) -> str:
+        """The name of its joint, or `*`."""
+        return place(self.joint, joints)
+
+    def judged_by(self, joints: Sequence[str]) -> list[str]:
+        """The joints whose error it is judged by."""
+        return list(joints) if self.joint == ROBOT else [joints[self.joint]]
 
     @property
     def parameters(self) -> int:

@@ -25,7 +25,7 @@ from .effect import Effect, MotionEffect, SensorEffect, WrenchEffect
 from .errors import SysidError
 from .instants import Instants, at_no_time
 from .model import Model
-from .model_parameters import ROBOT
+from .model_parameters import place
 from .robot import Robot
 
 NOWHERE: Mapping[str, str] = MappingProxyType({})
@@ -219,10 +219,7 @@ def inverse_dynamics(model: Model, x, levels: Mapping[str, str] = NOWHERE) -> In
         if isinstance(effect, DRIVE_EFFECTS):
             continue  # torque is the joint's, whatever turns it
         if not (effect.instantaneous and _keeps_its_word(effect, robot, joints, named)):
-            omitted += [
-                f"{effect.name}.{'*' if joint == ROBOT else robot.joints[joint]}"
-                for joint in joints
-            ]
+            omitted += [f"{effect.name}.{place(joint, robot.joints)}" for joint in joints]
             continue
         uses_load |= effect.uses_load
         if effect.elementwise:

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from .effect import Effect
 from .effect_parameters import Shape
 
 ROBOT = -1  # the "joint" of an effect of the whole robot, called `*`
+
+
+def place(joint: int, joints: Sequence[str]) -> str:
+    """The name of a joint by its number, `*` of the whole robot."""
+    return "*" if joint == ROBOT else joints[joint]
 
 
 @dataclass(frozen=True)

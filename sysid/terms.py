@@ -15,7 +15,7 @@ from .effect import Effect, TorqueEffect, WrenchEffect
 from .effect_parameters import Shape
 from .errors import SysidError
 from .inertia import PARAMETERS, UNITS
-from .model_parameters import ROBOT, Coefficient, ShapeValue, holds
+from .model_parameters import ROBOT, Coefficient, ShapeValue, holds, place
 from .motion import Motion, Piece
 from .robot import Robot
 from .scales import Scales, scales
@@ -94,7 +94,7 @@ class Terms:
 
     def _name(self, effect: Effect, joint: int, word: str) -> str:
         level = "" if effect.level is None else f"[{effect.level}]"
-        return f"{effect.name}.{'*' if joint == ROBOT else self.robot.joints[joint]}.{word}{level}"
+        return f"{effect.name}.{place(joint, self.robot.joints)}.{word}{level}"
 
     def _unit(self, unit: str, joint: int) -> str:
         return units.of_joint(unit, prismatic=joint != ROBOT and bool(self.robot.prismatic[joint]))

@@ -16,6 +16,7 @@ import numpy as np
 from .drives import DRIVE_EFFECTS
 from .estimate import Fit
 from .inertia import pseudo
+from .model_parameters import place
 from .urdf import rotation_rpy, rpy_of
 
 SAYS = frozenset({"damping", "friction"})  # of `Effect.simulators`
@@ -151,7 +152,7 @@ def _unsaid(fit: Fit) -> str:
         if known or isinstance(effect, DRIVE_EFFECTS):
             continue
         for joint in joints:
-            name = f"{effect.name}.{'*' if joint < 0 else robot.joints[joint]}"
+            name = f"{effect.name}.{place(joint, robot.joints)}"
             own = ", ".join(
                 f"{one.name.rpartition('.')[2]} = {at:.6g} {one.unit}"
                 for one, at in values

@@ -10,7 +10,7 @@ import pytest
 from scripts.blind_parts import cases, robots
 from sysid import borne_out, pipeline
 from sysid.blocks import Belief
-from sysid.candidates import candidates
+from sysid.candidates import Candidate, candidates
 from sysid.comparison import Difference
 from sysid.diagnose.ask import Asked, ask
 from sysid.diagnose.detectable import detectable
@@ -28,6 +28,7 @@ from sysid.statement.words import elsewhere
 from sysid.transfer import Transfer
 from sysid.unexplained import Refused, changed
 from sysid.view import first_view
+from sysid.vocabulary import find
 
 # ---- verdicts, by hand
 
@@ -81,7 +82,7 @@ def test_what_is_nothing_in_size_and_error_is_not_claimed(monkeypatch, fall, tol
     monkeypatch.setattr(borne_out.comparison, "compare", falls)
     monkeypatch.setattr(borne_out.comparison, "together", lambda *_, **__: Difference("", "", "*", all_, 0.01))
     shown.parameters_of = lambda effect, joint: {"T": (size, 0.1, "s"), "k": (3.0, float("nan"), "1")}
-    candidate = SimpleNamespace(joint=1, key=("delay", 1), touches=lambda dof: [1])
+    candidate = Candidate(find("delay"), 1, ())
     assert (borne_out.in_doubt(fitted(1.0, train=1.0), after, shown, candidate) is None) is stands
 
 
@@ -90,18 +91,18 @@ def test_an_effect_of_the_whole_robot_stands_under_either_prior(monkeypatch, und
     """A prior that held the bodies against what was missing may hold them against the effect: then what `sysid add` gives counts."""
     before, after, shown = fitted(1.0, train=1.0), fitted(1.0, train=0.9), fitted(1.0, train=0.9)
     monkeypatch.setattr(borne_out.comparison, "together", lambda _, one, **__: Difference("", "", "*", told if one is shown else under, 0.01))
-    candidate = SimpleNamespace(joint=-1, key=("gravity_tilt", -1), touches=lambda dof: list(range(dof)))
+    candidate = Candidate(find("gravity_tilt"), -1, ())
     assert (borne_out.in_doubt(before, after, shown, candidate) is None) is stands
 
 
-@pytest.mark.parametrize(("touches", "all_", "stands"), [([0, 1], -0.03, True), ([0, 1], -0.008, False), ([0, 1], 0.0, False), ([1], -0.03, False)])
-def test_what_moves_a_joint_may_show_in_the_torque_of_another(monkeypatch, touches, all_, stands):
+@pytest.mark.parametrize(("effect", "all_", "stands"), [("encoder_offset", -0.03, True), ("encoder_offset", -0.008, False), ("encoder_offset", 0.0, False), ("warmup", -0.03, False)])
+def test_what_moves_a_joint_may_show_in_the_torque_of_another(monkeypatch, effect, all_, stands):
     """The error of its own joint hardly falls, that of all together by three standard errors, or less than one."""
     monkeypatch.setattr(borne_out.comparison, "compare", lambda *_: [Difference("", "", "elbow", -0.001, 0.01)])
     monkeypatch.setattr(borne_out.comparison, "together", lambda *_, **__: Difference("", "", "*", all_, 0.01))
     after = fitted(1.0, train=0.9)
     after.parameters_of = lambda effect, joint: {"d": (0.5, 0.1, "rad")}
-    candidate = SimpleNamespace(joint=1, key=("encoder_offset", 1), touches=lambda dof: touches)
+    candidate = Candidate(find(effect), 1, ())
     assert (borne_out.in_doubt(fitted(1.0, train=1.0), after, after, candidate) is None) is stands
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from ..blocks import jackknife
 from ..inertia import DIVERGENCES, PARAMETERIZATIONS, pseudo
 from ..model import Model
-from ..model_parameters import ROBOT
+from ..model_parameters import ROBOT, place
 from ..objective import Objective
 from ..projection import inverted, of_data, root
 from ..solve import Coordinates, solve
@@ -52,7 +52,7 @@ def together(model: Model, asked: Question, chosen) -> tuple[tuple[Change, ...],
         rest = asked.across([other for other in chosen if other != key])
         share, z = asked.taken(key, rest, with_all)
         error = share / z if z else np.nan
-        joint = "*" if key[1] == ROBOT else model.robot.joints[key[1]]
+        joint = place(key[1], model.robot.joints)
         by_data = [one[own, own] for one in spreads]
         parameters = _parameters(model, key, c[own], without[:, own], *by_data)
         out.append(Change(key[0], joint, share, error, parameters))

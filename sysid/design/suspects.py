@@ -20,7 +20,6 @@ from ..effect import SensorEffect
 from ..effect_parameters import Shape
 from ..estimate import Fit
 from ..model import Model
-from ..model_parameters import ROBOT
 from ..motion import Motion
 from ..rows import Rows, stack, starts
 from ..source import Source
@@ -48,8 +47,7 @@ class Suspect:
 
     def named(self, joints: Sequence[str]) -> str:
         """`effect:joint`, as `--separate` has it."""
-        own = self.candidate
-        return f"{own.name}:{'*' if own.joint == ROBOT else joints[own.joint]}"
+        return f"{self.candidate.name}:{self.candidate.where(joints)}"
 
 
 def along(

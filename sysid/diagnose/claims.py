@@ -14,7 +14,7 @@ import numpy as np
 
 from .. import pipeline
 from ..addition import grown, spelled
-from ..borne_out import in_doubt, where
+from ..borne_out import in_doubt
 from ..estimate import Fit
 from ..experiment_logs import Read
 from ..failures import taken
@@ -59,7 +59,7 @@ def claimed(
     stands, refused, last = dict[int, Claim](), dict[int, tuple[Fit, Refused]](), fit
 
     def with_(how: Callable, member: Member):
-        name, joints, options = spelled(member.candidate, where(member.candidate, fit))
+        name, joints, options = spelled(member.candidate, member.candidate.where(fit.joints))
         spec = grown(last.experiment, name, joints, options, every=fit.joints)
         return how(spec, last, filters=fit.filters, progress=tell, measured=measured)
 
@@ -73,7 +73,7 @@ def claimed(
         first, *other = step.choice.members[:_FITTED]
         near = [first, *(m for m in other if m[0].candidate.key not in there)]
         head, fits, why = _borne_out([m for m, _ in near], last, with_)
-        own = step.candidate.name, where(step.candidate, fit), why
+        own = step.candidate.name, step.candidate.where(fit.joints), why
         refused.pop(number, None)
         if head is None:
             shares = taken(step.before.settled, step.after.settled, test)
@@ -86,7 +86,9 @@ def claimed(
         near.sort(key=lambda one: one[0] is not head)
         fits = [fits[id(m)] if id(m) in fits else with_(pipeline.fit_grown, m) for m, _ in near]
         found = [finding(last, a, m, p, step, len(stands)) for a, (m, p) in zip(fits, near)]
-        named = [(m.candidate.name, where(m.candidate, fit), p) for m, p in step.choice.members]
+        named = [
+            (m.candidate.name, m.candidate.where(fit.joints), p) for m, p in step.choice.members
+        ]
         stands[number] = Claim(step, tuple(found), last, fits[0], tuple(named))
         last = fits[0]
     claims, own = list(stands.values()), [claim.step for claim in stands.values()]

@@ -9,7 +9,6 @@ import numpy as np
 
 from .. import comparison
 from ..addition import command, spelled
-from ..borne_out import judged_by, where
 from ..estimate import Fit
 from .refits import Member
 from .steps import Step
@@ -58,13 +57,13 @@ def finding(
         number: of the step among those that stand.
     """
     candidate = member.candidate
-    own, joint = judged_by(candidate, before), where(candidate, before)
+    own, joint = candidate.judged_by(before.joints), candidate.where(before.joints)
     square = lambda fit: np.mean([fit.rms("test")[j] ** 2 for j in own])  # noqa: E731
     errors = [float(np.sqrt(square(fit))) for fit in (before, after)]
     differences = {d.joint: d.se for d in comparison.compare(before, after, ("before", "after"))}
     se = float(np.sqrt(np.nansum([differences[j] ** 2 for j in own]) / len(own)))
     tied = [
-        (m.candidate.name, where(m.candidate, before))
+        (m.candidate.name, m.candidate.where(before.joints))
         for m, _ in step.choice.members
         if m is not member
     ]

@@ -8,7 +8,7 @@ import numpy as np
 
 from .. import regressor
 from ..model import Model
-from ..model_parameters import ROBOT
+from ..model_parameters import place
 from ..motion import Motion
 from .stated import Stated, stated
 
@@ -35,7 +35,7 @@ def costs(
         motion: of the test logs, or None.
     """
     joints, rotors = model.robot.joints, len(model.robot.bodies) > model.robot.dof
-    named = [(name, "*" if joint == ROBOT else joints[joint]) for name, joint in said.unsaid]
+    named = [(name, place(joint, joints)) for name, joint in said.unsaid]
     if motion is None:
         left = [*named, *([("rotors", "*")] if rotors else [])]
         return tuple(Cost(*entry, None) for entry in left), None

@@ -37,7 +37,7 @@ def document(found: Diagnosis, run="") -> dict:
         "detectable": [
             {
                 "effect": d.candidate.name,
-                "joint": _joint(d.candidate, joints),
+                "joint": d.candidate.where(joints),
                 "parameter": d.parameter,
                 "size": d.size,
                 "unit": d.unit,
@@ -51,7 +51,7 @@ def document(found: Diagnosis, run="") -> dict:
         "absorbed": [
             {
                 "effect": d.candidate.name,
-                "joint": _joint(d.candidate, joints),
+                "joint": d.candidate.where(joints),
                 "separate_by": d.candidate.effect.separate_by,
             }
             for d in found.detectable
@@ -117,10 +117,6 @@ def _units(d, fit) -> dict[str, str]:
     slides = d.candidate.joint != ROBOT and bool(fit.model.robot.prismatic[d.candidate.joint])
     shapes = d.candidate.effect.shapes()
     return {s.name: of_joint(s.unit, prismatic=slides) for s in shapes if s.name in d.at}
-
-
-def _joint(candidate, joints) -> str:
-    return "*" if candidate.joint == ROBOT else joints[candidate.joint]
 
 
 def _floor(floor) -> dict:
