@@ -10,7 +10,6 @@ import numpy as np
 
 from .candidates import Candidate
 from .model_parameters import ROBOT
-from .noise import DOUBT
 
 _CLEAR = 2.0  # standard deviations
 _MOST = 0.5  # of what stands above a floor, or of a square
@@ -136,17 +135,6 @@ def noisy(before: float, after: float, floor) -> bool:
     if floor.rms is None or _MOST * after**2 > floor.rms**2:
         return False
     return explains(before, after, floor.rms) >= _MOST or floor.reached(after)
-
-
-def above(remains, error: float, floor: float) -> bool:
-    """Whether what the motion predicts stands above the floor: the error without it does, and it is
-    more than the floor's doubt lets pass.
-
-    Args:
-        remains: the `flexible.Unknown` that predicts it, None where nothing does.
-    """
-    left = 1.0 if remains is None else 1.0 - remains.share
-    return left < (1.0 + DOUBT) ** -2 and left * error**2 >= floor**2
 
 
 def by_weights(fit, joint: str, floor: float | None, weighed: dict[str, float]) -> bool:

@@ -310,7 +310,7 @@ def test_where_nothing_can_be_asked_nothing_is_there():
 
 def test_a_function_alone_is_said_with_its_variables():
     found = asked(LAWS["a product of two angles"][0])
-    seen = replace(found, chance=0.5, gain=np.zeros(10), shares={}).with_law(Law(1e-3, "q_elbow and q_shoulder", 0.4))
+    seen = replace(found, chance=0.5, gain=np.zeros(10), shares={}).with_law(Law(1e-3, "q_elbow and q_shoulder", 0.4), 2, 0.03)
     assert seen.predictable(2, WORTH) and seen.share == pytest.approx(0.4)
     (entry,) = dependences(seen)
     assert entry == {"variable": "q_elbow", "with": "q_shoulder", "share": pytest.approx(0.4)}

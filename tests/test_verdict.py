@@ -189,7 +189,10 @@ def test_what_the_motion_predicts_and_no_effect_does_is_unknown():
     said = _verdict(found)
     assert said["depends_on"] == [{"variable": "q_elbow", "share": 0.6}] and said["share_left"] == pytest.approx(0.6) and said["also"] == []
     # nothing above the floor is left: it predicts the noise's own colour at most
-    assert elbow(1.0, rest=left(0.6)).status == "complete"
+    assert elbow(1.01, rest=left(0.6)).status == "complete"
+    # at the floor as far as that is known, and not by its standard error
+    assert elbow(1.08, rest=left(0.6)).status == "unknown"
+    assert elbow(1.08).status == "complete"
     assert elbow(2.0, rest=left(0.6 * WORTH)).status == "unresolved"
 
 
@@ -255,16 +258,15 @@ def test_what_only_the_weights_of_the_joints_leave_is_said_to_be_theirs(weighed,
     fit, floors = fitted(2.0, train=train), [floor(), floor()]
     says = verdicts(fit, (), [NOISE, NOISE], floors, weighed={"elbow": weighed})[1].says
     assert ("`weighting: noise` under `solver:`" in says) is told and "2 times the noise floor" in says or not told
-    # what the motion predicts of it is no unknown effect then
-    assert (verdicts(fit, (), [NOISE, left(0.5)], floors, weighed={"elbow": weighed})[1].status == "unresolved") is told
     fit.weights = np.ones(2)  # they do count so
     assert "weighting" not in verdicts(fit, (), [NOISE, NOISE], floors, weighed={"elbow": weighed})[1].says
 
 
 def test_what_is_left_with_other_weights_may_still_be_unknown():
-    """With `weighting: noise` the error would be 1.35 times the floor, and the motion predicts half of that."""
+    """With `weighting: noise` the error would be 1.35 times the floor, and the motion predicts half of that; not where it would be no more than noise."""
     known = {"weighed": {"elbow": 1.35}}
     assert verdicts(fitted(2.0), (), [NOISE, left(0.5)], [floor(), floor()], **known)[1].status == "unknown"
+    assert verdicts(fitted(2.0), (), [NOISE, left(0.5)], [floor(), floor()], weighed={"elbow": 1.01})[1].status == "unresolved"
     found = verdicts(fitted(2.0), (), [NOISE, NOISE], [floor(), floor()], **known)[1]
     assert found.status == "unresolved" and "it would be 1.4 times the noise floor" in found.says
 
@@ -412,7 +414,7 @@ def asked_of_elbow(error: float, *, gain: float = 0.3, chance: float = 1e-3, nea
         return Law(chance, "q_elbow and qd_shoulder", gain)
 
     found = verdicts(
-        fitted(error), [], [NOISE, NOISE], [floor(), floor()], (), (), weighed, agreed, lambda j, own: near if own > 0 else None, beyond
+        fitted(error), [], [NOISE, NOISE], [floor(), floor()], (), (), weighed, agreed, lambda j, own, there: near if own > 0 else None, beyond
     )
     return found[1], seen
 
@@ -422,9 +424,19 @@ def test_blocks_are_asked_of_joints_above_their_floors_alone():
     assert found.status == "unknown" and seen == [1] and found.left.single == pytest.approx(0.3)
     found, seen = asked_of_elbow(1.0)
     assert found.status == "complete" and seen == []
-    # nor where the weights of the fit are most of it
-    found, seen = asked_of_elbow(3.0, weighed={"shoulder": 1.0, "elbow": 1.2})
+    # at the floor as far as that is known, and a law stands out all the same
+    found, seen = asked_of_elbow(1.08)
+    assert found.status == "unknown" and seen == [1]
+    # nor where the weights of the fit are all of it
+    found, seen = asked_of_elbow(3.0, weighed={"shoulder": 1.0, "elbow": 1.01})
     assert found.status == "unresolved" and seen == []
+
+
+def test_a_law_stands_beside_what_is_claimed():
+    """Ridge regression says little of what an effect left, one function much: the effect is not all."""
+    some = [claim("torque_gain", "elbow", [0.0, 0.6], fitted(1.3))]
+    by = lambda share: verdicts(fitted(3.0), some, [NOISE, left(0.2)], [floor(), floor()], law=lambda j: Law(1e-9, "q_elbow and q_shoulder", share))[1]  # noqa: E731
+    assert by(0.3).status == "missing" and by(0.9).status == "unknown" and by(0.9).left.share == pytest.approx(0.9)
 
 
 @pytest.mark.parametrize(("gain", "chance"), [(0.3, 0.2), (0.5 * WORTH, 1e-3)])
@@ -460,7 +472,7 @@ def test_where_a_law_stands_out_with_the_effect_in_the_model_too_the_effect_is_n
     assert (found.says == told) is (status == "unknown")
     assert (found.may is None) is (status == "unknown") and found.left.single == pytest.approx(0.3)
     # what ridges predicted without it is nothing that they predict with it
-    ridged = verdicts(fitted(3.0), [], [NOISE, left(0.5)], [floor(), floor()], near=lambda j, own: (stribeck, 0.02), beyond=lambda *_: Law(1e-6, "q", 0.001))
+    ridged = verdicts(fitted(3.0), [], [NOISE, left(0.5)], [floor(), floor()], near=lambda j, own, there: (stribeck, 0.02), beyond=lambda *_: Law(1e-6, "q", 0.001))
     assert ridged[1].status == "unresolved"
     # where no law stands out without it, nobody looks for one with it
     asked_of_elbow(3.0, chance=0.5, near=(stribeck, 0.02), beyond=beyond)
@@ -471,7 +483,7 @@ def test_an_effect_that_may_be_there_is_told_where_nothing_else_predicts_the_res
     """It takes half of all that is left then."""
     asked = []
 
-    def near(j: int, own: float):
+    def near(j: int, own: float, there: bool):
         asked.append((j, own))
         return SimpleNamespace(name="torque_saturation"), 0.012
 
@@ -496,5 +508,9 @@ def test_an_effect_is_near_that_stands_at_five_per_cent_and_takes_half():
     groups = [group("spring"), group("cable"), group("cogging"), group("payload")]  # whose sign forbids the last
     one = (groups, np.array([3.9, 3.95, 3.0, 3.99]), np.array([6.0, 4.0, 9.0, 9.0]), maxima)
     asked = Asked({0: one}, Belief())
-    assert asked.near(0, 10.0)[0].name == "spring"  # cable takes less than half, cogging may be chance
-    assert asked.near(0, 7.0)[0].name == "cable" and asked.near(0, 20.0) is None is asked.near(1, 10.0)
+    assert asked.near(0, 10.0, False)[0].name == "spring"  # cable takes less than half, cogging may be chance
+    assert asked.near(0, 7.0, False)[0].name == "cable" and asked.near(0, 20.0, False) is None is asked.near(1, 10.0, True)
+    # where something is there, what would be chance among all may be it
+    assert asked.near(0, 14.0, False) is None and asked.near(0, 14.0, True)[0].name == "cogging"
+    asked = Asked({0: (groups, np.array([3.9, 3.95, 1.6, 3.99]), *one[2:])}, Belief())
+    assert asked.near(0, 14.0, True) is None

@@ -63,6 +63,7 @@ def claimed(
         spec = grown(last.experiment, name, joints, options, every=fit.joints)
         return how(spec, last, filters=fit.filters, progress=tell, measured=measured)
 
+    named = lambda one: (one.name, one.where(fit.joints))  # noqa: E731
     heads = [step.candidate.key for step in steps]
     # what was refused is asked once more with all that stand: the search found it beside them
     for number, step in [*enumerate(steps), *enumerate(steps)]:
@@ -73,7 +74,7 @@ def claimed(
         first, *other = step.choice.members[:_FITTED]
         near = [first, *(m for m in other if m[0].candidate.key not in there)]
         head, fits, why = _borne_out([m for m, _ in near], last, with_)
-        own = step.candidate.name, step.candidate.where(fit.joints), why
+        own = *named(step.candidate), why
         refused.pop(number, None)
         if head is None:
             shares = taken(step.before.settled, step.after.settled, test)
@@ -86,10 +87,8 @@ def claimed(
         near.sort(key=lambda one: one[0] is not head)
         fits = [fits[id(m)] if id(m) in fits else with_(pipeline.fit_grown, m) for m, _ in near]
         found = [finding(last, a, m, p, step, len(stands)) for a, (m, p) in zip(fits, near)]
-        named = [
-            (m.candidate.name, m.candidate.where(fit.joints), p) for m, p in step.choice.members
-        ]
-        stands[number] = Claim(step, tuple(found), last, fits[0], tuple(named))
+        set_ = tuple((*named(m.candidate), p) for m, p in step.choice.members)
+        stands[number] = Claim(step, tuple(found), last, fits[0], set_)
         last = fits[0]
     claims, own = list(stands.values()), [claim.step for claim in stands.values()]
     if any(one.choice.head is not other.choice.head for one, other in zip(own, steps)):

@@ -57,8 +57,8 @@ class Group:
 
     @cached_property
     def taken(self) -> float:
-        """The gain of all folds."""
-        return float(gain(self).sum())
+        """What it takes of the weighted squared residual of blocks held apart from it."""
+        return float(blocks.gains(self.c, self.scores, self.squares).sum())
 
     @cached_property
     def moves(self) -> np.ndarray:
@@ -155,11 +155,6 @@ class Group:
     def coefficients(self) -> np.ndarray:
         """(k0,) the candidate's own."""
         return self.back @ self.c
-
-
-def gain(group: Group) -> np.ndarray:
-    """(folds,) what a group takes of the weighted squared residual of blocks held apart from it."""
-    return blocks.gains(group.c, group.scores, group.squares)
 
 
 def known_together(groups: list[Group]) -> None:

@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from ..candidates import Candidate
 from ..estimate import Fit
 from ..flexible import Law, Unknown
 from ..transfer import Transfer
-from ..unexplained import above, by_weights, cause, explains, in_vain, loudest, noisy, not_all
+from ..unexplained import by_weights, cause, explains, in_vain, loudest, noisy, not_all
 from .ask import HALF
 from .claims import Claim
 from .select import LEVEL, WORTH
@@ -51,7 +53,7 @@ def verdicts(
     carried: Sequence[Transfer] = (),
     weighed: dict[str, float] | None = None,
     law: Callable[[int], Law] | None = None,
-    near: Callable[[int, float], tuple[Candidate, float] | None] | None = None,
+    near: Callable[[int, float, bool], tuple[Candidate, float] | None] | None = None,
     beyond: Callable[[int, Candidate], Law | None] | None = None,
 ) -> list[Verdict]:
     """The verdict on every joint.
@@ -61,48 +63,51 @@ def verdicts(
             in the model. floors: of each joint's noise. carried: whether the model with all claims
             carries over, of each joint. weighed: {joint: RMS where each counts by its noise}.
             law: the function that stands out most of what is left of a joint, asked where `left`
-            says nothing. near: the effect that may be what is left, or predicted of it. beyond: the
-            function that stands out most with such an effect in the model.
+            says nothing, or something is claimed. near: the effect that may be what is left, or
+            predicted of it. beyond: the function that stands out most with such an effect in the
+            model.
     """
     last = claims[-1].after if claims else fit
     errors = last.rms("train"), last.rms("test")
-    reaches = [f.reached(max(e[j] for e in errors)) for f, j in zip(floors, fit.joints)]
-    evens = [by_weights(last, joint, f.rms, weighed or {}) for f, joint in zip(floors, fit.joints)]
-    asked = [not at and not even for at, even in zip(reaches, evens)]
-    louder = loudest(errors[1], floors, asked)
+    weighed, most = weighed or {}, {j: max(e[j] for e in errors) for j in fit.joints}
+    by_joint = list(zip(fit.joints, floors))
+    reaches = [floor.reached(most[joint]) for joint, floor in by_joint]
+    evens = [by_weights(last, joint, floor.rms, weighed) for joint, floor in by_joint]
+    louder = loudest(errors[1], floors, [not (at or even) for at, even in zip(reaches, evens)])
+    # an error that is no more than noise, however joints are weighed, lacks nothing
+    asked = [not f.within(min(most[j], weighed.get(j, np.inf))) for j, f in by_joint]
     out = []
     for j, joint in enumerate(fit.joints):
         taking = [c for c in claims if c.head.joint == joint or c.step.shares[j] >= WORTH]
         pairs = [(fit.rms(part)[joint], last.rms(part)[joint]) for part in ("train", "test")]
-        first, then, floor = *pairs[1], floors[j].rms
+        first, then = pairs[1]
         both = [after for _, after in pairs]
         # what does not lower the joint's error on the test logs is no name for it
         own = tuple(c for c in taking if c.head.joint in (joint, "*") and then < first)
         others = tuple(c for c in taking if c.head.joint not in (joint, "*"))
-        low, noise = (floor or unsure or 0.0 for unsure in (floors[j].low, floors[j].about))
+        low, noise = (floors[j].rms or v or 0.0 for v in (floors[j].low, floors[j].about))
         explained = explains(first, then, low) if claims else float("nan")
         # who leaves more that is no noise is no name for what is missing; in no log is there more
         # noise than an error of another, so that what does not carry over is no noise
         whole = (1.0 + _LEFT) * explains(first, then, min(*both, noise)) >= 1.0
         whole |= noisy(*pairs[1], floors[j]) or floors[j].reached(both[0])
-        seen, among = left[j], sum(asked) if asked[j] else len(left)
-        if law and asked[j] and then > 0.0 and not seen.predictable(among, WORTH):
-            seen = seen.with_law(law(j))
-        remains = seen if seen.predictable(among, WORTH) else None
-        most = remains.share if remains else 1.0
-        looks = near(j, most * seen.total) if near else None
-        looks = looks or in_vain(refused, fit.joints, j, HALF * most)
-        reached = reaches[j] and first > 0.0 and not above(remains, then, floor)
+        seen, among = left[j], sum(asked)
+        if law and asked[j] and then > 0.0 and (own or not seen.predictable(among, WORTH)):
+            seen = seen.with_law(law(j), among, WORTH)
+        remains = seen if asked[j] and seen.predictable(among, WORTH) else None
+        part = remains.share if remains else 1.0
+        looks = near(j, part * seen.total, bool(remains)) if near else None
+        looks = looks or in_vain(refused, fit.joints, j, HALF * part)
+        reached = reaches[j] and first > 0.0 and not remains
         taken = sum(c.step.shares[j] for c in own)
-        even = evens[j] and floors[j].reached(weighed[joint])  # it explains all
         little = remains is None or remains.share * max(1.0 - taken, 0.0) <= _LEFT * taken
         stands, further = bool(own) and (whole or evens[j]) and little, None
-        if looks and remains and beyond and not (own or reached or even):
+        if looks and remains and beyond and not own:
             further = beyond(j, looks[0])
             further = further if further and further.predicts(among, WORTH) else None
         if stands:
             told = ("missing", own, explained, remains)
-        elif own or (remains and not (reached or even) and (further or not looks)):
+        elif own or (remains and (further or not looks)):
             why = not_all(looks[0].name, further.share) if further else ""
             why = why if remains else cause(both, floors[j])
             told = ("unknown", own or others, explained, remains, why)
@@ -116,8 +121,8 @@ def verdicts(
         elif floors[j].reached(first) or not claims:
             told = ("complete",)
         else:
-            most = others or (max(claims, key=lambda c, j=j: c.step.shares[j]),)
-            told = ("explained", most, explained)
+            who = others or (max(claims, key=lambda c, j=j: c.step.shares[j]),)
+            told = ("explained", who, explained)
         out.append(Verdict(joint, *told))
     said = {found.joint: found.says for found in carried}
     return [replace(one, carries=said.get(one.joint, "")) for one in out]

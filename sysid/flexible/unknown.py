@@ -15,7 +15,7 @@ TONE = 1e-4  # probability of a line that strong by chance
 # Of a squared residual: two that differ by less correlate by 0.99; and by how much their difference
 # may follow what was predicted, so that its share changes by a hundredth
 _SAME, _FOLLOWS = 0.02, 0.005
-LEVEL = 0.05  # family-wise and nominal: how often a law is said to be missing where none is
+LEVEL = 0.01  # family-wise and nominal, as of effects: a law is said to be missing, and none is
 
 
 @dataclass(frozen=True)
@@ -85,8 +85,11 @@ class Unknown:
         functions = self.chance < 0.5 * LEVEL / joints and self.predicted > worth
         return bool(functions or self.tone > worth)
 
-    def with_law(self, found: Law) -> Unknown:
-        """This and the function that stands out most; the chance is the smaller one of the two."""
+    def with_law(self, found: Law, joints: int, worth: float) -> Unknown:
+        """This and the function that stands out most, where it predicts a part worth having; the
+        chance is the smaller one of the two."""
+        if not found.predicts(joints, worth):
+            return self
         share = min(found.share, 1.0)
         shares = self.shares | {found.variables: max(share, self.shares.get(found.variables, 0.0))}
         return replace(self, chance=min(self.chance, found.chance), shares=shares, single=share)

@@ -50,6 +50,10 @@ class NoiseFloor:
         """Whether an error is at it, as far as it is known."""
         return self.rms is not None and error <= (1.0 + DOUBT) * self.rms + 2.0 * self.std
 
+    def within(self, error: float) -> bool:
+        """Whether an error is no more than it, by its standard error."""
+        return self.rms is not None and error <= self.rms + self.std
+
 
 @dataclass(frozen=True)
 class Estimate:
