@@ -62,10 +62,9 @@ def verdicts(
         fit: of the experiment as it is. left: what functions of the motion predict with all claims
             in the model. floors: of each joint's noise. carried: whether the model with all claims
             carries over, of each joint. weighed: {joint: RMS where each counts by its noise}.
-            law: the function that stands out most of what is left of a joint, asked where `left`
-            says nothing, or something is claimed. near: the effect that may be what is left, or
-            predicted of it. beyond: the function that stands out most with such an effect in the
-            model.
+            law: the function that stands out most of what is left of a joint. near: the effect that
+            may be what is left, or predicted of it. beyond: the function that stands out most with
+            such an effect in the model.
     """
     last = claims[-1].after if claims else fit
     errors = last.rms("train"), last.rms("test")
@@ -92,7 +91,7 @@ def verdicts(
         whole = (1.0 + _LEFT) * explains(first, then, min(*both, noise)) >= 1.0
         whole |= noisy(*pairs[1], floors[j]) or floors[j].reached(both[0])
         seen, among = left[j], sum(asked)
-        if law and asked[j] and then > 0.0 and (own or not seen.predictable(among, WORTH)):
+        if law and asked[j] and then > 0.0:
             seen = seen.with_law(law(j), among, WORTH)
         remains = seen if asked[j] and seen.predictable(among, WORTH) else None
         part = remains.share if remains else 1.0
