@@ -15,7 +15,6 @@ from .evidence import Group
 from .projected import groups
 
 _MAY_BE = 0.05  # family-wise: an effect that may be there, though it is not claimed
-ALONE = 1.645  # standard errors: five per cent, were it the only question
 HALF = 0.5  # of what functions of the motion predict: that much may be the effect
 
 
@@ -60,13 +59,14 @@ class Asked:
 
     def near(self, joint: int, gain: float, there: bool) -> tuple[Candidate, float] | None:
         """The effect on a joint that may be there and takes half of a gain: the likeliest; there:
-        as something surely is, and the question is whether this is it."""
-        found, told, gains, _ = self.by_joint.get(joint, ([], np.zeros(0), np.zeros(0), None))
-        takes = np.flatnonzero((gains > HALF * gain) & (told > ALONE))
-        best = max((k for k in takes if found[k].signed), key=told.__getitem__, default=None)
-        p = 1.0 if best is None else null.chance(told[best], self.maxima)
-        may = best is not None and (there or p <= _MAY_BE)
-        return (found[best].candidate, p) if may else None
+        as something on that joint surely is, among its own effects alone."""
+        found, statistics, gains, own = self.by_joint.get(joint, ([], [], [], None))
+        takes = [k for k, taken in enumerate(gains) if taken > HALF * gain and found[k].signed]
+        best = max(takes, key=lambda k: statistics[k], default=None)
+        if best is None:
+            return None
+        p, alone = (null.chance(statistics[best], most) for most in (self.maxima, own))
+        return (found[best].candidate, p) if (alone if there else p) <= _MAY_BE else None
 
     def of(self, candidate: Candidate) -> Group | None:
         """The group of a candidate, of the sign it may have, that takes most; None without one."""

@@ -13,7 +13,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ..view import View
-from .ask import ALONE, Asked, ask
+from .ask import Asked, ask
 from .evidence import Group
 from .refits import settled
 from .steps import Step, rejoined, revised, step_of
@@ -21,6 +21,7 @@ from .ties import NEAR, Choice, alike, chosen, price_of
 
 LEVEL = 0.01  # family-wise: how often anything is accused where nothing is there
 WORTH = 0.03  # of a joint's squared residual under the low-pass: 1.5 % of its root mean square
+_ALONE = 1.645  # standard errors: five per cent, were it the only question
 _MOST_STEPS, _SHORTLIST, _TRIALS = 8, 8, 2
 _HIDES = 0.25  # of a joint's squared residual: without less, statistics grow by less than a seventh
 
@@ -117,7 +118,7 @@ def _rivals(view: View, asked: Asked, worth: float) -> dict[int, tuple[int, floa
     own, known = dict[tuple, list[int]](), [(c.effect, c.joint) for c in view.model.coefficients]
     # what rests on few blocks stands out of none, and may be what another one speaks for
     few = np.array([not group.testable for group in asked.groups], dtype=bool)
-    for k in np.flatnonzero((~(asked.statistics <= ALONE) | few) & (asked.gains > 0)):
+    for k in np.flatnonzero((~(asked.statistics <= _ALONE) | few) & (asked.gains > 0)):
         group = asked.groups[k]
         # more terms in the place of the model's fewer: only where the log tells each of them
         untold = len(group.sizes) - len(group.c) if group.candidate.begins else 0
