@@ -216,7 +216,8 @@ def test_names_that_look_like_markup_show_as_text(opened):
     page.wait_for_function(DONE, timeout=WAIT)
     expect(page.locator("h1")).to_have_text(EVIL_NAME)
     expect(page.locator("#verdict .card").first).to_contain_text(EVIL)
-    page.get_by_role("button", name=f"preview what cogging on {EVIL} would explain").click()
+    page.wait_for_function(DRAWN, timeout=WAIT)
+    pressed(page, page.get_by_role("button", name=f"preview what cogging on {EVIL} would explain"))
     expect(page.locator("#workspace-fall")).to_contain_text(f"{EVIL}: ", timeout=WAIT)
     expect(page.locator("#workspace-shown option:checked")).to_have_text(f"with cogging on {EVIL}")
     for place in page.locator("section").all():
