@@ -330,3 +330,16 @@ def test_ridges_are_climbed_to_the_one_that_a_look_at_all_of_them_finds(law, mon
     for found, best in zip(climbed, ridge.predicted(every, y, use, spans)):
         np.testing.assert_allclose(found, best, atol=1e-9 * N)
     assert few <= 0.7 * len(ridge._RIDGES) * len(spans)
+
+
+@pytest.mark.parametrize(("least", "close"), [(1e-4, 1e-3), (1e-9, 1e-8)])
+def test_ridges_are_solved_in_single_precision_where_that_is_enough(least, close):
+    rng = np.random.default_rng(5)
+    rows = rng.normal(size=(N, 3)) @ rng.normal(size=(3, 120)) + 0.05 * rng.normal(size=(N, 120))  # three of 120 say nearly all
+    rows /= np.sqrt(np.mean(rows**2, axis=0))
+    system, right = rows.T @ rows, rows.T @ (rows[:, 0] + 0.1 * rng.normal(size=N))
+    ridges = N * np.array([least, 1e-2, 3.0])
+    found = ridge._solved(system, ridges, right)
+    for own, strength in zip(found.T, ridges):
+        told = rows @ np.linalg.solve(system + strength * np.eye(120), right)
+        assert np.max(np.abs(rows @ own - told)) < close * np.std(told)
