@@ -216,6 +216,21 @@ def test_the_set_holds_the_truth_nine_times_in_ten():
     assert worse <= 0.02 * draws
 
 
+def test_coefficients_that_one_block_holds_move_without_bound():
+    """Where a block left out leaves nothing, whatever it says is nothing beside how far it moves that."""
+    rng = np.random.default_rng(3)
+    squares = np.zeros((6, 2, 2))
+    squares[2, 0, 0] = 1.0  # of the first direction
+    squares[:, 1, 1] = rng.dirichlet(np.full(6, 5.0))
+    scores = rng.normal(size=(6, 2)) * np.sqrt(np.einsum("bkk->bk", squares))
+    c = scores.sum(0)
+    noisy = scores + rng.normal(size=scores.shape) * 1e-3
+    found = blocks.moves(c, noisy, squares, squares)
+    assert np.isfinite(found).all() and np.abs(found[2, 0]) > 1e3 * np.abs(c[0])
+    for b in range(6):  # the other direction as ever
+        assert found[b, 1] == pytest.approx((noisy[b, 1] - squares[b, 1, 1] * c[1]) / (1.0 - squares[b, 1, 1]), rel=1e-6)
+
+
 def test_chances_are_shares_of_one():
     rng = np.random.default_rng(0)
     losses = rng.normal(size=(25, 4))

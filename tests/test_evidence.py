@@ -425,6 +425,20 @@ def test_a_direction_that_one_block_holds_is_not_told():
         assert (chance(group) < 0.01) is found
 
 
+@pytest.mark.parametrize("blows", [False, True])
+@pytest.mark.parametrize("beside", [0.0, 1e-17])
+def test_what_stands_in_one_block_alone_is_not_told_by_the_prior(beside, blows):
+    """Evened over the blocks nothing is left of it but what the prior says, and that is no test."""
+    rng = np.random.default_rng(2)
+    group = struck(0, 0.0, blows)
+    squares = np.full_like(group.squares, beside)
+    squares[7], squares[-1] = 0.7, 0.3
+    scores = rng.normal(size=group.scores.shape) * np.sqrt(squares[:, :, 0])
+    group = replace(group, squares=squares, loud_squares=squares, scores=scores, loud=scores)
+    assert group.tested is group and not group.testable
+    assert np.isnan(null.statistics([group])).all() and np.isneginf(null.maxima([group], rng)).all()
+
+
 def test_blows_told_evenly_keep_the_level():
     """Of noise alone one in twenty stands out at 5 %; of a column that is there all do."""
     p = np.array([chance(struck(seed, 0.0)) for seed in range(200)])

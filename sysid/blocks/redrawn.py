@@ -5,11 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 _FOURTH = 3.0  # moment of a normal variable
+_OTHERS = 1e-9  # of a direction: what is left of it, however much of it one block holds
 
 
 def left_out(squares: np.ndarray) -> np.ndarray:
-    """(1 - G_b)^-1 (..., k, k) of squares that sum to one over blocks."""
-    return np.linalg.inv(np.eye(squares.shape[-1]) - squares)
+    """(1 - G_b)^-1 (..., k, k) of squares that sum to one over blocks; of a direction that one
+    block holds all of, a factor so large that whatever that block says counts for nothing."""
+    return np.linalg.inv((1.0 + _OTHERS) * np.eye(squares.shape[-1]) - squares)
 
 
 def redrawn(moves: np.ndarray, noise: np.ndarray):

@@ -105,8 +105,8 @@ class Group:
         w = np.append(weight, 1.0)[:, None]
         squares = group.squares * w[:, None]
         values, vectors = np.linalg.eigh(squares.sum(0))
-        if values.min() < 1e-6:
-            return self
+        if np.linalg.eigvalsh(squares[:-1].sum(0) - squares[-1]).min() < 1e-6:
+            return self  # the prior would tell most of it
         told = {"scores": w * group.scores, "loud": w * group.loud, "squares": squares}
         told["foreseen"] = group.foreseen * np.sum(weight**2 * share) / share.sum()
         told |= {"loud_squares": w[:, None] * group.loud_squares, "whole": group.whole or self}
