@@ -51,7 +51,8 @@ def held_out(experiment: Experiment, spec: PreprocessSpec, model: Model, logs: S
     data = compress(model, motion, thin=thin)
     target = data if spec.torque == "raw" and spec.standstill == "keep" and not motion.events else compress(model, raw, thin=thin)
     moving = moving_coefficients(model, motion)
-    folds = data.stretches(_FOLDS)
+    # a part that the joints stood still in, or were braked, has no error
+    folds = [fold for fold in data.stretches(_FOLDS) if _only(target, fold).rows.any()]
     size = np.array([max(float(np.sum(f.triangle[:, -1] ** 2)), 1e-300) for f in target.by_joint]) / np.maximum(target.rows, 1)
     squares, rows, errors = np.zeros(model.robot.dof), np.zeros(model.robot.dof), []
     if len(folds) < 2:

@@ -135,6 +135,8 @@ class Compressed:
 
 def _merged(factors: Sequence[Factor], joint: int) -> Factor:
     own = [factor for factor in factors if factor.joint == joint]
+    if not own:  # a joint that no row tells of
+        return Factor(joint, 0, np.zeros(0, dtype=int), np.zeros((0, 1)), 0)
     alike: dict[bytes, list[Factor]] = {}
     for factor in own:
         alike.setdefault(factor.columns.tobytes(), []).append(factor)

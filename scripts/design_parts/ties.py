@@ -15,6 +15,7 @@ from scripts.design_parts.robots import (
     JOINTS,
     RATE,
     ROBOTS,
+    FirstLog,
     experiment_with,
     posed,
     random_motion,
@@ -34,6 +35,8 @@ HIDDEN = (
 TWINS = {("planar", "encoder_offset:shoulder")}
 #: joints whose torque stands well above its noise in a poor log; of an arm's wrist none names anything
 LOADED = {robot: joints[:4] for robot, joints in JOINTS.items()}
+#: of a leg 4 s of sines name nothing, or name it alone
+POOR = FIRST | {"leg": (FirstLog(10.0, "moves"),)}
 _SIZES = (1.0, 2.5)  # of the simulation's usual
 _TRIED = 30  # effects that are hidden in turn until one ends in a tie
 
@@ -70,7 +73,7 @@ def trial(case: dict, arms=ARMS) -> dict:
             if (case["robot"], own) in TWINS:
                 continue
             asked = f"{own}:size={rng.choice(_SIZES):g}"
-            first = FIRST[case["robot"]][int(rng.integers(len(FIRST[case["robot"]])))]
+            first = POOR[case["robot"]][int(rng.integers(len(POOR[case["robot"]])))]
             told["tried"].append(asked)
             begun = time.process_time()
             try:

@@ -50,6 +50,11 @@ class Asked:
         """Family-wise p-value of a group."""
         return null.chance(self.statistics[k], self.maxima)
 
+    def threshold(self, level: float) -> float:
+        """The statistic beyond chance at a family-wise level; infinity where nothing is testable."""
+        least = self.maxima.min() if len(self.groups) else -np.inf
+        return float(np.quantile(self.maxima, 1.0 - level)) if np.isfinite(least) else np.inf
+
     def told(self, k: int, settled: Group) -> Asked:
         """The answers where the k-th group says what it says about where it has settled."""
         out, statistics = replace(self), self.statistics.copy()

@@ -42,7 +42,7 @@ class Detectable:
 
 def detectable(view: View, asked: Asked, candidates) -> list[Detectable]:
     """For every candidate's best set of shape values and variant."""
-    threshold = float(np.quantile(asked.maxima, 1.0 - LEVEL)) if len(asked.groups) else np.inf
+    threshold = asked.threshold(LEVEL)
     loss = np.maximum(np.sum(view.design.residual**2, axis=0), 1e-300)
     best, leading = dict[tuple, Detectable](), cache(partial(_leading, view))
     for candidate in candidates:

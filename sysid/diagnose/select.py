@@ -14,7 +14,6 @@ import numpy as np
 
 from ..view import View
 from .ask import Asked, ask
-from .evidence import Group
 from .refits import settled
 from .steps import Step, rejoined, revised, step_of
 from .ties import NEAR, Choice, alike, chosen, price_of
@@ -66,7 +65,7 @@ def _next(view: View, asked: Asked, level: float, worth: float, open_: list[Choi
     What takes much of a residual, by its slopes where it does nothing, under weights of joints that
     lack it and a prior as strong as they ask for, may say so only about where it has settled.
     """
-    threshold = np.quantile(asked.maxima, 1.0 - level) if len(asked.groups) else np.inf
+    threshold = asked.threshold(level)
     rivals = _rivals(view, asked, worth)
     hopeful = [k for k, (clear, _) in rivals.items() if asked.statistics[clear] > threshold]
     if step := _standing(view, asked, rivals, hopeful, worth, open_):
@@ -90,10 +89,12 @@ def _standing(view: View, asked: Asked, rivals, hopeful, worth: float, open_) ->
     """The first that joins of those that stand out, by falling gain, each beside its rivals."""
     while hopeful:
         top = hopeful[0]
-        # whoever takes as much as one that is there may be what is there
-        near = [k for k in rivals if asked.gains[k] >= NEAR * asked.gains[top]]
-        short = [k for k in near if _beside(view, asked.groups[k], asked.groups[top])]
-        short = [top, *(k for k in short if k != top)][:_SHORTLIST]
+        # whoever takes as much as one that is there may be what is there, on one joint or wherever
+        # it takes the same part of what is left: what moves a joint may take something else
+        near = [k for k in rivals if asked.gains[k] >= NEAR * asked.gains[top] and k != top]
+        first, at = asked.groups[top], lambda k: asked.groups[k].candidate.joint
+        same = lambda k: at(k) == at(top) or alike(view, asked.groups[k], first)  # noqa: B023, E731
+        short = [top, *filter(same, near)][:_SHORTLIST]
         found = chosen(view, [asked.groups[k] for k in short], np.random.default_rng(1))
         if found is not None:
             # of all that were compared one at least is there, though its sign may forbid its name
@@ -104,12 +105,6 @@ def _standing(view: View, asked: Asked, rivals, hopeful, worth: float, open_) ->
                 open_.append(found)
         hopeful = [k for k in hopeful if k not in short]
     return None
-
-
-def _beside(view: View, one: Group, other: Group) -> bool:
-    """Whether two candidates may explain the same: on one joint, or the same part of what is left,
-    wherever they stand. What moves a joint changes all torques, and may take something else."""
-    return one.candidate.joint == other.candidate.joint or alike(view, one, other)
 
 
 def _rivals(view: View, asked: Asked, worth: float) -> dict[int, tuple[int, float]]:
