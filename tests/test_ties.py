@@ -9,8 +9,7 @@ from ruamel.yaml import YAML
 from sysid import blocks, pipeline
 from sysid.diagnose.ask import ask
 from sysid.diagnose.refits import refitted, settled
-from sysid.diagnose.select import _beside
-from sysid.diagnose.ties import Choice, chosen, holds, price_of
+from sysid.diagnose.ties import Choice, alike, chosen, holds, price_of
 from sysid.view import first_view, losses, weighed
 from tests.evidences import posed, stacked, viewed
 
@@ -184,10 +183,10 @@ def test_who_is_compared_stands_on_the_joint_or_takes_the_same_part(biased):
     """What a shoulder that gives moves of an elbow's torque is not the elbow's bias, though it changes that torque too."""
     view, groups = biased
     bias, twin = (of(groups, name, 1) for name in ("torque_bias", "asymmetric_coulomb"))
-    assert _beside(view, twin, bias)
+    assert alike(view, twin, bias)
     gives = [g for g in groups if g.candidate.key == ("elasticity", 0)]
-    assert gives and not any(_beside(view, g, bias) for g in gives)
-    assert all(_beside(view, g, gives[0]) for g in groups if g.candidate.joint == 0)
+    assert gives and not any(alike(view, g, bias) for g in gives)
+    assert all(alike(view, g, gives[0]) for g in groups if g.candidate.joint == 0)
 
 
 def test_a_number_costs_the_logarithm_of_the_values_and_of_its_signs(biased):

@@ -89,12 +89,10 @@ def _standing(view: View, asked: Asked, rivals, hopeful, worth: float, open_) ->
     """The first that joins of those that stand out, by falling gain, each beside its rivals."""
     while hopeful:
         top = hopeful[0]
-        # whoever takes as much as one that is there may be what is there, on one joint or wherever
-        # it takes the same part of what is left: what moves a joint may take something else
+        # whoever takes as much as one that is there may be what is there
         near = [k for k in rivals if asked.gains[k] >= NEAR * asked.gains[top] and k != top]
-        first, at = asked.groups[top], lambda k: asked.groups[k].candidate.joint
-        same = lambda k: at(k) == at(top) or alike(view, asked.groups[k], first)  # noqa: B023, E731
-        short = [top, *filter(same, near)][:_SHORTLIST]
+        short = [k for k in near if alike(view, asked.groups[k], asked.groups[top])]
+        short = [top, *short][:_SHORTLIST]
         found = chosen(view, [asked.groups[k] for k in short], np.random.default_rng(1))
         if found is not None:
             # of all that were compared one at least is there, though its sign may forbid its name

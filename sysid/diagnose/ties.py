@@ -174,9 +174,12 @@ def holds(view: View, general: Member, special: Member) -> bool:
 
 
 def alike(view: View, one: Group, other: Group) -> bool:
-    """Whether two candidates take the same part of what a model leaves, the greater half of it at
-    least: then one of them in the model leaves the other little to do, on whichever joints they
-    stand."""
+    """Whether two candidates may explain the same: on one joint, or wherever they take the same
+    part of what a model leaves, the greater half of it at least: then one of them in the model
+    leaves the other little to do. What moves a joint changes all torques, and may take something
+    else."""
+    if one.candidate.joint == other.candidate.joint:
+        return True
     first, second = _taken(view, one), _taken(view, other)
     return bool(np.sum(first * second) ** 2 > 0.5 * np.sum(first**2) * np.sum(second**2))
 
