@@ -51,7 +51,7 @@ class Asked:
         return null.chance(self.statistics[k], self.maxima)
 
     def threshold(self, level: float) -> float:
-        """The statistic beyond chance at a family-wise level; infinity where nothing is testable."""
+        """The statistic beyond chance at a family-wise level; infinity where none is testable."""
         least = self.maxima.min() if len(self.groups) else -np.inf
         return float(np.quantile(self.maxima, 1.0 - level)) if np.isfinite(least) else np.inf
 
