@@ -24,6 +24,8 @@ import traceback
 import warnings
 from collections import Counter
 from concurrent.futures import ProcessPoolExecutor
+from contextlib import nullcontext
+from multiprocessing import get_context
 from pathlib import Path
 from unittest import mock
 
@@ -133,8 +135,11 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--jobs", type=int, default=1)
     options = parser.parse_args(arguments)
     numbers, count, bad = range(options.first, options.first + options.number), Counter(), 0
-    with ProcessPoolExecutor(options.jobs) as pool:
-        for number, (case, came_to) in zip(numbers, pool.map(one, [options.seed] * len(numbers), numbers)):
+    # a process that is forked while polars' threads are at work may wait for them for ever
+    several = ProcessPoolExecutor(options.jobs, mp_context=get_context("spawn")) if options.jobs > 1 else nullcontext()
+    with several as pool:
+        every = (pool.map if pool else map)(one, [options.seed] * len(numbers), numbers)
+        for number, (case, came_to) in zip(numbers, every):
             usual = came_to in ("told", "refused", "not made")
             count[came_to if usual else "WRONG"] += 1
             bad += not usual

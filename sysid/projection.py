@@ -12,6 +12,7 @@ FLAT = 1e-6  # share of a column's square: what the model leaves of it beyond th
 _TOLD = 1e-6  # of a direction's square: less than that the data say nothing
 DATA = 0.5  # of a direction's square must stand in the data; the prior may not tell most of it
 NOISE = 0.25  # of a direction's square: noise to half of its size, it says nothing about a law
+_NOUGHT = 1e-200  # a column's square: what an exponential leaves far out, and no number to divide by
 
 
 def prior_hessian(found) -> np.ndarray:
@@ -153,9 +154,10 @@ def directions(plain, whole, data, rough):
             included. data, rough: (k0, k0) the same of the data alone, and of what noise adds.
     """
     size = np.sqrt(np.clip(np.diagonal(plain), 0.0, None))
-    if not np.all(np.isfinite(whole)) or not size.max() > 0:
+    there = np.diagonal(plain) > _NOUGHT
+    if not np.all(np.isfinite(whole)) or not there.any():
         return None
-    scale = np.where(size > 0, size, 1.0)
+    scale = np.where(there, size, 1.0)
     values, vectors = np.linalg.eigh(whole / np.outer(scale, scale))
     kept = values > FLAT
     turn = vectors[:, kept] / np.sqrt(values[kept]) / scale[:, None]
@@ -170,12 +172,13 @@ def directions(plain, whole, data, rough):
 def directions_of(plain, whole, data, rough) -> list:
     """`directions` of many groups of columns, of arrays (groups, k0, k0), at once."""
     diagonals = np.diagonal(plain, axis1=1, axis2=2)
-    usual = np.isfinite(whole).all(axis=(1, 2)) & (diagonals > 0.0).all(axis=1)
-    scale = np.where(usual[:, None], np.sqrt(np.where(diagonals > 0.0, diagonals, 1.0)), 1.0)
+    usual = np.isfinite(whole).all(axis=(1, 2)) & (diagonals > _NOUGHT).all(axis=1)
+    scale = np.sqrt(np.where(usual[:, None], diagonals, 1.0))
     system = whole / (scale[:, :, None] * scale[:, None])
     values, turn = np.linalg.eigh(np.where(usual[:, None, None], system, 0.0))
     usual &= values[:, 0] > FLAT
     turn = turn / np.sqrt(np.where(usual[:, None], values, 1.0))[:, None] / scale[:, :, None]
+    turn = np.where(usual[:, None, None], turn, 0.0)
     for matrix, good in ((data, lambda v: v > DATA), (rough, lambda v: v < NOISE)):
         inside = np.swapaxes(turn, 1, 2) @ matrix @ turn
         values, vectors = np.linalg.eigh(np.where(usual[:, None, None], inside, 0.0))

@@ -84,6 +84,7 @@ def many(squares: np.ndarray) -> np.ndarray:
 def evening(share: np.ndarray) -> np.ndarray:
     """Weights of blocks by their shares (blocks,), under which twice the fewest take part: no block
     counts more than the rest allows."""
+    share = np.maximum(share, 0.0)  # rounding leaves less of what a block has nothing of
     return np.minimum(1.0, even(share, 2.0 * RESTING) / np.maximum(share, 1e-300))
 
 

@@ -68,7 +68,8 @@ def failures(held_out: HeldOut, raw: Prediction, levels) -> list[Failure]:
         levels: (dof,) noise floors, in which the joints' errors are compared.
     """
     robot, rows, known = held_out.model.robot, held_out.rows, held_out.variables
-    weighted = (held_out.rms() / np.maximum(levels, 1e-9 * max(np.max(levels), 1e-300))) ** 2
+    least = max(1e-9 * np.max(levels), 1e-100)  # of joints that were braked all the time
+    weighted = (held_out.rms() / np.maximum(levels, least)) ** 2
     stretches = _stretches(raw)
     out = []
     for j, joint in enumerate(robot.joints):
