@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from . import comparison
 from .candidates import Candidate
@@ -14,9 +14,12 @@ _LIKELY = 0.05  # less is not listed
 _NOTHING = 5e-3  # of an error: a hundredth of its square, the least that is told in per cent
 
 
-def in_doubt(before: Fit, after: Fit, told: Fit, candidate: Candidate) -> str | None:
-    """Why fits do not bear out a candidate, None where they do. Both are fits with it: after under
-    the prior of the one before, told as `sysid add` gives it."""
+def in_doubt(
+    before: Fit, after: Fit, told: Fit, weighed: Callable[[], Fit], candidate: Candidate
+) -> str | None:
+    """Why fits do not bear out a candidate, None where they do. All are fits with it: after under
+    the prior of the one before, told as `sysid add` gives it, weighed the same with each joint
+    weighed by its noise."""
     own, whole = candidate.judged_by(before.joints), candidate.joint == ROBOT
     if whole:  # what held bodies against its lack may hold them against it
         after = min((after, told), key=lambda one: comparison.together(before, one).delta_rms)
@@ -38,10 +41,27 @@ def in_doubt(before: Fit, after: Fit, told: Fit, candidate: Candidate) -> str | 
     if change.delta_rms > -_NOTHING * unit and not wide:
         falls = "hardly falls" if change.delta_rms < 0.0 else "does not fall"
         return f"with it the error on the test logs {falls} ({rise})"
-    # as the fit weighs them: it trades what a quiet joint loses for what a loud one gains
-    if (paid := comparison.together(before, after, weighed=True)).delta_rms > paid.se:
+    # as the fit weighs them: it trades what a quiet joint loses for what a loud one gains; and what
+    # held bodies against its lack may hold them against it
+    paid = [comparison.together(before, one, weighed=True) for one in (after, told)]
+    if all(one.delta_rms > one.se for one in paid):
         return "with it the test error of all joints together, as the fit weighs them, rises"
+    if nought(told.parameters_of(*candidate.key)):
+        own = sizes(candidate, told if told.weights is not None else weighed())
+        if own and nought(own, clear=1.0):  # to leave it out predicts better (Haitovsky 1969)
+            return "its size is less than its standard deviation, each joint weighed by its noise"
     return None
+
+
+def sizes(candidate: Candidate, fit: Fit) -> dict[str, tuple[float, float, str]]:
+    """{name: (value, std, unit)} of an effect's parameters in a fit that say how large it is: how
+    far they are from where it does nothing."""
+    effect = candidate.effect
+    nothing = {c.name: 0.0 for c in effect.coefficients()}
+    nothing |= {s.name: s.start for s in effect.shapes() if s.start is not None}
+    found = fit.parameters_of(*candidate.key).items()
+    own = ((name, name.rpartition(".")[2], *size) for name, size in found)
+    return {name: (at - nothing[kind], *rest) for name, kind, at, *rest in own if kind in nothing}
 
 
 def undecided(members: Sequence[tuple[Candidate, float]], fit: Fit) -> Refused:
