@@ -2,24 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 from . import comparison
 from .candidates import Candidate
 from .estimate import Fit
 from .model_parameters import ROBOT
-from .unexplained import Refused, changed, nought
+from .unexplained import CLEAR, Refused, changed, nought
 
 _LIKELY = 0.05  # less is not listed
 _NOTHING = 5e-3  # of an error: a hundredth of its square, the least that is told in per cent
 
 
-def in_doubt(
-    before: Fit, after: Fit, told: Fit, weighed: Callable[[], Fit], candidate: Candidate
-) -> str | None:
-    """Why fits do not bear out a candidate, None where they do. All are fits with it: after under
-    the prior of the one before, told as `sysid add` gives it, weighed the same with each joint
-    weighed by its noise."""
+def in_doubt(before: Fit, after: Fit, told: Fit, candidate: Candidate) -> str | None:
+    """Why fits do not bear out a candidate, None where they do. Both are fits with it: after under
+    the prior of the one before, told as `sysid add` gives it."""
     own, whole = candidate.judged_by(before.joints), candidate.joint == ROBOT
     if whole:  # what held bodies against its lack may hold them against it
         after = min((after, told), key=lambda one: comparison.together(before, one).delta_rms)
@@ -33,9 +30,9 @@ def in_doubt(
         change, shown = (next(d for d in one if d.joint == own[0]) for one in changes)
         unit = before.rms("test")[own[0]]
         rise = changed(change.delta_rms / max(unit, 1e-300))
-        still = any(-d.delta_rms < d.se for d in (change, shown))
+        still = any(-d.delta_rms < CLEAR * d.se for d in (change, shown))
         if still and nought(told.parameters_of(*candidate.key)):
-            return "its size is nothing beside its deviation, and the test error hardly falls"
+            return "its size is nothing beside its deviation, nor the fall of the test error beside its own"
     # what moves a joint may show in the torque of those that it carries, or that carry it
     wide = len(candidate.touches(2)) > 1 and comparison.falls(before, after, _NOTHING)
     if change.delta_rms > -_NOTHING * unit and not wide:
@@ -46,22 +43,7 @@ def in_doubt(
     paid = [comparison.together(before, one, weighed=True) for one in (after, told)]
     if all(one.delta_rms > one.se for one in paid):
         return "with it the test error of all joints together, as the fit weighs them, rises"
-    if nought(told.parameters_of(*candidate.key)):
-        own = sizes(candidate, told if told.weights is not None else weighed())
-        if own and nought(own, clear=1.0):  # to leave it out predicts better (Haitovsky 1969)
-            return "its size is less than its standard deviation, each joint weighed by its noise"
     return None
-
-
-def sizes(candidate: Candidate, fit: Fit) -> dict[str, tuple[float, float, str]]:
-    """{name: (value, std, unit)} of an effect's parameters in a fit that say how large it is: how
-    far they are from where it does nothing."""
-    effect = candidate.effect
-    nothing = {c.name: 0.0 for c in effect.coefficients()}
-    nothing |= {s.name: s.start for s in effect.shapes() if s.start is not None}
-    found = fit.parameters_of(*candidate.key).items()
-    own = ((name, name.rpartition(".")[2], *size) for name, size in found)
-    return {name: (at - nothing[kind], *rest) for name, kind, at, *rest in own if kind in nothing}
 
 
 def undecided(members: Sequence[tuple[Candidate, float]], fit: Fit) -> Refused:

@@ -206,12 +206,6 @@ def fit_grown(experiment: Experiment, before: Fit, **how) -> Fit:
     return fit(with_weight(experiment, AUTO) if before.strength.auto else experiment, **how)
 
 
-def fit_weighed(experiment: Experiment, before: Fit, **how) -> Fit:
-    """`fit_grown` with each joint weighed by its noise."""
-    solver = experiment.solver.model_copy(update={"weighting": "noise"})
-    return fit_grown(experiment.model_copy(update={"solver": solver}), before, **how)
-
-
 def predict_log(found: Fit, log: str | LogSpec, *, levels: Mapping[str, str] | None = None) -> Prediction:
     """What a fitted model predicts on another log, read and filtered as the experiment says.
 

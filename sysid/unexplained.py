@@ -11,7 +11,7 @@ import numpy as np
 from .candidates import Candidate
 from .model_parameters import ROBOT
 
-_CLEAR = 2.0  # standard deviations
+CLEAR = 2.0  # standard deviations
 _MOST = 0.5  # of what stands above a floor, or of a square
 WEIGHED = "`weighting: noise` under `solver:` in the experiment file"
 
@@ -165,10 +165,10 @@ def changed(share: float) -> str:
     return f"{percent:+.0f} %" if abs(percent) > 99.5 else f"{percent:+.2g} %"
 
 
-def nought(numbers: dict[str, tuple[float, float, str]], clear: float = _CLEAR) -> bool:
+def nought(numbers: dict[str, tuple[float, float, str]]) -> bool:
     """Whether all of an effect's parameters {name: (value, std, unit)} that are determined are
-    nothing beside their standard deviations, `clear` of these, or none is determined."""
-    return all(abs(at) <= clear * std for at, std, _ in numbers.values() if np.isfinite(std))
+    nothing beside their standard deviations, or none is determined."""
+    return all(abs(at) <= CLEAR * std for at, std, _ in numbers.values() if np.isfinite(std))
 
 
 def hidden_by_weights(effect: str, joint: str, numbers, weights) -> str | None:

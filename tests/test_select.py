@@ -232,12 +232,12 @@ def test_what_is_refused_alone_is_asked_again_beside_what_stands(simulated, monk
     """The search found the first beside the second: fits may bear it out only with that one in the model."""
     real, asked = claims.in_doubt, []
 
-    def in_doubt(before, *fits, candidate):
+    def in_doubt(before, after, told, candidate):
         asked.append(candidate.name)
         alone = candidate.name == asked[0] and not before.model.terms[-1][0].name == "load_friction"
-        return "too much else is missing" if alone else real(before, *fits, candidate)
+        return "too much else is missing" if alone else real(before, after, told, candidate)
 
-    monkeypatch.setattr(claims, "in_doubt", lambda *given: in_doubt(*given[:-1], candidate=given[-1]))
+    monkeypatch.setattr(claims, "in_doubt", in_doubt)
     found = diagnose(pipeline.load(simulated(*TWO)))
     first, second = ("cogging", "load_friction")
     assert asked == [first, second, first]

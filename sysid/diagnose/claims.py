@@ -104,8 +104,7 @@ def _borne_out(near: list[Member], last: Fit, with_: Callable):
     for member in near:
         after, compared = with_(pipeline.refit, member)  # and under the last one's prior
         fits[id(member)] = after
-        weighed = lambda: with_(pipeline.fit_weighed, member)  # noqa: B023, E731
-        whys.append(in_doubt(last, compared, after, weighed, member.candidate))
+        whys.append(in_doubt(last, compared, after, member.candidate))
         if whys[-1] is None:
             return member, fits, whys[0]
     return None, fits, whys[0]
