@@ -31,7 +31,7 @@ def in_doubt(before: Fit, after: Fit, told: Fit, candidate: Candidate) -> str | 
         unit = before.rms("test")[own[0]]
         rise = changed(change.delta_rms / max(unit, 1e-300))
         still = any(-d.delta_rms < CLEAR * d.se for d in (change, shown))
-        if still and nought(told.parameters_of(*candidate.key)):
+        if still and nought(sizes(candidate, told)):
             return "its size is nothing beside its deviation, nor the fall of the test error beside its own"
     # what moves a joint may show in the torque of those that it carries, or that carry it
     wide = len(candidate.touches(2)) > 1 and comparison.falls(before, after, _NOTHING)
@@ -44,6 +44,18 @@ def in_doubt(before: Fit, after: Fit, told: Fit, candidate: Candidate) -> str | 
     if all(one.delta_rms > one.se for one in paid):
         return "with it the test error of all joints together, as the fit weighs them, rises"
     return None
+
+
+def sizes(candidate: Candidate, fit: Fit) -> dict[str, tuple[float, float, str]]:
+    """{name: (value, std, unit)} of an effect's parameters in a fit that say how large it is: how
+    far they are from where it does nothing. How it does what it does, as the limit of a
+    saturation, no log need tell from nought."""
+    effect = candidate.effect
+    nothing = {c.name: 0.0 for c in effect.coefficients()}
+    nothing |= {s.name: s.start for s in effect.shapes() if s.start is not None}
+    found = fit.parameters_of(*candidate.key).items()
+    own = ((name, name.rpartition(".")[2], *size) for name, size in found)
+    return {n: (at - nothing[word], *rest) for n, word, at, *rest in own if word in nothing}
 
 
 def undecided(members: Sequence[tuple[Candidate, float]], fit: Fit) -> Refused:
