@@ -48,8 +48,8 @@ def in_doubt(before: Fit, after: Fit, told: Fit, candidate: Candidate) -> str | 
 
 def sizes(candidate: Candidate, fit: Fit) -> dict[str, tuple[float, float, str]]:
     """{name: (value, std, unit)} of an effect's parameters in a fit that say how large it is: how
-    far they are from where it does nothing. How it does what it does, as the limit of a
-    saturation, no log need tell from nought."""
+    far they are from where it does nothing. Beyond which torque a signal bends, or how fast warmth
+    comes, is no size."""
     effect = candidate.effect
     nothing = {c.name: 0.0 for c in effect.coefficients()}
     nothing |= {s.name: s.start for s in effect.shapes() if s.start is not None}
