@@ -111,7 +111,7 @@ def _verdict(v: dict) -> str:
     if v["status"] == "explained":
         words += " by " + ", ".join(f"`{b['effect']}` on {b['joint']}" for b in v["by"])
     if v["status"] == "unknown" and v.get("depends_on"):
-        words += "; follows " + ", ".join(d["variable"] for d in v["depends_on"][:3])
+        words += "; follows " + ", ".join(dict.fromkeys(d["variable"] for d in v["depends_on"][:3]))
     return words
 
 
