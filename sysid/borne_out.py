@@ -54,7 +54,7 @@ def sizes(candidate: Candidate, fit: Fit) -> dict[str, tuple[float, float, str]]
     nothing = {c.name: 0.0 for c in effect.coefficients()}
     nothing |= {s.name: s.start for s in effect.shapes() if s.start is not None}
     found = fit.parameters_of(*candidate.key).items()
-    own = ((name, name.rpartition(".")[2], *size) for name, size in found)
+    own = ((name, name.rpartition(".")[2].partition("[")[0], *size) for name, size in found)
     return {n: (at - nothing[word], *rest) for n, word, at, *rest in own if word in nothing}
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 _FOURTH = 3.0  # moment of a normal variable
-_OTHERS = 1e-9  # of a direction: what is left of it, however much of it one block holds
+_OTHERS = 1e-12  # of a direction: what is left of it, however much of it one block holds
 
 
 def left_out(squares: np.ndarray) -> np.ndarray:

@@ -228,7 +228,7 @@ class _Asker:
         unit = np.sum(weight * squares, axis=0)
         c = np.einsum("bg,bdg->dg", weight, score) / unit
         moves = loud - loud_squares[:, None] * c
-        moves *= (weight / (unit - weight * squares))[:, None]
+        moves *= (weight / np.maximum(unit - weight * squares, 1e-12 * unit))[:, None]
         # of a column of unit size
         seen, freedom = unit * np.sum(moves**2, axis=0), np.maximum(rest[good] - 1.0, 1.0)
         return _Told(count, np.flatnonzero(good), unit, np.sqrt(unit) * c, seen, freedom)
