@@ -24,7 +24,6 @@ import traceback
 import warnings
 from collections import Counter
 from concurrent.futures import ProcessPoolExecutor
-from contextlib import nullcontext
 from multiprocessing import get_context
 from pathlib import Path
 from unittest import mock
@@ -136,7 +135,7 @@ def main(arguments: list[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     numbers, count, bad = range(options.first, options.first + options.number), Counter(), 0
     # a process that is forked while polars' threads are at work may wait for them for ever
-    several = ProcessPoolExecutor(options.jobs, mp_context=get_context("spawn")) if options.jobs > 1 else nullcontext()
+    several = ProcessPoolExecutor(options.jobs, mp_context=get_context("spawn")) if options.jobs > 1 else contextlib.nullcontext()
     with several as pool:
         every = (pool.map if pool else map)(one, [options.seed] * len(numbers), numbers)
         for number, (case, came_to) in zip(numbers, every):
