@@ -4,12 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from . import comparison
 from .candidates import Candidate
+from .effect import Effect
 from .estimate import Fit
 from .model_parameters import ROBOT
-from .unexplained import CLEAR, Refused, changed, nought
+from .unexplained import Refused, changed
 
+CLEAR = 2.0  # standard deviations
+Number = tuple[float, float, str]  # value, standard deviation, unit
 _LIKELY = 0.05  # less is not listed
 _NOTHING = 5e-3  # of an error: a hundredth of its square, the least that is told in per cent
 
@@ -31,7 +36,7 @@ def in_doubt(before: Fit, after: Fit, told: Fit, candidate: Candidate) -> str | 
         unit = before.rms("test")[own[0]]
         rise = changed(change.delta_rms / max(unit, 1e-300))
         still = any(-d.delta_rms < CLEAR * d.se for d in (change, shown))
-        if still and nought(sizes(candidate, told)):
+        if still and not size_told(candidate.effect, told.parameters_of(*candidate.key)):
             return "its size is nothing beside its deviation, nor the fall of the test error beside its own"
     # what moves a joint may show in the torque of those that it carries, or that carry it
     wide = len(candidate.touches(2)) > 1 and comparison.falls(before, after, _NOTHING)
@@ -46,15 +51,22 @@ def in_doubt(before: Fit, after: Fit, told: Fit, candidate: Candidate) -> str | 
     return None
 
 
-def sizes(candidate: Candidate, fit: Fit) -> dict[str, tuple[float, float, str]]:
-    """{name: (value, std, unit)} of an effect's parameters in a fit that say how large it is: how
-    far they are from where it does nothing. Beyond which torque a signal bends, or how fast warmth
-    comes, is no size."""
-    effect = candidate.effect
+def size_told(effect: Effect, numbers: dict[str, Number]) -> bool:
+    """Whether any of an effect's `sizes` is more than its standard deviation can make."""
+    known = [(at, std) for at, std, _ in sizes(effect, numbers).values() if np.isfinite(std)]
+    return any(abs(at) > CLEAR * std for at, std in known)
+
+
+def sizes(effect: Effect, numbers: dict[str, Number]) -> dict[str, Number]:
+    """Of an effect's parameters those that say how large it is: how far they are from where it does
+    nothing. Beyond which torque a signal bends, or how fast warmth comes, is no size.
+
+    Args:
+        numbers: {name: (value, std, unit)}, as `Fit.parameters_of` has them, of one joint or more.
+    """
     nothing = {c.name: 0.0 for c in effect.coefficients()}
     nothing |= {s.name: s.start for s in effect.shapes() if s.start is not None}
-    found = fit.parameters_of(*candidate.key).items()
-    own = ((name, name.rpartition(".")[2].partition("[")[0], *size) for name, size in found)
+    own = ((n, n.rpartition(".")[2].partition("[")[0], *size) for n, size in numbers.items())
     return {n: (at - nothing[word], *rest) for n, word, at, *rest in own if word in nothing}
 
 

@@ -14,6 +14,7 @@ from pathlib import Path
 
 from . import bounded, comparison, config, experiment_file, fit_document, pipeline, results, state, whole_files
 from .addition import spelled
+from .borne_out import size_told
 from .diagnose.diagnosis import Diagnosis, diagnose
 from .effect_entry import asked, with_effect
 from .errors import SysidError
@@ -21,7 +22,6 @@ from .estimate import Fit
 from .notices import noticed
 from .specs import Experiment
 from .statement import kept
-from .unexplained import nought
 
 _HISTORY, _STEPS = "history.json", "steps"
 
@@ -224,7 +224,11 @@ def _untold(added: Added, name: str, parameters: list[dict]) -> str:
     """What to know of an effect whose size is nothing beside its deviations and that lowers no error; empty of others."""
     numbers = {p["name"]: (p["value"], float("nan") if p["std"] is None else p["std"], p["unit"]) for p in parameters}
     falls = any(-d.delta_rms > d.se for d in added.differences)
-    if added.refused or not numbers or falls or not nought(numbers):
+    if added.refused or not numbers or falls:
+        return ""
+    (first, *_), terms = numbers, added.after.model.terms
+    own = next(effect for effect, _ in terms if first.startswith(f"{effect.name}."))
+    if size_told(own, numbers):
         return ""
     return (
         f"nothing in these logs speaks for {name}: its size is nothing beside its standard deviation, and no held-out error falls by more than its "

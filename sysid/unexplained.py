@@ -6,12 +6,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from .candidates import Candidate
 from .model_parameters import ROBOT
 
-CLEAR = 2.0  # standard deviations
 _MOST = 0.5  # of what stands above a floor, or of a square
 WEIGHED = "`weighting: noise` under `solver:` in the experiment file"
 
@@ -165,21 +162,9 @@ def changed(share: float) -> str:
     return f"{percent:+.0f} %" if abs(percent) > 99.5 else f"{percent:+.2g} %"
 
 
-def nought(numbers: dict[str, tuple[float, float, str]]) -> bool:
-    """Whether all of an effect's parameters {name: (value, std, unit)} that are determined are
-    nothing beside their standard deviations, or none is determined."""
-    return all(abs(at) <= CLEAR * std for at, std, _ in numbers.values() if np.isfinite(std))
-
-
-def hidden_by_weights(effect: str, joint: str, numbers, weights) -> str | None:
-    """What to know where a fit in which all joints count alike (`weights` None) does not tell the
-    size of an effect that is there.
-
-    Args:
-        numbers: its parameters, as of `nought`.
-    """
-    if weights is not None or not nought(numbers):
-        return None
+def hidden_by_weights(effect: str, joint: str) -> str:
+    """What to know where a fit in which all joints count alike does not tell the size of an effect
+    that is there."""
     return (
         f"{effect} on {joint} is there, by how the test error falls, but this fit tells its size "
         f"badly: joints with more noise count as much as quiet ones; {WEIGHED} tells it better"

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import pytest
 
 from sysid import comparison, vocabulary
-from sysid.borne_out import in_doubt, sizes
+from sysid.borne_out import in_doubt, size_told, sizes
 from sysid.candidates import Candidate
 from sysid.comparison import Difference
 
@@ -42,6 +42,12 @@ def test_how_large_an_effect_is_says_what_vanishes_with_it():
     numbers = {"torque_saturation": ("e", "limit"), "delay": ("d",), "warmup": ("dFv", "dFc", "T"), "elasticity": ("compliance", "damping")}
     said = {"torque_saturation": {"e"}, "delay": {"d"}, "warmup": {"dFv", "dFc"}, "elasticity": {"compliance"}}
     for name, words in numbers.items():
-        fit = SimpleNamespace(parameters_of=lambda effect, joint, words=words: {f"{effect}.hip.{word}": (2.0, 0.5, "") for word in words})
-        found = sizes(Candidate(vocabulary.find(name), 0, ()), fit)
+        found = sizes(vocabulary.find(name), {f"{name}.hip.{word}": (2.0, 0.5, "") for word in words})
         assert {key.rpartition(".")[2] for key in found} == said[name] and set(found.values()) == {(2.0, 0.5, "")}
+
+
+@pytest.mark.parametrize(("share", "told"), [((0.3, 0.1), True), ((0.1, 0.3), False), ((0.3, float("nan")), False)])
+def test_a_limit_that_is_told_is_no_size_that_is(share, told):
+    """As everywhere that says whether a size is told: the diagnosis, `sysid add`, what the weights of joints hide."""
+    numbers = {"torque_saturation.hip.e": (*share, "1"), "torque_saturation.hip.limit": (8.0, 1.0, "N m")}
+    assert size_told(vocabulary.find("torque_saturation"), numbers) is told

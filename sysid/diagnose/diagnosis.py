@@ -116,5 +116,5 @@ def diagnose(
 def _notices(claims, refused) -> Iterator[str]:
     yield from (f"{r.effect} on {r.joint} is not claimed: {r.why}" for r in refused)
     for head, weights in ((c.head, c.after.weights) for c in claims):
-        if words := hidden_by_weights(head.effect, head.joint, head.parameters, weights):
-            yield words
+        if weights is None and not borne_out.size_told(head.candidate.effect, head.parameters):
+            yield hidden_by_weights(head.effect, head.joint)

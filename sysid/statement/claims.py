@@ -7,11 +7,11 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..addition import spelled
+from ..borne_out import size_told
 from ..diagnose.claims import Claim
 from ..diagnose.diagnosis import Diagnosis
 from ..diagnose.findings import Finding
 from ..fit_document import number
-from ..unexplained import nought
 from ..vocabulary import describe
 
 
@@ -68,8 +68,7 @@ def finding(f: Finding, claim: Claim, found: Diagnosis) -> dict:
             name: {"value": number(v), "std": number(s), "unit": u}
             for name, (v, s, u) in f.parameters.items()
         },
-        # whether any is more than its deviation can make
-        "size_told": not nought(f.parameters),
+        "size_told": size_told(f.candidate.effect, f.parameters),
         "tied_with": list(f.tied_with),
         "separate_by": f.candidate.effect.separate_by,
         "command": f.command,
