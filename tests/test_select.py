@@ -364,6 +364,19 @@ def test_friction_that_falls_at_low_speed_only_is_no_warmth(simulated):
     assert "warmup" not in {c.head.effect for c in found.claims}
 
 
+@pytest.mark.parametrize(("seed", "dry"), [(3, True), (4, True), (7, False)])
+def test_warmth_that_changes_one_kind_of_friction_alone_is_warmth(simulated, seed, dry):
+    """Noise makes the other one's change negative every other time, by no more than chance."""
+
+    def warm(q, qd, qdd, t, load, memory):
+        return np.array([0.0, 0.5 * np.exp(-t / 5.0) * (np.tanh(qd[1] / 1e-3) if dry else qd[1])])
+
+    found = diagnose(pipeline.load(simulated(f"warm_{seed}", warm, seed=seed, duration=14.0)))
+    assert [(c.head.effect, c.head.joint) for c in found.claims] == [("warmup", "elbow")]
+    value, std, _ = found.claims[0].head.parameters[f"warmup.elbow.{'dFc' if dry else 'dFv'}"]
+    assert abs(value - 0.5) < 3.0 * std < 0.5
+
+
 def test_an_option_survives_its_discovery(simulated, tmp_path):
     """Friction that follows the angle in proportion to speed is `position_friction` with an option."""
     law = lambda q, qd, qdd, t, load, memory: np.array([0.0, 0.3 * qd[1] * (1.0 + np.sin(3.0 * q[1]))])  # noqa: E731

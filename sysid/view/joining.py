@@ -16,6 +16,7 @@ from .design import designed
 from .view import View, looked_at
 
 COMPARED = 1e-4  # share of the objective: finer than rivals are ever told apart by
+_CHANCE = 1.645  # standard deviations: five per cent to one side
 
 
 def joined(view: View, *added: tuple[Candidate, dict[str, float]], like: View | None = None):
@@ -31,15 +32,24 @@ def joined(view: View, *added: tuple[Candidate, dict[str, float]], like: View | 
 
 
 def allowed(view: View, candidate: Candidate) -> bool:
-    """Whether the coefficients of a candidate that joined are not negative where they may not be,
-    and it does anything at all."""
+    """Whether what joined last does anything at all, with coefficients that may not be negative and
+    are not, or one of them is not and the others by no more than chance: of what acts by two of
+    which one is nothing, noise makes this one negative every other time."""
     model, first = view.model, 10 * view.model.bodies
-    x = view.x
     own = [k for k, c in enumerate(model.coefficients) if (c.effect, c.joint) == candidate.key]
-    if any(model.coefficients[k].positive and x[first + k] <= 0.0 for k in own):
+    bound = first + np.array([k for k in own if model.coefficients[k].positive], dtype=int)
+    below = bound[view.x[bound] <= 0.0]
+    if 0 < len(below) and (len(below) == len(bound) or _clearly(view, below)):
         return False
     starts = [(v.shape.start, at) for v, at in _own(view) if v.shape.start is not None]
     return not starts or any(at != start for start, at in starts)
+
+
+def _clearly(view: View, below: np.ndarray) -> bool:
+    """Whether any of these parameters is below nought by more than blocks of time, each left out,
+    move it."""
+    moves = view.sums.scores @ view.design.turn[below].T
+    return bool((view.x[below] < -_CHANCE * np.sqrt(np.sum(moves**2, axis=0))).any())
 
 
 def weighed(view: View, weights=None) -> View:
