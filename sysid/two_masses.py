@@ -85,8 +85,11 @@ def sprung(load, inertia, step: float, *, compliance: float, damping: float) -> 
     begun = np.stack([right, np.zeros(len(load)), np.zeros(len(load))], axis=1)
     begun[0, 1] = begun[1, 2] = 1.0  # from any other first two samples
     found = dtbtrs(band, begun, uplo="L")[0]
-    early = max(5, math.ceil(_FORGOTTEN * float(np.median(still)) / max(damping, 1e-3)))
-    rings = np.diff(found[:early], 2, axis=0)
+    slow = float(np.median(still))
+    early = max(5, math.ceil(_FORGOTTEN * slow / max(damping, 1e-3)))
+    # a filter bends a log's ends, and the link's first turn with them: what rings after it is asked, where that is not forgotten yet
+    bent = min(int(2.0 * math.pi * slow), early // 4) if slow > 1.0 else 0
+    rings = np.diff(found[bent:early], 2, axis=0)
     change = np.linalg.lstsq(rings[:, 1:], -rings[:, 0], rcond=1e-9)[0]
     return found[:, 0] + found[:, 1:] @ change
 
