@@ -5,11 +5,13 @@ with the simulator's truth.json, which the diagnosis does not read.
 """
 
 import json
+import re
 import shlex
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
+import polars
 import pytest
 from ruamel.yaml import YAML
 
@@ -111,6 +113,26 @@ def test_a_bias_and_asymmetric_friction_cannot_be_told_apart(diagnosed, simulate
     (other,) = [f for f in found.findings if f.effect == "asymmetric_coulomb"]
     assert other.tied_with == ("torque_bias",) and other.step is None and other.candidate.effect.separate_by
     assert len(found.claims) == 1
+
+
+def test_a_robot_a_hundred_times_lighter_is_asked_alike(diagnosed, simulated, tmp_path):
+    """Bodies and torques all in other units: a prior that was weak for the heavy one is as weak for the light one."""
+    folder = simulated(*BIAS)
+    lighter = lambda found: f'{found[1]}="{float(found[2]) / 100.0!r}"'  # noqa: E731
+    urdf = re.sub(r'\b(mass value|i[xyz]{2})="([^"]+)"', lighter, (folder / "robot.urdf").read_text())
+    (tmp_path / "robot.urdf").write_text(urdf)
+    (tmp_path / "config.yaml").write_text((folder / "config.yaml").read_text())
+    for part in ("train", "test"):
+        log = polars.read_csv(folder / f"{part}.csv")
+        log.with_columns(polars.col("^tau_.*$") / 100.0).write_csv(tmp_path / f"{part}.csv")
+    heavy, light = diagnosed(*BIAS), diagnose(pipeline.load(tmp_path))
+    sets = [[{(effect, joint) for effect, joint, _ in claim.set} for claim in found.claims] for found in (heavy, light)]
+    assert sets[0] == sets[1] != []
+    statistics = [sorted(c.head.p for c in found.claims) for found in (heavy, light)]
+    assert statistics[0] == statistics[1]
+    assert light.view.experiment.prior.weight < 1e-3 * heavy.view.experiment.prior.weight
+    value, std, _ = light.claims[0].head.parameters["torque_bias.elbow.b"]
+    assert abs(value - 0.004) < 3.0 * std < 0.001
 
 
 def test_two_effects_on_two_joints_are_both_named(diagnosed, simulated):

@@ -106,10 +106,15 @@ def trial(case: dict, arms=ARMS) -> dict:
                 found = design(experiment, separate=apart, processes=1)
                 motion, chance = (found.t, found.q), _chance(found.pairs, told["hidden"])
             told["seconds"][arm] = time.process_time() - begun
-            both = experiment_with(
-                case["robot"], folder / arm, case["seed"], [hidden(told["asked"])], [motion],
-                first,
-            )  # fmt: skip
+            try:
+                both = experiment_with(
+                    case["robot"], folder / arm, case["seed"], [hidden(told["asked"])], [motion],
+                    first,
+                )  # fmt: skip
+            except SysidError as error:  # what is hidden keeps the robot from following the motion
+                none = {"alone": False, "promised": chance, "sets": [], "error": str(error)}
+                told["arms"][arm] = none
+                continue
             begun = time.process_time()
             sets = _sets(diagnose(both))
             told["seconds"][f"diagnose {arm}"] = time.process_time() - begun

@@ -15,7 +15,8 @@ A suspect a that is true leaves, of its torque s_a, what the model and its rival
 between them, lambda = min_x |s_a - X x|^2 over the noise, on the new log alone and as a diagnosis sees it:
 under its low-pass, with standstill left out. The log of the likelihood ratio is then normal with mean
 lambda / 2 and variance lambda, and a set holds one name where it exceeds log 9. And that it is named at
-all, lambda against nothing must stand above what the best of all candidates makes of noise.
+all, lambda against nothing must stand above what the best of all candidates makes of noise. What is promised
+of a pair is the mean over which of the two is true.
 
 Source: White 1980 (H^-1 S H^-1); Atkinson & Fedorov 1975 (T-optimality); Wald 1943.
 """
@@ -57,7 +58,8 @@ class Pair:
 def pairs(
     fit: Fit, suspects: Sequence[Suspect], new: Motion, samples: float, asked: int
 ) -> list[Pair]:
-    """How likely it is that each two suspects will be told apart by a new log, and named at all.
+    """How likely it is that of each two suspects the one that is true will be named by a new log, and
+    told from the other: in the mean over which of them that is.
 
     Args:
         new: the new log's motion, as a diagnosis sees it; samples: of it. asked: candidates that a
@@ -73,12 +75,12 @@ def pairs(
     out = []
     for i, a in enumerate(suspects):
         for j, b in enumerate(suspects[:i]):
-            apart = [
-                _apart(_left(base, prior, own[k] @ suspects[k].size, own[m]))
+            # whichever of them is true, and nobody knows which
+            told = [
+                min(_apart(_left(base, prior, own[k] @ suspects[k].size, own[m])), named[k])
                 for k, m in ((i, j), (j, i))
             ]
-            probability = min(*apart, named[i], named[j])
-            out.append(Pair(b.named(fit.joints), a.named(fit.joints), probability))
+            out.append(Pair(b.named(fit.joints), a.named(fit.joints), float(np.mean(told))))
     return out
 
 

@@ -19,7 +19,7 @@ from ..model import Model
 from ..motion import Motion
 from ..notices import samples_of
 from ..posed_problem import inverse
-from ..prior_weight import USUAL, with_weight
+from ..prior_weight import USUAL, weakest, with_weight
 from ..same_samples import same
 from ..settled import Settled
 from ..shape import settle
@@ -213,12 +213,17 @@ def first_view(experiment: Experiment, fit: Fit, logs=None) -> View:
     once more; in the widest band that this noise leaves.
 
     A weight of the prior that was chosen bends the bodies by as much as one standard error allows.
-    A diagnosis is finer than that and would call it missing physics: it asks under the usual one.
+    A diagnosis is finer than that and would call it missing physics: it asks under the usual one,
+    or, where torques are small, under one that says no more than that bodies are plausible.
 
     Args:
         logs: the training logs, where they are at hand.
     """
-    experiment = with_weight(experiment, USUAL) if fit.strength.auto else experiment
+    if fit.strength.auto:
+        # with weights of a geometric mean of one, every joint's residual has this variance
+        rms = np.array([one for one in fit.rms("train").values() if one > 0.0])
+        variance = float(np.exp(2.0 * np.mean(np.log(rms)))) if len(rms) else np.inf
+        experiment = with_weight(experiment, min(USUAL, weakest(variance)))
     if logs is None:
         logs = experiment_logs.read(experiment, fit.model.robot, experiment.data.train)
     cutoff = widest(logs, known=(own_band := band(logs)))
