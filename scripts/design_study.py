@@ -27,9 +27,7 @@ import os
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import argparse
-import shutil
 import sys
-import tempfile
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -43,8 +41,8 @@ def main(arguments: list[str] | None = None) -> None:
     """Run a study, print its table."""
     import importlib
 
+    from scripts.journaled import results
     from sysid import fit_document
-    from sysid.studies.journal import Journal, run
 
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
@@ -65,23 +63,10 @@ def main(arguments: list[str] | None = None) -> None:
         options.out
         / f"{options.study}_{options.seed}_{'_'.join(robots)}_{settings['source']}.jsonl"
     )
-    if options.table:
-        # of a copy: a journal that is opened is written anew, and another process may be at it
-        with tempfile.TemporaryDirectory() as place:
-            copy = shutil.copy(path, place) if path.exists() else Path(place) / path.name
-            done = Journal(Path(copy), settings).done
-    else:
-        journal = Journal(path, settings)
-        tasks = [(str(n), (part.case(options.seed, n, robots),)) for n in range(options.number)]
-        run(
-            journal,
-            tasks,
-            part.trial,
-            jobs=options.jobs,
-            progress=lambda share: print(f"{share:.0%}", file=sys.stderr, flush=True),
-        )
-        done = journal.done
-    print("\n".join(part.table(list(done.values()))))
+    tasks = [(str(n), (part.case(options.seed, n, robots),)) for n in range(options.number)]
+    how = {"jobs": options.jobs, "more": not options.table}
+    done = results(path, settings, tasks, part.trial, **how)
+    print("\n".join(part.table(done)))
 
 
 if __name__ == "__main__":
