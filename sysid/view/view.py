@@ -221,8 +221,9 @@ def first_view(experiment: Experiment, fit: Fit, logs=None) -> View:
     """
     if fit.strength.auto:
         # with weights of a geometric mean of one, every joint's residual has this variance
-        rms = np.array([one for one in fit.rms("train").values() if one > 0.0])
-        variance = float(np.exp(2.0 * np.mean(np.log(rms)))) if len(rms) else np.inf
+        rms = np.array(list(fit.rms("train").values()))
+        alike = (rms * inverse(rms))[rms > 0.0]
+        variance = float(np.median(alike)) ** 2 if len(alike) else np.inf
         experiment = with_weight(experiment, min(USUAL, weakest(variance)))
     if logs is None:
         logs = experiment_logs.read(experiment, fit.model.robot, experiment.data.train)
