@@ -132,7 +132,7 @@ def main() -> None:
     """Run what is there, and write the page."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--out", type=Path, default=Path("runs/real_logs"))
-    parser.add_argument("--only", action="append", default=[])
+    parser.add_argument("--only", action="append", default=[], choices=[name for name, *_ in ROBOTS])
     parser.add_argument("--publish", action="store_true", help="write docs/real_logs.md too")
     options = parser.parse_args()
     data = os.environ.get("SYSID_DATA_DIR")
