@@ -114,7 +114,7 @@ def logged(arm: Arm, model: mujoco.MjModel, effect: str | None, k: int, rng: np.
         mujoco.mj_inverse(known, needed)
         torque = needed.qfrc_inverse + arm.armature * qdd[i]
         torque = torque + stiffness * (q[i] - angle) + damping * (qd[i] - speed)
-        data.qfrc_applied[by] = torque
+        data.qfrc_applied[by] = law.acts(torque)
         data.qfrc_applied[by[k]] += law.torque(angle[k], speed[k], now)
         seen = law.seen(torque)
         if i % every == 0:
@@ -166,6 +166,16 @@ class Law:
         }.get(self.effect, 0.0)
         return self.size * float(share)
 
+    def acts(self, torque: np.ndarray) -> np.ndarray:
+        """What acts of the torque (dof,) that motors are asked for: a current loop follows late."""
+        if self.effect != "current_lag":
+            return torque
+        own, out = torque[self.k], torque.copy()
+        before = own if self.lagged is None else self.lagged
+        self.lagged = before + STEP / 0.01 * (own - before)
+        out[self.k] = self.lagged
+        return out
+
     def seen(self, torque: np.ndarray) -> np.ndarray:
         """What is logged of the motors' torque (dof,)."""
         own, out = torque[self.k], torque.copy()
@@ -174,10 +184,6 @@ class Law:
         if self.effect == "delay":
             self.past = [*self.past, own][-round(0.008 / STEP) - 1 :]
             out[self.k] = self.past[0]
-        if self.effect == "current_lag":
-            before = own if self.lagged is None else self.lagged
-            self.lagged = before + STEP / 0.01 * (own - before)
-            out[self.k] = self.lagged
         return out
 
     def read(self, angles: np.ndarray) -> np.ndarray:
