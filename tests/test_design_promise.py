@@ -91,7 +91,7 @@ def test_what_is_left_of_a_suspect_and_whether_it_is_named():
     left = target - stacked @ np.linalg.lstsq(stacked, target, rcond=None)[0]
     assert promise._left(base, prior, signature, rival) == pytest.approx(float(left @ left))
     assert promise._named(3.6**2, 65) == pytest.approx(0.5, abs=0.02) and promise._named(36.0, 65) > 0.98
-    assert promise._apart(0.0) == 0.0 and promise._apart(20.0) > 0.9
+    assert promise._apart(0.0, 1.0) == 0.0 and promise._apart(20.0, 1.0) > 0.9
 
 
 def test_a_likely_size_is_what_logs_and_usual_sizes_suggest():

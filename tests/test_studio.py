@@ -619,7 +619,7 @@ def test_a_motion_is_designed_with_its_files_to_take_along(opened, monkeypatch):
 
     asked = []
 
-    def design(experiment, *, separate, duration, processes, progress):
+    def design(experiment, *, separate, duration, processes, progress, diagnosis):
         asked.append((experiment.name, separate, duration))
         progress("searching", 0.5)
         return "found"

@@ -61,6 +61,7 @@ def _sets(found) -> list[list[tuple[str, str, float]]]:
 def trial(case: dict, arms=ARMS) -> dict:
     """One robot: the tie after its first log, and what stands after the second."""
     from sysid import design, diagnose
+    from sysid.statement.document import document
 
     rng = np.random.default_rng(case["seed"])
     told = {**case, "tried": [], "tie": None, "arms": {}, "seconds": {}}
@@ -81,7 +82,8 @@ def trial(case: dict, arms=ARMS) -> dict:
                     case["robot"], folder / f"first_{k}", case["seed"], [hidden(asked)],
                     first=first,
                 )  # fmt: skip
-                sets = _sets(diagnose(experiment))
+                diagnosis = diagnose(experiment)
+                sets = _sets(diagnosis)
             except SysidError as error:  # a size that this robot cannot have
                 told["tried"][-1] += f" ({type(error).__name__})"
                 continue
@@ -103,7 +105,8 @@ def trial(case: dict, arms=ARMS) -> dict:
                 chance = None
             else:
                 apart = suspects if arm == "designed" else []
-                found = design(experiment, separate=apart, processes=1)
+                said = document(diagnosis)
+                found = design(experiment, separate=apart, diagnosis=said, processes=1)
                 motion, chance = (found.t, found.q), _chance(found.pairs, told["hidden"])
             told["seconds"][arm] = time.process_time() - begun
             try:

@@ -19,6 +19,7 @@ search.py       several starts in several processes
 spectrum.py     the noise that a fit's residual tells, and what it makes of a fit
 likely_prior.py how near to the URDF's the logs make bodies likeliest to be
 promise.py      deviations now and after, and which suspects will be told apart
+left_open.py    what a diagnosis could not tell apart
 basis.py        what a design starts from
 designed.py     all of it on one page
 result.py       a motion and what it promises

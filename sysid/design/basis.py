@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
 import numpy as np
@@ -27,6 +27,8 @@ from ..smoother import Smoother
 from ..specs import Experiment, PreprocessSpec
 from .columns import instant_of
 from .information import Known, own_size
+from .left_open import LeftOpen
+from .left_open import read as logs_of
 from .noise import noise_of, size_of
 from .suspects import Seen, along, played, suspected, unseen
 
@@ -34,14 +36,17 @@ _WINDOW = 0.1  # s, where none is known
 _FASTEST = 0.25  # of a period of the filter's window: what it still lets through of the fastest
 _GUESSED = 0.02  # of a joint's torque: its noise, where no log says
 _RATE = 500.0  # Hz, where no log says
-_STILL, _STILL_SHARE = 0.03, 0.03  # rad/s or m/s, of the top speed: slower is standing (`preprocess`)
+_STILL, _STILL_SHARE = (
+    0.03,
+    0.03,
+)  # rad/s or m/s, of the top speed: slower is standing (`preprocess`)
 _USUAL = 10.0  # s of a motion that says how a robot usually moves, where no log does
 
 
 @dataclass(frozen=True)
 class Basis:
     """What a design starts from. logs: those of the fit; motion: these, filtered; test: logs that it
-    was tested on."""
+    was tested on; chances: how likely a diagnosis of these found each suspect."""
 
     robot: Robot
     fit: Fit | None
@@ -53,6 +58,7 @@ class Basis:
     levels: Mapping[str, str]
     logs: tuple[Log, ...] = ()
     test: tuple[Log, ...] = ()
+    chances: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def fastest(self) -> float:
@@ -61,12 +67,19 @@ class Basis:
 
 
 def basis(
-    experiment: Experiment, separate, tell, levels: Mapping[str, str] = MappingProxyType({})
+    experiment: Experiment,
+    separate,
+    tell,
+    levels: Mapping[str, str] = MappingProxyType({}),
+    diagnosis: Mapping | None = None,
 ) -> Basis:
     """What an experiment knows of its robot at {group: level}. Raises SysidError."""
+    left = (
+        LeftOpen(tuple(separate or ())) if diagnosis is None else LeftOpen.of(diagnosis, separate)
+    )
     machine, structure, prior = pipeline.build(experiment)
     levels = _levels(structure, levels)
-    _suspects(experiment, structure, separate)  # a suspect that is not there is told before any work
+    _suspects(experiment, structure, left.suspects)  # one that is not there is told before any work
     fit, motion, logs, test = None, None, (), ()
     if _has_logs(experiment):
         read = experiment_logs.read_all(experiment)
@@ -74,6 +87,8 @@ def basis(
         spec = settled(fit.experiment.preprocess, fit.filters)
         motion = prepare(read.train, spec, machine.joints)
         structure, x = fit.model, fit.x
+        if diagnosis is not None and left.logs != logs_of(fit.logs):
+            left = LeftOpen(tuple(separate or ()))  # of other logs
         logs, test = tuple(read.train), tuple(read.test)
         noise = noise_of(fit)
         pose = np.concatenate([p.q for p in motion.pieces]).mean(axis=0)
@@ -93,10 +108,16 @@ def basis(
         low, high = np.where(np.isfinite(machine.limits.T), machine.limits.T, [[-1.0], [1.0]])
         pose = np.clip(np.zeros(machine.dof), 0.9 * low + 0.1 * high, 0.1 * low + 0.9 * high)
         rate, window = experiment.data.rate or _RATE, _WINDOW
-    asked = _suspects(experiment, structure, separate)
+    if separate is None and left.suspects:
+        words = " and ".join(f"{effect}:{joint}" for effect, joint in left.suspects)
+        said = f"the motion is to tell {words} apart, which the last diagnosis could not"
+        warnings.warn(
+            SysidWarning(f"{said}; --separate none designs the one that tells most"), stacklevel=2
+        )
+    asked = _suspects(experiment, structure, left.suspects)
     known = _known(experiment, structure, levels, fit, x, noise, prior, asked, motion)
     known = replace(known, **_left_out(machine, experiment, fit, rate, window))
-    return Basis(machine, fit, motion, known, pose, rate, window, levels, logs, test)
+    return Basis(machine, fit, motion, known, pose, rate, window, levels, logs, test, left.chances)
 
 
 def _left_out(machine: Robot, experiment: Experiment, fit, rate: float, window: float) -> dict:

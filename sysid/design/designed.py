@@ -44,19 +44,24 @@ HARMONICS = 5
 
 
 def design(
-    experiment: Experiment, *, duration: float = 20.0, separate: Sequence[tuple[str, str]] = (),
+    experiment: Experiment, *, duration: float = 20.0,
+    separate: Sequence[tuple[str, str]] | None = None,
     limits_spec: LimitsSpec | None = None, seed: int = 0, processes: int | None = None,
-    levels: Mapping[str, str] | None = None, progress: Callable[[str, float], None] | None = None,
+    levels: Mapping[str, str] | None = None, diagnosis: Mapping | None = None,
+    progress: Callable[[str, float], None] | None = None,
 ) -> Design:  # fmt: skip
     """The next motion to log.
 
     Args:
-        duration [s]. separate: suspects, (effect, joint) each, `*` for the robot.
+        duration [s]. separate: suspects, (effect, joint) each, `*` for the robot; none of them for the
+            motion that tells most; None: what the diagnosis could not tell apart.
         limits_spec: limits beside the URDF's. seed: of the starts.
         processes: that share the starts, as many as there are cores where it is None; the motion is
             the same whatever their number.
         levels: {group: level} of logs that the motion is for, where effects are per group; the
             first level by default, which is told.
+        diagnosis: the document of one of the experiment, as `sysid diagnose --json` has it: how likely it
+            found each suspect counts in what is promised. One of other logs is left aside.
 
     Raises:
         SysidError: bad input, or no motion keeps to the limits.
@@ -65,7 +70,7 @@ def design(
     if not 2.0 <= duration <= 600.0:
         raise ConfigError(f"--duration {duration:g}", allowed="2 to 600 s")
     with noticed() as notices:
-        base = basis(experiment, separate, tell, levels or {})
+        base = basis(experiment, separate, tell, levels or {}, diagnosis)
         problem, bounds = posed(base, duration, limits_spec)
         found, random_best = searched(
             problem, base.pose, base.fastest, seed, processes=processes, tell=tell
@@ -139,7 +144,8 @@ def _told(
         if len(base.known.suspects) > 1:
             seen = _questioned(base, log)
             asked = len(candidates(base.fit.model, ()))
-            pairs = promise.pairs(base.fit, base.known.suspects, seen, seen.samples, asked)
+            who = base.known.suspects, seen, seen.samples, asked
+            pairs = promise.pairs(base.fit, *who, base.chances)
     return Design(
         joints=base.robot.joints, family=family, coefficients=family.coefficients(found.z),
         amounts=found.z[:, family.waves :],

@@ -14,17 +14,19 @@ kind, and for what a model lacks.
 A suspect a that is true leaves, of its torque s_a, what the model and its rival b cannot make
 between them, lambda = min_x |s_a - X x|^2 over the noise, on the new log alone and as a diagnosis sees it:
 under its low-pass, with standstill left out. The log of the likelihood ratio is then normal with mean
-lambda / 2 and variance lambda, and a set holds one name where it exceeds log 9. And that it is named at
-all, lambda against nothing must stand above what the best of all candidates makes of noise. What is promised
-of a pair is the mean over which of the two is true.
+lambda / 2 and variance lambda. A set holds one name where it and the log of the odds that a diagnosis
+of the old logs gave exceed log 9. And that it is named at all, lambda against nothing must stand above
+what the best of all candidates makes of noise. What is promised of a pair is the mean over which of the
+two is true, by these odds.
 
 Source: White 1980 (H^-1 S H^-1); Atkinson & Fedorov 1975 (T-optimality); Wald 1943.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 from scipy.special import ndtr, ndtri
@@ -56,14 +58,20 @@ class Pair:
 
 
 def pairs(
-    fit: Fit, suspects: Sequence[Suspect], new: Motion, samples: float, asked: int
+    fit: Fit,
+    suspects: Sequence[Suspect],
+    new: Motion,
+    samples: float,
+    asked: int,
+    chances: Mapping[str, float] = MappingProxyType({}),
 ) -> list[Pair]:
     """How likely it is that of each two suspects the one that is true will be named by a new log, and
-    told from the other: in the mean over which of them that is.
+    told from the other by all logs: in the mean over which of them that is.
 
     Args:
         new: the new log's motion, as a diagnosis sees it; samples: of it. asked: candidates that a
-            diagnosis questions.
+            diagnosis questions. chances: how likely one of the old logs found each suspect, `effect:joint`;
+            two of which it does not say both are as likely as each other.
     """
     seen = Seen.of(fit, new, samples)
     weigh = lambda columns: (columns * seen.weights[:, None, None]).reshape(-1, columns.shape[2])  # noqa: E731
@@ -71,16 +79,19 @@ def pairs(
     own = [weigh(seen.columns(one)) for one in suspects]
     sure = known_bodies(fit.experiment, fit.model)
     prior = own_size(fit.model, fit.prior, fit.x, size_of(fit), sure)
-    named = [_named(_left(base, prior, a @ one.size, a[:, :0]), asked) for a, one in zip(own, suspects)]
+    named = [
+        _named(_left(base, prior, a @ one.size, a[:, :0]), asked) for a, one in zip(own, suspects)
+    ]
+    words = [one.named(fit.joints) for one in suspects]
     out = []
-    for i, a in enumerate(suspects):
-        for j, b in enumerate(suspects[:i]):
-            # whichever of them is true, and nobody knows which
-            told = [
-                min(_apart(_left(base, prior, own[k] @ suspects[k].size, own[m])), named[k])
-                for k, m in ((i, j), (j, i))
-            ]
-            out.append(Pair(b.named(fit.joints), a.named(fit.joints), float(np.mean(told))))
+    for i, a in enumerate(words):
+        for j, b in enumerate(words[:i]):
+            one, other = (chances[a], chances[b]) if {a, b} <= chances.keys() else (0.5, 0.5)
+            share, told = one / (one + other), 0.0
+            for k, m, chance in ((i, j, share), (j, i, 1.0 - share)):  # whichever of them is true
+                left = _left(base, prior, own[k] @ suspects[k].size, own[m])
+                told += chance * min(_apart(left, chance / (1.0 - chance)), named[k])
+            out.append(Pair(b, a, float(told)))
     return out
 
 
@@ -94,9 +105,10 @@ def _left(base, prior, signature, rival) -> float:
     return max(float(signature @ signature - cross @ solved(gram, cross[:, None])[:, 0]), 0.0)
 
 
-def _apart(left: float) -> float:
-    """The probability that a set will hold one of two."""
-    return float(ndtr((0.5 * left - _ODDS) / np.sqrt(left))) if left > 0.0 else 0.0
+def _apart(left: float, odds: float) -> float:
+    """The probability that a set will hold one of two that had these odds."""
+    more = 0.5 * left + np.log(odds) - _ODDS
+    return float(ndtr(more / np.sqrt(left))) if left > 0.0 else float(more > 0.0)
 
 
 def _named(left: float, asked: int) -> float:

@@ -37,9 +37,7 @@ def diagnosed(
     Raises:
         SysidError: bad input.
     """
-    # that of the experiment as it is may be the start of a discovery
-    there = (_read(experiment, folder) for folder in (run, *sorted(run.glob("steps/*"))))
-    if (said := next((one for one in there if one is not None), None)) is not None:
+    if (said := standing(experiment, run)) is not None:
         fit = pipeline.fit(experiment, progress=progress)
         if _of(said, fit):
             results.write(fit, run)
@@ -49,6 +47,14 @@ def diagnosed(
     else:
         made = diagnose(experiment, progress=progress)
     return made.fit, written(experiment, made, run)
+
+
+def standing(experiment: Experiment, run: Path) -> dict | None:
+    """The diagnosis in a run folder, or in one of its steps, that is of an experiment as it is; of
+    which logs is not asked."""
+    # that of the experiment as it is may be the start of a discovery
+    there = (_read(experiment, folder) for folder in (run, *sorted(run.glob("steps/*"))))
+    return next((one for one in there if one is not None), None)
 
 
 def found(experiment: Experiment, fit: Fit, run: Path) -> dict | None:

@@ -12,6 +12,7 @@ from .. import bounded
 from .. import design as designing
 from ..errors import SysidError
 from ..specs import Experiment
+from ..statement import kept
 
 FILES = {
     "trajectory.csv": "text/csv",
@@ -42,8 +43,9 @@ def made(
 ) -> None:
     """Design a motion and write its folder. Raises SysidError."""
     found = designing.design(
-        experiment, separate=separate, duration=duration, processes=1, progress=tell
-    )
+        experiment, separate=separate, duration=duration, processes=1, progress=tell,
+        diagnosis=kept.standing(experiment, run),
+    )  # fmt: skip
     designing.write(found, run / "designs" / named(separate))
 
 
