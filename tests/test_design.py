@@ -274,6 +274,36 @@ def test_what_shrinks_keeps_to_its_limits_and_touches_one(arm):
     assert counted > 8 and touched >= 0.9 * counted
 
 
+def test_what_is_played_is_looked_at_between_two_looks(poor, arm, monkeypatch):
+    """Links that come nearest between two instants at which a search looks at distances, by less than a millimetre."""
+    posed = _posed(arm, arm.model.robot)
+    z = problem.shrunk(posed, problem.drawn(posed, np.zeros(2), np.random.default_rng(1)))
+    at, clearance = int(np.argmax(np.abs(posed.basis[1] @ z.T)[:, 0])), posed.limits.clearance
+    at += 5 - at % problem.CLOSE  # where it is fast, in the middle between two looks
+    where = (posed.basis[0, at] @ z.T)[0]
+
+    class Narrow:
+        """The links touch at one angle of the shoulder, which the robot does not stand at."""
+
+        looks = True
+
+        def least(self, q, most=np.inf):
+            return np.where(np.abs(np.asarray(q)[:, 0] - where) < 1e-4, clearance - 1e-4, clearance + 1.0)
+
+        def nearest(self, q):
+            return float(self.least(q).min())
+
+    narrow = replace(posed, geometry=Narrow())
+    np.testing.assert_array_equal(problem.shrunk(narrow, z), z)
+    closely = problem.shrunk(narrow, z, 1)
+    assert closely is None or narrow.geometry.nearest(posed.basis[0] @ closely.T) > clearance
+    looked = []
+    whole = problem.shrunk
+    monkeypatch.setattr(search.solve, "shrunk", lambda posed, z, close=problem.CLOSE: looked.append(close) or whole(posed, z, close))
+    design(pipeline.load(poor[0]), duration=3.0, processes=1)
+    assert looked[-1] == 1 and set(looked[:-1]) == {problem.CLOSE}
+
+
 def test_pairs_are_told_apart_or_said_not_to_be(poor, designed):
     (pair,) = designed.pairs
     assert {pair.a, pair.b} == {"stribeck:shoulder", "spring:shoulder"} and pair.probability > 0.9

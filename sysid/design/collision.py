@@ -15,7 +15,7 @@ import pinocchio as pin
 
 from . import spheres
 
-_EVERY = 8  # poses from one at which all pairs are asked to the next, for a first idea of the least
+_EVERY = 80  # poses from one at which all pairs are asked to the next, for a first idea of the least
 _CHUNK = 2048  # poses whose spheres stand in memory at once
 _UP = np.array([0.0, 0.0, 1.0])
 

@@ -209,5 +209,5 @@ def _margins(problem: Problem, bounds: Limits, found: Found) -> dict[str, float]
     most = shares(whole, motion, torque(whole, *motion[:3])).max(axis=(1, 2))
     names = ("position", "velocity", "acceleration", "jerk", "torque")
     out = {name: float(1.0 - share) for name, share in zip(names, most)}
-    near = problem.geometry.nearest(motion[0][::10])
+    near = problem.geometry.nearest(motion[0])
     return out | ({"collision": near} if np.isfinite(near) else {})

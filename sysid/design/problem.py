@@ -22,7 +22,10 @@ from .suspects import Suspect, along
 _NODES = 12.0  # for each period of the fastest harmonic: inertia goes with its square and products
 _FINE = 0.01  # s: the steps of a motion that a suspect looks back along
 _CHECKED = 1000.0  # Hz at which limits are kept
-_CLOSE = 10  # every so many of them distances are: between two a link's point moves a few mm
+CLOSE = (
+    10  # every so many of them distances are while a motion is sought: between two a link's point
+)
+# moves a few mm, and by how much links are nearer there than at both is less than a millimetre
 _BISECTIONS = 10
 _SMALLEST = 1e-3  # share of a motion that is none
 
@@ -125,8 +128,8 @@ def passed(problem: Problem, z) -> np.ndarray:
     over = np.moveaxis(shares(problem, motion, torque(problem, *motion[:3])), 1, 2)
     found = [t[_peaks(own)] for own in over.reshape(-1, len(t)) if own.max() > 1.0]
     clearance = problem.limits.clearance
-    lacks = clearance - problem.geometry.least(motion[0][::_CLOSE], clearance)
-    return np.concatenate([*found, t[::_CLOSE][_peaks(1.0 + lacks)], np.zeros(0)])
+    lacks = clearance - problem.geometry.least(motion[0][::CLOSE], clearance)
+    return np.concatenate([*found, t[::CLOSE][_peaks(1.0 + lacks)], np.zeros(0)])
 
 
 def _peaks(share) -> np.ndarray:
@@ -136,14 +139,18 @@ def _peaks(share) -> np.ndarray:
     return np.array([a + int(np.argmax(share[a:b])) for a, b in zip(starts, stops)], dtype=int)
 
 
-def shrunk(problem: Problem, z) -> np.ndarray | None:
+def shrunk(problem: Problem, z, close: int = CLOSE) -> np.ndarray | None:
     """The largest share of a motion about its middle pose that keeps to the limits; None where not
-    even the pose does."""
+    even the pose does.
+
+    Args:
+        close: distances are looked at every so many of the checked times.
+    """
     still = _still(z)
     if not rests(problem, z):
         return None
     share = _kinematic(problem, z)
-    whole = np.arange(len(problem.checked)), np.arange(0, len(problem.checked), _CLOSE)
+    whole = np.arange(len(problem.checked)), np.arange(0, len(problem.checked), close)
     while True:
         here = still + share * (z - still)
         over = _over(problem, here, *whole)

@@ -68,7 +68,12 @@ def searched(
     best = max(starts, key=lambda found: found.value, default=None)
     simple = max(plain, key=lambda found: found.value, default=best)
     # what maneuvers add must be more than where searches happen to end
-    return (best if best is None or best.value > simple.value + _CLEAR else simple), random_best
+    best = best if best is None or best.value > simple.value + _CLEAR else simple
+    if best is None:
+        return None, random_best
+    # the one that is played is looked at closely
+    (last,) = work(Found.of, [(problem.of(best.family), best.z, 1)])
+    return (last if np.isfinite(last.value) else None), random_best
 
 
 def promising(starts: list[Found]) -> list[Found]:

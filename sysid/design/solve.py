@@ -21,7 +21,7 @@ from .collision import Near
 from .columns import columns, with_changes
 from .fourier import Fourier
 from .information import information, worth
-from .problem import Problem, looking_back, passed, shares, shrunk, told, torque, value
+from .problem import CLOSE, Problem, looking_back, passed, shares, shrunk, told, torque, value
 from .slopes import slopes
 
 STEPS = (40, 15, 10, 10)  # linear programs, again each time that more times are looked at
@@ -47,9 +47,9 @@ class Found:
     log_det: float = -np.inf
 
     @classmethod
-    def of(cls, problem: Problem, z: np.ndarray) -> Found:
-        """The largest share of a motion that keeps to every limit."""
-        kept, family = shrunk(problem, z), problem.family
+    def of(cls, problem: Problem, z: np.ndarray, close: int = CLOSE) -> Found:
+        """The largest share of a motion that keeps to every limit; close: as of `shrunk`."""
+        kept, family = shrunk(problem, z, close), problem.family
         return cls(family, z, -np.inf) if kept is None else cls(family, kept, *value(problem, kept))
 
 
