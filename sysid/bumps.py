@@ -2,12 +2,15 @@
 
 An arm that gives way to a push moves smoothly, and a smooth torque drives it: only what its
 equations leave is the push. It stands in those of several joints at once and nowhere else, while
-what a model lacks on one joint stays in that joint's equation.
+what a model lacks on one joint stays in that joint's equation. But a push may drive one joint alone:
+what outweighs all the rest of a log in a moment of it says nothing of how the joint moves otherwise,
+for no other moment confirms it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -28,44 +31,123 @@ from .stretches import stretches
 _EFFECTS = ("viscous", "coulomb", "torque_bias")  # what any joint has
 _NEARBY = 0.5  # s to either side whose median a burst must exceed
 _OFTEN = 3.0  # s of log to a burst: what comes more often is how the machine moves, and no accident
+_SHARE = 0.2  # of how far torque goes within twice a burst's time: of a quick move less is left
 _FEWEST = 50  # rows of a joint that have a usual
 _WHITE = 0.706  # z75 - z50 of a normal variable's size over its median
 _PASSES = 2  # the second with every joint weighted by what the first leaves
 
 
 def bumps(robot: Robot, logs: Sequence[Log], *, among: int = 1) -> list[Event]:
-    """Knocks in what rigid bodies with friction, fitted to logs of a robot, leave of them.
+    """The knocks of logs of a robot: in what rigid bodies with friction, fitted to them, leave.
 
     The size of what is left, under the low-pass of a diagnosis, over the usual: the larger of the
-    joint's own and of what is about it. A knock is where it surprises on two joints.
+    joint's own and of what is about it. A knock is where it surprises on two joints, or on one where
+    its square is more than that of all that is usual on that joint. A quick move among slow ones is
+    none, be it that the signals showed it: of how far torque goes meanwhile little is left, as
+    equations follow it but for what they lack.
 
     Args:
-        among: as of `outliers.spikes`.
+        logs: with the events that their signals show. among: as of `outliers.spikes`.
     """
-    if robot.dof < 2:
-        return []
-    cutoff = widest(logs, known=(own_band := band(logs)))
-    if (motion := lowpassed(logs, robot.joints, cutoff, known=own_band)) is None:
-        return []
+    shown = [event for log in logs for event in log.events if event.kind == "knock"]
+    calm = [replace(log, events=tuple(e for e in log.events if e.kind != "knock")) for log in logs]
+    cutoff = widest(calm, known=(own_band := band(calm)))
+    if (motion := lowpassed(calm, robot.joints, cutoff, known=own_band)) is None:
+        return shown
     model = build(robot, [EffectSpec(name=name) for name in _EFFECTS])
     stride = stride_of(motion, cutoff)
     rows, parts = apart(model, motion, stride)
     step = stride * motion.pieces[0].step
-    size = np.abs(_left(rows, parts, _kinds(motion)[rows.piece]))
-    own = np.stack([_surprise(a, u, rows.piece, step) for a, u in zip(size.T, rows.use.T)], axis=1)
-    span = len(own) * step
+    span = len(rows.t) * step
     level = np.log(span / BURST * robot.dof * among / CHANCE)
-    found = []
-    for number, piece in enumerate(motion.pieces):
+    found, kinds = [], _kinds(motion)[rows.piece]
+    names = [piece.source for piece in motion.pieces]
+    counted, most = rows.use.copy(), np.full(rows.use.shape, -1.0)
+    while sum(not _same(shown, event) for event in found) * _OFTEN <= span:
+        more, strange = _bursts(rows, parts, kinds, step, level)
+        most = np.maximum(most, strange)
+        for a, b, members in more:
+            start, stop = float(rows.t[a]), float(rows.t[b])
+            joints = tuple(robot.joints[j] for j in members)
+            event = Event("knock", names[rows.piece[a]], start, stop, joints, "both")
+            found = _merged(found, event)  # what rings on
+            # what is left of the others is seen without them
+            rows.use[a : b + 1], rows.tau[a : b + 1] = False, 0.0
+            for _, columns in parts:
+                columns[:, a : b + 1] = 0.0
+        if not more:
+            break
+    else:
+        return shown
+    source = np.array(names)[rows.piece]
+    for event in shown:
+        near = (
+            (source == event.log) & (rows.t >= event.start - BURST) & (rows.t <= event.stop + BURST)
+        )
+        # where no row counts it costs none
+        if not counted[near].any() or most[near].max() > 0.5 * level:
+            found = _merged(found, event)
+    return found
+
+
+def _same(events: list[Event], one: Event) -> list[Event]:
+    """Those of events which an event overlaps, or follows within a burst."""
+    own = [e for e in events if e.log == one.log]
+    return [e for e in own if e.start <= one.stop + BURST and one.start <= e.stop + BURST]
+
+
+def _merged(found: list[Event], event: Event) -> list[Event]:
+    """Events, and one more that is one with those near to it."""
+    whole = [*_same(found, event), event]
+    joints = tuple(dict.fromkeys(joint for e in whole for joint in e.joints))
+    start, stop = min(e.start for e in whole), max(e.stop for e in whole)
+    rest = [e for e in found if e not in whole]
+    return [*rest, replace(event, start=start, stop=stop, joints=joints)]
+
+
+def _bursts(rows: Rows, parts, kinds, step: float, level: float):
+    """First and last row, and joints, of what stands out of what least squares leave; and how
+    surprising what is left is (n, dof) where it is no small share of how far torque goes."""
+    left, weights = _left(rows, parts, kinds)
+    size, wide = np.abs(left), 2 * max(1, round(2.0 * BURST / step)) + 1
+    own = np.stack([_surprise(a, u, rows.piece, step) for a, u in zip(size.T, rows.use.T)], axis=1)
+    strange, out = np.full(own.shape, -1.0), []
+    for number in np.unique(rows.piece):
         (at,) = np.nonzero(rows.piece == number)
-        # at once: within a burst, as each joint's rows may count at other moments of it
-        wide = running(own[at], max(1, round(BURST / step)), "max")
-        for a, b in bursts(np.sort(wide, axis=1)[:, -2], level):
-            greatest = own[at[a : b + 1]].max(axis=0)
-            joints = tuple(robot.joints[j] for j in np.flatnonzero(greatest > 0.5 * level))
-            start, stop = (float(rows.t[at[k]]) for k in (a, b))
-            found.append(Event("knock", piece.source, start, stop, joints, "both"))
-    return found if len(found) * _OFTEN <= span else []
+        goes = sum(
+            running(np.where(rows.use[at], way * rows.tau[at], -np.inf), wide, "max")
+            for way in (1.0, -1.0)
+        )
+        far = size[at] > _SHARE * weights * np.maximum(goes, 0.0)
+        strange[at] = np.where(far & rows.use[at], own[at], -1.0)
+        for a, b in [*_together(own[at], step, level), *_outweighing(own, size, at, level)]:
+            members = np.flatnonzero(own[at[a : b + 1]].max(axis=0) > 0.5 * level)
+            tells = strange[at[a : b + 1]].max() > 0.5 * level
+            a, b = int(at[a]), int(at[b])
+            if tells and not any(a <= last and first <= b for first, last, _ in out):
+                out.append((a, b, members.tolist()))
+    # the others may be what these bend
+    great = [own[a : b + 1].max() for a, b, _ in out]
+    return [one for one, size in zip(out, great) if size > 0.5 * max(great)], strange
+
+
+def _together(surprises, step: float, level: float) -> list[tuple[int, int]]:
+    """Where two joints surprise (n, dof) at once: within a burst, as each joint's rows may count at
+    other moments of it."""
+    if surprises.shape[1] < 2:
+        return []
+    wide = running(surprises, max(1, round(BURST / step)), "max")
+    return bursts(np.sort(wide, axis=1)[:, -2], level)
+
+
+def _outweighing(surprises, size, at, level: float) -> list[tuple[int, int]]:
+    """Where a joint's burst, of rows `at`, has a greater square than all its rows (n, dof) without
+    any burst."""
+    out = []
+    for s, square in zip(surprises.T, np.square(size).T):
+        calm = np.sum(square) - sum(np.sum(square[a : b + 1]) for a, b in bursts(s, level))
+        out += [(a, b) for a, b in bursts(s[at], level) if np.sum(square[at[a : b + 1]]) > calm]
+    return out
 
 
 def apart(model: Model, motion: Motion, stride: int) -> tuple[Rows, list[tuple]]:
@@ -89,9 +171,9 @@ def _kinds(motion: Motion) -> np.ndarray:
     return np.array([[*dict.fromkeys(each)].index(own) for own in each])
 
 
-def _left(rows: Rows, joints: list[tuple], kind: np.ndarray) -> np.ndarray:
-    """What least squares leave (n, dof), every joint in units of its median; of rows of each kind
-    (n,) by itself.
+def _left(rows: Rows, joints: list[tuple], kind: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """What least squares leave (n, dof), every joint in units of its median, and one over these
+    (dof,); of rows of each kind (n,) by itself.
 
     Args:
         joints: of each, its parameters and their columns (support, n).
@@ -114,7 +196,7 @@ def _left(rows: Rows, joints: list[tuple], kind: np.ndarray) -> np.ndarray:
                 left[own, j] = rows.tau[own, j] - x[at] @ values[:, own]
         usual = [np.median(np.abs(e[u])) if u.any() else 0.0 for e, u in zip(left.T, rows.use.T)]
         weights = ratio(np.ones(len(usual)), np.array(usual))
-    return left * weights
+    return left * weights, weights
 
 
 def _surprise(size, use, piece, step: float) -> np.ndarray:

@@ -64,8 +64,9 @@ def with_events(machine: Robot, read: list[logs.Log], *, among: int = 1) -> list
     if among > 1:  # what is looked for in signals leaves half a span's memory free between what is held
         released()
     felt = bumps(machine, found, among=among)
-    more = [[e for e in felt if e.log == log.name] for log in found]
-    return [replace(log, events=events.ordered([*log.events, *own])) if own else log for log, own in zip(found, more)]
+    other = [[e for e in log.events if e.kind != "knock"] for log in found]
+    knocks = [[e for e in felt if e.log == log.name] for log in found]
+    return [replace(log, events=events.ordered([*own, *more])) for log, own, more in zip(found, other, knocks)]
 
 
 def _with_events_of_spans(machine: Robot, log: logs.Log) -> logs.Log:

@@ -95,17 +95,60 @@ def test_a_push_stands_on_two_joints_within_a_burst(pushed, monkeypatch, apart, 
     from sysid import bumps as module
 
     machine, logs = read(pushed[0])
-    joints = iter((500, 500, 500))
-    shift = iter((0.0, apart, np.inf))
+    shift = iter((0.0, apart))
 
     def surprise(size, use, piece, step):
-        out, at, late = np.full(len(size), -1.0), next(joints), next(shift)
+        out, late = np.full(len(size), -1.0), next(shift, np.inf)
         if np.isfinite(late):
-            out[at + round(late / step)] = 100.0
+            out[500 + round(late / step)] = 100.0
         return out
 
     monkeypatch.setattr(module, "_surprise", surprise)
+    monkeypatch.setattr(module, "_SHARE", -1.0)  # however far torque goes
     assert len(bumps(machine, [replace(log, events=()) for log in logs])) == found
+
+
+def pulsed(log, at: float, joint: int, size: float):
+    """A log with 60 ms of what drives one joint alone."""
+    (segment,) = log.segments
+    share = np.clip((segment.t - at) / 0.06, 0.0, 1.0)
+    tau = segment.tau.copy()
+    tau[:, joint] += size * np.std(tau[:, joint]) * np.sin(np.pi * share)
+    return replace(log, events=(), segments=(replace(segment, tau=tau),))
+
+
+def test_what_outweighs_all_the_rest_on_one_joint_is_a_push(leg, tmp_path):
+    """It says nothing of how the joint moves otherwise; a tenth of it may."""
+    experiment, machine, *_ = leg
+    write(simulate(machine, seed=4, duration=12.0, rate=500.0), experiment, tmp_path / "logs")
+    log = next(log for log in read(pipeline.load(tmp_path / "logs"))[1] if log.path.stem == "train")
+    (event,) = bumps(machine, [pulsed(log, 5.0, 1, 3.0)])
+    assert event.joints == (machine.joints[1],) and 4.9 < event.start < 5.06 < event.stop + 0.06 < 5.3
+    assert bumps(machine, [pulsed(log, 5.0, 1, 0.1)]) == []
+
+
+def test_pushes_behind_a_greater_one_are_found(leg, tmp_path):
+    """Which bends the fit until it is left out."""
+    experiment, machine, *_ = leg
+    write(simulate(machine, seed=4, duration=12.0, rate=500.0), experiment, tmp_path / "logs")
+    log = next(log for log in read(pipeline.load(tmp_path / "logs"))[1] if log.path.stem == "train")
+    both = pulsed(pulsed(log, 5.0, 1, 30.0), 8.0, 1, 1.5)
+    assert [round(event.start) for event in sorted(bumps(machine, [both]), key=lambda e: e.start)] == [5, 8]
+
+
+@pytest.mark.parametrize("seed", [1, 4, 9])
+def test_a_quick_move_among_slow_ones_is_no_knock(planar, tmp_path, seed, monkeypatch):
+    """The signals show one; the robot's equations follow it."""
+    (tmp_path / "plain.yaml").write_text(f"robot: {{urdf: {planar.path}}}\n")
+    experiment, machine, *_ = load(tmp_path / "plain.yaml")
+    write(simulate(machine, seed=seed, duration=12.0, rate=500.0, motion="moves"), experiment, tmp_path / "logs")
+    shown, whole = [], experiment_logs.bumps
+    monkeypatch.setattr(
+        experiment_logs, "bumps",
+        lambda robot, logs, **how: shown.extend(e for log in logs for e in log.events if e.kind == "knock") or whole(robot, logs, **how),
+    )  # fmt: skip
+    _, logs = read(pipeline.load(tmp_path / "logs"))
+    assert shown and not [e for log in logs for e in log.events if e.kind == "knock"]
 
 
 def test_columns_apart_are_those_of_the_rows(pushed):
