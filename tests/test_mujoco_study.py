@@ -60,6 +60,39 @@ def test_a_soft_and_a_loose_joint_are_measured_at_the_motor(arm):
     assert mujoco.MjSpec.from_string(arm.urdf).compile().nv == 3
 
 
+def test_labs_have_manners_of_their_own():
+    drawn = [plant.Manner(**trial.case(7, number, labs=True)["manner"]) for number in range(100)]
+    assert {m.motion for m in drawn} == {"sines", "moves"} and {m.rate for m in drawn} == {100.0, 200.0, 500.0, 1000.0}
+    for name in ("jitter", "steps", "spikes", "knocks"):
+        assert 20 < sum(bool(getattr(m, name)) for m in drawn) < 50
+    assert plant.Manner(**trial.case(7, 0)["manner"]) == plant.Manner()
+
+
+def test_moves_go_from_rest_to_rest_and_are_derivatives_of_each_other():
+    t, q, qd, qdd = plant.moves(np.random.default_rng(1), 2)
+    assert np.abs(qd[0]).max() == np.abs(qdd[0]).max() == 0.0 and np.abs(q).max() <= 1.2
+    np.testing.assert_allclose(np.gradient(q, plant.STEP, axis=0)[1:-1], qd[1:-1], atol=2e-3)
+    np.testing.assert_allclose(np.gradient(qd, plant.STEP, axis=0)[1:-1], qdd[1:-1], atol=0.1)
+    rests = np.all(qd == 0.0, axis=1)
+    assert 0.1 < rests.mean() < 0.7 and 6 < np.count_nonzero(np.diff(rests.astype(int)) == 1) < 30
+
+
+def test_logs_are_read_as_their_manner_says(arm):
+    rng, n = np.random.default_rng(2), 4000
+    steps = sorted(plant.samples(rng, plant.Manner(rate=100.0, jitter=0.2), n))
+    assert steps[0] >= 0 and steps[-1] < n and len(steps) == n // 20
+    assert np.ptp(np.array(steps) - 20 * np.arange(len(steps))) == 8  # 4 steps early to 4 late
+    plain = np.column_stack([plant.STEP * np.arange(n), rng.normal(size=(n, 6))])
+    coarse = plant.read(plain.copy(), rng, plant.Manner(noise=0.0, steps=0.01, bits=10, spikes=0.01))
+    np.testing.assert_allclose(coarse[:, 1:4] / (2.0 * np.pi / 1024), np.round(coarse[:, 1:4] / (2.0 * np.pi / 1024)), atol=1e-9)
+    assert np.abs(coarse[:, 1:4] - plain[:, 1:4]).max() <= 1.0001 * np.pi / 1024
+    spiked = np.abs(coarse[:, 4:] - plain[:, 4:]) > 4.0
+    assert 0.005 < spiked.mean() < 0.015 and len(np.unique(coarse[:, 4])) < 250
+    blows = plant.knocked(rng, 3, arm.torque, plant.STEP * np.arange(40000))
+    struck = np.any(blows != 0.0, axis=1)
+    assert np.count_nonzero(np.diff(struck.astype(int)) == 1) == 3 and struck.sum() == pytest.approx(3 * 0.05 / plant.STEP, rel=0.05)
+
+
 def test_a_claim_is_there_where_its_set_holds_what_is_hidden():
     one = {"effect": "spring", "joint": "a", "visible": True, "status": {"a": "missing"}}
     results = [

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-STEP, RATE, SECONDS = 0.0005, 500.0, 20.0  # s of the simulation; Hz and s of a log
+STEP, SECONDS = 0.0005, 20.0  # s of the simulation, and of a log
 _HARMONICS = np.array([1, 2, 3, 5, 8, 12, 17, 23])
 _SWING = 1.2  # rad to either side
 _CONTROLLER, _DAMPED = 8.0, 0.8  # Hz
 _SLOW = 0.005  # rad/s below which friction that is applied as a torque is less than all of it
-_BITS = 18
+_KNOCK = 0.05  # s that a knock lasts
 
 #: What may be hidden, under the name that the catalogue has for it.
 TORQUES = (
@@ -22,6 +22,31 @@ TORQUES = (
 SENSORS = ("torque_gain", "delay", "current_lag", "encoder_offset")
 NATIVE = ("spring", "elasticity", "backlash", "gravity_tilt")  # MuJoCo's own
 HIDDEN = (*TORQUES, *SENSORS, *NATIVE)
+
+
+@dataclass(frozen=True)
+class Manner:
+    """How an arm moves and what its logs are like: sines or moves from point to point with stops between
+    them; Hz, and how much of a period a sample may be early or late; bits a turn of angles; noise of torque, over
+    its RMS; steps of torque, over its greatest; share of torque samples that are spikes; knocks in a log."""
+
+    motion: str = "sines"
+    rate: float = 500.0
+    jitter: float = 0.0
+    bits: int = 18
+    noise: float = 0.01
+    steps: float = 0.0
+    spikes: float = 0.0
+    knocks: int = 0
+
+
+def of_a_lab(rng: np.random.Generator) -> Manner:
+    """A manner as labs have it."""
+    pick = lambda *those: those[int(rng.integers(len(those)))]  # noqa: E731
+    return Manner(
+        pick("sines", "moves"), pick(100.0, 200.0, 500.0, 1000.0), pick(0.0, 0.0, 0.2), pick(14, 16, 18, 20),
+        pick(0.005, 0.01, 0.03), pick(0.0, 0.0, 0.004), pick(0.0, 0.0, 0.002), pick(0, 0, 3),
+    )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -97,7 +122,9 @@ def built(arm: Arm, effect: str | None, k: int, rng: np.random.Generator) -> muj
     return spec.compile()
 
 
-def logged(arm: Arm, model: mujoco.MjModel, effect: str | None, k: int, rng: np.random.Generator) -> np.ndarray:
+def logged(
+    arm: Arm, model: mujoco.MjModel, effect: str | None, k: int, rng: np.random.Generator, manner: Manner
+) -> np.ndarray:
     """A log (n, 1 + 2 dof): t, angles, torques."""
     known = mujoco.MjSpec.from_string(arm.urdf).compile()
     needed, data, dof = mujoco.MjData(known), mujoco.MjData(model), len(arm.names)
@@ -105,27 +132,76 @@ def logged(arm: Arm, model: mujoco.MjModel, effect: str | None, k: int, rng: np.
     by = np.array([model.joint(name).dofadr[0] for name in arm.names])
     stiffness = arm.inertia * (2.0 * np.pi * _CONTROLLER) ** 2
     damping = 2.0 * _DAMPED * arm.inertia * 2.0 * np.pi * _CONTROLLER
-    t, q, qd, qdd = wanted(rng, dof)
+    t, q, qd, qdd = wanted(rng, dof) if manner.motion == "sines" else moves(rng, dof)
+    blows = knocked(rng, manner.knocks, arm.torque, t)
     data.qpos[at], data.qvel[by] = q[0], qd[0]
-    law, told, every = Law(effect, arm, k), [], round(1.0 / (RATE * STEP))
+    law, told, when = Law(effect, arm, k), [], samples(rng, manner, len(t))
     for i, now in enumerate(t):
         angle, speed = data.qpos[at], data.qvel[by]
         needed.qpos[:], needed.qvel[:], needed.qacc[:] = angle, speed, qdd[i]
         mujoco.mj_inverse(known, needed)
         torque = needed.qfrc_inverse + arm.armature * qdd[i]
         torque = torque + stiffness * (q[i] - angle) + damping * (qd[i] - speed)
-        data.qfrc_applied[by] = law.acts(torque)
+        data.qfrc_applied[by] = law.acts(torque) + blows[i]
         data.qfrc_applied[by[k]] += law.torque(angle[k], speed[k], now)
         seen = law.seen(torque)
-        if i % every == 0:
+        if i in when:
             told.append(np.concatenate([[now], law.read(angle), seen]))
         mujoco.mj_step(model, data)
-    out = np.array(told)
-    torques = out[:, 1 + dof :]
-    torques += rng.normal(size=torques.shape) * 0.01 * np.sqrt((torques**2).mean(0))
-    step = 2.0 * np.pi / 2**_BITS
-    out[:, 1 : 1 + dof] = np.round(out[:, 1 : 1 + dof] / step) * step
+    return read(np.array(told), rng, manner)
+
+
+def samples(rng: np.random.Generator, manner: Manner, steps: int) -> set[int]:
+    """Steps of the simulation that are logged."""
+    every = round(1.0 / (manner.rate * STEP))
+    kept = np.arange(0, steps, every)
+    late = int(manner.jitter * every)
+    if late:
+        kept = np.clip(kept + rng.integers(-late, late + 1, len(kept)), 0, steps - 1)
+    return set(kept.tolist())
+
+
+def read(log: np.ndarray, rng: np.random.Generator, manner: Manner) -> np.ndarray:
+    """A log (n, 1 + 2 dof) as sensors read it."""
+    dof = (log.shape[1] - 1) // 2
+    torques, angles = log[:, 1 + dof :], log[:, 1 : 1 + dof]
+    size = np.sqrt((torques**2).mean(0))
+    torques += rng.normal(size=torques.shape) * manner.noise * size
+    if manner.spikes:
+        torques += 5.0 * size * (rng.random(torques.shape) < manner.spikes) * rng.choice([-1.0, 1.0], torques.shape)
+    if manner.steps:
+        step = manner.steps * np.abs(torques).max(0)
+        torques[:] = np.round(torques / step) * step
+    step = 2.0 * np.pi / 2**manner.bits
+    angles[:] = np.round(angles / step) * step
+    return log
+
+
+def knocked(rng: np.random.Generator, knocks: int, size: np.ndarray, t: np.ndarray) -> np.ndarray:
+    """(n, dof) what knocks do to joints whose torques are so large (dof,)."""
+    out = np.zeros((len(t), len(size)))
+    for start in rng.uniform(1.0, t[-1] - 1.0, knocks):
+        share = (t - start) / _KNOCK
+        inside = (share > 0.0) & (share < 1.0)
+        out[inside] += np.sin(np.pi * share[inside, None]) * 1.5 * size * rng.normal(size=len(size))
     return out
+
+
+def moves(rng: np.random.Generator, dof: int):
+    """t (n,), and a motion q, qd, qdd (n, dof) from pose to pose, with stops between them."""
+    t = np.arange(0.0, SECONDS, STEP)
+    q, qd, qdd = np.zeros((3, len(t), dof))
+    here, now = rng.uniform(-_SWING, _SWING, dof), 0.0
+    while now < SECONDS:
+        there, lasts, rests = rng.uniform(-_SWING, _SWING, dof), rng.uniform(0.6, 1.8), rng.uniform(0.2, 1.0)
+        later = t >= now
+        s = np.clip((t[later, None] - now) / lasts, 0.0, 1.0)
+        far = there - here
+        q[later] = here + far * (10.0 * s**3 - 15.0 * s**4 + 6.0 * s**5)
+        qd[later] = far * (30.0 * s**2 - 60.0 * s**3 + 30.0 * s**4) / lasts
+        qdd[later] = far * (60.0 * s - 180.0 * s**2 + 120.0 * s**3) / lasts**2
+        here, now = there, now + lasts + rests
+    return t, q, qd, qdd
 
 
 def wanted(rng: np.random.Generator, dof: int):

@@ -6,13 +6,14 @@ import tempfile
 import time
 import warnings
 from collections import Counter
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
 import yaml
 
 from scripts.blind_parts.robots import PLANAR
-from scripts.mujoco_parts.plant import HIDDEN, arm_of, built, logged
+from scripts.mujoco_parts.plant import HIDDEN, Manner, arm_of, built, logged, of_a_lab
 from tests.servos import arm_urdf
 
 ARMS = ("planar", "arm of 3", "arm of 5")
@@ -20,12 +21,13 @@ CONTROLS = 5  # one case in so many has nothing hidden
 VISIBLE = 0.1  # of a held-out error
 
 
-def case(seed: int, number: int) -> dict:
-    """What the number-th case of a seed is: every effect in turn, nothing in between, on an arm drawn."""
+def case(seed: int, number: int, labs: bool = False) -> dict:
+    """What the number-th case of a seed is: every effect in turn, nothing in between, on an arm drawn; with
+    `labs` moved and logged as labs do."""
     rng = np.random.default_rng([seed, number])
     turn, control = divmod(number, CONTROLS)
     effect = None if control == CONTROLS - 1 else HIDDEN[(turn * (CONTROLS - 1) + control) % len(HIDDEN)]
-    return {"seed": int(rng.integers(2**31)), "arm": ARMS[int(rng.integers(len(ARMS)))], "effect": effect}
+    return {"seed": int(rng.integers(2**31)), "arm": ARMS[int(rng.integers(len(ARMS)))], "effect": effect, "manner": asdict(of_a_lab(rng) if labs else Manner())}
 
 
 def trial(case: dict) -> dict:
@@ -41,7 +43,7 @@ def trial(case: dict) -> dict:
     with tempfile.TemporaryDirectory() as place, warnings.catch_warnings():
         warnings.simplefilter("ignore")
         folder = Path(place)
-        written(folder, arm, [logged(arm, model, effect, k, rng) for _ in range(2)])
+        written(folder, arm, [logged(arm, model, effect, k, rng, Manner(**case["manner"])) for _ in range(2)])
         begun = time.process_time()
         found = diagnose(pipeline.load(folder))
         seconds = time.process_time() - begun
