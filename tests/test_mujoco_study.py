@@ -61,7 +61,7 @@ def test_a_soft_and_a_loose_joint_are_measured_at_the_motor(arm):
 
 
 def test_labs_have_manners_of_their_own():
-    drawn = [plant.Manner(**trial.case(7, number, labs=True)["manner"]) for number in range(100)]
+    drawn = [plant.Manner(**trial.case(7, number, "labs")["manner"]) for number in range(100)]
     assert {m.motion for m in drawn} == {"sines", "moves"} and {m.rate for m in drawn} == {100.0, 200.0, 500.0, 1000.0}
     for name in ("jitter", "steps", "spikes", "knocks"):
         assert 20 < sum(bool(getattr(m, name)) for m in drawn) < 50
@@ -75,6 +75,14 @@ def test_moves_go_from_rest_to_rest_and_are_derivatives_of_each_other():
     np.testing.assert_allclose(np.gradient(qd, plant.STEP, axis=0)[1:-1], qdd[1:-1], atol=0.1)
     rests = np.all(qd == 0.0, axis=1)
     assert 0.1 < rests.mean() < 0.7 and 6 < np.count_nonzero(np.diff(rests.astype(int)) == 1) < 30
+
+
+def test_a_slow_motion_is_one_sine_a_joint():
+    t, q, qd, qdd = plant.slow(np.random.default_rng(1), 3)
+    np.testing.assert_allclose(np.gradient(q, plant.STEP, axis=0)[1:-1], qd[1:-1], atol=1e-4)
+    square = -(qdd / q)[np.abs(q).min(axis=1) > 0.01]
+    np.testing.assert_allclose(square, np.broadcast_to(square[0], square.shape), rtol=1e-6)
+    assert np.abs(q).max() <= 1.0 and (square[0] < (2.0 * np.pi * 0.3) ** 2).all()
 
 
 def test_logs_are_read_as_their_manner_says(arm):

@@ -26,8 +26,8 @@ HIDDEN = (*TORQUES, *SENSORS, *NATIVE)
 
 @dataclass(frozen=True)
 class Manner:
-    """How an arm moves and what its logs are like: sines or moves from point to point with stops between
-    them; Hz, and how much of a period a sample may be early or late; bits a turn of angles; noise of torque, over
+    """How an arm moves and what its logs are like: sines, moves from point to point with stops between
+    them, or one slow sine a joint; Hz, and how much of a period a sample may be early or late; bits a turn of angles; noise of torque, over
     its RMS; steps of torque, over its greatest; share of torque samples that are spikes; knocks in a log."""
 
     motion: str = "sines"
@@ -47,6 +47,10 @@ def of_a_lab(rng: np.random.Generator) -> Manner:
         pick("sines", "moves"), pick(100.0, 200.0, 500.0, 1000.0), pick(0.0, 0.0, 0.2), pick(14, 16, 18, 20),
         pick(0.005, 0.01, 0.03), pick(0.0, 0.0, 0.004), pick(0.0, 0.0, 0.002), pick(0, 0, 3),
     )  # fmt: skip
+
+
+#: how logs may be: of {name: what draws a manner}
+MANNERS = {"clean": lambda rng: Manner(), "labs": of_a_lab, "slow": lambda rng: Manner("slow")}
 
 
 @dataclass(frozen=True)
@@ -132,7 +136,7 @@ def logged(
     by = np.array([model.joint(name).dofadr[0] for name in arm.names])
     stiffness = arm.inertia * (2.0 * np.pi * _CONTROLLER) ** 2
     damping = 2.0 * _DAMPED * arm.inertia * 2.0 * np.pi * _CONTROLLER
-    t, q, qd, qdd = wanted(rng, dof) if manner.motion == "sines" else moves(rng, dof)
+    t, q, qd, qdd = {"sines": wanted, "moves": moves, "slow": slow}[manner.motion](rng, dof)
     blows = knocked(rng, manner.knocks, arm.torque, t)
     data.qpos[at], data.qvel[by] = q[0], qd[0]
     law, told, when = Law(effect, arm, k), [], samples(rng, manner, len(t))
@@ -202,6 +206,14 @@ def moves(rng: np.random.Generator, dof: int):
         qdd[later] = far * (60.0 * s - 180.0 * s**2 + 120.0 * s**3) / lasts**2
         here, now = there, now + lasts + rests
     return t, q, qd, qdd
+
+
+def slow(rng: np.random.Generator, dof: int):
+    """t (n,), and one slow sine a joint q, qd, qdd (n, dof), as a first log often is."""
+    t = np.arange(0.0, SECONDS, STEP)
+    omega = 2.0 * np.pi * rng.uniform(0.05, 0.3, dof)
+    size, angle = rng.uniform(0.4, 1.0, dof), omega * t[:, None] + rng.uniform(0.0, 2.0 * np.pi, dof)
+    return t, size * np.sin(angle), size * omega * np.cos(angle), -size * omega**2 * np.sin(angle)
 
 
 def wanted(rng: np.random.Generator, dof: int):

@@ -13,7 +13,7 @@ import numpy as np
 import yaml
 
 from scripts.blind_parts.robots import PLANAR
-from scripts.mujoco_parts.plant import HIDDEN, Manner, arm_of, built, logged, of_a_lab
+from scripts.mujoco_parts.plant import HIDDEN, MANNERS, Manner, arm_of, built, logged
 from tests.servos import arm_urdf
 
 ARMS = ("planar", "arm of 3", "arm of 5")
@@ -21,13 +21,14 @@ CONTROLS = 5  # one case in so many has nothing hidden
 VISIBLE = 0.1  # of a held-out error
 
 
-def case(seed: int, number: int, labs: bool = False) -> dict:
-    """What the number-th case of a seed is: every effect in turn, nothing in between, on an arm drawn; with
-    `labs` moved and logged as labs do."""
+def case(seed: int, number: int, manner: str = "clean") -> dict:
+    """What the number-th case of a seed is: every effect in turn, nothing in between, on an arm drawn that
+    moves and is logged in a manner of `plant.MANNERS`."""
     rng = np.random.default_rng([seed, number])
     turn, control = divmod(number, CONTROLS)
     effect = None if control == CONTROLS - 1 else HIDDEN[(turn * (CONTROLS - 1) + control) % len(HIDDEN)]
-    return {"seed": int(rng.integers(2**31)), "arm": ARMS[int(rng.integers(len(ARMS)))], "effect": effect, "manner": asdict(of_a_lab(rng) if labs else Manner())}
+    drawn = {"seed": int(rng.integers(2**31)), "arm": ARMS[int(rng.integers(len(ARMS)))], "effect": effect}
+    return {**drawn, "manner": asdict(MANNERS[manner](rng))}
 
 
 def trial(case: dict) -> dict:
