@@ -51,7 +51,7 @@ def bumps(robot: Robot, logs: Sequence[Log], *, among: int = 1) -> list[Event]:
     """
     shown = [event for log in logs for event in log.events if event.kind == "knock"]
     calm = [replace(log, events=tuple(e for e in log.events if e.kind != "knock")) for log in logs]
-    cutoff = widest(calm, known=(own_band := band(calm)))
+    cutoff = widest(logs, known=(own_band := band(logs)))
     if (motion := lowpassed(calm, robot.joints, cutoff, known=own_band)) is None:
         return shown
     model = build(robot, [EffectSpec(name=name) for name in _EFFECTS])

@@ -233,6 +233,16 @@ def test_lumps_of_noise_far_above_the_motion_do_not_widen_the_band():
     assert widest([a_log(t, q + noise * lump + 1e-6 * rng.normal(size=q.shape), q)]) == 15.0
 
 
+def test_a_knock_does_not_widen_the_band():
+    """What an arm is pushed to for 40 ms is no motion of its own."""
+    t = np.arange(20_000) * STEP
+    q = 0.3 * np.sin(2.0 * np.pi * 0.6 * t)[:, None] * [1.0, 0.5]
+    struck = q + 0.05 * np.exp(-(((t - 7.0) / 0.01) ** 2))[:, None]
+    knock = Event("knock", "log", 6.98, 7.02, ("a", "b"), "both")
+    assert widest([a_log(t, struck, q)]) > 40.0
+    assert widest([replace(a_log(t, struck, q), events=(knock,))]) == 15.0
+
+
 def test_the_band_narrows_with_the_angles_noise():
     """To where it makes a quarter: the power of what acceleration makes of white noise grows with the fourth power, as is said."""
     assert narrowed(15.0, 0.1) == narrowed(15.0, 0.25) == narrowed(15.0, 0.0) == 15.0

@@ -8,11 +8,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..events import mended
+from ..events import Event, mended
 from ..gaussian import HIGHEST, Gaussian
 from ..log import Log
 from ..motion import Motion, Piece
 from ..nonnegative import least_squares
+from ..outliers import BURST
 from ..preprocess import assembled, share_left_out, unused_of, without_events
 from ..running import running
 from ..smoother import differences
@@ -82,11 +83,11 @@ def widest(logs: Sequence[Log], *, known: float | None = None) -> float:
 
 
 def band(logs: Sequence[Log]) -> float:
-    """The frequency [Hz] below which the speeds of all joints stay, the noise of their angles
-    aside; zero where nothing moves."""
-    bands = []
-    for segment in (s for log in logs for s in log.segments if len(s.t) > 50):
-        speed = np.diff(segment.q, axis=0)
+    """The frequency [Hz] below which all joints' speeds stay, noise and knocks aside; zero where
+    nothing moves."""
+    bands, every = [], ((s, log.events) for log in logs for s in log.segments if len(s.t) > 50)
+    for segment, events in every:
+        speed = _calm(segment, events)
         speed = speed[:, np.ptp(segment.q, axis=0) > 1e-3 * np.ptp(segment.q, axis=0).max()]
         if not speed.size:
             continue
@@ -97,6 +98,17 @@ def band(logs: Sequence[Log]) -> float:
             last = max(int(np.argmax(one >= 0.99 * one[-1])) for one in sums)
             bands.append(last / (len(speed) * segment.step))
     return float(np.median(bands or [0.0]))
+
+
+def _calm(segment, events: Sequence[Event]) -> np.ndarray:
+    """What angles change by from sample to sample (n - 1, dof), straight through knocks."""
+    speed, t, struck = np.diff(segment.q, axis=0), segment.t[1:], False
+    for event in (e for e in events if e.kind == "knock"):
+        struck |= (t >= event.start - BURST) & (t <= event.stop + BURST)
+    if np.any(struck) and not np.all(struck):
+        for values in speed.T:
+            values[struck] = np.interp(t[struck], t[~struck], values[~struck])
+    return speed
 
 
 def _without_noise(power: np.ndarray) -> np.ndarray:
