@@ -63,8 +63,14 @@ def bumps(robot: Robot, logs: Sequence[Log], *, among: int = 1) -> list[Event]:
     found, kinds = [], _kinds(motion)[rows.piece]
     names = [piece.source for piece in motion.pieces]
     counted, most = rows.use.copy(), np.full(rows.use.shape, -1.0)
+    source, aside = np.array(names)[rows.piece], np.zeros(len(rows.t), dtype=bool)
+    places = [
+        (source == e.log) & (rows.t >= e.start - BURST) & (rows.t <= e.stop + BURST) for e in shown
+    ]
+    for near in places:
+        aside |= near  # a fit that has not seen them says whether they follow it
     while sum(not _same(shown, event) for event in found) * _OFTEN <= span:
-        more, strange = _bursts(rows, parts, kinds, step, level)
+        more, strange = _bursts(rows, parts, kinds, aside, step, level)
         most = np.maximum(most, strange)
         for a, b, members in more:
             start, stop = float(rows.t[a]), float(rows.t[b])
@@ -79,11 +85,7 @@ def bumps(robot: Robot, logs: Sequence[Log], *, among: int = 1) -> list[Event]:
             break
     else:
         return shown
-    source = np.array(names)[rows.piece]
-    for event in shown:
-        near = (
-            (source == event.log) & (rows.t >= event.start - BURST) & (rows.t <= event.stop + BURST)
-        )
+    for event, near in zip(shown, places):
         # where no row counts it costs none
         if not counted[near].any() or most[near].max() > 0.5 * level:
             found = _merged(found, event)
@@ -105,10 +107,10 @@ def _merged(found: list[Event], event: Event) -> list[Event]:
     return [*rest, replace(event, start=start, stop=stop, joints=joints)]
 
 
-def _bursts(rows: Rows, parts, kinds, step: float, level: float):
+def _bursts(rows: Rows, parts, kinds, aside, step: float, level: float):
     """First and last row, and joints, of what stands out of what least squares leave; and how
     surprising what is left is (n, dof) where it is no small share of how far torque goes."""
-    left, weights = _left(rows, parts, kinds)
+    left, weights = _left(rows, parts, kinds, aside)
     size, wide = np.abs(left), 2 * max(1, round(2.0 * BURST / step)) + 1
     own = np.stack([_surprise(a, u, rows.piece, step) for a, u in zip(size.T, rows.use.T)], axis=1)
     strange, out = np.full(own.shape, -1.0), []
@@ -171,30 +173,35 @@ def _kinds(motion: Motion) -> np.ndarray:
     return np.array([[*dict.fromkeys(each)].index(own) for own in each])
 
 
-def _left(rows: Rows, joints: list[tuple], kind: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _left(
+    rows: Rows, joints: list[tuple], kind: np.ndarray, aside: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """What least squares leave (n, dof), every joint in units of its median, and one over these
     (dof,); of rows of each kind (n,) by itself.
 
     Args:
-        joints: of each, its parameters and their columns (support, n).
+        joints: of each, its parameters and their columns (support, n). aside: rows (n,) that are
+            foreseen and not fitted.
     """
     weights, left = np.ones(rows.tau.shape[1]), np.zeros(rows.tau.shape)
     every, parts = slice(None), []
     size = 1 + max(int(at.max(initial=-1)) for at, _ in joints)
     for own in (kind == number for number in np.unique(kind)):
-        own = every if own.all() else own
+        told = own & ~aside
+        own, told = (every if part.all() else part for part in (own, told))
         squares, along = np.zeros((len(joints), size, size)), np.zeros((len(joints), size))
         for j, (at, values) in enumerate(joints):
-            values = values[:, own]
+            values = values[:, told]
             squares[j][np.ix_(at, at)] = values @ values.T
-            along[j, at] = values @ rows.tau[own, j]
+            along[j, at] = values @ rows.tau[told, j]
         parts.append((own, squares, along))
     for _ in range(_PASSES):
         for own, squares, along in parts:
             x = inverted(np.tensordot(weights**2, squares, 1)) @ (weights**2 @ along)
             for j, (at, values) in enumerate(joints):
                 left[own, j] = rows.tau[own, j] - x[at] @ values[:, own]
-        usual = [np.median(np.abs(e[u])) if u.any() else 0.0 for e, u in zip(left.T, rows.use.T)]
+        even = (rows.use & ~aside[:, None]).T
+        usual = [np.median(np.abs(e[u])) if u.any() else 0.0 for e, u in zip(left.T, even)]
         weights = ratio(np.ones(len(usual)), np.array(usual))
     return left * weights, weights
 
