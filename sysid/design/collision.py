@@ -15,7 +15,8 @@ import pinocchio as pin
 
 from . import spheres
 
-_EVERY = 80  # poses from one at which all pairs are asked to the next, for a first idea of the least
+# Poses from one at which all pairs are asked to the next, for a first idea of the least.
+_EVERY = 80
 _CHUNK = 2048  # poses whose spheres stand in memory at once
 _UP = np.array([0.0, 0.0, 1.0])
 

@@ -22,10 +22,9 @@ from .suspects import Suspect, along
 _NODES = 12.0  # for each period of the fastest harmonic: inertia goes with its square and products
 _FINE = 0.01  # s: the steps of a motion that a suspect looks back along
 _CHECKED = 1000.0  # Hz at which limits are kept
-CLOSE = (
-    10  # every so many of them distances are while a motion is sought: between two a link's point
-)
-# moves a few mm, and by how much links are nearer there than at both is less than a millimetre
+# Every so many of them distances are looked at while a motion is sought: between two a link's point
+# moves a few mm, and links are nearer there than at both by less than a millimetre.
+CLOSE = 10
 _BISECTIONS = 10
 _SMALLEST = 1e-3  # share of a motion that is none
 

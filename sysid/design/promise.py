@@ -87,10 +87,13 @@ def pairs(
     for i, a in enumerate(words):
         for j, b in enumerate(words[:i]):
             one, other = (chances[a], chances[b]) if {a, b} <= chances.keys() else (0.5, 0.5)
-            share, told = one / (one + other), 0.0
-            for k, m, chance in ((i, j, share), (j, i, 1.0 - share)):  # whichever of them is true
+            told = 0.0
+            for k, m, odds in (
+                (i, j, one / other),
+                (j, i, other / one),
+            ):  # whichever of them is true
                 left = _left(base, prior, own[k] @ suspects[k].size, own[m])
-                told += chance * min(_apart(left, chance / (1.0 - chance)), named[k])
+                told += odds / (1.0 + odds) * min(_apart(left, odds), named[k])
             out.append(Pair(b, a, float(told)))
     return out
 
