@@ -87,11 +87,8 @@ def pairs(
     for i, a in enumerate(words):
         for j, b in enumerate(words[:i]):
             one, other = (chances[a], chances[b]) if {a, b} <= chances.keys() else (0.5, 0.5)
-            told = 0.0
-            for k, m, odds in (
-                (i, j, one / other),
-                (j, i, other / one),
-            ):  # whichever of them is true
+            told, ways = 0.0, ((i, j, one / other), (j, i, other / one))
+            for k, m, odds in ways:  # whichever of them is true
                 left = _left(base, prior, own[k] @ suspects[k].size, own[m])
                 told += odds / (1.0 + odds) * min(_apart(left, odds), named[k])
             out.append(Pair(b, a, float(told)))
