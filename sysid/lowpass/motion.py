@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..events import Event, mended
+from ..events import Event, mended, usable
 from ..gaussian import HIGHEST, Gaussian
 from ..log import Log
 from ..motion import Motion, Piece
@@ -102,12 +102,12 @@ def band(logs: Sequence[Log]) -> float:
 
 def _calm(segment, events: Sequence[Event]) -> np.ndarray:
     """What angles change by from sample to sample (n - 1, dof), straight through knocks."""
-    speed, t, struck = np.diff(segment.q, axis=0), segment.t[1:], False
-    for event in (e for e in events if e.kind == "knock"):
-        struck |= (t >= event.start - BURST) & (t <= event.stop + BURST)
-    if np.any(struck) and not np.all(struck):
+    speed, t = np.diff(segment.q, axis=0), segment.t[1:]
+    knocks = [event for event in events if event.kind == "knock"]
+    good = usable(t, ("any",), knocks, torque=BURST)[:, 0]
+    if good.any() and not good.all():
         for values in speed.T:
-            values[struck] = np.interp(t[struck], t[~struck], values[~struck])
+            values[~good] = np.interp(t[~good], t[good], values[good])
     return speed
 
 
