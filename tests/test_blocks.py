@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from scipy.signal import lfilter
+from scipy.special import expit
 from scipy.stats import binom, norm
 from scipy.stats import t as student
 
@@ -199,7 +200,7 @@ def test_what_differs_by_rounding_is_the_same():
     assert p[2] < 0.01
     # a difference that is small but no rounding counts
     assert blocks.confidence_set(losses[:, [0, 2]] * [1.0, 1.0] + [1e3, 1e3], np.random.default_rng(0))[1] < 0.01
-    np.testing.assert_allclose(blocks.chances(losses, rng), [1 / 3, 1 / 3, 0.0, 1 / 3])
+    np.testing.assert_allclose(blocks.chances(losses, rng, 0.1), [1 / 3, 1 / 3, 0.0, 1 / 3], atol=1e-9)
 
 
 def test_the_set_holds_the_truth_nine_times_in_ten():
@@ -234,21 +235,28 @@ def test_coefficients_that_one_block_holds_move_without_bound():
 def test_chances_are_shares_of_one():
     rng = np.random.default_rng(0)
     losses = rng.normal(size=(25, 4))
-    found = blocks.chances(losses, rng)
+    found = blocks.chances(losses, rng, 0.5)
     assert found.shape == (4,) and found.sum() == pytest.approx(1.0) and (found >= 0).all()
     losses[:, 2] -= 50.0
-    np.testing.assert_array_equal(blocks.chances(losses, rng), [0.0, 0.0, 1.0, 0.0])
+    np.testing.assert_allclose(blocks.chances(losses, rng, 0.5), [0.0, 0.0, 1.0, 0.0], atol=1e-9)
 
 
+@pytest.mark.parametrize("unit", [1e-6, 2.0, 30.0])
 @pytest.mark.parametrize("far", [0.0, 0.7, 1.5])
-def test_chances_of_two_in_closed_form(far):
-    """The mean under random weights is normal about the mean, with the variance of the blocks over their count and one."""
+def test_chances_of_two_in_closed_form(far, unit):
+    """The sum under random weights is normal about the sum, and the odds are those of normal noise. Where all blocks say the same, and
+    little, neither of two is sure."""
     rng = np.random.default_rng(4)
     n = 60
     d = rng.normal(size=n)
     d = (d - d.mean()) / d.std() + far / np.sqrt(n + 1)
-    found = blocks.chances(np.stack([np.zeros(n), d], axis=1), rng, draws=20_000)
-    assert found[0] == pytest.approx(norm.cdf(far), abs=0.015)
+    found = blocks.chances(np.stack([np.zeros(n), d], axis=1), rng, unit, draws=20_000)
+    told = n / np.sqrt(n + 1) * (far + np.linspace(-6.0, 6.0, 4001))
+    density = norm.pdf(np.linspace(-6.0, 6.0, 4001)) * 12.0 / 4000
+    assert found[0] == pytest.approx(density @ expit(told / (2.0 * unit)), abs=0.015)
+    assert found[0] == pytest.approx(norm.cdf(far), abs=0.015) or unit > 1e-6
+    alike = blocks.chances(np.stack([np.zeros(n), np.full(n, 2.0 / n)], axis=1), rng, 1.0)
+    np.testing.assert_allclose(alike[1] / alike[0], np.exp(-1.0))
 
 
 def test_slopes_of_noise_are_as_likely_as_they_are_told():

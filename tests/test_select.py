@@ -476,7 +476,7 @@ def test_more_terms_are_asked_for_only_where_the_log_tells_each():
         effect = vocabulary.find("position_friction").given(harmonics=harmonics)
         candidate = Candidate(effect, 0, (("harmonics", harmonics),), begins)
         made = {"candidate": candidate, "c": np.ones(directions), "sizes": np.ones(2 * harmonics), "signed": True, "testable": True}
-        return SimpleNamespace(**made, numbers=directions, either=directions, moves=np.ones(directions), shapes={})
+        return SimpleNamespace(**made, numbers=directions, either=directions, variance=1.0, shapes={})
 
     own = SimpleNamespace(effect="position_friction", joint=0)  # the model has one harmonic, two terms
 

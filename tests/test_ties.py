@@ -50,6 +50,27 @@ def test_what_the_angles_noise_makes_is_taken_off_the_losses():
     np.testing.assert_allclose(losses(view, p.number), plain - 12 * 0.09)  # twelve rows a block
 
 
+@pytest.mark.parametrize("share", [0.0, 0.05, 0.2])
+def test_what_noise_in_a_column_bends_is_no_loss(share):
+    """tau = 2 x + e, and x is seen as x + n: least squares tells 2 / (1 + share), and what is then left of x is no fault of the model.
+    With a second draw of n the losses are those of e alone, to the share squared."""
+    rng, n = np.random.default_rng(11), 40_000
+    x, e = np.sin(np.arange(n) * 0.01) * np.sqrt(2.0), 0.1 * rng.normal(size=n)
+    seen, again = (x + np.sqrt(share) * rng.normal(size=(2, n))[k] for k in range(2))
+    size = np.sqrt(seen @ seen)
+    told = seen @ (2.0 * x + e) / size  # of the column that is orthonormal
+    design = SimpleNamespace(
+        columns=(seen / size)[None, :, None], residual=(2.0 * x + e - told * seen / size)[:, None],
+        rough_columns=((again - x) / size)[None, :, None], rough_residual=(-told * (again - x) / size)[:, None],
+    )  # fmt: skip
+    view = SimpleNamespace(design=design, weights=np.ones(1))
+    lost = losses(view, np.arange(n) // (n // 40)).sum() - e @ e
+    bent = np.sum(design.residual**2) - np.sum(design.rough_residual**2) - e @ e  # without a step towards two
+    assert abs(lost) < 4.0 * n * share**4 + 0.05 * n * share**2 + 50.0
+    if share:
+        assert bent > 0.8 * 4.0 * n * share**2 / (1.0 + share) ** 2 > 5.0 * abs(lost)
+
+
 @pytest.fixture(scope="module")
 def biased(simulated):
     """The view of an arm with a bias in its elbow, and what is asked of it."""
@@ -128,12 +149,28 @@ def test_who_is_hardly_ever_the_best_is_none_of_the_explanations(biased, monkeyp
     view, groups = biased
     asked, found = [of(groups, *key) for key in (("torque_bias", 1), ("asymmetric_coulomb", 1))], []
     for chances in ([likelier, 1.0 - likelier], [1.0 - likelier, likelier]):
-        monkeypatch.setattr(blocks, "chances", lambda losses, rng: np.array(chances))  # noqa: B023
+        monkeypatch.setattr(blocks, "chances", lambda losses, rng, unit: np.array(chances))  # noqa: B023
         found.append(chosen(view, asked, np.random.default_rng(0)))
     assert sorted(len(one.members) for one in found) == kept
     for one in found:
         assert one.head.candidate.name == "torque_bias"
         assert {m.candidate.name for m in one.close} == {"torque_bias", "asymmetric_coulomb"}
+
+
+@pytest.mark.parametrize("likely, named", [(0.3, True), (0.05, False)])
+def test_what_only_adds_freedom_is_named_within_the_ninety_per_cent(biased, monkeypatch, likely, named):
+    """A spring holds a bias, and predicts what a bias makes as well: it is as likely as the price of its number says."""
+    view, groups = biased
+    asked = [of(groups, *key) for key in (("torque_bias", 1), ("spring", 1))]
+    monkeypatch.setattr(type(asked[0]), "either", 1)
+    twins = {"torque_bias": 1.0 - likely, "spring": likely}
+    first = min(asked, key=lambda group: refitted(view, group).losses.sum()).candidate.name
+    chances = np.array([twins[first], 1.0 - twins[first]])  # by rising loss
+    monkeypatch.setattr(blocks, "chances", lambda losses, rng, unit: chances)
+    found = chosen(view, asked, np.random.default_rng(0))
+    told = {member.candidate.name: p for member, p in found.members}
+    assert found.head.candidate.name == "torque_bias"
+    assert told == pytest.approx(twins if named else {"torque_bias": 1.0})
 
 
 def test_a_sign_that_was_free_to_choose_halves_the_odds_and_no_more(biased, monkeypatch):
@@ -159,14 +196,35 @@ def test_what_only_its_fewer_signs_made_the_head_is_none_where_another_is_likeli
     def told(found, number):
         out = plain(found, number)
         mine = any(effect.name == "asymmetric_coulomb" for effect, _ in found.model.terms)
-        return out - less / out.size if mine else out
+        swing = 1.0 + 4.0 * np.cos(np.pi * np.arange(len(out)))[:, None]  # what is the same in every block no draw would doubt
+        return out - swing * less / np.sum(swing * np.ones_like(out)) if mine else out
 
     for where in ("refits", "ties"):
         monkeypatch.setattr(f"sysid.diagnose.{where}.losses", told)
     for likelier, head in ((0.9, "asymmetric_coulomb"), (0.6, "torque_bias")):
-        monkeypatch.setattr(blocks, "chances", lambda losses, rng: np.array([likelier, 1.0 - likelier]))  # noqa: B023
+        monkeypatch.setattr(blocks, "chances", lambda losses, rng, unit: np.array([likelier, 1.0 - likelier]))  # noqa: B023
         found = chosen(view, asked, np.random.default_rng(0))
         assert found.head.candidate.name == head, likelier
+
+
+def test_what_costs_less_heads_no_set_that_hardly_any_draw_leaves_it_in(biased, monkeypatch):
+    """A bias costs a number less than a spring, and heads the set though it loses a little more; where every block says so, it does
+    not, and of two that are the same both are named."""
+    view, groups = biased
+    asked = [of(groups, *key) for key in (("torque_bias", 1), ("asymmetric_coulomb", 1), ("spring", 1))]
+    plain, less = losses, 0.5 * np.sum(asked[0].moves ** 2)
+    for scatter, heads in ((5.0, {"torque_bias", "asymmetric_coulomb"}), (0.1, {"spring"})):
+
+        def told(found, number, scatter=scatter):
+            swing = 1.0 + scatter * np.cos(np.pi * np.arange(number.max() + 1))
+            mine = any(effect.name == "spring" for effect, _ in found.model.terms)
+            out = np.zeros_like(plain(found, number)) + 1.0
+            return out - (swing * less / swing.sum())[:, None] / out.shape[1] if mine else out
+
+        for where in ("refits", "ties"):
+            monkeypatch.setattr(f"sysid.diagnose.{where}.losses", told)
+        found = chosen(view, asked, np.random.default_rng(0))
+        assert {member.candidate.name for member, _ in found.members} == heads, scatter
 
 
 def test_what_only_adds_freedom_is_told(biased):

@@ -44,15 +44,20 @@ def confidence_set(losses, rng: np.random.Generator, *, draws: int = 1000) -> np
     return p
 
 
-def chances(losses, rng: np.random.Generator, *, draws: int = 4000) -> np.ndarray:
-    """(models,) how often each model loses least over resampled blocks.
+def chances(losses, rng: np.random.Generator, unit: float, *, draws: int = 4000) -> np.ndarray:
+    """(models,) how likely each model is the one, over resampled blocks: by the likelihood of
+    normal noise, exp(-loss / (2 unit)).
+
+    Args:
+        losses: (blocks, models) squared errors. unit: their variance, of one direction.
 
     Source: Yao, Vehtari, Simpson & Gelman 2018 (pseudo-BMA with the Bayesian bootstrap).
     """
-    drawn = rng.dirichlet(np.ones(len(losses)), draws) @ losses
-    least = drawn.min(1, keepdims=True)
-    best = drawn <= least + SAME * np.abs(least)  # what is the same, but for rounding, shares
-    return (best / best.sum(1, keepdims=True)).mean(0)
+    count = len(losses)
+    drawn = count * rng.dirichlet(np.ones(count), draws) @ losses
+    more = drawn - drawn.min(1, keepdims=True)
+    likely = np.exp(-more / (2.0 * max(unit, 1e-300)))
+    return (likely / likely.sum(1, keepdims=True)).mean(0)
 
 
 def within_one_error(errors, best: int | None = None) -> np.ndarray:

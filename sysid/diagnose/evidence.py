@@ -65,6 +65,11 @@ class Group:
         """(blocks, k) how far they move when a block is left out."""
         return blocks.moves(self.c, self.loud, self.loud_squares, self.squares)
 
+    @property
+    def variance(self) -> float:
+        """Of the coefficient of one direction."""
+        return float(np.sum(self.moves**2) / len(self.c))
+
     @cached_property
     def spreads(self) -> tuple[float, float, float]:
         """The moves' sum of squares, what it would be were the noise always the same (that of the
@@ -149,7 +154,8 @@ class Group:
         """How many of its numbers may have either sign."""
         shapes, own = self.candidate.effect.shapes(), self.candidate.effect.coefficients()
         either = sum(s.low < 0.0 < s.high for s in shapes) + sum(c.lower != 0 for c in own)
-        return max(either - int(np.sum(self.sizes == 0.0)), 0)  # not of those that do nothing
+        nothing = int(np.sum(self.sizes == 0.0))  # what does nothing has no sign
+        return max(min(either - nothing, self.numbers), 0)
 
     @property
     def coefficients(self) -> np.ndarray:

@@ -42,7 +42,7 @@ class Member:
 
 def refitted(view: View, group: Group) -> Member | None:
     """A group's candidate in the model, everything settled again; None where its sign or its bounds
-    forbid it."""
+    forbid it, or where it leaves more than the model without it."""
     candidate = group.candidate
     shapes = dict(group.shapes)
     if candidate.nonlinear and at_start(candidate, shapes):
@@ -51,7 +51,11 @@ def refitted(view: View, group: Group) -> Member | None:
         for shape, step in zip(free, group.coefficients):
             shapes[shape.name] = float(np.clip(shapes[shape.name] + step, *limits[shape.name]))
     found = joined(view, (candidate, shapes))
-    return Member(group, found, losses(found, view.blocks)) if allowed(found, candidate) else None
+    # beyond a resonance the angles' noise may be all that it leaves, of which much is taken off
+    left = [np.sum(one.design.residual**2) for one in (view, found)]
+    if not allowed(found, candidate) or left[1] > left[0]:
+        return None
+    return Member(group, found, losses(found, view.blocks))
 
 
 def settled(view: View, group: Group) -> Group | None:

@@ -13,9 +13,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .. import blocks
-from ..candidate_columns import columns_of
 from ..posed_problem import inverse
-from ..view import COMPARED, View, losses, taken, weighed
+from ..view import COMPARED, View, losses, makes, part_taken, taken, weighed
 from .evidence import Group
 from .projected import groups_at
 from .refits import Member, refitted
@@ -24,7 +23,6 @@ _OUTSIDE, _HARDLY = 0.10, 0.01  # outside the set of 90 %: p-value; chance of al
 _UNEVEN = 0.35  # logarithm: two joints count half as much against each other, in power
 NEAR = 0.4  # of what the best takes, as all are asked at once: by less no refit makes it the best
 _CLOSE = 0.1  # of what the head takes: by less another may have lost to what still acted then
-_SAME = 0.99  # share of a candidate's torque that another one's columns hold
 
 
 @dataclass(frozen=True)
@@ -85,28 +83,31 @@ def chosen(view: View, groups: list[Group], rng: np.random.Generator) -> Choice 
     members, table, priced = [members[k] for k in kept], table[:, kept], priced[:, kept]
     free = table + np.array([price(m.group, signs=0.0) for m in members]) / len(table)
     p = blocks.confidence_set(table, rng)
-    # what is least once its numbers are paid for is no worse for predicting a little less
-    least = int(np.argmin(priced.sum(0)))
-    inside = [k for k in np.argsort(table.sum(0)) if p[k] >= _OUTSIDE or k == least]
-    # the best, and of two that are the same the simplest: not what rounding left with less
     same, lost = blocks.SAME * np.abs(table).sum(0).min(), priced.sum(0)
+    # what is least once its numbers are paid for is no worse for predicting a little less, unless
+    # hardly any draw of the blocks agrees; nor is what is the same but for rounding
+    least = (lost <= lost.min() + same) & (p[int(np.argmin(lost))] >= _HARDLY)
+    inside = [k for k in np.argsort(table.sum(0)) if p[k] >= _OUTSIDE or least[k]]
+    # the best, and of two that are the same the simplest: not what rounding left with less
     best = [k for k in inside if lost[k] <= lost[inside].min() + same]
     head = min(best, key=lambda k: members[k].candidate.simplicity)
-    inside = [k for k in inside if k == head or not holds(view, members[k], members[head])]
     # no log tells that a sign was free to choose: it halves the odds
     odds, lost = np.exp2([-members[k].group.either for k in inside]), free.sum(0)
-    odds = odds * blocks.chances(free[:, inside], rng)
+    odds = odds * blocks.chances(free[:, inside], rng, group.variance)
     chance = dict(zip(inside, odds / odds.sum()))
     # whom only its fewer signs made the head may be less likely than another
-    other = max([head, *(k for k in inside if lost[k] < lost[head] - same)], key=chance.get)
-    if other != head:
-        inside = [k for k in inside if k == other or not holds(view, members[k], members[other])]
-        head = other
-    order = sorted(inside, key=lambda k: (k != head, -chance[k]))
+    wide = lambda k: k != head and holds(view, members[k], members[head])  # noqa: E731
+    less = [k for k in inside if lost[k] < lost[head] - same and not wide(k)]
+    head, order, told = max([head, *less], key=chance.get), list[int](), 0.0
+    for k in sorted(inside, key=lambda k: (k != head, -chance[k])):
+        # what only adds freedom predicts as well: it counts by how likely it is
+        order += [] if told > 1.0 - _OUTSIDE and wide(k) else [k]
+        told += chance[k]
     order = [k for n, k in enumerate(order) if not n or sum(map(chance.get, order[n:])) > _HARDLY]
+    whole = sum(map(chance.get, order))
     return Choice(
         members[head],
-        tuple((members[k], float(chance[k])) for k in order),
+        tuple((members[k], float(chance[k] / whole)) for k in order),
         base.sum(1) - table[:, head],
         tuple(replace(m, view=replace(m.view)) for k, m in enumerate(members) if k not in order),
         taken(view, base, members[head].losses),
@@ -139,10 +140,9 @@ def price_of(view: View, group: Group) -> Callable[..., float]:
     it could be lies on the other side.
     """
     values = 2.0 * view.cutoff * view.step * float(np.mean(view.rows.use.sum(0)))
-    one = np.sum(group.moves**2) / len(group.c)
     each = max(np.log(values) - 1.0, 0.0)
     sign = 2.0 * np.log(2.0)
-    return lambda other, signs=sign: one * (each * other.numbers + signs * other.either)
+    return lambda other, signs=sign: group.variance * (each * other.numbers + signs * other.either)
 
 
 def _least(members: list[Member], lost: np.ndarray) -> list[int]:
@@ -161,16 +161,8 @@ def holds(view: View, general: Member, special: Member) -> bool:
     one, other = general.candidate, special.candidate
     if one.nonlinear or one.parameters <= other.parameters or one.joint != other.joint:
         return False
-    columns = columns_of(view.source, one, [general.shapes])[0]
-    joints = one.touches(view.model.robot.dof)
-    target = (special.view.source.predicted - view.source.predicted) * view.rows.use * view.weights
-    base = view.design.columns[joints].reshape(-1, view.design.columns.shape[2])
-    flat = (columns * view.weights[joints][:, None, None]).reshape(-1, columns.shape[2])
-    wanted = target[:, joints].T.ravel()
-    rest = lambda a: wanted - a @ np.linalg.lstsq(a, wanted, rcond=1e-9)[0]  # noqa: E731
-    alone = np.sum(rest(base) ** 2)
-    both = np.sum(rest(np.concatenate([base, flat], axis=1)) ** 2)
-    return bool(alone > 0 and both < (1.0 - _SAME) * alone)
+    torque = special.view.source.predicted - view.source.predicted
+    return makes(view, one, general.shapes, torque)
 
 
 def alike(view: View, one: Group, other: Group) -> bool:
@@ -180,17 +172,6 @@ def alike(view: View, one: Group, other: Group) -> bool:
     else."""
     if one.candidate.joint == other.candidate.joint:
         return True
-    first, second = _taken(view, one), _taken(view, other)
+    both = ((g.candidate, g.shapes, g.coefficients) for g in (one, other))
+    first, second = (part_taken(view, *how) for how in both)
     return bool(np.sum(first * second) ** 2 > 0.5 * np.sum(first**2) * np.sum(second**2))
-
-
-def _taken(view: View, group: Group) -> np.ndarray:
-    """(dof, n) weighted torque that a group takes of the residual, the model's own columns
-    refitted."""
-    design, joints = view.design, group.candidate.touches(view.model.robot.dof)
-    columns = columns_of(view.source, group.candidate, [group.shapes])[0]
-    own = columns @ group.coefficients * view.weights[joints, None]
-    out = np.zeros(design.columns.shape[:2])
-    out[joints] = own
-    absorbed = np.einsum("jnk,jn->k", design.columns, out)
-    return out - np.einsum("jnk,k->jn", design.columns, absorbed)

@@ -4,6 +4,7 @@ from .design import Design, Sums, by_block, designed, instrumented, summed
 from .joining import COMPARED, allowed, around, joined, shapes_of, weighed
 from .laws import law
 from .losses import losses, taken
+from .overlap import makes, part_taken
 from .singles import greatest
 from .view import View, elsewhere, first_view, looked_at, too_short
 
@@ -24,6 +25,8 @@ __all__ = [
     "law",
     "looked_at",
     "losses",
+    "makes",
+    "part_taken",
     "shapes_of",
     "summed",
     "taken",

@@ -18,16 +18,23 @@ def losses(view: View, number: np.ndarray) -> np.ndarray:
     """
     design, spans = view.design, by_block(number)
     fold = blocks.folds(len(spans))
+    pairs = (design.columns, design.residual), (design.rough_columns, design.rough_residual)
+    # the angles' noise stands in columns and residual alike, and bends what is fitted: one step
+    # towards what would be fitted without it, of which as much is left as noise squared
+    step = -np.einsum("jnk,nj->k", *pairs[1])
+    pairs = [(a, r - np.einsum("jnk,k->nj", a, step)) for a, r in pairs]
     out = np.zeros((len(spans), len(view.weights)))
     for f in range(fold.max() + 1):
         own = np.flatnonzero(fold == f)
         rows = slice(spans[own[0]].start, spans[own[-1]].stop)
-        a, r = design.columns[:, rows], design.residual[rows]
-        pull = np.einsum("jnk,nj->k", a, r)
+        (a, r), (more, noise) = [(a[:, rows], r[rows]) for a, r in pairs]
+        pull = np.einsum("jnk,nj->k", a, r) - np.einsum("jnk,nj->k", more, noise)
         rest = np.eye(a.shape[2]) - sum(one.T @ one for one in a)
         change = np.linalg.lstsq(rest, pull, rcond=1e-10)[0]
-        told = (r + np.einsum("jnk,k->nj", a, change)) * r - design.rough_residual[rows] ** 2
-        out[own] = np.add.reduceat(told, [spans[b].start - rows.start for b in own])
+        whole, of_noise = (
+            (r + np.einsum("jnk,k->nj", a, change)) * r for a, r in ((a, r), (more, noise))
+        )
+        out[own] = np.add.reduceat(whole - of_noise, [spans[b].start - rows.start for b in own])
     return out
 
 

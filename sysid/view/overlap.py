@@ -1,0 +1,37 @@
+"""What a candidate's columns have in common with a torque, and with what a model leaves."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..candidate_columns import columns_of
+from ..candidates import Candidate
+from .view import View
+
+_SAME = 0.99  # share of a torque that columns hold
+
+
+def makes(view: View, candidate: Candidate, shapes: dict[str, float], torque) -> bool:
+    """Whether a candidate's columns at shape values make, beside the model's own, nearly all of a
+    torque (n, dof) that these do not."""
+    columns = columns_of(view.source, candidate, [shapes])[0]
+    joints = candidate.touches(view.model.robot.dof)
+    target = torque * view.rows.use * view.weights
+    base = view.design.columns[joints].reshape(-1, view.design.columns.shape[2])
+    flat = (columns * view.weights[joints][:, None, None]).reshape(-1, columns.shape[2])
+    wanted = target[:, joints].T.ravel()
+    rest = lambda a: wanted - a @ np.linalg.lstsq(a, wanted, rcond=1e-9)[0]  # noqa: E731
+    alone = np.sum(rest(base) ** 2)
+    both = np.sum(rest(np.concatenate([base, flat], axis=1)) ** 2)
+    return bool(alone > 0 and both < (1.0 - _SAME) * alone)
+
+
+def part_taken(view: View, candidate: Candidate, shapes: dict[str, float], coefficients):
+    """(dof, n) weighted torque that a candidate with coefficients (k,) takes of the residual, the
+    model's own columns refitted."""
+    design, joints = view.design, candidate.touches(view.model.robot.dof)
+    own = columns_of(view.source, candidate, [shapes])[0] @ coefficients
+    out = np.zeros(design.columns.shape[:2])
+    out[joints] = own * view.weights[joints, None]
+    absorbed = np.einsum("jnk,jn->k", design.columns, out)
+    return out - np.einsum("jnk,k->jn", design.columns, absorbed)
