@@ -216,6 +216,9 @@ def test_lag_is_undone_by_its_low_pass():
     read = vocabulary.find("current_lag").sensed(torque[None], 0.001, T)[0]
     np.testing.assert_allclose(lsim(lti([1.0], [T, 1.0]), read, t)[1], torque, atol=5e-4)
     assert vocabulary.find("current_lag").sensed(torque[None, :1], 0.001, T).shape == (1, 1)
+    turns = 2.0 * np.pi * 10.0 * np.arange(100) * 0.01  # of a slow logger, what is fast
+    made = vocabulary.find("current_lag").sensed(np.sin(turns)[None], 0.01, T)[0] - np.sin(turns)
+    np.testing.assert_allclose(made[2:-2], T * 2.0 * np.pi * 10.0 * np.cos(turns)[2:-2], atol=0.006 * T * 2.0 * np.pi * 10.0)
 
 
 def test_gain_multiplies():

@@ -16,9 +16,15 @@ class CurrentLag(SensorEffect):
     separate_by = "steps or a random binary torque: a lag rounds them, a delay moves them"
     maneuvers = ("chirp",)
     source = "first-order lag; no reference"
-    reach = 1
+    reach = 2
 
     T = Shape("s", 0.0, 0.05, start=0.0, says="time constant of the current loop")
 
     def sensed(self, torque, step, T):
-        return torque + T * np.gradient(torque, step, axis=-1) if torque.shape[-1] > 1 else torque
+        if torque.shape[-1] < 2:
+            return torque
+        rate = np.gradient(torque, step, axis=-1)
+        # two neighbours make 6 % too little of 10 Hz at 100 Hz, which a delay has in full
+        far, near = torque[..., 4:] - torque[..., :-4], torque[..., 3:-1] - torque[..., 1:-3]
+        rate[..., 2:-2] = (8.0 * near - far) / (12.0 * step)
+        return torque + T * rate
