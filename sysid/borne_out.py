@@ -43,6 +43,13 @@ def in_doubt(before: Fit, after: Fit, told: Fit, candidate: Candidate) -> str | 
     if change.delta_rms > -_NOTHING * unit and not wide:
         falls = "hardly falls" if change.delta_rms < 0.0 else "does not fall"
         return f"with it the error on the test logs {falls} ({rise})"
+    # what is told is the error of the other fit: where it rises, nobody sees an error fall
+    if whole:
+        risen = comparison.rises(before, told, None)
+    else:
+        risen = shown.delta_rms > 0.0 and not (wide and comparison.falls(before, told, _NOTHING))
+    if risen:
+        return "as `sysid add` fits it, the error on the test logs rises"
     # as the fit weighs them: it trades what a quiet joint loses for what a loud one gains; and what
     # held bodies against its lack may hold them against it
     paid = [comparison.together(before, one, weighed=True) for one in (after, told)]

@@ -22,12 +22,13 @@ class Told(SimpleNamespace):
         return {"cogging.elbow.a1": (5.0, 1.0, "N m"), "cogging.elbow.k": (30.0, 0.1, "1/rad")}
 
 
-def judged(monkeypatch, paid: tuple[float, float]) -> str:
+def judged(monkeypatch, paid: tuple[float, float], own: float = -0.1) -> str:
     """What is in doubt of an effect by which the error of its joint falls; paid: what all joints together lose under the prior before,
-    and as `sysid add` gives it."""
+    and as `sysid add` gives it; own: by how much the joint's own error then changes."""
     before, after, told = (Told(error=error) for error in (1.0, 0.8, 0.8))
     change = {id(after): paid[0], id(told): paid[1]}
-    monkeypatch.setattr(comparison, "compare", lambda *given: (Difference("a", "b", "elbow", -0.1, 0.02),))
+    fall = {id(after): -0.1, id(told): own}
+    monkeypatch.setattr(comparison, "compare", lambda _, one: (Difference("a", "b", "elbow", fall[id(one)], 0.02),))
     monkeypatch.setattr(comparison, "together", lambda _, one, weighed=False: Difference("a", "b", "*", change[id(one)], 0.002))
     return in_doubt(before, after, told, Candidate(vocabulary.find("cogging"), 1, ())) or ""
 
@@ -35,6 +36,12 @@ def judged(monkeypatch, paid: tuple[float, float]) -> str:
 @pytest.mark.parametrize(("paid", "refused"), [((0.01, 0.01), True), ((0.01, -0.05), False), ((-0.05, 0.01), False), ((0.001, 0.001), False)])
 def test_an_effect_is_refused_where_the_others_pay_for_it_under_either_prior(monkeypatch, paid, refused):
     assert ("as the fit weighs them, rises" in judged(monkeypatch, paid)) is refused
+
+
+@pytest.mark.parametrize(("own", "refused"), [(-0.001, False), (0.001, True)])
+def test_an_effect_is_refused_where_its_joints_error_rises_as_add_fits_it(monkeypatch, own, refused):
+    """Under the prior of the fit before it the error falls, which nobody sees who adds it."""
+    assert ("as `sysid add` fits it" in judged(monkeypatch, (-0.05, -0.05), own)) is refused
 
 
 def test_how_large_an_effect_is_says_what_vanishes_with_it():
