@@ -20,7 +20,7 @@ def posed(rng: np.random.Generator, *, n: int = 240, dof: int = 2, size: int = 5
 
 
 def viewed(p):
-    """What evidence sees of it: a view without a motion, its noise of the angles none."""
+    """What evidence sees of it: a view whose motion is slower than a hertz, its noise of the angles none."""
     m, y = stacked(p, np.zeros((*p.a.shape[:2], 0)))
     x = np.linalg.lstsq(m, y, rcond=None)[0]
     residual = (p.tau - np.einsum("jnk,k->nj", p.a, x)) * p.weights
@@ -29,8 +29,8 @@ def viewed(p):
     columns = columns @ turn
     design = Design(columns, residual, np.zeros(len(x)), turn, 0.0 * columns, 0.0 * residual)
     noise = spectra(residual, columns, np.ones(residual.shape, bool), 0.01, 0.01)
-    rows = SimpleNamespace(use=np.ones(residual.shape, bool))
-    return SimpleNamespace(rows=rows, design=design, sums=summed(design, by_block(p.number)), blocks=p.number, weights=p.weights, x=x, spectra=noise)
+    rows, motion = SimpleNamespace(use=np.ones(residual.shape, bool), piece=np.zeros(len(residual))), SimpleNamespace(band=1.0)
+    return SimpleNamespace(rows=rows, motion=motion, step=0.02, design=design, sums=summed(design, by_block(p.number)), blocks=p.number, weights=p.weights, x=x, spectra=noise)
 
 
 def stacked(p, own, joints=(0, 1), keep=None):

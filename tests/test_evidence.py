@@ -162,8 +162,13 @@ def test_columns_that_are_mostly_noise_make_no_group():
     view = viewed(p)
     own = rng.normal(size=(1, 2, 240, 1))
     candidate = grouped(view, own)[0].candidate
-    group = lambda share: projected.made(view, [(candidate, {})], [0, 1], own, own + share * rng.normal(size=own.shape))  # noqa: E731
+    group = lambda share, own=own: projected.made(view, [(candidate, {})], [0, 1], own, own + share * rng.normal(size=own.shape))  # noqa: E731
     assert len(group(0.3)) == 1 and group(0.8) == []
+    # what is as slow as the motion is asked, where noise is a small part of that
+    slow = np.sin(2.0 * np.pi * 0.7 * 0.02 * np.arange(240) + np.array([0.0, 1.0])[:, None])[None, :, :, None]
+    (plain,), (told,) = group(0.1, slow), group(0.8, slow)
+    assert told.slow and not plain.slow
+    assert told.coefficients == pytest.approx(plain.coefficients, abs=0.5 * np.sqrt(plain.variance) * np.linalg.norm(plain.back))
 
 
 def test_a_scale_of_the_columns_changes_coefficients_alone():

@@ -303,3 +303,16 @@ def test_rivals_are_judged_with_the_weights_that_the_best_of_them_leaves(biased)
         np.testing.assert_array_equal(member.view.weights, found.head.view.weights)
     # shares are of what each joint loses, whatever it counts, less what the angles' noise makes
     assert 1.0 - share[1] ** 2 < found.shares[1] < 1.0 and abs(found.shares[0]) < 0.5
+
+
+def test_what_is_mostly_noise_is_asked_by_what_is_as_slow_as_the_motion(simulated, diagnosed):
+    """With twelve bits at the joint a torque's rate is mostly noise of the angles, under a low-pass of ten hertz. What of it is as slow
+    as the motion tells that the torque is late; refits, which see the rest too, do not tell a lag from a delay."""
+    how = {"encoder": 12, "duration": 12.0}
+    experiment = pipeline.load(simulated("lag under coarse angles", "current_lag:elbow:T=0.01", **how))
+    groups = {g.candidate.name: g for g in ask(first_view(experiment, pipeline.fit(experiment))).groups if g.candidate.joint == 1}
+    assert groups["delay"].slow and groups["current_lag"].slow and not groups["torque_bias"].slow
+    assert groups["current_lag"].coefficients[0] == pytest.approx(0.01, rel=0.4)
+    (claim,) = diagnosed("lag under coarse angles", "current_lag:elbow:T=0.01", **how).claims
+    assert {effect for effect, *_ in claim.set} == {"delay", "current_lag"} and claim.head.rms_after < claim.head.rms_before
+    assert diagnosed("nothing under coarse angles", **how).claims == ()

@@ -39,7 +39,7 @@ from .numbering import (
 )
 from .parameters import covariance, widening
 from .redrawn import left_out, normal_scores, ratio_at, redrawn
-from .rivals import SAME, chances, confidence_set, within_one_error
+from .rivals import SAME, chances, confidence_set, price, within_one_error
 
 __all__ = [
     "Belief",
@@ -67,6 +67,7 @@ __all__ = [
     "moves",
     "normal_scores",
     "numbered",
+    "price",
     "ratio_at",
     "redrawn",
     "resting",

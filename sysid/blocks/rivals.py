@@ -60,6 +60,20 @@ def chances(losses, rng: np.random.Generator, unit: float, *, draws: int = 4000)
     return (likely / likely.sum(1, keepdims=True)).mean(0)
 
 
+def price(values: float) -> tuple[float, float]:
+    """What a fitted number costs, and what one that may have either sign costs beside it, of
+    squared errors of blocks held apart, in units of the variance of one direction.
+
+    Blocks held apart ask who predicts best, and what holds the truth and more predicts about as
+    well as the truth. Who is the truth is another question: a number then costs the logarithm of
+    the count of independent `values`, of which holding apart has charged one; and one that may have
+    either sign twice the logarithm of two, as half of what it could be lies on the other side.
+
+    Source: Schwarz 1978.
+    """
+    return max(float(np.log(values)) - 1.0, 0.0), 2.0 * float(np.log(2.0))
+
+
 def within_one_error(errors, best: int | None = None) -> np.ndarray:
     """(models,) bool: those that lose no more than the best by more than one standard error of the
     difference.

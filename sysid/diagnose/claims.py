@@ -10,8 +10,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from .. import pipeline
 from ..addition import grown, spelled
 from ..borne_out import in_doubt
@@ -42,10 +40,6 @@ class Claim:
     def head(self) -> Finding:
         """What is claimed."""
         return self.findings[0]
-
-    def after_square(self, joints) -> float:
-        """Mean squared error on the test logs over joints, with the head in the model."""
-        return float(np.mean([self.after.rms("test")[joint] ** 2 for joint in joints]))
 
 
 def claimed(

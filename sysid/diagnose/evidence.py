@@ -36,7 +36,8 @@ class Group:
     before the model's fit; `back` (k0, k) turns coefficients of these into the
     candidate's own; `sizes` (k0,) the weighted norm of what the model leaves of each own column;
     `foreseen` (k, k) the scores' covariance, were the noise always the same; `loss` the squared
-    residual of its joints; `whole` the group that this one is a part of, None where it is all."""
+    residual of its joints; `whole` the group that this one is a part of, None where it is all;
+    slow: of columns that are mostly noise, what is as slow as the motion."""
 
     candidate: Candidate
     shapes: dict[str, float]
@@ -49,6 +50,7 @@ class Group:
     foreseen: np.ndarray
     loss: float
     whole: Group | None = None
+    slow: bool = False
 
     @cached_property
     def c(self) -> np.ndarray:

@@ -9,8 +9,8 @@ import numpy as np
 
 from ..candidate_columns import columns_of, tried
 from ..candidates import Candidate
-from ..projection import directions_of
-from ..view import View, by_block
+from ..projection import FLAT, NOISE, directions_of
+from ..view import View, by_block, slow_part
 from ..view.stationary import covariance
 from .evidence import Group, known_together
 
@@ -47,8 +47,13 @@ def groups_at(view: View, asked: Sequence[Asked], among: Sequence[int] = ()) -> 
     return out + [group for key in list(alike) for group in together(key)]
 
 
-def made(view: View, asked, joints: Sequence[int], plain: np.ndarray, rough) -> list[Group]:
-    """Groups of columns (asked, joints, n, k) on the motion, and on the rough one."""
+def made(
+    view: View, asked, joints: Sequence[int], plain: np.ndarray, rough, slow: bool = False
+) -> list[Group]:
+    """Groups of columns (asked, joints, n, k) on the motion, and on the rough one.
+
+    What is mostly noise is asked by what of it is as slow as the motion. slow: it is that.
+    """
     design, sums, spans = view.design, view.sums, by_block(view.blocks)
     count, _, n, k = plain.shape
     size, kk, parts = design.columns.shape[2], count * k, len(sums.scores)  # a prior has no columns
@@ -90,14 +95,20 @@ def made(view: View, asked, joints: Sequence[int], plain: np.ndarray, rough) -> 
     noise = rough_cross - absorbed @ sums.rough_squares
     rough_square = rough_own - pair(split(rough_cross), by) - pair(by, split(noise))
     whole, data = own.sum(0) - pair(by, by), squares[:-1].sum(0)
-    out = []
-    for s, found in enumerate(directions_of(own.sum(0), whole, data, rough_square)):
+    out, told_by = [], directions_of(own.sum(0), whole, data, rough_square)
+    for s, found in enumerate(told_by):
         if found is None:
             continue
         (candidate, shapes), (turn, sizes) = asked[s], found
         turned = turn.T @ squares[:, s] @ turn
         told = score[:, s] @ turn, turned, loud[:, s] @ turn, turned + turn.T @ more[:, s] @ turn
         rest = turn, sizes, turn.T @ foreseen[s] @ turn, float(loss)
-        out.append(Group(candidate, dict(shapes), *told, *rest))
+        out.append(Group(candidate, dict(shapes), *told, *rest, slow=slow))
     known_together(out)
-    return out
+    sizes = (np.trace(a, axis1=1, axis2=2) for a in (rough_square, whole, own.sum(0)))
+    noisy = [s for s, (n, w, o) in enumerate(zip(*sizes)) if n > NOISE * w > NOISE * FLAT * o]
+    noisy = [s for s in noisy if told_by[s] is None]
+    if slow or not noisy:
+        return out
+    both = (slow_part(view, columns[noisy]) for columns in (plain, rough))
+    return out + made(view, [asked[s] for s in noisy], joints, *both, slow=True)

@@ -15,7 +15,7 @@ from .evidence import Group
 from .projected import groups_at
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Member:
     """A candidate refitted: the view of the model with it, and its losses (blocks, dof)."""
 

@@ -74,6 +74,9 @@ def chosen(view: View, groups: list[Group], rng: np.random.Generator) -> Choice 
     first, (view, members) = view, _even(view, members)
     base = losses(view, view.blocks)
     table = np.stack([m.losses.sum(1) for m in members], axis=1)
+    noisy = _mostly_noise(members, table.sum(0))
+    for member in noisy[1:]:
+        table[:, members.index(member)] = table[:, members.index(noisy[0])]
     group = members[int(np.argmin(table.sum(0)))].group
     if view is not first:  # with these weights
         group = (groups_at(view, [(group.candidate, group.shapes)]) or [group])[0]
@@ -92,13 +95,16 @@ def chosen(view: View, groups: list[Group], rng: np.random.Generator) -> Choice 
     best = [k for k in inside if lost[k] <= lost[inside].min() + same]
     head = min(best, key=lambda k: members[k].candidate.simplicity)
     # no log tells that a sign was free to choose: it halves the odds
-    odds, lost = np.exp2([-members[k].group.either for k in inside]), free.sum(0)
+    signs = [(noisy[0] if m in noisy else m).group.either for m in (members[k] for k in inside)]
+    odds, lost = np.exp2(np.negative(signs)), free.sum(0)
     odds = odds * blocks.chances(free[:, inside], rng, group.variance)
     chance = dict(zip(inside, odds / odds.sum()))
     # whom only its fewer signs made the head may be less likely than another
     wide = lambda k: k != head and holds(view, members[k], members[head])  # noqa: E731
     less = [k for k in inside if lost[k] < lost[head] - same and not wide(k)]
     head, order, told = max([head, *less], key=chance.get), list[int](), 0.0
+    if members[head] in noisy and noisy[0] in members:
+        head = members.index(noisy[0])
     for k in sorted(inside, key=lambda k: (k != head, -chance[k])):
         # what only adds freedom predicts as well: it counts by how likely it is
         order += [] if told > 1.0 - _OUTSIDE and wide(k) else [k]
@@ -129,30 +135,28 @@ def _even(view: View, members: list[Member]) -> tuple[View, list[Member]]:
     return view, [Member(group, found, losses(found, view.blocks)) for group, found in even]
 
 
-def price_of(view: View, group: Group) -> Callable[..., float]:
-    """What the numbers of a candidate cost, of the loss of all blocks.
+def _mostly_noise(members: list[Member], lost: np.ndarray) -> list[Member]:
+    """Those that refits do not tell apart, as their columns are mostly noise, and that take as much
+    of what is as slow as the motion: first whose refit leaves least, which noise bent least."""
+    slow = [members[k] for k in np.argsort(lost) if members[k].group.slow]
+    return [m for m in slow if m.group.taken >= (1.0 - _CLOSE) * slow[0].group.taken]
 
-    Blocks held apart ask who predicts best, and what holds the truth and more predicts about as
-    well as the truth. Who is the truth is another question: a number then costs the logarithm of
-    the count of values (those that a band holds: two a cycle of its cutoff) times the variance of
-    one direction (that of the best one's `group`), of which holding apart has charged one (Schwarz
-    1978); and one that may have either sign twice the logarithm of two times it, as half of what
-    it could be lies on the other side.
-    """
+
+def price_of(view: View, group: Group) -> Callable[..., float]:
+    """What the numbers of a candidate cost, of the loss of all blocks, and their signs, in units of
+    the variance of one direction (that of the best one's `group`): a band holds two values a cycle
+    of its cutoff."""
     values = 2.0 * view.cutoff * view.step * float(np.mean(view.rows.use.sum(0)))
-    each = max(np.log(values) - 1.0, 0.0)
-    sign = 2.0 * np.log(2.0)
+    each, sign = blocks.price(values)
     return lambda other, signs=sign: group.variance * (each * other.numbers + signs * other.either)
 
 
 def _least(members: list[Member], lost: np.ndarray) -> list[int]:
     """Of the variants of each candidate, the one that lost least."""
     kept: dict = {}
-    for k, member in enumerate(members):
-        key = member.candidate.key
-        if key not in kept or lost[k] < lost[kept[key]]:
-            kept[key] = k
-    return list(kept.values())
+    for k in np.argsort(lost):
+        kept.setdefault(members[k].candidate.key, int(k))
+    return sorted(kept.values())
 
 
 def holds(view: View, general: Member, special: Member) -> bool:

@@ -39,11 +39,9 @@ def finding(f: Finding, claim: Claim, found: Diagnosis) -> dict:
     before, after = f.rms_before**2, f.rms_after**2
     names = found.fit.joints if f.joint == "*" else [f.joint]
     levels = [found.floors[j].rms for j in names]
-    floor = (
-        np.mean([level**2 for level in levels])
-        if None not in levels
-        else min(after, claim.after_square(names))
-    )
+    left = np.mean([claim.after.rms("test")[j] ** 2 for j in names])
+    known = None not in levels
+    floor = np.mean([level**2 for level in levels]) if known else min(after, float(left))
     misfit = max(before - floor, abs(before - after), 1e-9 * before, 1e-300)
     return {
         "effect": f.effect,

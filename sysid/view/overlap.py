@@ -1,4 +1,5 @@
-"""What a candidate's columns have in common with a torque, and with what a model leaves."""
+"""What a candidate's columns have in common with a torque, with what a model leaves, and with the
+motion."""
 
 from __future__ import annotations
 
@@ -6,6 +7,7 @@ import numpy as np
 
 from ..candidate_columns import columns_of
 from ..candidates import Candidate
+from ..lowpass import calm
 from .view import View
 
 _SAME = 0.99  # share of a torque that columns hold
@@ -35,3 +37,12 @@ def part_taken(view: View, candidate: Candidate, shapes: dict[str, float], coeff
     out[joints] = own * view.weights[joints, None]
     absorbed = np.einsum("jnk,jn->k", design.columns, out)
     return out - np.einsum("jnk,k->jn", design.columns, absorbed)
+
+
+def slow_part(view: View, columns: np.ndarray) -> np.ndarray:
+    """Columns (..., n, k) without what is faster than the laws of the motion."""
+    rows = np.moveaxis(columns, -2, 0)
+    piece, band = view.rows.piece, view.motion.band
+    slow = calm(rows.reshape(len(rows), -1), piece, band, view.step).reshape(rows.shape)
+    # samples last in memory, as columns are
+    return np.swapaxes(np.ascontiguousarray(np.swapaxes(np.moveaxis(slow, 0, -2), -1, -2)), -1, -2)
