@@ -12,7 +12,7 @@ from scipy.stats import t as student
 
 from sysid import blocks, candidate_columns, config, listed_effects, regressor, vocabulary
 from sysid.candidate_columns import columns_of
-from sysid.candidates import candidates
+from sysid.candidates import Candidate, candidates
 from sysid.diagnose import null, projected
 from sysid.log import Log, Segment
 from sysid.lowpass import lowpassed, stride_of
@@ -161,7 +161,7 @@ def test_columns_that_are_mostly_noise_make_no_group():
     p = posed(rng)
     view = viewed(p)
     own = rng.normal(size=(1, 2, 240, 1))
-    candidate = grouped(view, own)[0].candidate
+    candidate = Candidate(vocabulary.find("delay"), -1, ())  # what is read late
     group = lambda share, own=own: projected.made(view, [(candidate, {})], [0, 1], own, own + share * rng.normal(size=own.shape))  # noqa: E731
     assert len(group(0.3)) == 1 and group(0.8) == []
     # what is as slow as the motion is asked, where noise is a small part of that

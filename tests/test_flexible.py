@@ -175,7 +175,7 @@ def left_by(values, *, columns=None, seconds: float = 0.5):
     )
     rows = SimpleNamespace(use=np.ones((N, 2), bool), piece=np.zeros(N, int))
     robot = SimpleNamespace(joints=("shoulder", "elbow"))
-    return SimpleNamespace(**{**vars(viewed(p)), "rows": rows}, variables=KNOWN, rough_variables=KNOWN, step=STEP, model=SimpleNamespace(robot=robot))
+    return SimpleNamespace(**{**vars(viewed(p)), "rows": rows, "step": STEP}, variables=KNOWN, rough_variables=KNOWN, model=SimpleNamespace(robot=robot))
 
 
 def coloured(seed: int, memory: float = 0.04):

@@ -50,27 +50,6 @@ def test_what_the_angles_noise_makes_is_taken_off_the_losses():
     np.testing.assert_allclose(losses(view, p.number), plain - 12 * 0.09)  # twelve rows a block
 
 
-@pytest.mark.parametrize("share", [0.0, 0.05, 0.2])
-def test_what_noise_in_a_column_bends_is_no_loss(share):
-    """tau = 2 x + e, and x is seen as x + n: least squares tells 2 / (1 + share), and what is then left of x is no fault of the model.
-    With a second draw of n the losses are those of e alone, to the share squared."""
-    rng, n = np.random.default_rng(11), 40_000
-    x, e = np.sin(np.arange(n) * 0.01) * np.sqrt(2.0), 0.1 * rng.normal(size=n)
-    seen, again = (x + np.sqrt(share) * rng.normal(size=(2, n))[k] for k in range(2))
-    size = np.sqrt(seen @ seen)
-    told = seen @ (2.0 * x + e) / size  # of the column that is orthonormal
-    design = SimpleNamespace(
-        columns=(seen / size)[None, :, None], residual=(2.0 * x + e - told * seen / size)[:, None],
-        rough_columns=((again - x) / size)[None, :, None], rough_residual=(-told * (again - x) / size)[:, None],
-    )  # fmt: skip
-    view = SimpleNamespace(design=design, weights=np.ones(1))
-    lost = losses(view, np.arange(n) // (n // 40)).sum() - e @ e
-    bent = np.sum(design.residual**2) - np.sum(design.rough_residual**2) - e @ e  # without a step towards two
-    assert abs(lost) < 4.0 * n * share**4 + 0.05 * n * share**2 + 50.0
-    if share:
-        assert bent > 0.8 * 4.0 * n * share**2 / (1.0 + share) ** 2 > 5.0 * abs(lost)
-
-
 @pytest.fixture(scope="module")
 def biased(simulated):
     """The view of an arm with a bias in its elbow, and what is asked of it."""

@@ -153,11 +153,10 @@ class Group:
 
     @property
     def either(self) -> int:
-        """How many of its numbers may have either sign."""
+        """How many of its numbers may have either sign, none that does nothing."""
         shapes, own = self.candidate.effect.shapes(), self.candidate.effect.coefficients()
         either = sum(s.low < 0.0 < s.high for s in shapes) + sum(c.lower != 0 for c in own)
-        nothing = int(np.sum(self.sizes == 0.0))  # what does nothing has no sign
-        return max(min(either - nothing, self.numbers), 0)
+        return max(min(either - int(np.sum(self.sizes == 0.0)), self.numbers), 0)
 
     @property
     def coefficients(self) -> np.ndarray:

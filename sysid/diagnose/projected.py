@@ -9,7 +9,8 @@ import numpy as np
 
 from ..candidate_columns import columns_of, tried
 from ..candidates import Candidate
-from ..projection import FLAT, NOISE, directions_of
+from ..effect import SensorEffect
+from ..projection import NOISE, directions_of
 from ..view import View, by_block, slow_part
 from ..view.stationary import covariance
 from .evidence import Group, known_together
@@ -52,7 +53,7 @@ def made(
 ) -> list[Group]:
     """Groups of columns (asked, joints, n, k) on the motion, and on the rough one.
 
-    What is mostly noise is asked by what of it is as slow as the motion. slow: it is that.
+    slow: they are as slow as the motion, which what is mostly noise is asked by.
     """
     design, sums, spans = view.design, view.sums, by_block(view.blocks)
     count, _, n, k = plain.shape
@@ -105,10 +106,10 @@ def made(
         rest = turn, sizes, turn.T @ foreseen[s] @ turn, float(loss)
         out.append(Group(candidate, dict(shapes), *told, *rest, slow=slow))
     known_together(out)
-    sizes = (np.trace(a, axis1=1, axis2=2) for a in (rough_square, whole, own.sum(0)))
-    noisy = [s for s, (n, w, o) in enumerate(zip(*sizes)) if n > NOISE * w > NOISE * FLAT * o]
-    noisy = [s for s in noisy if told_by[s] is None]
-    if slow or not noisy:
+    sizes = zip(told_by, *(np.trace(a, axis1=1, axis2=2) for a in (rough_square, whole)))
+    noisy = [s for s, (one, n, left) in enumerate(sizes) if one is None and n > NOISE * left > 0.0]
+    late = [s for s in noisy if isinstance(asked[s][0].effect, SensorEffect)]
+    if slow or not late:
         return out
-    both = (slow_part(view, columns[noisy]) for columns in (plain, rough))
-    return out + made(view, [asked[s] for s in noisy], joints, *both, slow=True)
+    both = (slow_part(view, columns[late]) for columns in (plain, rough))
+    return out + made(view, [asked[s] for s in late], joints, *both, slow=True)

@@ -51,11 +51,9 @@ def refitted(view: View, group: Group) -> Member | None:
         for shape, step in zip(free, group.coefficients):
             shapes[shape.name] = float(np.clip(shapes[shape.name] + step, *limits[shape.name]))
     found = joined(view, (candidate, shapes))
-    # beyond a resonance the angles' noise may be all that it leaves, of which much is taken off
     left = [np.sum(one.design.residual**2) for one in (view, found)]
-    if not allowed(found, candidate) or left[1] > left[0]:
-        return None
-    return Member(group, found, losses(found, view.blocks))
+    may = allowed(found, candidate) and left[1] <= left[0]
+    return Member(group, found, losses(found, view.blocks)) if may else None
 
 
 def settled(view: View, group: Group) -> Group | None:

@@ -71,7 +71,7 @@ def _revised_once(first: View, steps: list[Step], worth: float, stirred: set[int
     joints that it changed, none where there is no such step."""
     for number, step in enumerate(steps[:-1]):
         rivals = step.choice.close
-        if len(rivals) < 2 or step.candidate.joint not in stirred:
+        if step.candidate.joint not in stirred:
             continue
         before, later = steps[:number], steps[number + 1 :]
         others = [(s.candidate, s.choice.head.shapes) for s in (*before, *later)]
