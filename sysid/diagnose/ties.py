@@ -112,9 +112,10 @@ def chosen(view: View, groups: list[Group], rng: np.random.Generator) -> Choice 
         order += [] if told > 1.0 - _OUTSIDE and wide(k) else [k]
         told += chance[k]
     order = [k for n, k in enumerate(order) if not n or sum(map(chance.get, order[n:])) > _HARDLY]
+    whole = sum(map(chance.get, order))
     return Choice(
         members[head],
-        tuple((members[k], float(chance[k] / sum(map(chance.get, order)))) for k in order),
+        tuple((members[k], float(chance[k] / whole)) for k in order),
         base.sum(1) - table[:, head],
         tuple(replace(m, view=replace(m.view)) for k, m in enumerate(members) if k not in order),
         taken(view, base, members[head].losses),
@@ -137,8 +138,8 @@ def _even(view: View, members: list[Member]) -> tuple[View, list[Member]]:
 
 
 def _mostly_noise(members: list[Member], lost: np.ndarray) -> list[Member]:
-    """Those whose columns are mostly noise, which refits do not tell apart, and that take as much of
-    what is slow: first whose refit leaves least, which noise bent least."""
+    """Those whose columns are mostly noise, so that refits do not tell them apart, and that take as
+    much of what is slow: first whose refit leaves least, which noise bent least."""
     slow = [members[k] for k in np.argsort(lost) if members[k].group.slow]
     return [m for m in slow if m.group.taken >= (1.0 - _CLOSE) * slow[0].group.taken]
 
