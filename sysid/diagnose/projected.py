@@ -53,7 +53,7 @@ def made(
 ) -> list[Group]:
     """Groups of columns (asked, joints, n, k) on the motion, and on the rough one.
 
-    slow: they are as slow as the motion, which what is mostly noise is asked by.
+    Of what is read late and is mostly noise, what is as slow as the motion is asked: `slow`.
     """
     design, sums, spans = view.design, view.sums, by_block(view.blocks)
     count, _, n, k = plain.shape
@@ -106,10 +106,10 @@ def made(
         rest = turn, sizes, turn.T @ foreseen[s] @ turn, float(loss)
         out.append(Group(candidate, dict(shapes), *told, *rest, slow=slow))
     known_together(out)
-    sizes = zip(told_by, *(np.trace(a, axis1=1, axis2=2) for a in (rough_square, whole)))
-    noisy = [s for s, (one, n, left) in enumerate(sizes) if one is None and n > NOISE * left > 0.0]
-    late = [s for s in noisy if isinstance(asked[s][0].effect, SensorEffect)]
-    if slow or not late:
+    none = (s for s, found in enumerate(told_by) if found is None and not slow)
+    late = [s for s in none if isinstance(asked[s][0].effect, SensorEffect)]
+    late = [s for s in late if np.trace(rough_square[s]) > NOISE * np.trace(whole[s]) > 0.0]
+    if not late:
         return out
     both = (slow_part(view, columns[late]) for columns in (plain, rough))
     return out + made(view, [asked[s] for s in late], joints, *both, slow=True)

@@ -97,8 +97,8 @@ def chosen(view: View, groups: list[Group], rng: np.random.Generator) -> Choice 
     best = [k for k in inside if lost[k] <= lost[inside].min() + same]
     head = min(best, key=lambda k: members[k].candidate.simplicity)
     # no log tells that a sign was free to choose: it halves the odds
-    signs = [(noisy[0] if m in noisy else m).group.either for m in (members[k] for k in inside)]
-    odds, lost = np.exp2(np.negative(signs)), free.sum(0)
+    own = [noisy[0] if members[k] in noisy else members[k] for k in inside]
+    odds, lost = np.exp2([-member.group.either for member in own]), free.sum(0)
     odds = odds * blocks.chances(free[:, inside], rng, group.variance)
     chance = dict(zip(inside, odds / odds.sum()))
     # whom only its fewer signs made the head may be less likely than another

@@ -39,9 +39,10 @@ def finding(f: Finding, claim: Claim, found: Diagnosis) -> dict:
     before, after = f.rms_before**2, f.rms_after**2
     names = found.fit.joints if f.joint == "*" else [f.joint]
     levels = [found.floors[j].rms for j in names]
-    left = np.mean([claim.after.rms("test")[j] ** 2 for j in names])
-    known = None not in levels
-    floor = np.mean([level**2 for level in levels]) if known else min(after, float(left))
+    if None in levels:  # no more than the claim leaves
+        floor = min(after, float(np.mean([claim.after.rms("test")[j] ** 2 for j in names])))
+    else:
+        floor = np.mean([level**2 for level in levels])
     misfit = max(before - floor, abs(before - after), 1e-9 * before, 1e-300)
     return {
         "effect": f.effect,

@@ -41,8 +41,7 @@ def part_taken(view: View, candidate: Candidate, shapes: dict[str, float], coeff
 
 def slow_part(view: View, columns: np.ndarray) -> np.ndarray:
     """Columns (..., n, k) without what is faster than the laws of the motion."""
-    rows = np.moveaxis(columns, -2, 0)
-    piece, band = view.rows.piece, view.motion.band
-    slow = calm(rows.reshape(len(rows), -1), piece, band, view.step).reshape(rows.shape)
-    # samples last in memory, as columns are
-    return np.swapaxes(np.ascontiguousarray(np.swapaxes(np.moveaxis(slow, 0, -2), -1, -2)), -1, -2)
+    last = np.swapaxes(columns, -1, -2)  # samples, as in memory
+    values = last.reshape(-1, last.shape[-1]).T
+    slow = calm(values, view.rows.piece, view.motion.band, view.step)
+    return np.swapaxes(slow.T.reshape(last.shape), -1, -2)
