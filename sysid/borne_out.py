@@ -50,11 +50,13 @@ def in_doubt(before: Fit, after: Fit, told: Fit, candidate: Candidate) -> str | 
         risen = shown.delta_rms > 0.0 and not (wide and comparison.falls(before, told, _NOTHING))
     if risen:
         return "as `sysid add` fits it, the error on the test logs rises"
-    # as the fit weighs them: it trades what a quiet joint loses for what a loud one gains; and what
-    # held bodies against its lack may hold them against it
-    paid = [comparison.together(before, one, weighed=True) for one in (after, told)]
+    # as the fit weighs them, as it trades what a quiet joint loses for what a loud one gains; and
+    # each by its own error, as little of a loud joint outweighs all of a quiet one's; and what held
+    # bodies against its lack may hold them against it
+    ways = [(one, weighed) for one in (after, told) for weighed in (True, False)]
+    paid = [comparison.together(before, one, weighed=weighed) for one, weighed in ways]
     if all(one.delta_rms > one.se for one in paid):
-        return "with it the test error of all joints together, as the fit weighs them, rises"
+        return "with it the test error of all joints together rises, whether as the fit weighs them or each by its own"
     return None
 
 

@@ -22,20 +22,27 @@ class Told(SimpleNamespace):
         return {"cogging.elbow.a1": (5.0, 1.0, "N m"), "cogging.elbow.k": (30.0, 0.1, "1/rad")}
 
 
-def judged(monkeypatch, paid: tuple[float, float], own: float = -0.1) -> str:
+def judged(monkeypatch, paid: tuple[float, float], own: float = -0.1, by_own: float = 0.01) -> str:
     """What is in doubt of an effect by which the error of its joint falls; paid: what all joints together lose under the prior before,
-    and as `sysid add` gives it; own: by how much the joint's own error then changes."""
+    and as `sysid add` gives it, as the fit weighs them; own: by how much the joint's own error then changes; by_own: what all lose, each
+    by its own."""
     before, after, told = (Told(error=error) for error in (1.0, 0.8, 0.8))
     change = {id(after): paid[0], id(told): paid[1]}
     fall = {id(after): -0.1, id(told): own}
     monkeypatch.setattr(comparison, "compare", lambda _, one: (Difference("a", "b", "elbow", fall[id(one)], 0.02),))
-    monkeypatch.setattr(comparison, "together", lambda _, one, weighed=False: Difference("a", "b", "*", change[id(one)], 0.002))
+    monkeypatch.setattr(comparison, "together", lambda _, one, weighed=False: Difference("a", "b", "*", change[id(one)] if weighed else by_own, 0.002))
     return in_doubt(before, after, told, Candidate(vocabulary.find("cogging"), 1, ())) or ""
 
 
 @pytest.mark.parametrize(("paid", "refused"), [((0.01, 0.01), True), ((0.01, -0.05), False), ((-0.05, 0.01), False), ((0.001, 0.001), False)])
 def test_an_effect_is_refused_where_the_others_pay_for_it_under_either_prior(monkeypatch, paid, refused):
-    assert ("as the fit weighs them, rises" in judged(monkeypatch, paid)) is refused
+    assert ("of all joints together rises" in judged(monkeypatch, paid)) is refused
+
+
+@pytest.mark.parametrize(("by_own", "refused"), [(0.01, True), (-0.05, False), (0.001, False)])
+def test_an_effect_is_refused_where_the_others_pay_for_it_however_they_count(monkeypatch, by_own, refused):
+    """As the fit weighs them the loud joints' rise outweighs all of a quiet one's error; each by its own it may be nothing beside its fall."""
+    assert ("of all joints together rises" in judged(monkeypatch, (0.01, 0.01), by_own=by_own)) is refused
 
 
 @pytest.mark.parametrize(("own", "refused"), [(-0.001, False), (0.001, True)])
