@@ -265,6 +265,16 @@ def test_what_only_the_weights_of_the_joints_leave_is_said_to_be_theirs(weighed,
     assert "weighting" not in verdicts(fit, (), [NOISE, NOISE], floors, weighed={"elbow": weighed})[1].says
 
 
+@pytest.mark.parametrize(("took", "rest", "status"), [(0.85, NOISE, "missing"), (0.75, NOISE, "unknown"), (0.85, left(0.6), "unknown"), (None, NOISE, "unknown")])
+def test_what_takes_nearly_all_where_all_joints_count_alike_stands(took, rest, status):
+    """A louder joint bends the bodies of a quiet one, whose error falls by little in a fit that weighs all alike, and whose floor nobody knows:
+    under the low-pass, each joint weighed by its own, one effect takes more than four fifths of it."""
+    known = {} if took is None else {"took": [0.0, took]}
+    claims = [claim("stribeck", "elbow", [0.0, 0.5], fitted(2.5))]
+    found = verdicts(fitted(3.0), claims, [NOISE, rest], [floor(), floor(None)], **known)
+    assert found[1].status == status
+
+
 def test_what_is_left_with_other_weights_may_still_be_unknown():
     """With `weighting: noise` the error would be 1.35 times the floor, and the motion predicts half of that; not where it would be no more than noise."""
     known = {"weighed": {"elbow": 1.35}}

@@ -21,7 +21,7 @@ import numpy as np
 from .. import borne_out, pipeline, thinning
 from ..candidates import Candidate, candidates, own_effects
 from ..estimate import Fit
-from ..failures import Failure, HeldOut, failures
+from ..failures import Failure, HeldOut, failures, fallen
 from ..flexible import Law
 from ..lowpass import lowpassed
 from ..noise import NoiseFloor, floors_of_fit
@@ -101,8 +101,8 @@ def diagnose(
             with_it = group and again() and refitted(after, group)
             return with_it and law(with_it.view, j, elsewhere(with_it.view, measured.test))
 
-        more = refused, transfers(last), weighed, lambda j: law(after, j, again())
-        said = verdicts(fit, claims, after.unknown, found, *more, then_asked.near, beyond)
+        more = refused, transfers(last), weighed, lambda j: law(after, j, again()), then_asked.near
+        said = verdicts(fit, claims, after.unknown, found, *more, beyond, fallen(first, then))
         errors = last.rms("test").values()
         levels = np.array([e if f.rms is None else f.rms for f, e in zip(found, errors)])
         where = failures(first, fit.predictions["test"].thinned(thinning.MOST), levels)

@@ -53,8 +53,9 @@ def verdicts(
     carried: Sequence[Transfer] = (),
     weighed: dict[str, float] | None = None,
     law: Callable[[int], Law] | None = None,
-    near: Callable[[int, float, bool], tuple[Candidate, float] | None] | None = None,
+    near: Callable[[int, float, bool], tuple[Candidate, float] | None] = lambda *_: None,
     beyond: Callable[[int, Candidate], Law | None] | None = None,
+    took: Sequence[float] | None = None,
 ) -> list[Verdict]:
     """The verdict on every joint.
 
@@ -64,7 +65,8 @@ def verdicts(
             carries over, of each joint. weighed: {joint: RMS where each counts by its noise}.
             law: the function that stands out most of what is left of a joint. near: the effect that
             may be what is left, or predicted of it. beyond: the function that stands out most with
-            such an effect in the model.
+            such an effect in the model. took: what all claims take of each joint's squared residual
+            on the test logs, under the low-pass, where a loud joint bends no quiet one.
     """
     last = claims[-1].after if claims else fit
     errors = last.rms("train"), last.rms("test")
@@ -79,8 +81,7 @@ def verdicts(
     for j, joint in enumerate(fit.joints):
         taking = [c for c in claims if c.head.joint == joint or c.step.shares[j] >= WORTH]
         pairs = [(fit.rms(part)[joint], last.rms(part)[joint]) for part in ("train", "test")]
-        first, then = pairs[1]
-        both = [after for _, after in pairs]
+        (first, then), both = pairs[1], [after for _, after in pairs]
         # what does not lower the joint's error on the test logs is no name for it
         own = tuple(c for c in taking if c.head.joint in (joint, "*") and then < first)
         others = tuple(c for c in taking if c.head.joint not in (joint, "*"))
@@ -90,27 +91,25 @@ def verdicts(
         # noise than an error of another, so that what does not carry over is no noise
         whole = (1.0 + _LEFT) * explains(first, then, min(*both, noise)) >= 1.0
         whole |= noisy(*pairs[1], floors[j]) or floors[j].reached(both[0])
+        whole |= took is not None and (1.0 + _LEFT) * took[j] >= 1.0
         seen, among = left[j], sum(asked)
         if law and asked[j] and then > 0.0:
             seen = seen.with_law(law(j), among, WORTH)
         remains = seen if asked[j] and seen.predictable(among, WORTH) else None
         part = remains.share if remains else 1.0
-        looks = near(j, part * seen.total, bool(remains)) if near else None
+        looks = near(j, part * seen.total, bool(remains))
         looks = looks or in_vain(refused, fit.joints, j, HALF * part)
-        reached = reaches[j] and first > 0.0 and not remains
         taken = sum(c.step.shares[j] for c in own)
         little = remains is None or remains.share * max(1.0 - taken, 0.0) <= _LEFT * taken
-        stands, further = bool(own) and (whole or evens[j]) and little, None
-        if looks and remains and beyond and not own:
-            further = beyond(j, looks[0])
-            further = further if further and further.predicts(among, WORTH) else None
-        if stands:
+        further = beyond(j, looks[0]) if looks and remains and beyond and not own else None
+        further = further if further and further.predicts(among, WORTH) else None
+        if own and (whole or evens[j]) and little:
             told = ("missing", own, explained, remains)
         elif own or (remains and (further or not looks)):
             why = not_all(looks[0].name, further.share) if further else ""
             why = why if remains else cause(both, floors[j])
             told = ("unknown", own or others, explained, remains, why)
-        elif not reached:
+        elif remains or not (reaches[j] and first > 0.0):
             without = weighed[joint] if evens[j] else None
             effect, p = looks or (None, 1.0)
             may = effect if p > LEVEL else None  # what stands above the level was fitted, in vain

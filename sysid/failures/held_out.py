@@ -54,5 +54,9 @@ class HeldOut:
 def taken(before: Settled, after: Settled, test: Motion) -> np.ndarray:
     """(dof,) the share of each joint's squared residual on a test motion that goes from one settled
     model to another; negative where it grows."""
-    was, now = (HeldOut(one, test).rms() for one in (before, after))
-    return 1.0 - (now / np.maximum(was, 1e-300)) ** 2
+    return fallen(*(HeldOut(one, test) for one in (before, after)))
+
+
+def fallen(before: HeldOut, after: HeldOut) -> np.ndarray:
+    """(dof,) the share of each joint's squared residual that goes; negative where it grows."""
+    return 1.0 - (after.rms() / np.maximum(before.rms(), 1e-300)) ** 2
