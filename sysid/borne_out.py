@@ -25,10 +25,9 @@ def in_doubt(before: Fit, after: Fit, told: Fit, candidate: Candidate) -> str | 
     own, whole = candidate.judged_by(before.joints), candidate.joint == ROBOT
     if whole:  # what held bodies against its lack may hold them against it
         after = min((after, told), key=lambda one: comparison.together(before, one).delta_rms)
-    if not any(after.rms("train")[joint] < before.rms("train")[joint] for joint in own):
-        return "the fit's own error does not fall with it"
+    fell = any(after.rms("train")[joint] < before.rms("train")[joint] for joint in own)
     if whole:
-        change, unit = comparison.together(before, after), 1.0
+        change, unit, still = comparison.together(before, after), 1.0, True
         rise = f"{changed(change.delta_rms)} over all joints"
     else:
         changes = [comparison.compare(before, one) for one in (after, told)]
@@ -36,8 +35,11 @@ def in_doubt(before: Fit, after: Fit, told: Fit, candidate: Candidate) -> str | 
         unit = before.rms("test")[own[0]]
         rise = changed(change.delta_rms / max(unit, 1e-300))
         still = any(-d.delta_rms < CLEAR * d.se for d in (change, shown))
-        if still and not size_told(candidate.effect, told.parameters_of(*candidate.key)):
-            return "its size is nothing beside its deviation, nor the fall of the test error beside its own"
+    # a fit that weighs all joints alike may trade a quiet one's own error for what a loud one gains
+    if not fell and still:
+        return "the fit's own error does not fall with it"
+    if not whole and still and not size_told(candidate.effect, told.parameters_of(*candidate.key)):
+        return "its size is nothing beside its deviation, nor the fall of the test error beside its own"
     # what moves a joint may show in the torque of those that it carries, or that carry it
     wide = len(candidate.touches(2)) > 1 and comparison.falls(before, after, _NOTHING)
     if change.delta_rms > -_NOTHING * unit and not wide:

@@ -51,6 +51,16 @@ def test_an_effect_is_refused_where_its_joints_error_rises_as_add_fits_it(monkey
     assert ("as `sysid add` fits it" in judged(monkeypatch, (-0.05, -0.05), own)) is refused
 
 
+@pytest.mark.parametrize(("se", "refused"), [(0.02, False), (0.06, True)])
+def test_a_quiet_joints_own_error_may_rise_where_that_on_the_test_logs_clearly_falls(monkeypatch, se, refused):
+    """A fit that weighs all joints alike trades what a quiet one loses on the training logs for what a loud one gains."""
+    before, after = Told(error=1.0), Told(error=1.0)
+    monkeypatch.setattr(comparison, "compare", lambda *_: (Difference("a", "b", "elbow", -0.1, se),))
+    monkeypatch.setattr(comparison, "together", lambda *_, **__: Difference("a", "b", "*", -0.01, 0.002))
+    said = in_doubt(before, after, after, Candidate(vocabulary.find("cogging"), 1, ()))
+    assert (said == "the fit's own error does not fall with it") is refused and (said is None) is not refused
+
+
 def test_how_large_an_effect_is_says_what_vanishes_with_it():
     """Of a saturation its share, not the limit beyond which it acts; of a delay the delay; of warm friction what falls, not how fast."""
     numbers = {"torque_saturation": ("e", "limit"), "delay": ("d",), "warmup": ("dFv", "dFc", "T"), "elasticity": ("compliance", "damping")}
