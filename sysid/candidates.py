@@ -83,6 +83,12 @@ class Candidate:
         """Whether what it does comes in blows, a few of which may outweigh all others."""
         return isinstance(self.effect, Deflection) and self.effect.blows
 
+    @property
+    def late(self) -> int | None:
+        """The joint whose torque it reads late, or early; None where it reads none so."""
+        reads = isinstance(self.effect, SensorEffect) and not self.effect.constant_gain
+        return self.joint if reads else None
+
     def touches(self, dof: int) -> list[int]:
         """The joints whose torque it changes."""
         everywhere = self.joint == ROBOT or isinstance(self.effect, (MotionEffect, WrenchEffect))

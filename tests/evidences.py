@@ -55,5 +55,5 @@ def roughened(p, rng: np.random.Generator, noise: float):
 
 def grouped(view, sets, joints=(0, 1), blows=False, rough=None):
     """The groups of sets of columns (sets, joints, n, k); rough: the same with the angles' noise once more."""
-    candidate = SimpleNamespace(name="made", effect=None, joint=-1 if len(joints) > 1 else joints[0], blows=blows)
+    candidate = SimpleNamespace(name="made", effect=None, joint=-1 if len(joints) > 1 else joints[0], blows=blows, late=None)
     return made(view, [(candidate, {"at": float(s)}) for s in range(len(sets))], list(joints), sets, sets if rough is None else rough)

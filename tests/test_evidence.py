@@ -346,7 +346,8 @@ def test_links_that_fly_are_those_of_the_joints_that_are_asked(views):
             ((*followed,),) = source._flights.values()
             assert followed == ([0, 1][: play.joint + 1] if not among else [0, 1])  # nobody else's
     for one, other in zip(*told):
-        np.testing.assert_allclose(one, other, rtol=1e-9, atol=1e-12)
+        # an integration in another order rounds at the size of its greatest torque, not of what is left near zero
+        np.testing.assert_allclose(one, other, rtol=1e-9, atol=64 * np.finfo(float).eps * np.abs(other).max())
 
 
 def test_what_a_joint_was_asked_of_a_residual_stands_while_it_is_the_same(views):

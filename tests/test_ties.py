@@ -10,7 +10,7 @@ from sysid import blocks, pipeline
 from sysid.diagnose.ask import ask
 from sysid.diagnose.refits import refitted, settled
 from sysid.diagnose.ties import Choice, alike, chosen, holds, price_of
-from sysid.view import first_view, losses, weighed
+from sysid.view import first_view, losses, slow_losses, weighed
 from tests.evidences import posed, stacked, viewed
 
 
@@ -282,6 +282,21 @@ def test_rivals_are_judged_with_the_weights_that_the_best_of_them_leaves(biased)
         np.testing.assert_array_equal(member.view.weights, found.head.view.weights)
     # shares are of what each joint loses, whatever it counts, less what the angles' noise makes
     assert 1.0 - share[1] ** 2 < found.shares[1] < 1.0 and abs(found.shares[0]) < 0.5
+
+
+def test_torques_that_are_read_late_are_told_apart_by_what_is_as_slow_as_the_motion(simulated):
+    """A lag makes the torque's rate, and of coarse angles that is loud: least squares make it too short, and a delay, which only turns
+    the noise's phase, leaves less. What is slow, with parameters that this noise does not bend, says that it is a lag, or neither."""
+    experiment = pipeline.load(simulated("lag under coarse angles", "current_lag:elbow:T=0.01", encoder=12, duration=12.0))
+    view = first_view(experiment, pipeline.fit(experiment))
+    groups = {g.candidate.name: g for g in ask(view).groups if g.candidate.joint == 1}
+    lag, delay = (refitted(view, groups[name]) for name in ("current_lag", "delay"))
+    assert lag.shapes["T"] < 0.007 and lag.losses.sum() > 1.2 * delay.losses.sum()
+    slow = [slow_losses(member.view, view.blocks) for member in (lag, delay)]
+    assert slow[0].shape == (view.blocks[-1] + 1,)
+    assert slow[0].sum() < slow[1].sum() + groups["delay"].variance
+    found = chosen(view, [groups["current_lag"], groups["delay"]], np.random.default_rng(1))
+    assert {m.candidate.name for m, _ in found.members} == {"current_lag", "delay"} and found.head.candidate.name == "delay"  # bent least
 
 
 def test_what_is_mostly_noise_is_asked_by_what_is_as_slow_as_the_motion(simulated, diagnosed):

@@ -9,7 +9,6 @@ import numpy as np
 
 from ..candidate_columns import columns_of, tried
 from ..candidates import Candidate
-from ..effect import SensorEffect
 from ..projection import NOISE, directions_of
 from ..view import View, by_block, slow_part
 from ..view.stationary import covariance
@@ -107,7 +106,7 @@ def made(
         out.append(Group(candidate, dict(shapes), *told, *rest, slow=slow))
     known_together(out)
     none = (s for s, found in enumerate(told_by) if found is None and not slow)
-    late = [s for s in none if isinstance(asked[s][0].effect, SensorEffect)]
+    late = [s for s in none if asked[s][0].late is not None]
     late = [s for s in late if np.trace(rough_square[s]) > NOISE * np.trace(whole[s]) > 0.0]
     if not late:
         return out

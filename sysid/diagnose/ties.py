@@ -14,7 +14,7 @@ import numpy as np
 
 from .. import blocks
 from ..posed_problem import inverse
-from ..view import COMPARED, View, losses, makes, part_taken, taken, weighed
+from ..view import COMPARED, View, losses, makes, part_taken, slow_losses, taken, weighed
 from .evidence import Group
 from .projected import groups_at
 from .refits import Member, refitted
@@ -76,9 +76,12 @@ def chosen(view: View, groups: list[Group], rng: np.random.Generator) -> Choice 
     # who loses more than nobody explains nothing, however far its losses scatter
     members = [m for m in members if m.losses.sum() <= base.sum()] or members[:1]
     table = np.stack([m.losses.sum(1) for m in members], axis=1)
-    noisy = _mostly_noise(members, table.sum(0))
-    for member in noisy[1:]:
-        table[:, members.index(member)] = table[:, members.index(noisy[0])]
+    # what reads torque late: alike in what is slow, and more or less of the noise of what is fast
+    by_loss = sorted(members, key=lambda m: m.losses.sum())
+    late = [[m for m in by_loss if m.candidate.late == j] for j in range(view.model.robot.dof)]
+    for some in (some for some in late if len(some) > 1):
+        own, slow = zip(*((members.index(m), slow_losses(m.view, view.blocks)) for m in some))
+        table[:, own] = (table[:, own[0]] - slow[0] + slow).T
     group = members[int(np.argmin(table.sum(0)))].group
     if view is not first:  # with these weights
         group = (groups_at(view, [(group.candidate, group.shapes)]) or [group])[0]
@@ -97,16 +100,16 @@ def chosen(view: View, groups: list[Group], rng: np.random.Generator) -> Choice 
     best = [k for k in inside if lost[k] <= lost[inside].min() + same]
     head = min(best, key=lambda k: members[k].candidate.simplicity)
     # no log tells that a sign was free to choose: it halves the odds
-    own = [noisy[0] if members[k] in noisy else members[k] for k in inside]
-    odds, lost = np.exp2([-member.group.either for member in own]), free.sum(0)
+    odds, lost = np.exp2([-members[k].group.either for k in inside]), free.sum(0)
     odds = odds * blocks.chances(free[:, inside], rng, group.variance)
     chance = dict(zip(inside, odds / odds.sum()))
     # whom only its fewer signs made the head may be less likely than another
     wide = lambda k: k != head and holds(view, members[k], members[head])  # noqa: E731
     less = [k for k in inside if lost[k] < lost[head] - same and not wide(k)]
     head, order, told = max([head, *less], key=chance.get), list[int](), 0.0
-    if members[head] in noisy and noisy[0] in members:
-        head = members.index(noisy[0])
+    # a refit of what is mostly noise is bent by it: whoever is bent least goes on
+    some = [m for m in late[members[head].candidate.joint] if members[head].group.slow]
+    head = next((k for k in (members.index(m) for m in some) if k in inside), head)
     for k in sorted(inside, key=lambda k: (k != head, -chance[k])):
         # what only adds freedom predicts as well: it counts by how likely it is
         order += [] if told > 1.0 - _OUTSIDE and wide(k) else [k]
@@ -135,13 +138,6 @@ def _even(view: View, members: list[Member]) -> tuple[View, list[Member]]:
     view = weighed(view, weights)
     even = [(m.group, weighed(m.view, weights)) for m in members]
     return view, [Member(group, found, losses(found, view.blocks)) for group, found in even]
-
-
-def _mostly_noise(members: list[Member], lost: np.ndarray) -> list[Member]:
-    """Those whose columns are mostly noise, so that refits do not tell them apart, and that take as
-    much of what is slow: first whose refit leaves least, which noise bent least."""
-    slow = [members[k] for k in np.argsort(lost) if members[k].group.slow]
-    return [m for m in slow if m.group.taken >= (1.0 - _CLOSE) * slow[0].group.taken]
 
 
 def price_of(view: View, group: Group) -> Callable[..., float]:

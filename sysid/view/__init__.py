@@ -3,7 +3,7 @@
 from .design import Design, Sums, by_block, designed, instrumented, summed
 from .joining import COMPARED, allowed, around, joined, shapes_of, weighed
 from .laws import law
-from .losses import losses, taken
+from .losses import losses, slow_losses, taken
 from .overlap import makes, part_taken, slow_part
 from .singles import greatest
 from .view import View, elsewhere, first_view, looked_at, too_short
@@ -28,6 +28,7 @@ __all__ = [
     "makes",
     "part_taken",
     "shapes_of",
+    "slow_losses",
     "slow_part",
     "summed",
     "taken",

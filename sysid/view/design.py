@@ -83,9 +83,10 @@ def designed(found: Settled, weights, source: Source, rough: Source, left=None) 
     return Design(columns @ turn, residual, change, turn, more @ turn, left)
 
 
-def instrumented(design: Design, use, piece, band: float, step: float) -> np.ndarray:
+def instrumented(design: Design, use, piece, band: float, step: float):
     """The residual (n, dof) where the columns without the noise of the angles, Z, tell the rest no
-    more: (Z'A + P) dx = (Z - A)'r, with the prior's P.
+    more, and how far that is from the design's optimum (directions,): (Z'A + P) dx = (Z - A)'r,
+    with the prior's P.
 
     Least squares holds A'r = 0, but noise stands in A and r alike and bends the parameters; what
     it leaves then follows the motion though nothing is missing.
@@ -99,7 +100,7 @@ def instrumented(design: Design, use, piece, band: float, step: float) -> np.nda
     z = np.stack([calm(own, piece, band, step) * use[:, [j]] for j, own in enumerate(a)])
     system = np.eye(a.shape[2]) + sum(one.T @ other for one, other in zip(z - a, a))
     change = np.linalg.lstsq(system, np.einsum("jnk,nj->k", z - a, r), rcond=1e-10)[0]
-    return r - np.einsum("jnk,k->nj", a, change)
+    return r - np.einsum("jnk,k->nj", a, change), change
 
 
 def by_block(number: np.ndarray) -> list[slice]:

@@ -7,7 +7,8 @@ from __future__ import annotations
 import numpy as np
 
 from .. import blocks
-from .design import by_block
+from ..lowpass import calm
+from .design import by_block, instrumented
 from .view import View
 
 
@@ -29,6 +30,17 @@ def losses(view: View, number: np.ndarray) -> np.ndarray:
         told = (r + np.einsum("jnk,k->nj", a, change)) * r - design.rough_residual[rows] ** 2
         out[own] = np.add.reduceat(told, [spans[b].start - rows.start for b in own])
     return out
+
+
+def slow_losses(view: View, number: np.ndarray) -> np.ndarray:
+    """(blocks,) what a model leaves that is as slow as the motion, its parameters told by columns
+    without the noise of the angles, less what that noise makes of it: of what is fast it is most,
+    how much of it stands in a prediction hangs on how a model reads torque, and it bends a fit."""
+    design, use, how = view.design, view.rows.use, (view.rows.piece, view.motion.band, view.step)
+    left, change = instrumented(design, use, *how)
+    more = design.rough_residual - np.einsum("jnk,k->nj", design.rough_columns, change)
+    told = np.sum(calm(left * use, *how) ** 2 - calm(more, *how) ** 2, axis=1)
+    return np.add.reduceat(told, [rows.start for rows in by_block(number)])
 
 
 def taken(view: View, before: np.ndarray, after: np.ndarray) -> np.ndarray:

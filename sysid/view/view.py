@@ -106,7 +106,7 @@ class View:
         the view that this one grew from, what it took there."""
         # three stretches a fold, so that what is left out is seldom where nothing else was
         rows = self.rows
-        residual = instrumented(self.design, rows.use, rows.piece, self.motion.band, self.step)
+        residual, _ = instrumented(self.design, rows.use, rows.piece, self.motion.band, self.step)
         stretch = blocks.numbered(rows.t, rows.piece, shortest=np.inf, fewest=3 * _FOLDS)
         fold, names = stretch % _FOLDS, self.model.robot.joints
         same = [one.of(residual[:, j]) for j, one in enumerate(self.asked)] or [None] * len(names)
