@@ -83,7 +83,9 @@ def designed(found: Settled, weights, source: Source, rough: Source, left=None) 
     return Design(columns @ turn, residual, change, turn, more @ turn, left)
 
 
-def instrumented(design: Design, use, piece, band: float, step: float):
+def instrumented(
+    design: Design, use, piece, band: float, step: float
+) -> tuple[np.ndarray, np.ndarray]:
     """The residual (n, dof) where the columns without the noise of the angles, Z, tell the rest no
     more, and how far that is from the design's optimum (directions,): (Z'A + P) dx = (Z - A)'r,
     with the prior's P.
