@@ -273,6 +273,8 @@ def test_what_takes_nearly_all_where_all_joints_count_alike_stands(took, rest, s
     claims = [claim("stribeck", "elbow", [0.0, 0.5], fitted(2.5))]
     found = verdicts(fitted(3.0), claims, [NOISE, rest], [floor(), floor(None)], **known)
     assert found[1].status == status
+    # where the floor is known, other weights would have said so
+    assert verdicts(fitted(3.0), claims, [NOISE, rest], [floor(), floor()], **known)[1].status == "unknown"
 
 
 def test_what_is_left_with_other_weights_may_still_be_unknown():

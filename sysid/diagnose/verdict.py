@@ -91,7 +91,9 @@ def verdicts(
         # noise than an error of another, so that what does not carry over is no noise
         whole = (1.0 + _LEFT) * explains(first, then, min(*both, noise)) >= 1.0
         whole |= noisy(*pairs[1], floors[j]) or floors[j].reached(both[0])
-        whole |= took is not None and (1.0 + _LEFT) * took[j] >= 1.0
+        # where a floor is known, other weights say how much of the rest loud joints make
+        unsaid = took is not None and floors[j].rms is None
+        whole |= unsaid and (1.0 + _LEFT) * took[j] >= 1.0
         seen, among = left[j], sum(asked)
         if law and asked[j] and then > 0.0:
             seen = seen.with_law(law(j), among, WORTH)
