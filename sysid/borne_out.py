@@ -56,7 +56,7 @@ def in_doubt(before: Fit, after: Fit, told: Fit, candidate: Candidate) -> str | 
     # each by its own error, as little of a loud joint outweighs all of a quiet one's; and what held
     # bodies against its lack may hold them against it
     ways = [(one, weighed) for one in (after, told) for weighed in (True, False)]
-    paid = [comparison.together(before, one, weighed=weighed) for one, weighed in ways]
+    paid = (comparison.together(before, one, weighed=weighed) for one, weighed in ways)
     if all(one.delta_rms > one.se for one in paid):
         return "with it the test error of all joints together rises, whether as the fit weighs them or each by its own"
     return None

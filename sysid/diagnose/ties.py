@@ -108,8 +108,8 @@ def chosen(view: View, groups: list[Group], rng: np.random.Generator) -> Choice 
     less = [k for k in inside if lost[k] < lost[head] - same and not wide(k)]
     head, order, told = max([head, *less], key=chance.get), list[int](), 0.0
     # a refit of what is mostly noise is bent by it: whoever is bent least goes on
-    some = [m for m in late[members[head].candidate.joint] if members[head].group.slow]
-    head = next((k for k in (members.index(m) for m in some) if k in inside), head)
+    bent = [m for m in late[members[head].candidate.joint] if members[head].group.slow]
+    head = next((k for k in map(members.index, bent) if k in inside), head)
     for k in sorted(inside, key=lambda k: (k != head, -chance[k])):
         # what only adds freedom predicts as well: it counts by how likely it is
         order += [] if told > 1.0 - _OUTSIDE and wide(k) else [k]
