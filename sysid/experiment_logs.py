@@ -10,10 +10,10 @@ from .bumps import bumps
 from .free_memory import released
 from .log_spec import LogSpec
 from .model import Model
-from .notices import noticed
 from .robot import Robot
 from .spans import Spans
 from .specs import Experiment
+from .warned import noticed
 from .workers import Mapped
 
 

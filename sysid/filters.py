@@ -6,7 +6,6 @@ fit states what the chosen filter gives and what its neighbours would have given
 likelihood of noise has it whose size nobody knows: in a sum of squares a shoulder would choose the filter of a wrist.
 """
 
-import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
@@ -14,7 +13,7 @@ import numpy as np
 
 from .blocks import within_one_error
 from .drives import slowest
-from .errors import SysidError, SysidWarning
+from .errors import SysidError
 from .filter_errors import held_out
 from .log import Log
 from .lowpass import band
@@ -22,6 +21,7 @@ from .model import Model
 from .smoother import Smoother
 from .spans import Spans
 from .specs import Experiment, PreprocessSpec
+from .warned import noticed, warn
 from .workers import Mapped
 
 _WINDOWS = (0.02, 0.03, 0.05, 0.07, 0.1, 0.15, 0.2, 0.3, 0.4, 0.6, 0.8)  # s
@@ -94,7 +94,7 @@ def begun(
             chosen = _best(tried, key, 0.1 if key == "window" else 10.0)
             place = [entry[key] for entry in tried].index(chosen)
             if len(tried) > 1 and place in (0, len(tried) - 1):
-                warnings.warn(SysidWarning(f"preprocess.{key}: auto chose {chosen:g}, the end of what was tried; give a number to go further"), stacklevel=2)
+                warn(f"preprocess.{key}: auto chose {chosen:g}, the end of what was tried; give a number to go further")
         shown = [{name: entry[name] for name in (key, "relative_error", "rms")} for entry in tried]
         return {**said, "order": spec.order, key: chosen, "chosen": "held-out error" if automatic else "given", "held_out": shown}
 
@@ -110,8 +110,7 @@ def _tried(experiment: Experiment, key: str, candidate: float, model: Model, log
     sampling rate."""
     spec = experiment.preprocess.model_copy(update={key: candidate})
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", SysidWarning)
+        with noticed():
             return {key: candidate, **held_out(experiment, spec, model, [_middle(log) for log in logs], prior, edge)}
     except SysidError:
         return None

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
@@ -12,7 +11,7 @@ import numpy as np
 from . import own_effects
 from .effect import Effect, LinkEffect
 from .effect_parameters import Asked, Shape
-from .errors import ConfigError, SysidWarning, meant
+from .errors import ConfigError, meant
 from .formula import Formula
 from .model import Model
 from .model_parameters import ROBOT, holds
@@ -21,6 +20,7 @@ from .robot import Robot
 from .specs import is_own
 from .terms import initial
 from .vocabulary import find
+from .warned import warn
 
 
 def build(robot: Robot, effects, folder: Path = Path(), signals=(), groups: Mapping[str, Mapping] = MappingProxyType({})) -> Model:
@@ -67,7 +67,7 @@ def _levels(effect: Effect, spec, groups: Mapping[str, Mapping]) -> list[Effect]
     levels = tuple(groups[spec.per])
     own = [level for level in levels if level not in (spec.spared or ())]
     if effect.mimics_mass and isinstance(effect, LinkEffect) and len(own) == len(levels):
-        warnings.warn(SysidWarning(f"{effect.name} is in every log: what all levels of {spec.per} share of it is the link's own, and the prior alone tells them apart; except: [LEVEL] names the logs without it"), stacklevel=2)
+        warn(f"{effect.name} is in every log: what all levels of {spec.per} share of it is the link's own, and the prior alone tells them apart; except: [LEVEL] names the logs without it")
     return [at_level(effect, spec.per, level, levels) for level in own]
 
 

@@ -5,7 +5,6 @@ refused with its row; what can be mended (an irregular clock, a gap) is mended w
 """
 
 import hashlib
-import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -15,7 +14,7 @@ import numpy as np
 from . import motor_side, units
 from .clock import Clock, corrected
 from .drive_spec import ActuatorSpec
-from .errors import LogError, SysidWarning
+from .errors import LogError
 from .events import Event
 from .groups import levels_of
 from .log_spec import DataSpec, LogSpec
@@ -23,6 +22,7 @@ from .recording import Recording, recorded
 from .rounded_stamps import off_steady
 from .segment import Segment
 from .spans import Spans
+from .warned import warn
 
 # A step longer than this many median steps is a hole that interpolation would invent motion for.
 GAP_STEPS = 10.0
@@ -189,7 +189,7 @@ def _convert(signals, data: DataSpec, joints, prismatic, where: str, drives) -> 
         far = [f"{joint} {value:.4g}" for joint, value, slides in zip(joints, largest, prismatic) if not slides and value > DEGREES]
         if far:
             said = f"{where}: angles reach {', '.join(far)} rad; if that is degrees, set data.units.position: deg"
-            warnings.warn(SysidWarning(said), stacklevel=3)
+            warn(said, above=2)
 
 
 def _segments(t, signals, where: str, breaks: Iterable[int] = ()):
@@ -199,9 +199,7 @@ def _segments(t, signals, where: str, breaks: Iterable[int] = ()):
     cuts = np.setdiff1d(np.flatnonzero(steps > GAP_STEPS * step) + 1, breaks)
     if cuts.size:
         longest = steps[cuts - 1].max()
-        warnings.warn(
-            SysidWarning(f"{where}: {cuts.size} gap(s), the longest {longest:.4g} s, split the log into {cuts.size + breaks.size + 1} segments"), stacklevel=3
-        )
+        warn(f"{where}: {cuts.size} gap(s), the longest {longest:.4g} s, split the log into {cuts.size + breaks.size + 1} segments", above=2)
     cuts = np.union1d(cuts, breaks).astype(int)
     resampled, off, lost = 0, 0.0, 0.0
     bounds = [0, *cuts.tolist(), len(t)]
@@ -230,14 +228,11 @@ def _segments(t, signals, where: str, breaks: Iterable[int] = ()):
         resampled += 1
         yield replace(segment(clock, own, part), clock=left)
     if resampled:
-        warnings.warn(
-            SysidWarning(f"{where}: steps of {np.delete(steps, cuts - 1).min():.4g} to {np.delete(steps, cuts - 1).max():.4g} s were resampled to a uniform {own:.4g} s"),
-            stacklevel=3,
-        )
+        warn(f"{where}: steps of {np.delete(steps, cuts - 1).min():.4g} to {np.delete(steps, cuts - 1).max():.4g} s were resampled to a uniform {own:.4g} s", above=2)
     if off > 0.0:
         said = f"{where}: the time stamps are off by {1e3 * off:.2g} ms (RMS), as the joints' angles show, and were corrected"
         ends = f"; at the ends, where these do not show it, up to {lost:.2g} s is left out" if lost > 0.0 else ""
-        warnings.warn(SysidWarning(said + ends), stacklevel=3)
+        warn(said + ends, above=2)
 
 
 def segment(t, step, part) -> Segment:

@@ -8,7 +8,6 @@ other is read whole, as a short one is, and then looked at in the same spans.
 from __future__ import annotations
 
 import re
-import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -18,13 +17,13 @@ import numpy as np
 
 from . import log as logs
 from . import recorded_columns, recording, spans, units
-from .errors import SysidWarning
 from .even_clock import EvenClock, Stretch
 from .groups import levels_of
 from .log import Log
 from .log_spec import DataSpec, LogSpec
 from .segment import Segment
 from .spans import Spans, edges, of_segment
+from .warned import noticed, warn
 
 _DEGREES = re.compile(r"joint '.*' reaches")  # a notice whose number differs from span to span
 
@@ -127,16 +126,14 @@ class _Source:
         row = stretch.row + first
         part = self._table.between(row, stretch.row + last)
         spec = self._spec.model_copy(update={"start": None, "stop": None})
-        with warnings.catch_warnings(record=True) as caught:
-            warnings.simplefilter("always", SysidWarning)
+        with noticed() as told:
             how = (spec, self._data, self._joints, self._prismatic, self._folder)
             samples = logs.measured(*how, table=part, first=row)
-        for warning in caught:
-            said = str(warning.message)
+        for said in told:
             key = found[0] if (found := _DEGREES.findall(said)) else said
             if key not in self._told:
                 self._told.add(key)
-                warnings.warn(warning.message, warning.category, stacklevel=2)
+                warn(said)
         t = stretch.begin + stretch.step * np.arange(first, last)
         return logs.segment(t, stretch.step, samples.signals)
 
@@ -164,7 +161,7 @@ class _Source:
         if len(found) > 1:
             cut = f"{len(found) - 1} gap(s), the longest {clock.longest:.4g} s"
             said = f"{self._table.path}: {cut}, split the log into {len(found)} segments"
-            warnings.warn(SysidWarning(said), stacklevel=3)
+            warn(said, above=2)
         return found
 
     def _times(self) -> Iterator[tuple[int, np.ndarray]]:

@@ -8,7 +8,6 @@ neighbours as all filters see.
 
 from __future__ import annotations
 
-import warnings
 import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -16,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from . import preprocess, standstill
-from .errors import LogError, SysidWarning
+from .errors import LogError
 from .extent import Extent, Reach, reach_of
 from .free_memory import released
 from .log import Log
@@ -24,6 +23,7 @@ from .motion import Motion, Piece, Pieces, never_moved
 from .preprocess import ROUNDING, needs, on_both_sides, piece_of, under_lowpass
 from .spans import Spans, around, carried
 from .specs import PreprocessSpec
+from .warned import warn
 from .workers import Mapped
 
 _SLOW = np.concatenate(
@@ -260,7 +260,7 @@ def _passed(places, share: Mapped, threshold, stuck, logs, joints) -> _Passed:
             )  # fmt: skip
         if dropped := len(log.segments) - count:
             said = f"{dropped} segment(s) shorter than the filter's window were left out"
-            warnings.warn(SysidWarning(f"{log.path}: {said}"), stacklevel=2)
+            warn(f"{log.path}: {said}")
     return _Passed(kept, seen, extent, slow)
 
 

@@ -19,9 +19,9 @@ from .diagnose.diagnosis import Diagnosis, diagnose
 from .effect_entry import asked, with_effect
 from .errors import SysidError
 from .estimate import Fit
-from .notices import noticed
 from .specs import Experiment
 from .statement import kept
+from .warned import noticed
 
 _HISTORY, _STEPS = "history.json", "steps"
 

@@ -4,17 +4,17 @@ and in no error, with what the filters carry of them to their sides.
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from .errors import ConfigError, SysidWarning
+from .errors import ConfigError
 from .events import Event, ordered
 from .log import Log
 from .spans import clocks
 from .specs import MaskSpec
+from .warned import warn
 
 
 def masked(logs: Sequence[Log], masks: Sequence[MaskSpec], joints: Sequence[str]) -> list[Log]:
@@ -45,7 +45,7 @@ def _with(log: Log, masks: Sequence[MaskSpec], joints: Sequence[str]) -> Log:
             Event("mask", log.name, max(mask.start, a), min(mask.stop, b), own) for a, b in held
         ]
         if not held:
-            warnings.warn(SysidWarning(_nothing(log, mask)), stacklevel=2)
+            warn(_nothing(log, mask))
     return replace(log, events=ordered([*log.events, *found])) if found else log
 
 

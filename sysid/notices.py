@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-import warnings
-from contextlib import contextmanager
 from dataclasses import replace
 
 import numpy as np
 
 from . import events
 from . import log as logs
-from .errors import LogError, SysidWarning
+from .errors import LogError
 from .estimate import Fit
 from .model import moving_coefficients
 from .motion import Motion
 from .same_samples import Sampled, same, sampled, told
 from .spans import Spans
 from .specs import Experiment
+from .warned import warn
 
 
 def tell_undetermined(found: Fit, motion: Motion) -> None:
@@ -27,7 +26,7 @@ def tell_undetermined(found: Fit, motion: Motion) -> None:
     names = [c.name for c, held, moves, own in zip(structure.coefficients, found.held, moving, of_level) if held and (moves or own)]
     names += [v.name for v, std in zip(structure.shape_values, found.shape_std) if not (v.held or np.isfinite(std))]
     if names:
-        warnings.warn(SysidWarning(f"this log cannot tell {', '.join(names)} from the rest of the model: held at the prior"), stacklevel=2)
+        warn(f"this log cannot tell {', '.join(names)} from the rest of the model: held at the prior")
 
 
 # Of a joint that moves through its reversals, a few per cent of the rows are slow; more means that it was held.
@@ -45,22 +44,22 @@ def tell_still(motion: Motion) -> None:
     """Joints that stand still in much of what they are logged in, or in all of it."""
     often = [f"{joint} {100 * share:.0f} %" for joint, share in zip(motion.joints, motion.standing) if share > _MUCH_STANDING and joint not in motion.still]
     if often:
-        warnings.warn(SysidWarning(f"joints that stand still in much of their rows, where friction may have any value up to its greatest: {', '.join(often)}; preprocess.standstill: auto leaves them out"), stacklevel=2)
+        warn(f"joints that stand still in much of their rows, where friction may have any value up to its greatest: {', '.join(often)}; preprocess.standstill: auto leaves them out")
     for joint in motion.still:
-        warnings.warn(SysidWarning(f"joint {joint!r} never moves in the training logs, or never clear of a standstill; its friction is held at its prior, and its bodies are where the other joints' torque leaves them"), stacklevel=2)
+        warn(f"joint {joint!r} never moves in the training logs, or never clear of a standstill; its friction is held at its prior, and its bodies are where the other joints' torque leaves them")
 
 
 def tell_left_out(motion: Motion, spec) -> None:
     """How many rows of each joint's reversals are left out."""
     shares = [f"{joint} {100 * count / motion.samples:.0f} %" for joint, count in zip(motion.joints, motion.left_out) if count and joint not in motion.unused]
     if spec.standstill == "auto" and shares:
-        warnings.warn(SysidWarning(f"rows around each joint's reversals and standstill, where the filter smears friction's jump, are left out of its fit and its error: {', '.join(shares)}; preprocess.standstill: keep uses every row"), stacklevel=2)
+        warn(f"rows around each joint's reversals and standstill, where the filter smears friction's jump, are left out of its fit and its error: {', '.join(shares)}; preprocess.standstill: keep uses every row")
 
 
 def tell_events(part: str, motion: Motion) -> list[dict]:
     """The events of a part as documents have them; the user is told."""
     for notice in events.told(motion.events, motion.disturbed, {"train": "training"}.get(part, part)):
-        warnings.warn(SysidWarning(notice), stacklevel=2)
+        warn(notice)
     return [{"part": part, "kind": e.kind, "log": e.log, "start": e.start, "stop": e.stop, "joints": list(e.joints), "signal": e.signal} for e in motion.events]
 
 
@@ -73,9 +72,9 @@ def tell_overlap(experiment: Experiment, found: list[dict]) -> None:
             if not logs.overlapping(test, own, train, other):
                 continue
             if own == other and test.name != train.name:
-                warnings.warn(SysidWarning(f"test log {test.name} is the training log {train.name} under another name; its error is not held out"), stacklevel=2)
+                warn(f"test log {test.name} is the training log {train.name} under another name; its error is not held out")
             else:
-                warnings.warn(SysidWarning(f"test log {test.name} overlaps a training log; its error is not held out"), stacklevel=2)
+                warn(f"test log {test.name} overlaps a training log; its error is not held out")
 
 
 def samples_of(part: str, read: list[logs.Log]) -> list[Sampled]:
@@ -90,18 +89,4 @@ def tell_same(read: list[Sampled], experiment: Experiment, provenance: list[dict
     for found in same(read) if len(read) > 1 else ():
         others = tuple(one for one in found.others if files.get(one.name) != files.get(found.first.name))
         if others:
-            warnings.warn(SysidWarning(told(replace(found, others=others))), stacklevel=2)
-
-
-@contextmanager
-def noticed():
-    """Collect what was decided for the user, each once, as text; other warnings go on as what they are."""
-    notices: list[str] = []
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always", SysidWarning)
-        yield notices
-    for warning in caught:
-        if not issubclass(warning.category, SysidWarning):
-            warnings.warn_explicit(warning.message, warning.category, warning.filename, warning.lineno)
-        elif str(warning.message) not in notices:
-            notices.append(str(warning.message))
+            warn(told(replace(found, others=others)))

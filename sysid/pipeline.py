@@ -9,7 +9,6 @@
 from __future__ import annotations
 
 import time
-import warnings
 from collections.abc import Callable, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
@@ -23,7 +22,6 @@ from . import log as logs
 from .compress import compress
 from .drives import scale_is_told, with_drives
 from .earlier_fit import read_inertias
-from .errors import SysidWarning
 from .estimate import Fit, identify
 from .experiment_logs import Read, read, read_all
 from .held_apart import prior_strength
@@ -34,7 +32,6 @@ from .long_prediction import predicted
 from .model import Model
 from .motion import Motion
 from .notices import (
-    noticed,
     refuse_no_torque,
     samples_of,
     tell_events,
@@ -52,6 +49,7 @@ from .shape_refinement import refined, scattered
 from .spec_values import AUTO
 from .specs import Experiment
 from .threads import single_threaded
+from .warned import noticed, warn
 from .workers import Mapped, crew
 
 #: called with the stage's name and the share of it done, 0 to 1
@@ -109,7 +107,7 @@ def _fit(experiment: Experiment, filters: dict | None, strength: PriorWeight | N
         with _timed(seconds, "robot", tell):
             machine, structure, prior = build(experiment)
         for text in measured.notices if measured else ():
-            warnings.warn(SysidWarning(text), stacklevel=2)
+            warn(text)
         with _timed(seconds, "read", tell):
             train = measured.train if measured else read(experiment, machine, experiment.data.train, structure=structure, mapped=mapped)
         refuse_no_torque(train)
@@ -140,12 +138,12 @@ def _fit(experiment: Experiment, filters: dict | None, strength: PriorWeight | N
             found = scattered(replace(found, strength=strength or weight), motion)
         if not found.physically_consistent:
             names = [body.name for body, possible in zip(machine.bodies, is_consistent(found.pi)) if not possible]
-            warnings.warn(SysidWarning(f"impossible bodies: {', '.join(names)}; identified.urdf will not serve a simulator. model.inertia: log-cholesky keeps them possible"), stacklevel=2)
+            warn(f"impossible bodies: {', '.join(names)}; identified.urdf will not serve a simulator. model.inertia: log-cholesky keeps them possible")
         tell_undetermined(found, motion)
         with _timed(seconds, "masses", tell):  # what other fits are compared with has been asked what it lacks
             heavy = masses.implausible(found, motion if filters is None else None)
         if heavy is not None:
-            warnings.warn(SysidWarning(heavy.says), stacklevel=2)
+            warn(heavy.says)
         with _timed(seconds, "predict", tell):
             predictions = {"train": predicted(structure, found.x, motion)}
             samples, left_out = {"train": motion.samples}, {"train": _left_out(motion)}
@@ -163,10 +161,10 @@ def _fit(experiment: Experiment, filters: dict | None, strength: PriorWeight | N
             told = drives.found(experiment, structure, found.x, found.uncertainty.std, found.shape_std)
             let_go = rollout.rms(experiment, structure, found.x, motion)
         if not scale_is_told(experiment, machine.joints):
-            warnings.warn(SysidWarning("no joint's torque is known in N m: these logs tell masses, friction and gains up to one common factor, which the prior's masses choose; one known gain, or a payload of known mass, settles it"), stacklevel=2)
+            warn("no joint's torque is known in N m: these logs tell masses, friction and gains up to one common factor, which the prior's masses choose; one known gain, or a payload of known mass, settles it")
         tell("left", 0.0)
         for text in implausible(replace(found, predictions=predictions)):
-            warnings.warn(SysidWarning(text), stacklevel=2)
+            warn(text)
     return replace(
         found, masses=masses.document(heavy), predictions=predictions, samples=samples, left_out=left_out, seconds=seconds, filters=chosen,
         logs=tuple(provenance), notices=tuple(notices), events=tuple(disturbed), drives=tuple(told), rollout=let_go, searched=searched,

@@ -7,13 +7,12 @@ the filtered motion, so that both sides of the equation of motion see one filter
 its own, at `cutoff`: the noise of derivatives grows with frequency, and beyond the motion's band there is nothing else.
 """
 
-import warnings
 from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from .errors import ConfigError, LogError, SysidWarning
+from .errors import ConfigError, LogError
 from .events import Event, mended, usable
 from .gaussian import HIGHEST, Gaussian
 from .log import Log
@@ -22,6 +21,7 @@ from .segment import Segment
 from .smoother import Smoother
 from .specs import PreprocessSpec
 from .standstill import clear_of_reversals, standstill_speed, turns, without_standstill
+from .warned import warn
 
 _MOST = 0.5  # of the weight that a low-pass has
 _KEPT_A_CYCLE = 8.0  # rows a cycle of a low-pass: what it lets through at half as many is 0.4 %
@@ -44,7 +44,7 @@ def prepare(logs: Sequence[Log], spec: PreprocessSpec, joints: tuple[str, ...]) 
             shortest = needs(spec, log.segments[0].step) if log.segments else 2
             raise LogError(f"{log.samples} samples are fewer than the filter's window of {shortest}", where=str(log.path), do="give a longer log or narrow preprocess.window")
         if dropped := len(log.segments) - (len(pieces) - before):
-            warnings.warn(SysidWarning(f"{log.path}: {dropped} segment(s) shorter than the filter's window were left out"), stacklevel=2)
+            warn(f"{log.path}: {dropped} segment(s) shorter than the filter's window were left out")
     disturbed, stuck = share_left_out(pieces), False
     if spec.standstill == "auto":
         pieces, stuck = _with_rows(clear_of_reversals(pieces, spec), pieces)

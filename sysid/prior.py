@@ -6,13 +6,12 @@ the same mass and centre of mass with its second moments raised to be positive; 
 primitive shapes; a ball. A stated mass is kept in all of them.
 """
 
-import warnings
 
 import numpy as np
 
-from .errors import SysidWarning
 from .inertia import pseudo
 from .inertia.consistency import is_consistent
+from .warned import warn
 
 # A second moment below this share of the body's mean one is no thickness that a link has (a 1 : 30 sheet).
 _THINNEST = 1e-3
@@ -85,4 +84,4 @@ def _raised(pi) -> np.ndarray | None:
 
 
 def _tell(name: str, problem: str, remedy: str) -> None:
-    warnings.warn(SysidWarning(f"body {name!r} {problem} in the URDF; {remedy}"), stacklevel=3)
+    warn(f"body {name!r} {problem} in the URDF; {remedy}", above=2)

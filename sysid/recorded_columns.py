@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import warnings
-
 from . import units
-from .errors import LogError, SysidWarning
+from .errors import LogError
 from .log_spec import ColumnsSpec, DataSpec
 from .readers.table import Table
+from .warned import warn
 
 _DEFAULTS = ColumnsSpec()
 
@@ -41,7 +40,7 @@ def check_headers(table: Table, data: DataSpec, wanted: dict, time: str | None) 
                 said, where=str(table.path),
                 do=f"write data.units.{quantity}: {stated}, or {taken} where the header is wrong",
             )  # fmt: skip
-        warnings.warn(SysidWarning(f"{table.path}: {said}; read in {taken}"), stacklevel=5)
+        warn(f"{table.path}: {said}; read in {taken}", above=4)
 
 
 def meant(table: Table, spec: ColumnsSpec, key: str):

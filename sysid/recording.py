@@ -8,18 +8,18 @@ across.
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from . import datasets, motor_side, units
-from .errors import LogError, SysidWarning
+from .errors import LogError
 from .log_spec import DataSpec, LogSpec
 from .readers import open_table
 from .readers.table import Table
 from .recorded_columns import KEYS, check_headers, meant, names_of, refuse_shared, single, time_of
+from .warned import warn
 
 _EPOCH = 1e6  # s: a clock that reads more counts from 1970, not from the log's start
 EPISODE = "episode_index"  # the column in which LeRobot numbers episodes
@@ -86,12 +86,10 @@ def recorded(
         t = _seconds(_joined([t for t, *_ in loaded]), loaded[0][1])
         anew = [row for row in borders[:-1] if t[row] <= t[row - 1]]
         if anew:
-            warnings.warn(
-                SysidWarning(
-                    f"{where}: the clock starts anew in {len(anew)} of {len(tables)} files; "
-                    "what each holds is a segment of its own"
-                ),
-                stacklevel=3,
+            warn(
+                f"{where}: the clock starts anew in {len(anew)} of {len(tables)} files; "
+                "what each holds is a segment of its own",
+                above=2,
             )
         breaks = np.union1d(breaks, anew)
     files = {

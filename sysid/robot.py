@@ -16,11 +16,12 @@ import numpy as np
 import pinocchio as pin
 
 from . import urdf, urdf_files
-from .errors import RobotError, SysidWarning
+from .errors import RobotError
 from .inertia import pseudo
 from .link_priors import LINK, link_priors
 from .robot_spec import RobotSpec
 from .rotors import rotors_of, with_rotors
+from .warned import warn
 
 
 @dataclass(frozen=True)
@@ -177,7 +178,6 @@ def _pinocchio_model(source: urdf.Urdf) -> pin.Model:
 
 
 def _chosen(spec: RobotSpec, source: urdf.Urdf, moving: list[str]):
-    import warnings
 
     where = str(source.path)
     for name in [*(spec.joints or []), *spec.lock]:
@@ -195,10 +195,7 @@ def _chosen(spec: RobotSpec, source: urdf.Urdf, moving: list[str]):
         return spec.joints
     followers = _mimics(source)
     if mimics := [name for name in moving if name in followers and name not in spec.lock]:
-        warnings.warn(
-            SysidWarning(f"joints {', '.join(mimics)} mimic others in the URDF and are locked; name them in robot.joints to move them"),
-            stacklevel=4,
-        )
+        warn(f"joints {', '.join(mimics)} mimic others in the URDF and are locked; name them in robot.joints to move them", above=3)
     chosen = [name for name in moving if name not in spec.lock and name not in mimics]
     if not chosen:
         raise RobotError("no joint is left to move", where=where, allowed="at least one revolute, continuous or prismatic joint")

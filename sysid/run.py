@@ -7,7 +7,6 @@ effects of identified.yaml and the values of fit.json.
 from __future__ import annotations
 
 import json
-import warnings
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,11 +14,12 @@ import numpy as np
 
 from . import bounded, config, pipeline
 from .earlier_fit import read_fit
-from .errors import ConfigError, SysidWarning
+from .errors import ConfigError
 from .inertia import PARAMETERS
 from .model import Model
 from .prediction import Prediction, units
 from .specs import Experiment
+from .warned import noticed
 from .with_torque import WithTorque
 
 
@@ -115,8 +115,7 @@ def read_run(folder: str | Path) -> Run:
     folder = Path(folder)
     values, _ = read_fit(folder / "fit.json", "the run")
     experiment = config.load(folder / "identified.yaml")
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", SysidWarning)  # what is odd in the URDF was told by the fit
+    with noticed():  # what is odd in the URDF was told by the fit
         _, model, _ = pipeline.build(experiment)
     document = json.loads(bounded.read_text(folder / "fit.json"))
     wanted = (*model.names, *(value.name for value in model.shape_values))

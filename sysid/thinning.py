@@ -14,9 +14,9 @@ from . import listed_effects, robot
 from .experiment_logs import Read
 from .experiment_logs import read as read_logs
 from .log import Log
-from .notices import noticed
 from .spans import SPAN, Spans
 from .specs import Experiment
+from .warned import noticed
 
 # rows of the training logs, and of the test logs: four minutes at 1 kHz, of which a low-pass leaves
 # more rows than are asked; what memory a diagnosis takes does not grow beyond

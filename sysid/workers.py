@@ -13,9 +13,10 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from itertools import islice
 
-from .errors import SysidError
+from .errors import SysidError, SysidWarning
 from .free_memory import kept
 from .threads import single_threaded
+from .warned import unheard, warn
 
 _DEATHS = 3  # of workers at one piece of work, after which it is given up
 _PATIENCE = 10  # s to find a scheduler
@@ -111,8 +112,7 @@ def _gathered(client, work: Callable, arguments: Iterable[tuple]) -> Iterator:
     from distributed import KilledWorker
 
     def submitted(each: tuple):
-        with warnings.catch_warnings():  # Dask's, of arguments that are large
-            warnings.simplefilter("ignore")
+        with unheard():  # Dask's, of arguments that are large
             return client.submit(_worked, work, each, pure=False)
 
     rest = iter(arguments)
@@ -131,7 +131,10 @@ def _gathered(client, work: Callable, arguments: Iterable[tuple]) -> Iterator:
                 ) from None
             futures.extend(submitted(each) for each in islice(rest, 1))
             for warning in said:
-                warnings.warn(warning, stacklevel=2)
+                if isinstance(warning, SysidWarning):
+                    warn(str(warning))
+                else:
+                    warnings.warn(warning, stacklevel=2)
             yield result
 
     return results()

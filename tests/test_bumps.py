@@ -12,9 +12,9 @@ from sysid.bumps import apart, bumps
 from sysid.events import Event
 from sysid.listed_effects import build
 from sysid.lowpass import lowpassed
-from sysid.notices import noticed
 from sysid.simulate import hidden, load, simulate, write
 from sysid.specs import EffectSpec
+from sysid.warned import noticed
 
 ROOT = Path(__file__).resolve().parent.parent
 

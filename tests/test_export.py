@@ -20,10 +20,10 @@ from sysid.inertia import pseudo
 from sysid.inertia.consistency import is_consistent
 from sysid.model import Model
 from sysid.model_parameters import ROBOT
-from sysid.notices import noticed
 from sysid.robot_spec import RobotSpec
 from sysid.run import Run
 from sysid.specs import Experiment
+from sysid.warned import noticed
 from tests import robots, servos
 from tests.test_inertia import random_bodies
 

@@ -13,9 +13,9 @@ from sysid.errors import ConfigError, SysidError
 from sysid.groups import names
 from sysid.listed_effects import build
 from sysid.log_spec import LogSpec
-from sysid.notices import noticed
 from sysid.per_level import at_level
 from sysid.vocabulary import find, vocabulary
+from sysid.warned import noticed
 from tests.conftest import dump, put
 from tests.grouped import MASS, experiment, tree
 from tests.test_effects import middle, moving

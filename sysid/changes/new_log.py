@@ -15,8 +15,8 @@ from ..log_spec import LogSpec
 from ..lowpass import LEAST, lowpassed, stride_of
 from ..model import Model
 from ..noise import floors_of
-from ..notices import noticed
 from ..specs import Experiment
+from ..warned import noticed
 from .fitted import Change, together
 from .halves import BLOCKS, support
 from .halves import question as asked_of

@@ -16,8 +16,8 @@ from importlib import import_module
 from pkgutil import iter_modules
 
 from ..callable_module import callable_module
-from ..notices import noticed
 from ..specs import Experiment
+from ..warned import noticed
 from .fault import ERROR, WARNING, Fault
 from .look import Look, looked
 

@@ -14,11 +14,11 @@ from ..listed_effects import build, found
 from ..lowpass import band, lowpassed, stride_of, widest
 from ..model import Model
 from ..motion import Motion
-from ..notices import noticed
 from ..robot import Robot
 from ..rows import Rows, stack
 from ..specs import EffectSpec, Experiment
 from ..trusted import Untrusted
+from ..warned import noticed
 from .equations import FEWEST, Equations
 from .logged import Logged, read
 from .tally import SPAN

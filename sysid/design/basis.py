@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
@@ -11,7 +10,7 @@ import numpy as np
 
 from .. import experiment_logs, pipeline
 from ..candidates import Candidate, candidates, own_effects
-from ..errors import ConfigError, LogError, SysidWarning
+from ..errors import ConfigError, LogError
 from ..estimate import Fit
 from ..filters import settled
 from ..log import Log
@@ -25,6 +24,7 @@ from ..robot import Robot
 from ..simulate.motion import draw, top_speeds
 from ..smoother import Smoother
 from ..specs import Experiment, PreprocessSpec
+from ..warned import warn
 from .columns import instant_of
 from .information import Known, own_size
 from .left_open import LeftOpen
@@ -91,12 +91,9 @@ def basis(
         rate = 1.0 / motion.pieces[0].step
         window = float(fit.filters.get("window", _WINDOW))
     else:
-        warnings.warn(
-            SysidWarning(
-                "there is no log yet: the design rests on the URDF, with noise of "
-                f"{100 * _GUESSED:g} % of each joint's torque limit"
-            ),
-            stacklevel=2,
+        warn(
+            "there is no log yet: the design rests on the URDF, with noise of "
+            f"{100 * _GUESSED:g} % of each joint's torque limit"
         )
         x = np.concatenate([prior.ravel(), np.zeros(len(structure.coefficients))])
         effort = np.array([machine.source.joints[j].effort for j in machine.joints])
@@ -107,9 +104,7 @@ def basis(
     if separate is None and left.suspects:
         words = " and ".join(f"{effect}:{joint}" for effect, joint in left.suspects)
         said = f"the motion is to tell {words} apart, which the last diagnosis could not"
-        warnings.warn(
-            SysidWarning(f"{said}; --separate none designs the one that tells most"), stacklevel=2
-        )
+        warn(f"{said}; --separate none designs the one that tells most")
     asked = _suspects(experiment, structure, left.suspects)
     known = _known(experiment, structure, levels, fit, x, noise, prior, asked, motion)
     known = replace(known, **_left_out(machine, experiment, fit, rate, window))
@@ -138,7 +133,7 @@ def _levels(model: Model, levels: Mapping[str, str]) -> dict[str, str]:
     for group, level in first.items():
         others = ", ".join(model.groups[group][1:])
         said = f"the motion is designed for {group} {level}; --level {group}=LEVEL ({others})"
-        warnings.warn(SysidWarning(f"{said} designs for another"), stacklevel=2)
+        warn(f"{said} designs for another")
     chosen = {**levels, **first}
     model.at(chosen, np.zeros(model.size))  # a level that is not there is told before any work
     return chosen

@@ -9,7 +9,6 @@ fit + motion -> deviations now and after, and which suspects will be told apart
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -17,18 +16,18 @@ from pathlib import Path
 import numpy as np
 
 from ..candidates import candidates
-from ..errors import ConfigError, SysidWarning
+from ..errors import ConfigError
 from ..estimate import Fit
 from ..filters import settled
 from ..log import Log
 from ..lowpass import lowpassed, widest
 from ..motion import Motion
 from ..noise import of_angles
-from ..notices import noticed
 from ..prediction import predict
 from ..preprocess import prepare
 from ..segment import Segment
 from ..specs import Experiment
+from ..warned import noticed, warn
 from . import promise
 from .basis import Basis, basis
 from .fourier import Fourier
@@ -81,7 +80,7 @@ def design(
                 do="give wider limits, a smaller clearance, or logs about another pose",
             )  # fmt: skip
         for text in bounds.said:
-            warnings.warn(SysidWarning(text), stacklevel=2)
+            warn(text)
     return _told(base, problem.of(found.family), bounds, found, random_best, notices)
 
 
@@ -173,8 +172,7 @@ def _log(base: Basis, t, q, needed) -> Log:
 def _fitted(base: Basis, log: Log) -> Motion:
     """A log as a fit sees it: filtered, rows around reversals left out."""
     spec = settled(base.fit.experiment.preprocess, base.fit.filters)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", SysidWarning)
+    with noticed():
         return prepare([log], spec, base.fit.joints)
 
 
@@ -191,8 +189,7 @@ def _heard(base: Basis) -> promise.Heard:
     spec, of = settled(fit.experiment.preprocess, fit.filters), (fit.model, fit.x)
     logs, motions = [base.logs], [base.motion]
     if base.test:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", SysidWarning)
+        with noticed():
             motions.append(prepare(base.test, spec, fit.joints))
         logs.append(base.test)
     known = [predict(*of, motion) for motion in motions]

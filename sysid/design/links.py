@@ -8,17 +8,16 @@ hangs on neighbouring joints.
 
 from __future__ import annotations
 
-import warnings
 from xml.etree import ElementTree
 
 import coal
 import numpy as np
 import pinocchio as pin
 
-from ..errors import SysidWarning
 from ..inertia import pseudo
 from ..robot import Robot, reduced
 from ..urdf_files import example_root, package_folders
+from ..warned import unheard, warn
 from .collision import Geometry
 
 _THINNEST = 0.02  # m: of a capsule
@@ -31,10 +30,7 @@ def geometry(robot: Robot, floor: float | None = None) -> Geometry:
     source = "the URDF's collision geometry, meshes as their convex hulls"
     if not shapes.ngeoms:
         shapes, source = _capsules(robot, model), "capsules as thick as the links' inertia says"
-        warnings.warn(
-            SysidWarning(f"no collision geometry can be read from the URDF: links are {source}"),
-            stacklevel=2,
-        )
+        warn(f"no collision geometry can be read from the URDF: links are {source}")
     near = {(j, int(model.parents[j])) for j in range(1, model.njoints)}
     for a, one in enumerate(shapes.geometryObjects):
         for b, two in enumerate(shapes.geometryObjects[:a]):
@@ -71,8 +67,7 @@ def _stated(robot: Robot) -> tuple[pin.Model, pin.GeometryModel]:
     whole = pin.buildModelFromXML(text)
     folders = [str(p) for p in (*package_folders(), example_root().parents[1], *robot.path.parents)]
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
+        with unheard():
             shapes = pin.buildGeomFromUrdfString(
                 whole, text, pin.GeometryType.COLLISION, package_dirs=folders
             )

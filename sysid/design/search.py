@@ -12,15 +12,14 @@ from __future__ import annotations
 import os
 import signal
 import time
-import warnings
 from collections.abc import Callable, Iterator
 from itertools import chain, repeat
 
 import numpy as np
 from joblib import Parallel, cpu_count, delayed
 
-from ..errors import SysidWarning
 from ..threads import single_threaded
+from ..warned import warn
 from . import solve
 from .fourier import Fourier
 from .problem import Problem, drawn, rests
@@ -62,7 +61,7 @@ def searched(
             tell("design", float(np.mean([climb.share for climb in climbs])))
     except KeyboardInterrupt:
         said = "stopped before the search had ended: this is the best motion so far"
-        warnings.warn(SysidWarning(said), stacklevel=2)
+        warn(said)
     starts += work(solve.ended, [(problem, climb) for climb in climbs])
     plain = [found for found in starts if not found.family.maneuvers]
     best = max(starts, key=lambda found: found.value, default=None)

@@ -25,12 +25,12 @@ from ..failures import Failure, HeldOut, failures, fallen
 from ..flexible import Law
 from ..lowpass import lowpassed
 from ..noise import NoiseFloor, floors_of_fit
-from ..notices import noticed
 from ..shown import ShownDiagnosis
 from ..specs import Experiment
 from ..transfer import transfers
 from ..unexplained import hidden_by_weights
 from ..view import View, elsewhere, first_view, law, too_short
+from ..warned import noticed
 from . import claims as claiming
 from . import select
 from .claims import Claim, Refused

@@ -7,7 +7,6 @@ installed, and its inverse dynamics compared.
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from importlib import import_module
@@ -17,16 +16,16 @@ import numpy as np
 
 from .. import experiment_logs
 from ..callable_module import callable_module
-from ..errors import SysidError, SysidWarning
+from ..errors import SysidError
 from ..estimate import Fit
 from ..filters import settled
 from ..fit_document import number
 from ..groups import levels_of
 from ..inertia.consistency import is_consistent
 from ..motion import Motion
-from ..notices import noticed
 from ..preprocess import prepare
 from ..run import Run, read_run
+from ..warned import noticed
 from ..whole_files import folder, write_atomically
 from .cost import Cost, costs, sampled
 from .document import comment, felt, line
@@ -139,8 +138,7 @@ def _test_motion(run: Run | Fit, levels: Mapping) -> tuple[Motion | None, str | 
         said = " and ".join(f"{group} {level}" for group, level in levels.items())
         return None, f"none is at {said}"
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", SysidWarning)
+        with noticed():
             logs = experiment_logs.read(spec, robot, tests)
             return prepare(logs, filters, robot.joints), None
     except SysidError as error:

@@ -10,13 +10,13 @@ from __future__ import annotations
 
 import ast
 import re
-import warnings
 from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..errors import ConfigError
+from ..warned import unheard
 from .tree import OPERATIONS, names_of, operands, terms
 from .words import FUNCTIONS, VARIABLES, mistyped, near
 
@@ -137,10 +137,7 @@ def _tree(text) -> ast.expr:
     if nested.max() > _DEEPEST:
         raise refused("a formula of too many nested parentheses", allowed=f"{_DEEPEST}")
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter(
-                "ignore"
-            )  # Python's own opinions of odd text; what is allowed is checked below
+        with unheard():  # Python's own opinions of odd text; what is allowed is checked below
             return ast.parse(" ".join(text.split()), mode="eval").body
     except SyntaxError as error:
         raise refused(

@@ -10,8 +10,8 @@ import numpy as np
 
 from .. import datasets
 from .. import robot as machines
-from ..notices import noticed
 from ..robot_spec import RobotSpec
+from ..warned import noticed
 from . import joints, physics, robots, units
 from .files import logs_among, opened
 from .guess import Draft, Guess

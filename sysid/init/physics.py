@@ -16,8 +16,8 @@ from .. import check, config
 from ..check.equations import Equations, Reading
 from ..check.look import Look, looked
 from ..errors import LogError
-from ..notices import noticed
 from ..units import DEGREE
+from ..warned import noticed
 from .guess import Draft, Guess
 from .logged import Signals
 

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import numpy as np
 
 from .. import experiment_logs, pipeline
-from ..errors import SysidError, SysidWarning
+from ..errors import SysidError
 from ..estimate import Fit
 from ..log_spec import LogSpec
 from ..prior_weight import number
 from ..run import Run, read_run
+from ..warned import noticed
 from .change import Change
 from .follow import Follower
 from .monitor import WINDOWS
@@ -156,8 +156,7 @@ class Online:
         """Rows of each stretch of logs on which nothing was changed, some minutes in all."""
         logs = [LogSpec(file=str(Path(log).resolve())) for log in sound] if sound else None
         step, left = self._stream.step, _LEARNED
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", SysidWarning)
+        with noticed():
             specs = logs or [*self.experiment.data.test, *self.experiment.data.train]
             read = experiment_logs.read(self.experiment, self.model.robot, specs)
         least, out = 2.0 * (min(WINDOWS) + self.late) + self.tick, []

@@ -8,12 +8,12 @@ generate code from them: JointState has had the same fields in every ROS.
 
 from __future__ import annotations
 
-import warnings
 from pathlib import Path
 
 import numpy as np
 
-from ..errors import LogError, SysidWarning
+from ..errors import LogError
+from ..warned import warn
 from .table import Table
 
 _TYPE = "sensor_msgs/msg/JointState"
@@ -152,7 +152,7 @@ class BagTable(Table):
         return out
 
     def _tell(self, text: str) -> None:
-        warnings.warn(SysidWarning(f"{self.path}: {text}"), stacklevel=4)
+        warn(f"{self.path}: {text}", above=3)
 
 
 def _by_signal(column: str) -> tuple[int, str]:

@@ -5,13 +5,13 @@ from __future__ import annotations
 import csv
 import io
 import re
-import warnings
 from collections import Counter
 
 import polars as pl
 
 from .. import units
-from ..errors import LogError, SysidWarning
+from ..errors import LogError
+from ..warned import warn
 from .table import Table
 
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?|[-+]?(nan|inf|infinity)", re.IGNORECASE)
@@ -83,7 +83,7 @@ class CsvTable(Table):
             raise LogError(f"cannot be read as CSV ({said})", where=f"{self.path}{self._longest()}", do="correct the row or leave it out") from None
         frame = frame.head(max(frame.height - blank, 0))
         if truncated and frame.height:
-            warnings.warn(SysidWarning(f"{self.path.name}: the last row is truncated and was dropped"), stacklevel=2)
+            warn(f"{self.path.name}: the last row is truncated and was dropped")
             frame = frame.head(frame.height - 1)
         out, columns = {}, frame.get_columns()
         del frame  # a column at a time: the file never stands in memory beside the arrays

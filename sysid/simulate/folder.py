@@ -10,18 +10,18 @@ import json
 import os
 import re
 import shutil
-import warnings
 from pathlib import Path
 
 import numpy as np
 
 from .. import bounded, config
-from ..errors import SysidError, SysidWarning
+from ..errors import SysidError
 from ..robot import Robot
 from ..robot import load as robot_of
 from ..spec_values import AUTO
 from ..specs import Experiment, PreprocessSpec
 from ..unfinished import beside
+from ..warned import noticed
 from .simulated import SimulatedLog, Simulation
 
 _LOG = re.compile(r"(train|train_[0-9]+|test)\.csv")
@@ -30,10 +30,9 @@ _LOG = re.compile(r"(train|train_[0-9]+|test)\.csv")
 def load(path: str | Path) -> tuple[Experiment, Robot, tuple[str, ...]]:
     """An experiment, its robot, and what was decided for the user on the way. Its logs need not be there. Raises SysidError."""
     experiment = config.load(path)
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always", SysidWarning)
+    with noticed() as notices:
         machine = robot_of(experiment.robot, experiment.folder)
-    return experiment, machine, tuple(dict.fromkeys(str(w.message) for w in caught if issubclass(w.category, SysidWarning)))
+    return experiment, machine, tuple(notices)
 
 
 def prepare(out: str | Path, *, force: bool = False) -> Path:

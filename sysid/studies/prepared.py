@@ -13,12 +13,13 @@ from ..held_apart import prior_strength
 from ..long_motion import prepare
 from ..model import Model, moving_coefficients
 from ..motion import Motion
-from ..notices import noticed, refuse_no_torque, tell_still
+from ..notices import refuse_no_torque, tell_still
 from ..pipeline import build, started
 from ..prior_weight import with_weight
 from ..shape_refinement import refined
 from ..specs import Experiment
 from ..triangles import Compressed
+from ..warned import noticed
 
 
 @dataclass(frozen=True)
