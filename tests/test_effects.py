@@ -137,7 +137,7 @@ def test_sums_of_few_terms_and_of_many_are_one_kind_of_candidate():
     machine, _ = arm_moving()
     own = [c for c in candidates(SimpleNamespace(robot=machine, terms=())) if c.joint == 0]
     kinds = {name: [c.kind for c in own if c.name == name] for name in ("position_friction", "cable", "elasticity")}
-    assert [len(set(kinds[name])) for name in kinds] == [2, 1, 2] and [len(kinds[name]) for name in kinds] == [4, 2, 2]
+    assert [len(set(kinds[name])) for name in kinds] == [2, 1, 2] and [len(kinds[name]) for name in kinds] == [6, 2, 2]
     assert all(any(c.by_name for c in own if c.name == name) for name in kinds)
     few = vocabulary.find("position_friction").given(times="speed", harmonics=1)
     assert [options for options, _ in few.richer()] == [{"times": "speed", "harmonics": count} for count in (2, 3)]

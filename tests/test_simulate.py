@@ -205,9 +205,25 @@ def test_each_effect_is_truly_there(machines, controls, effect):
     joint = "*" if CATALOGUE[effect].robot else machine.joints[1]
     simulation = simulate(machine, hide=[Hidden(effect, joint)], seed=7, duration=SECONDS)
     assert (misfit(machine, simulation, "train", effect) < 0.03).all()
-    for key in ("inertias", "friction", "armature", "torque_noise_std", "encoder_step"):
+    for key in ("inertias", "armature", "torque_noise_std", "encoder_step"):
         assert simulation.truth[key] == control.truth[key]
+    if effect != "position_friction":  # which may need more of it
+        assert simulation.truth["friction"] == control.truth["friction"]
     assert np.abs(simulation.train.clean.sensed - control.train.clean.sensed).max() > 0.5 * simulation.train.noise.min()
+
+
+def test_friction_that_varies_by_more_than_itself_is_friction_at_every_angle(machines):
+    """The truth has as much Coulomb friction as the waves need: what is simulated is their sum, and nothing of it is cut off."""
+    machine = machines["arm"]
+    control = simulate(machine, seed=7, duration=SECONDS)
+    usual = control.truth["friction"]["elbow"]["Fc"]
+    waves = {"a1": 1.1 * usual, "b1": 0.0, "a2": 0.0, "b2": -0.9 * usual}
+    simulation = simulate(machine, hide=[Hidden("position_friction", "elbow", waves)], seed=7, duration=SECONDS)
+    level, q = simulation.truth["friction"]["elbow"]["Fc"], np.linspace(-np.pi, np.pi, 100_000)
+    varied = level + waves["a1"] * np.cos(q) + waves["b2"] * np.sin(2.0 * q)
+    assert usual < level and abs(varied.min()) < 1e-6 * usual
+    assert simulation.truth["friction"]["shoulder"] == control.truth["friction"]["shoulder"]
+    assert (misfit(machine, simulation, "train", "position_friction") < 0.03).all()
 
 
 def test_an_elastic_drive_is_a_spring(machines):

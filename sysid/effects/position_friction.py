@@ -43,7 +43,7 @@ class PositionFriction(TorqueEffect):
 
     def variants(self, robot, joint):
         # of a short travel several harmonics are nearly one curve, and their coefficients no numbers of its friction
-        return [{"times": times, **few} for few in ({"harmonics": 1}, {}) for times in ("direction", "speed")]
+        return [{"times": times, **few} for few in ({"harmonics": 1}, {"harmonics": 2}, {}) for times in ("direction", "speed")]
 
     def richer(self, **shapes):
         own = type(self).harmonics

@@ -116,7 +116,8 @@ class DirectionalEfficiency(Part):
 
 
 class PositionFriction(Part):
-    """sum a_k cos kq + b_k sin kq more Coulomb friction, none of it below zero. `waves`: [(k, a_k, b_k)]."""
+    """sum a_k cos kq + b_k sin kq more Coulomb friction, of which there is enough (`truth.rubbing`): beside another effect on it
+    none is below zero. `waves`: [(k, a_k, b_k)]."""
 
     def level(self, plant, plus, minus, v, load):
         q = plant.xm[plant.motor[self.j]]

@@ -84,6 +84,7 @@ def simulate(
     truth = Truth(drawn.true_bodies(robot, random("bodies")), np.array(robot.gravity), scales.viscous, scales.coulomb, armature)
     rng = random("hidden")
     named = [settled(h, robot, scales, rng) for h in named]
+    truth = drawn.rubbing(truth, robot, named)
     std = drawn.noise_std(scales, random("friction"), noise)
     steps = drawn.encoder_steps(robot, encoder)
     sensor = _Sensor(scales, steps, keep, std, colour, share, nuisance)

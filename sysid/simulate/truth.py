@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pinocchio as pin
@@ -20,6 +21,7 @@ _SPREAD = np.array([0.15, 0.15, 0.15, 0.15, 0.10, 0.10, 0.10, 0.01, 0.01, 0.01])
 _FRICTION, _VISCOUS, _NOISE = (0.03, 0.08), (0.03, 0.08), (0.01, 0.02)  # of a joint's rms torque; viscous at its top speed
 _ARMATURE = (0.2, 0.6)  # of a joint's typical inertia
 _FLOOR_TORQUE, _FLOOR_INERTIA = 0.02, 0.02  # of the largest joint's: a wrist's motor is not as light as its hand
+_TURN = 4097  # angles of a turn
 _MOTOR_BITS, _GEAR = 14, 100.0  # of an encoder on the motor; the gear behind a motor that has no rotor in the model
 
 
@@ -92,6 +94,17 @@ def encoder_steps(robot: Robot, bits: int | None) -> np.ndarray:
             if ratio > 0.0:
                 steps[j] = 2.0 * np.pi / 2.0 ** (_MOTOR_BITS if bits is None else bits) / ratio
     return steps
+
+
+def rubbing(truth: Truth, robot, named: list[Hidden]) -> Truth:
+    """The truth with so much Coulomb friction that what changes with a joint's angle is friction at every angle of a turn."""
+    coulomb, q = truth.coulomb.copy(), np.linspace(0.0, 2.0 * np.pi, _TURN)
+    for hide in named:
+        if hide.effect == "position_friction":
+            waves = [value * (np.cos if name[0] == "a" else np.sin)(int(name[1:]) * q) for name, value in hide.values.items()]
+            j = robot.joints.index(hide.joint)
+            coulomb[j] = max(coulomb[j], -float(np.sum(waves, axis=0).min()))
+    return replace(truth, coulomb=coulomb)
 
 
 def draw_bursts(named: list[Hidden], rng, place: int, duration: float) -> list[tuple[float, float, np.ndarray]]:
