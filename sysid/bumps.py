@@ -44,7 +44,7 @@ def bumps(robot: Robot, logs: Sequence[Log], *, among: int = 1) -> list[Event]:
     joint's own and of what is about it. A knock is where it surprises on two joints, or on one where
     its square is more than that of all that is usual on that joint. A quick move among slow ones is
     none, be it that the signals showed it: of how far torque goes meanwhile little is left, as
-    equations follow it but for what they lack.
+    equations follow it but for what they lack. Nor is torque at its limit.
 
     Args:
         logs: with the events that their signals show. among: as of `outliers.spikes`.
@@ -113,6 +113,7 @@ def _bursts(rows: Rows, parts, kinds, aside, step: float, level: float):
     left, weights = _left(rows, parts, kinds, aside)
     size, wide = np.abs(left), 2 * max(1, round(2.0 * BURST / step)) + 1
     own = np.stack([_surprise(a, u, rows.piece, step) for a, u in zip(size.T, rows.use.T)], axis=1)
+    _spare_limits(own, left, weights, rows, level)
     strange, out = np.full(own.shape, -1.0), []
     for number in np.unique(rows.piece):
         (at,) = np.nonzero(rows.piece == number)
@@ -131,6 +132,27 @@ def _bursts(rows: Rows, parts, kinds, aside, step: float, level: float):
     # the others may be what these bend
     great = [own[a : b + 1].max() for a, b, _ in out]
     return [one for one, size in zip(out, great) if size > 0.5 * max(great)], strange
+
+
+def _spare_limits(surprises, left, weights, rows: Rows, level: float) -> None:
+    """Take from surprises (n, dof), in place, those of bursts in which torque is at its limit.
+
+    What is left (n, dof) says there that torque should have gone further, and it is as great as
+    anywhere but for noise: a reading that clips, or a drive that gives no more. A push comes
+    wherever torque is.
+    """
+    for own, rest, tau, use, weight in zip(surprises.T, left.T, rows.tau.T, rows.use.T, weights):
+        if not use.any():
+            continue
+        lower = np.where(tau > 0.0, tau[use].max() - tau, tau - tau[use].min())
+        noise = surprise(weight * lower, _WHITE, among=np.abs(rest[use])) < 0.5 * level
+        top = (rest * tau < 0.0) & noise
+        for number in np.unique(rows.piece):
+            (at,) = np.nonzero(rows.piece == number)
+            for a, b in bursts(own[at], level):
+                whole = at[a : b + 1]
+                if top[whole[np.argmax(np.abs(rest[whole]))]]:
+                    own[whole] = -1.0
 
 
 def _together(surprises, step: float, level: float) -> list[tuple[int, int]]:

@@ -127,6 +127,26 @@ def test_what_outweighs_all_the_rest_on_one_joint_is_a_push(leg, tmp_path):
     assert bumps(machine, [pulsed(log, 5.0, 1, 0.1)]) == []
 
 
+def clipped(log, joint: int, share: float):
+    """A log whose reading of a joint's torque goes no further than a share of the greatest."""
+    (segment,) = log.segments
+    tau, top = segment.tau.copy(), np.abs(segment.tau[:, joint]).max()
+    noise = 0.002 * top * np.random.default_rng(0).normal(size=len(tau))
+    tau[:, joint] = np.clip(tau[:, joint], -share * top, share * top) + noise
+    return replace(log, events=(), segments=(replace(segment, tau=tau),))
+
+
+@pytest.mark.parametrize(("seed", "joint", "share"), [(6, 0, 0.8), (6, 2, 0.6), (7, 1, 0.7), (11, 2, 0.7)])
+def test_torque_at_its_limit_is_no_push(leg, tmp_path, seed, joint, share):
+    """It should have gone further, and is as great as anywhere; beside it a push is one."""
+    experiment, machine, *_ = leg
+    write(simulate(machine, seed=seed, duration=12.0, rate=500.0), experiment, tmp_path / "logs")
+    log = next(log for log in read(pipeline.load(tmp_path / "logs"))[1] if log.path.stem == "train")
+    assert bumps(machine, [clipped(log, joint, share)]) == []
+    (event,) = bumps(machine, [clipped(pulsed(log, 5.0, (joint + 1) % 3, 6.0), joint, share)])
+    assert machine.joints[(joint + 1) % 3] in event.joints and 4.9 < event.start < 5.06
+
+
 def test_pushes_behind_a_greater_one_are_found(leg, tmp_path):
     """Which bends the fit until it is left out."""
     experiment, machine, *_ = leg
