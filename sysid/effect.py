@@ -41,7 +41,8 @@ class Effect(ABC):
         of `design.maneuvers` that show it, of those that the harmonics of a designed motion do badly.
     reach: samples on either side of a row that its columns look at; memory: they look back to the start of the log.
     mimics_mass: bodies take its place where a model lacks it, and their masses are off.
-    uses_load: they need `motion.load` (n, dof), the torque that the bodies alone are predicted to need.
+    uses_load: they need `motion.load` (n, dof), the torque that the bodies alone are predicted to need; uses_needed: and
+        `motion.needed`, that of all that is in the model but such effects.
     elementwise: each row of its columns follows from the joint's own q, qd, qdd and load in that row, and shape values may
         be arrays along the rows: joints can then be treated as samples of one joint.
     given_coefficients: {name: value} of those that the user says.
@@ -68,6 +69,7 @@ class Effect(ABC):
     group: ClassVar[str | None] = None
     level: ClassVar[str | None] = None
     uses_load: ClassVar[bool] = False
+    uses_needed: ClassVar[bool] = False
     mimics_mass: ClassVar[bool] = False
     elementwise: ClassVar[bool] = False
     simulators: ClassVar[dict[str, str]] = {}

@@ -13,7 +13,7 @@ so that one call serves all of them.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 import numpy as np
@@ -21,11 +21,13 @@ import pinocchio as pin
 
 from . import own_effects, regressor
 from .drives import DRIVE_EFFECTS
-from .effect import Effect, MotionEffect, SensorEffect, WrenchEffect
+from .effect import Effect, MotionEffect, SensorEffect
 from .errors import SysidError
 from .instants import Instants, at_no_time
 from .model import Model
 from .model_parameters import place
+from .needed import Acting, acting
+from .needed import torque as acting_torque
 from .robot import Robot
 
 NOWHERE: Mapping[str, str] = MappingProxyType({})
@@ -102,6 +104,7 @@ class InverseDynamics:
     omitted: tuple[str, ...]
     _bodies: _Rigid
     _load: _Rigid | None
+    _behind: tuple[Acting, ...] | None
     _alike: tuple[_Alike, ...]
     _single: tuple[_Single, ...]
     _moving: tuple[_Single, ...]
@@ -146,13 +149,21 @@ class InverseDynamics:
         return out
 
     def _torque(self, q, qd, qdd) -> np.ndarray:
-        load = None if self._load is None else self._load.many(q, qd, qdd)
         part, gravity = None, None
         if self._moving or self._single:
-            part = at_no_time(q, qd, qdd, load)
+            part = at_no_time(q, qd, qdd)
             for own in self._moving:
                 part = own.effect.moved(part, own.joint, **own.shapes)
             q, qd, qdd, gravity = part.q, part.qd, part.qdd, part.gravity
+        load = None if self._load is None else self._load.many(q, qd, qdd, gravity)
+        if part is not None:
+            part = replace(part, load=load)
+        if self._behind is not None:
+            needed = load.copy()
+            for one in self._behind:
+                joints, values = acting_torque(one, part, self._bodies.robot)
+                needed[:, joints] += values
+            part = replace(part, needed=needed)
         if len(q) == 1 and gravity is None:
             out = self._bodies.one(q[0], qd[0], qdd[0])[None]
         else:
@@ -160,13 +171,8 @@ class InverseDynamics:
         if self._alike:
             self._add_alike(out.reshape(-1), q, qd, qdd, load, len(q))
         for own in self._single:
-            if isinstance(own.effect, WrenchEffect):
-                columns = own.effect.columns(part, self._bodies.robot, **own.shapes)
-                out += np.einsum("k,jkn->nj", own.coefficients, columns)
-            else:
-                out[:, own.joint] += own.coefficients @ own.effect.columns(
-                    part, own.joint, **own.shapes
-                )
+            joints, values = acting_torque(own, part, self._bodies.robot)
+            out[:, joints] += values
         for own in self._sensors:
             out[:, own.joint] = own.effect.sensed(out[None, :, own.joint], 1.0, **own.shapes)[0]
         return out
@@ -222,7 +228,7 @@ def inverse_dynamics(model: Model, x, levels: Mapping[str, str] = NOWHERE) -> In
             omitted += [f"{effect.name}.{place(joint, robot.joints)}" for joint in joints]
             continue
         uses_load |= effect.uses_load
-        if effect.elementwise:
+        if effect.elementwise and not effect.uses_needed:
             kept["alike"].append(_alike(effect, robot.dof, joints, own, named))
             continue
         kind = (
@@ -245,8 +251,17 @@ def inverse_dynamics(model: Model, x, levels: Mapping[str, str] = NOWHERE) -> In
         tuple(omitted),
         _Rigid.of(robot, pi),
         load,
+        _behind(model, kept["single"]),
         **{f"_{kind}": tuple(v) for kind, v in kept.items()},
     )
+
+
+def _behind(model: Model, single: list[_Single]) -> tuple[Acting, ...] | None:
+    """What acts beside the load where an effect looks at what is needed, None where none does or
+    nobody knows."""
+    if not model.referred or not any(own.effect.uses_needed for own in single):
+        return None
+    return tuple(one for one in acting(model) if one.effect.instantaneous)
 
 
 def _keeps_its_word(

@@ -13,6 +13,8 @@ from .deflection import Deflection
 from .effect import MotionEffect, SensorEffect, TorqueEffect, WrenchEffect
 from .model_parameters import ROBOT
 from .motion import Motion, Piece, never_move
+from .needed import Acting, needed
+from .needed import torque as torque_of
 from .terms import Terms
 
 _CHUNK = 4096  # samples whose columns stand in memory at once
@@ -22,14 +24,14 @@ _CHUNK = 4096  # samples whose columns stand in memory at once
 class Model(Terms):
     """A robot and the effects on its joints, with the torque that they need. Immutable; estimates live in `Fit`."""
 
-    _links: dict = field(default_factory=dict, repr=False, compare=False)  # what no shape value changes
+    _links: dict = field(default_factory=dict, repr=False, compare=False)  # no shape value changes it
     _rigid: dict = field(default_factory=dict, repr=False, compare=False)  # the bodies' columns, which no torque effect changes
 
     def support(self, joint: int, piece: Piece | None = None) -> np.ndarray:
         """Indices of the parameters that can enter the torque of a joint, in a piece's log or in any, ascending."""
         robot = self.robot
         depends = np.abs(robot.transmission) > 0
-        for row, parent in enumerate(robot.parents):  # parents first: a body moves with what carries it
+        for row, parent in enumerate(robot.parents):  # parents first: a body moves with its carrier
             if parent >= 0:
                 depends[row] |= depends[parent]
         bodies = [10 * b + k for b, body in enumerate(robot.bodies) if depends[body.row, joint] for k in range(10)]
@@ -40,7 +42,7 @@ class Model(Terms):
 
     @property
     def gains(self) -> list[int]:
-        """Which shape values multiply their joint's torque by one number in all logs, and are free."""
+        """Which free shape values multiply their joint's torque by one number in all logs."""
         effects = [self.terms[value.term][0] for value in self.shape_values]
         return [k for k, (effect, value) in enumerate(zip(effects, self.shape_values)) if isinstance(effect, SensorEffect) and effect.constant_gain and effect.level is None and not value.held]
 
@@ -78,7 +80,7 @@ class Model(Terms):
     def _link_side(self, piece: Piece, joint: int) -> tuple[np.ndarray, np.ndarray]:
         """Load and inertia of a joint's link over a whole piece."""
         key = (id(piece.q), joint)
-        if key not in self._links:  # with the angles themselves, so that no others come to their place
+        if key not in self._links:  # with the angles, so that no others come to their place
             self._links[key] = (piece.q, two_masses.link_side(self.robot, self._bodies, piece, joint))
         return self._links[key][1]
 
@@ -96,23 +98,27 @@ class Model(Terms):
         return self._seen(piece, slice(0, len(piece.t)), self.remembered(piece))
 
     def _seen(self, piece: Piece, rows: slice, remembered: dict, loaded: bool = False) -> Piece:
-        """Rows of a piece with the load that effects look at, and moved as the motion effects say."""
+        """Rows of a piece moved as the motion effects say, with the load that effects look at."""
         part = piece.part(rows)
-        if loaded or any(effect.uses_load and not effect.memory for effect, _ in self.terms):
-            part = replace(part, load=self._load(piece, rows, part))
         for term, (effect, joints) in enumerate(self.terms):
             if isinstance(effect, MotionEffect):
                 for joint in joints:
                     known = {"behind": remembered[term, joint][:, rows]} if isinstance(effect, Deflection) else {}
                     part = effect.moved(part, joint, **known, **self.shapes_of(term, joint))
+        looks = [effect for effect, _ in self.terms if effect.uses_load and not effect.memory]
+        if loaded or looks:
+            part = replace(part, load=self._load(piece, rows, part))
+        if self.referred and (loaded or any(effect.uses_needed for effect in looks)):
+            part = replace(part, needed=needed(self, piece, part, rows, remembered))
         return part
 
     def _load(self, piece: Piece, rows: slice, part: Piece) -> np.ndarray:
         """Load (n, dof) of rows of a piece, seen as `part`; the last of a slice is kept."""
-        key = ("load", rows.start, rows.stop, rows.step) if isinstance(rows, slice) else None
+        moves = any(isinstance(effect, MotionEffect) for effect, _ in self.terms)
+        key = ("load", rows.start, rows.stop, rows.step) if isinstance(rows, slice) and not moves else None
         robot, bodies, load = piece.kept.get(key, (None, None, None))
         if robot is not self.robot or bodies is not self._bodies:
-            load = regressor.torque(self.robot, self._bodies, part.q, part.qd, part.qdd)
+            load = regressor.torque(self.robot, self._bodies, part.q, part.qd, part.qdd, gravity=part.gravity, deflection=part.deflection)
             if key is not None:
                 piece.kept[key] = self.robot, self._bodies, load
         return load
@@ -121,7 +127,7 @@ class Model(Terms):
         """For each joint the columns (support in this piece, n) of the rows `rows` of a piece, filtered where its torque is.
 
         Args:
-            rows: a slice, or the rows' numbers where nothing looks beside them (no filter, no `reach`).
+            rows: a slice, or the rows' numbers where nothing looks beside them (filter, `reach`).
             remembered: `remembered(piece)`, where it is at hand.
             keep: the bodies' columns for whoever asks again for these rows, of this model or of one that grew from it.
         """
@@ -201,10 +207,10 @@ class Model(Terms):
                     own = np.asarray(c)[k : k + size]
                     if isinstance(effect, TorqueEffect) and effect.memory:
                         predicted[joint] += own @ remembered[term, joint][:, wide]
-                    elif isinstance(effect, TorqueEffect):
-                        predicted[joint] += own @ effect.columns(part, joint, **self.shapes_of(term, joint))
-                    elif isinstance(effect, WrenchEffect):
-                        predicted += np.einsum("k,jkn->jn", own, effect.columns(part, self.robot, **self.shapes_of(term, joint)))
+                    elif size:
+                        one = Acting(term, joint, effect, own, self.shapes_of(term, joint))
+                        where, values = torque_of(one, part, self.robot)
+                        predicted[where] += values.T
                     k += size
             for joint in range(self.robot.dof):
                 predicted[joint] = self.sensed(predicted[None, joint], piece, joint)[0]
@@ -245,7 +251,7 @@ def moving_coefficients(model: Model, motion: Motion) -> np.ndarray:
     silent = (*motion.still, *motion.unused)
     told = lambda c: c.given is None and (c.joint == ROBOT or model.robot.joints[c.joint] not in silent)  # noqa: E731
     out = np.array([told(c) for c in model.coefficients], dtype=bool)
-    for at in {c.at for c in model.coefficients} - {None}:  # a joint may stand in all logs of a level
+    for at in {c.at for c in model.coefficients} - {None}:  # a joint may stand in all of a level's
         here = [piece for piece in motion.pieces if piece.levels.get(at[0]) == at[1]]
         stays = never_move(here) if here else np.ones(model.robot.dof, dtype=bool)
         out &= np.array([c.at != at or c.joint == ROBOT or not stays[c.joint] for c in model.coefficients], dtype=bool)

@@ -43,7 +43,7 @@ class Piece:
 
     `kept` is for what is made of these rows once for all who ask; it goes with the piece.
 
-    What a model adds: `load` (n, dof) the torque that its bodies alone need; `gravity` (3,) or None for the robot's own;
+    What a model adds: `load` (n, dof) the torque that its bodies alone need, `needed` that of its effects as well, where known; `gravity` (3,) or None for the robot's own;
     `deflection` (3, n, dof), how far each link is behind its motor in q, qd and qdd, or None.
     """
 
@@ -65,6 +65,7 @@ class Piece:
     levels: Mapping[str, str] = field(default_factory=dict)
     sight: Smoother | None = None
     load: np.ndarray | None = None
+    needed: np.ndarray | None = None
     gravity: np.ndarray | None = None
     deflection: np.ndarray | None = None
     weight: np.ndarray | None = None
@@ -92,7 +93,7 @@ class Piece:
             self, t=self.t[rows], q=self.q[rows], qd=self.qd[rows], qdd=self.qdd[rows], tau=self.tau[rows],
             measured=self.measured[rows], signals={name: values[rows] for name, values in self.signals.items()},
             use=None if self.use is None else self.use[rows], core=slice(0, len(self.t[rows])),
-            load=None if self.load is None else self.load[rows], weight=None if self.weight is None else self.weight[rows],
+            load=None if self.load is None else self.load[rows], needed=None if self.needed is None else self.needed[rows], weight=None if self.weight is None else self.weight[rows],
             deflection=None if self.deflection is None else self.deflection[:, rows],
         )  # fmt: skip
 
@@ -100,7 +101,7 @@ class Piece:
         """The piece without its rows: where it is from, how many there are, and the filter of both sides."""
         none = np.zeros((0, self.q.shape[1]))
         return replace(
-            self, t=none[:, 0], q=none, qd=none, qdd=none, tau=none, measured=none, signals={}, use=None, load=None, deflection=None, weight=None,
+            self, t=none[:, 0], q=none, qd=none, qdd=none, tau=none, measured=none, signals={}, use=None, load=None, needed=None, deflection=None, weight=None,
         )  # fmt: skip
 
     @property

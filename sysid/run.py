@@ -125,9 +125,9 @@ def read_run(folder: str | Path) -> Run:
         )
     x = np.array([values[name] for name in model.names])
     model = model.with_shapes([values[value.name] for value in model.shape_values])
-    return Run(
-        folder, experiment, model.with_reference(_load_bodies(model, document, x)), x, document
-    )
+    c = x[10 * model.bodies :]
+    model = model.with_reference(_load_bodies(model, document, x), c)
+    return Run(folder, experiment, model, x, document)
 
 
 def _load_bodies(model: Model, document: dict, x: np.ndarray) -> np.ndarray:

@@ -78,7 +78,7 @@ def settle(
     if hold:
         return best
     if model.uses_load:
-        best = solved(best.model.with_reference(_bodies(best)))
+        best = solved(best.model.referring_to(best.x))
     search = Search(motion, weights, attempted, lambda found: _descended(found, motion, attempted, weights, tolerance))
     tally = {}
     if grid:
@@ -218,8 +218,8 @@ def _renewed(best: Settled, solved, share: float) -> tuple[Settled, float]:
     """
     new, old = _bodies(best), best.model.reference
     if old is None or not best.model.deflects:
-        return solved(best.model.with_reference(new)) or best, share
-    tried = solved(best.model.with_reference(old + share * (new - old))) or best
+        return solved(best.model.referring_to(best.x)) or best, share
+    tried = solved(best.model.with_reference(old + share * (new - old), best.x[new.size :])) or best
     return (tried, min(2.0 * share, 1.0)) if tried.objective <= best.objective else (best, 0.5 * share)
 
 

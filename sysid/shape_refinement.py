@@ -88,7 +88,7 @@ def refined(experiment: Experiment, structure: Model, motion: Motion, prior, nea
             break  # nobody would look where it leads
         structure = structure.with_shapes(values)
         if structure.uses_load:
-            structure = structure.with_reference(fit.pi)
+            structure = structure.referring_to(fit.x)
         slopes = Linearised(structure, fit.x)
         if not far:
             break

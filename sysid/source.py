@@ -36,9 +36,7 @@ class Source:
     @cached_property
     def referenced(self) -> Model:
         """The model with bodies that effects of the load look at: its own, or those of x."""
-        if self.model.reference is not None:
-            return self.model
-        return self.model.with_reference(self.x[: 10 * self.model.bodies].reshape(-1, 10))
+        return self.model if self.model.reference is not None else self.model.referring_to(self.x)
 
     @cached_property
     def _seen(self) -> list:

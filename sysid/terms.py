@@ -28,7 +28,8 @@ class Terms:
     terms: (effect, joints that have it) in order; joints (-1,) for an effect of the whole robot.
     shapes: the values that the columns are not linear in, in the order of `shape_values`.
     held: {(term, joint, name): value} of shape values that the user gave.
-    reference: (bodies, 10) of the bodies whose torque is the `load` that some effects look at.
+    reference: (bodies, 10) of the bodies whose torque is the `load` that some effects look at; referred {coefficient: value}
+        with which effects need torque as well, None where these are not known.
     """
 
     robot: Robot
@@ -37,6 +38,7 @@ class Terms:
     held: tuple[tuple[tuple[int, int, str], float], ...] = ()
     reference: np.ndarray | None = None
     scales: Scales | None = None
+    referred: Mapping[str, float] | None = None
 
     @property
     def bodies(self) -> int:
@@ -176,9 +178,16 @@ class Terms:
         """The model with other values of some shape values, by their numbers."""
         return self.with_shapes([at.get(k, s) for k, s in enumerate(self.shapes)])
 
-    def with_reference(self, pi) -> Self:
-        """The model with other bodies behind its `load`."""
-        return replace(self, reference=np.array(pi), _links={})
+    def with_reference(self, pi, c=None) -> Self:
+        """The model with other bodies (bodies, 10) behind its `load`, and coefficients (coefficients,) of its effects, if known."""
+        names = (one.name for one in self.coefficients)
+        named = None if c is None else dict(zip(names, np.asarray(c, dtype=float).tolist(), strict=True))
+        return replace(self, reference=np.array(pi), referred=named, _links={})
+
+    def referring_to(self, x) -> Self:
+        """The model with the load and the effects of parameters x (size,)."""
+        pi, c = np.split(np.asarray(x), [10 * self.bodies])
+        return self.with_reference(pi.reshape(-1, 10), c)
 
     def scaled_by(self, motion: Motion) -> Self:
         """The model with shape bounds as wide as this motion is; its shape values stay, within them or not."""

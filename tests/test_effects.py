@@ -9,12 +9,16 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from sysid import effect, regressor, robot, robot_spec, specs, vocabulary
+from sysid import effect, pipeline, regressor, robot, robot_spec, specs, vocabulary
+from sysid.addition import grown
 from sysid.candidates import candidates
 from sysid.errors import ConfigError
 from sysid.inertia import pseudo
+from sysid.model import Model
 from sysid.motion import Piece
 from sysid.per_level import at_level
+from sysid.simulate import hidden, load, simulate, write
+from sysid.warned import noticed
 from tests.problems import UR5, fourier_motion
 
 SLIDE = """<robot name="slide"><link name="base"/>
@@ -369,6 +373,41 @@ def test_columns_by_hand(name):
     options, shapes, wanted = BY_HAND[name]
     found = vocabulary.find(name).given(**options)
     np.testing.assert_allclose(found.columns(small_piece(), 1, **shapes), wanted, atol=1e-12)
+
+
+def test_what_a_joint_needs_is_its_load_and_what_else_acts_on_it():
+    """Whatever looks at it is no part of it; where nobody knows the coefficients the load is all there is."""
+    machine, piece = moving()
+    names = ("viscous", "coulomb", "armature", "presliding", "torque_saturation")
+    model = Model(machine, tuple((vocabulary.find(name).given(), (1,)) for name in names)).with_shapes([0.1, 2.0])
+    c = np.array([0.3, 0.7, 0.2, 0.4, -1.0])
+    seen = model.with_reference(machine.prior, c).seen(piece)
+    load = regressor.torque(machine, machine.prior, piece.q, piece.qd, piece.qdd)
+    z = vocabulary.find("presliding").given().columns(piece, 1, 0.1)[0]
+    np.testing.assert_allclose(seen.load, load, rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(seen.needed[:, 0], load[:, 0], rtol=1e-12, atol=1e-12)
+    wanted = load[:, 1] + 0.3 * piece.qd[:, 1] + 0.7 * piece.direction(1) + 0.2 * piece.qdd[:, 1] + 0.4 * z
+    np.testing.assert_allclose(seen.needed[:, 1], wanted, rtol=1e-12, atol=1e-12)
+    rows = slice(20, 60, 4)
+    np.testing.assert_allclose(model.with_reference(machine.prior, c).columns(piece, rows)[1][-1], (np.sign(wanted) * np.maximum(np.abs(wanted) - 2.0, 0.0))[rows], atol=1e-12)
+    assert model.with_reference(machine.prior).seen(piece).needed is None
+
+
+@pytest.mark.parametrize(("seed", "limit"), [(3, 22.0), (8, 24.0)])
+def test_a_reading_that_clips_has_one_limit_whatever_rubs(planar, tmp_path, seed, limit):
+    """Friction and the motor's inertia are read as well: of the load alone the limit would be another at every speed."""
+    (tmp_path / "plain.yaml").write_text(f"robot: {{urdf: {planar.path}}}\n")
+    experiment, machine, *_ = load(tmp_path / "plain.yaml")
+    made = simulate(machine, hide=[hidden(f"torque_saturation:shoulder:limit={limit}")], seed=seed, duration=12.0, rate=500.0)
+    write(made, experiment, tmp_path / "logs")
+    with noticed():
+        found = pipeline.fit(grown(pipeline.load(tmp_path / "logs"), "torque_saturation", ["shoulder"], {}))
+    noise = made.truth["logs"]["test"]["noise_rms"]["shoulder"]
+    values = dict(zip((v.name for v in found.model.shape_values), zip(found.model.shapes, found.shape_std)))
+    at, std = values["torque_saturation.shoulder.limit"]
+    e = found.x[10 * found.model.bodies :][[c.name for c in found.model.coefficients].index("torque_saturation.shoulder.e")]
+    assert abs(at - limit) < 3.0 * std < 0.02 * limit and abs(e + 1.0) < 0.05
+    assert found.rms("test")["shoulder"] < 1.1 * noise
 
 
 def test_more_columns_by_hand():

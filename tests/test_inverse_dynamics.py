@@ -70,13 +70,14 @@ def grown(machine, piece, names) -> tuple[Model, np.ndarray]:
             at = middle(found, machine, piece, max(joint, 0))
             values += [at[shape.name] * rng.uniform(0.7, 0.9) for shape in found.shapes()]
     pi = np.array(machine.prior) * rng.uniform(0.8, 1.2)
-    model = Model(machine, tuple(terms)).with_shapes(values).with_reference(0.9 * pi)
-    return model, np.concatenate([pi.ravel(), rng.uniform(0.5, 2.0, len(model.coefficients))])
+    model = Model(machine, tuple(terms)).with_shapes(values)
+    x = np.concatenate([pi.ravel(), rng.uniform(0.5, 2.0, len(model.coefficients))])
+    return model.referring_to(0.9 * x), x
 
 
 def slowly(model: Model, piece: Piece, x) -> np.ndarray:
     """The same by what predicts logs, without what looks back."""
-    kept = Model(model.robot, model.terms, model.shapes, reference=model.reference)
+    kept = replace(model, _links={}, _rigid={})
     c, k = [], 10 * model.bodies
     for found, joints in model.terms:
         size = len(found.coefficients()) * len(joints)

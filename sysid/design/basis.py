@@ -184,9 +184,8 @@ def _known(
         if fit is not None:
             before = before + _told(fit, levels, places, noise)
         return Known(instant, own, noise, before, alone=alone)
-    count = 10 * instant.bodies
     if instant.reference is None:
-        instant = instant.with_reference(own[:count].reshape(-1, 10))
+        instant = instant.referring_to(own)
     if fit is None:
         q, qd, qdd = usual = _usual(model.robot)
         instant = instant.scaled_by(played(q, qd, qdd, 1.0 / _RATE, model.robot.joints))

@@ -26,6 +26,8 @@ def joined(view: View, *added: tuple[Candidate, dict[str, float]], like: View | 
         like: whose weights and noise it has, where these are not to be its own.
     """
     source = view.source
+    if any(candidate.effect.uses_load for candidate, _ in added):
+        source = replace(source, model=source.referenced)  # while its parameters are the model's
     for candidate, shapes in added:
         source = replace(source, model=grown(source, candidate, shapes))
     return _again(view, source.model, (like or view).weights, tolerance=COMPARED, like=like)
