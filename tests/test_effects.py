@@ -15,6 +15,7 @@ from sysid.candidates import candidates
 from sysid.errors import ConfigError
 from sysid.inertia import pseudo
 from sysid.model import Model
+from sysid.model_parameters import ROBOT
 from sysid.motion import Piece
 from sysid.per_level import at_level
 from sysid.simulate import hidden, load, simulate, write
@@ -391,6 +392,21 @@ def test_what_a_joint_needs_is_its_load_and_what_else_acts_on_it():
     rows = slice(20, 60, 4)
     np.testing.assert_allclose(model.with_reference(machine.prior, c).columns(piece, rows)[1][-1], (np.sign(wanted) * np.maximum(np.abs(wanted) - 2.0, 0.0))[rows], atol=1e-12)
     assert model.with_reference(machine.prior).seen(piece).needed is None
+
+
+def test_a_load_is_that_of_the_motion_that_the_links_make():
+    """Not of what an encoder that is off says of it, nor under the gravity of a level base."""
+    machine, piece = arm_moving()
+    names = {"gravity_tilt": ROBOT, "encoder_offset": 2, "load_friction": 2}
+    model = Model(machine, tuple((vocabulary.find(name).given().bound(machine, j), (j,)) for name, j in names.items()))
+    at = {"gravity_tilt.*.roll": 0.2, "gravity_tilt.*.pitch": -0.1, "encoder_offset": 0.3}
+    values = [next(size for name, size in at.items() if v.name.startswith(name)) for v in model.shape_values]
+    model = model.with_shapes(values).with_reference(machine.prior)
+    moved = model.moved(piece)
+    assert not np.allclose(moved.q[:, 2], piece.q[:, 2]) and not np.allclose(moved.gravity, machine.gravity)
+    load = regressor.torque(machine, machine.prior, moved.q, moved.qd, moved.qdd, gravity=moved.gravity)
+    rows = slice(10, 90, 7)
+    np.testing.assert_allclose(model.columns(piece, rows)[2][-1], (np.abs(load) * np.sign(piece.qd))[rows, 2], rtol=1e-9)
 
 
 @pytest.mark.parametrize(("seed", "limit"), [(3, 22.0), (8, 24.0)])
