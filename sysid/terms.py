@@ -168,7 +168,11 @@ class Terms:
         kept = [*range(10 * self.bodies), *(10 * self.bodies + k for k, c in enumerate(self.coefficients) if here(self.terms[c.term][0]))]
         own = self._kept(lambda effect, joint: here(effect))
         terms = tuple((effect if effect.group is None else effect.plain, joints) for effect, joints in own.terms)
-        return replace(own, terms=terms), np.asarray(x)[kept]
+        plain = replace(own, terms=terms)
+        if self.referred:  # by names that say no level
+            values = (self.referred.get(one.name, 0.0) for one in own.coefficients)
+            plain = replace(plain, referred=dict(zip((one.name for one in plain.coefficients), values)))
+        return plain, np.asarray(x)[kept]
 
     def with_shapes(self, values) -> Self:
         """The model with other shape values."""

@@ -13,6 +13,7 @@ from sysid.listed_effects import build as build_model
 from sysid.model import Model
 from sysid.model_parameters import ROBOT
 from sysid.motion import Piece
+from sysid.per_level import at_level
 from sysid.robot_spec import RobotSpec
 from sysid.trusted import trust
 from tests import robots
@@ -126,6 +127,22 @@ def test_all_effects_at_once():
     torque = inverse_dynamics.inverse_dynamics(model, x)
     agree(torque(piece.q, piece.qd, piece.qdd), slowly(model, piece, x))
     assert {name.partition(".")[0] for name in torque.omitted} == PAST
+
+
+def test_what_is_needed_at_a_level_has_the_friction_of_that_level():
+    machine, piece = arm()
+    levels = ("cold", "warm")
+    terms = [at_level(vocabulary.find("coulomb"), "oil", one, levels) for one in levels]
+    terms.append(vocabulary.find("torque_saturation").given())
+    model = Model(machine, tuple((effect, (1,)) for effect in terms)).with_shapes([40.0])
+    x = np.concatenate([np.ravel(machine.prior), [5.0, 25.0, -1.0]])
+    model = model.referring_to(x)
+    for one in levels:
+        own = replace(piece, levels={"oil": one})
+        expected = model.torque(own, machine.prior, x[-3:])
+        assert np.abs(expected[:, 1]).max() < 40.0 + 1e-9
+        torque = inverse_dynamics.inverse_dynamics(model, x, {"oil": one})
+        agree(torque(piece.q, piece.qd, piece.qdd), expected)
 
 
 def test_rotors_and_other_orders_against_pinocchio(tmp_path):
