@@ -26,8 +26,7 @@ from .errors import SysidError
 from .instants import Instants, at_no_time
 from .model import Model
 from .model_parameters import place
-from .needed import Acting, acting
-from .needed import torque as acting_torque
+from .needed import Acting, add, behind
 from .robot import Robot
 
 NOWHERE: Mapping[str, str] = MappingProxyType({})
@@ -81,16 +80,6 @@ class _Alike:
 
 
 @dataclass(frozen=True)
-class _Single:
-    """Any other effect on one joint (-1: on the robot): coefficients (k,), shape values."""
-
-    effect: Effect
-    joint: int
-    coefficients: np.ndarray
-    shapes: dict[str, float]
-
-
-@dataclass(frozen=True)
 class InverseDynamics:
     """Torque of an identified model, one sample or many at a time; see `inverse_dynamics`.
 
@@ -106,9 +95,9 @@ class InverseDynamics:
     _load: _Rigid | None
     _behind: tuple[Acting, ...] | None
     _alike: tuple[_Alike, ...]
-    _single: tuple[_Single, ...]
-    _moving: tuple[_Single, ...]
-    _sensors: tuple[_Single, ...]
+    _single: tuple[Acting, ...]
+    _moving: tuple[Acting, ...]
+    _sensors: tuple[Acting, ...]
 
     def __repr__(self) -> str:
         left = f"; without {', '.join(self.omitted)}" if self.omitted else ""
@@ -160,9 +149,7 @@ class InverseDynamics:
             part = replace(part, load=load)
         if self._behind is not None:
             needed = load.copy()
-            for one in self._behind:
-                joints, values = acting_torque(one, part, self._bodies.robot)
-                needed[:, joints] += values
+            add(needed, self._behind, part, self._bodies.robot)
             part = replace(part, needed=needed)
         if len(q) == 1 and gravity is None:
             out = self._bodies.one(q[0], qd[0], qdd[0])[None]
@@ -170,9 +157,7 @@ class InverseDynamics:
             out = self._bodies.many(q, qd, qdd, gravity)
         if self._alike:
             self._add_alike(out.reshape(-1), q, qd, qdd, load, len(q))
-        for own in self._single:
-            joints, values = acting_torque(own, part, self._bodies.robot)
-            out[:, joints] += values
+        add(out, self._single, part, self._bodies.robot)
         for own in self._sensors:
             out[:, own.joint] = own.effect.sensed(out[None, :, own.joint], 1.0, **own.shapes)[0]
         return out
@@ -239,7 +224,7 @@ def inverse_dynamics(model: Model, x, levels: Mapping[str, str] = NOWHERE) -> In
             else "single"
         )
         kept[kind] += [
-            _Single(effect, joint, c, shapes) for joint, c, shapes in zip(joints, own, named)
+            Acting(term, joint, effect, c, at) for joint, c, at in zip(joints, own, named)
         ]
     load = (
         _Rigid.of(robot, robot.prior if model.reference is None else model.reference)
@@ -256,12 +241,12 @@ def inverse_dynamics(model: Model, x, levels: Mapping[str, str] = NOWHERE) -> In
     )
 
 
-def _behind(model: Model, single: list[_Single]) -> tuple[Acting, ...] | None:
+def _behind(model: Model, single: list[Acting]) -> tuple[Acting, ...] | None:
     """What acts beside the load where an effect looks at what is needed, None where none does or
     nobody knows."""
     if not model.referred or not any(own.effect.uses_needed for own in single):
         return None
-    return tuple(one for one in acting(model) if one.effect.instantaneous)
+    return tuple(one for one in behind(model) if one.effect.instantaneous)
 
 
 def _keeps_its_word(

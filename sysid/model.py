@@ -13,8 +13,7 @@ from .deflection import Deflection
 from .effect import MotionEffect, SensorEffect, TorqueEffect, WrenchEffect
 from .model_parameters import ROBOT
 from .motion import Motion, Piece, never_move
-from .needed import Acting, needed
-from .needed import torque as torque_of
+from .needed import acting, add_over, needed
 from .terms import Terms
 
 _CHUNK = 4096  # samples whose columns stand in memory at once
@@ -192,26 +191,13 @@ class Model(Terms):
             stride: predict every `stride`-th sample only.
         """
         out = np.empty((-(-piece.samples // stride), self.robot.dof))
-        remembered = self.remembered(piece)
+        remembered, effects = self.remembered(piece), list(acting(self, c))
         for rows in chunks(piece, stride * max(1, (_CHUNK if piece.smoother is None else 4 * _CHUNK) // stride)):
             wide, inner = self._widened(piece, slice(rows.start, rows.stop, stride))
             part = self._seen(piece, wide, remembered)
-            predicted = regressor.torque(self.robot, pi, part.q, part.qd, part.qdd, gravity=part.gravity, deflection=part.deflection).T
-            k = 0
-            for term, (effect, joints) in enumerate(self.terms):
-                size = len(effect.coefficients())
-                if not effect.present(piece):
-                    k += size * len(joints)
-                    continue
-                for joint in joints:
-                    own = np.asarray(c)[k : k + size]
-                    if isinstance(effect, TorqueEffect) and effect.memory:
-                        predicted[joint] += own @ remembered[term, joint][:, wide]
-                    elif size:
-                        one = Acting(term, joint, effect, own, self.shapes_of(term, joint))
-                        where, values = torque_of(one, part, self.robot)
-                        predicted[where] += values.T
-                    k += size
+            predicted = regressor.torque(self.robot, pi, part.q, part.qd, part.qdd, gravity=part.gravity, deflection=part.deflection)
+            add_over(predicted, effects, piece, part, wide, remembered, self.robot)
+            predicted = predicted.T
             for joint in range(self.robot.dof):
                 predicted[joint] = self.sensed(predicted[None, joint], piece, joint)[0]
             settled = np.stack([piece.settled(own, inner, joint, wide.start) for joint, own in enumerate(predicted)], axis=1)
