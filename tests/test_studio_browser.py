@@ -63,11 +63,31 @@ def questioned(leg):
     return run
 
 
-class Served:
-    """The studio as a process of its own, in the folder that holds the experiment's."""
+HELD = """
+import sys, time
+from pathlib import Path
+from sysid.cli import main
+from sysid.studio import session
+diagnose, go = session.diagnose, Path(sys.argv.pop(1))
+def held(*asked, progress, **named):
+    while not go.exists():
+        progress("waiting to begin", 0.0)  # a short job is let by, as between two reports of a diagnosis
+        time.sleep(0.02)
+    return diagnose(*asked, progress=progress, **named)
+session.diagnose = held
+main()
+"""
 
-    def __init__(self, folder, run):
-        words = [sys.executable, "-m", "sysid", "studio", folder.name, "--port", "0", "--json", "--out", str(run)]
+
+class Served:
+    """The studio as a process of its own, in the folder that holds the experiment's. No diagnosis begins before the file `go` is there: what is
+    seen meanwhile does not hang on how fast a machine is."""
+
+    def __init__(self, folder, run, held=False):
+        self.go = folder.parent / "go"
+        if not held:
+            self.go.touch()
+        words = [sys.executable, "-c", HELD, str(self.go), "studio", folder.name, "--port", "0", "--json", "--out", str(run)]
         self.process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=folder.parent)
         self.address = json.loads(self.process.stdout.readline())["studio"]
 
@@ -79,12 +99,14 @@ class Served:
 
 @pytest.fixture
 def opened(request, browser, tmp_path):
-    """Opens pages on a copy of the leg, diagnosed before but for `fresh`; nothing may go wrong in their consoles, and nothing may be asked elsewhere."""
-    kind = getattr(request, "param", "questioned")
+    """Opens pages on a copy of the leg, diagnosed before but for `fresh`; nothing may go wrong in their consoles, and nothing may be asked elsewhere.
+
+    `held`: what is diagnosed waits for `opened.go` to be touched."""
+    kind, _, held = getattr(request, "param", "questioned").partition(" ")
     folder = rippled(tmp_path / EVIL_NAME) if kind == "evil" else shutil.copytree(request.getfixturevalue("leg"), tmp_path / "leg")
     if kind == "questioned":
         shutil.copytree(request.getfixturevalue("questioned"), tmp_path / "run")
-    served, wrong = Served(folder, tmp_path / "run"), []
+    served, wrong = Served(folder, tmp_path / "run", bool(held)), []
     context = browser.new_context(viewport={"width": 1280, "height": 900})
 
     def page():
@@ -96,8 +118,9 @@ def opened(request, browser, tmp_path):
         made.goto(served.address)
         return made
 
-    page.file, page.served, page.run = folder / "config.yaml", served, tmp_path / "run"
+    page.file, page.served, page.run, page.go = folder / "config.yaml", served, tmp_path / "run", served.go
     yield page
+    served.go.touch()
     context.close()
     served.stop()
     assert not wrong, wrong
@@ -443,7 +466,7 @@ def test_one_joint_from_all_sides(opened):
     assert content  # the last of them
 
 
-@pytest.mark.parametrize("opened", ["fresh"], indirect=True)
+@pytest.mark.parametrize("opened", ["fresh held"], indirect=True)
 def test_an_effect_is_tried_while_the_diagnosis_is_at_work(opened):
     """What would it give? Asked before the verdict stands (how soon it is answered: test_studio.py); what was typed stays when it comes."""
     from playwright.sync_api import expect
@@ -456,6 +479,8 @@ def test_an_effect_is_tried_while_the_diagnosis_is_at_work(opened):
     page.locator("#own-formula").fill("a*sin(3*q)")
     page.locator("#own-preview").click()
     expect(page.locator("#workspace-fall")).to_contain_text("with stribeck on hip, against step 0: start (now)", timeout=WAIT)
+    assert page.locator("main").get_attribute("aria-busy") == "true"  # the diagnosis is still at work
+    opened.go.touch()
     page.wait_for_function(DONE, timeout=WAIT)
     assert page.locator("#own-formula").input_value() == "a*sin(3*q)" and page.locator("#own-effect").input_value() == "stribeck"
     assert page.evaluate("[...document.querySelectorAll('#sections > section')].map(e => e.id).slice(0, 4)") == ["verdict", "workspace", "steps", "suspects"]
@@ -485,6 +510,7 @@ def test_a_button_does_not_slip_from_under_the_hand(opened):
     assert len(page.evaluate("window.moved")) == 1, page.evaluate("window.moved")
 
 
+@pytest.mark.parametrize("opened", ["questioned held"], indirect=True)
 def test_what_was_added_is_seen_beside_what_was_before(opened):
     """After an addition the falling error is the first thing seen, and both models stand in the same chart."""
     from playwright.sync_api import expect
@@ -500,6 +526,7 @@ def test_what_was_added_is_seen_beside_what_was_before(opened):
     assert fall.evaluate("e => e.compareDocumentPosition(document.querySelector('#verdict')) & 4")  # first of all
     assert page.locator("main").get_attribute("aria-busy") == "true"  # the diagnosis is still at work
     assert {"predicted beside", "residual beside"} <= set(traces(page, "time")["names"])
+    opened.go.touch()
     page.wait_for_function(DONE, timeout=WAIT)
     expect(page.locator("#workspace-fall")).to_contain_text("against step 0")
     page.locator("#workspace-beside").select_option("")
