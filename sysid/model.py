@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from . import regressor, two_masses
 from .deflection import Deflection
-from .effect import MotionEffect, SensorEffect, TorqueEffect, WrenchEffect
+from .effect import Effect, MotionEffect, SensorEffect, TorqueEffect, WrenchEffect
 from .model_parameters import ROBOT
 from .motion import Motion, Piece, never_move
 from .needed import acting, add_over, needed
@@ -73,7 +73,7 @@ class Model(Terms):
             for joint in joints
         }
         columns = [term for term, (effect, _) in enumerate(self.terms) if effect.memory and not isinstance(effect, Deflection)]
-        part = self.seen(piece, out) if columns else None
+        part = self._seen(piece, slice(0, len(piece.t)), out, [self.terms[term][0] for term in columns]) if columns else None
         return out | {(term, joint): self.terms[term][0].columns(part, joint, **self.shapes_of(term, joint)) for term in columns for joint in self.terms[term][1]}
 
     def _link_side(self, piece: Piece, joint: int) -> tuple[np.ndarray, np.ndarray]:
@@ -87,29 +87,32 @@ class Model(Terms):
     def _bodies(self) -> np.ndarray:
         return self.robot.prior if self.reference is None else self.reference
 
-    def seen(self, piece: Piece, remembered: dict | None = None) -> Piece:
-        """A whole piece, of which `remembered(piece)` is known, as effects see it: moved, with the load that its bodies need."""
-        known = self.remembered(piece) if remembered is None else remembered
-        return self._seen(piece, slice(0, len(piece.t)), known, True)
+    def seen(self, piece: Piece) -> Piece:
+        """A whole piece as effects see it: moved, with the load that its bodies need."""
+        return self._seen(piece, slice(0, len(piece.t)), self.remembered(piece), None)
 
     def moved(self, piece: Piece) -> Piece:
         """The same, with a load only where an effect of the model looks at it."""
-        return self._seen(piece, slice(0, len(piece.t)), self.remembered(piece))
+        return self._seen(piece, slice(0, len(piece.t)), self.remembered(piece), [effect for effect, _ in self.terms if not isinstance(effect, Deflection)])
 
-    def _seen(self, piece: Piece, rows: slice, remembered: dict, loaded: bool = False) -> Piece:
-        """Rows of a piece moved as the motion effects say, with the load that effects look at."""
+    def _seen(self, piece: Piece, rows: slice, remembered: dict, looking: Sequence[Effect] | None) -> Piece:
+        """Rows of a piece moved as the motion effects say, with the load that the effects `looking` look at; None: whoever may."""
         part = piece.part(rows)
         for term, (effect, joints) in enumerate(self.terms):
             if isinstance(effect, MotionEffect):
                 for joint in joints:
                     known = {"behind": remembered[term, joint][:, rows]} if isinstance(effect, Deflection) else {}
                     part = effect.moved(part, joint, **known, **self.shapes_of(term, joint))
-        looks = [effect for effect, _ in self.terms if effect.uses_load and not effect.memory]
-        if loaded or looks:
+        if looking is None or any(effect.uses_load for effect in looking):
             part = replace(part, load=self._load(piece, rows, part))
-        if self.referred and (loaded or any(effect.uses_needed for effect in looks)):
+        if self.referred and (looking is None or any(effect.uses_needed for effect in looking)):
             part = replace(part, needed=needed(self, piece, part, rows, remembered))
         return part
+
+    @cached_property
+    def _at_once(self) -> list[Effect]:
+        """The effects that look back to no start of a log."""
+        return [effect for effect, _ in self.terms if not effect.memory]
 
     def _load(self, piece: Piece, rows: slice, part: Piece) -> np.ndarray:
         """Load (n, dof) of rows of a piece, seen as `part`; the last of a slice is kept."""
@@ -133,7 +136,7 @@ class Model(Terms):
         wide, inner = self._widened(piece, rows)
         if remembered is None:
             remembered = self.remembered(piece)
-        part = self._seen(piece, wide, remembered)
+        part = self._seen(piece, wide, remembered, self._at_once)
         by_joint: list[list[np.ndarray]] = [[] for _ in self.robot.joints]
         for term, (effect, joints) in enumerate(self.terms):
             for joint in joints if effect.present(piece) else ():
@@ -194,7 +197,7 @@ class Model(Terms):
         remembered, effects = self.remembered(piece), list(acting(self, c))
         for rows in chunks(piece, stride * max(1, (_CHUNK if piece.smoother is None else 4 * _CHUNK) // stride)):
             wide, inner = self._widened(piece, slice(rows.start, rows.stop, stride))
-            part = self._seen(piece, wide, remembered)
+            part = self._seen(piece, wide, remembered, self._at_once)
             predicted = regressor.torque(self.robot, pi, part.q, part.qd, part.qdd, gravity=part.gravity, deflection=part.deflection)
             add_over(predicted, effects, piece, part, wide, remembered, self.robot)
             predicted = predicted.T

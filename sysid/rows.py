@@ -90,7 +90,7 @@ def stack(model: Model, motion: Motion, stride: int) -> Rows:
     for here, parts in stretches(model, motion, stride):
         for joint, (support, values) in enumerate(parts):
             columns[joint, here, support] = values
-    columns *= found.use.T[:, :, None]
+    columns[~found.use.T] = 0.0
     return replace(found, columns=columns)
 
 
@@ -120,7 +120,7 @@ def tangents(model: Model, motion: Motion, x, stride: int, use: np.ndarray, midd
             continue
         step, effect = difference_step(value, model.shapes[k]), model.terms[value.term][0]
         if isinstance(effect, TorqueEffect):  # all else stays
-            pieces = seen(model, motion) if pieces is None else pieces
+            pieces = [model.moved(piece) for piece in motion.pieces] if pieces is None else pieces
             at = model.shapes_of(value.term, value.joint)
             asked = lambda h: signatures(model, motion, pieces, effect, value.joint, [at, {**at, value.shape.name: model.shapes[k] + h}], stride, use)  # noqa: B023, E731
             try:

@@ -33,6 +33,7 @@ from .triangles import Compressed
 
 _MOST_ROWS, _STEPS, _TRIES, _SETTLED = 6000, 12, 6, 1e-7
 _ROUNDING = 1e-14  # share of the greatest
+_SHORTER = 0.7  # of a step that failed: what is tried next
 _LEAST_SHARE = 0.25  # of the way to another load
 
 
@@ -173,9 +174,13 @@ def _descended(best: Settled, motion: Motion, solved, weights, tolerance: float)
         moving = _moving(best, motion, free, scale, low, high) if free else None
         if moving is not None and moving[3] > tolerance * abs(best.objective):
             inside, system, right, _ = moving
-            at = np.array(best.model.shapes)
+            at, failed = np.array(best.model.shapes), None
             for _ in range(_TRIES):
                 step = _damped(system, right, damping, low[inside] - at[inside], high[inside] - at[inside])
+                # nearly what failed would fail again: damping is felt where no bound holds a step back, and only from some size on
+                while failed is not None and damping < 1.0 / _ROUNDING and np.all(np.abs(step) > _SHORTER * np.abs(failed)):
+                    damping, growth = min(damping * growth, 1.0 / _ROUNDING), 2.0 * growth
+                    step = _damped(system, right, damping, low[inside] - at[inside], high[inside] - at[inside])
                 promised = float(right @ step - 0.5 * step @ system @ step)
                 moved = at.copy()
                 moved[inside] += step
@@ -184,6 +189,7 @@ def _descended(best: Settled, motion: Motion, solved, weights, tolerance: float)
                     kept = (best.objective - tried.objective) / promised if promised > 0 else 1.0
                     best, damping, growth = tried, max(damping * max(1.0 / 3.0, 1.0 - (2.0 * kept - 1.0) ** 3), 1e-9), 2.0
                     break
+                failed = step
                 damping, growth = min(damping * growth, 1.0 / _ROUNDING), 2.0 * growth
         if not abs(before - best.objective) > tolerance * abs(before):
             break
@@ -230,7 +236,8 @@ def _normal(found: Settled, motion: Motion, free, scale):
     predicted = rows.tau - residual  # where rows count: elsewhere no slope does
     slopes = row.tangents(found.model, motion, found.x, found.stride, rows.use, predicted)[:, :, free]
     loose = _loose(found.model, found.problem.coordinates.held, at_zero(found))
-    base = sum(2.0 * w**2 * a.T @ a for w, a in zip(scale, rows.columns)) + prior_hessian(found)
+    objective = found.problem.objective  # of all these columns, weighted
+    base = objective.hessian(found.x) if objective.weight else objective.data_hessian()
     cross = sum(2.0 * w**2 * a.T @ t for w, a, t in zip(scale, rows.columns, slopes))
     base, cross = base[np.ix_(loose, loose)], cross[loose]
     system = sum(2.0 * w**2 * t.T @ t for w, t in zip(scale, slopes)) - cross.T @ inverted(base) @ cross

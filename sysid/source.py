@@ -40,7 +40,9 @@ class Source:
 
     @cached_property
     def _seen(self) -> list:
-        return row.seen(self.model, self.motion)
+        if self.referenced is self.model:
+            return self.pieces
+        return [self.model.moved(piece) for piece in self.motion.pieces]
 
     @cached_property
     def _bent(self) -> dict:

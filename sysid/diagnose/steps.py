@@ -7,10 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .. import blocks
 from ..candidates import Candidate
 from ..model_parameters import ROBOT
-from ..view import View, joined, losses, taken, weighed
+from ..view import View, joined, losses, shapes_in, taken, weighed
 from .projected import groups_at
 from .ties import NEAR, Choice, chosen
 
@@ -41,9 +40,8 @@ class Step:
 def step_of(view: View, p: float, found: Choice, worth: float) -> Step | None:
     """The step that a choice makes, None where it takes too little of any joint to be worth it, or
     no more of all together than the standard error of that."""
-    if found.shares.max() < worth or found.gain.sum() <= blocks.standard_error(found.gain):
-        return None
-    return Step(found, p, view, weighed(found.head.view), found.shares)
+    has = found.worth_having(worth)
+    return Step(found, p, view, weighed(found.head.view), found.shares) if has else None
 
 
 def revised(first: View, steps: list[Step], worth: float) -> list[Step]:
@@ -57,11 +55,11 @@ def revised(first: View, steps: list[Step], worth: float) -> list[Step]:
     last = {step.candidate.key: step for step in steps}
     if len(last) < len(steps):
         steps = rejoined(first, [step for step in steps if last[step.candidate.key] is step])
-    stirred = steps[-1].changed
-    for _ in range(2 * len(steps)):  # two that speak for each other could take turns for ever
+    stirred, seen = steps[-1].changed, list[list]()
+    # two that speak for each other would take turns for ever
+    while (heads := [step.candidate.key for step in steps]) not in seen:
+        seen.append(heads)
         steps, changed = _revised_once(first, steps, worth, stirred)
-        if not changed:
-            break
         stirred |= changed
     return steps
 
@@ -69,21 +67,21 @@ def revised(first: View, steps: list[Step], worth: float) -> list[Step]:
 def _revised_once(first: View, steps: list[Step], worth: float, stirred: set[int]):
     """Steps up to the first of the joints `stirred` that is another one now, or goes; and the
     joints that it changed, none where there is no such step."""
+    last = steps[-1].after
     for number, step in enumerate(steps[:-1]):
-        rivals = step.choice.close
         if step.candidate.joint not in stirred:
             continue
         before, later = steps[:number], steps[number + 1 :]
         others = [(s.candidate, s.choice.head.shapes) for s in (*before, *later)]
-        without = joined(first, *others, like=steps[-1].after)
-        groups = groups_at(without, [(m.candidate, m.asked) for m in rivals])
+        without = joined(first, *((c, shapes_in(last, c, own)) for c, own in others), like=last)
+        groups = groups_at(without, [(m.candidate, m.asked) for m in step.choice.close])
         least = NEAR * max((group.taken for group in groups), default=0.0)
         own = step.candidate.key
         near = [group for group in groups if group.candidate.key == own or group.taken >= least]
         found = chosen(without, near, np.random.default_rng(1))
-        again = None if found is None else step_of(without, step.p, found, worth)
-        if again is None:
+        if found is None or not found.worth_having(worth):
             return rejoined(first, [*before, *later]), step.changed
+        again = replace(step, choice=found, shares=found.shares)
         if again.candidate.key != step.candidate.key:
             return rejoined(first, [*before, again, *later]), step.changed | again.changed
         steps = [*before, replace(step, choice=found), *later]

@@ -53,6 +53,12 @@ class Choice:
         most = self.head.losses.sum() + _CLOSE * self.gain.sum()
         return [*(m for m, _ in self.members), *(m for m in self.beaten if m.losses.sum() <= most)]
 
+    def worth_having(self, least: float) -> bool:
+        """Whether it takes that share of some joint, and more of all than its standard error."""
+        return bool(
+            self.shares.max() >= least and self.gain.sum() > blocks.standard_error(self.gain)
+        )
+
     def headed(self, head: Member) -> Choice:
         """The choice with another of its members at the head."""
         members = sorted(self.members, key=lambda one: one[0] is not head)

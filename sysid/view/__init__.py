@@ -1,7 +1,7 @@
 """What a diagnosis looks at: a model settled on the motion of logs, and its least squares."""
 
 from .design import Design, Sums, by_block, designed, instrumented, summed
-from .joining import COMPARED, allowed, around, joined, shapes_of, weighed
+from .joining import COMPARED, allowed, around, joined, shapes_in, shapes_of, weighed
 from .laws import law
 from .losses import losses, slow_losses, taken
 from .overlap import makes, part_taken, slow_part
@@ -27,6 +27,7 @@ __all__ = [
     "losses",
     "makes",
     "part_taken",
+    "shapes_in",
     "shapes_of",
     "slow_losses",
     "slow_part",

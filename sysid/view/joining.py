@@ -96,6 +96,15 @@ def shapes_of(view: View) -> dict[str, float]:
     return {v.shape.name: at for v, at in _own(view)}
 
 
+def shapes_in(view: View, candidate: Candidate, shapes: dict[str, float]) -> dict[str, float]:
+    """Shape values of a candidate as they stand in a view's model; what it lacks, as in `shapes`."""
+    model = view.model
+    there = [(model.terms[v.term][0].name, v.joint) == candidate.key for v in model.shape_values]
+    values = zip(model.shape_values, model.shapes, there)
+    found = {v.shape.name: at for v, at, own in values if own}
+    return {name: found.get(name, at) for name, at in shapes.items()}
+
+
 def _own(view: View):
     """The shape values of what joined last, and where they stand."""
     own = view.model.last_shapes

@@ -221,16 +221,19 @@ class _Asker:
         absorbed, mixed, squares = absorbed[:, good], mixed[:, :, good], squares[:, good]
         freed = self.freed @ mixed  # what the model's own columns took of a block's noise
         back = np.swapaxes(self.told, 1, 2)
-        score = score[:, :, good] - back @ absorbed
-        loud = score + back @ freed
+        score = score[:, :, good]
+        score -= back @ absorbed
+        moves = back @ freed  # in place: these are the greatest arrays of a diagnosis
+        moves += score
         loud_squares = squares + np.einsum("bpk,bpk->bk", mixed, freed)
         count, weight = weight.shape[1], weight[:, good]
         unit = np.sum(weight * squares, axis=0)
         c = np.einsum("bg,bdg->dg", weight, score) / unit
-        moves = loud - loud_squares[:, None] * c
+        moves -= loud_squares[:, None] * c
         moves *= (weight / np.maximum(unit - weight * squares, 1e-12 * unit))[:, None]
         # of a column of unit size
-        seen, freedom = unit * np.sum(moves**2, axis=0), np.maximum(rest[good] - 1.0, 1.0)
+        seen = unit * np.einsum("bdk,bdk->dk", moves, moves)
+        freedom = np.maximum(rest[good] - 1.0, 1.0)
         return _Told(count, np.flatnonzero(good), unit, np.sqrt(unit) * c, seen, freedom)
 
     def scores(self, told: list[_Told]) -> np.ndarray:
