@@ -13,7 +13,9 @@ same seed, and the search of its log is asked at the diagnosis's own level.
 
 soft: elasticity and backlash in turn, of the benchmark's sizes. Counted are the logs whose fit, on the test log, has an error a
 tenth lower on some joint where the same robot is simulated without the effect: there it is to be named, alone or in a set of
-two. `others`: the same robots with a delay, a current's lag, or nothing, in which neither may be named.
+two. `shown`: of these, where the training log, of which alone anything is named, shows it as well: play flies where the load
+changes its sign, and of two logs one may hold such moments and the other none. `others`: the same robots with a delay, a
+current's lag, or nothing, in which neither may be named.
 
 All resume: finished logs stand in a journal in --out, named after the seed and the state of the package's source.
 """
@@ -171,8 +173,10 @@ def soft(case: dict, level: float, worth: float) -> dict:
         (hidden,) = case["hidden"] or [None]
         asked = hidden is None or hidden["effect"] not in SOFT
         if not asked:
-            case["plain"] = fitted(simulated(machine, [], options)[0], "plain").rms("test")
-            case["matters"] = any(case["plain"][joint] <= _MATTERS * error for joint, error in case["error"].items())
+            plain = fitted(simulated(machine, [], options)[0], "plain")
+            case["plain"] = plain.rms("test")
+            for key, part in (("matters", "test"), ("shown", "train")):
+                case[key] = any(plain.rms(part)[joint] <= _MATTERS * error for joint, error in fit.rms(part).items())
         if asked or case["matters"]:
             found = diagnose(fit.experiment, fit=fit)
             case["sets"] = [[[effect, joint, chance] for effect, joint, chance in claim.set] for claim in found.claims]
@@ -204,6 +208,7 @@ def told(kind: str, records: list[dict]) -> dict:
         for effect in SOFT:
             own = [r for r in records if r.get("matters") and r["hidden"][0]["effect"] == effect]
             out[effect] = {key: share(sum(r[key] for r in own), len(own)) for key in ("named", "head", "in_set")}
+            out[effect]["shown"] = share(sum(r["named"] for r in own if r["shown"]), sum(r["shown"] for r in own))
             claims = [tuple(head) for r in own for head in r["heads"]]
             right = sum(list((r["hidden"][0]["effect"], r["hidden"][0]["joint"])) in r["heads"] for r in own)
             out[effect]["other_claims"] = share(len(claims) - right, len(claims))
