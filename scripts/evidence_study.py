@@ -13,9 +13,8 @@ same seed, and the search of its log is asked at the diagnosis's own level.
 
 soft: elasticity and backlash in turn, of the benchmark's sizes. Counted are the logs whose fit, on the test log, has an error a
 tenth lower on some joint where the same robot is simulated without the effect: there it is to be named, alone or in a set of
-two. `shown`: of these, where the training log, of which alone anything is named, shows it as well: play flies where the load
-changes its sign, and of two logs one may hold such moments and the other none. `others`: the same robots with a delay, a
-current's lag, or nothing, in which neither may be named.
+two. `shown`: of these, where the training log, of which alone anything is named, shows it as well. `others`: the same robots
+with a delay, a current's lag, or nothing, in which neither may be named.
 
 All resume: finished logs stand in a journal in --out, named after the seed and the state of the package's source.
 """
@@ -174,9 +173,8 @@ def soft(case: dict, level: float, worth: float) -> dict:
         asked = hidden is None or hidden["effect"] not in SOFT
         if not asked:
             plain = fitted(simulated(machine, [], options)[0], "plain")
-            case["plain"] = plain.rms("test")
-            for key, part in (("matters", "test"), ("shown", "train")):
-                case[key] = any(plain.rms(part)[joint] <= _MATTERS * error for joint, error in fit.rms(part).items())
+            falls = lambda part: any(plain.rms(part)[joint] <= _MATTERS * error for joint, error in fit.rms(part).items())
+            case |= {"plain": plain.rms("test"), "matters": falls("test"), "shown": falls("train")}
         if asked or case["matters"]:
             found = diagnose(fit.experiment, fit=fit)
             case["sets"] = [[[effect, joint, chance] for effect, joint, chance in claim.set] for claim in found.claims]
@@ -241,8 +239,7 @@ def main() -> None:
 
     level = options.level if options.level is not None else 0.05 if options.study == "size" else LEVEL
     worth = options.worth if options.worth is not None else 0.0 if options.study == "size" else WORTH
-    digest = fit_document.program()[:10]
-    out = whole_files.folder(options.out)
+    digest, out = fit_document.program()[:10], whole_files.folder(options.out)
     settings = {"study": options.study, "seed": options.seed, "level": level, "worth": worth, "source": digest}
     journal = Journal(out / f"{options.study}-{options.seed}-{level:g}-{worth:g}-{digest}.jsonl", settings)
     draw = {"soft": lambda s, k: drawn(s, k, SOFT), "others": lambda s, k: drawn(s, k, OTHERS)}.get(options.study, conditions)
