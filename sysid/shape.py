@@ -178,7 +178,7 @@ def _descended(best: Settled, motion: Motion, solved, weights, tolerance: float)
             for _ in range(_TRIES):
                 step = _damped(system, right, damping, low[inside] - at[inside], high[inside] - at[inside])
                 # nearly what failed would fail again: damping is felt where no bound holds a step back, and only from some size on
-                while failed is not None and damping < 1.0 / _ROUNDING and np.all(np.abs(step) > _SHORTER * np.abs(failed)):
+                while failed is not None and damping < 1.0 / _ROUNDING and not np.any(np.abs(step) < _SHORTER * np.abs(failed)):
                     damping, growth = min(damping * growth, 1.0 / _ROUNDING), 2.0 * growth
                     step = _damped(system, right, damping, low[inside] - at[inside], high[inside] - at[inside])
                 promised = float(right @ step - 0.5 * step @ system @ step)

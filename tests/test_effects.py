@@ -394,6 +394,19 @@ def test_what_a_joint_needs_is_its_load_and_what_else_acts_on_it():
     assert model.with_reference(machine.prior).seen(piece).needed is None
 
 
+def test_no_load_is_made_for_what_looks_at_none(monkeypatch):
+    machine, piece = moving()
+    piece = replace(piece, load=None)
+    made = []
+    monkeypatch.setattr(Model, "_load", lambda self, piece, rows, part: (made.append(part), np.zeros_like(part.q))[1])
+    model = lambda *names: Model(machine, tuple((vocabulary.find(name).given(), (1,)) for name in names))  # noqa: E731
+    plain = model("coulomb", "presliding").with_shapes([0.1])
+    plain.columns(piece, slice(20, 60))
+    assert plain.moved(piece).load is None and not made
+    assert plain.seen(piece).load is not None and len(made) == 1  # whoever may ask
+    assert model("load_friction").moved(piece).load is not None and len(made) == 2
+
+
 def test_a_load_is_that_of_the_motion_that_the_links_make():
     """Not of what an encoder that is off says of it, nor under the gravity of a level base."""
     machine, piece = arm_moving()

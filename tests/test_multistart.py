@@ -224,3 +224,21 @@ def test_damped_steps_stay_within_their_bounds():
     np.testing.assert_allclose(step, [1.0, -0.9], atol=1e-9)  # a clipped step would have -9
     small = shape._damped(system, right, 1e6, low, high)
     np.testing.assert_allclose(small, right / (1e6 * np.diagonal(system)), rtol=1e-4, atol=1e-9)
+
+
+def test_nearly_what_failed_is_not_tried_again(monkeypatch):
+    """A bound holds the step of the first value back, and damping far below one changes none of it: the next that is tried is clearly shorter."""
+    system, right = np.diag([1.0, 1.0]), np.array([50.0, 0.0])
+    values = [SimpleNamespace(held=False, low=-1.0, high=1.0)] * 2
+    tried = []
+
+    def model(shapes):
+        return SimpleNamespace(robot=SimpleNamespace(dof=1), shape_values=values, shapes=shapes, uses_load=False, with_shapes=model)
+
+    def solved(asked):
+        tried.append(float(np.abs(asked.shapes).max()))
+        return SimpleNamespace(model=asked, objective=1.0 + tried[-1] if tried[-1] > 0.1 else 0.5)
+
+    monkeypatch.setattr(shape, "_moving", lambda *_: (np.array([0, 1]), system, right, 1.0))
+    found = shape._descended(SimpleNamespace(model=model(np.zeros(2)), objective=1.0), None, solved, None, 0.6)
+    assert found.objective == 0.5 and all(then < 0.7 * first for first, then in zip(tried, tried[1:])), tried

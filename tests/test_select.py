@@ -18,13 +18,13 @@ from ruamel.yaml import YAML
 from sysid import effect_entry, fit_document, loop, pipeline, results, simulate, vocabulary
 from sysid.addition import command, grown, spelled
 from sysid.candidates import Candidate
-from sysid.diagnose import claims, select
+from sysid.diagnose import claims, select, steps
 from sysid.diagnose.ask import ask
 from sysid.diagnose.diagnosis import diagnose
 from sysid.diagnose.select import LEVEL, WORTH, search
 from sysid.statement.document import document
 from sysid.trusted import trust
-from sysid.view import first_view
+from sysid.view import first_view, shapes_in
 
 BIAS = ("bias", "torque_bias:elbow:b=0.4")
 STRIBECK = ("stribeck", "stribeck:shoulder:dF=1.5,vs=0.4")
@@ -491,3 +491,24 @@ def test_more_terms_are_asked_for_only_where_the_log_tells_each():
     assert rivals(group(4, ((),), 3)) == {0}  # what is there takes two of six directions, and the log tells the other four
     assert rivals(group(3, ((),), 3)) == set()
     assert rivals(group(3, (), 3)) == {0}  # nothing of it is there yet
+
+
+def test_two_that_take_turns_are_stopped_when_they_come_back(monkeypatch):
+    """Each speaks for the other: the heads are those that they were when they are first there again."""
+    one, other, last = (SimpleNamespace(candidate=SimpleNamespace(key=(name, 0)), changed={0}) for name in ("torque_gain", "torque_saturation", "cogging"))
+    turns = {one.candidate.key: [other, last], other.candidate.key: [one, last]}
+    asked = []
+
+    def turn(first, found, worth, stirred):
+        asked.append(found)
+        return turns[found[0].candidate.key], {0}
+
+    monkeypatch.setattr(steps, "_revised_once", turn)
+    assert steps.revised(None, [one, last], WORTH) == [one, last] and len(asked) == 2
+
+
+def test_shape_values_are_those_that_a_model_stands_at():
+    values = [SimpleNamespace(term=0, joint=j, shape=SimpleNamespace(name=name)) for j in (0, 1) for name in ("compliance", "damping")]
+    model = SimpleNamespace(shape_values=values, shapes=(1.0, 2.0, 3.0, 4.0), terms=[(SimpleNamespace(name="elasticity"), (0, 1))])
+    asked = SimpleNamespace(key=("elasticity", 1))
+    assert shapes_in(SimpleNamespace(model=model), asked, {"compliance": 9.0, "damping": 9.0, "other": 5.0}) == {"compliance": 3.0, "damping": 4.0, "other": 5.0}
