@@ -47,8 +47,7 @@ class Rows:
 
     def of(self, motion: Motion, name: str) -> np.ndarray:
         """What the pieces of the motion call `name`, on the rows."""
-        pieces = enumerate(motion.pieces)
-        return np.concatenate([getattr(p, name)[self.index[self.piece == k]] for k, p in pieces])
+        return np.concatenate([getattr(p, name)[self.index[self.piece == k]] for k, p in enumerate(motion.pieces)])
 
 
 def stride_for(motion: Motion, most: int) -> int:
@@ -120,7 +119,7 @@ def tangents(model: Model, motion: Motion, x, stride: int, use: np.ndarray, midd
             continue
         step, effect = difference_step(value, model.shapes[k]), model.terms[value.term][0]
         if isinstance(effect, TorqueEffect):  # all else stays
-            pieces = [model.moved(piece) for piece in motion.pieces] if pieces is None else pieces
+            pieces = moved(model, motion) if pieces is None else pieces
             at = model.shapes_of(value.term, value.joint)
             asked = lambda h: signatures(model, motion, pieces, effect, value.joint, [at, {**at, value.shape.name: model.shapes[k] + h}], stride, use)  # noqa: B023, E731
             try:
@@ -136,9 +135,9 @@ def tangents(model: Model, motion: Motion, x, stride: int, use: np.ndarray, midd
         if (slope := model.gain_slope(k, step)) is not None:
             out[value.joint, :, k] = slope * middle[:, value.joint] * use[:, value.joint]
             continue
-        moved = lambda h: predicted(model.with_shapes([s + h * (i == k) for i, s in enumerate(model.shapes)]), motion, x, stride)  # noqa: B023, E731
+        nudged = lambda h: predicted(model.with_shapes([s + h * (i == k) for i, s in enumerate(model.shapes)]), motion, x, stride)  # noqa: B023, E731
         both = model.shapes[k] == value.shape.start and value.low <= model.shapes[k] - step <= value.high
-        change = 0.5 * (moved(step) - moved(-step)) if both else moved(step) - middle
+        change = 0.5 * (nudged(step) - nudged(-step)) if both else nudged(step) - middle
         if np.abs(change).max(initial=0.0) > _ROUNDED * np.abs(middle).max(initial=0.0):
             out[:, :, k] = (change / step * use).T
     return out
@@ -156,6 +155,11 @@ def difference_step(value, at: float) -> float:
 def seen(model: Model, motion: Motion) -> list:
     """Each whole piece as the effects of a model see it: moved, with the load that its bodies need."""
     return [model.seen(piece) for piece in motion.pieces]
+
+
+def moved(model: Model, motion: Motion) -> list:
+    """The same, with a load only where an effect of the model looks at it."""
+    return [model.moved(piece) for piece in motion.pieces]
 
 
 NUDGES = (1e-4, 1e-3, 1e-1)  # rad, rad/s, rad/s²: torque bends little over them
@@ -219,8 +223,7 @@ def low_passed(motion: Motion, torque: list[np.ndarray], stride: int) -> np.ndar
     """What sensors show of torque (..., dof, n) over each whole piece, on the rows that a stride keeps, as both sides are seen."""
     out = []
     for piece, rows, whole in zip(motion.pieces, starts(motion, stride), torque):
-        each = [piece.settled(whole[..., j, :], rows, j) for j in range(whole.shape[-2])]
-        out.append(np.stack(each, axis=-2))
+        out.append(np.stack([piece.settled(whole[..., j, :], rows, j) for j in range(whole.shape[-2])], axis=-2))
     return np.concatenate(out, axis=-1)
 
 

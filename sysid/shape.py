@@ -11,6 +11,7 @@ place would bring its noise into the columns.
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -175,12 +176,13 @@ def _descended(best: Settled, motion: Motion, solved, weights, tolerance: float)
         if moving is not None and moving[3] > tolerance * abs(best.objective):
             inside, system, right, _ = moving
             at, failed = np.array(best.model.shapes), None
+            damped = partial(_damped, system, right, low=low[inside] - at[inside], high=high[inside] - at[inside])
             for _ in range(_TRIES):
-                step = _damped(system, right, damping, low[inside] - at[inside], high[inside] - at[inside])
+                step = damped(damping)
                 # nearly what failed would fail again: damping is felt where no bound holds a step back, and only from some size on
                 while failed is not None and damping < 1.0 / _ROUNDING and not np.any(np.abs(step) < _SHORTER * np.abs(failed)):
                     damping, growth = min(damping * growth, 1.0 / _ROUNDING), 2.0 * growth
-                    step = _damped(system, right, damping, low[inside] - at[inside], high[inside] - at[inside])
+                    step = damped(damping)
                 promised = float(right @ step - 0.5 * step @ system @ step)
                 moved = at.copy()
                 moved[inside] += step
@@ -196,7 +198,7 @@ def _descended(best: Settled, motion: Motion, solved, weights, tolerance: float)
     return best
 
 
-def _damped(system, right, damping: float, low, high) -> np.ndarray:
+def _damped(system, right, damping: float, *, low, high) -> np.ndarray:
     """The step of normal equations with their diagonal enlarged, within bounds."""
     from scipy.optimize import lsq_linear  # its import takes as long as a small fit
 

@@ -42,7 +42,7 @@ class Source:
     def _seen(self) -> list:
         if self.referenced is self.model:
             return self.pieces
-        return [self.model.moved(piece) for piece in self.motion.pieces]
+        return row.moved(self.model, self.motion)
 
     @cached_property
     def _bent(self) -> dict:

@@ -508,7 +508,9 @@ def test_two_that_take_turns_are_stopped_when_they_come_back(monkeypatch):
 
 
 def test_shape_values_are_those_that_a_model_stands_at():
-    values = [SimpleNamespace(term=0, joint=j, shape=SimpleNamespace(name=name)) for j in (0, 1) for name in ("compliance", "damping")]
-    model = SimpleNamespace(shape_values=values, shapes=(1.0, 2.0, 3.0, 4.0), terms=[(SimpleNamespace(name="elasticity"), (0, 1))])
-    asked = SimpleNamespace(key=("elasticity", 1))
-    assert shapes_in(SimpleNamespace(model=model), asked, {"compliance": 9.0, "damping": 9.0, "other": 5.0}) == {"compliance": 3.0, "damping": 4.0, "other": 5.0}
+    standing = {(0, 0): {"compliance": 1.0, "damping": 2.0}, (1, 1): {"compliance": 3.0, "damping": 4.0}}
+    terms = [(SimpleNamespace(name="elasticity"), (joint,)) for joint in (0, 1)]
+    view = SimpleNamespace(model=SimpleNamespace(terms=terms, shapes_of=lambda term, joint: standing[term, joint]))
+    asked = {"compliance": 9.0, "damping": 9.0, "other": 5.0}
+    assert shapes_in(view, SimpleNamespace(key=("elasticity", 1)), asked) == {"compliance": 3.0, "damping": 4.0, "other": 5.0}
+    assert shapes_in(view, SimpleNamespace(key=("backlash", 1)), asked) == asked

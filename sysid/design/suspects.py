@@ -21,7 +21,7 @@ from ..effect_parameters import Shape
 from ..estimate import Fit
 from ..model import Model
 from ..motion import Motion
-from ..rows import Rows, stack, starts
+from ..rows import Rows, moved, stack, starts
 from ..source import Source
 from .columns import piece
 from .noise import noise_of
@@ -80,7 +80,7 @@ class _Unloaded(Source):
     @cached_property
     def pieces(self) -> list:
         """Whole pieces as these effects see them."""
-        return [self.model.moved(piece) for piece in self.motion.pieces]
+        return moved(self.model, self.motion)
 
 
 def played(

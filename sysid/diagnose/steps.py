@@ -81,8 +81,8 @@ def _revised_once(first: View, steps: list[Step], worth: float, stirred: set[int
         found = chosen(without, near, np.random.default_rng(1))
         if found is None or not found.worth_having(worth):
             return rejoined(first, [*before, *later]), step.changed
-        again = replace(step, choice=found, shares=found.shares)
-        if again.candidate.key != step.candidate.key:
+        if found.head.candidate.key != own:
+            again = replace(step, choice=found, shares=found.shares)
             return rejoined(first, [*before, again, *later]), step.changed | again.changed
         steps = [*before, replace(step, choice=found), *later]
     return steps, set()

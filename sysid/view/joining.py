@@ -98,10 +98,10 @@ def shapes_of(view: View) -> dict[str, float]:
 
 def shapes_in(view: View, candidate: Candidate, shapes: dict[str, float]) -> dict[str, float]:
     """Shape values of a candidate as they stand in a view's model; what it lacks, as in `shapes`."""
-    model = view.model
-    there = [(model.terms[v.term][0].name, v.joint) == candidate.key for v in model.shape_values]
-    values = zip(model.shape_values, model.shapes, there)
-    found = {v.shape.name: at for v, at, own in values if own}
+    name, joint = candidate.key
+    terms = enumerate(view.model.terms)
+    own = [term for term, (one, joints) in terms if one.name == name and joint in joints]
+    found = view.model.shapes_of(own[0], joint) if own else {}
     return {name: found.get(name, at) for name, at in shapes.items()}
 
 
