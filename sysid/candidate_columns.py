@@ -60,6 +60,16 @@ def bounds_of(model: Model, candidate: Candidate) -> list[tuple]:
     return model.ranges(candidate.effect, candidate.joint)
 
 
+def leading_of(model: Model, candidate: Candidate) -> tuple[str, str]:
+    """Name and unit of the number that says first how large an effect is."""
+    effect, grown = candidate.effect, model.with_effect(candidate.effect, (candidate.joint,))
+    if not candidate.nonlinear:
+        return effect.coefficients()[0].name, grown.coefficients[len(model.coefficients)].unit
+    values = grown.shape_values[grown.last_shapes]
+    first = next(v for v in values if v.shape.start is not None)
+    return first.shape.name, first.unit
+
+
 def further(model: Model, candidate: Candidate) -> list[dict[str, float]]:
     """Sets of shape values to try beyond an effect's start, at which its torque is no multiple of
     its slope there."""

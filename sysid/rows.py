@@ -18,7 +18,7 @@ from .slides import counted
 from .stretches import stretches
 from .two_masses import link_load
 
-_ROUNDED = 1e-12  # of a torque: what rounding, and the third power of a step of 1e-4, leave of a difference
+_ROUNDED = 1e-12  # of a torque: what rounding, and the cube of a step of 1e-4, leave of a difference
 
 
 @dataclass(frozen=True)
@@ -124,7 +124,7 @@ def tangents(model: Model, motion: Motion, x, stride: int, use: np.ndarray, midd
             asked = lambda h: signatures(model, motion, pieces, effect, value.joint, [at, {**at, value.shape.name: model.shapes[k] + h}], stride, use)  # noqa: B023, E731
             try:
                 here, there = asked(step)
-            except NotFinite:  # at the end of a formula's domain the slope is that of the other side
+            except NotFinite:  # at the end of a formula's domain: the slope of the other side
                 step = -step
                 here, there = asked(step)
             own = [i for i, c in enumerate(model.coefficients) if (c.term, c.joint) == (value.term, value.joint)]
@@ -153,7 +153,7 @@ def difference_step(value, at: float) -> float:
 
 
 def seen(model: Model, motion: Motion) -> list:
-    """Each whole piece as the effects of a model see it: moved, with the load that its bodies need."""
+    """Each whole piece as effects of a model see it: moved, with the load that its bodies need."""
     return [model.seen(piece) for piece in motion.pieces]
 
 
@@ -223,7 +223,8 @@ def low_passed(motion: Motion, torque: list[np.ndarray], stride: int) -> np.ndar
     """What sensors show of torque (..., dof, n) over each whole piece, on the rows that a stride keeps, as both sides are seen."""
     out = []
     for piece, rows, whole in zip(motion.pieces, starts(motion, stride), torque):
-        out.append(np.stack([piece.settled(whole[..., j, :], rows, j) for j in range(whole.shape[-2])], axis=-2))
+        each = [piece.settled(whole[..., j, :], rows, j) for j in range(whole.shape[-2])]
+        out.append(np.stack(each, axis=-2))
     return np.concatenate(out, axis=-1)
 
 

@@ -41,6 +41,19 @@ def _convolved(values, weights) -> np.ndarray:
     return out.reshape(values.shape)
 
 
+def rate(values, step: float, half: int, order: int) -> np.ndarray:
+    """Rate (..., n) of values (..., n) `step` seconds apart, n > 2 half: that of the polynomial fitted to `half` samples on either side; of
+    the first and the last window, at either end."""
+    length = 2 * half + 1
+    u = np.arange(-half, half + 1) / half
+    rows = np.linalg.pinv(np.vander(u, order + 1, increasing=True))
+    slopes = np.vander(u, order, increasing=True) @ (np.arange(1, order + 1)[:, None] * rows[1:]) / (half * step)  # at each sample of a window
+    out = np.moveaxis(_convolved(np.moveaxis(values, -1, 0), slopes[half]), 0, -1)
+    out[..., :half] = values[..., :length] @ slopes[:half].T
+    out[..., -half:] = values[..., -length:] @ slopes[-half:].T
+    return out
+
+
 class Smoother:
     """A linear, zero-phase filter over samples, with the reach [samples] of its memory."""
 

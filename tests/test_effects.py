@@ -226,6 +226,17 @@ def test_lag_is_undone_by_its_low_pass():
     np.testing.assert_allclose(made[2:-2], T * 2.0 * np.pi * 10.0 * np.cos(turns)[2:-2], atol=0.006 * T * 2.0 * np.pi * 10.0)
 
 
+def test_noise_of_the_predicted_torque_does_not_shorten_a_lag():
+    """Least squares of what a lag makes of a torque on the rate of a noisy one: differences of neighbours find half of the lag."""
+    t, T, lag = np.arange(20000) * 0.001, 0.01, vocabulary.find("current_lag")
+    torque, turns = np.sin(2.0 * np.pi * t) + 0.5 * np.cos(14.0 * t), np.cos(2.0 * np.pi * t) * 2.0 * np.pi - 7.0 * np.sin(14.0 * t)
+    noisy = torque + np.random.default_rng(4).normal(scale=0.01, size=t.shape)
+    late = torque + T * turns - noisy
+    found = lambda rate: np.sum(late * rate) / np.sum(rate**2)  # noqa: E731
+    assert found(lag.sensed(noisy[None], 0.001, 1.0)[0] - noisy) == pytest.approx(T, rel=0.02)
+    assert found(np.gradient(noisy, 0.001)) < 0.6 * T
+
+
 def test_gain_multiplies():
     np.testing.assert_allclose(vocabulary.find("torque_gain").sensed(np.array([[1.0, -2.0]]), 0.01, 0.3), [[1.3, -2.6]])
 

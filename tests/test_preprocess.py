@@ -10,7 +10,7 @@ from sysid import filters
 from sysid.errors import ConfigError, LogError, SysidWarning
 from sysid.log import Log, Segment
 from sysid.preprocess import prepare
-from sysid.smoother import Smoother, _convolved, savitzky_golay
+from sysid.smoother import Smoother, _convolved, rate, savitzky_golay
 from sysid.specs import PreprocessSpec
 from tests.problems import arm, arm_log
 
@@ -48,6 +48,15 @@ def test_savitzky_golay_is_scipy_s(length, order):
         theirs = savgol_filter(values, length, order, deriv=derivative, delta=STEP, axis=0)[half:-half]
         # scipy fits in powers of sample numbers up to 50^4 and keeps nine digits
         np.testing.assert_allclose(ours, theirs, atol=1e-8 * np.abs(theirs).max())
+
+
+@pytest.mark.parametrize("half", [2, 5, 20])
+def test_rate_is_scipy_s_to_both_ends(half):
+    from scipy.signal import savgol_filter
+
+    values = np.random.default_rng(half).normal(size=(2, 3, 90))
+    theirs = savgol_filter(values, 2 * half + 1, 4, deriv=1, delta=STEP, axis=-1)
+    np.testing.assert_allclose(rate(values, STEP, half, 4), theirs, rtol=1e-9, atol=1e-9 * np.abs(theirs).max())
 
 
 def test_savitzky_golay_of_a_high_order_is_still_a_fit():

@@ -196,7 +196,7 @@ def test_each_joint_is_said_in_a_paragraph():
         f"{FIRST}: missing: cogging and payload of the whole robot; "
         "with all that is named 95 % of the misfit is explained"
     )
-    assert "from 0.4 to 0.11 N m" in first and "cogging takes 94 % of what was left: a1" in first
+    assert "from 0.4 to 0.11 N m" in first and "cogging takes 94 % of what was left; with all that is named a1" in first
     assert "payload takes 94 % of what was left on all joints add it with" in first
     assert "add x spring" not in first and "a1 = 1.235 +- 0.012 N m, k = 101 1/rad" in first
     assert (

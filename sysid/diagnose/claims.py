@@ -1,8 +1,10 @@
 """What the search found, as `sysid add` gives it: each effect written into the experiment and
 fitted as the user's fit is.
 
-So what a diagnosis states is what comes of it. The test logs may only refuse; where they refuse the
-likeliest of what the training logs cannot tell apart, the next one is fitted.
+So what a diagnosis states is what comes of it; of several effects, what comes of all: one that is
+still missing bends the parameters of another, which no deviation knows. The test logs may only
+refuse; where they refuse the likeliest of what the training logs cannot tell apart, the next one is
+fitted.
 """
 
 from __future__ import annotations
@@ -40,6 +42,12 @@ class Claim:
     def head(self) -> Finding:
         """What is claimed."""
         return self.findings[0]
+
+    def beside_all(self, step: Step, last: Fit) -> Claim:
+        """The claim of a step, with the parameters that the fit of all claims gives it."""
+        numbers = last.parameters_of(*self.head.candidate.key)
+        head = replace(self.head, parameters=numbers)
+        return replace(self, step=step, findings=(head, *self.findings[1:]))
 
 
 def claimed(
@@ -87,7 +95,7 @@ def claimed(
     claims, own = list(stands.values()), [claim.step for claim in stands.values()]
     if any(one.choice.head is not other.choice.head for one, other in zip(own, steps)):
         own = rejoined(steps[0].before, own)  # without what is refused
-    claims = [replace(claim, step=step) for claim, step in zip(claims, own)]
+    claims = [claim.beside_all(step, last) for claim, step in zip(claims, own)]
     return claims, [words for _, words in refused.values()]
 
 

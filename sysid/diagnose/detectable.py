@@ -15,7 +15,7 @@ import numpy as np
 from scipy.special import ndtri
 
 from ..blocks import Belief, ratio_at
-from ..candidate_columns import at_start
+from ..candidate_columns import at_start, leading_of
 from ..candidates import Candidate
 from ..model_parameters import ROBOT
 from ..view import View
@@ -44,7 +44,7 @@ def detectable(view: View, asked: Asked, candidates) -> list[Detectable]:
     """For every candidate's best set of shape values and variant."""
     threshold = asked.threshold(LEVEL)
     loss = np.maximum(np.sum(view.design.residual**2, axis=0), 1e-300)
-    best, leading = dict[tuple, Detectable](), cache(partial(_leading, view))
+    best, leading = dict[tuple, Detectable](), cache(partial(leading_of, view.model))
     for candidate in candidates:
         # a force from outside has none until somebody says when it acts
         if candidate.parameters and not candidate.begins:
@@ -64,15 +64,6 @@ def detectable(view: View, asked: Asked, candidates) -> list[Detectable]:
             at = {shape: own for shape, own in group.shapes.items() if shape != name}
             best[group.candidate.key] = Detectable(group.candidate, name, unit, size, POWER, at)
     return list(best.values())
-
-
-def _leading(view: View, candidate: Candidate) -> tuple[str, str]:
-    effect = candidate.effect
-    grown = view.model.with_effect(effect, (candidate.joint,))
-    if not candidate.nonlinear:
-        return effect.coefficients()[0].name, grown.coefficients[len(view.model.coefficients)].unit
-    first = next(v for v in grown.shape_values[grown.last_shapes] if v.shape.start is not None)
-    return first.shape.name, first.unit
 
 
 def _size(group: Group, threshold: float, loss: np.ndarray, belief: Belief) -> float:

@@ -20,9 +20,9 @@ class Finding:
 
     joint: its name, or `*`. p: family-wise p-value of its set; probability: of being the best of
     its set. rms_before, rms_after: on the test logs, on its joint (over all joints for `*`), of the
-    fits without it and with it. parameters: {name: (value, std or NaN, unit)} of the fit with it.
-    tied_with: words of the others of its set, with their joint where it is another. step: which
-    step of the search it heads, or None. command: what adds it.
+    fits without it and with it. parameters: {name: (value, std or NaN, unit)} of the fit with it,
+    of a claim with all that is claimed. tied_with: words of the others of its set, with their joint
+    where it is another. step: which step of the search it heads, or None. command: what adds it.
     """
 
     member: Member

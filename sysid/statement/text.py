@@ -153,11 +153,12 @@ def _head(f: dict, of: Told, joint: str, width: int, said: dict[str, str]) -> li
     said[f["command"]] = joint
     told = [(name.rpartition(".")[2], p) for name, p in f["parameters"].items()]
     values = [valued(name, p) for name, p in told if p["value"] is not None]
-    takes = ""
-    if len(of.sets) > 1 and f["misfit_known"]:
+    takes, beside = "", "with all that is named " if len(of.sets) > 1 else ""
+    if beside and f["misfit_known"]:
         where = "" if f["joint"] == joint else " on all joints"
         takes = f" takes {percent(max(f['misfit_removed'], 0.0))} of what was left{where}"
-    words = f"  {f['effect']}{takes}" + (f": {', '.join(values)}" if values else "")
+    numbers = f"{';' if takes else ':'} {beside}{', '.join(values)}" if values else ""
+    words = f"  {f['effect']}{takes}{numbers}"
     out = wrapped(words, width, "    ") if takes or values else []
     for name, value in f["options"].items():
         out += wrapped(f"  {name} {value}: {f['options_say'][name]}", width, "    ")
