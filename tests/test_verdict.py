@@ -454,6 +454,14 @@ def test_a_law_stands_beside_what_is_claimed():
     assert by(0.3).status == "missing" and by(0.9).status == "unknown" and by(0.9).left.share == pytest.approx(0.9)
 
 
+def test_what_explains_the_training_logs_alone_may_be_another_law():
+    """At the floor there, and far above it on the test logs, where a function of the motion predicts all that is left."""
+    some = [claim("joint_coupling", "elbow", [0.0, 0.87], fitted(1.9, train=1.02))]
+    by = lambda share: verdicts(fitted(3.2, train=1.9), some, [NOISE, left(0.2)], [floor(), floor()], law=lambda j: Law(1e-9, "qd_elbow", share))[1]  # noqa: E731
+    assert by(0.99).status == "unknown" and by(0.99).explained == pytest.approx(0.72, abs=0.01)
+    assert by(0.3).status == "missing"
+
+
 @pytest.mark.parametrize(("gain", "chance"), [(0.3, 0.2), (0.5 * WORTH, 1e-3)])
 def test_blocks_that_agree_by_chance_or_on_little_say_nothing(gain, chance):
     assert asked_of_elbow(3.0, gain=gain, chance=chance)[0].status == "unresolved"

@@ -101,7 +101,8 @@ def verdicts(
         part = remains.share if remains else 1.0
         looks = near(j, part * seen.total, bool(remains))
         looks = looks or in_vain(refused, fit.joints, j, HALF * part)
-        taken = sum(c.step.shares[j] for c in own)
+        # of whichever logs they explain less of: where these do not carry over, another law may
+        taken = max(min(sum(c.step.shares[j] for c in own), explained), 0.0)
         little = remains is None or remains.share * max(1.0 - taken, 0.0) <= _LEFT * taken
         further = beyond(j, looks[0]) if looks and remains and beyond and not own else None
         further = further if further and further.predicts(among, WORTH) else None
