@@ -21,6 +21,7 @@ from .prior_weight import PriorWeight, is_auto, with_weight
 from .specs import Experiment
 
 _PASSES, _NEAR = 3, 0.1  # refinements on all rows; of a standard deviation, or of a value's range
+_PART = 0.25  # of a step that led uphill
 _ROUNDS = 3  # of a prior's weight and the shape values under it
 
 
@@ -68,9 +69,14 @@ def refined(experiment: Experiment, structure: Model, motion: Motion, prior, nea
             structure, slopes = again.model, Linearised(again.model, again.x)
             data = compress(slopes, motion)
         fit = identify(weighed, structure, motion, data, prior, near=slopes.x)
-        # blows make valleys narrower than a step, and slopes say little at a corner, or where others do nearly the same: the
-        # last step is taken back; not the load that was renewed with it, which may cost more than the one before
+        # blows make valleys narrower than a step, and slopes say little at a corner, or where others do nearly the same: part of
+        # the last step is tried, and it is taken back; not the load that was renewed with it, which may cost more than the one before
         if best is not None and fit.objective > best[0]:
+            if number < _PASSES - 1:
+                begun = np.array(best[1].shapes)
+                structure = structure.with_shapes(begun + _PART * (np.array(structure.shapes) - begun))
+                slopes = Linearised(structure, best[2].x)
+                continue
             if structure.uses_load and not structure.deflects:
                 structure = structure.with_shapes(best[1].shapes)
                 return structure, Linearised(structure, best[2].x), searched, best[3]

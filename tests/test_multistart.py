@@ -216,13 +216,26 @@ def test_a_correction_that_makes_it_worse_is_taken_back(effects, monkeypatch):
     assert fit.objective < identify(experiment, worse, motion, compress(Linearised(worse, fit.x), motion), prior).objective
 
 
+def test_of_a_correction_that_leads_too_far_a_part_is_kept(monkeypatch):
+    """The rows in memory put a value a little beside where all rows have it, and slopes there lead four times too far."""
+    experiment, _, motion, prior = too_little_friction()
+    structure = pipeline.build(experiment)[1].measured_by(motion)
+    best, *_ = shape_refinement.refined(experiment, structure, motion, prior)
+    beside = shape.settle(experiment, best.with_shapes([best.shapes[0] + 0.1]), motion, prior, hold=True)
+    monkeypatch.setattr(shape, "settle", lambda *_, **__: beside)
+    steps = iter([-0.4, 0.0])
+    monkeypatch.setattr(shape, "correction", lambda fit, data: np.array([next(steps)]))
+    model, *_ = shape_refinement.refined(experiment, structure, motion, prior)
+    assert model.shapes[0] == pytest.approx(best.shapes[0], abs=1e-9)
+
+
 def test_damped_steps_stay_within_their_bounds():
     """What a bound takes of one value the others answer: the least of the quadratic within them."""
     system, right = np.array([[2.0, 1.8], [1.8, 2.0]]), np.array([4.0, 0.0])
     low, high = np.array([-1.0, -9.0]), np.array([1.0, 9.0])
-    step = shape._damped(system, right, 0.0, low, high)
+    step = shape._damped(system, right, 0.0, low=low, high=high)
     np.testing.assert_allclose(step, [1.0, -0.9], atol=1e-9)  # a clipped step would have -9
-    small = shape._damped(system, right, 1e6, low, high)
+    small = shape._damped(system, right, 1e6, low=low, high=high)
     np.testing.assert_allclose(small, right / (1e6 * np.diagonal(system)), rtol=1e-4, atol=1e-9)
 
 
