@@ -227,14 +227,22 @@ def test_lag_is_undone_by_its_low_pass():
 
 
 def test_noise_of_the_predicted_torque_does_not_shorten_a_lag():
-    """Least squares of what a lag makes of a torque on the rate of a noisy one: differences of neighbours find half of the lag."""
+    """Least squares of what a lag makes of a torque on the rate of a noisy one: differences of neighbours find little more than half of it."""
     t, T, lag = np.arange(20000) * 0.001, 0.01, vocabulary.find("current_lag")
     torque, turns = np.sin(2.0 * np.pi * t) + 0.5 * np.cos(14.0 * t), np.cos(2.0 * np.pi * t) * 2.0 * np.pi - 7.0 * np.sin(14.0 * t)
     noisy = torque + np.random.default_rng(4).normal(scale=0.01, size=t.shape)
     late = torque + T * turns - noisy
     found = lambda rate: np.sum(late * rate) / np.sum(rate**2)  # noqa: E731
-    assert found(lag.sensed(noisy[None], 0.001, 1.0)[0] - noisy) == pytest.approx(T, rel=0.02)
+    assert found((lag.sensed(noisy[None], 0.001, T)[0] - noisy) / T) == pytest.approx(T, rel=0.02)
     assert found(np.gradient(noisy, 0.001)) < 0.6 * T
+
+
+def test_what_a_lag_makes_does_not_jump_with_its_time_constant():
+    """The window grows with it, by parts of a sample: a sum of a mean and what a sample more adds to it."""
+    lag, torque = vocabulary.find("current_lag"), np.random.default_rng(3).normal(size=(1, 300))
+    steps = np.linspace(0.0, 0.09, 4000)
+    made = np.stack([lag.sensed(torque, 0.001, T)[0] for T in steps])
+    assert np.abs(np.diff(made, axis=0)).max() < 0.02 * np.abs(made - torque).max()
 
 
 def test_gain_multiplies():

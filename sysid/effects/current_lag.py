@@ -6,15 +6,16 @@ from ..effect import SensorEffect
 from ..effect_parameters import Shape
 from ..smoother import rate
 
-_HALF = 0.02  # s: makes half a per cent too little of 10 Hz and 7 % of 20 Hz, where a motion has hardly any torque and noise most of its rate
+_HALF = 1.0  # time constants: makes half a per cent too little of the rate at 1.3 times the loop's corner, 7 % at 2.5 times
 _DEGREE = 4
 
 
 class CurrentLag(SensorEffect):
     """The torque that acts is the commanded or logged one through the current loop's low-pass of time constant T.
 
-    The rate of the torque is that of a polynomial fitted to 20 ms on either side, to two samples at least and `reach` at most (Savitzky &
-    Golay 1964): differences of neighbours make most of the angles' noise, and that would pull T towards zero.
+    The rate of the torque is that of a polynomial fitted to one time constant on either side, to two samples at least and `reach` at most
+    (Savitzky & Golay 1964): a loop passes little of what is faster, and of differences of neighbours the angles' noise makes most, which
+    would pull T towards zero.
     """
 
     name = "current_lag"
@@ -32,7 +33,13 @@ class CurrentLag(SensorEffect):
         n = torque.shape[-1]
         if n < 2 or not T:
             return torque
-        half = min(max(_DEGREE // 2, round(_HALF / step)), self.reach, (n - 1) // 2)
-        if 2 * half < _DEGREE:
+        most = min(self.reach, (n - 1) // 2)
+        if 2 * most < _DEGREE:
             return torque + T * np.gradient(torque, step, axis=-1)
-        return torque + T * rate(torque, step, half, _DEGREE)
+        # between two whole numbers of samples a mean of both: what is fitted to T may not jump
+        half = float(np.clip(_HALF * T / step, _DEGREE // 2, most))
+        lower = min(int(half), most - 1) if half > _DEGREE // 2 else _DEGREE // 2
+        slope = rate(torque, step, lower, _DEGREE)
+        if half > lower:
+            slope += (half - lower) * (rate(torque, step, lower + 1, _DEGREE) - slope)
+        return torque + T * slope
