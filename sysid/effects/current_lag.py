@@ -6,7 +6,6 @@ from ..effect import SensorEffect
 from ..effect_parameters import Shape
 from ..smoother import rate
 
-_HALF = 1.0  # time constants: makes half a per cent too little of the rate at 1.3 times the loop's corner, 7 % at 2.5 times
 _DEGREE = 4
 
 
@@ -14,8 +13,8 @@ class CurrentLag(SensorEffect):
     """The torque that acts is the commanded or logged one through the current loop's low-pass of time constant T.
 
     The rate of the torque is that of a polynomial fitted to one time constant on either side, to two samples at least and `reach` at most
-    (Savitzky & Golay 1964): a loop passes little of what is faster, and of differences of neighbours the angles' noise makes most, which
-    would pull T towards zero.
+    (Savitzky & Golay 1964), which makes half a per cent too little of it at 1.3 times the loop's corner, and 7 % at 2.5 times. A loop
+    passes little of what is faster, and of differences of neighbours the angles' noise makes most, which would pull T towards zero.
     """
 
     name = "current_lag"
@@ -36,10 +35,9 @@ class CurrentLag(SensorEffect):
         most = min(self.reach, (n - 1) // 2)
         if 2 * most < _DEGREE:
             return torque + T * np.gradient(torque, step, axis=-1)
-        # between two whole numbers of samples a mean of both: what is fitted to T may not jump
-        half = float(np.clip(_HALF * T / step, _DEGREE // 2, most))
-        lower = min(int(half), most - 1) if half > _DEGREE // 2 else _DEGREE // 2
-        slope = rate(torque, step, lower, _DEGREE)
-        if half > lower:
-            slope += (half - lower) * (rate(torque, step, lower + 1, _DEGREE) - slope)
+        half = float(np.clip(T / step, _DEGREE // 2, most))
+        whole = int(half)
+        slope = rate(torque, step, whole, _DEGREE)
+        if half > whole:  # a mean of two windows: what is fitted to T may not jump
+            slope += (half - whole) * (rate(torque, step, whole + 1, _DEGREE) - slope)
         return torque + T * slope
