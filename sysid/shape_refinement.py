@@ -70,7 +70,7 @@ def refined(experiment: Experiment, structure: Model, motion: Motion, prior, nea
             data = compress(slopes, motion)
         fit = identify(weighed, structure, motion, data, prior, near=slopes.x)
         # blows make valleys narrower than a step, and slopes say little at a corner, or where others do nearly the same: part of
-        # the last step is tried, and it is taken back; not the load that was renewed with it, which may cost more than the one before
+        # the last step is tried, else it is taken back; not the load that was renewed with it, which may cost more than the one before
         if best is not None and fit.objective > best[0]:
             if number < _PASSES - 1:
                 begun = np.array(best[1].shapes)

@@ -20,9 +20,15 @@ def savitzky_golay(length: int, order: int, derivative: int, step: float) -> np.
     Source: Savitzky & Golay 1964.
     """
     half = length // 2
-    u = np.arange(-half, half + 1) / half  # on [-1, 1], where powers stay apart
-    rows = np.linalg.pinv(np.vander(u, order + 1, increasing=True))
+    _, rows = _fitted(half, order)
     return rows[derivative] * math.factorial(derivative) / (half * step) ** derivative
+
+
+def _fitted(half: int, order: int) -> tuple[np.ndarray, np.ndarray]:
+    """Places (n,) in a window of 2 half + 1 samples, on [-1, 1], where powers stay apart, and the weights (order + 1, n) that give the
+    coefficients of the polynomial fitted to it."""
+    u = np.arange(-half, half + 1) / half
+    return u, np.linalg.pinv(np.vander(u, order + 1, increasing=True))
 
 
 def differences(q, step: float) -> tuple[np.ndarray, np.ndarray]:
@@ -41,17 +47,31 @@ def _convolved(values, weights) -> np.ndarray:
     return out.reshape(values.shape)
 
 
-def rate(values, step: float, half: int, order: int) -> np.ndarray:
-    """Rate (..., n) of values (..., n) `step` seconds apart, n > 2 half: that of the polynomial fitted to `half` samples on either side; of
-    the first and the last window, at either end."""
-    length = 2 * half + 1
-    u = np.arange(-half, half + 1) / half
-    rows = np.linalg.pinv(np.vander(u, order + 1, increasing=True))
-    slopes = np.vander(u, order, increasing=True) @ (np.arange(1, order + 1)[:, None] * rows[1:]) / (half * step)  # at each sample of a window
-    out = np.moveaxis(_convolved(np.moveaxis(values, -1, 0), slopes[half]), 0, -1)
-    out[..., :half] = values[..., :length] @ slopes[:half].T
-    out[..., -half:] = values[..., -length:] @ slopes[-half:].T
+def rate(values, step: float, half: float, order: int) -> np.ndarray:
+    """Rate (..., n) of values (..., n) `step` seconds apart: that of the polynomial fitted to `half` samples on either side; of the first
+    and the last window, at either end.
+
+    Args:
+        half: at most (n - 1) / 2; between two whole numbers the mean of both, so that nothing jumps with it.
+    """
+    whole = int(half)
+    slopes = _slopes(whole, order, step)
+    if half > whole:
+        wider = _slopes(whole + 1, order, step)
+        same = np.zeros_like(wider)  # the narrower window about each place of the wider one
+        same[: whole + 1, :-2], same[whole + 1, 1:-1], same[whole + 2 :, 2:] = slopes[: whole + 1], slopes[whole], slopes[whole:]
+        slopes = same + (half - whole) * (wider - same)
+    length, middle = len(slopes), len(slopes) // 2
+    out = np.moveaxis(_convolved(np.moveaxis(values, -1, 0), slopes[middle]), 0, -1)
+    out[..., :middle] = values[..., :length] @ slopes[:middle].T
+    out[..., -middle:] = values[..., -length:] @ slopes[-middle:].T
     return out
+
+
+def _slopes(half: int, order: int, step: float) -> np.ndarray:
+    """Weights (n, n) that give the rate at each of the n = 2 half + 1 samples of a window."""
+    u, rows = _fitted(half, order)
+    return np.vander(u, order, increasing=True) @ (np.arange(1, order + 1)[:, None] * rows[1:]) / (half * step)
 
 
 class Smoother:

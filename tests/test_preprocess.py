@@ -59,6 +59,12 @@ def test_rate_is_scipy_s_to_both_ends(half):
     np.testing.assert_allclose(rate(values, STEP, half, 4), theirs, rtol=1e-9, atol=1e-9 * np.abs(theirs).max())
 
 
+def test_rate_between_two_windows_is_their_mean():
+    values = np.random.default_rng(6).normal(size=(2, 40))
+    narrow, wide = (rate(values, STEP, half, 4) for half in (5, 6))
+    np.testing.assert_allclose(rate(values, STEP, 5.25, 4), 0.75 * narrow + 0.25 * wide, atol=1e-9 * np.abs(narrow).max())
+
+
 def test_savitzky_golay_of_a_high_order_is_still_a_fit():
     """Order 9 over 401 samples: powers of sample numbers have no digits left there (scipy's filter returns zero)."""
     t = np.linspace(-1, 1, 2001)

@@ -36,8 +36,4 @@ class CurrentLag(SensorEffect):
         if 2 * most < _DEGREE:
             return torque + T * np.gradient(torque, step, axis=-1)
         half = float(np.clip(T / step, _DEGREE // 2, most))
-        whole = int(half)
-        slope = rate(torque, step, whole, _DEGREE)
-        if half > whole:  # a mean of two windows: what is fitted to T may not jump
-            slope += (half - whole) * (rate(torque, step, whole + 1, _DEGREE) - slope)
-        return torque + T * slope
+        return torque + T * rate(torque, step, half, _DEGREE)
