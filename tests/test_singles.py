@@ -78,8 +78,9 @@ def test_draws_are_fitted_by_the_model_as_the_residual_is():
     p.root = 0.0 * p.root
     view = viewed(p)
     asker = _Asker(view, 1, np.random.default_rng(0), 200)
-    assert np.abs(asker.told[-1]).max() < 1e-3 * np.abs(asker.told[0]).max()
-    assert asker.rows.shape == (N, 201) and np.std(asker.loss[1:]) < 0.3 * np.mean(asker.loss[1:])
+    told = asker.told_of_drawn
+    assert np.abs(told[-1]).max() < 1e-3 * np.abs(told[0]).max()
+    assert asker.drawn.shape == (N, 200) and np.std(asker.loss[1:]) < 0.3 * np.mean(asker.loss[1:])
 
 
 def test_the_greatest_stands_out_as_often_as_its_chance_says():
@@ -158,7 +159,7 @@ def test_what_is_there_is_the_greatest_and_comes_back_whole():
 def test_a_long_log_is_asked_beside_fewer_draws(monkeypatch):
     p, columns = problem()
     monkeypatch.setattr("sysid.view.singles._MOST", 60.0 * N)
-    assert _Asker(viewed(p), 1, np.random.default_rng(0), _draws(viewed(p))).rows.shape == (N, 61)
+    assert _Asker(viewed(p), 1, np.random.default_rng(0), _draws(viewed(p))).drawn.shape == (N, 60)
     p.tau[:, 1] += 2.0 * columns[:, 2]
     found = greatest([viewed(p)], 1, lambda: [(list("abcdef"), twice(columns))], np.random.default_rng(0))
     assert found.words == "c" and found.chance < 1e-4

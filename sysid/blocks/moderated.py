@@ -20,6 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 
 _FEWEST = 10  # ratios whose quartiles tell anything
+_SIZES = np.geomspace(0.05, 1e4, 100)  # of ratios
 _LEAST, _MOST = 0.5, 100.0  # degrees of freedom: fewer count for nothing, more make no difference
 
 
@@ -39,15 +40,25 @@ class Belief:
             seen, foreseen, own: as of `believed`. drawn: (..., sums) what draws see in place of
                 `seen`.
         """
-        from scipy.special import fdtrc  # not scipy.stats, whose import takes longer than a fit
 
         drawn = seen if drawn is None else drawn
         if not self.freedom:
             return drawn, own
         foreseen = self.scale * np.asarray(foreseen)
-        louder = fdtrc(own, self.freedom, np.asarray(seen) / np.maximum(foreseen, 1e-300))
-        more = self.freedom * np.minimum(1.0, 2.0 * louder)
+        ratio = np.asarray(seen) / np.maximum(foreseen, 1e-300)
+        more = self.freedom * np.minimum(1.0, 2.0 * _beyond(ratio, own, self.freedom))
         return (own * drawn + more * foreseen) / (own + more), own + more
+
+
+def _beyond(ratio, own, freedom: float):
+    """Probability of F ratios (..., sums) as great, with `own` (sums,) and `freedom` degrees of
+    freedom; of many draws to a hundredth, by lines between the sizes of a table."""
+    from scipy.special import fdtrc  # not scipy.stats, whose import takes longer than a fit
+
+    if ratio.ndim < 2 or len(ratio) <= len(_SIZES):
+        return fdtrc(own, freedom, ratio)
+    known = fdtrc(own[:, None], freedom, _SIZES)
+    return np.stack([np.interp(r, _SIZES, p) for r, p in zip(ratio.T, known)], axis=1)
 
 
 def believed(seen, foreseen, own, most: float = _MOST) -> Belief:

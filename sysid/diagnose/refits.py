@@ -37,20 +37,19 @@ class Member:
     @property
     def shapes(self) -> dict[str, float]:
         """Its shape values, refitted."""
-        return shapes_of(self.view)
+        return shapes_of(self.view, self.candidate)
 
 
-def refitted(view: View, group: Group) -> Member | None:
+def refitted(view: View, group: Group, found: View | None = None) -> Member | None:
     """A group's candidate in the model, everything settled again; None where its sign or its bounds
-    forbid it, or where it leaves more than the model without it."""
-    candidate = group.candidate
-    shapes = dict(group.shapes)
-    if candidate.nonlinear and at_start(candidate, shapes):
+    forbid it, or where it leaves more than the model without it. found: where it is at hand."""
+    candidate, shapes = group.candidate, dict(group.shapes)
+    if found is None and candidate.nonlinear and at_start(candidate, shapes):
         free = [s for s, *_ in bounds_of(view.model, candidate) if s.start is not None]
         limits = {s.name: (low, high) for s, low, high, _ in bounds_of(view.model, candidate)}
         for shape, step in zip(free, group.coefficients):
             shapes[shape.name] = float(np.clip(shapes[shape.name] + step, *limits[shape.name]))
-    found = joined(view, (candidate, shapes))
+    found = found or joined(view, (candidate, shapes))
     left = [np.sum(one.design.residual**2) for one in (view, found)]
     may = allowed(found, candidate) and left[1] <= left[0]
     return Member(group, found, losses(found, view.blocks)) if may else None
@@ -64,6 +63,6 @@ def settled(view: View, group: Group) -> Group | None:
     if after is None or not allowed(after, member.candidate):
         return None
     seen = around(view, after, member.candidate)
-    found = groups_at(seen, [(member.candidate, shapes_of(after))])
+    found = groups_at(seen, [(member.candidate, shapes_of(after, member.candidate))])
     # what it takes stands in the noise no more
     return replace(found[0], loss=np.inf) if found else None

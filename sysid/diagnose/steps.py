@@ -71,31 +71,32 @@ def _revised_once(first: View, steps: list[Step], worth: float, stirred: set[int
     for number, step in enumerate(steps[:-1]):
         if step.candidate.joint not in stirred:
             continue
-        before, later = steps[:number], steps[number + 1 :]
+        before, later, own = steps[:number], steps[number + 1 :], step.candidate
         others = [(s.candidate, s.choice.head.shapes) for s in (*before, *later)]
-        without = joined(first, *((c, shapes_in(last, c, own)) for c, own in others), like=last)
+        without = joined(first, *((c, shapes_in(last, c, at)) for c, at in others), like=last)
         groups = groups_at(without, [(m.candidate, m.asked) for m in step.choice.close])
         least = NEAR * max((group.taken for group in groups), default=0.0)
-        own = step.candidate.key
-        near = [group for group in groups if group.candidate.key == own or group.taken >= least]
-        found = chosen(without, near, np.random.default_rng(1))
+        near = [g for g in groups if g.candidate.key == own.key or g.taken >= least]
+        found = chosen(without, near, np.random.default_rng(1), {id(own): last})
         if found is None or not found.worth_having(worth):
             return rejoined(first, [*before, *later]), step.changed
-        if found.head.candidate.key != own:
-            again = replace(step, choice=found, shares=found.shares)
+        if found.head.candidate.key != own.key:
+            again = replace(step, choice=found, before=without, shares=found.shares)
             return rejoined(first, [*before, again, *later]), step.changed | again.changed
         steps = [*before, replace(step, choice=found), *later]
     return steps, set()
 
 
 def rejoined(first: View, steps: list[Step]) -> list[Step]:
-    """The heads of steps, joined one after another anew."""
+    """The heads of steps, joined one after another anew from where another view is before one."""
     out: list[Step] = []
     for step in steps:
         view = out[-1].after if out else first
         there = {other.candidate.key for other in steps if other is not step}
         step = replace(step, choice=step.choice.without(there))
-        after = joined(view, (step.candidate, step.choice.head.shapes))
-        shares = taken(view, losses(view, view.blocks), losses(after, view.blocks))
-        out.append(Step(step.choice, step.p, view, weighed(after), shares))
+        if step.before is not view:
+            after = joined(view, (step.candidate, step.choice.head.shapes))
+            shares = taken(view, losses(view, view.blocks), losses(after, view.blocks))
+            step = Step(step.choice, step.p, view, weighed(after), shares)
+        out.append(step)
     return out

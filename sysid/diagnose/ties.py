@@ -7,7 +7,7 @@ heads it, or hardly ever would, is told by these losses and by how many numbers 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -71,10 +71,10 @@ class Choice:
         return replace(self, members=tuple((m, p / whole) for m, p in kept))
 
 
-def chosen(view: View, groups: list[Group], rng: np.random.Generator) -> Choice | None:
+def chosen(view: View, groups: list[Group], rng, known: Mapping = {}) -> Choice | None:
     """The best of some candidates, refitted, and those that cannot be told from it; None where none
-    may be."""
-    members = [m for m in (refitted(view, g) for g in groups) if m is not None]
+    may be. known: {id of a candidate: the view with it} that are at hand."""
+    members = [m for g in groups if (m := refitted(view, g, known.get(id(g.candidate))))]
     if not members:
         return None
     first, (view, members) = view, _even(view, members)

@@ -34,16 +34,16 @@ def joined(view: View, *added: tuple[Candidate, dict[str, float]], like: View | 
 
 
 def allowed(view: View, candidate: Candidate) -> bool:
-    """Whether what joined last does anything at all, with coefficients that may not be negative and
-    are not, or one of them is not and the others by no more than chance: of what acts by two of
-    which one is nothing, noise makes this one negative every other time."""
+    """Whether a candidate that joined does anything at all, with coefficients that may not be
+    negative and are not, or one of them is not and the others by no more than chance: of what acts
+    by two of which one is nothing, noise makes this one negative every other time."""
     model, first = view.model, 10 * view.model.bodies
     own = [k for k, c in enumerate(model.coefficients) if (c.effect, c.joint) == candidate.key]
     bound = first + np.array([k for k in own if model.coefficients[k].positive], dtype=int)
     below = bound[view.x[bound] <= 0.0]
     if 0 < len(below) and (len(below) == len(bound) or _clearly(view, below)):
         return False
-    starts = [(v.shape.start, at) for v, at in _own(view) if v.shape.start is not None]
+    starts = [(v.shape.start, at) for v, at in _own(view, candidate) if v.shape.start is not None]
     return not starts or any(at != start for start, at in starts)
 
 
@@ -78,11 +78,12 @@ def around(view: View, after: View, candidate: Candidate) -> View:
     found = placed(view.experiment, rest, view.motion, view.prior, x, **how)
     known = after.weights, found, view.blocks, (), after
     out = View(view.experiment, view.motion, view.rough, view.prior, view.stride, *known)
-    columns = columns_of(out.source, candidate, [shapes_of(after)])[0]
+    columns = columns_of(out.source, candidate, [shapes_of(after, candidate)])[0]
     if candidate.nonlinear:
         # from where it does nothing; a value that only says how has no torque of its own
-        steps = [0.0 if v.shape.start is None else at - v.shape.start for v, at in _own(after)]
-        leading = [step for (v, _), step in zip(_own(after), steps) if v.shape.start is not None]
+        own = _own(after, candidate)
+        steps = [0.0 if v.shape.start is None else at - v.shape.start for v, at in own]
+        leading = [step for (v, _), step in zip(own, steps) if v.shape.start is not None]
         values = np.array(leading[:1] if candidate.swings else steps)
     left = last.rows.residual(last.x) * after.weights
     joints = candidate.touches(view.model.robot.dof)
@@ -91,9 +92,9 @@ def around(view: View, after: View, candidate: Candidate) -> View:
     return out
 
 
-def shapes_of(view: View) -> dict[str, float]:
-    """The shape values of what joined last."""
-    return {v.shape.name: at for v, at in _own(view)}
+def shapes_of(view: View, candidate: Candidate) -> dict[str, float]:
+    """The shape values of a candidate that joined."""
+    return {v.shape.name: at for v, at in _own(view, candidate)}
 
 
 def shapes_in(view: View, candidate: Candidate, shapes: dict[str, float]) -> dict[str, float]:
@@ -105,10 +106,11 @@ def shapes_in(view: View, candidate: Candidate, shapes: dict[str, float]) -> dic
     return {name: found.get(name, at) for name, at in shapes.items()}
 
 
-def _own(view: View):
-    """The shape values of what joined last, and where they stand."""
-    own = view.model.last_shapes
-    return list(zip(view.model.shape_values[own], view.model.shapes[own]))
+def _own(view: View, candidate: Candidate):
+    """The shape values of a candidate that joined, and where they stand."""
+    model, terms = view.model, view.model.terms
+    known = zip(model.shape_values, model.shapes)
+    return [(v, at) for v, at in known if (terms[v.term][0].name, v.joint) == candidate.key]
 
 
 def _again(view: View, model, weights, **how) -> View:

@@ -52,7 +52,7 @@ def greatest(views, j: int, asked: Columns, rng: np.random.Generator) -> Single 
     """
     draws = min(_draws(view) for view in views)
     askers = [_Asker(view, j, rng, draws) for view in views]
-    ends = np.cumsum([len(asker.rows) for asker in askers for _ in range(2)])[:-1]
+    ends = np.cumsum([len(asker.residual) for asker in askers for _ in range(2)])[:-1]
     found: list[list[_Told]] = [[] for _ in views]
     places = []
     for part, (_, values) in enumerate(asked()):
@@ -175,24 +175,24 @@ class _Asker:
         self.columns, self.squares, self.freed = design.columns[j], sums.squares, sums.freed
         self.rough_columns, self.rough_squares = design.rough_columns[j], sums.rough_squares
         self.noise = design.rough_residual[:, j]
-        self.rows = np.column_stack([design.residual[:, j], fitted])
-        self.loss = np.sum(self.rows**2, axis=0)
-        first = (sums.scores - sums.rough_scores)[:, :, None]
-        self.told = np.concatenate([first, told], axis=2)
+        self.residual, self.drawn = design.residual[:, j], fitted.astype(np.float32)
+        self.loss = np.append(np.sum(self.residual**2), np.sum(fitted**2, axis=0))
+        self.told = sums.scores - sums.rough_scores
+        self.told_of_drawn = np.swapaxes(told, 1, 2).astype(np.float32)
 
     def _summed(self, values: np.ndarray, more: np.ndarray):
         """Over blocks, the prior's last, of weighted columns (n, k): squares of them, and off the
-        model; scores beside residual and draws; what the model takes of them, of all and mixed with
-        its own; and the squares of what the angles' noise adds to what is left of them."""
+        model; scores off the model; what the model takes of them, of all and mixed with its own;
+        and the squares of what the angles' noise adds to what is left of them."""
         parts, count = len(self.told), values.shape[1]
         cross = np.zeros((parts, self.columns.shape[1], count))
-        own, score = np.zeros((parts, count)), np.zeros((parts, self.rows.shape[1], count))
+        own, score = np.zeros((parts, count)), np.zeros((parts, count))
         for b, rows in enumerate(self.spans):
             cross[b] = self.columns[rows].T @ values[rows]
             own[b] = np.sum(values[rows] ** 2, axis=0)
-            score[b] = self.rows[rows].T @ values[rows]
-            score[b, 0] -= self.noise[rows] @ more[rows]
+            score[b] = self.residual[rows] @ values[rows] - self.noise[rows] @ more[rows]
         absorbed = cross.sum(0)  # in the design's directions, in which the system is one
+        score -= self.told @ absorbed
         mixed = cross - self.squares @ absorbed
         squares = own - np.einsum("bpk,pk->bk", cross + mixed, absorbed)
         noisy = self.rough_columns.T @ more
@@ -202,8 +202,8 @@ class _Asker:
 
     def apart(self, column: np.ndarray, more: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Scores and squares (blocks + 1,) of one weighted column (n, 1), off the model."""
-        _, squares, score, absorbed, *_ = self._summed(column, more)
-        return score[:, 0, 0] - self.told[:, :, 0] @ absorbed[:, 0], squares[:, 0]
+        _, squares, score, *_ = self._summed(column, more)
+        return score[:, 0], squares[:, 0]
 
     def told_by(self, values: np.ndarray, more: np.ndarray) -> _Told:
         """Of weighted columns (n, k), with what the angles' noise, once more, adds to them."""
@@ -220,21 +220,30 @@ class _Asker:
         good = known & (rest >= blocks.RESTING) & (most <= blocks.LEVERAGE)
         absorbed, mixed, squares = absorbed[:, good], mixed[:, :, good], squares[:, good]
         freed = self.freed @ mixed  # what the model's own columns took of a block's noise
-        back = np.swapaxes(self.told, 1, 2)
-        score = score[:, :, good]
-        score -= back @ absorbed
-        moves = back @ freed  # in place: these are the greatest arrays of a diagnosis
-        moves += score
-        loud_squares = squares + np.einsum("bpk,bpk->bk", mixed, freed)
         count, weight = weight.shape[1], weight[:, good]
         unit = np.sum(weight * squares, axis=0)
-        c = np.einsum("bg,bdg->dg", weight, score) / unit
-        moves -= loud_squares[:, None] * c
-        moves *= (weight / np.maximum(unit - weight * squares, 1e-12 * unit))[:, None]
-        # of a column of unit size
-        seen = unit * np.einsum("bdk,bdk->dk", moves, moves)
+        rest_of = weight / np.maximum(unit - weight * squares, 1e-12 * unit)
+        loud_squares = squares + np.einsum("bpk,bpk->bk", mixed, freed)
+
+        def told(score, moves):
+            c = np.einsum("bg,bdg->dg", weight, score) / unit
+            moves -= loud_squares[:, None] * c
+            moves *= rest_of[:, None]
+            # of a column of unit size
+            return np.sqrt(unit) * c, unit * np.einsum("bdk,bdk->dk", moves, moves)
+
+        score = score[:, None, good]
+        own = told(score, score + np.einsum("bp,bpk->bk", self.told, freed)[:, None])
+        # of draws these are the greatest arrays of a diagnosis: in single precision, and in place
+        back, single = self.told_of_drawn, values[:, good].astype(np.float32)
+        score = back @ -absorbed.astype(np.float32)
+        for b, rows in enumerate(self.spans):
+            score[b] += self.drawn[rows].T @ single[rows]
+        moves = back @ freed.astype(np.float32)
+        moves += score
+        c, seen = (np.concatenate(both) for both in zip(own, told(score, moves)))
         freedom = np.maximum(rest[good] - 1.0, 1.0)
-        return _Told(count, np.flatnonzero(good), unit, np.sqrt(unit) * c, seen, freedom)
+        return _Told(count, np.flatnonzero(good), unit, c, seen, freedom)
 
     def scores(self, told: list[_Told]) -> np.ndarray:
         """(1 + draws, k) of all columns that are kept, as normal variables with the sign of the
