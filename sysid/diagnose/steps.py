@@ -1,5 +1,4 @@
-"""Effects that joined the model one after another, and how they are chosen again with the
-others."""
+"""Effects that joined the model one after another, and how they are chosen again together."""
 
 from __future__ import annotations
 
@@ -81,21 +80,21 @@ def _revised_once(first: View, steps: list[Step], worth: float, stirred: set[int
         if found is None or not found.worth_having(worth):
             return rejoined(first, [*before, *later]), step.changed
         if found.head.candidate.key != own.key:
-            again = replace(step, choice=found, before=without, shares=found.shares)
+            again = replace(step, choice=found, shares=found.shares)
             return rejoined(first, [*before, again, *later]), step.changed | again.changed
         steps = [*before, replace(step, choice=found), *later]
     return steps, set()
 
 
 def rejoined(first: View, steps: list[Step]) -> list[Step]:
-    """The heads of steps, joined one after another anew from where another view is before one."""
+    """Heads of steps, joined anew from the first whose head, or the view before it, is another."""
     out: list[Step] = []
     for step in steps:
         view = out[-1].after if out else first
         there = {other.candidate.key for other in steps if other is not step}
-        step = replace(step, choice=step.choice.without(there))
-        if step.before is not view:
-            after = joined(view, (step.candidate, step.choice.head.shapes))
+        step, own = replace(step, choice=step.choice.without(there)), step.candidate
+        if step.before is not view or step.after.model.terms[-1] != (own.effect, (own.joint,)):
+            after = joined(view, (own, step.choice.head.shapes))
             shares = taken(view, losses(view, view.blocks), losses(after, view.blocks))
             step = Step(step.choice, step.p, view, weighed(after), shares)
         out.append(step)
