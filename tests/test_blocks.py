@@ -345,3 +345,16 @@ def test_where_noise_is_louder_blocks_speak_for_themselves():
     np.testing.assert_allclose(same, freedom)
     np.testing.assert_allclose(again[:, 0], drawn[:, 0], rtol=0.02)
     assert blocks.Belief().moderated(seen, foreseen, own)[0] is seen
+
+
+@pytest.mark.parametrize("freedom", [0.7, 8.0, 90.0])
+def test_many_draws_are_moderated_as_each_alone_is(freedom):
+    """By a table of the F distribution, as near as makes no difference to a deviation."""
+    rng = np.random.default_rng(7)
+    own, foreseen = rng.uniform(1.0, 30.0, 40), rng.uniform(0.5, 2.0, 40)
+    seen = foreseen * rng.f(own, 6.0, (300, 40)) * np.geomspace(0.01, 100.0, 300)[:, None]
+    belief = blocks.Belief(1.2, freedom)
+    spread, told = belief.moderated(seen, foreseen, own)
+    each = [belief.moderated(row, foreseen, own) for row in seen]
+    np.testing.assert_allclose(told, [d for _, d in each], atol=0.03 * freedom)
+    np.testing.assert_allclose(spread, [v for v, _ in each], rtol=0.1)

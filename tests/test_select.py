@@ -7,6 +7,7 @@ with the simulator's truth.json, which the diagnosis does not read.
 import json
 import re
 import shlex
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -21,10 +22,12 @@ from sysid.candidates import Candidate
 from sysid.diagnose import claims, select, steps
 from sysid.diagnose.ask import ask
 from sysid.diagnose.diagnosis import diagnose
+from sysid.diagnose.projected import groups_at
 from sysid.diagnose.select import LEVEL, WORTH, search
+from sysid.diagnose.ties import chosen
 from sysid.statement.document import document
 from sysid.trusted import trust
-from sysid.view import first_view, shapes_in
+from sysid.view import first_view, joined, shapes_in
 
 BIAS = ("bias", "torque_bias:elbow:b=0.4")
 STRIBECK = ("stribeck", "stribeck:shoulder:dF=1.5,vs=0.4")
@@ -522,3 +525,44 @@ def test_shape_values_are_those_that_a_model_stands_at():
     asked = {"compliance": 9.0, "damping": 9.0, "other": 5.0}
     assert shapes_in(view, SimpleNamespace(key=("elasticity", 1)), asked) == {"compliance": 3.0, "damping": 4.0, "other": 5.0}
     assert shapes_in(view, SimpleNamespace(key=("backlash", 1)), asked) == asked
+
+
+# ---- what has joined is not joined again
+
+
+@pytest.fixture(scope="module")
+def two_joined(simulated):
+    experiment = pipeline.load(simulated(*TWO))
+    view = first_view(experiment, pipeline.fit(experiment))
+    found = search(view)[0]
+    assert {step.candidate.key for step in found} == {("cogging", 1), ("load_friction", 0)}
+    return view, found
+
+
+def test_steps_stand_up_to_the_first_whose_head_is_another(two_joined):
+    view, found = two_joined
+    again = steps.rejoined(view, found)
+    assert all(one.after is step.after for one, step in zip(again, found)) and len(again) == 2
+    other = next(g for g in ask(view).groups if g.candidate.key == ("torque_bias", 0))
+    head = replace(found[0].choice.head, group=other)
+    for number in range(2):
+        changed = [replace(step, choice=replace(step.choice, head=head, members=((head, 1.0),))) if k == number else step for k, step in enumerate(found)]
+        again = steps.rejoined(view, changed)
+        kept = [one.after is step.after for one, step in zip(again, found)]
+        assert kept == [number > 0, False]
+        assert again[number].after.model.terms[-1][0].name == "torque_bias" and again[-1].before is again[0].after
+    gone = steps.rejoined(view, found[1:])
+    assert gone[0].before is view and gone[0].after is not found[1].after
+
+
+def test_what_the_last_model_holds_is_what_a_refit_finds(two_joined):
+    view, found = two_joined
+    last, (first, second) = found[-1].after, found
+    without = joined(view, (second.candidate, second.choice.head.shapes), like=last)
+    groups = groups_at(without, [(first.candidate, first.choice.head.asked)])
+    known = chosen(without, groups, np.random.default_rng(1), {id(first.candidate): last})
+    anew = chosen(without, groups, np.random.default_rng(1))
+    assert known.head.view is last and anew.head.view is not last
+    assert known.gain.sum() == pytest.approx(anew.gain.sum(), rel=1e-3) and known.shares == pytest.approx(anew.shares, abs=1e-3)
+    for name, at in anew.head.shapes.items():
+        assert known.head.shapes[name] == pytest.approx(at, rel=1e-2)
