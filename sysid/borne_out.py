@@ -84,7 +84,7 @@ def sizes(effect: Effect, numbers: dict[str, Number]) -> dict[str, Number]:
 def undecided(members: Sequence[tuple[Candidate, float]], fit: Fit) -> Refused:
     """What is there and cannot be told from effects on other joints, first the first: candidates
     with their probabilities."""
-    likely = [(one.name, one.where(fit.joints), chance) for one, chance in members]
+    likely = [(*one.named(fit.joints), chance) for one, chance in members]
     names = [
         f"{one} on {at} ({100 * chance:.0f} %)" for one, at, chance in likely if chance >= _LIKELY
     ]

@@ -52,6 +52,10 @@ class Candidate:
         """The name of its joint, or `*`."""
         return place(self.joint, joints)
 
+    def named(self, joints: Sequence[str]) -> tuple[str, str]:
+        """Its word and `where` it is."""
+        return self.name, self.where(joints)
+
     def judged_by(self, joints: Sequence[str]) -> list[str]:
         """The joints whose error it is judged by."""
         return list(joints) if self.joint == ROBOT else [joints[self.joint]]

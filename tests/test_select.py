@@ -23,8 +23,9 @@ from sysid.diagnose import claims, select, steps
 from sysid.diagnose.ask import ask
 from sysid.diagnose.diagnosis import diagnose
 from sysid.diagnose.projected import groups_at
+from sysid.diagnose.refits import Member
 from sysid.diagnose.select import LEVEL, WORTH, search
-from sysid.diagnose.ties import chosen
+from sysid.diagnose.ties import Choice, chosen
 from sysid.statement.document import document
 from sysid.trusted import trust
 from sysid.view import first_view, joined, shapes_in
@@ -277,6 +278,36 @@ def test_what_is_refused_alone_is_asked_again_beside_what_stands(simulated, monk
     assert [c.head.effect for c in found.claims] == [second, first] and found.refused == ()
     assert found.claims[1].before is found.claims[0].after
     assert [{first, second} <= {effect.name for effect, _ in c.step.after.model.terms} for c in found.claims] == [False, True]
+
+
+@pytest.mark.parametrize("borne", [True, False])
+def test_another_variant_of_what_joined_later_may_stand_for_a_head_that_is_refused(monkeypatch, borne):
+    """Of one effect on a joint one variant is claimed; and what is claimed is not told as refused as well."""
+    soft, play, other = (
+        Candidate(vocabulary.find(name).given(encoder=encoder), 1, (("encoder", encoder),)) for name, encoder in (("elasticity", "motor"), ("backlash", "motor"), ("backlash", "joint"))
+    )
+    one, two, three = (Member(SimpleNamespace(candidate=c), None, None) for c in (soft, play, other))
+    choice = lambda *members: Choice(members[0], tuple((m, 1.0 / len(members)) for m in members), None)  # noqa: E731
+    found = [steps.Step(made, 1e-3, SimpleNamespace(settled=None), SimpleNamespace(settled=None), np.zeros(2)) for made in (choice(one, two), choice(three))]
+    fit, asked = SimpleNamespace(joints=("shoulder", "elbow")), []
+
+    def borne_out(near, last, with_):
+        asked.append([m.candidate for m in near])
+        good = [m for m in near if borne and m is two]
+        return (good[0], {id(two): SimpleNamespace()}, "no") if good else (None, {}, "no")
+
+    monkeypatch.setattr(claims, "_borne_out", borne_out)
+    monkeypatch.setattr(claims, "taken", lambda *views: np.zeros(2))
+    monkeypatch.setattr(claims, "rejoined", lambda first, own: own)
+    monkeypatch.setattr(claims.pipeline, "fit_grown", lambda *given, **how: SimpleNamespace())
+    monkeypatch.setattr(claims, "grown", lambda *given, **how: None)
+    monkeypatch.setattr(claims, "finding", lambda before, after, member, *rest: SimpleNamespace(effect=member.candidate.name, joint="elbow"))
+    monkeypatch.setattr(claims.Claim, "beside_all", lambda claim, step, last: claim)
+    fit.experiment, fit.filters = None, None
+    stands, refused = claims.claimed(found, fit, None, None, None)
+    assert asked == ([[soft, play]] if borne else [[soft, play], [other]])
+    assert [claim.head.effect for claim in stands] == ["backlash"] * borne
+    assert [r.effect for r in refused] == ["elasticity"] + ["backlash"] * (not borne)
 
 
 def log_of(folder) -> str:

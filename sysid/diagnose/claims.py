@@ -3,8 +3,7 @@ fitted as the user's fit is.
 
 So what a diagnosis states is what comes of it; of several effects, what comes of all: one that is
 still missing bends the parameters of another, which no deviation knows. The test logs may only
-refuse; where they refuse the likeliest of what the training logs cannot tell apart, the next one is
-fitted.
+refuse: then the next likeliest of what the training logs cannot tell apart is fitted.
 """
 
 from __future__ import annotations
@@ -65,18 +64,18 @@ def claimed(
         spec = grown(last.experiment, name, joints, options, every=fit.joints)
         return how(spec, last, filters=fit.filters, progress=tell, measured=measured)
 
-    named = lambda one: (one.name, one.where(fit.joints))  # noqa: E731
-    heads = [step.candidate.key for step in steps]
+    heads = [step.candidate.kind for step in steps]
     # what was refused is asked once more with all that stand: the search found it beside them
     for number, step in [*enumerate(steps), *enumerate(steps)]:
-        if number in stands or refused.get(number, (None,))[0] is last:
+        there = {claim.step.candidate.key for claim in stands.values()}
+        if number in stands or step.candidate.key in there or last is refused.get(number, [0])[0]:
             continue
-        there = {*heads, *(claim.step.candidate.key for claim in stands.values())}
         # with the head refused the least likely member may be it
         first, *other = step.choice.members[:_FITTED]
-        near = [first, *(m for m in other if m[0].candidate.key not in there)]
+        free = lambda one: one.key not in there and one.kind not in heads  # noqa: B023, E731
+        near = [first, *(m for m in other if free(m[0].candidate))]
         head, fits, why = _borne_out([m for m, _ in near], last, with_)
-        own = *named(step.candidate), why
+        own = *step.candidate.named(fit.joints), why
         refused.pop(number, None)
         if head is None:
             shares = taken(step.before.settled, step.after.settled, test)
@@ -89,14 +88,15 @@ def claimed(
         near.sort(key=lambda one: one[0] is not head)
         fits = [fits[id(m)] if id(m) in fits else with_(pipeline.fit_grown, m) for m, _ in near]
         found = [finding(last, a, m, p, step, len(stands)) for a, (m, p) in zip(fits, near)]
-        set_ = tuple((*named(m.candidate), p) for m, p in step.choice.members)
+        set_ = tuple((*m.candidate.named(fit.joints), p) for m, p in step.choice.members)
         stands[number] = Claim(step, tuple(found), last, fits[0], set_)
         last = fits[0]
     claims, own = list(stands.values()), [claim.step for claim in stands.values()]
     if any(one.choice.head is not other.choice.head for one, other in zip(own, steps)):
         own = rejoined(steps[0].before, own)  # without what is refused
     claims = [claim.beside_all(step, last) for claim, step in zip(claims, own)]
-    return claims, [words for _, words in refused.values()]
+    there = {(claim.head.effect, claim.head.joint) for claim in claims}
+    return claims, [own for _, own in refused.values() if (own.effect, own.joint) not in there]
 
 
 def _borne_out(near: list[Member], last: Fit, with_: Callable):

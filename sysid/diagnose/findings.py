@@ -62,11 +62,7 @@ def finding(
     errors = [float(np.sqrt(square(fit))) for fit in (before, after)]
     differences = {d.joint: d.se for d in comparison.compare(before, after, ("before", "after"))}
     se = float(np.sqrt(np.nansum([differences[j] ** 2 for j in own]) / len(own)))
-    tied = [
-        (m.candidate.name, m.candidate.where(before.joints))
-        for m, _ in step.choice.members
-        if m is not member
-    ]
+    tied = [m.candidate.named(before.joints) for m, _ in step.choice.members if m is not member]
     words = tuple(name if at in (joint, "*") else f"{name} on {at}" for name, at in tied)
     heads = number if member is step.choice.head else None
     added = command(before.experiment.path, *spelled(candidate, joint))

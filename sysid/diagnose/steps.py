@@ -8,7 +8,7 @@ import numpy as np
 
 from ..candidates import Candidate
 from ..model_parameters import ROBOT
-from ..view import View, joined, losses, shapes_in, taken, weighed
+from ..view import View, joined, shapes_in, took, weighed
 from .projected import groups_at
 from .ties import NEAR, Choice, chosen
 
@@ -31,14 +31,12 @@ class Step:
 
     @property
     def changed(self) -> set[int]:
-        """Its joint, the robot as a whole, and the joints whose residual it changed by more than a
-        hundredth."""
+        """Its joint, the robot, and joints whose residual it changed by more than a hundredth."""
         return {ROBOT, self.candidate.joint, *np.flatnonzero(np.abs(self.shares) > 0.01)}
 
 
 def step_of(view: View, p: float, found: Choice, worth: float) -> Step | None:
-    """The step that a choice makes, None where it takes too little of any joint to be worth it, or
-    no more of all together than the standard error of that."""
+    """The step that a choice makes, None where what it takes is not worth having."""
     has = found.worth_having(worth)
     return Step(found, p, view, weighed(found.head.view), found.shares) if has else None
 
@@ -76,7 +74,11 @@ def _revised_once(first: View, steps: list[Step], worth: float, stirred: set[int
         groups = groups_at(without, [(m.candidate, m.asked) for m in step.choice.close])
         least = NEAR * max((group.taken for group in groups), default=0.0)
         near = [g for g in groups if g.candidate.key == own.key or g.taken >= least]
-        found = chosen(without, near, np.random.default_rng(1), {id(own): last})
+        if any(group.candidate is own for group in near):
+            found = chosen(without, near, np.random.default_rng(1), {id(own): last})
+        else:  # its slopes say nothing here; what it takes does
+            gain, shares = took(without, last)
+            found = replace(step.choice, gain=gain, shares=shares)
         if found is None or not found.worth_having(worth):
             return rejoined(first, [*before, *later]), step.changed
         if found.head.candidate.key != own.key:
@@ -95,7 +97,6 @@ def rejoined(first: View, steps: list[Step]) -> list[Step]:
         step, own = replace(step, choice=step.choice.without(there)), step.candidate
         if step.before is not view or step.after.model.terms[-1] != (own.effect, (own.joint,)):
             after = joined(view, (own, step.choice.head.shapes))
-            shares = taken(view, losses(view, view.blocks), losses(after, view.blocks))
-            step = Step(step.choice, step.p, view, weighed(after), shares)
+            step = Step(step.choice, step.p, view, weighed(after), took(view, after)[1])
         out.append(step)
     return out

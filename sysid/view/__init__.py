@@ -3,7 +3,7 @@
 from .design import Design, Sums, by_block, designed, instrumented, summed
 from .joining import COMPARED, allowed, around, joined, shapes_in, shapes_of, weighed
 from .laws import law
-from .losses import losses, slow_losses, taken
+from .losses import losses, slow_losses, taken, took
 from .overlap import makes, part_taken, slow_part
 from .singles import greatest
 from .view import View, elsewhere, first_view, looked_at, too_short
@@ -34,5 +34,6 @@ __all__ = [
     "summed",
     "taken",
     "too_short",
+    "took",
     "weighed",
 ]

@@ -47,3 +47,10 @@ def taken(view: View, before: np.ndarray, after: np.ndarray) -> np.ndarray:
     """The share (dof,) of each joint's loss in a view that goes, of losses (blocks, dof)."""
     whole = before.sum(0) + np.sum(view.design.rough_residual**2, axis=0)
     return (before - after).sum(0) / np.maximum(whole, 1e-300)
+
+
+def took(view: View, after: View) -> tuple[np.ndarray, np.ndarray]:
+    """What the model of `after` leaves less than that of a view, in its blocks (blocks,), and the
+    share (dof,) of each joint's loss."""
+    base, then = (losses(one, view.blocks) for one in (view, after))
+    return (base - then).sum(axis=1), taken(view, base, then)
