@@ -40,7 +40,6 @@ class Belief:
             seen, foreseen, own: as of `believed`. drawn: (..., sums) what draws see in place of
                 `seen`.
         """
-
         drawn = seen if drawn is None else drawn
         if not self.freedom:
             return drawn, own

@@ -222,18 +222,18 @@ class _Asker:
         freed = self.freed @ mixed  # what the model's own columns took of a block's noise
         count, weight = weight.shape[1], weight[:, good]
         unit = np.sum(weight * squares, axis=0)
-        rest_of = weight / np.maximum(unit - weight * squares, 1e-12 * unit)
+        others = weight / np.maximum(unit - weight * squares, 1e-12 * unit)
         loud_squares = squares + np.einsum("bpk,bpk->bk", mixed, freed)
 
         def told(score, moves):
             c = np.einsum("bg,bdg->dg", weight, score) / unit
             moves -= loud_squares[:, None] * c
-            moves *= rest_of[:, None]
+            moves *= others[:, None]
             # of a column of unit size
             return np.sqrt(unit) * c, unit * np.einsum("bdk,bdk->dk", moves, moves)
 
         score = score[:, None, good]
-        own = told(score, score + np.einsum("bp,bpk->bk", self.told, freed)[:, None])
+        real = told(score, score + np.einsum("bp,bpk->bk", self.told, freed)[:, None])
         # of draws these are the greatest arrays of a diagnosis: in single precision, and in place
         back, single = self.told_of_drawn, values[:, good].astype(np.float32)
         score = back @ -absorbed.astype(np.float32)
@@ -241,7 +241,7 @@ class _Asker:
             score[b] += self.drawn[rows].T @ single[rows]
         moves = back @ freed.astype(np.float32)
         moves += score
-        c, seen = (np.concatenate(both) for both in zip(own, told(score, moves)))
+        c, seen = (np.concatenate(both) for both in zip(real, told(score, moves)))
         freedom = np.maximum(rest[good] - 1.0, 1.0)
         return _Told(count, np.flatnonzero(good), unit, c, seen, freedom)
 
