@@ -49,7 +49,8 @@ def refitted(view: View, group: Group, found: View | None = None) -> Member | No
         limits = {s.name: (low, high) for s, low, high, _ in bounds_of(view.model, candidate)}
         for shape, step in zip(free, group.coefficients):
             shapes[shape.name] = float(np.clip(shapes[shape.name] + step, *limits[shape.name]))
-    found = found or joined(view, (candidate, shapes))
+    strikes = candidate.blows and candidate.swings  # from hollow to hollow no slope leads
+    found = found or joined(view, (candidate, shapes), strikes=strikes)
     left = [np.sum(one.design.residual**2) for one in (view, found)]
     may = allowed(found, candidate) and left[1] <= left[0]
     return Member(group, found, losses(found, view.blocks)) if may else None

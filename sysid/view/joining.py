@@ -19,18 +19,25 @@ COMPARED = 1e-4  # share of the objective: finer than rivals are ever told apart
 _CHANCE = 1.645  # standard deviations: five per cent to one side
 
 
-def joined(view: View, *added: tuple[Candidate, dict[str, float]], like: View | None = None):
+def joined(
+    view: View,
+    *added: tuple[Candidate, dict[str, float]],
+    strikes: bool = False,
+    like: View | None = None,
+):
     """The view of a view's model with candidates, all settled again from their shape values on.
 
     Args:
-        like: whose weights and noise it has, where these are not to be its own.
+        strikes: as of `looked_at`. like: whose weights and noise it has, where these are not to be
+            its own.
     """
     source = view.source
     if any(candidate.effect.uses_load for candidate, _ in added):
         source = replace(source, model=source.referenced)  # while its parameters are the model's
     for candidate, shapes in added:
         source = replace(source, model=grown(source, candidate, shapes))
-    return _again(view, source.model, (like or view).weights, tolerance=COMPARED, like=like)
+    how = {"tolerance": COMPARED, "strikes": strikes, "like": like}
+    return _again(view, source.model, (like or view).weights, **how)
 
 
 def allowed(view: View, candidate: Candidate) -> bool:

@@ -181,6 +181,7 @@ def looked_at(
     weights=None,
     grid: bool = True,
     tolerance: float = 1e-7,
+    strikes: bool = False,
     grown: View | None = None,
     like: View | None = None,
 ) -> View:
@@ -191,12 +192,13 @@ def looked_at(
         grid: search the grids of shape values; without it, from those that the model has.
         tolerance: share of the objective by which a step of the shape values must lower it for
             another to follow.
+        strikes: look all about the values of effects by which a link strikes.
         grown: the view whose model this one grew from. like: whose noise it has, where that is known.
     """
 
     def view(weights, model: Model, grid: bool) -> View:
         options = {"weights": weights, "stride": stride, "grid": grid, "tolerance": tolerance}
-        found = settle(experiment, model, motion, prior, **options)
+        found = settle(experiment, model, motion, prior, strikes=strikes, **options)
         own = stride, np.asarray(weights), found
         before = (grown.blocks, grown.answers) if grown else (None, ())
         return View(experiment, motion, rough, prior, *own, *before, like)
