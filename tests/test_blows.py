@@ -8,6 +8,9 @@ import pytest
 from sysid import pipeline, shape
 from sysid.blows import scatter, striking, struck
 from sysid.config import load
+from sysid.diagnose.ask import ask
+from sysid.diagnose.refits import refitted
+from sysid.view import first_view, joined, losses
 
 from .test_select import edited
 
@@ -64,3 +67,16 @@ def test_only_what_strikes_is_looked_at(fitted):
     fit, _ = fitted
     assert list(striking(fit.model)) == [(2, 1)]
     assert striking(fit.model.without("backlash", 1)) == {}
+
+
+def test_a_search_finds_the_hollow_of_the_width(simulated):
+    """From where all are asked, slopes lead to the next hollow, in which the play may take nothing."""
+    experiment = pipeline.load(simulated("play", HIDDEN, seed=6, duration=15.0))
+    view = first_view(experiment, pipeline.fit(experiment))
+    asked = ask(view)
+    own = [k for k, g in enumerate(asked.groups) if g.candidate.key == ("backlash", 1) and g.candidate.swings]
+    group = asked.groups[max(own, key=lambda k: asked.gains[k])]
+    member, near = refitted(view, group), joined(view, (group.candidate, dict(group.shapes)))
+    assert member.shapes["b"] == pytest.approx(0.012, rel=0.05)
+    left = [losses(one, view.blocks).sum() for one in (view, near, member.view)]
+    assert left[2] < 0.5 * left[1] < 0.5 * left[0]
