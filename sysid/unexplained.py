@@ -11,6 +11,7 @@ from .model_parameters import ROBOT
 
 _MOST = 0.5  # of what stands above a floor, or of a square
 WEIGHED = "`weighting: noise` under `solver:` in the experiment file"
+LOW_PASS = "`torque: low-pass` under `preprocess:` in the experiment file"
 
 
 @dataclass(frozen=True)
@@ -19,6 +20,7 @@ class Refused:
 
     candidate, p, shares: of one that the training logs told: what joined, its family-wise p-value,
     and of each joint's squared residual on the test logs, under the low-pass, what it takes (dof,).
+    raw: whether the fit's torque is as logged.
     """
 
     effect: str
@@ -27,6 +29,7 @@ class Refused:
     candidate: Candidate | None = None
     p: float = 1.0
     shares: Sequence[float] = ()
+    raw: bool = False
 
     @property
     def told(self) -> str:
@@ -36,6 +39,7 @@ class Refused:
             return said
         share = self.shares[self.candidate.joint]  # another joint's may be all that falls
         low = f"; under the low-pass of a diagnosis it takes {share:.0%} of that error's square"
+        low += f"; with {LOW_PASS} a fit may bear it out" * self.raw
         return said + low * bool(share >= _MOST)
 
 

@@ -303,7 +303,7 @@ def test_another_variant_of_what_joined_later_may_stand_for_a_head_that_is_refus
     monkeypatch.setattr(claims, "grown", lambda *given, **how: None)
     monkeypatch.setattr(claims, "finding", lambda before, after, member, *rest: SimpleNamespace(effect=member.candidate.name, joint="elbow"))
     monkeypatch.setattr(claims.Claim, "beside_all", lambda claim, step, last: claim)
-    fit.experiment, fit.filters = None, None
+    fit.experiment, fit.filters = SimpleNamespace(preprocess=SimpleNamespace(torque="raw")), None
     stands, refused = claims.claimed(found, fit, None, None, None)
     assert asked == ([[soft, play]] if borne else [[soft, play], [other]])
     assert [claim.head.effect for claim in stands] == ["backlash"] * borne

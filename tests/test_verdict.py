@@ -252,6 +252,8 @@ def test_what_test_logs_bear_out_under_the_low_pass_and_no_fit_does_is_not_calle
     found = elbow(3.0, rest=left(0.5), refused=[refused])
     assert found.status == status and found.may is None
     assert ("takes 90%" in refused.told) is (share == 0.9)  # not what it takes of the other joint
+    assert "torque: low-pass" not in refused.told  # the fit sees both sides so, or nothing stands there
+    assert ("torque: low-pass" in replace(refused, raw=True).told) is (share == 0.9)
     assert ("what is left may be elasticity, though no fit with it bore that out" in found.says) is (status == "unresolved")
 
 

@@ -79,7 +79,8 @@ def claimed(
         refused.pop(number, None)
         if head is None:
             shares = taken(step.before.settled, step.after.settled, test)
-            refused[number] = last, Refused(*own, step.candidate, step.p, shares)
+            told = step.candidate, step.p, shares, fit.experiment.preprocess.torque == "raw"
+            refused[number] = last, Refused(*own, *told)
             continue
         if why:
             refused[~number] = last, Refused(*own)
