@@ -19,6 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from . import eigen
 from .inertia.pseudo import to_pseudo
 from .interior import scaled_columns, scaled_gradient, scaling
 from .objective import Objective, add_blocks
@@ -86,7 +87,7 @@ def certify(objective: Objective, x: np.ndarray, positive: np.ndarray, held: np.
     if constrained and not barrier:
         # at an optimum on the boundary the gradient on J is a positive matrix that is flat where J is not
         matrices = unpacked(rest[:count])
-        values, axes = np.linalg.eigh(matrices)
+        values, axes = eigen.symmetric(matrices)
         explained = (axes * np.clip(values, 0.0, None)[:, None, :]) @ np.swapaxes(axes, -1, -2)
         rest[:count] -= coordinates(explained).ravel()
         inverse = np.linalg.inv(factors)
@@ -108,7 +109,7 @@ def certify(objective: Objective, x: np.ndarray, positive: np.ndarray, held: np.
 def _decrement(gradient, hessian, norm) -> float:
     """G' H^+ G; infinite where the gradient leaves the range of H by more than rounding."""
     scale = np.sqrt(np.where(np.diagonal(hessian) > 0, np.diagonal(hessian), 1.0))
-    values, vectors = np.linalg.eigh(hessian / np.outer(scale, scale))
+    values, vectors = eigen.symmetric(hessian / np.outer(scale, scale))
     along = vectors.T @ (gradient / scale)
     flat = values < 1e-14 * values[-1]
     # R' r with |r| up to the data's norm is known to that norm times rounding; the search leaves a little more

@@ -19,6 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from . import eigen
 from . import rows as row
 from .effect import NotFinite, SensorEffect
 from .projection import inverted, prior_hessian
@@ -61,7 +62,7 @@ class Landscape:
     def _gains(self, made: np.ndarray) -> np.ndarray:
         finite, unit = _unit(made)
         system, right = self._reduced(unit)
-        sizes, axes = np.linalg.eigh(system)
+        sizes, axes = eigen.symmetric(system)
         seen = sizes > _VISIBLE
         along = np.einsum("bij,bi->bj", axes, right)
         c = np.einsum("bij,bj->bi", axes, along * seen / np.where(seen, sizes, 1.0))
@@ -211,7 +212,7 @@ def landscape(
 def _half_inverse(columns: list[np.ndarray], prior: np.ndarray) -> np.ndarray:
     """G (size, r) with GG' = (A'A + P)^-1 on its range, of columns A in parts (n, size): from
     singular values, as those of A'A would lose half the digits."""
-    sizes, axes = np.linalg.eigh(prior)
+    sizes, axes = eigen.symmetric(prior)
     root = (axes * np.sqrt(np.clip(sizes, 0.0, None))).T
     stacked = np.concatenate([*columns, root])
     norm = np.linalg.norm(stacked, axis=0)

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from . import eigen
 from .objective import add_blocks
 
 FLAT = 1e-6  # share of a column's square: what the model leaves of it beyond that is rounding
@@ -106,7 +107,7 @@ def spectrum(system: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     there = diagonal > 1e-100
     scale = np.sqrt(np.where(there, diagonal, 1.0))
     kept = np.where(np.outer(there, there), system, 0.0)
-    return scale, *np.linalg.eigh(kept / np.outer(scale, scale))
+    return scale, *eigen.symmetric(kept / np.outer(scale, scale))
 
 
 def spanned(system: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -127,7 +128,7 @@ def told(data: np.ndarray, system: np.ndarray) -> np.ndarray:
     data's part of it (size, size) tells at all."""
     scale, values, vectors = spanned(system)
     free = vectors / np.sqrt(values) / scale[:, None]
-    share, vectors = np.linalg.eigh(free.T @ data @ free)
+    share, vectors = eigen.symmetric(free.T @ data @ free)
     return free @ vectors[:, share > _TOLD]
 
 
@@ -158,11 +159,11 @@ def directions(plain, whole, data, rough):
     if not np.all(np.isfinite(whole)) or not there.any():
         return None
     scale = np.where(there, size, 1.0)
-    values, vectors = np.linalg.eigh(whole / np.outer(scale, scale))
+    values, vectors = eigen.symmetric(whole / np.outer(scale, scale))
     kept = values > FLAT
     turn = vectors[:, kept] / np.sqrt(values[kept]) / scale[:, None]
     for matrix, good in ((data, lambda v: v > DATA), (rough, lambda v: v < NOISE)):
-        values, vectors = np.linalg.eigh(turn.T @ matrix @ turn)
+        values, vectors = eigen.symmetric(turn.T @ matrix @ turn)
         turn = turn @ vectors[:, good(values)]
         if not turn.shape[1]:
             return None
@@ -175,13 +176,13 @@ def directions_of(plain, whole, data, rough) -> list:
     usual = np.isfinite(whole).all(axis=(1, 2)) & (diagonals > _NOUGHT).all(axis=1)
     scale = np.sqrt(np.where(usual[:, None], diagonals, 1.0))
     system = whole / (scale[:, :, None] * scale[:, None])
-    values, turn = np.linalg.eigh(np.where(usual[:, None, None], system, 0.0))
+    values, turn = eigen.symmetric(np.where(usual[:, None, None], system, 0.0))
     usual &= values[:, 0] > FLAT
     turn = turn / np.sqrt(np.where(usual[:, None], values, 1.0))[:, None] / scale[:, :, None]
     turn = np.where(usual[:, None, None], turn, 0.0)
     for matrix, good in ((data, lambda v: v > DATA), (rough, lambda v: v < NOISE)):
         inside = np.swapaxes(turn, 1, 2) @ matrix @ turn
-        values, vectors = np.linalg.eigh(np.where(usual[:, None, None], inside, 0.0))
+        values, vectors = eigen.symmetric(np.where(usual[:, None, None], inside, 0.0))
         usual &= good(values).all(axis=1)
         turn = turn @ vectors
     size = np.sqrt(np.clip(np.diagonal(whole, axis1=1, axis2=2), 0.0, None))

@@ -18,6 +18,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from . import eigen
+
 # Of rows over P, squared: a direction in which they are beyond it costs as many digits of others.
 _BEYOND = 1e3
 # Of the sum of squares over P before P is renewed, for the same reason.
@@ -100,5 +102,5 @@ def _invertible(known: np.ndarray) -> np.ndarray:
 
 def _root(gram: np.ndarray) -> np.ndarray:
     """C (k, k) with C'C the positive semidefinite matrix whose upper half is given."""
-    values, vectors = np.linalg.eigh(gram, UPLO="U")
+    values, vectors = eigen.symmetric(gram.T)
     return np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T

@@ -15,7 +15,7 @@ from functools import partial
 
 import numpy as np
 
-from . import blows, multistart
+from . import blows, eigen, multistart
 from . import rows as row
 from .deflection import Deflection
 from .effect import NotFinite
@@ -203,7 +203,7 @@ def _damped(system, right, damping: float, *, low, high) -> np.ndarray:
     from scipy.optimize import lsq_linear  # its import takes as long as a small fit
 
     diagonal = np.diagonal(system)
-    sizes, axes = np.linalg.eigh(system + damping * np.diag(np.where(diagonal > 0, diagonal, 1.0)))
+    sizes, axes = eigen.symmetric(system + damping * np.diag(np.where(diagonal > 0, diagonal, 1.0)))
     roots = np.sqrt(np.maximum(sizes, _ROUNDING * max(sizes[-1], _ROUNDING)))
     return lsq_linear(roots[:, None] * axes.T, axes.T @ right / roots, bounds=(low, high), method="bvls").x
 

@@ -3,6 +3,8 @@
 import numpy as np
 from scipy.linalg.lapack import dpotrf, dpotrs
 
+from . import eigen
+
 
 def within(gradient, hessian, metric, radius, *, ridge: float):
     """The minimiser of the quadratic model within the ball; its promised decrease and its length."""
@@ -34,7 +36,7 @@ def _ball(g, h, radius):
             return y
     if (y := _on_the_sphere(g, h, radius)) is not None:
         return y
-    values, vectors = np.linalg.eigh(h)
+    values, vectors = eigen.symmetric(h)
     along = vectors.T @ g
     floor = max(0.0, -values[0])
     norm = lambda shift: np.linalg.norm(along / (values + shift))  # noqa: E731

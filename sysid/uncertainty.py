@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from . import blocks
+from . import blocks, eigen
 from .objective import Objective, add_blocks
 from .prior_weight import weakest
 from .projection import told
@@ -100,7 +100,7 @@ def by_block(compressed: Compressed, x, weights, basis, free):
 def whitening(hessian) -> np.ndarray:
     """A basis (size, range) with basis' hessian basis = 1."""
     scale = np.sqrt(np.where(np.diagonal(hessian) > 0.0, np.diagonal(hessian), 1.0))
-    values, vectors = np.linalg.eigh(hessian / np.outer(scale, scale))
+    values, vectors = eigen.symmetric(hessian / np.outer(scale, scale))
     kept = values >= _FLAT * values[-1]
     return vectors[:, kept] / np.sqrt(values[kept]) / scale[:, None]
 
@@ -109,7 +109,7 @@ def _inverse(hessian):
     """Inverse of a scaled positive semidefinite matrix on its range, and which parameters leave
     that range."""
     scale = np.sqrt(np.where(np.diagonal(hessian) > 0.0, np.diagonal(hessian), 1.0))
-    values, vectors = np.linalg.eigh(hessian / np.outer(scale, scale))
+    values, vectors = eigen.symmetric(hessian / np.outer(scale, scale))
     flat = values < _FLAT * values[-1]
     inverse = (vectors[:, ~flat] / values[~flat]) @ vectors[:, ~flat].T / np.outer(scale, scale)
     leaves = (np.sum(vectors[:, flat] ** 2, axis=1) > 1e-6) | (np.diagonal(hessian) <= 0.0)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from .. import eigen
 from .numbering import summed
 
 RESTING = 5.0  # blocks that a test must rest on
@@ -108,7 +109,7 @@ def shared(squares: np.ndarray, most: float) -> np.ndarray:
     block holds more than `most`."""
     turn = np.eye(squares.shape[1])
     while turn.shape[1]:
-        values, vectors = np.linalg.eigh(turn.T @ squares @ turn)
+        values, vectors = eigen.symmetric(turn.T @ squares @ turn)
         if values.max() <= most:
             break
         turn = turn @ vectors[int(np.argmax(values[:, -1]))][:, :-1]

@@ -27,6 +27,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from .. import eigen
+
 # As the map keeps V right under white noise, more neighbours cost degrees of freedom alone, and
 # noise whose memory is a block long needs them: with two, `scripts/coverage.py --colour 0.3` finds
 # 88 % of a planar arm's combinations within two deviations.
@@ -106,6 +108,6 @@ def _map(expected, right) -> np.ndarray:
 
 def _roots(matrix) -> tuple[np.ndarray, np.ndarray]:
     """The square root of a positive definite matrix and its inverse."""
-    values, vectors = np.linalg.eigh(0.5 * (matrix + matrix.T))
+    values, vectors = eigen.symmetric(0.5 * (matrix + matrix.T))
     values = np.sqrt(np.maximum(values, 1e-15 * max(values[-1], 1e-300)))
     return (vectors * values) @ vectors.T, (vectors / values) @ vectors.T

@@ -25,7 +25,7 @@ from functools import cached_property
 
 import numpy as np
 
-from .. import blocks
+from .. import blocks, eigen
 from ..candidates import Candidate
 
 
@@ -111,7 +111,7 @@ class Group:
             return group
         w = np.append(weight, 1.0)[:, None]
         squares = group.squares * w[:, None]
-        values, vectors = np.linalg.eigh(squares.sum(0))
+        values, vectors = eigen.symmetric(squares.sum(0))
         if np.linalg.eigvalsh(squares[:-1].sum(0) - squares[-1]).min() < 1e-6:
             return self  # the prior would tell most of it
         told = {"scores": w * group.scores, "loud": w * group.loud, "squares": squares}

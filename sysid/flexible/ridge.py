@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.linalg import get_lapack_funcs
 
+from .. import eigen
 from .functions import that_say_something
 
 _APART = (
@@ -75,7 +76,7 @@ def _solved(system, ridges, right) -> np.ndarray:
     """Coefficients (k, ridges) of normal equations with each of some ridges; in single precision
     where its rounding (Higham 2002, theorem 10.3) is below the least of them."""
     if len(system) < _MANY:
-        values, vectors = np.linalg.eigh(system)
+        values, vectors = eigen.symmetric(system)
         shrunk = (vectors.T @ right)[:, None] / (np.clip(values, 0.0, None)[:, None] + ridges)
         return vectors @ shrunk
     rounding = len(system) * np.finfo(np.float32).eps * np.diagonal(system).max()

@@ -24,6 +24,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import stats
 
+from .. import eigen
 from .whitening import Whitening
 
 WINDOWS = (1.0, 4.0)  # s
@@ -108,7 +109,7 @@ def worth(sums: Ticks) -> tuple[np.ndarray, np.ndarray]:
     own = np.where(g > 0.0, sums.own_b**2 / np.where(g > 0.0, g, 1.0), 0.0).reshape(n, -1)
     size = np.sqrt(np.maximum(np.einsum("nii->ni", body_g), 1e-300))
     scaled = body_g / size[:, :, None] / size[:, None, :]
-    values, vectors = np.linalg.eigh(scaled)
+    values, vectors = eigen.symmetric(scaled)
     along = np.einsum("nki,nk->ni", vectors, sums.body_b / size)
     kept = values > 1e-9 * values[:, -1:]
     body = np.where(kept, along**2 / np.where(kept, values, 1.0), 0.0).sum(axis=1)
@@ -150,7 +151,7 @@ def unsure(parts: list[np.ndarray]) -> np.ndarray:
     information = sum(np.einsum("jni,jnk->ik", own, own, optimize=True) for own in parts)
     size = np.sqrt(np.maximum(np.diagonal(information), 0.0))
     size = np.where(size > 0.0, size, 1.0)
-    values, vectors = np.linalg.eigh(information / np.outer(size, size))
+    values, vectors = eigen.symmetric(information / np.outer(size, size))
     kept = values > _TOLD * values[-1]
     return vectors[:, kept] / np.sqrt(values[kept]) / size[:, None]
 

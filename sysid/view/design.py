@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from .. import eigen
 from .. import rows as row
 from ..lowpass import calm
 from ..projection import prior_hessian, told
@@ -121,7 +122,7 @@ def freed(squares: np.ndarray) -> np.ndarray:
 
     Source: Bell & McCaffrey 2002 (the second cluster-robust covariance).
     """
-    taken, turn = np.linalg.eigh(squares)
+    taken, turn = eigen.symmetric(squares)
     taken = np.clip(taken, _FIRST, 1.0 - _FIRST)[:, None]
     return (turn * ((1.0 - taken) ** -0.5 - 1.0) / taken) @ np.swapaxes(turn, 1, 2)
 
