@@ -281,7 +281,8 @@ def test_what_is_refused_alone_is_asked_again_beside_what_stands(simulated, monk
 
 
 @pytest.mark.parametrize("borne", [True, False])
-def test_another_variant_of_what_joined_later_may_stand_for_a_head_that_is_refused(monkeypatch, borne):
+@pytest.mark.parametrize(("torque", "filter_"), [("raw", "savitzky-golay"), ("raw", "none"), ("low-pass", "savitzky-golay")])
+def test_another_variant_of_what_joined_later_may_stand_for_a_head_that_is_refused(monkeypatch, borne, torque, filter_):
     """Of one effect on a joint one variant is claimed; and what is claimed is not told as refused as well."""
     soft, play, other = (
         Candidate(vocabulary.find(name).given(encoder=encoder), 1, (("encoder", encoder),)) for name, encoder in (("elasticity", "motor"), ("backlash", "motor"), ("backlash", "joint"))
@@ -303,11 +304,12 @@ def test_another_variant_of_what_joined_later_may_stand_for_a_head_that_is_refus
     monkeypatch.setattr(claims, "grown", lambda *given, **how: None)
     monkeypatch.setattr(claims, "finding", lambda before, after, member, *rest: SimpleNamespace(effect=member.candidate.name, joint="elbow"))
     monkeypatch.setattr(claims.Claim, "beside_all", lambda claim, step, last: claim)
-    fit.experiment, fit.filters = SimpleNamespace(preprocess=SimpleNamespace(torque="raw")), None
+    fit.experiment, fit.filters = SimpleNamespace(preprocess=SimpleNamespace(torque=torque, filter=filter_)), None
     stands, refused = claims.claimed(found, fit, None, None, None)
     assert asked == ([[soft, play]] if borne else [[soft, play], [other]])
     assert [claim.head.effect for claim in stands] == ["backlash"] * borne
     assert [r.effect for r in refused] == ["elasticity"] + ["backlash"] * (not borne)
+    assert borne or [r.raw for r in refused] == 2 * [(torque, filter_) == ("raw", "savitzky-golay")]
 
 
 def log_of(folder) -> str:

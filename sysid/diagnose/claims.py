@@ -79,8 +79,9 @@ def claimed(
         refused.pop(number, None)
         if head is None:
             shares = taken(step.before.settled, step.after.settled, test)
-            told = step.candidate, step.p, shares, fit.experiment.preprocess.torque == "raw"
-            refused[number] = last, Refused(*own, *told)
+            spec = fit.experiment.preprocess
+            raw = spec.torque == "raw" and spec.filter != "none"  # a low-pass goes with a filter
+            refused[number] = last, Refused(*own, step.candidate, step.p, shares, raw)
             continue
         if why:
             refused[~number] = last, Refused(*own)
