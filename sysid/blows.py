@@ -16,11 +16,12 @@ from .deflection import Deflection
 from .model import Model
 from .projection import Projection, prior_hessian
 
-# How far about what was found, by how many values, and how far the other values: from one to the next of the first it is as far as
-# from end to end of the next.
-_STAGES = ((2.5, 41, np.inf), (1.08, 21, 1.5), (1.008, 9, 1.1))
+# How far about what was found, by how many values, and how far the other values: from one to the next of each it is as far as from
+# end to end of the next. First all over its range: what goes downhill may stop in a hollow of a play that is next to none.
+_STAGES = ((np.inf, 41, np.inf), (2.5, 41, np.inf), (1.08, 21, 1.5), (1.008, 9, 1.1))
+_NEAR = 2  # stages from here on look about what was found before
 _OTHERS = 7  # values of each of the others
-_LEAST = 500.0  # times less than the most it may be: what a first value begins with where it does nothing yet
+_LEAST = 500.0  # times less than the most it may be: less is nothing to look about
 _TOGETHER = 64  # sets whose torque is made at once
 _SOLVED = 4  # of the best values, which are solved with every bound kept
 _AGAIN = 3  # searches, one after the other
@@ -61,12 +62,12 @@ def struck(found, motion, weights, solved, *, wide: bool):
 
     Args:
         found: a `settled.Settled`. weights: (joints,) or None. solved: a model with everything linear solved for, None where it has no
-            torque. wide: whether to look far about the values that were found.
+            torque. wide: whether to look all over the range of what strikes.
     """
     tally: dict[tuple[int, int], int] = {}
     for place, own in striking(found.model).items():
         known = _link(found, motion, place, own)
-        for stage in _STAGES[0 if wide else 1 :]:
+        for stage in _STAGES[0 if wide else _NEAR :]:
             if (sets := _sets(found.model, own, *stage)) is None:
                 continue
             gains = _tried(found, motion, weights, place, own, sets, known).sum(axis=1)
@@ -90,7 +91,7 @@ def scatter(found, motion, weights) -> dict[int, float]:
     """How far the shape values of what strikes scatter, {number: standard deviation}, if blocks of time are drawn anew (bootstrap)."""
     out: dict[int, float] = {}
     for place, own in striking(found.model).items():
-        stages = [sets for stage in _STAGES if (sets := _sets(found.model, own, *stage)) is not None]
+        stages = [sets for stage in _STAGES[1:] if (sets := _sets(found.model, own, *stage)) is not None]
         if not stages:
             continue
         known = _link(found, motion, place, own)
@@ -105,18 +106,16 @@ def scatter(found, motion, weights) -> dict[int, float]:
 
 
 def _sets(model: Model, own: list[int], far: float, count: int, others: float) -> np.ndarray | None:
-    """Sets (sets, own) of values about those of the model, these first; of what does not strike yet from the least on that it may be,
-    or None where only its neighbourhood is asked for."""
+    """Sets (sets, own) of values about those of the model, these first; None where what strikes does next to nothing and only its
+    neighbourhood is asked for."""
     lists = []
     for k in own:
         value, at = model.shape_values[k], model.shapes[k]
         first = value.shape.start is not None
-        if begins := first and at == value.shape.start:
-            if np.isfinite(others):
-                return None
-            at = value.high
-        wide = _LEAST if begins else far if first else others
-        low, high = max(value.low, at / wide), min(value.high, at * wide)
+        least, wide = value.high / _LEAST if first else value.low, far if first else others
+        if first and at < least and np.isfinite(far):
+            return None
+        low, high = (least, value.high) if wide == np.inf else (max(least, at / wide), min(value.high, at * wide))
         lists.append(np.geomspace(low, high, count if first else _OTHERS))
     return np.array([[model.shapes[k] for k in own], *product(*lists)])
 

@@ -59,7 +59,7 @@ class Deflection(MotionEffect):
         motor = self.encoder == "motor"
         behind = self.links([(load, inertia if motor else 0.0 * inertia, motion.step, shapes) for load, inertia, motion, shapes in cases])
         return [
-            rates(motion.sight.smoothed(own) if self.blows and motion.sight is not None else own, motion.step)
+            motion.sight.rates(own) if self.blows and motion.sight is not None and len(own) > 1 else rates(own, motion.step)
             for own, (_, _, motion, _) in zip(behind, cases)
         ]
 

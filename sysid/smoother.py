@@ -132,12 +132,12 @@ class Smoother:
         smooth = self(q)
         return smooth, *differences(smooth, self.step)
 
-    def smoothed(self, values) -> np.ndarray:
-        """Values (n,) filtered to their very ends, beyond which they go on as they came."""
-        reach = min(self.reach, len(values) - 1)
-        if reach < 1:
-            return np.array(values)
-        return self(np.pad(values, reach, mode="reflect", reflect_type="odd"))[reach:-reach]
+    def rates(self, values) -> np.ndarray:
+        """Values (n,), n > 1, with their first two derivatives (3, n), to their very ends, beyond which they go on as they came: what
+        `differentiate` makes of an angle that turns by them."""
+        edge = self.reach + 1  # and one of a difference
+        padded = np.pad(values, edge, mode="reflect", reflect_type="odd")[:, None]
+        return np.stack([own[edge:-edge, 0] for own in self.differentiate(padded)])
 
     def __call__(self, values, axis: int = 0) -> np.ndarray:
         """The filtered values, same shape; samples along `axis`."""

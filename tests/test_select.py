@@ -552,9 +552,12 @@ def test_two_that_take_turns_are_stopped_when_they_come_back(monkeypatch):
 
 
 def test_shape_values_are_those_that_a_model_stands_at():
-    standing = {(0, 0): {"compliance": 1.0, "damping": 2.0}, (1, 1): {"compliance": 3.0, "damping": 4.0}}
-    terms = [(SimpleNamespace(name="elasticity"), (joint,)) for joint in (0, 1)]
-    view = SimpleNamespace(model=SimpleNamespace(terms=terms, shapes_of=lambda term, joint: standing[term, joint]))
+    """By what an effect is called and its joint, whatever variant of it joined; what the model lacks is as it was asked."""
+    standing = {0: {"compliance": 1.0, "damping": 2.0}, 1: {"compliance": 3.0, "damping": 4.0}}
+    values = {(joint, name): at for joint, own in standing.items() for name, at in own.items()}
+    known = [SimpleNamespace(term=joint, joint=joint, shape=SimpleNamespace(name=name)) for joint, name in values]
+    terms = [(SimpleNamespace(name="elasticity"), (joint,)) for joint in standing]
+    view = SimpleNamespace(model=SimpleNamespace(terms=terms, shape_values=known, shapes=tuple(values.values())))
     asked = {"compliance": 9.0, "damping": 9.0, "other": 5.0}
     assert shapes_in(view, SimpleNamespace(key=("elasticity", 1)), asked) == {"compliance": 3.0, "damping": 4.0, "other": 5.0}
     assert shapes_in(view, SimpleNamespace(key=("backlash", 1)), asked) == asked

@@ -1,6 +1,7 @@
 """A link behind its motor, against integrations of the same law, closed forms and the simulator's link, which no sensor sees."""
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ from scipy.integrate import solve_ivp
 
 from sysid import config, pipeline, regressor, robot, robot_spec, specs, two_masses
 from sysid.addition import grown
+from sysid.effects.backlash import Backlash
 from sysid.lowpass import Gaussian
 from sysid.simulate import hidden, simulate
 from sysid.smoother import Smoother
@@ -178,8 +180,32 @@ def test_rotors_are_no_load_of_their_own_gear():
 
 
 def test_a_filter_reaches_the_ends():
-    """Of a straight line, as of anything that it leaves alone, nothing changes, up to the last sample."""
+    """Of a straight line, as of anything that it leaves alone, nothing changes, up to the last sample, however short."""
     smoother = Smoother(specs.PreprocessSpec(window=0.1), 0.01)
-    line = np.linspace(-1.0, 2.0, 60)
-    np.testing.assert_allclose(smoother.smoothed(line), line, atol=1e-12)
-    np.testing.assert_array_equal(smoother.smoothed(line[:1]), line[:1])
+    for count in (2, 3, 60):
+        line = np.linspace(-1.0, 2.0, count)
+        q, qd, qdd = smoother.rates(line)
+        slope = 3.0 / (count - 1) / 0.01
+        np.testing.assert_allclose(q, line, atol=1e-9)
+        np.testing.assert_allclose(qd, slope, rtol=1e-8)
+        np.testing.assert_allclose(qdd, 0.0, atol=1e-6 * slope)
+
+
+@pytest.mark.parametrize("spec", [{"filter": "savitzky-golay", "window": 0.1}, {"filter": "butterworth", "cutoff": 10.0}])
+def test_a_link_is_seen_as_the_angles_were(spec):
+    """The motor answers a blow, and its acceleration is what the filter makes of its angle: of how far the link stands behind it the
+    filter must make the same, derivative by derivative. Differences of the filtered angle let side lobes through that grow with the
+    square of frequency."""
+    smoother, rng = Smoother(specs.PreprocessSpec(**spec), 0.001), np.random.default_rng(0)
+    behind = np.cumsum(np.cumsum(rng.normal(size=2000) * (rng.random(2000) < 0.02)))  # blows
+    inside = slice(4 * smoother.reach, -4 * smoother.reach)  # a Butterworth filter remembers its ends for longer than one reach
+    for seen, own in zip(smoother.rates(behind), smoother.differentiate(behind[:, None])):
+        np.testing.assert_allclose(seen[inside], own[inside, 0], rtol=1e-6, atol=1e-6 * np.abs(own).max())
+    play = Backlash()
+    load, mass = 5.0 * np.sin(0.02 * np.arange(2000)), np.full(2000, 0.3)
+    piece = SimpleNamespace(step=0.001, sight=smoother)
+    plain = play.apart(load, mass, SimpleNamespace(step=0.001, sight=None), b=0.02, teeth=40.0)
+    seen = play.apart(load, mass, piece, b=0.02, teeth=40.0)
+    own = smoother.differentiate(plain[0][:, None])[2][:, 0]
+    np.testing.assert_allclose(seen[2][inside], own[inside], atol=1e-6 * np.abs(own).max())
+    assert np.abs(plain[2]).max() > 3.0 * np.abs(own).max()  # blows there are

@@ -106,11 +106,8 @@ def shapes_of(view: View, candidate: Candidate) -> dict[str, float]:
 
 def shapes_in(view: View, candidate: Candidate, shapes: dict[str, float]) -> dict[str, float]:
     """Shape values of a candidate as they stand in a view's model; what it lacks, as in `shapes`."""
-    name, joint = candidate.key
-    terms = enumerate(view.model.terms)
-    own = [term for term, (one, joints) in terms if one.name == name and joint in joints]
-    found = view.model.shapes_of(own[0], joint) if own else {}
-    return {name: found.get(name, at) for name, at in shapes.items()}
+    own = shapes_of(view, candidate)
+    return {name: own.get(name, at) for name, at in shapes.items()}
 
 
 def _own(view: View, candidate: Candidate):
