@@ -16,13 +16,12 @@ from .deflection import Deflection
 from .model import Model
 from .projection import Projection, prior_hessian
 
-# How far about what was found, by how many values, and how far the other values: from one to the next of each it is as far as from
-# end to end of the next. First all over its range: what goes downhill may stop in a hollow of a play that is next to none.
-_STAGES = ((np.inf, 41, np.inf), (2.5, 41, np.inf), (1.08, 21, 1.5), (1.008, 9, 1.1))
+# How far about what was found, by how many values, and the same of the other values: from one to the next it is as far as from end to
+# end of the next stage. First all over the range: what goes downhill may stop in a hollow of a play that is next to none.
+_STAGES = ((np.inf, 81, np.inf, 3), (1.3, 17, np.inf, 3), (1.08, 21, 1.5, 5), (1.008, 9, 1.1, 5))
 _NEAR = 2  # stages from here on look about what was found before
-_OTHERS = 7  # values of each of the others
 _LEAST = 500.0  # times less than the most it may be: less is nothing to look about
-_TOGETHER = 64  # sets whose torque is made at once
+_TOGETHER = 128  # sets whose torque is made at once
 _SOLVED = 4  # of the best values, which are solved with every bound kept
 _AGAIN = 3  # searches, one after the other
 _BLOCKS, _DRAWS = 40, 200
@@ -91,7 +90,7 @@ def scatter(found, motion, weights) -> dict[int, float]:
     """How far the shape values of what strikes scatter, {number: standard deviation}, if blocks of time are drawn anew (bootstrap)."""
     out: dict[int, float] = {}
     for place, own in striking(found.model).items():
-        stages = [sets for stage in _STAGES[1:] if (sets := _sets(found.model, own, *stage)) is not None]
+        stages = [sets for stage in _STAGES if (sets := _sets(found.model, own, *stage)) is not None]
         if not stages:
             continue
         known = _link(found, motion, place, own)
@@ -105,7 +104,7 @@ def scatter(found, motion, weights) -> dict[int, float]:
     return out
 
 
-def _sets(model: Model, own: list[int], far: float, count: int, others: float) -> np.ndarray | None:
+def _sets(model: Model, own: list[int], far: float, count: int, others: float, fewer: int) -> np.ndarray | None:
     """Sets (sets, own) of values about those of the model, these first; None where what strikes does next to nothing and only its
     neighbourhood is asked for."""
     lists = []
@@ -116,7 +115,7 @@ def _sets(model: Model, own: list[int], far: float, count: int, others: float) -
         if first and at < least and np.isfinite(far):
             return None
         low, high = (least, value.high) if wide == np.inf else (max(least, at / wide), min(value.high, at * wide))
-        lists.append(np.geomspace(low, high, count if first else _OTHERS))
+        lists.append(np.geomspace(low, high, count if first else fewer))
     return np.array([[model.shapes[k] for k in own], *product(*lists)])
 
 
