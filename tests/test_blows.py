@@ -33,11 +33,13 @@ def test_the_width_of_play_is_within_its_deviation(fitted):
     assert std > 0.003 * truth
 
 
-def test_a_wrong_hollow_is_left(fitted):
+@pytest.mark.parametrize("begun", [1.3, 1e-6])
+def test_a_wrong_hollow_is_left(fitted, begun):
+    """Also that of a play that is next to none, at which a way downhill may end."""
     fit, _ = fitted
     motion = pipeline.prepare(pipeline.read(fit.experiment, fit.model.robot, fit.experiment.data.train), fit.experiment.preprocess, fit.joints)
     (own,) = striking(fit.model).values()
-    off = fit.model.with_shapes([s * (1.3 if k == own[0] else 1.0) for k, s in enumerate(fit.model.shapes)])
+    off = fit.model.with_shapes([s * (begun if k == own[0] else 1.0) for k, s in enumerate(fit.model.shapes)])
     held = shape.settle(fit.experiment, off, motion, fit.prior, hold=True)
     problems = []
 
@@ -47,7 +49,7 @@ def test_a_wrong_hollow_is_left(fitted):
 
     found, tally = struck(held, motion, None, solved, wide=True)
     assert found.objective < 0.95 * held.objective and 0 < len(problems) < 30
-    assert sum(tally.values()) > 400
+    assert sum(tally.values()) > 300
     assert found.model.shapes[own[0]] == pytest.approx(fit.model.shapes[own[0]], rel=0.1)
     spread = scatter(found, motion, None)
     assert set(spread) == set(own) and all(np.isfinite(list(spread.values())))
