@@ -79,7 +79,7 @@ def settle(
     best = attempted(model) or solved(multistart.finite(model, motion))
     if hold:
         return best
-    if model.uses_load:
+    if model.uses_load and (model.reference is None or not model.deflects):  # else on the way downhill, where that is lower
         best = solved(best.model.referring_to(best.x))
     search = Search(motion, weights, attempted, lambda found: _descended(found, motion, attempted, weights, tolerance))
     tally = {}

@@ -10,6 +10,7 @@ from sysid.blows import scatter, striking, struck
 from sysid.config import load
 from sysid.diagnose.ask import ask
 from sysid.diagnose.refits import refitted
+from sysid.prior_weight import with_weight
 from sysid.view import first_view, joined, losses
 
 from .test_select import edited
@@ -53,6 +54,22 @@ def test_a_wrong_hollow_is_left(fitted, begun):
     assert found.model.shapes[own[0]] == pytest.approx(fit.model.shapes[own[0]], rel=0.1)
     spread = scatter(found, motion, None)
     assert set(spread) == set(own) and all(np.isfinite(list(spread.values())))
+
+
+def test_a_load_that_is_renewed_costs_nothing(fitted):
+    """Other bodies' load has blows at other times: what was found under one load stays where those of the bodies that are found leave
+    more."""
+    fit, _ = fitted
+    motion = pipeline.prepare(pipeline.read(fit.experiment, fit.model.robot, fit.experiment.data.train), fit.experiment.preprocess, fit.joints)
+    costs = []
+    for weight in (1e-3, 0.1, 10.0, 100.0):
+        experiment = with_weight(fit.experiment, weight)
+        held = shape.settle(experiment, fit.model, motion, fit.prior, hold=True)
+        again = shape.settle(experiment, fit.model, motion, fit.prior, grid=False)
+        assert again.objective <= held.objective
+        renewed = shape.settle(experiment, fit.model.referring_to(held.x), motion, fit.prior, hold=True)
+        costs.append(renewed.objective - held.objective)
+    assert max(costs) > 0.0  # some loads would
 
 
 @pytest.mark.parametrize("held", [{"teeth": 30.0}, {"b": 0.012}])
