@@ -153,9 +153,11 @@ def check_finite(values, name: str, where: str, *, joints=(), t=None, first: int
         return
     row, *column = (int(k) for k in np.argwhere(~(np.abs(values) <= _LARGEST))[0])
     joint = f" of joint {joints[column[0]]!r}" if column else ""
+    bad = int(np.sum(~(np.abs(values.reshape(len(values), -1)) <= _LARGEST).all(axis=1)))
+    left = "the row" if bad == 1 else f"the row, and {bad - 1} more like it,"
     raise LogError(
         f"{name.removeprefix('signals.')}{joint} is {values[row, *column]:g}", where=f"{where} row {first + row} counted from 0" + ("" if t is None else f", t = {t[row]:.6g} s"),
-        allowed=f"finite numbers, at most {_LARGEST:g} in size", do="leave the row out; a gap is split there",
+        allowed=f"finite numbers, at most {_LARGEST:g} in size", do=f"leave {left} out; a gap is split there",
     )  # fmt: skip
 
 
@@ -188,7 +190,9 @@ def _convert(signals, data: DataSpec, joints, prismatic, where: str, drives) -> 
         largest = np.abs(signals["q"]).max(axis=0)
         far = [f"{joint} {value:.4g}" for joint, value, slides in zip(joints, largest, prismatic) if not slides and value > DEGREES]
         if far:
-            said = f"{where}: angles reach {', '.join(far)} rad; if that is degrees, set data.units.position: deg"
+            alone = len(far) < len(joints) - prismatic.sum()  # one unit is for all of them
+            do = "`sysid check` says what to write" if alone else "set data.units.position: deg"
+            said = f"{where}: angles reach {', '.join(far)} rad; if that is degrees, {do}"
             warn(said, above=2)
 
 

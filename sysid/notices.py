@@ -12,7 +12,7 @@ from .errors import LogError
 from .estimate import Fit
 from .model import moving_coefficients
 from .motion import Motion
-from .same_samples import Sampled, same, sampled, told
+from .same_samples import NOT_HELD_OUT, Sampled, same, sampled, told
 from .spans import Spans
 from .specs import Experiment
 from .warned import warn
@@ -40,10 +40,10 @@ def refuse_no_torque(train: list[logs.Log]) -> None:
         raise LogError("the torque of every joint is 0 in every row: none was logged", where=str(train[0].path), do="name the columns of torque in data.columns.torque, or what drives the joints in actuator")
 
 
-def tell_still(motion: Motion) -> None:
-    """Joints that stand still in much of what they are logged in, or in all of it."""
+def tell_still(motion: Motion, spec) -> None:
+    """Joints that stand still in much of what they are logged in, where that counts, or in all of it."""
     often = [f"{joint} {100 * share:.0f} %" for joint, share in zip(motion.joints, motion.standing) if share > _MUCH_STANDING and joint not in motion.still]
-    if often:
+    if often and spec.standstill == "keep":
         warn(f"joints that stand still in much of their rows, where friction may have any value up to its greatest: {', '.join(often)}; preprocess.standstill: auto leaves them out")
     for joint in motion.still:
         warn(f"joint {joint!r} never moves in the training logs, or never clear of a standstill; its friction is held at its prior, and its bodies are where the other joints' torque leaves them")
@@ -72,9 +72,9 @@ def tell_overlap(experiment: Experiment, found: list[dict]) -> None:
             if not logs.overlapping(test, own, train, other):
                 continue
             if own == other and test.name != train.name:
-                warn(f"test log {test.name} is the training log {train.name} under another name; its error is not held out")
+                warn(f"test log {test.name} is the training log {train.name} under another name; its error {NOT_HELD_OUT}")
             else:
-                warn(f"test log {test.name} overlaps a training log; its error is not held out")
+                warn(f"test log {test.name} overlaps a training log; its error {NOT_HELD_OUT}")
 
 
 def samples_of(part: str, read: list[logs.Log]) -> list[Sampled]:

@@ -124,7 +124,7 @@ def _fit(experiment: Experiment, filters: dict | None, strength: PriorWeight | N
             motion = prepare(train, preprocess, machine.joints, mapped)
             chosen = comparing() if later else chosen
             del train, comparing  # the filtered motion holds all that is needed from here on
-        tell_still(motion)
+        tell_still(motion, experiment.preprocess)
         tell_left_out(motion, preprocess)
         disturbed = tell_events("train", motion)
         with _timed(seconds, "shape", tell):

@@ -9,7 +9,7 @@ import numpy as np
 from .estimate import Fit
 
 _EFFORT, _FEWEST = 1.5, 3  # times what the URDF allows the drive, and in how many samples
-_ASK = "are its columns, signs and units right? `sysid check` says"
+ASK = "are its columns, signs and units right? `sysid check` says"
 
 
 def implausible(fit: Fit) -> Iterator[str]:
@@ -17,10 +17,10 @@ def implausible(fit: Fit) -> Iterator[str]:
     test = fit.predictions["test"].errors()
     worse = [f"{joint} (R2 {r2:.2g})" for joint, r2 in zip(fit.joints, test["r2"]) if r2 < 0.0]
     if worse:
-        yield f"implausible: the model is worse than none on the test logs of {', '.join(worse)}; {_ASK}"
+        yield f"implausible: the model is worse than none on the test logs of {', '.join(worse)}; {ASK}"
     robot, greatest = fit.model.robot, fit.predictions["train"].greatest(_FEWEST)
     for j, joint in enumerate(fit.joints):
         allowed = robot.source.joints[joint].effort
         torque = greatest[:, j]
         if np.sum(torque > _EFFORT * allowed) >= _FEWEST:
-            yield f"implausible: the torque of {joint} reaches {torque.max():.4g}, the URDF allows its drive {allowed:.4g}; {_ASK}"
+            yield f"implausible: the torque of {joint} reaches {torque.max():.4g}, the URDF allows its drive {allowed:.4g}; {ASK}"

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+NOT_HELD_OUT = "is not held out"  # an error, in whatever says so
 _FEWEST = 50  # rows in a row that no chance makes equal
 _MOST = 0.5  # of the rows that two logs have beside each other
 
@@ -101,9 +102,9 @@ def told(found: Same) -> str:
     names = ", ".join(one.name for one in found.others)
     test = found.others[0].part == "test"
     if found.moved:
-        held = "; an error on them is not held out" if test and found.first.part == "train" else ""
+        held = f"; an error on them {NOT_HELD_OUT}" if test and found.first.part == "train" else ""
         return f"the torque of {names} is that of {found.first.name} sample by sample, while the angles differ: a command that was played again, or a copied column, and no measurement{held}"
     hold = "holds" if len(found.others) == 1 else "hold"
     if test and found.first.part == "train":
-        return f"{names} {hold} samples of the training log {found.first.name}, {found.rows} of them from {found.since:.4g} s on: an error on them is not held out"
+        return f"{names} {hold} samples of the training log {found.first.name}, {found.rows} of them from {found.since:.4g} s on: an error on them {NOT_HELD_OUT}"
     return f"{names} {hold} samples of {found.first.name}: they count twice"

@@ -86,7 +86,7 @@ class Smoother:
             if self.length <= self.order:
                 raise ConfigError(
                     f"preprocess.window of {spec.window:g} s is {self.length} samples at {1 / step:.4g} Hz",
-                    allowed=f"more than order = {self.order} samples, {(self.order + 1) * step:.3g} s", do="widen the window",
+                    allowed=f"more than order = {self.order} samples, {(self.order + 1) * step:.3g} s", do="widen the window, or name the unit of the time stamps in data.units.time where it is not s",
                 )  # fmt: skip
             self.reach = self.length // 2
         elif self.kind == "butterworth":

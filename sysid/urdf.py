@@ -224,5 +224,6 @@ def _joint(element, path: Path) -> Joint:
     # zero is what exporters write where nobody knows
     most = [(numbers(limit, key, 1, "0", path, f"joint {name!r}")[0] if limit is not None else 0.0) or math.inf for key in ("velocity", "effort")]
     lower, upper, *most = (math.copysign(math.inf, value) if abs(value) > LARGEST else value for value in (lower, upper, *most))
-    bounds = (lower, upper) if kind != "continuous" else (-math.inf, math.inf)
+    # a joint that moves has a range: who states none, or a single place, states no limit
+    bounds = (lower, upper) if kind not in MOVING or (kind != "continuous" and lower < upper) else (-math.inf, math.inf)
     return Joint(name, kind, ends[0], ends[1], damping, friction, bounds, *most)

@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from .. import experiment_logs, pipeline, robot
+from .. import experiment_logs, pipeline
 from ..errors import SysidError
 from ..estimate import Fit
 from ..listed_effects import build, found
@@ -149,5 +149,5 @@ class Look:
 def looked(experiment: Experiment) -> Look:
     """Read everything that an experiment names. Raises SysidError, as a fit would."""
     experiment = pipeline.started(experiment)
-    machine = robot.load(experiment.robot, experiment.folder)
+    machine, *_ = pipeline.build(experiment)
     return Look(experiment, machine, read(experiment, machine))

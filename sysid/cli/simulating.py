@@ -30,7 +30,7 @@ def simulate(
     spikes: Annotated[float, typer.Option("--spikes", help="Wrong samples in the torque, a second and joint.")] = 0.0,
     brakes: Annotated[bool, typer.Option("--brakes", help="A joint that rests is braked: its torque reads 0, its angle is frozen (with --motion moves).")] = False,
     jitter: Annotated[float, typer.Option("--jitter", help="Milliseconds (standard deviation) that samples come early or late; a slow logger: --rate 100 --jitter 2.")] = 0.0,
-    trajectory: Annotated[Optional[Path], typer.Option("--trajectory", help="A motion for the training log to play, trajectory.csv of `sysid design`; the same seed and --duration make the same robot.")] = None,  # noqa: UP045
+    trajectory: Annotated[Optional[Path], typer.Option("--trajectory", help="A motion for the training log to play, trajectory.csv of `sysid design`; the same --seed, --duration, --motion, --logs, --rate and --speed make the same robot.")] = None,  # noqa: UP045
     current: Annotated[Optional[str], typer.Option("--current", metavar="STEP", help="Step of the logged torque [N m], or a share of each joint's peak, as in 2%.")] = None,  # noqa: UP045
     force: Annotated[bool, typer.Option("--force", help="Write over a simulation whose files were changed since.")] = False,
     as_json: Json = False, quiet: Quiet = False,

@@ -95,6 +95,7 @@ def document(found: Diagnosis, run="") -> dict:
             "rms_test_after": dict(zip(joints, found.last.rms().tolist())),
         },
         "next_log": _next_log(found),
+        "unused": list(fit.experiment.data.unused),
         "not_claimed": [
             {"effect": r.effect, "joint": r.joint, "why": r.why} for r in found.refused
         ],
@@ -108,7 +109,9 @@ def document(found: Diagnosis, run="") -> dict:
 def _next_log(found) -> str | None:
     """The command that designs the log to take next, where these do not say why an error stands,
     and neither an effect that may be it nor how the fit weighs its joints does."""
-    blind = any(v.status == "unresolved" and not (v.may or v.even) for v in found.verdict)
+    unused = found.fit.experiment.data.unused  # no log shows what is not to be looked at
+    own = (v for v in found.verdict if v.joint not in unused)
+    blind = any(v.status == "unresolved" and not (v.may or v.even) for v in own)
     return another_log(found.fit.experiment.path) if blind else None
 
 

@@ -100,11 +100,9 @@ def _joint(v: dict, of: Told, width: int, said: dict[str, str]) -> list[str]:
 
 def blind(document: dict) -> list[str]:
     """The joints whose error another log may explain, and nothing that is known now."""
-    return [
-        v["joint"]
-        for v in document["verdict"]
-        if v["status"] == "unresolved" and "may_be" not in v and "weighting" not in v
-    ]
+    own = (v for v in document["verdict"] if v["joint"] not in document.get("unused", ()))
+    open_ = (v for v in own if v["status"] == "unresolved")
+    return [v["joint"] for v in open_ if not {"may_be", "weighting"} & v.keys()]
 
 
 def needing(document: dict) -> str:
@@ -169,8 +167,8 @@ def _head(f: dict, of: Told, joint: str, width: int, said: dict[str, str]) -> li
         rest = listed([f"{placed(e, j, f['joint'])} ({percent(p)})" for e, j, p in told], "or")
         words = f"  {untold_from(f['probability'])} {rest}"
         out += wrapped(words, width, "    ")
-        words = f"  to separate them: {f['separate_by']}; or play the motion designed by"
-        out += wrapped(words, width, "    ")
+        own = f"  to separate them: {f['separate_by']}; "
+        out += wrapped(f"{own}or, where a motion can, play the one designed by", width, "    ")
         out.append(designs(f["command"], (f["effect"], f["joint"]), told))
     if few := [placed(e, j, f["joint"]) for e, j, p in others if p < LIKELY]:
         words = f"  not ruled out, though less than 1 % likely: {listed(few, 'and')}"

@@ -48,7 +48,7 @@ def prepared(experiment: Experiment) -> Prepared:
         if "auto" in (preprocess.window, preprocess.cutoff):
             preprocess = filtering.settled(preprocess, filtering.compare(experiment, structure, train, prior))
         motion = prepare(train, preprocess, machine.joints)
-        tell_still(motion)
+        tell_still(motion, experiment.preprocess)
         structure, _, _, strength = refined(experiment, structure, motion, prior)
         held_out = prepare(read(experiment, machine, experiment.data.test), preprocess, machine.joints)
         train_data, test_data = compress(structure, motion), compress(structure, held_out)

@@ -26,9 +26,10 @@ def show_design(document: dict, experiment) -> None:
     left = [f"{name} {100 * share:.1f} %" for name, share in document["margins"].items() if name != "collision"]
     near = document["margins"].get("collision")
     print(f"unused of each limit: {', '.join(left)}" + ("" if near is None else f"; links keep {near:.3g} m apart"))
+    never = [pair for pair in document["separates"] if pair["probability"] < _NEVER]
     for pair in document["separates"]:
-        if pair["probability"] < _NEVER:
-            print(f"{pair['a']} and {pair['b']}: no motion within these limits is likely to tell them apart; `sysid effects` says what else does")
+        if pair in never:
+            print(f"{pair['a']} and {pair['b']}: no motion within these limits is likely to tell them apart")
             continue
         print(f"{pair['a']} and {pair['b']} will be told apart with probability {pair['probability']:.2f}")
     told = [(name, s) for name, s in document["expected_std"].items() if s["now"] and s["after"] < _FALLS * s["now"]]
@@ -40,6 +41,10 @@ def show_design(document: dict, experiment) -> None:
             print(f"  {name}  {s['now']:.2g} -> {s['after']:.2g}{unit}")
     show_notices(document)
     print(f"folder: {document['run']}")
+    if never and len(never) == len(document["separates"]):  # it was asked for nothing else
+        print("another motion is no answer to what was asked; what else may be stands under `separate by`")
+        next_step("effects", never[0]["a"].partition(":")[0])
+        return
     motion = Path(document["run"]) / "trajectory.csv"
     said = f"play {motion} on the robot, and list its log beside the others in data.train of {experiment.path}"
     next_step("diagnose", typed(experiment.path), first=said)

@@ -6,6 +6,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from ..addition import typed
+from ..plausible import ASK
 from ..statement import text
 from .tables import terminal_width
 
@@ -46,15 +47,18 @@ def mended_first(document: dict, experiment, masses: dict) -> bool:
     if not implausible(document):
         return False
     out, target = out_of(experiment, document["run"]), typed(experiment.path)
-    if masses.get("prior_weight") is not None:
+    unchecked = not _checked(document, experiment)
+    if unchecked and any(ASK in notice for notice in implausible(document)):  # wrong columns make masses, and effects that mend them
+        next_step("check", target, first="how joints are explained cannot be meant: see what the logs say", out=out)
+    elif masses.get("prior_weight") is not None:
         adds = f" and type {masses['command']}" if masses.get("command") else ""
         next_step("fit", target, first=f"the masses cannot be meant: write `weight: auto` under `prior:` in {experiment.path}{adds}", out=out)
     elif masses.get("command"):
         next_line(masses["command"], out=out)
-    elif _checked(document, experiment):
-        return False
+    elif unchecked:
+        next_step("check", target, first="the masses cannot be meant: see what the logs say", out=out)
     else:
-        next_step("check", target, first="the masses, or how joints are explained, cannot be meant: see what the logs say", out=out)
+        return False
     return True
 
 

@@ -12,6 +12,8 @@ from .diagnosis import show_verdict
 from .next_steps import next_line, next_step, out_of
 from .tables import number, show_notices, table, terminal_width
 
+_NOTHING = 1e-6  # of an error: rounding
+
 
 def show_added(document: dict, experiment, run, before=()) -> None:
     """The held-out error before and after an effect.
@@ -34,6 +36,9 @@ def show_added(document: dict, experiment, run, before=()) -> None:
         Console().print(escape(document["says"]), soft_wrap=True, highlight=False)
     if not document["refused"]:
         print(f"written into {document['experiment']}")
+        if all(abs(d["delta_rms"] or 0.0) <= _NOTHING * (first[d["joint"]] or 0.0) for d in document["differences"]):
+            words = f"nothing changes with it, as these logs show none of it: it may be taken out of {document['experiment']} again"
+            print("\n".join(text.wrapped(words, terminal_width(), "  ")))
     if document["untold"]:
         print("\n".join(text.wrapped(document["untold"], terminal_width(), "  ")))
     show_notices(document, before)

@@ -6,6 +6,7 @@ import shutil
 from rich.console import Console
 from rich.markup import escape
 
+from ..same_samples import NOT_HELD_OUT
 from ..statement import tables, text
 
 
@@ -41,9 +42,9 @@ def show_notices(document: dict, before=()) -> None:
     """What was decided for the user, each on a line; where a key is named, how it stands in the file.
 
     Args:
-        before: notices that another command told of the same run.
+        before: notices that another command told of the same run; what makes an error none is told again.
     """
-    console, new = Console(), [notice for notice in document["notices"] if notice not in before]
+    console, new = Console(), [notice for notice in document["notices"] if notice not in before or NOT_HELD_OUT in notice]
     if old := len(document["notices"]) - len(new):
         new.append(f"{old} more on these logs and their fit {'are' if old > 1 else 'is'} as told before: see fit.json in the run folder")
     for notice in new:

@@ -1,0 +1,72 @@
+"""What is told to be typed next can be done, and leads on."""
+
+import json
+import re
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from sysid import urdf
+from sysid.statement import text
+from sysid.terminal.designed import show_design
+from sysid.terminal.next_steps import mended_first
+
+from .conftest import JOINTS, URDF
+
+
+@pytest.mark.parametrize("limit", ['<limit effort="39" velocity="1.4"/>', '<limit lower="0" upper="0" effort="39" velocity="1.4"/>', ""])
+def test_a_joint_that_moves_and_whose_limits_are_nothing_has_none(tmp_path, limit):
+    """As exporters write a joint that turns without end: a motion could keep within no such range."""
+    said = re.sub(r"<limit [^>]*/>", limit, URDF, count=1)
+    assert said != URDF
+    file = tmp_path / "robot.urdf"
+    file.write_text(said)
+    own = [urdf.read(file).joints[joint].limits for joint in JOINTS]
+    assert own == [(-np.inf, np.inf), (-3.0, 3.0)]
+
+
+def design(probability):
+    return {
+        "duration": 20.0, "criterion": {"log_det": 3.0, "random_best": None}, "margins": {"collision": None}, "expected_std": {},
+        "separates": [{"a": "torque_bias:elbow", "b": "asymmetric_coulomb:elbow", "probability": probability}], "notices": [], "run": "next",
+    }  # fmt: skip
+
+
+def test_a_motion_that_answers_nothing_is_not_to_be_played(capsys):
+    experiment = SimpleNamespace(path=Path("arm/config.yaml"))
+    show_design(design(0.0), experiment)
+    said = capsys.readouterr().out
+    assert "trajectory.csv" not in said and said.splitlines()[-1] == "next: sysid effects torque_bias"
+    show_design(design(0.9), experiment)
+    said = capsys.readouterr().out
+    assert "trajectory.csv" in said and said.splitlines()[-1].startswith("next: sysid diagnose arm")
+
+
+def test_logs_are_checked_before_an_effect_mends_what_wrong_columns_bent(capsys, tmp_path):
+    file = tmp_path / "config.yaml"
+    file.write_text("robot: {}\n")
+    experiment = SimpleNamespace(path=file, name="arm")
+    masses = {"command": "sysid add arm payload", "prior_weight": None}
+    worse = {"notices": ["implausible: the model is worse than none on the test logs of elbow (R2 -2); are its columns, signs and units right? `sysid check` says"], "run": str(tmp_path)}
+    heavy = {"notices": ["implausible masses, the URDF's in brackets: fore 0.765 kg (2.5 kg)"], "run": str(tmp_path)}
+    assert mended_first(worse, experiment, masses)
+    assert "next: sysid check" in capsys.readouterr().out
+    assert mended_first(heavy, experiment, masses)
+    assert "next: sysid add arm payload" in capsys.readouterr().out
+    (tmp_path / "check.json").write_text(json.dumps({"ok": True, "faults": []}))
+    assert mended_first(worse, experiment, masses)  # it has been checked
+    assert "next: sysid add arm payload" in capsys.readouterr().out
+
+
+def test_a_joint_that_is_not_used_needs_no_other_log():
+    verdict = [{"joint": joint, "status": "unresolved"} for joint in ("hip", "knee")]
+    assert text.blind({"verdict": verdict}) == ["hip", "knee"]
+    assert text.blind({"verdict": verdict, "unused": ["knee"]}) == ["hip"]
+
+
+def test_a_check_refuses_what_a_fit_would(experiment, cli):
+    folder = experiment(config={"model.effects": ["viscous", "coulomb", "viscous"]})
+    for command in ("check", "fit"):
+        cli(command, folder).complains("viscous stands twice")
