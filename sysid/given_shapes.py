@@ -24,7 +24,8 @@ def said_of_shapes(fit) -> list[str]:
         out.append(f"{', '.join(held)}: held as the experiment says")
     for value, at in zip(fit.model.shape_values, fit.model.shapes):
         if at_edge(value, at):
-            out.append(f"{value.name} = {at:.4g} {value.unit} is at the edge of its range, {value.low:.4g} to {value.high:.4g}")
+            unit = "" if value.unit in ("", "1") else f" {value.unit}"
+            out.append(f"{value.name} = {at:.4g}{unit} is at the edge of its range, {value.low:.4g} to {value.high:.4g}")
     return out
 
 

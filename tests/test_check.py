@@ -161,3 +161,15 @@ def test_a_fit_says_which_torque_no_drive_gives(made, tmp_path):
     urdf = logs / "robot.urdf"
     urdf.write_text(urdf.read_text().replace('effort="100"', 'effort="0.5"'))
     assert any("the torque of elbow reaches" in notice for notice in pipeline.fit(pipeline.load(logs)).notices)
+
+
+@pytest.mark.parametrize("constant", [1.5, -1.5, -0.2])
+def test_a_torque_that_is_one_number_is_no_current(made, tmp_path, constant):
+    """Of a joint whose torque is constant no masses tell a unit."""
+    logs = shutil.copytree(made(), tmp_path / "logs")
+    for name in ("train.csv", "test.csv"):
+        table = pl.read_csv(logs / name)
+        (column,) = [c for c in table.columns if c.startswith("tau") and c.endswith("elbow")]
+        table.with_columns(pl.lit(constant).alias(column)).write_csv(logs / name)
+    found = check.check(pipeline.load(logs))
+    assert {f.fault for f in found if f.joint == "elbow" and f.severity == "error"} == {"effort_missing"}

@@ -120,7 +120,8 @@ def _negated(look: Look, key: str, joint: str) -> str:
 def _factors(look: Look, equations: Equations, reading: Reading, scored: Scored) -> Iterator[Fault]:
     """How much larger or smaller the torque is than the URDF's masses ask for."""
     free = equations.scored(reading, free=True)
-    tells = free.known & (free.taken > _EXPLAINS) & (free.factor > 0.0)
+    logged = np.any([log.tally.swing > 0.0 for log in look.logs], axis=0)  # else none was
+    tells = logged & free.known & (free.taken > _EXPLAINS) & (free.factor > 0.0)
     off = (
         tells
         & ((free.factor < LIKELY[0]) | (free.factor > LIKELY[1]))
