@@ -38,7 +38,8 @@ class Refused:
         if self.candidate is None or self.candidate.joint == ROBOT:
             return said
         share = self.shares[self.candidate.joint]  # another joint's may be all that falls
-        low = f"; under the low-pass of a diagnosis it takes {share:.0%} of that error's square"
+        taken = f"{100 * share:.0f} % of that error's square"
+        low = f"; under the low-pass of a diagnosis it takes {taken}"
         low += f"; with {LOW_PASS} a fit may bear it out" * self.raw
         return said + low * bool(share >= _MOST)
 
@@ -109,8 +110,8 @@ def not_all(effect: str, share: float) -> str:
     """What an effect that may be there is beside a law that stands out with it in the model too,
     and predicts such a share of what it leaves."""
     return (
-        f"{effect} may be part of what is left, but not all: with {effect} in the model, the motion "
-        f"still predicts {share:.0%} of the rest"
+        f"{effect} may be part of what is left, but not all: with {effect} in the model, the "
+        f"motion still predicts {100 * share:.0f} % of the rest"
     )
 
 

@@ -70,3 +70,9 @@ def test_a_check_refuses_what_a_fit_would(experiment, cli):
     folder = experiment(config={"model.effects": ["viscous", "coulomb", "viscous"]})
     for command in ("check", "fit"):
         cli(command, folder).complains("viscous stands twice")
+
+
+def test_a_motion_is_not_written_among_the_files_of_an_experiment(experiment, cli):
+    folder = experiment()
+    cli("design", folder, out=folder).complains("an experiment stands in this folder", "--out")
+    assert not list(folder.glob("trajectory*"))

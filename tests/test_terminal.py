@@ -231,7 +231,7 @@ def test_each_joint_is_said_in_a_paragraph():
     (_, lines), *_ = text.verdict(of(document(verdict=[{"joint": "j3", "status": "complete"}])), 80)
     assert " ".join(map(str.strip, lines)) == (
         "j3: complete: no further effect is supported by these logs; its error is 4.00 times the "
-        "noise floor, which is known no nearer"
+        "noise floor, and that is not known to better"
     )
     close = document(verdict=[{"joint": "j3", "status": "complete"}])
     close["joints"]["j3"]["noise_floor"] = 0.39

@@ -251,7 +251,7 @@ def test_what_test_logs_bear_out_under_the_low_pass_and_no_fit_does_is_not_calle
     refused = Refused("elasticity", joint, "the error on the test logs does not fall", what, 0.001, np.array([0.9, share]))
     found = elbow(3.0, rest=left(0.5), refused=[refused])
     assert found.status == status and found.may is None
-    assert ("takes 90%" in refused.told) is (share == 0.9)  # not what it takes of the other joint
+    assert ("takes 90 %" in refused.told) is (share == 0.9)  # not what it takes of the other joint
     assert "torque: low-pass" not in refused.told  # the fit sees both sides so, or nothing stands there
     assert ("torque: low-pass" in replace(refused, raw=True).told) is (share == 0.9)
     assert ("what is left may be elasticity, though no fit with it bore that out" in found.says) is (status == "unresolved")
@@ -493,7 +493,7 @@ def test_where_a_law_stands_out_with_the_effect_in_the_model_too_the_effect_is_n
 
     found, _ = asked_of_elbow(3.0, near=(stribeck, 0.02), beyond=beyond)
     assert found.status == status and asked == [(1, stribeck)]
-    told = "stribeck may be part of what is left, but not all: with stribeck in the model, the motion still predicts 20% of the rest"
+    told = "stribeck may be part of what is left, but not all: with stribeck in the model, the motion still predicts 20 % of the rest"
     assert (found.says == told) is (status == "unknown")
     assert (found.may is None) is (status == "unknown") and found.left.single == pytest.approx(0.3)
     # what ridges predicted without it is nothing that they predict with it

@@ -30,6 +30,8 @@ def design(
     from ..statement import kept
 
     spec, folder = pipeline.load(experiment), whole_files.folder(out)
+    if (folder / "config.yaml").is_file():
+        raise SysidError("an experiment stands in this folder", where=str(folder), do="give the motion another with --out")
     suspects = None if separate is None else [] if separate == "none" else [_suspect(text) for text in separate.split(",")]
     last = kept.standing(spec, Path("runs") / spec.name)
     bounds = designing.read_limits(limits) if limits else None

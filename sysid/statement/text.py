@@ -119,7 +119,8 @@ def near(v: dict, document: dict) -> str:
         error = document["claims"][-1]["rms_test_after"][v["joint"]]
     if not floor or (error or 0.0) < 1.05 * floor:
         return ""
-    return f"; its error is {error / floor:#.3g} times the noise floor, which is known no nearer"
+    times = f"{error / floor:#.3g} times the noise floor"
+    return f"; its error is {times}, and that is not known to better"
 
 
 def _fall(v: dict, of: Told) -> str:
