@@ -74,5 +74,6 @@ def test_a_check_refuses_what_a_fit_would(experiment, cli):
 
 def test_a_motion_is_not_written_among_the_files_of_an_experiment(experiment, cli):
     folder = experiment()
-    cli("design", folder, out=folder).complains("an experiment stands in this folder", "--out")
+    said = cli("design", folder, out=folder)
+    assert said.status == 2 and "an experiment stands in this folder" in said.err and len(said.err.splitlines()) == 1
     assert not list(folder.glob("trajectory*"))
