@@ -14,14 +14,14 @@ from typing import Any
 from pydantic import ValidationError
 
 from . import bounded, datasets, groups
-from .config_errors import keys_of, named, refused, unknown_key
+from .config_errors import keys_of, named, own_keys, refused, unknown_key
 from .errors import ConfigError
 from .formula import parse
 from .log_spec import LogSpec
 from .mistyped import FEW, standing
 from .readers import is_log_folder, listed
 from .specs import ENTRY, EffectSpec, Experiment, is_own
-from .vocabulary import find, vocabulary
+from .vocabulary import vocabulary
 from .yaml_text import parse_yaml, plain
 
 _LARGEST_FILE = 1_000_000  # bytes
@@ -181,11 +181,9 @@ def _known(name: str) -> str:
 
 
 def _own_keys(name: str, given) -> list[str]:
-    """The keys that an effect has beside those of every entry: its options, and its shape values, which may be held or be told where to be searched."""
-    if is_own(name):
-        return [key for key in given if key not in ENTRY]  # only the file can tell; it is not run here
-    effect = find(name)
-    return [*effect.options, *(shape.name for shape in effect.shapes())]
+    """The keys that an effect has beside those of every entry."""
+    # of one's own only the file can tell; it is not run here
+    return [key for key in given if key not in ENTRY] if is_own(name) else own_keys(name)
 
 
 def _formula(value: Any) -> dict:

@@ -10,6 +10,7 @@ from pydantic import BaseModel, ValidationError
 
 from .errors import ConfigError
 from .specs import EffectSpec, Experiment
+from .vocabulary import find, vocabulary
 from .yaml_text import plain
 
 
@@ -63,10 +64,26 @@ def _spelled(location: tuple) -> str:
     return "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in location).lstrip(".")
 
 
+def _of_effect(tree, location: tuple) -> list[str]:
+    """The keys that an effect of the catalogue has beside those of every entry; none elsewhere."""
+    if location[:2] not in (("model", "effects"), ("model", "candidates")) or len(location) != 4:
+        return []
+    entry = tree["model"][location[1]][location[2]]
+    (name,) = entry if isinstance(entry, dict) and len(entry) == 1 else ("",)
+    return own_keys(str(name)) if name in vocabulary() else []
+
+
+def own_keys(name: str) -> list[str]:
+    """The keys that an effect of the catalogue has beside those of every entry: its options, and its shape values, which may be held or be
+    told where to be searched."""
+    effect = find(name)
+    return [*effect.options, *(shape.name for shape in effect.shapes())]
+
+
 def unknown_key(tree, location: tuple, path: Path) -> ConfigError:
     """A key that is not known, with those that it may have been."""
     key, parent = str(location[-1]), _spelled(location[:-1])
-    keys = keys_of(_model_at(location))
+    keys = [*_of_effect(tree, location), *keys_of(_model_at(location))]
     close = difflib.get_close_matches(key, keys, n=3, cutoff=0.4) or keys
     line = line_of(tree, location)
     return ConfigError(

@@ -83,6 +83,7 @@ def asked(file: Path):
     except ConfigError as error:
         said = re.sub(rf"^{re.escape(str(file))}( line \d+)?: ", "", str(error))
         said = re.sub(r"^(unknown) key (.*) in model\.effects\[\d+\]", r"\1 option \2", said)
+        said = re.sub(r"unknown key (.*?): ", r"unknown option \1: ", said).replace("leave `joints` out", "leave --joint out")
         raise SysidError(re.sub(r"^model\.effects(\[\d+\])?[:.] ?", "", said)) from None
 
 

@@ -138,7 +138,7 @@ def _of_the_motion(experiment: Experiment, model: Model, logs: Sequence[Log], pr
         cutoff = max(min(band(logs), 2.0 * slowest(experiment, model.robot, prior, q)), 1.0 / (its_step * rows))
     window = spec.window if "window" in own else max(1.0 / (_ANGLES * cutoff), 2.0 * (spec.order // 2) * step)
     return {
-        "filter": spec.filter, "torque": "low-pass", "standstill": spec.standstill, "order": spec.order, "window": window, "cutoff": cutoff,
+        "filter": spec.filter, "torque": "low-pass", "standstill": spec.standstill, "order": spec.order, "window": float(window), "cutoff": float(cutoff),
         "chosen": "given" if own == {"window", "cutoff"} else "the motion's band", "held_out": [],
     }  # fmt: skip
 

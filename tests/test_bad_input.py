@@ -198,6 +198,7 @@ def test_unknown_key(experiment, cli, key):
         ({"data.train": ["train.csv", {"fil": "train.csv"}]}, "unknown key 'fil' in data.train[1]", "file"),
         ({"model.effects": ["coulomb", {"viscous": {"jonts": ["elbow"]}}]}, "unknown key 'jonts' in model.effects[1]", "joints"),
         ({"model.effects": [{"viscous": {"limit": 1}}]}, "unknown key 'limit' in model.effects[0]", "joints"),
+        ({"model.effects": [{"cogging": {"line": 2}}]}, "unknown key 'line' in model.effects[0]", "lines"),
     ],
 )
 def test_unknown_key_within_a_list(experiment, cli, change, said, closest):

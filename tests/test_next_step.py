@@ -13,7 +13,7 @@ from sysid.statement import text
 from sysid.terminal.designed import show_design
 from sysid.terminal.next_steps import mended_first
 
-from .conftest import JOINTS, URDF
+from .conftest import JOINTS, RATE, URDF
 
 
 @pytest.mark.parametrize("limit", ['<limit effort="39" velocity="1.4"/>', '<limit lower="0" upper="0" effort="39" velocity="1.4"/>', ""])
@@ -77,3 +77,17 @@ def test_a_motion_is_not_written_among_the_files_of_an_experiment(experiment, cl
     said = cli("design", folder, out=folder)
     assert said.status == 2 and "an experiment stands in this folder" in said.err and len(said.err.splitlines()) == 1
     assert not list(folder.glob("trajectory*"))
+
+
+def test_a_low_pass_is_chosen_in_numbers_that_a_file_can_hold(experiment, cli):
+    """Of a slow log the window is as many of its own steps as a polynomial needs."""
+    folder = experiment(config={"preprocess.torque": "low-pass"}, train=slower, test=slower)
+    said = cli("add", folder, "torque_bias", "--joint", "elbow", "--force")
+    assert said.status == 0, said.err
+    fit = json.loads((folder.parent / "run" / "fit.json").read_text())
+    assert fit["filter"]["torque"] == "low-pass" and fit["filter"]["window"] == pytest.approx(4.0 * 4.0 / RATE)
+
+
+def slower(columns):
+    """Every fourth sample."""
+    return {name: values[::4] for name, values in columns.items()}

@@ -34,7 +34,7 @@ def test_a_sentence_that_was_mended_is_gone(words):
     [
         (["stribek"], "sysid: there is no effect 'stribek'; allowed: stribeck"),
         (["stribeck", "--joint", "elbo"], "sysid: stribeck names the joint 'elbo'; allowed: shoulder, elbow"),
-        (["stribeck", "--option", "foo=1"], "sysid: unknown option 'foo'; allowed: joints"),
+        (["stribeck", "--option", "foo=1"], "sysid: unknown option 'foo'; allowed: vs, joints"),
         (["formula", "--option", "formula=a*sin(3*z)"], "sysid: sin(3 * z) in the formula holds nothing"),
         (["viscous"], "sysid: viscous is in the model already"),
     ],
