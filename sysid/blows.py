@@ -111,7 +111,7 @@ def _sets(model: Model, own: list[int], far: float, count: int, others: float, f
     for k in own:
         value, at = model.shape_values[k], model.shapes[k]
         first = value.shape.start is not None
-        least, wide = value.high / _LEAST if first else value.low, far if first else others
+        least, wide = max(value.low, value.high / _LEAST) if first else value.low, far if first else others
         if first and at < least and np.isfinite(far):
             return None
         low, high = (least, value.high) if wide == np.inf else (max(least, at / wide), min(value.high, at * wide))

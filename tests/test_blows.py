@@ -1,12 +1,13 @@
 """Play between teeth: blows come at other times for the next width, and slopes say neither where the best one is nor how sure it is."""
 
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from sysid import pipeline, shape
-from sysid.blows import scatter, striking, struck
+from sysid.blows import _STAGES, _sets, scatter, striking, struck
 from sysid.config import load
 from sysid.diagnose.ask import ask
 from sysid.diagnose.refits import refitted
@@ -80,6 +81,21 @@ def test_one_value_is_looked_for_where_the_other_is_held(simulated, held):
     assert len(striking(fit.model)[2, 1]) == 1
     found = fit.model.shapes_of(2, 1)
     assert held.items() <= found.items() and found["b"] == pytest.approx(0.012, rel=0.3) and 15.0 <= found["teeth"] <= 80.0
+
+
+@pytest.mark.parametrize("stage", range(len(_STAGES)))
+@pytest.mark.parametrize("within", [(0.0, 0.05), (0.01, 0.02)])
+def test_no_value_is_tried_beyond_its_range(stage, within):
+    """Of a play that the user lets be within a range as well, from the first of the model's values on."""
+    values = [("b", *within, 0.0), ("teeth", 15.0, 80.0, None)]
+    shown = [SimpleNamespace(low=low, high=high, shape=SimpleNamespace(start=start)) for _, low, high, start in values]
+    model = SimpleNamespace(shape_values=shown, shapes=(0.0105, 70.0))
+    tried = _sets(model, [0, 1], *_STAGES[stage])
+    assert tuple(tried[0]) == model.shapes and len(tried) > 40
+    for (_, low, high, _), column in zip(values, tried.T):
+        assert np.all((column >= low * (1 - 1e-12)) & (column <= high * (1 + 1e-12))) and np.isfinite(column).all()
+    if not stage:
+        assert tried[1:, 0].max() == pytest.approx(within[1]) and tried[1:, 0].min() == pytest.approx(max(within[0], within[1] / 500.0))
 
 
 def test_only_what_strikes_is_looked_at(fitted):
