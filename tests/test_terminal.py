@@ -237,6 +237,9 @@ def test_each_joint_is_said_in_a_paragraph():
     close["joints"]["j3"]["noise_floor"] = 0.39
     (_, lines), *_ = text.verdict(of(close), 80)
     assert lines == ["j3: complete: no further effect is supported by these logs"]
+    close["not_claimed"] = [{"effect": "spring", "joint": "j3", "why": "the error rises"}]
+    (_, lines), *_ = text.verdict(of(close), 200)
+    assert lines == ["j3: complete: no further effect is supported by these logs; spring was looked at and is not claimed: the error rises"]
 
 
 def test_what_a_verdict_told_is_no_note_again(monkeypatch, capsys):

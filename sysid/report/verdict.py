@@ -6,7 +6,7 @@ from ..addition import LIKELY, apart, designs, likely
 from ..estimate import Fit
 from ..given_shapes import given_shapes, said_of_shapes
 from ..statement import text
-from ..statement.words import followed, percent, untold
+from ..statement.words import followed, near, percent, refused, untold
 from .section import Section
 from .words import (
     SPACE,
@@ -108,7 +108,7 @@ def _card(found: dict, fit: Fit, document: dict) -> dict:
         "claims": [_claim(*one, joint, several) for one in heads],
         "fall": fall,
         "left": left_words(found, fit),
-        "near": text.near(found, document) if status == "complete" else "",
+        "near": near(found, document) + refused(joint, document) if status == "complete" else "",
         "tried": found.get("may_be"),
         "blind": joint in text.blind(document),
         "says": _first(says),

@@ -6,13 +6,26 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from ..addition import LIKELY, designs, likely
-from .words import elsewhere, followed, listed, percent, placed, quantity, untold, valued, wrapped
+from .words import (
+    elsewhere,
+    followed,
+    listed,
+    near,
+    percent,
+    placed,
+    quantity,
+    refused,
+    untold,
+    valued,
+    wrapped,
+)  # fmt: skip
 
 if TYPE_CHECKING:
     from ..diagnose.diagnosis import Diagnosis
 
 ANOTHER = "a motion that tells most of what these logs leave open"
 TRIED = "to try it, and see the held-out error before and after"
+NO_MORE = "no further effect is supported by these logs"
 OWN = "a law of your own can be tried: `sysid effects formula`"
 _SURE = 0.9  # the set holds the truth so often
 _TOGETHER = "several variables together"
@@ -69,7 +82,7 @@ def _joint(v: dict, of: Told, width: int, said: dict[str, str]) -> list[str]:
     ]
     named = listed(words, "and") if heads else ""
     first = {
-        "complete": lambda: f"no further effect is supported by these logs{near(v, of.document)}",
+        "complete": lambda: NO_MORE + near(v, of.document) + refused(joint, of.document),
         "explained": lambda: (
             "by "
             + listed([placed(c["effect"], c["joint"]) for c in v["by"]], "and")
@@ -109,18 +122,6 @@ def needing(document: dict) -> str:
     """Which joints need another log, in words."""
     joints = blind(document)
     return f"{listed(joints, 'and')} need{'s' * (len(joints) == 1)} another log"
-
-
-def near(v: dict, document: dict) -> str:
-    """How far above its noise floor a joint's error is that is at it, as near as that is known."""
-    entry = document["joints"][v["joint"]]
-    floor, error = entry["noise_floor"], entry["rms"]["test"]
-    if error is not None and document["claims"]:  # with all that is named
-        error = document["claims"][-1]["rms_test_after"][v["joint"]]
-    if not floor or (error or 0.0) < 1.05 * floor:
-        return ""
-    times = f"{error / floor:#.3g} times the noise floor"
-    return f"; its error is {times}, and that is not known to better"
 
 
 def _fall(v: dict, of: Told) -> str:

@@ -89,3 +89,22 @@ def elsewhere(joint: str, joints: dict[str, dict], after: dict[str, float], unit
     if most == joint or falls[most] < _HARDLY or falls.get(joint, 0.0) >= _HARDLY:
         return ""
     return f", that of {most} from {before[most]:.4g} to {after[most]:.4g} {units[most]}"
+
+
+def refused(joint: str, document: dict) -> str:
+    """What was looked at on a joint and is not claimed, behind what is said of it."""
+    own = (r for r in document["not_claimed"] if r["joint"] == joint)
+    said = (f"; {r['effect']} was looked at and is not claimed: {r['why']}" for r in own)
+    return "".join(said)
+
+
+def near(v: dict, document: dict) -> str:
+    """How far above its noise floor a joint's error is that is at it, as near as that is known."""
+    entry = document["joints"][v["joint"]]
+    floor, error = entry["noise_floor"], entry["rms"]["test"]
+    if error is not None and document["claims"]:  # with all that is named
+        error = document["claims"][-1]["rms_test_after"][v["joint"]]
+    if not floor or (error or 0.0) < 1.05 * floor:
+        return ""
+    times = f"{error / floor:#.3g} times the noise floor"
+    return f"; its error is {times}, and that is not known to better"
