@@ -201,7 +201,7 @@ def test_each_joint_is_said_in_a_paragraph():
     assert "add x spring" not in first and "a1 = 1.235 +- 0.012 N m, k = 101 1/rad" in first
     assert (
         "cannot tell it (60 %) from spring (30 %) or payload of the whole robot (10 %) "
-        "to separate them: creep; or, where a motion can, play the one designed by sysid design " in first
+        "to separate them: creep; or, if a motion can, by sysid design " in first
     )
     assert f"--separate 'cogging:{FIRST},spring:{FIRST},payload:*' --out next add it with" in first
     assert (

@@ -169,8 +169,8 @@ def _head(f: dict, of: Told, joint: str, width: int, said: dict[str, str]) -> li
         rest = listed([f"{placed(e, j, f['joint'])} ({percent(p)})" for e, j, p in told], "or")
         words = f"  {untold_from(f['probability'])} {rest}"
         out += wrapped(words, width, "    ")
-        own = f"  to separate them: {f['separate_by']}; "
-        out += wrapped(f"{own}or, where a motion can, play the one designed by", width, "    ")
+        words = f"  to separate them: {f['separate_by']}; or, if a motion can, by"
+        out += wrapped(words, width, "    ")
         out.append(designs(f["command"], (f["effect"], f["joint"]), told))
     if few := [placed(e, j, f["joint"]) for e, j, p in others if p < LIKELY]:
         words = f"  not ruled out, though less than 1 % likely: {listed(few, 'and')}"
