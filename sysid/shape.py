@@ -79,7 +79,8 @@ def settle(
     best = attempted(model) or solved(multistart.finite(model, motion))
     if hold:
         return best
-    if model.uses_load and (model.reference is None or not model.deflects):  # else on the way downhill, where that is lower
+    # of what strikes on the way downhill alone, where that is lower: with other bodies' load it strikes at other times
+    if model.uses_load and (model.reference is None or not blows.striking(model)):
         best = solved(best.model.referring_to(best.x))
     search = Search(motion, weights, attempted, lambda found: _descended(found, motion, attempted, weights, tolerance))
     tally = {}
