@@ -18,7 +18,7 @@ from .words import (
     untold,
     valued,
     wrapped,
-)  # fmt: skip
+)
 
 if TYPE_CHECKING:
     from ..diagnose.diagnosis import Diagnosis
