@@ -18,7 +18,7 @@ from .filter_errors import held_out
 from .log import Log
 from .lowpass import band
 from .model import Model
-from .smoother import Smoother
+from .preprocess import needs
 from .spans import Spans
 from .specs import Experiment, PreprocessSpec
 from .warned import noticed, warn
@@ -26,6 +26,8 @@ from .workers import Mapped
 
 _WINDOWS = (0.02, 0.03, 0.05, 0.07, 0.1, 0.15, 0.2, 0.3, 0.4, 0.6, 0.8)  # s
 _CUTOFFS = (1.0, 1.5, 2.0, 3.0, 5.0, 7.0, 10.0, 15.0, 20.0, 30.0, 50.0, 100.0)  # Hz
+_SLOW = (0.3, 0.5, 0.7)  # Hz, of a low-pass on both sides beside these: an arm of 300 kg moves at half a hertz
+_USUAL = {"window": 0.1, "cutoff": 10.0}  # s and Hz
 # Windows of an angle, a cycle of the low-pass on both sides. A polynomial of order 4 is -3 dB at 1.56 / window: friction's jump is smeared
 # over a short time only, and the noise that comes through stays behind the low-pass.
 _ANGLES, _POSES = 12.0, 50
@@ -44,7 +46,7 @@ def compare(
     Returns:
         {"filter", "order", "window" or "cutoff", "torque", "chosen": "given" or "held-out error", "held_out": [
         {"window" or "cutoff": value, "relative_error": geometric mean over the joints, "rms": {joint: N m}}, ...]}; neighbours are half and
-        double the value where it was given, the whole grid where it was `auto`.
+        double the value where it was given, the whole grid where it was `auto`, as a low-pass on both sides is where no cutoff is said.
     """
     return begun(experiment, model, logs, prior, progress=progress, mapped=mapped)()
 
@@ -64,22 +66,24 @@ def begun(
         progress: called with the share of the filters that is done. mapped: what shares work among processes, as of `workers.crew`;
             None: there is this one.
     """
-    spec = experiment.preprocess
-    if lowpassed(experiment):
+    spec, low = experiment.preprocess, lowpassed(experiment)
+    if low and (_servos(experiment) or "cutoff" in _given(spec)):
         return lambda: _of_the_motion(experiment, model, logs, prior)
     said = {"filter": spec.filter, "torque": spec.torque, "standstill": spec.standstill}
     if spec.filter == "none":
         return lambda: {**said, "chosen": "given", "held_out": []}
-    key = _key(spec)
-    value = getattr(spec, key)
+    key = "cutoff" if low else _key(spec)
+    value = "auto" if low else getattr(spec, key)
     automatic = value == "auto"
-    candidates = (_WINDOWS if key == "window" else _CUTOFFS) if automatic else (value / 2, value, value * 2)
+    values = ((*_SLOW, *_CUTOFFS) if low else _WINDOWS if key == "window" else _CUTOFFS) if automatic else (value / 2, value, value * 2)
+    step = max(segment.step for log in logs for segment in log.segments)
+    candidates = [{"cutoff": value, "window": _window(spec, value, step)} if low else {key: value} for value in values]
     shortened = [_middle(log) for log in logs]
-    edge = _widest_edge(spec, key, candidates, shortened)
+    edge = _widest_edge(spec, candidates, shortened)
     # a file that others read, they read themselves
     sent = [log if mapped and isinstance(log.segments, Spans) and not log.segments.held else own for log, own in zip(logs, shortened)]
     share = mapped or (lambda work, arguments: (work(*each) for each in arguments))
-    tries = share(_tried, ((experiment, key, candidate, model, sent, prior, edge) for candidate in candidates))
+    tries = share(_tried, ((experiment, candidate, model, sent, prior, edge) for candidate in candidates))
 
     def result() -> dict:
         tried: list[dict] = []
@@ -87,16 +91,18 @@ def begun(
             tried += [] if found is None else [found]
             if progress:
                 progress((number + 1) / len(candidates))
-        chosen = value
+        chosen = {key: value}
         if automatic:
+            if not tried and low:  # too short to hold a part of them out
+                return _of_the_motion(experiment, model, logs, prior)
             if not tried:
                 raise SysidError(f"no {key} suits the logs", where="preprocess", do=f"give {key} a number")
-            chosen = _best(tried, key, 0.1 if key == "window" else 10.0)
-            place = [entry[key] for entry in tried].index(chosen)
-            if len(tried) > 1 and place in (0, len(tried) - 1):
-                warn(f"preprocess.{key}: auto chose {chosen:g}, the end of what was tried; give a number to go further")
+            best = _best(tried, key, _USUAL[key])
+            chosen = {name: best[name] for name in candidates[0]}
+            if len(tried) > 1 and best in (tried[0], tried[-1]):
+                warn(f"preprocess.{key}: auto chose {best[key]:g}, the end of what was tried; give a number to go further")
         shown = [{name: entry[name] for name in (key, "relative_error", "rms")} for entry in tried]
-        return {**said, "order": spec.order, key: chosen, "chosen": "held-out error" if automatic else "given", "held_out": shown}
+        return {**said, "order": spec.order, **chosen, "chosen": "held-out error" if automatic else "given", "held_out": shown}
 
     return result
 
@@ -105,13 +111,27 @@ def _key(spec: PreprocessSpec) -> str:
     return "window" if spec.filter == "savitzky-golay" else "cutoff"
 
 
-def _tried(experiment: Experiment, key: str, candidate: float, model: Model, logs: Sequence[Log], prior, edge: float) -> dict | None:
+def _given(spec: PreprocessSpec) -> set[str]:
+    """What of a low-pass an experiment says: `window`, `cutoff`."""
+    return {key for key in ("window", "cutoff") if key in spec.model_fields_set and getattr(spec, key) != "auto"}
+
+
+def _servos(experiment: Experiment) -> bool:
+    return any(actuator.command is not None for actuator in experiment.actuator.values())
+
+
+def _window(spec: PreprocessSpec, cutoff: float, step: float) -> float:
+    """The window [s] of angles behind a low-pass, on logs whose longest step is `step`: far beyond it, where none is given."""
+    return spec.window if "window" in _given(spec) else float(max(1.0 / (_ANGLES * cutoff), 2.0 * (spec.order // 2) * step))
+
+
+def _tried(experiment: Experiment, candidate: dict, model: Model, logs: Sequence[Log], prior, edge: float) -> dict | None:
     """What a filter leaves of the middles of logs; None where it is none: a window shorter than its order, a cutoff above half the
     sampling rate."""
-    spec = experiment.preprocess.model_copy(update={key: candidate})
+    spec = experiment.preprocess.model_copy(update=candidate)
     try:
         with noticed():
-            return {key: candidate, **held_out(experiment, spec, model, [_middle(log) for log in logs], prior, edge)}
+            return {**candidate, **held_out(experiment, spec, model, [_middle(log) for log in logs], prior, edge)}
     except SysidError:
         return None
 
@@ -120,8 +140,7 @@ def lowpassed(experiment: Experiment) -> bool:
     """Whether both sides of an experiment go under a low-pass: where it says so, and where a joint's torque is made of its own angle, a
     servo's, and it says nothing of filters."""
     spec = experiment.preprocess
-    servo = any(actuator.command is not None for actuator in experiment.actuator.values())
-    return spec.filter != "none" and (spec.torque == "low-pass" or (servo and not spec.model_fields_set & {"filter", "window", "cutoff", "torque"}))
+    return spec.filter != "none" and (spec.torque == "low-pass" or (_servos(experiment) and not spec.model_fields_set & {"filter", "window", "cutoff", "torque"}))
 
 
 def _of_the_motion(experiment: Experiment, model: Model, logs: Sequence[Log], prior) -> dict:
@@ -129,21 +148,20 @@ def _of_the_motion(experiment: Experiment, model: Model, logs: Sequence[Log], pr
     as from there on noise of the angles, which inertia makes torque of, grows with the square of frequency; the angles far beyond.
     """
     spec = experiment.preprocess
-    own = {key for key in ("window", "cutoff") if key in spec.model_fields_set and getattr(spec, key) != "auto"}
     # of each, its step and angles thinned: a long one does not stand in memory
     thinned = [(len(s.t), s.step, s.q[:: -(-len(s.q) // _POSES)].copy()) for log in logs for s in log.segments]
-    cutoff, step = spec.cutoff, max(step for _, step, _ in thinned)
-    if "cutoff" not in own:
+    cutoff = spec.cutoff
+    if "cutoff" not in _given(spec):
         rows, its_step, q = max(thinned, key=lambda one: one[0])
-        cutoff = max(min(band(logs), 2.0 * slowest(experiment, model.robot, prior, q)), 1.0 / (its_step * rows))
-    window = spec.window if "window" in own else max(1.0 / (_ANGLES * cutoff), 2.0 * (spec.order // 2) * step)
+        cutoff = float(max(min(band(logs), 2.0 * slowest(experiment, model.robot, prior, q)), 1.0 / (its_step * rows)))
+    window = _window(spec, cutoff, max(step for _, step, _ in thinned))
     return {
         "filter": spec.filter, "torque": "low-pass", "standstill": spec.standstill, "order": spec.order, "window": float(window), "cutoff": float(cutoff),
-        "chosen": "given" if own == {"window", "cutoff"} else "the motion's band", "held_out": [],
+        "chosen": "given" if "cutoff" in _given(spec) else "the motion's band", "held_out": [],
     }  # fmt: skip
 
 
-def _widest_edge(spec: PreprocessSpec, key: str, candidates, logs) -> float:
+def _widest_edge(spec: PreprocessSpec, candidates: Sequence[dict], logs) -> float:
     """Seconds that every candidate leaves out at both ends of a log, so that all are judged on the same rows.
 
     A candidate that would take more than a tenth of the shortest log does not set it, and is judged on what it has.
@@ -154,21 +172,20 @@ def _widest_edge(spec: PreprocessSpec, key: str, candidates, logs) -> float:
         for log in logs:
             for segment in log.segments:
                 try:
-                    reach = Smoother(spec.model_copy(update={key: candidate}), segment.step).reach
+                    edges.append(needs(spec.model_copy(update=candidate), segment.step) // 2 * segment.step)
                 except SysidError:
                     continue
-                edges.append(reach * segment.step * (2 if spec.torque == "same" else 1))
     return max((edge for edge in edges if edge <= 0.1 * shortest), default=0.0)
 
 
-def _best(tried: list[dict], key: str, usual: float) -> float:
+def _best(tried: list[dict], key: str, usual: float) -> dict:
     """The candidate of least held-out error; among those within one standard error of it, the one nearest the usual."""
     least = min(tried, key=lambda entry: entry["relative_error"])
     # a candidate that is missing folds cannot be compared
     alike = [entry for entry in tried if len(entry["folds"]) == len(least["folds"])]
     kept = within_one_error([entry["folds"] for entry in alike], alike.index(least))
-    tied = [entry[key] for entry, within in zip(alike, kept) if within]
-    return min(tied, key=lambda value: abs(np.log(value / usual)))
+    tied = [entry for entry, within in zip(alike, kept) if within]
+    return min(tied, key=lambda entry: abs(np.log(entry[key] / usual)))
 
 
 def settled(spec: PreprocessSpec, chosen: dict) -> PreprocessSpec:

@@ -4,7 +4,7 @@ Savitzky-Golay takes q, qd and qdd from one and the same fitted polynomial and l
 does. A zero-phase Butterworth filters the angle once and takes central differences of it. With `torque: same`
 the filter that the angles saw also goes over torque and over every column that is not a smooth function of
 the filtered motion, so that both sides of the equation of motion see one filter. With `torque: low-pass` that is a low-pass of
-its own, at `cutoff`: the noise of derivatives grows with frequency, and beyond the motion's band there is nothing else.
+its own, at `cutoff`: the noise of derivatives grows with frequency, and far beyond the motion's band there is nothing else.
 """
 
 from collections.abc import Sequence

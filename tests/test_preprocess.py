@@ -237,6 +237,32 @@ def test_auto_window_follows_the_noise_and_the_motion():
     assert chosen[2e-3] > 2 * chosen[1e-6]
 
 
+def test_a_low_pass_follows_the_noise_too():
+    """What an angle's noise becomes as acceleration asks for a lower cutoff; torque is held against what was logged, so that none wins
+    by what it smooths away. Where one is given, nothing is chosen."""
+    from dataclasses import replace
+
+    experiment, structure, _, _, prior = arm()
+    rng = np.random.default_rng(8)
+    low = PreprocessSpec(torque="low-pass")
+    experiment = experiment.model_copy(update={"preprocess": low})
+    chosen = {}
+    for noise in (1e-6, 2e-3):
+        made = arm_log(structure.robot, rng, seconds=20)
+        (segment,) = made.segments
+        noisy = replace(made, segments=(replace(segment, q=segment.q + noise * rng.normal(size=segment.q.shape)),))
+        found = filters.compare(experiment, structure, [noisy], prior)
+        errors = {entry["cutoff"]: entry["relative_error"] for entry in found["held_out"]}
+        assert errors[found["cutoff"]] < 1.1 * min(errors.values()) and found["chosen"] == "held-out error"
+        # the angles' window goes with it
+        assert found["window"] == pytest.approx(max(1.0 / (12.0 * found["cutoff"]), 4.0 * segment.step))
+        chosen[noise] = found["cutoff"]
+    assert chosen[2e-3] < 0.6 * chosen[1e-6]
+    given = experiment.model_copy(update={"preprocess": PreprocessSpec(torque="low-pass", cutoff=4.0)})
+    found = filters.compare(given, structure, [noisy], prior)
+    assert (found["cutoff"], found["chosen"], found["held_out"]) == (4.0, "given", [])
+
+
 def test_a_given_filter_is_shown_beside_half_and_double():
     experiment, structure, _, _, prior = arm()
     made = arm_log(structure.robot, np.random.default_rng(3), seconds=10)

@@ -97,19 +97,21 @@ def _show_groups(groups: dict) -> None:
 
 
 def _show_filter(chosen: dict) -> None:
-    key = "window" if "window" in chosen else "cutoff"
+    low = chosen["torque"] == "low-pass" and chosen["filter"] != "none"
+    key = "window" if "window" in chosen and not low else "cutoff"
     unit = "s" if key == "window" else "Hz"
-    if chosen["torque"] == "low-pass" and chosen["filter"] != "none":
-        print(f"filter: {chosen['filter']}, window {chosen['window']:g} s; both sides under a low-pass at {chosen['cutoff']:g} Hz ({chosen['chosen']})")
-        return
-    if not chosen["held_out"]:
-        print(f"filter: {chosen['filter']}")
-        return
-    values = [entry[key] for entry in chosen["held_out"]]
-    at = values.index(chosen[key]) if chosen[key] in values else None
-    near = chosen["held_out"] if at is None else chosen["held_out"][max(at - 1, 0) : at + 2]  # the others are in fit.json
-    shown = ", ".join(f"{entry[key]:g} {unit}: {100 * entry['relative_error']:.2f} %" for entry in near)
-    words = f"filter: {chosen['filter']}, {key} {chosen[key]:g} {unit} ({chosen['chosen']}); relative error on stretches of the training logs that were held apart: {shown}"
+    if low:
+        words = f"filter: {chosen['filter']}, window {chosen['window']:g} s; both sides under a low-pass at {chosen['cutoff']:.3g} Hz ({chosen['chosen']})"
+    elif chosen["held_out"]:
+        words = f"filter: {chosen['filter']}, {key} {chosen[key]:g} {unit} ({chosen['chosen']})"
+    else:
+        words = f"filter: {chosen['filter']}"
+    if chosen["held_out"]:
+        values = [entry[key] for entry in chosen["held_out"]]
+        at = values.index(chosen[key]) if chosen[key] in values else None
+        near = chosen["held_out"] if at is None else chosen["held_out"][max(at - 1, 0) : at + 2]  # the others are in fit.json
+        shown = ", ".join(f"{entry[key]:g} {unit}: {100 * entry['relative_error']:.2f} %" for entry in near)
+        words += f"; relative error on stretches of the training logs that were held apart: {shown}"
     print("\n".join(text.wrapped(words, terminal_width(), "  ")))
 
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from itertools import islice
 
 import numpy as np
-from scipy.special import log_ndtr, ndtr, ndtri
+from scipy.special import log_ndtr, ndtri
 
 from .. import blocks
 from ..projection import DATA, FLAT, NOISE
@@ -119,7 +119,7 @@ def _beyond(value: float, maxima: np.ndarray) -> float:
     least, half, most = -ndtri(-np.expm1(log / count))
     k = int(np.argmin(np.abs(half / (most - least) - middle / max(high - low, 1e-12))))
     size = max(high - low + middle, 1e-12) / (most - least + half)[k]
-    return float(-np.expm1(count[k] * np.log1p(-ndtr(-value / size))))
+    return float(-np.expm1(count[k] * log_ndtr(value / size)))
 
 
 @dataclass(frozen=True)
