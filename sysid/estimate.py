@@ -96,6 +96,13 @@ class Fit(WithTorque):
         """Joint names."""
         return self.model.robot.joints
 
+    @property
+    def unused(self) -> tuple[str, ...]:
+        """The joints of which no torque is used: those that the experiment says, and those of which none was logged."""
+        lacking = {joint for event in self.events if event["kind"] == "missing" for joint in event["joints"]}
+        seen = sum(prediction.counts for prediction in self.predictions.values())
+        return tuple(j for k, j in enumerate(self.joints) if j in self.experiment.data.unused or (j in lacking and not seen[k]))
+
     def parameters_of(self, effect: str, joint: int) -> dict[str, tuple[float, float, str]]:
         """{name: (value, std or NaN, unit)} of an effect's parameters on a joint's number, -1 where its scope is the robot."""
         own, model = (effect, joint), self.model

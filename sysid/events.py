@@ -6,6 +6,7 @@ knock       several joints pulsed or rang at once, for tens of milliseconds: a h
 spike       a sample or a few of one joint's torque stand alone
 brake       one joint's torque repeats exactly while it rests: not the torque that holds it
 frozen      one joint's torque or angle repeats exactly while it moves: the reading stood still
+missing     one joint's torque never changes though it moves: none was logged, or another signal
 saturation  as frozen, at the highest or lowest torque of the log: told, but not left out
 mask        no event: a stretch that the user leaves out (`masks`)
 """
@@ -19,11 +20,12 @@ import numpy as np
 
 from .knocks import knocks
 from .outliers import spikes
-from .repeats import held_angle, held_torque, rests
+from .repeats import TRAVELS, held_angle, held_torque, rests
 from .segment import Segment
 
 WORDS = {
     "knock": "knock", "spike": "torque spike", "brake": "closed brake", "frozen": "frozen value",
+    "missing": "missing torque",
     "saturation": "flat top", "mask": "masked stretch",
 }  # fmt: skip
 KINDS = tuple(WORDS)
@@ -79,7 +81,9 @@ def find(
             kind = "brake" if rests(q, first, last, usual) else "frozen"
             kind = "saturation" if extreme else kind
             tell(kind, first, last, [j])
-        if not tau.any() and segment.tau.any() and rests(q, 0, len(q) - 1, usual):
+        if not np.ptp(tau) and np.ptp(q) > TRAVELS:
+            tell("missing", 0, len(q) - 1, [j])
+        elif not tau.any() and segment.tau.any() and rests(q, 0, len(q) - 1, usual):
             tell("brake", 0, len(q) - 1, [j])
         for first, last in held_angle(q):
             tell("frozen", first, last, [j], "position")

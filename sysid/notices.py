@@ -40,18 +40,30 @@ def refuse_no_torque(train: list[logs.Log]) -> None:
         raise LogError("the torque of every joint is 0 in every row: none was logged", where=str(train[0].path), do="name the columns of torque in data.columns.torque, or what drives the joints in actuator")
 
 
+def refuse_no_row(motion: Motion) -> None:
+    """Raises LogError: no row of any joint counts."""
+    counted = [joint for joint, out in zip(motion.joints, motion.left_out) if out < motion.samples and joint not in motion.unused]
+    if not counted:
+        why = events.told(motion.events, motion.disturbed, "training")
+        raise LogError(f"no row of the training logs counts{''.join(f'; {one}' for one in why[:1])}", do="give logs in which the joints move and their torque is measured")
+
+
 def tell_still(motion: Motion, spec) -> None:
     """Joints that stand still in much of what they are logged in, where that counts, or in all of it."""
     often = [f"{joint} {100 * share:.0f} %" for joint, share in zip(motion.joints, motion.standing) if share > _MUCH_STANDING and joint not in motion.still]
     if often and spec.standstill == "keep":
         warn(f"joints that stand still in much of their rows, where friction may have any value up to its greatest: {', '.join(often)}; preprocess.standstill: auto leaves them out")
+    silent = {joint for event in motion.events if event.kind == "missing" for joint in event.joints}
     for joint in motion.still:
+        if joint in silent:
+            warn(f"the torque of {joint} is the same in every row of the training logs though it moves: none was logged; log it, or name the joint in data.unused; its friction is held at its prior")
+            continue
         warn(f"joint {joint!r} never moves in the training logs, or never clear of a standstill; its friction is held at its prior, and its bodies are where the other joints' torque leaves them")
 
 
 def tell_left_out(motion: Motion, spec) -> None:
     """How many rows of each joint's reversals are left out."""
-    shares = [f"{joint} {100 * count / motion.samples:.0f} %" for joint, count in zip(motion.joints, motion.left_out) if count and joint not in motion.unused]
+    shares = [f"{joint} {100 * count / motion.samples:.0f} %" for joint, count in zip(motion.joints, motion.left_out) if count and joint not in (*motion.unused, *motion.still)]
     if spec.standstill == "auto" and shares:
         warn(f"rows around each joint's reversals and standstill, where the filter smears friction's jump, are left out of its fit and its error: {', '.join(shares)}; preprocess.standstill: keep uses every row")
 

@@ -32,6 +32,7 @@ from .long_prediction import predicted
 from .model import Model
 from .motion import Motion
 from .notices import (
+    refuse_no_row,
     refuse_no_torque,
     samples_of,
     tell_events,
@@ -124,6 +125,7 @@ def _fit(experiment: Experiment, filters: dict | None, strength: PriorWeight | N
             motion = prepare(train, preprocess, machine.joints, mapped)
             chosen = comparing() if later else chosen
             del train, comparing  # the filtered motion holds all that is needed from here on
+        refuse_no_row(motion)
         tell_still(motion, experiment.preprocess)
         tell_left_out(motion, preprocess)
         disturbed = tell_events("train", motion)

@@ -6,6 +6,7 @@ import numpy as np
 
 from .outliers import CHANCE, RESTING, SHORT, quantum, runs
 
+TRAVELS = 0.05  # rad or m: a joint that moves so far needs torque
 _GRAINS = 2.5  # quanta: two and the rounding; less is how coarse values move
 _MOVING = 1.5  # quanta a sample: what moves as fast repeats no value
 _ABOUT = 4  # samples to either side whose speed is what the joint had

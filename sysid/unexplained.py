@@ -73,7 +73,10 @@ def cause(
     """
     error = errors[1]
     if not error > 0.0:
-        return "none of its rows on the test logs counts: unused, at a standstill, or disturbed"
+        return (
+            "none of its rows on the test logs counts: its torque is unused or was not logged, it "
+            "stands still, or it is disturbed"
+        )
     if looks:
         tried = "" if may else ", though no fit with it bore that out,"
         return (

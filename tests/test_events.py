@@ -325,7 +325,9 @@ def test_the_view_of_the_diagnosis_leaves_events_out():
 
 
 def test_a_log_without_events_keeps_every_row_and_one_with_them_does_not_disturb_the_others():
-    assert prepare([log(segment())], PreprocessSpec(standstill="keep"), JOINTS).pieces[0].use is None
+    assert (
+        prepare([log(segment())], PreprocessSpec(standstill="keep"), JOINTS).pieces[0].use is None
+    )
     spike = Event("spike", "made.csv", 5.0, 5.0, ("b",))
     one, two = prepare(
         [log(segment(), events=[spike]), log(segment())], PreprocessSpec(standstill="keep"), JOINTS
@@ -391,7 +393,9 @@ def real(name: str) -> dict[str, tuple[tuple[Event, ...], Log]]:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         machine = pipeline.build(experiment)[0]
-        logs = experiment_logs.read(experiment, machine, [*experiment.data.train, *experiment.data.test])
+        logs = experiment_logs.read(
+            experiment, machine, [*experiment.data.train, *experiment.data.test]
+        )
     return {one.name: one for one in logs}
 
 
@@ -436,3 +440,16 @@ def test_standing_ripple_and_gear_impacts_are_left_in(name):
 
 def joints(one: Log) -> tuple[str, ...]:
     return ("axis0",) if one.segments[0].q.shape[1] == 1 else tuple(f"A{k}" for k in range(1, 7))
+
+
+@pytest.mark.parametrize("value", [0.0, 2.5])
+def test_a_torque_that_never_changes_though_the_joint_moves_was_not_logged(value):
+    made = changed(segment(), tau=(slice(None), 1, value))
+    (event,) = find(made, JOINTS)
+    assert (event.kind, event.joints, event.signal) == ("missing", ("b",), "torque")
+    assert (event.start, event.stop) == (made.t[0], made.t[-1])
+    use = usable(made.t, JOINTS, [event])
+    assert not use[:, 1].any() and use[:, [0, 2]].all()
+    # one that stands still may need the same torque throughout, and a brake reads none
+    still = changed(made, q=(slice(None), 1, 0.3))
+    assert [event.kind for event in find(still, JOINTS)] == ["brake"] * (value == 0.0)

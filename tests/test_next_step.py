@@ -91,3 +91,36 @@ def test_a_low_pass_is_chosen_in_numbers_that_a_file_can_hold(experiment, cli):
 def slower(columns):
     """Every fourth sample."""
     return {name: values[::4] for name, values in columns.items()}
+
+
+def without_torque(*joints):
+    """Columns whose torque of some joints never changes."""
+    return lambda columns: {name: 1.5 + 0.0 * values if name in [f"tau_{joint}" for joint in joints] else values for name, values in columns.items()}
+
+
+def test_a_torque_that_was_not_logged_bends_no_other_joint(experiment, cli):
+    """It is told, and the joint is as one that the experiment says is not used: no motion is asked for on its account."""
+    lacks = without_torque("elbow")
+    bare = experiment(train=lacks, test=lacks, name="bare")
+    named = experiment(config={"data.unused": ["elbow"]}, name="named")
+    fits = {}
+    for folder in (bare, named):
+        said = cli("fit", folder, out=folder / "run")
+        assert said.status == 0, said.err
+        fits[folder.name] = json.loads((folder / "run" / "fit.json").read_text())
+        if folder is bare:
+            assert "of elbow no torque was logged" in said.out and "log it, or name the joint in data.unused" in " ".join(said.out.split())
+    first, second = (fits[name]["rms"]["test"] for name in ("bare", "named"))
+    assert first["shoulder"] == pytest.approx(second["shoulder"], rel=1e-6)
+    assert first["elbow"] is None and second["elbow"] is None
+    said = cli("diagnose", bare, "--json", out=bare / "run")
+    found = json.loads(said.out)
+    assert found["unused"] == ["elbow"] and text.blind(found) == [joint for joint in text.blind(found) if joint != "elbow"]
+    assert (found["next_log"] is not None) is bool(text.blind(found))
+
+
+def test_logs_of_which_no_row_counts_are_refused(experiment, cli):
+    lacks = without_torque("shoulder", "elbow")
+    cli("fit", experiment(train=lacks, test=lacks)).complains("no row of the training logs counts", "2 missing torques", "their torque is measured")
+    masked = experiment(config={"preprocess.mask": [{"log": "train.csv", "start": 0.0, "stop": 1e3}]}, name="masked")
+    cli("fit", masked).complains("no row of the training logs counts", "masked")

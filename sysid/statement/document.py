@@ -14,11 +14,22 @@ from ..fit_document import number, versions
 from ..flexible import Unknown
 from ..model_parameters import ROBOT
 from ..units import of_joint
+from . import text
 from .claims import chances, claims, finding
 
 
 def document(found: Diagnosis, run="") -> dict:
-    """The document of `sysid diagnose`. NaN is None."""
+    """The document of `sysid diagnose`. NaN is None.
+
+    next_log: the command that designs the log to take next, where these do not say why an error
+    stands, and neither an effect that may be it nor how the fit weighs its joints does.
+    """
+    out = _document(found, run)
+    blind = text.blind(out)
+    return {**out, "next_log": another_log(found.fit.experiment.path) if blind else None}
+
+
+def _document(found: Diagnosis, run) -> dict:
     fit, joints = found.fit, found.fit.joints
     rms = {part: dict(zip(joints, fit.predictions[part].told())) for part in ("train", "test")}
     return {
@@ -94,8 +105,8 @@ def document(found: Diagnosis, run="") -> dict:
             "rms_test_before": dict(zip(joints, found.first.rms().tolist())),
             "rms_test_after": dict(zip(joints, found.last.rms().tolist())),
         },
-        "next_log": _next_log(found),
-        "unused": list(fit.experiment.data.unused),
+        "next_log": None,
+        "unused": list(fit.unused),
         "not_claimed": [
             {"effect": r.effect, "joint": r.joint, "why": r.why} for r in found.refused
         ],
@@ -104,15 +115,6 @@ def document(found: Diagnosis, run="") -> dict:
         "versions": versions(),
         "run": str(run),
     }
-
-
-def _next_log(found) -> str | None:
-    """The command that designs the log to take next, where these do not say why an error stands,
-    and neither an effect that may be it nor how the fit weighs its joints does."""
-    unused = found.fit.experiment.data.unused  # no log shows what is not to be looked at
-    own = (v for v in found.verdict if v.joint not in unused)
-    blind = any(v.status == "unresolved" and not (v.may or v.even) for v in own)
-    return another_log(found.fit.experiment.path) if blind else None
 
 
 def _units(d, fit) -> dict[str, str]:

@@ -13,7 +13,7 @@ from ..held_apart import prior_strength
 from ..long_motion import prepare
 from ..model import Model, moving_coefficients
 from ..motion import Motion
-from ..notices import refuse_no_torque, tell_still
+from ..notices import refuse_no_row, refuse_no_torque, tell_still
 from ..pipeline import build, started
 from ..prior_weight import with_weight
 from ..shape_refinement import refined
@@ -45,9 +45,10 @@ def prepared(experiment: Experiment) -> Prepared:
         train = read(experiment, machine, experiment.data.train)
         refuse_no_torque(train)
         preprocess = experiment.preprocess
-        if "auto" in (preprocess.window, preprocess.cutoff):
+        if "auto" in (preprocess.window, preprocess.cutoff) or filtering.lowpassed(experiment):
             preprocess = filtering.settled(preprocess, filtering.compare(experiment, structure, train, prior))
         motion = prepare(train, preprocess, machine.joints)
+        refuse_no_row(motion)
         tell_still(motion, experiment.preprocess)
         structure, _, _, strength = refined(experiment, structure, motion, prior)
         held_out = prepare(read(experiment, machine, experiment.data.test), preprocess, machine.joints)

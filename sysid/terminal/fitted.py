@@ -37,8 +37,10 @@ def show_fit(fit: Fit, document: dict) -> None:
     ]  # fmt: skip
     table(f"{fit.experiment.name}: residual by joint", ["joint", "", "RMS train", "RMS test", "relative test", "R2 test"], rows)
     print(f"RMS over the rows that count, {document['band']}; relative to the RMS of the joint's own torque")
-    if fit.experiment.data.unused:
-        print(f"of {', '.join(fit.experiment.data.unused)} no torque is used (data.unused)")
+    if named := fit.experiment.data.unused:
+        print(f"of {', '.join(named)} no torque is used (data.unused)")
+    if silent := [joint for joint in fit.unused if joint not in named]:
+        print(f"of {', '.join(silent)} no torque was logged")
     _show_groups(document.get("groups", {}))
     certificate = document["certificate"]
     for own in document["drives"]:

@@ -45,7 +45,8 @@ def find(look: Look) -> Iterator[Fault]:
     """spikes, knock, brake_closed, values_held, saturation."""
     for log in look.logs:
         groups: dict[tuple[str, str], list] = {}
-        for event in log.log.events:
+        # torque that is missing is `effort_missing`
+        for event in (one for one in log.log.events if one.kind in _KINDS):
             for joint in event.joints if event.kind != "knock" else ("",):
                 groups.setdefault((event.kind, joint), []).append(event)
         for (kind, joint), own in groups.items():

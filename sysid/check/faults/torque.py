@@ -7,12 +7,12 @@ from collections.abc import Iterator
 import numpy as np
 
 from ...outliers import quantum
+from ...repeats import TRAVELS
 from ..fault import ERROR, WARNING, Fault
 from ..look import Logged, Look
 
 AFTER, SENSELESS = 0, ()
 _COARSE = 0.015  # of the greatest torque
-_TRAVELS = 0.05  # rad or m: a joint that moves so far needs torque
 
 
 def find(look: Look) -> Iterator[Fault]:
@@ -25,7 +25,7 @@ def find(look: Look) -> Iterator[Fault]:
 def _of_log(look: Look, log: Logged, j: int, joint: str) -> Iterator[Fault]:
     tally, name = log.tally, log.log.name
     if not tally.swing[j] > 0.0:
-        moves = tally.travel[j] > _TRAVELS
+        moves = tally.travel[j] > TRAVELS
         if moves or not (tally.low[1].any() or tally.high[1].any()):
             why = "the joint moves" if moves else "so is that of every other joint"
             yield Fault(
