@@ -124,3 +124,19 @@ def test_logs_of_which_no_row_counts_are_refused(experiment, cli):
     cli("fit", experiment(train=lacks, test=lacks)).complains("no row of the training logs counts", "2 missing torques", "their torque is measured")
     masked = experiment(config={"preprocess.mask": [{"log": "train.csv", "start": 0.0, "stop": 1e3}]}, name="masked")
     cli("fit", masked).complains("no row of the training logs counts", "masked")
+
+
+@pytest.mark.parametrize("lock", [{}, {"elbow": 0.3}])
+def test_a_joint_that_is_locked_and_moves_is_told(experiment, cli, lock):
+    folder = experiment(config={"robot.joints": ["shoulder"], "robot.lock": lock})
+    said = " ".join(cli("fit", folder).out.split())
+    assert f"joint elbow is locked at {lock.get('elbow', 0)} rad, and train.csv has it from -" in said and "name it in robot.joints" in said
+
+
+def test_a_joint_that_is_locked_where_it_stands_is_not(experiment, cli):
+    standing = lambda columns: columns | {"q_elbow": 0.3 + 0.0 * columns["q_elbow"]}  # noqa: E731
+    for lock, told in ((0.3, False), (0.0, True)):
+        folder = experiment(config={"robot.joints": ["shoulder"], "robot.lock": {"elbow": lock}}, train=standing, test=standing, name=f"at{lock}")
+        assert ("is locked" in cli("fit", folder).out) is told
+    other = experiment(config={"robot.joints": ["shoulder"]}, train=lambda c: {k: v for k, v in c.items() if k != "q_elbow"}, name="bare")
+    assert "is locked" not in cli("fit", other).out
