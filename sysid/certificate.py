@@ -68,12 +68,14 @@ def certify(objective: Objective, x: np.ndarray, positive: np.ndarray, held: np.
     slope = 2.0 * image.T @ objective.misfit(x)
     hessian = 2.0 * image.T @ image
     own = np.arange(count)
+    # of each body: what is added to any stays as self-concordant by the least of them
+    barriers = objective.weight * np.broadcast_to(objective.divergence.scale, (objective.bodies,))
     if barrier:
         # in these coordinates the barrier's gradient is -1 and its Hessian 1, exactly
         linear = np.append(objective.divergence.linear.ravel(), np.zeros(len(c)))
         slope += objective.weight * scaled_gradient(linear, turn, spread)
-        slope[:count] -= objective.weight * packed(np.ones((objective.bodies, 4)))
-        hessian[own, own] += objective.weight
+        slope[:count] -= packed(barriers[:, None] * np.ones(4))
+        hessian[own, own] += np.repeat(barriers, 10)
     elif objective.weight > 0.0:
         pull = np.append(objective.weight * objective.divergence.gradient(pi).ravel(), np.zeros(len(c)))
         slope += scaled_gradient(pull, turn, spread)
@@ -95,8 +97,9 @@ def certify(objective: Objective, x: np.ndarray, positive: np.ndarray, held: np.
     free = np.append(np.ones(count, dtype=bool), ~held & ~at_zero)
     decrement = _decrement(rest[free], hessian[np.ix_(free, free)], float(np.linalg.norm(objective.triangle[:, -1])))
     if barrier:
-        scaled = np.sqrt(decrement / objective.weight)
-        bound += objective.weight * (-scaled - np.log1p(-scaled)) if scaled < 1.0 else np.inf
+        least = barriers.min()
+        scaled = np.sqrt(decrement / least)
+        bound += least * (-scaled - np.log1p(-scaled)) if scaled < 1.0 else np.inf
     else:
         bound += 0.5 * decrement
     gap = bound / value if value > 0.0 else bound

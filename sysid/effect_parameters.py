@@ -11,11 +11,13 @@ import numpy as np
 
 @dataclass
 class Linear:
-    """A coefficient that multiplies one column. `unit` is written for a revolute joint; `lower` is 0 or None."""
+    """A coefficient that multiplies one column. `unit` is written for a revolute joint; `lower` is 0 or None; of_body: it is one of
+    ten in a row, the inertial parameters of a body."""
 
     unit: str
     lower: float | None = None
     says: str = ""
+    of_body: bool = False
     name: str = field(default="", init=False)
 
     def __set_name__(self, owner, name):

@@ -167,5 +167,5 @@ def identify(experiment: Experiment, model: Model, motion: Motion, data: Compres
         experiment=experiment, model=model, x=solution.x, objective=solution.objective, solution=solution,
         certificate=certificate, held=held, weights=problem.weights, compressed=compressed,
         uncertainty=kept, shape_std=shape_std, shape_covariance=shape_covariance, prior=prior, known=problem.objective.known, strength=PriorWeight(number(experiment)),
-        physically_consistent=bool(is_consistent(solution.x[:count].reshape(-1, 10)).all()),
+        physically_consistent=bool(is_consistent(solution.x[problem.every_body]).all()),
     )  # fmt: skip

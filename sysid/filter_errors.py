@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from . import interior
 from .compress import compress
 from .errors import SysidError
 from .events import usable
@@ -60,12 +59,8 @@ def held_out(experiment: Experiment, spec: PreprocessSpec, model: Model, logs: S
     for fold in folds:
         kept = data.without(fold)
         problem = pose(experiment, model, kept, moving, prior)
-        iterates, _, _ = interior.minimise(
-            problem.objective, problem.coordinates.positive, problem.coordinates.held, problem.coordinates.physical(problem.start),
-            tolerance=experiment.solver.tolerance,
-        )  # fmt: skip
         held = _only(target, fold)
-        own = held.squares(iterates[-1])
+        own = held.squares(problem.minimum(experiment.solver.tolerance))
         squares += own
         rows += held.rows
         errors.append(_logarithm(own, size, held.rows))

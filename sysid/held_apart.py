@@ -18,7 +18,6 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from .blocks import standard_error, within_one_error
-from .interior import minimise
 from .model import Model, moving_coefficients
 from .motion import Motion
 from .posed_problem import Problem, known_bodies, noise_weights, pose
@@ -76,9 +75,7 @@ def solved(
     found = None if near is None else problem.from_nearby(near, tolerance)
     if found is not None:
         return found
-    own = problem.coordinates
-    start = own.physical(problem.start)
-    return minimise(problem.objective, own.positive, own.held, start, tolerance=tolerance)[0][-1]
+    return problem.minimum(tolerance)
 
 
 def held_apart(

@@ -88,10 +88,11 @@ def minimise(objective: Objective, positive: np.ndarray, held: np.ndarray, start
     count = 10 * objective.bodies
     free, bound = ~held, positive & ~held
     rows, target = objective.triangle[:, :-1], objective.triangle[:, -1]
-    linear, quadratic, barrier = _prior_parts(objective)
+    linear, quadratic, barriers = _prior_parts(objective)
+    barrier = objective.barrier
     x = _inside(start, rows, target, bound, count)
     iterates, values, best, near = [x], [objective.value(x)], np.inf, False
-    mu = max(0.01 * values[0] / len(x), barrier)
+    mu = max(0.01 * values[0] / len(x), float(barriers.max()))
     z = mu * np.linalg.inv(to_pseudo(x[:count].reshape(-1, 10)))
     state = _State(x, z, np.where(bound, mu / np.where(bound, x[count:], 1.0), 0.0))
     unit = np.concatenate([np.ones(count), np.where(bound, 1.0, 0.0)])
@@ -100,7 +101,7 @@ def minimise(objective: Objective, positive: np.ndarray, held: np.ndarray, start
     for _ in range(max_iterations + 1):
         value = max(abs(values[-1]), np.finfo(float).tiny)
         floor_c = _NOTHING * value / len(x)
-        floor_j = barrier or floor_c
+        floor_j = barriers if barrier else floor_c
         try:
             scaled = _scale(state, count, bound)
         except np.linalg.LinAlgError:
@@ -124,7 +125,7 @@ def minimise(objective: Objective, positive: np.ndarray, held: np.ndarray, start
         solve = _solver(system)
         squares_c = np.where(bound, scaled.root**2, 0.0)
         # the objective is off by about gamma off^2
-        off = np.abs(scaled.weights**2 - floor_j).max() / floor_j if barrier else 0.0
+        off = np.max(np.abs(scaled.weights**2 - floor_j) / floor_j) if barrier else 0.0
         loose = squares_c.sum() + (0.0 if barrier else np.sum(scaled.weights**2))
         near = False
         if off < 1e-4 and loose <= _NEARLY * value:
@@ -144,7 +145,7 @@ def minimise(objective: Objective, positive: np.ndarray, held: np.ndarray, start
         if not barrier:
             mu_j = mu_c = (np.sum(scaled.weights**2) + squares_c.sum()) / size
         # bodies under a barrier stay at its weight, however little is left of the coefficients' complementarity
-        levels = max(ahead * mu_j, floor_j), max(ahead * mu_c, floor_c)
+        levels = np.maximum(ahead * mu_j, floor_j), max(ahead * mu_c, floor_c)
         change = _change(solve, slope, scaled, _aim(scaled, bound, *levels, straight), fixed, bound)
         keep = 1.0 - np.clip(_PER_GAP * loose / value, _LEAST, _LEAVE)
         length = min(1.0, keep * _reach(change, scaled, bound))
@@ -173,14 +174,14 @@ def _inside(start, rows, target, bound, count: int) -> np.ndarray:
 
 
 def _prior_parts(objective: Objective):
-    """gamma times the prior without its barrier: linear (size,), quadratic (bodies, 10, 10) or None, barrier weight."""
-    linear = np.zeros(objective.triangle.shape[1] - 1)
+    """gamma times the prior without its barrier: linear (size,), quadratic (bodies, 10, 10) or None, the barrier's weights (bodies, 1)."""
+    linear, none = np.zeros(objective.triangle.shape[1] - 1), np.zeros((objective.bodies, 1))
     if objective.weight == 0.0:
-        return linear, None, 0.0
+        return linear, None, none
     if objective.barrier:
         linear[: 10 * objective.bodies] = objective.weight * objective.divergence.linear.ravel()
-        return linear, None, objective.weight
-    return linear, objective.weight * np.asarray(objective.divergence.hessian(objective.divergence.prior)), 0.0
+        return linear, None, none + objective.weight * np.reshape(objective.divergence.scale, (-1, 1))
+    return linear, objective.weight * np.asarray(objective.divergence.hessian(objective.divergence.prior)), none
 
 
 def _scale(state: _State, count: int, bound) -> _Scaled:
@@ -230,7 +231,7 @@ def _change(solve, slope, scaled: _Scaled, aim, fixed, bound) -> _Change:
     return _Change(step, both, np.where(bound, aim[count:] - scaled.root - step[count:], 0.0))
 
 
-def _aim(scaled: _Scaled, bound, level_j: float, level_c: float, straight: _Change | None) -> np.ndarray:
+def _aim(scaled: _Scaled, bound, level_j, level_c: float, straight: _Change | None) -> np.ndarray:
     """What body plus multiplier should change by, plus the multiplier: the right side of the scaled equations.
 
     Complementarity asks Lambda o (dJ + dZ) = level - Lambda^2 - dJ o dZ; the last term is what the predictor

@@ -19,7 +19,7 @@ def place(joint: int, joints: Sequence[str]) -> str:
 @dataclass(frozen=True)
 class Coefficient:
     """One linear coefficient of an effect on a joint (-1: on the robot). given: its value, where the user says it; term: the
-    model's, -1 where it is no model's; at: the (group, level) of logs that have it, None where all do."""
+    model's, -1 where it is no model's; at: the (group, level) of logs that have it, None where all do; of_body: as of `Linear`."""
 
     effect: str
     joint: int
@@ -29,6 +29,7 @@ class Coefficient:
     given: float | None = None
     term: int = -1
     at: tuple[str, str] | None = None
+    of_body: bool = False
 
 
 @dataclass(frozen=True)

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from .carried import BALL, WEAK, Carried, places_of
 from .certificate import Certificate, certify
 from .errors import ConfigError
 from .inertia import DIVERGENCES, PARAMETERIZATIONS
+from .interior import minimise
 from .model import Model
 from .nearby import from_nearby
 from .objective import Objective, posed
@@ -26,28 +28,68 @@ class Problem:
     coordinates: Coordinates
     start: np.ndarray
     weights: np.ndarray | None
+    carried: Carried | None = None
+
+    @property
+    def every_body(self) -> np.ndarray:
+        """(bodies, 10) where the parameters of the robot's bodies stand in x, and of those that effects carry."""
+        own = np.arange(10 * self.objective.bodies).reshape(-1, 10)
+        return own if self.carried is None else np.concatenate([own, self.carried.places])
+
+    @property
+    def _handed(self):
+        """Objective, coordinates, and the order in which the solver is handed x."""
+        if self.carried is None:
+            return self.objective, self.coordinates, slice(None)
+        return self.carried.handed(self.objective, self.coordinates)
+
+    def _possible(self, x) -> np.ndarray:
+        return np.array(x) if self.carried is None else self.carried.possible(x)
 
     def solve(self, experiment: Experiment, start=None, callback=None) -> Solution:
         """Solve from `start` (default: the prior) with the experiment's settings."""
-        settings = experiment.solver
-        return solve(
-            self.objective, self.coordinates, self.start if start is None else start,
+        settings, (objective, coordinates, order) = experiment.solver, self._handed
+        begun = self.start if start is None else start
+        if self.carried is not None:
+            begun = coordinates.theta(self._possible(self.coordinates.physical(begun))[order])
+        found = solve(
+            objective, coordinates, begun,
             tolerance=settings.tolerance, max_iterations=settings.max_iterations, handover=settings.handover,
             callback=callback,
         )  # fmt: skip
+        return found if self.carried is None else replace(found, x=_back(found.x, order), trace=tuple(_back(x, order) for x in found.trace))
+
+    def minimum(self, tolerance: float) -> np.ndarray:
+        """The optimum (size,), by the interior-point method alone."""
+        objective, coordinates, order = self._handed
+        begun = self._possible(self.coordinates.physical(self.start))[order]
+        return _back(minimise(objective, coordinates.positive, coordinates.held, begun, tolerance=tolerance)[0][-1], order)
 
     def from_nearby(self, x, tolerance: float) -> np.ndarray | None:
         """The optimum (size,) from that of a problem that differs a little; None where it is not near, or the prior is no barrier."""
         if not self.objective.barrier:
             return None
-        begun, held = np.array(x), 10 * self.coordinates.bodies + np.flatnonzero(self.coordinates.held)
+        begun, held = self._possible(x), 10 * self.coordinates.bodies + np.flatnonzero(self.coordinates.held)
         begun[held] = self.coordinates.physical(self.start)[held]
-        return from_nearby(self.objective, self.coordinates.positive, self.coordinates.held, begun, tolerance=tolerance)
+        objective, coordinates, order = self._handed
+        found = from_nearby(objective, coordinates.positive, coordinates.held, begun[order], tolerance=tolerance)
+        return None if found is None else _back(found, order)
 
     def certify(self, x) -> Certificate:
         """The certificate of x (size,)."""
-        coordinates = self.coordinates
-        return certify(self.objective, x, coordinates.positive, coordinates.held, constrained=coordinates.constrained(self.objective))
+        objective, coordinates, order = self._handed
+        found = certify(objective, x[order], coordinates.positive, coordinates.held, constrained=coordinates.constrained(objective))
+        if self.carried is None:
+            return found
+        left = order[10 * coordinates.bodies :] - 10 * self.coordinates.bodies  # which coefficients the solver's are
+        return replace(found, at_zero={int(left[k]): push for k, push in found.at_zero.items()})
+
+
+def _back(x: np.ndarray, order) -> np.ndarray:
+    """What the solver calls x in the model's order."""
+    out = np.empty_like(x)
+    out[order] = x
+    return out
 
 
 def pose(experiment: Experiment, model: Model, compressed: Compressed, moving: np.ndarray, prior: np.ndarray, weights=None) -> Problem:
@@ -65,11 +107,29 @@ def pose(experiment: Experiment, model: Model, compressed: Compressed, moving: n
     slopes = objective.triangle.shape[1] - 1 - size
     positive = np.array([c.positive for c in model.coefficients] + [False] * slopes, dtype=bool)
     moving = np.append(moving, np.ones(slopes, dtype=bool))
+    own = carried(objective, model, compressed, weights)
+    if own is not None:  # of a body the prior says what data do not
+        moving[own.places.ravel() - 10 * model.bodies] = False
     held = ~moving | undetermined(objective, model, moving)
+    if own is not None:
+        held[own.places.ravel() - 10 * model.bodies] = False
     coordinates = Coordinates(PARAMETERIZATIONS[spec.model.inertia](), model.bodies, positive, held)
     x = np.concatenate([prior.ravel(), _starting_coefficients(model, objective, prior, positive, held)])
     x[size:] = 0.0
-    return Problem(objective, coordinates, coordinates.theta(x), weights)
+    if own is not None:
+        x[own.places] = BALL
+    return Problem(objective, coordinates, coordinates.theta(x), weights, own)
+
+
+def carried(objective: Objective, model: Model, compressed: Compressed, weights) -> Carried | None:
+    """The bodies among a model's coefficients that any log shows; None where there is none."""
+    places = places_of(model.coefficients, 10 * model.bodies)
+    given = [one for one in places if objective.triangle[:, one].any() and all(model.coefficients[k - 10 * model.bodies].given is None for k in one)]
+    if not given:
+        return None
+    rest = compressed.total(weights)[-1, -1] ** 2  # what the best coefficients leave, bodies possible or not
+    variance = rest / max(int(compressed.rows.sum()) - compressed.size, 1)
+    return Carried(np.array(given), WEAK * max(variance, np.finfo(float).tiny))
 
 
 def known_bodies(experiment: Experiment, model: Model) -> list[int]:

@@ -52,6 +52,7 @@ class Terms:
             Coefficient(
                 effect.name, joint, self._name(effect, joint, linear.name), self._unit(linear.unit, joint), linear.lower == 0,
                 effect.given_coefficients.get(linear.name), term, None if effect.group is None else (effect.group, effect.level),
+                linear.of_body,
             )
             for term, (effect, joints) in enumerate(self.terms)
             for joint in joints

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..blocks import jackknife
-from ..inertia import DIVERGENCES, PARAMETERIZATIONS, pseudo
+from ..carried import BALL, WEAK
+from ..inertia import DIVERGENCES, PARAMETERIZATIONS
 from ..model import Model
 from ..model_parameters import ROBOT, place
 from ..objective import Objective
@@ -16,8 +17,6 @@ from ..projection import inverted, of_data, root
 from ..solve import Coordinates, solve
 from ..vocabulary import find
 from .halves import Key, Question, least_squares
-
-_WEAK = 1e-2  # of the noise's square: the weight of the payload's prior, a ball of a kilogram
 
 
 @dataclass(frozen=True)
@@ -70,11 +69,10 @@ def possible(products, places, own: slice | None) -> tuple[np.ndarray, np.ndarra
     order = [*body, *(k for k in range(size) if k not in body)]
     at = [places[k] for k in order]
     triangle = np.linalg.qr(root(products[np.ix_([*at, -1], [*at, -1])]).T, mode="r")
-    ball = pseudo.sphere(1.0, np.zeros(3), 0.05)
-    objective = Objective(triangle, DIVERGENCES["log-det"](ball[None]), _WEAK)
+    objective = Objective(triangle, DIVERGENCES["log-det"](BALL[None]), WEAK)
     flat = np.zeros(size - 10, dtype=bool)
     coordinates = Coordinates(PARAMETERIZATIONS["log-cholesky"](), 1, flat, flat)
-    start = np.concatenate([ball, least_squares(products, at)[10:]])
+    start = np.concatenate([BALL, least_squares(products, at)[10:]])
     theta = coordinates.theta(start)
     found = solve(objective, coordinates, theta, tolerance=1e-10, max_iterations=200, handover=0.5)
     out, around = np.empty(size), np.zeros((size, size))

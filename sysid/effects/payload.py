@@ -10,7 +10,7 @@ from ..regressor import body_motions, wrench_columns
 
 
 class Payload(LinkEffect):
-    """A rigid body held by a link during some logs; its ten parameters stand about that link's frame.
+    """A rigid body held by a link during some logs, always a possible one; its ten parameters stand about that link's frame.
 
     Present in every log, it is the link's own inertia and cannot be told from it.
     """
@@ -40,7 +40,7 @@ class Payload(LinkEffect):
         return self.logs is None
 
     def coefficients(self):
-        return tuple(called(Linear(unit, lower=0 if p == "m" else None, says=f"{p} of the payload"), p) for p, unit in zip(PARAMETERS, UNITS))
+        return tuple(called(Linear(unit, says=f"{p} of the payload", of_body=True), p) for p, unit in zip(PARAMETERS, UNITS))
 
     def columns(self, motion, robot):
         out = np.zeros((robot.dof, 10, len(motion.t)))

@@ -35,6 +35,8 @@ class Divergence(ABC):
     barrier = False
     #: True where a body's change counts as a share of the prior body
     relative = True
+    #: (bodies,) by which each body's counts, or one for all
+    scale: float | np.ndarray = 1.0
 
     def __init__(self, prior):
         self.prior = np.array(prior, dtype=float)
@@ -119,6 +121,26 @@ class Euclidean(_Quadratic):
 
     def _constant_metric(self):
         return np.broadcast_to(np.eye(10), self.prior.shape[:-1] + (10, 10)).copy()
+
+
+class Scaled(Divergence):
+    """A divergence of several bodies, each of which counts `scale` (bodies,) times."""
+
+    def __init__(self, divergence: Divergence, scale):
+        super().__init__(divergence.prior)
+        self.name, self.barrier, self.relative = divergence.name, divergence.barrier, divergence.relative
+        self.scale, self._own = np.asarray(scale, dtype=float), divergence
+        if self.barrier:
+            self.linear = divergence.linear * self.scale[:, None]
+
+    def value(self, pi):
+        return self.scale * self._own.value(pi)
+
+    def gradient(self, pi):
+        return self.scale[:, None] * self._own.gradient(pi)
+
+    def hessian(self, pi):
+        return self.scale[:, None, None] * self._own.hessian(pi)
 
 
 DIVERGENCES = {kind.name: kind for kind in (LogDet, Pullback, Euclidean)}
