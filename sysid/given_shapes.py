@@ -1,5 +1,7 @@
 """Shape values in words: a certificate takes them as given, so what was done to find them is said."""
 
+from .units import behind
+
 
 def given_shapes(fit) -> str:
     """What a certificate takes as given, in words: it proves the rest of the model at the shape values that stand there, of which
@@ -24,8 +26,7 @@ def said_of_shapes(fit) -> list[str]:
         out.append(f"{', '.join(held)}: held as the experiment says")
     for value, at in zip(fit.model.shape_values, fit.model.shapes):
         if at_edge(value, at):
-            unit = "" if value.unit in ("", "1") else f" {value.unit}"
-            out.append(f"{value.name} = {at:.4g}{unit} is at the edge of its range, {value.low:.4g} to {value.high:.4g}")
+            out.append(f"{value.name} = {at:.4g}{behind(value.unit)} is at the edge of its range, {value.low:.4g} to {value.high:.4g}")
     return out
 
 

@@ -34,7 +34,7 @@ class Refused:
     @property
     def told(self) -> str:
         """In words."""
-        said = f"{self.effect} was looked at and is not claimed: {self.why}"
+        said = not_claimed(self.effect, self.why)
         if self.candidate is None or self.candidate.joint == ROBOT:
             return said
         share = self.shares[self.candidate.joint]  # another joint's may be all that falls
@@ -42,6 +42,11 @@ class Refused:
         low = f"; under the low-pass of a diagnosis it takes {taken}"
         low += f"; with {LOW_PASS} a fit may bear it out" * self.raw
         return said + low * bool(share >= _MOST)
+
+
+def not_claimed(effect: str, why: str) -> str:
+    """Of an effect that was looked at, in words."""
+    return f"{effect} was looked at and is not claimed: {why}"
 
 
 def in_vain(refused: Sequence[Refused], joints, j: int, least: float):

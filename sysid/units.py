@@ -63,3 +63,8 @@ def of_joint(unit: str, *, prismatic: bool) -> str:
     for revolute, linear in (("kg m^2", "kg"), ("N m", "N"), ("rad", "m")):
         unit = unit.replace(revolute, linear)
     return unit
+
+
+def behind(unit: str, shown: str = " {}") -> str:
+    """What stands behind a number or a name for its unit: nothing where it has none. shown: how, about the unit's place."""
+    return "" if unit in ("", "1") else shown.format(unit)

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from ..units import behind
 from .charts import BLUE, LEGEND, ORANGE, axis, chart, plain, rounded
 
 
@@ -83,7 +84,7 @@ def whiskers(name: str, label: str, groups: list[dict]) -> dict:
                     "hovertemplate": f"prior %{{x:.4g}} {group['unit']}",
                 }
             )
-        unit = "" if group["unit"] in ("", "1") else f" [{group['unit']}]"
+        unit = behind(group["unit"], " [{}]")
         layout[f"xaxis{number}"] = axis(
             f"{group.get('quantity', 'value')}{unit}", anchor=f"y{number}", zeroline=True, nticks=6
         )

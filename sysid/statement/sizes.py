@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from ..units import behind
 from .tables import columns
 from .words import wrapped
 
@@ -72,7 +73,7 @@ def _cells(document: dict, joints: Sequence[str]) -> dict[str, list[str]]:
 
 def _label(key: tuple[str, str, str]) -> str:
     effect, parameter, unit = key
-    return f"{effect} {parameter}" + ("" if unit in ("", "1") else f" [{unit}]")
+    return f"{effect} {parameter}{behind(unit, ' [{}]')}"
 
 
 def _parts(rows: dict, joints: Sequence[str], width: int) -> list[list[int]]:

@@ -6,6 +6,9 @@ import re
 import textwrap
 from collections.abc import Callable, Sequence
 
+from ..unexplained import not_claimed
+from ..units import behind
+
 _HARDLY = 0.01  # of an error
 
 
@@ -25,8 +28,7 @@ def quantity(variable: str) -> str:
 def valued(name: str, p: dict) -> str:
     """A parameter {value, std, unit} with its deviation and its unit, where it has these."""
     std = "" if p["std"] is None else f" +- {p['std']:.2g}"
-    unit = "" if p["unit"] in ("", "1") else f" {p['unit']}"
-    return f"{name} = {p['value']:.4g}{std}{unit}"
+    return f"{name} = {p['value']:.4g}{std}{behind(p['unit'])}"
 
 
 def untold(parameters: dict[str, dict]) -> str:
@@ -94,8 +96,7 @@ def elsewhere(joint: str, joints: dict[str, dict], after: dict[str, float], unit
 def refused(joint: str, document: dict) -> str:
     """What was looked at on a joint and is not claimed, behind what is said of it."""
     own = (r for r in document["not_claimed"] if r["joint"] == joint)
-    said = (f"; {r['effect']} was looked at and is not claimed: {r['why']}" for r in own)
-    return "".join(said)
+    return "".join(f"; {not_claimed(r['effect'], r['why'])}" for r in own)
 
 
 def near(v: dict, document: dict) -> str:

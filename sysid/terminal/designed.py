@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from ..addition import typed
+from ..units import behind
 from .next_steps import next_step
 from .tables import show_notices
 
@@ -37,8 +38,7 @@ def show_design(document: dict, experiment) -> None:
     if told:
         print("standard deviations that fall most, now and after:")
         for name, s in told[:_SHOWN_STD]:
-            unit = "" if s["unit"] in ("", "1") else f" {s['unit']}"
-            print(f"  {name}  {s['now']:.2g} -> {s['after']:.2g}{unit}")
+            print(f"  {name}  {s['now']:.2g} -> {s['after']:.2g}{behind(s['unit'])}")
     show_notices(document)
     print(f"folder: {document['run']}")
     if never and len(never) == len(document["separates"]):  # it was asked for nothing else

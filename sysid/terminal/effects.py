@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 
 from ..statement import text
+from ..units import behind
 from .tables import terminal_width
 
 
@@ -28,8 +29,7 @@ def _described(effect: dict) -> Iterator[str]:
     yield f"  kind         {effect['kind']}, of {'the whole robot' if effect['scope'] == 'robot' else 'a joint'}"
     yield f"  equation     {effect['equation']}"
     for parameter in effect["parameters"]:
-        unit = "" if parameter["unit"] == "1" else f" {parameter['unit']}"
-        yield f"  {parameter['name']:<12}{unit}{_bounds(parameter)}: {parameter['says']}"
+        yield f"  {parameter['name']:<12}{behind(parameter['unit'])}{_bounds(parameter)}: {parameter['says']}"
     for option, says in effect["options"].items():
         yield f"  {option + ':':<12} {says}"
     yield f"  looks like   {effect['looks_like']}"

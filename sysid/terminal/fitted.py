@@ -9,6 +9,7 @@ from ..export import exported
 from ..given_shapes import given_shapes, said_of_shapes
 from ..init.text import flow
 from ..statement import faults, text
+from ..units import behind
 from .next_steps import mended_first, next_step, out_of
 from .tables import four, number, percent, show_notices, table, terminal_width
 
@@ -45,7 +46,7 @@ def show_fit(fit: Fit, document: dict) -> None:
     certificate = document["certificate"]
     for own in document["drives"]:
         deviation = "" if own["std"] is None else f" +- {own['std']:.2g}"
-        print(f"drive of {own['joint']}: {own['name']} = {own['value']:.6g}{deviation}{'' if own['unit'] == '1' else ' ' + own['unit']}")
+        print(f"drive of {own['joint']}: {own['name']} = {own['value']:.6g}{deviation}{behind(own['unit'])}")
     if document["rollout"]:
         missed = ", ".join(f"{joint} {value:.3g}" for joint, value in document["rollout"].items())
         print(f"rollout of the closed loop over the test logs, RMS of the angles it misses [rad or m]: {missed}")
