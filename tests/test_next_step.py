@@ -10,6 +10,7 @@ import pytest
 
 from sysid import urdf
 from sysid.statement import text
+from sysid.statement.words import either
 from sysid.terminal.designed import show_design
 from sysid.terminal.next_steps import mended_first
 
@@ -140,3 +141,18 @@ def test_a_joint_that_is_locked_where_it_stands_is_not(experiment, cli):
         assert ("is locked" in cli("fit", folder).out) is told
     other = experiment(config={"robot.joints": ["shoulder"]}, train=lambda c: {k: v for k, v in c.items() if k != "q_elbow"}, name="bare")
     assert "is locked" not in cli("fit", other).out
+
+
+@pytest.mark.parametrize(
+    ("head", "others", "said"),
+    [
+        (0.9, [("stribeck", "hip", 0.1)], "spring"),
+        (0.52, [("stribeck", "hip", 0.48)], "spring"),
+        (0.5, [("stribeck", "hip", 0.5)], "spring or stribeck"),
+        (0.3, [("stribeck", "hip", 0.4), ("spring", "hip", 0.3)], "spring"),  # with other options
+        (0.4, [("stribeck", "hip", 0.25), ("cable", "knee", 0.35)], "spring or cable on knee"),
+        (0.2, [("stribeck", "hip", 0.15), ("cable", "hip", 0.15), ("delay", "hip", 0.1)], "spring, stribeck, cable or delay"),
+    ],
+)
+def test_a_name_that_is_no_likelier_right_than_wrong_does_not_stand_alone(head, others, said):
+    assert either(("spring", "hip"), [("spring", "hip", head), *others], "hip") == said

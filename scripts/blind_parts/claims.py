@@ -5,6 +5,8 @@ Documents of the old diagnosis and of the new one are read: `tied_with` and `als
 
 from __future__ import annotations
 
+from sysid.statement.words import named
+
 FLOOR = 0.25  # of the true noise, within which a noise floor is right
 
 
@@ -55,13 +57,25 @@ def claims(record: dict) -> list[dict]:
             pair = step["effect"], step["joint"]
             true = _is_hidden(step["effect"], joint, hidden)
             held = true or any(_is_hidden(*_split(w, joint), hidden) for w in step["tied_with"])
+            said = true or any(_is_hidden(w, joint, hidden) for w in _said(step, verdict, joint))
             if joint not in own:
-                before = found.get(pair, {"true": False, "held": False})
+                before = found.get(pair, {"true": False, "held": False, "said": False})
                 found[pair] = {
                     "key": record["key"], "effect": pair[0], "joint": pair[1],
                     "true": true or before["true"], "held": held or before["held"],
+                    "said": said or before["said"],
                 }  # fmt: skip
     return list(found.values())
+
+
+def _said(step: dict, verdict: dict, joint: str) -> list[str]:
+    """The effects that the verdict's first line says of a step: its head, and where this is no
+    likelier right than wrong those beside it."""
+    if step["effect"] == verdict["effect"] and verdict.get("set"):
+        members = [(m["effect"], m["joint"], m["probability"]) for m in verdict["set"]]
+        return [w for w, at in named((step["effect"], step["joint"]), members) if at in (joint, "*")]
+    alone = round(step.get("probability", 1.0), 2) > 0.5
+    return [step["effect"], *([] if alone else step["tied_with"])]
 
 
 def _split(word: str, joint: str) -> tuple[str, str]:
@@ -93,6 +107,7 @@ def counts(records: list[dict]) -> dict:
     false = [claim for claim in made if not claim["true"]]
     return {
         "false claims": (len(false), len(made)),
+        "false claims, as said": (sum(not claim["said"] for claim in made), len(made)),
         "false claims, families too": (sum(not claim["held"] for claim in made), len(made)),
         "floors": (len(near) + len(null), len(said)),
         "floors null": (len(null), len(said)),

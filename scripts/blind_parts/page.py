@@ -109,6 +109,7 @@ def page(found: dict, records: list[dict], settings: dict, notes: str = "") -> s
         f"Unresolved on some joint, which is no accusation: {percent(found['controls']['unresolved'])}.",
         "## Claims that are not there, and the noise floor",
         f"Claims are the (effect, joint) pairs that first verdicts name, on the joint of an outside law excepted. Not there: {percent(found['claims']['false'])}; "
+        f"as the verdict's first line says it, \"a or b\" where a is no likelier right than wrong: {percent(found['claims']['false_as_said'])}; "
         f"where the family or set is counted with it: {percent(found['claims']['false_families_too'])}."
         + (f" Effects in a set that names something: {found['claims']['members']:.1f} on average." if found["claims"]["members"] else ""),
         "True noise is what torque noise, encoder and clock add to the residual of the first fit, over all logs; spikes and closed brakes are none.",

@@ -137,7 +137,7 @@ def summary(records: list[dict], under: str = "clean") -> dict:
             for kind in OUTSIDE for own in [[r for r in out_seen if r["effect"] == kind]]
         },
         "claims": {
-            "false": share(*said["false claims"]), "false_families_too": share(*said["false claims, families too"]), "list": said["false"],
+            "false": share(*said["false claims"]), "false_as_said": share(*said["false claims, as said"]), "false_families_too": share(*said["false claims, families too"]), "list": said["false"],
             "members": statistics.fmean(len(words) for r in sets for words in r["said"][:1]) if sets else None,
         },
         "floors": {"good": share(*said["floors"]), "null": share(*said["floors null"]), "ratio": said["ratios"]},

@@ -6,7 +6,7 @@ from ..addition import LIKELY, apart, designs, likely
 from ..estimate import Fit
 from ..given_shapes import given_shapes, said_of_shapes
 from ..statement import text
-from ..statement.words import followed, near, percent, refused, untold
+from ..statement.words import either, followed, near, percent, refused, untold
 from .section import Section
 from .words import (
     SPACE,
@@ -90,7 +90,8 @@ def _card(found: dict, fit: Fit, document: dict) -> dict:
     findings, claims = document["findings"], document["claims"]
     told = [(findings[c["findings"][0]], c["set"]) for c in claims]
     heads = [one for command in commands for one in told if one[0]["command"] == command]
-    names = [placed(head["effect"], head["joint"], joint) for head, _ in heads]
+    members = lambda set_: [(m["effect"], m["joint"], m["probability"]) for m in set_]  # noqa: E731
+    names = [either((head["effect"], head["joint"]), members(set_), joint) for head, set_ in heads]
     if status == "explained":
         names = [placed(c["effect"], c["joint"]) for c in found["by"]]
     fall = ""

@@ -13,17 +13,20 @@ from ..diagnose.diagnosis import Diagnosis
 from ..diagnose.findings import Finding
 from ..fit_document import number
 from ..vocabulary import describe
+from .words import named
 
 
 def claims(found: Diagnosis) -> Iterator[dict]:
     """Of each step that stands: the numbers of its findings, the head first; what may stand in its
-    place; the held-out error with it and all before it in the model."""
-    first = 0
+    place, and what of it is named: as much as is likelier right than wrong; the held-out error with
+    it and all before it in the model."""
+    first, of = 0, lambda head: (head.effect, head.joint)
     for claim in found.claims:
         last = first + len(claim.findings)
         yield {
             "findings": list(range(first, last)),
             "set": chances(claim),
+            "named": [{"effect": e, "joint": j} for e, j in named(of(claim.head), claim.set)],
             "rms_test_after": claim.after.rms("test"),
         }
         first = last

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from ..addition import LIKELY, designs, likely
 from .words import (
+    either,
     elsewhere,
     followed,
     listed,
@@ -16,6 +17,7 @@ from .words import (
     quantity,
     refused,
     untold,
+    untold_from,
     valued,
     wrapped,
 )
@@ -27,7 +29,6 @@ ANOTHER = "a motion that tells most of what these logs leave open"
 TRIED = "to try it, and see the held-out error before and after"
 NO_MORE = "no further effect is supported by these logs"
 OWN = "a law of your own can be tried: `sysid effects formula`"
-_SURE = 0.9  # the set holds the truth so often
 _TOGETHER = "several variables together"
 
 
@@ -74,7 +75,7 @@ def _joint(v: dict, of: Told, width: int, said: dict[str, str]) -> list[str]:
     seen = of.document["joints"][joint]["rms"]["test"] is not None  # a row of it counts
     known = {f["command"]: f for f in of.document["findings"]}
     heads = [known[command] for command in v.get("commands", []) if command in known]
-    words = [placed(f["effect"], f["joint"], joint) for f in heads]
+    words = [either((f["effect"], f["joint"]), of.sets[f["command"]], joint) for f in heads]
     # what comes in the place of the same effect with other options is named by these
     words = [
         word + (f" with {_options(f)}" if word in words[:k] else "")
@@ -176,13 +177,6 @@ def _head(f: dict, of: Told, joint: str, width: int, said: dict[str, str]) -> li
         words = f"  not ruled out, though less than 1 % likely: {listed(few, 'and')}"
         out += wrapped(words, width, "    ")
     return [*out, "  add it with", f["command"]]
-
-
-def untold_from(probability: float) -> str:
-    """How sure an effect's name is, before what else it may be."""
-    if probability >= _SURE:
-        return f"it is {percent(probability)} likely; these logs do not rule out"
-    return f"these logs cannot tell it ({percent(probability)}) from"
 
 
 def _options(f: dict) -> str:

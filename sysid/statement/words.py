@@ -9,13 +9,42 @@ from collections.abc import Callable, Sequence
 from ..unexplained import not_claimed
 from ..units import behind
 
+Members = Sequence[tuple[str, str, float]]  # (effect, joint, probability) of a set
 _HARDLY = 0.01  # of an error
+_SURE = 0.9  # the set holds the truth so often
 
 
 def followed(entry: dict, word: Callable[[str], str]) -> str:
     """What a residual follows, alone or with a second variable, in words."""
     first, other = word(entry["variable"]), entry.get("with")
     return f"{first} with {word(other)}" if other else f"{first} alone"
+
+
+def named(head: tuple[str, str], members: Members) -> list[tuple[str, str]]:
+    """The head of a set, with as many of those that the logs cannot tell it from as make the name
+    likelier right than wrong: (effect, joint) of each."""
+    chances: dict[tuple[str, str], float] = {head: 0.0}
+    for *who, p in members:  # with whatever options
+        chances[tuple(who)] = chances.get(tuple(who), 0.0) + p
+    out, chance = [head], chances.pop(head)
+    for who, p in sorted(chances.items(), key=lambda one: -one[1]):
+        if round(chance, 2) > 0.5:
+            break
+        out.append(who)
+        chance += p
+    return out
+
+
+def either(head: tuple[str, str], members: Members, joint: str) -> str:
+    """What is `named`, said of a joint."""
+    return listed([placed(*who, joint) for who in named(head, members)], "or")
+
+
+def untold_from(probability: float) -> str:
+    """How sure an effect's name is, before what else it may be."""
+    if probability >= _SURE:
+        return f"it is {percent(probability)} likely; these logs do not rule out"
+    return f"these logs cannot tell it ({percent(probability)}) from"
 
 
 def quantity(variable: str) -> str:
