@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from sysid.failures import regions
 from sysid.lowpass import LEAST
 from sysid.report.sections import sections
 from sysid.statement import text
+from sysid.statement.claims import confidence_set, ties
 from sysid.statement.document import document
 from tests.test_select import BIAS, PRODUCT, TWO
 
@@ -170,3 +172,17 @@ def test_what_may_be_it_is_to_be_tried_and_what_weights_leave_needs_no_log(found
     assert own["command"] in lines and not any("design" in line for line in lines)
     card = sections(found.fit, said, [])["verdict"]["html"]
     assert command in card and "another log" not in card and "blind" not in card
+
+
+@pytest.mark.parametrize(
+    ("chances", "inside"),
+    [((1.0,), 1), ((0.5, 0.5), 2), ((0.92, 0.08), 1), ((0.89, 0.08, 0.03), 2), ((0.26, 0.74), 2), ((0.4, 0.3, 0.25, 0.05), 3)],
+)
+def test_a_set_holds_the_truth_nine_times_in_ten_and_no_more(chances, inside):
+    """The head is in it, however likely; what is left out is not ruled out, and stands in the claim's own set."""
+    members = tuple((effect, "hip", p) for effect, p in zip(("cable", "spring", "cogging", "stribeck"), chances))
+    claim = SimpleNamespace(set=members)
+    assert confidence_set(claim) == members[:inside]
+    others = [effect for effect, *_ in members[1:inside]]
+    assert ties(claim, SimpleNamespace(effect="cable", joint="hip")) == others
+    assert ties(claim, SimpleNamespace(effect="cable", joint="knee")) == [f"{effect} on hip" for effect in ("cable", *others)]

@@ -26,6 +26,7 @@ from sysid.diagnose.projected import groups_at
 from sysid.diagnose.refits import Member
 from sysid.diagnose.select import LEVEL, WORTH, search
 from sysid.diagnose.ties import Choice, chosen
+from sysid.statement.claims import ties
 from sysid.statement.document import document
 from sysid.trusted import trust
 from sysid.view import first_view, joined, shapes_in
@@ -115,7 +116,8 @@ def test_a_bias_and_asymmetric_friction_cannot_be_told_apart(diagnosed, simulate
     assert own.head.effect == "torque_bias"  # the plainer of the two
     near(own.head, simulated(*BIAS), "b")
     (other,) = [f for f in found.findings if f.effect == "asymmetric_coulomb"]
-    assert other.tied_with == ("torque_bias",) and other.step is None and other.candidate.effect.separate_by
+    (claim,) = found.claims
+    assert ties(claim, other) == ["torque_bias"] and other.step is None and other.candidate.effect.separate_by
     assert len(found.claims) == 1
 
 

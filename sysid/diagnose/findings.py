@@ -21,8 +21,8 @@ class Finding:
     joint: its name, or `*`. p: family-wise p-value of its set; probability: of being the best of
     its set. rms_before, rms_after: on the test logs, on its joint (over all joints for `*`), of the
     fits without it and with it. parameters: {name: (value, std or NaN, unit)} of the fit with it,
-    of a claim with all that is claimed. tied_with: words of the others of its set, with their joint
-    where it is another. step: which step of the search it heads, or None. command: what adds it.
+    of a claim with all that is claimed. step: which step of the search it heads, or None. command:
+    what adds it.
     """
 
     member: Member
@@ -33,7 +33,6 @@ class Finding:
     rms_after: float
     fall_se: float
     parameters: dict[str, tuple[float, float, str]]
-    tied_with: tuple[str, ...]
     step: int | None
     command: str
 
@@ -62,9 +61,7 @@ def finding(
     errors = [float(np.sqrt(square(fit))) for fit in (before, after)]
     differences = {d.joint: d.se for d in comparison.compare(before, after, ("before", "after"))}
     se = float(np.sqrt(np.nansum([differences[j] ** 2 for j in own]) / len(own)))
-    tied = [m.candidate.named(before.joints) for m, _ in step.choice.members if m is not member]
-    words = tuple(name if at in (joint, "*") else f"{name} on {at}" for name, at in tied)
     heads = number if member is step.choice.head else None
     added = command(before.experiment.path, *spelled(candidate, joint))
     numbers = after.parameters_of(*candidate.key)
-    return Finding(member, joint, step.p, chance, *errors, se, numbers, words, heads, added)
+    return Finding(member, joint, step.p, chance, *errors, se, numbers, heads, added)

@@ -13,7 +13,7 @@ from ..diagnose.diagnosis import Diagnosis
 from ..diagnose.findings import Finding
 from ..fit_document import number
 from ..vocabulary import describe
-from .words import named
+from .words import SURE, Members, named
 
 
 def claims(found: Diagnosis) -> Iterator[dict]:
@@ -25,16 +25,35 @@ def claims(found: Diagnosis) -> Iterator[dict]:
         last = first + len(claim.findings)
         yield {
             "findings": list(range(first, last)),
-            "set": chances(claim),
+            "set": chances(claim.set),
             "named": [{"effect": e, "joint": j} for e, j in named(of(claim.head), claim.set)],
             "rms_test_after": claim.after.rms("test"),
         }
         first = last
 
 
-def chances(claim: Claim) -> list[dict]:
+def chances(members: Members) -> list[dict]:
     """What may stand in a step's place, with probabilities."""
-    return [{"effect": e, "joint": j, "probability": p} for e, j, p in claim.set]
+    return [{"effect": e, "joint": j, "probability": p} for e, j, p in members]
+
+
+def confidence_set(claim: Claim) -> Members:
+    """The smallest set of explanations, the head first, that holds the truth nine times in ten.
+    What is not ruled out beside these stands in the claim's own set."""
+    chance = 0.0
+    for count, (*_, p) in enumerate(claim.set, 1):
+        chance += p
+        if chance >= SURE:
+            return claim.set[:count]
+    return claim.set
+
+
+def ties(claim: Claim, f: Finding) -> list[str]:
+    """The words of that set that are not a finding of its own: with their joint, where it is
+    another."""
+    own = (f.effect, f.joint)
+    others = ((e, j) for e, j, _ in confidence_set(claim) if (e, j) != own)
+    return [e if j in (f.joint, "*") else f"{e} on {j}" for e, j in others]
 
 
 def finding(f: Finding, claim: Claim, found: Diagnosis) -> dict:
@@ -71,7 +90,7 @@ def finding(f: Finding, claim: Claim, found: Diagnosis) -> dict:
             for name, (v, s, u) in f.parameters.items()
         },
         "size_told": size_told(f.candidate.effect, f.parameters),
-        "tied_with": list(f.tied_with),
+        "tied_with": ties(claim, f),
         "separate_by": f.candidate.effect.separate_by,
         "command": f.command,
         "joins_as_step": None if f.step is None else f.step + 1,

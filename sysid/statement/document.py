@@ -15,7 +15,7 @@ from ..flexible import Unknown
 from ..model_parameters import ROBOT
 from ..units import of_joint
 from . import text
-from .claims import chances, claims, finding
+from .claims import chances, claims, confidence_set, finding, ties
 
 
 def document(found: Diagnosis, run="") -> dict:
@@ -140,9 +140,9 @@ def _verdict(v: Verdict, path="config.yaml") -> dict:
         first = v.claims[0]
         named = {
             "effect": first.head.effect,
-            "tied_with": list(first.head.tied_with),
+            "tied_with": ties(first, first.head),
             "command": first.head.command,
-            "set": chances(first),
+            "set": chances(confidence_set(first)),
             "explained": number(v.explained),
         }
         also = [c.head.effect for c in v.claims[1:]]

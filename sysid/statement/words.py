@@ -11,7 +11,7 @@ from ..units import behind
 
 Members = Sequence[tuple[str, str, float]]  # (effect, joint, probability) of a set
 _HARDLY = 0.01  # of an error
-_SURE = 0.9  # the set holds the truth so often
+SURE = 0.9  # the set holds the truth so often
 
 
 def followed(entry: dict, word: Callable[[str], str]) -> str:
@@ -42,7 +42,7 @@ def either(head: tuple[str, str], members: Members, joint: str) -> str:
 
 def untold_from(probability: float) -> str:
     """How sure an effect's name is, before what else it may be."""
-    if probability >= _SURE:
+    if probability >= SURE:
         return f"it is {percent(probability)} likely; these logs do not rule out"
     return f"these logs cannot tell it ({percent(probability)}) from"
 
