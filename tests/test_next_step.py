@@ -10,7 +10,7 @@ import pytest
 
 from sysid import urdf
 from sysid.statement import text
-from sysid.statement.words import either
+from sysid.statement.words import all_of, either, named
 from sysid.terminal.designed import show_design
 from sysid.terminal.next_steps import mended_first
 
@@ -155,4 +155,16 @@ def test_a_joint_that_is_locked_where_it_stands_is_not(experiment, cli):
     ],
 )
 def test_a_name_that_is_no_likelier_right_than_wrong_does_not_stand_alone(head, others, said):
-    assert either(("spring", "hip"), [("spring", "hip", head), *others], "hip") == said
+    told = [{"effect": e, "joint": j} for e, j in named(("spring", "hip"), [("spring", "hip", head), *others])]
+    spring = {"effect": "spring", "joint": "hip"}
+    document = {"claims": [{"named": [{"effect": "delay", "joint": "knee"}]}, {"named": told}]}
+    assert either(spring, document, "hip") == said
+    assert either(spring, {"claims": document["claims"][:1]}) == "spring on hip"
+
+
+def test_alternatives_do_not_run_into_what_holds_with_them():
+    pair = [{"effect": effect, "joint": "hip"} for effect in ("torque_bias", "asymmetric_coulomb")]
+    found = either(pair[0], {"claims": [{"named": pair}]})
+    assert found == "torque_bias or asymmetric_coulomb on hip"
+    assert all_of([found]) == found
+    assert all_of(["load_friction on knee", found]) == "load_friction on knee and (torque_bias or asymmetric_coulomb on hip)"

@@ -90,10 +90,9 @@ def _card(found: dict, fit: Fit, document: dict) -> dict:
     findings, claims = document["findings"], document["claims"]
     told = [(findings[c["findings"][0]], c["set"]) for c in claims]
     heads = [one for command in commands for one in told if one[0]["command"] == command]
-    members = lambda set_: [(m["effect"], m["joint"], m["probability"]) for m in set_]  # noqa: E731
-    names = [either((head["effect"], head["joint"]), members(set_), joint) for head, set_ in heads]
+    names = [either(head, document, joint) for head, _ in heads]
     if status == "explained":
-        names = [placed(c["effect"], c["joint"]) for c in found["by"]]
+        names = [either(c, document) for c in found["by"]]
     fall = ""
     if status in ("explained", "missing") or heads or (status == "unresolved" and claims):
         fall = _fall(found, fit, document)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from ..addition import LIKELY, designs, likely
 from .words import (
+    all_of,
     either,
     elsewhere,
     followed,
@@ -75,19 +76,17 @@ def _joint(v: dict, of: Told, width: int, said: dict[str, str]) -> list[str]:
     seen = of.document["joints"][joint]["rms"]["test"] is not None  # a row of it counts
     known = {f["command"]: f for f in of.document["findings"]}
     heads = [known[command] for command in v.get("commands", []) if command in known]
-    words = [either((f["effect"], f["joint"]), of.sets[f["command"]], joint) for f in heads]
+    words = [either(f, of.document, joint) for f in heads]
     # what comes in the place of the same effect with other options is named by these
     words = [
         word + (f" with {_options(f)}" if word in words[:k] else "")
         for k, (word, f) in enumerate(zip(words, heads))
     ]
-    named = listed(words, "and") if heads else ""
+    named = all_of(words) if heads else ""
     first = {
         "complete": lambda: NO_MORE + near(v, of.document) + refused(joint, of.document),
         "explained": lambda: (
-            "by "
-            + listed([placed(c["effect"], c["joint"]) for c in v["by"]], "and")
-            + f"; {_fall(v, of)}"
+            f"by {all_of([either(c, of.document) for c in v['by']])}; {_fall(v, of)}"
         ),
         "unresolved": lambda: v["says"] + (f"; {_fall(v, of)}" if of.sets and seen else ""),
         "missing": lambda: f"{named or v['effect']}; {_fall(v, of)}",

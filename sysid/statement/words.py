@@ -35,9 +35,23 @@ def named(head: tuple[str, str], members: Members) -> list[tuple[str, str]]:
     return out
 
 
-def either(head: tuple[str, str], members: Members, joint: str) -> str:
-    """What is `named`, said of a joint."""
-    return listed([placed(*who, joint) for who in named(head, members)], "or")
+def either(own: dict, document: dict, here: str = "") -> str:
+    """The effect and joint that a verdict or a finding has, with what else its claim is `named`,
+    said of the joint `here`."""
+    out = [(own["effect"], own["joint"])]
+    for claim in document["claims"]:
+        told = [(n["effect"], n["joint"]) for n in claim.get("named", ())]
+        out = told if told[:1] == out[:1] else out
+    effects, joints = zip(*out)
+    if len(set(joints)) == 1:
+        return placed(listed(effects, "or"), joints[0], here)
+    return listed([placed(*who, here) for who in out], "or")
+
+
+def all_of(words: Sequence[str]) -> str:
+    """Words that hold together, some of which are alternatives."""
+    apart = len(words) > 1
+    return listed([f"({word})" if apart and " or " in word else word for word in words], "and")
 
 
 def untold_from(probability: float) -> str:
