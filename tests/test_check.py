@@ -173,3 +173,22 @@ def test_a_torque_that_is_one_number_is_no_current(made, tmp_path, constant):
         table.with_columns(pl.lit(constant).alias(column)).write_csv(logs / name)
     found = check.check(pipeline.load(logs))
     assert {f.fault for f in found if f.joint == "elbow" and f.severity == "error"} == {"effort_missing"}
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_channel_that_nothing_was_connected_to_is_no_torque(made, tmp_path, seed):
+    """Noise about a constant; and what follows the motion, however little of it there is, is one."""
+    rng = np.random.default_rng(seed)
+    for scale in (None, 0.05):
+        logs = shutil.copytree(made(), tmp_path / f"logs{scale}")
+        for name in ("train.csv", "test.csv"):
+            table = pl.read_csv(logs / name)
+            (column,) = [c for c in table.columns if c.startswith("tau") and c.endswith("elbow")]
+            own = table[column].to_numpy()
+            other = 0.3 + 0.02 * rng.normal(size=len(own)) if scale is None else scale * own
+            table.with_columns(pl.Series(column, other)).write_csv(logs / name)
+        found = check.check(pipeline.load(logs))
+        errors = {f.fault for f in found if f.joint == "elbow" and f.severity == "error"}
+        assert errors == ({"effort_missing"} if scale is None else set())
+        if scale is None:
+            assert not any(f.fault == "mass_implausible" for f in found)

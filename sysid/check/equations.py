@@ -45,12 +45,14 @@ class Reading:
 @dataclass(frozen=True)
 class Scored:
     """Of each joint (dof,): squares left, squares of its torque about its mean, the factor of the
-    URDF's torque, the share of squares that this torque takes, and whether anything is known."""
+    URDF's torque, the share of squares that this torque takes, squares of the URDF's torque itself
+    about its mean, and whether anything is known."""
 
     left: np.ndarray
     whole: np.ndarray
     factor: np.ndarray
     taken: np.ndarray
+    bodies: np.ndarray
     known: np.ndarray
 
     @property
@@ -99,11 +101,11 @@ class Equations:
         return Scored(*map(np.array, zip(*found)))
 
 
-def _fitted(columns, tau, free: bool) -> tuple[float, float, float, float, bool]:
+def _fitted(columns, tau, free: bool) -> tuple[float, float, float, float, float, bool]:
     """Least squares of one joint's torque (n,) by columns (5, n), with their signs and the first
     one's bounds."""
     if len(tau) < FEWEST or not np.ptp(tau) > 0.0:
-        return 1.0, 1.0, 1.0, 0.0, False
+        return 1.0, 1.0, 1.0, 0.0, 0.0, False
     size = np.sqrt(np.mean(columns**2, axis=1)) + 1e-300
     unit = float(np.std(tau))
     factor = np.linalg.qr(np.column_stack([(columns / size[:, None]).T, tau / unit]), mode="r")
@@ -117,7 +119,8 @@ def _fitted(columns, tau, free: bool) -> tuple[float, float, float, float, bool]
     whole = float(np.sum((tau - tau.mean()) ** 2))
     squares = max(left * unit**2, 1e-12 * whole)
     taken = max(alone - left, 0.0) * unit**2 / whole
-    return squares, whole, float(own * unit / size[0]), taken, True
+    bodies = float(np.sum((columns[0] - columns[0].mean()) ** 2))
+    return squares, whole, float(own * unit / size[0]), taken, bodies, True
 
 
 def _nonnegative(a, y) -> tuple[np.ndarray, float]:

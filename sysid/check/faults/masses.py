@@ -24,6 +24,7 @@ AFTER, SENSELESS = (
         "sign_flipped",
         "torque_in_amperes",
         "commanded_torque",
+        "effort_missing",
     ),
 )
 # Times the URDF's: weights of simulated arms with masses and centres drawn about theirs, and of
