@@ -2,8 +2,9 @@
 
 Their ten columns are as linear as a link's, and they have to be as possible. So the solver is handed
 them beside the robot's bodies, and parameters go back to their place in the model. What is believed
-of such a body is next to nothing, and the same whatever the robot's prior weighs: it keeps the body
-possible where the data would not, and says what they do not tell.
+of such a body is next to nothing, and the same whatever the robot's prior weighs (but for none: then
+it has none either): it keeps the body possible where the data would not, and says what they do not
+tell.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from .solve import Coordinates
 
 BALL = pseudo.sphere(1.0, np.zeros(3), 0.05)  # a kilogram at the link's own frame
 WEAK = 1e-2  # of the noise's square: the weight of this prior
+LEAST = 1e-10  # and of the robot's prior's: of less double precision finds no optimum of both
 
 
 @dataclass(frozen=True)
@@ -45,7 +47,7 @@ class Carried:
         own = objective.divergence
         divergence = type(own)(np.concatenate([own.prior, np.tile(BALL, (more, 1))]))
         if objective.weight > 0.0:
-            ratio = self.weight / objective.weight
+            ratio = max(self.weight / objective.weight, LEAST)
             scale = np.concatenate([np.ones(objective.bodies), np.full(more, ratio)])
             divergence = Scaled(divergence, scale)
         known = objective.known

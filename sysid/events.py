@@ -81,9 +81,7 @@ def find(
             kind = "brake" if rests(q, first, last, usual) else "frozen"
             kind = "saturation" if extreme else kind
             tell(kind, first, last, [j])
-        if not np.ptp(tau) and np.ptp(q) > TRAVELS:
-            tell("missing", 0, len(q) - 1, [j])
-        elif not tau.any() and segment.tau.any() and rests(q, 0, len(q) - 1, usual):
+        if not tau.any() and segment.tau.any() and rests(q, 0, len(q) - 1, usual):
             tell("brake", 0, len(q) - 1, [j])
         for first, last in held_angle(q):
             tell("frozen", first, last, [j], "position")
@@ -91,6 +89,37 @@ def find(
     for first, last, members in struck:
         tell("knock", first, last, members, "both")
     return ordered(found)
+
+
+def extent(segment: Segment) -> np.ndarray:
+    """(4, dof): the least and the greatest torque and angle of each joint."""
+    tau, q = segment.tau, segment.q
+    return np.stack([tau.min(axis=0), tau.max(axis=0), q.min(axis=0), q.max(axis=0)])
+
+
+def unlogged(
+    logs: Sequence[tuple[str, float, float, np.ndarray]], joints: Sequence[str]
+) -> list[list[Event]]:
+    """Of each log the joints whose torque never changes in it: though they move there, or where it
+    is the same in another log in which they do.
+
+    Args:
+        logs: name, first and last time [s], and the `extent` (segments, 4, dof) of its segments.
+    """
+    found = []
+    for *_, extents in logs:
+        low, high = extents[:, 0].min(axis=0), extents[:, 1].max(axis=0)
+        travel = extents[:, 3].max(axis=0) - extents[:, 2].min(axis=0)
+        found.append((np.where(low == high, low, np.nan), travel > TRAVELS))
+    known = [{own[j] for own, moves in found if moves[j]} for j in range(len(joints))]
+    return [
+        [
+            Event("missing", name, start, stop, (joint,))
+            for j, joint in enumerate(joints)
+            if own[j] in known[j]  # NaN is in none
+        ]
+        for (name, start, stop, _), (own, _) in zip(logs, found)
+    ]
 
 
 def clipped(events: Sequence[Event], start: float, stop: float) -> list[Event]:

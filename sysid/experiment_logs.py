@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, replace
+
+import numpy as np
 
 from . import events, long_log, masks, robot
 from . import log as logs
@@ -36,31 +39,47 @@ def read(experiment: Experiment, machine: Robot, specs: list[LogSpec], *, struct
         found = list(mapped(_read_one, ((machine, experiment.preprocess.events, spec, how) for spec in specs)))
     else:
         read = [reader.read(spec, *how) for spec in specs]
-        found = read if experiment.preprocess.events == "keep" else with_events(machine, read)
+        found = read if experiment.preprocess.events == "keep" else with_events(machine, read, driven=experiment.actuator)
     return masks.masked(found, experiment.preprocess.mask, machine.joints)
 
 
 def _read_one(machine: Robot, kept: str, spec: LogSpec, how: tuple) -> logs.Log:
     log = long_log.read(spec, *how)
-    return log if kept == "keep" else with_events(machine, [log])[0]
+    return log if kept == "keep" else with_events(machine, [log], driven=how[-1])[0]
 
 
 _BESIDE = 1024  # rows of a span's neighbours that are looked at with it: more than an event's surroundings
 
 
-def with_events(machine: Robot, read: list[logs.Log], *, among: int = 1) -> list[logs.Log]:
+def with_events(machine: Robot, read: list[logs.Log], *, driven: Collection[str] = ()) -> list[logs.Log]:
     """Logs with their events: first those that the signals show, then those that only the robot's equations do. Each span of a long
     log is looked at by itself.
 
     Args:
+        driven: joints whose torque is that of an actuator, which may be the same throughout.
+    """
+    short = [log for log in read if not isinstance(log.segments, Spans)]
+    silent = _silent(short, [np.stack([events.extent(s) for s in log.segments]) for log in short], machine, driven)
+    done = iter(_disturbed(machine, [replace(log, events=own) for log, own in zip(short, silent)]) if short else ())
+    return [_disturbed_in_spans(machine, log, driven) if isinstance(log.segments, Spans) else next(done) for log in read]
+
+
+def _silent(read: list[logs.Log], extents: list[np.ndarray], machine: Robot, driven: Collection[str]) -> list[tuple[events.Event, ...]]:
+    """What of the logs' torques was not logged, by the extents of their segments."""
+    ends = [(log.name, float(log.segments[0].t[0]), float(log.segments[-1].t[-1])) for log in read]
+    found = events.unlogged([(*own, extent) for own, extent in zip(ends, extents)], machine.joints)
+    return [tuple(e for e in own if not {*e.joints} & {*driven, *log.unused}) for log, own in zip(read, found)]
+
+
+def _disturbed(machine: Robot, read: list[logs.Log], *, among: int = 1) -> list[logs.Log]:
+    """Logs with what disturbed them beside the events that they have.
+
+    Args:
         among: how many parts their log has, where these are the spans of one.
     """
-    if any(isinstance(log.segments, Spans) for log in read):
-        return [with_events(machine, [log])[0] if not isinstance(log.segments, Spans) else _with_events_of_spans(machine, log) for log in read]
     told = lambda log, e: not (e.signal == "torque" and set(e.joints) <= set(log.unused))  # noqa: E731
-    found = [
-        replace(log, events=tuple(e for s in log.segments for e in events.find(s, machine.joints, log=log.name, among=among) if told(log, e))) for log in read
-    ]  # fmt: skip
+    own = lambda log: (e for s in log.segments for e in events.find(s, machine.joints, log=log.name, among=among) if told(log, e))  # noqa: E731
+    found = [replace(log, events=(*log.events, *own(log))) for log in read]
     if among > 1:  # what is looked for in signals leaves half a span's memory free between what is held
         released()
     felt = bumps(machine, found, among=among)
@@ -69,20 +88,22 @@ def with_events(machine: Robot, read: list[logs.Log], *, among: int = 1) -> list
     return [replace(log, events=events.ordered([*own, *more])) for log, own, more in zip(found, other, knocks)]
 
 
-def _with_events_of_spans(machine: Robot, log: logs.Log) -> logs.Log:
-    found, step = [], 0.0
+def _disturbed_in_spans(machine: Robot, log: logs.Log, driven: Collection[str]) -> logs.Log:
+    found, extents, step = [], [], 0.0
     for number in range(len(log.segments)):
-        own, step = _of_span(machine, log, number)
+        own, step, extent = _of_span(machine, log, number)
         found += own
-    return replace(log, events=events.joined(found, step))
+        extents.append(extent)
+    (silent,) = _silent([log], [np.stack(extents)], machine, driven)
+    return replace(log, events=events.ordered([*events.joined(found, step), *silent]))
 
 
-def _of_span(machine: Robot, log: logs.Log, number: int) -> tuple[list[events.Event], float]:
-    """Events of a span of a log, and its step [s]; nothing of it stays in memory."""
+def _of_span(machine: Robot, log: logs.Log, number: int) -> tuple[list[events.Event], float, np.ndarray]:
+    """Events of a span of a log, its step [s] and its extent; nothing of it stays in memory."""
     released()
     span = log.segments.around(number, _BESIDE)
-    (own,) = with_events(machine, [replace(log, segments=(replace(span, core=None),))], among=len(log.segments))
-    return events.clipped(own.events, *span.t[[span.core.start, span.core.stop - 1]]), span.step
+    (own,) = _disturbed(machine, [replace(log, segments=(replace(span, core=None),))], among=len(log.segments))
+    return events.clipped(own.events, *span.t[[span.core.start, span.core.stop - 1]]), span.step, events.extent(span)
 
 
 @dataclass(frozen=True)

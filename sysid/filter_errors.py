@@ -49,6 +49,8 @@ def held_out(experiment: Experiment, spec: PreprocessSpec, model: Model, logs: S
     thin = max(1, motion.samples // _ROWS)
     data = compress(model, motion, thin=thin)
     target = data if spec.torque == "raw" and spec.standstill == "keep" and not motion.events else compress(model, raw, thin=thin)
+    if spec.torque == "low-pass" and np.any((data.rows == 0) & (target.rows > 0)):
+        raise SysidError("the filter leaves a joint no row", where="preprocess")
     moving = moving_coefficients(model, motion)
     # a part that the joints stood still in, or were braked, has no error
     folds = [fold for fold in data.stretches(_FOLDS) if _only(target, fold).rows.any()]

@@ -76,9 +76,9 @@ def begun(
     value = "auto" if low else getattr(spec, key)
     automatic = value == "auto"
     values = ((*_SLOW, *_CUTOFFS) if low else _WINDOWS if key == "window" else _CUTOFFS) if automatic else (value / 2, value, value * 2)
-    step = max(segment.step for log in logs for segment in log.segments)
-    candidates = [{"cutoff": value, "window": _window(spec, value, step)} if low else {key: value} for value in values]
     shortened = [_middle(log) for log in logs]
+    step = max(segment.step for log in shortened for segment in log.segments)
+    candidates = [{"cutoff": value, "window": _window(spec, value, step)} if low else {key: value} for value in values]
     edge = _widest_edge(spec, candidates, shortened)
     # a file that others read, they read themselves
     sent = [log if mapped and isinstance(log.segments, Spans) and not log.segments.held else own for log, own in zip(logs, shortened)]

@@ -30,6 +30,7 @@ FEWEST = 3  # of fewer no standard error can be told
 _DECADES = 12  # below the strongest: weaker than that a prior is rounding of what the data say
 _CLEAR = 3.0  # standard errors above the best: no weight beyond it will be within one
 _NOTHING = 1e-4  # of an error: what a tenth of a weight changes where it has ceased to matter
+_NONE = 1e-300  # what stands for a weight of nothing where logarithms are taken
 _TOLERANCE = 1e-6  # its square, as a share of the objective, is far below any standard error
 
 
@@ -54,7 +55,8 @@ class HeldApart:
 
         Each begins where the one before it ended, the first where the nearest weight's first did.
         """
-        nearest = min(self._solved, key=lambda w: abs(np.log(w / weight)), default=None)
+        away = lambda w: abs(np.log(max(w, _NONE) / max(weight, _NONE)))  # noqa: E731
+        nearest = min(self._solved, key=away, default=None)
         out, x = [], self._solved.get(nearest)
         for problem, stretch in zip(self.problems, self.stretches):
             x = solved(problem, weight, tolerance, near=x)

@@ -93,7 +93,9 @@ def minimise(objective: Objective, positive: np.ndarray, held: np.ndarray, start
     x = _inside(start, rows, target, bound, count)
     iterates, values, best, near = [x], [objective.value(x)], np.inf, False
     mu = max(0.01 * values[0] / len(x), float(barriers.max()))
-    z = mu * np.linalg.inv(to_pseudo(x[:count].reshape(-1, 10)))
+    z = np.maximum(0.01 * values[0] / len(x), barriers)[:, :, None] * np.linalg.inv(to_pseudo(x[:count].reshape(-1, 10)))
+    # bodies whose barriers weigh more and less come to their levels at their own pace
+    every = {"axis": 1, "keepdims": True} if np.ptp(barriers) > 0.0 else {}
     state = _State(x, z, np.where(bound, mu / np.where(bound, x[count:], 1.0), 0.0))
     unit = np.concatenate([np.ones(count), np.where(bound, 1.0, 0.0)])
     size = 4 * objective.bodies + int(bound.sum())
@@ -141,7 +143,7 @@ def minimise(objective: Objective, positive: np.ndarray, held: np.ndarray, start
         # predictor: straight for the final targets; how far it gets sets how far the corrector aims
         straight = _change(solve, slope, scaled, _aim(scaled, bound, floor_j, floor_c, None), fixed, bound)
         ahead = (1.0 - min(1.0, _reach(straight, scaled, bound))) ** 3
-        mu_j, mu_c = np.mean(scaled.weights**2), squares_c.sum() / max(int(bound.sum()), 1)
+        mu_j, mu_c = np.mean(scaled.weights**2, **every), squares_c.sum() / max(int(bound.sum()), 1)
         if not barrier:
             mu_j = mu_c = (np.sum(scaled.weights**2) + squares_c.sum()) / size
         # bodies under a barrier stay at its weight, however little is left of the coefficients' complementarity

@@ -8,6 +8,8 @@ import numpy as np
 
 from . import log, long_log
 from .errors import SysidError
+from .recorded_columns import meant
+from .recording import table_of
 from .repeats import TRAVELS
 from .robot import Robot
 from .specs import Experiment
@@ -18,27 +20,45 @@ def elsewhere(experiment: Experiment, robot: Robot) -> Iterator[str]:
     """What is wrong with the lock of each such joint, in words. A link that moves while its model
     stands is in every joint's torque that carries it, and looks like one of their effects.
 
-    Only columns that go by a pattern of the joints' names are found.
+    Of joints that `robot.lock` names somebody has said where they stand; of others only columns that
+    go by a pattern of the joints' names are found.
     """
-    columns = experiment.data.columns.model_copy(update={"velocity": None, "acceleration": None})
-    nothing = {"columns": columns, "position": {}, "torque": {}, "signals": {}, "groups": {}}
-    for joint, angle in robot.locked.items():
-        slides = robot.source.joints[joint].type == "prismatic"
-        data = experiment.data.model_copy(update={**nothing, "unused": [joint]})
-        how = data, (joint,), np.array([slides]), experiment.folder, {}
-        for spec in experiment.data.train:
-            try:
-                with noticed():
-                    spans = long_log.in_spans(spec, *how)
-                    q = spans.segments[0].q if spans else log.measured(spec, *how).signals["q"]
-            except SysidError:
-                continue  # it has no such column
-            low, high = q.min(initial=angle), q.max(initial=angle)
-            if max(angle - low, high - angle) > TRAVELS:
-                unit = "m" if slides else "rad"
+    types = {joint: robot.source.joints[joint].type for joint in robot.locked}
+    left = [joint for joint in robot.locked if joint not in experiment.robot.lock]
+    for spec in experiment.data.train if left else ():
+        with noticed():
+            found = _angles(experiment, spec, left, types)
+        for joint, q in found.items():
+            angle, off = robot.locked[joint], q - robot.locked[joint]
+            if types[joint] == "continuous":  # a whole turn away is where it stands
+                off = (off + np.pi) % (2.0 * np.pi) - np.pi
+            if np.abs(off).max(initial=0.0) > TRAVELS:
+                left.remove(joint)
+                unit = "m" if types[joint] == "prismatic" else "rad"
                 yield (
                     f"joint {joint} is locked at {angle:.3g} {unit}, and {spec.name} has it from "
                     f"{q.min():.3g} to {q.max():.3g}: name it in robot.joints (and in data.unused "
                     "where its torque is not usable), or say in robot.lock where it stands"
                 )
-                break
+
+
+def _angles(experiment: Experiment, spec, joints: list[str], types: dict) -> dict[str, np.ndarray]:
+    """Angles (n,) of those joints of which a log has a column, of the first span of a long one."""
+    try:
+        table = table_of(spec.names[0], spec, experiment.folder)
+        pattern = meant(table, experiment.data.columns, "position")
+        if not isinstance(pattern, str) or "{joint}" not in pattern:
+            return {}
+        there = [joint for joint in joints if table.has(pattern.replace("{joint}", joint))]
+        if not there:
+            return {}
+        columns = experiment.data.columns.model_copy(update={"velocity": None, "acceleration": None})
+        nothing = {"columns": columns, "position": {}, "torque": {}, "signals": {}, "groups": {}}
+        data = experiment.data.model_copy(update={**nothing, "unused": there})
+        slides = np.array([types[joint] == "prismatic" for joint in there])
+        how = data, tuple(there), slides, experiment.folder, {}
+        spans = long_log.in_spans(spec, *how)
+        q = spans.segments[0].q if spans else log.measured(spec, *how).signals["q"]
+    except SysidError:
+        return {}  # a fit says what is wrong with it
+    return dict(zip(there, q.T))

@@ -24,6 +24,9 @@ def tell_undetermined(found: Fit, motion: Motion) -> None:
     moving = moving_coefficients(structure, motion)
     of_level = [c.at is not None and structure.robot.joints[c.joint] not in motion.still for c in structure.coefficients]
     names = [c.name for c, held, moves, own in zip(structure.coefficients, found.held, moving, of_level) if held and (moves or own)]
+    # of a body that is carried the prior says what data do not, and no deviation knows of it
+    stds = found.uncertainty.std[10 * structure.bodies :]
+    names += [c.name for c, std in zip(structure.coefficients, stds) if c.of_body and not np.isfinite(std)]
     names += [v.name for v, std in zip(structure.shape_values, found.shape_std) if not (v.held or np.isfinite(std))]
     if names:
         warn(f"this log cannot tell {', '.join(names)} from the rest of the model: held at the prior")
@@ -53,11 +56,11 @@ def tell_still(motion: Motion, spec) -> None:
     often = [f"{joint} {100 * share:.0f} %" for joint, share in zip(motion.joints, motion.standing) if share > _MUCH_STANDING and joint not in motion.still]
     if often and spec.standstill == "keep":
         warn(f"joints that stand still in much of their rows, where friction may have any value up to its greatest: {', '.join(often)}; preprocess.standstill: auto leaves them out")
-    silent = {joint for event in motion.events if event.kind == "missing" for joint in event.joints}
-    for joint in motion.still:
-        if joint in silent:
-            warn(f"the torque of {joint} is the same in every row of the training logs though it moves: none was logged; log it, or name the joint in data.unused; its friction is held at its prior")
-            continue
+    lacking = {joint for event in motion.events if event.kind == "missing" for joint in event.joints}
+    silent = [joint for joint, out in zip(motion.joints, motion.left_out) if joint in lacking and out >= motion.samples]
+    if silent:
+        warn(f"the torque of {', '.join(silent)} never changes in the training logs, though the joint moves: none was logged; log it, or name the joint in data.unused; where nothing drives the joint, preprocess.events: keep takes its torque as it is")
+    for joint in (one for one in motion.still if one not in silent):
         warn(f"joint {joint!r} never moves in the training logs, or never clear of a standstill; its friction is held at its prior, and its bodies are where the other joints' torque leaves them")
 
 

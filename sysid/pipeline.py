@@ -142,7 +142,7 @@ def _fit(experiment: Experiment, filters: dict | None, strength: PriorWeight | N
             found = scattered(replace(found, strength=strength or weight), motion)
         if not found.physically_consistent:
             names = [body.name for body, possible in zip(machine.bodies, is_consistent(found.pi)) if not possible]
-            warn(f"impossible bodies: {', '.join(names)}; identified.urdf will not serve a simulator. model.inertia: log-cholesky keeps them possible")
+            warn(f"impossible bodies: {', '.join(names or ['what an effect carries'])}; identified.urdf will not serve a simulator. model.inertia: log-cholesky keeps them possible")
         tell_undetermined(found, motion)
         with _timed(seconds, "masses", tell):  # what other fits are compared with has been asked what it lacks
             heavy = masses.implausible(found, motion if filters is None else None)

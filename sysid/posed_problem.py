@@ -127,8 +127,9 @@ def carried(objective: Objective, model: Model, compressed: Compressed, weights)
     given = [one for one in places if objective.triangle[:, one].any() and all(model.coefficients[k - 10 * model.bodies].given is None for k in one)]
     if not given:
         return None
-    rest = compressed.total(weights)[-1, -1] ** 2  # what the best coefficients leave, bodies possible or not
-    variance = rest / max(int(compressed.rows.sum()) - compressed.size, 1)
+    # what the best coefficients leave, bodies possible or not; of a log without noise a millionth of the torque
+    total, rows = compressed.total(weights), int(compressed.rows.sum())
+    variance = max(total[-1, -1] ** 2 / max(rows - compressed.size, 1), 1e-12 * np.sum(total[:, -1] ** 2) / max(rows, 1))
     return Carried(np.array(given), WEAK * max(variance, np.finfo(float).tiny))
 
 

@@ -11,7 +11,7 @@ import pytest
 from scipy.signal import lfilter
 
 from sysid import config, experiment_logs, pipeline
-from sysid.events import Event, find, mended, told, usable
+from sysid.events import Event, extent, find, mended, told, unlogged, usable
 from sysid.log import Log, Segment
 from sysid.lowpass import lowpassed
 from sysid.preprocess import prepare
@@ -445,11 +445,43 @@ def joints(one: Log) -> tuple[str, ...]:
 @pytest.mark.parametrize("value", [0.0, 2.5])
 def test_a_torque_that_never_changes_though_the_joint_moves_was_not_logged(value):
     made = changed(segment(), tau=(slice(None), 1, value))
-    (event,) = find(made, JOINTS)
+    still = changed(made, q=(slice(None), 1, 0.3))
+    ends = lambda own: (own.t[0], own.t[-1], np.stack([extent(own)]))  # noqa: E731
+    (found, rests) = unlogged([("a.csv", *ends(made)), ("b.csv", *ends(still))], JOINTS)
+    (event,) = found
     assert (event.kind, event.joints, event.signal) == ("missing", ("b",), "torque")
     assert (event.start, event.stop) == (made.t[0], made.t[-1])
     use = usable(made.t, JOINTS, [event])
     assert not use[:, 1].any() and use[:, [0, 2]].all()
-    # one that stands still may need the same torque throughout, and a brake reads none
-    still = changed(made, q=(slice(None), 1, 0.3))
-    assert [event.kind for event in find(still, JOINTS)] == ["brake"] * (value == 0.0)
+    # one that stands still may need the same torque throughout; what is none elsewhere is none there
+    assert [event.log for event in rests] == ["b.csv"]
+    assert unlogged([("b.csv", *ends(still))], JOINTS) == [[]]
+    # a log in parts is one: it moves in one of them
+    parts = np.stack([extent(made), extent(still)])
+    assert len(unlogged([("a.csv", 0.0, 30.0, parts)], JOINTS)[0]) == 1
+    other = np.stack([extent(made), extent(changed(made, tau=(slice(None), 1, value + 1.0)))])
+    assert unlogged([("a.csv", 0.0, 30.0, other)], JOINTS) == [[]]
+
+
+def test_an_actuator_s_torque_may_be_the_same_throughout(experiment):
+    """What a constant command makes; and spans of a long log are one log."""
+    lacks = lambda columns: columns | {"tau_elbow": 1.5 + 0.0 * columns["tau_elbow"]}  # noqa: E731
+    spec = pipeline.load(experiment(train=lacks, test=lacks))
+    machine, structure, _ = pipeline.build(spec)
+    (log,) = experiment_logs.read(spec, machine, spec.data.train)
+    assert [event.joints for event in log.events if event.kind == "missing"] == [("elbow",)]
+    plain = replace(log, events=())
+    (log,) = experiment_logs.with_events(machine, [plain], driven=["elbow"])
+    assert not any(event.kind == "missing" for event in log.events)
+    (whole,) = log.segments
+    third = len(whole.t) // 3
+    gone = replace(
+        plain,
+        segments=tuple(
+            replace(whole, t=whole.t[rows], q=whole.q[rows], tau=whole.tau[rows])
+            for rows in (slice(0, third), slice(third, None))
+        ),
+    )
+    (log,) = experiment_logs.with_events(machine, [gone])
+    (event,) = [event for event in log.events if event.kind == "missing"]
+    assert (event.start, event.stop) == (whole.t[0], whole.t[-1])

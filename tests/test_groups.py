@@ -359,3 +359,17 @@ def test_a_payload_is_a_possible_body(briefly, divergence):
         task.solve(solver=cp.CLARABEL, tol_gap_abs=1e-9, tol_gap_rel=1e-10, tol_feas=1e-10)
     least = float(task.solution.opt_val) + triangle[-1, -1] ** 2
     assert found.objective == pytest.approx(least, rel=1e-6)
+
+
+@pytest.mark.parametrize("weight", [1e-6, 1.0, 1e6])
+def test_a_payload_beside_a_prior_of_any_weight_is_proven(folder, weight):
+    """What is believed of it weighs as much less, and comes to its level at its own pace."""
+    found = sysid.fit(
+        config.experiment(
+            tree(prior={"divergence": "log-det", "weight": weight}), folder / "config.yaml"
+        )
+    )
+    assert found.solution.converged and found.certificate.globally_optimal
+    if weight <= 1.0:
+        mass, std = value(found, "payload.*.m[two]")
+        assert abs(mass - MASS["two"]) < 4.0 * std

@@ -127,20 +127,25 @@ def test_logs_of_which_no_row_counts_are_refused(experiment, cli):
     cli("fit", masked).complains("no row of the training logs counts", "masked")
 
 
-@pytest.mark.parametrize("lock", [{}, {"elbow": 0.3}])
-def test_a_joint_that_is_locked_and_moves_is_told(experiment, cli, lock):
-    folder = experiment(config={"robot.joints": ["shoulder"], "robot.lock": lock})
+def test_a_joint_that_is_locked_and_moves_is_told(experiment, cli):
+    folder = experiment(config={"robot.joints": ["shoulder"]})
     said = " ".join(cli("fit", folder).out.split())
-    assert f"joint elbow is locked at {lock.get('elbow', 0)} rad, and train.csv has it from -" in said and "name it in robot.joints" in said
+    assert "joint elbow is locked at 0 rad, and train.csv has it from -" in said and "name it in robot.joints" in said
+    # whoever says where it stands knows; and a column that goes by no name is not the elbow's
+    for number, config in enumerate(({"robot.lock": {"elbow": 0.3}}, {"data.columns.position": ["q_shoulder"]}, {"data.columns.position": "q_shoulder"})):
+        said = cli("fit", experiment(config={"robot.joints": ["shoulder"], **config}, name=f"other{number}"))
+        assert said.status == 0 and "is locked" not in said.out, said.err
 
 
-def test_a_joint_that_is_locked_where_it_stands_is_not(experiment, cli):
-    standing = lambda columns: columns | {"q_elbow": 0.3 + 0.0 * columns["q_elbow"]}  # noqa: E731
-    for lock, told in ((0.3, False), (0.0, True)):
-        folder = experiment(config={"robot.joints": ["shoulder"], "robot.lock": {"elbow": lock}}, train=standing, test=standing, name=f"at{lock}")
-        assert ("is locked" in cli("fit", folder).out) is told
-    other = experiment(config={"robot.joints": ["shoulder"]}, train=lambda c: {k: v for k, v in c.items() if k != "q_elbow"}, name="bare")
-    assert "is locked" not in cli("fit", other).out
+@pytest.mark.parametrize(("kind", "angle", "told"), [("revolute", 0.0, False), ("revolute", 0.3, True), ("revolute", 2.0 * np.pi, True), ("continuous", 2.0 * np.pi, False)])
+def test_a_joint_that_is_locked_where_it_stands_is_not(experiment, cli, kind, angle, told):
+    turned = lambda text: text.replace('name="elbow" type="revolute"', f'name="elbow" type="{kind}"')  # noqa: E731
+    assert kind == "revolute" or turned(URDF) != URDF
+    standing = lambda columns: columns | {"q_elbow": angle + 0.0 * columns["q_elbow"]}  # noqa: E731
+    folder = experiment(config={"robot.joints": ["shoulder"]}, urdf=turned, train=standing, test=standing)
+    assert ("is locked" in cli("fit", folder).out) is told
+    bare = experiment(config={"robot.joints": ["shoulder"]}, train=lambda c: {k: v for k, v in c.items() if k != "q_elbow"}, name="bare")
+    assert "is locked" not in cli("fit", bare).out
 
 
 @pytest.mark.parametrize(
@@ -157,14 +162,23 @@ def test_a_joint_that_is_locked_where_it_stands_is_not(experiment, cli):
 def test_a_name_that_is_no_likelier_right_than_wrong_does_not_stand_alone(head, others, said):
     told = [{"effect": e, "joint": j} for e, j in named(("spring", "hip"), [("spring", "hip", head), *others])]
     spring = {"effect": "spring", "joint": "hip"}
-    document = {"claims": [{"named": [{"effect": "delay", "joint": "knee"}]}, {"named": told}]}
+    document = {
+        "findings": [{"command": "first"}, {"command": "second"}, {"command": "third"}],
+        "claims": [
+            {"findings": [0], "named": [{"effect": "delay", "joint": "knee"}]},
+            {"findings": [1], "named": told},
+            {"findings": [2], "named": [spring]},  # the same with other options, later
+        ],
+    }
     assert either(spring, document, "hip") == said
-    assert either(spring, {"claims": document["claims"][:1]}) == "spring on hip"
+    assert either({**spring, "command": "second"}, document, "hip") == said
+    assert either({**spring, "command": "third"}, document, "hip") == "spring"
+    assert either(spring, {**document, "claims": document["claims"][:1]}) == "spring on hip"
 
 
 def test_alternatives_do_not_run_into_what_holds_with_them():
     pair = [{"effect": effect, "joint": "hip"} for effect in ("torque_bias", "asymmetric_coulomb")]
-    found = either(pair[0], {"claims": [{"named": pair}]})
+    found = either(pair[0], {"findings": [{}], "claims": [{"findings": [0], "named": pair}]})
     assert found == "torque_bias or asymmetric_coulomb on hip"
     assert all_of([found]) == found
     assert all_of(["load_friction on knee", found]) == "load_friction on knee and (torque_bias or asymmetric_coulomb on hip)"

@@ -57,7 +57,7 @@ def claims(record: dict) -> list[dict]:
             pair = step["effect"], step["joint"]
             true = _is_hidden(step["effect"], joint, hidden)
             held = true or any(_is_hidden(*_split(w, joint), hidden) for w in step["tied_with"])
-            said = true or any(_is_hidden(w, joint, hidden) for w in _said(step, verdict, joint))
+            said = true or any(pair in hidden for pair in _said(step, verdict, joint))
             if joint not in own:
                 before = found.get(pair, {"true": False, "held": False, "said": False})
                 found[pair] = {
@@ -68,14 +68,17 @@ def claims(record: dict) -> list[dict]:
     return list(found.values())
 
 
-def _said(step: dict, verdict: dict, joint: str) -> list[str]:
-    """The effects that the verdict's first line says of a step: its head, and where this is no
-    likelier right than wrong those beside it."""
+def _said(step: dict, verdict: dict, joint: str) -> list[tuple[str, str]]:
+    """The (effect, joint) pairs that the verdict's first line says of a step: its head, and where
+    this is no likelier right than wrong those beside it."""
+    if "named" in step:  # of a journal that has what the document says
+        return [(m["effect"], m["joint"]) for m in step["named"]]
+    own = step["effect"], step["joint"]
     if step["effect"] == verdict["effect"] and verdict.get("set"):
-        members = [(m["effect"], m["joint"], m["probability"]) for m in verdict["set"]]
-        return [w for w, at in named((step["effect"], step["joint"]), members) if at in (joint, "*")]
-    alone = round(step.get("probability", 1.0), 2) > 0.5
-    return [step["effect"], *([] if alone else step["tied_with"])]
+        return named(own, [(m["effect"], m["joint"], m["probability"]) for m in verdict["set"]])
+    # of another than the first the others' probabilities are not in older journals
+    alone = round(step.get("probability", 1.0), 2) > 0.5 or len(step["tied_with"]) != 1
+    return [own, *([] if alone else [_split(w, joint) for w in step["tied_with"]])]
 
 
 def _split(word: str, joint: str) -> tuple[str, str]:

@@ -153,11 +153,12 @@ def _one(case: Case, folder: Path, found: dict, stage: list[str]) -> None:
         | {"depends_on": [d["variable"] for d in entry.get("depends_on", [])][:3]}
         for entry in first["verdict"]
     ]
+    named = {c["findings"][0]: {"named": c["named"]} for c in first.get("claims", ()) if "named" in c}
     found["findings"] = [
         {"effect": f["effect"], "joint": f["joint"], "tied_with": f.get("tied_with", []), "step": f.get("joins_as_step"), "removed": f.get("misfit_removed"),
          "visible": f.get("visible"), "probability": f.get("probability"), "parameters": {name: p["value"] for name, p in f.get("parameters", {}).items()},
-         "deviations": {name: p["std"] for name, p in f.get("parameters", {}).items()}}
-        for f in first["findings"]
+         "deviations": {name: p["std"] for name, p in f.get("parameters", {}).items()}, **named.get(k, {})}
+        for k, f in enumerate(first["findings"])
     ]  # fmt: skip
     unseen = {(entry["effect"], entry["joint"]) for entry in first.get("absorbed", [])}
     found["said_not_visible"] = [(h["effect"], h["joint"]) in unseen for h in found["hidden"]]

@@ -66,7 +66,8 @@ def read(experiment: Experiment, machine: Robot) -> tuple[Logged, ...]:
     for part in ("train", "test"):
         specs = getattr(data, part)
         taken = [_taken(spec, how) for spec in specs]
-        found = experiment_logs.with_events(machine, [log for log, _ in taken])
+        read = [log for log, _ in taken]
+        found = experiment_logs.with_events(machine, read, driven=experiment.actuator)
         for spec, (_, told), whole, log in zip(specs, taken, found, thinned(found)):
             if isinstance(whole.segments, Spans):
                 out.append(_long(part, spec, told, whole, log, machine))

@@ -10,7 +10,7 @@ from ..regressor import body_motions, wrench_columns
 
 
 class Payload(LinkEffect):
-    """A rigid body held by a link during some logs, always a possible one; its ten parameters stand about that link's frame.
+    """A rigid body held by a link during some logs, as possible as the links are; its ten parameters stand about that link's frame.
 
     Present in every log, it is the link's own inertia and cannot be told from it.
     """

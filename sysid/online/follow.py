@@ -36,7 +36,7 @@ class Follower:
         self.experiment, self.model = experiment, model
         self.prior, self.moving, self.forgetting = np.asarray(prior), moving, forgetting
         self.factor = np.zeros((model.size + 1, model.size + 1))
-        self.rows = 0
+        self.rows, self._counted = 0, 0.0  # and the joints' rows, each as much as is left of it
         self._x: np.ndarray | None = None
         self._asked_at = -1
 
@@ -52,13 +52,14 @@ class Follower:
             stacked[own, -1] = rows.tau[:, joint] * weight
         self.factor = triangle(stacked)
         self.rows += n
+        self._counted = self._counted * self.forgetting**n + dof * float(np.sum(weight**2))
 
     @property
     def x(self) -> np.ndarray:
         """The optimum (size,) of all rows so far."""
         if self._asked_at != self.rows or self._x is None:
             whole = np.arange(self.model.size)
-            factor = Factor(0, 0, whole, self.factor, max(self.rows, 1))
+            factor = Factor(0, 0, whole, self.factor, max(round(self._counted), 1))
             data = Compressed(self.model.size, 1, (factor,), max(self.rows, 1))
             problem = pose(self.experiment, self.model, data, self.moving, self.prior)
             # without a barrier a body may stand on the edge of what is possible, where no search

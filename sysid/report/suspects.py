@@ -21,7 +21,8 @@ def suspects(document: dict) -> Section:
         }
         for step, claim in enumerate(document["claims"], start=1)
     ]
-    separate = {f["separate_by"]: None for f in found if f["tied_with"] and f["separate_by"]}
+    tied = [k for claim in document["claims"] if len(claim["set"]) > 1 for k in claim["findings"]]
+    separate = {found[k]["separate_by"]: None for k in tied if found[k]["separate_by"]}
     refused = [(placed(r["effect"], r["joint"]), r["why"]) for r in document["not_claimed"]]
     values = {"groups": groups if found else [], "separate": list(separate), "refused": refused}
     return Section("Suspects", "suspects", values)

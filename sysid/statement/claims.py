@@ -43,7 +43,7 @@ def confidence_set(claim: Claim) -> Members:
     chance = 0.0
     for count, (*_, p) in enumerate(claim.set, 1):
         chance += p
-        if chance >= SURE:
+        if chance >= SURE - 1e-9:  # but for rounding
             return claim.set[:count]
     return claim.set
 

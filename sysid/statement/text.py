@@ -79,7 +79,7 @@ def _joint(v: dict, of: Told, width: int, said: dict[str, str]) -> list[str]:
     words = [either(f, of.document, joint) for f in heads]
     # what comes in the place of the same effect with other options is named by these
     words = [
-        word + (f" with {_options(f)}" if word in words[:k] else "")
+        word.replace(f["effect"], _with_options(f), 1) if word in words[:k] else word
         for k, (word, f) in enumerate(zip(words, heads))
     ]
     named = all_of(words) if heads else ""
@@ -178,8 +178,9 @@ def _head(f: dict, of: Told, joint: str, width: int, said: dict[str, str]) -> li
     return [*out, "  add it with", f["command"]]
 
 
-def _options(f: dict) -> str:
-    return listed([f"{name} {value}" for name, value in f["options"].items()] or ["none"], "and")
+def _with_options(f: dict) -> str:
+    own = [f"{name} {value}" for name, value in f["options"].items()]
+    return f"{f['effect']} with {listed(own or ['none'], 'and')}"
 
 
 def _left(v: dict) -> str:

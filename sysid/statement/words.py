@@ -36,12 +36,14 @@ def named(head: tuple[str, str], members: Members) -> list[tuple[str, str]]:
 
 
 def either(own: dict, document: dict, here: str = "") -> str:
-    """The effect and joint that a verdict or a finding has, with what else its claim is `named`,
-    said of the joint `here`."""
+    """The effect and joint that a verdict has, or a finding with its command, with what else its
+    claim is `named`, said of the joint `here`."""
     out = [(own["effect"], own["joint"])]
-    for claim in document["claims"]:
+    for claim in reversed(document["claims"]):
         told = [(n["effect"], n["joint"]) for n in claim.get("named", ())]
-        out = told if told[:1] == out[:1] else out
+        head = document["findings"][claim["findings"][0]] if "command" in own else own
+        if told[:1] == out[:1] and head.get("command") == own.get("command"):
+            out = told
     effects, joints = zip(*out)
     if len(set(joints)) == 1:
         return placed(listed(effects, "or"), joints[0], here)
