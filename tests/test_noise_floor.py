@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 from scipy.signal import butter, lfilter, sosfiltfilt
 
+from sysid import experiment_logs, pipeline
 from sysid.noise import NoiseFloor, floor, floors
+from sysid.noise.of_fit import floors_of_fit
 
 
 def periodic(seconds: float, step: float, frequency: float, rng) -> np.ndarray:
@@ -424,3 +426,18 @@ def test_bursts_of_a_knock_that_no_event_told_do_not_raise_it(shape):
     residual = np.zeros_like(q)
     residual[:, 1] = knocked
     assert floor([residual], [torque(q, step) + residual], [q], [step], 1).rms == pytest.approx(e.std(), rel=0.1)
+
+
+def test_no_model_s_floor_is_above_what_another_leaves(simulated):
+    """Noise is in what every model leaves: where the one that is looked at leaves more of a joint than the fit, the fit's tells it."""
+    experiment = pipeline.load(simulated("clean"))
+    fit = pipeline.fit(experiment)
+    logs = [experiment_logs.read(experiment, fit.model.robot, part) for part in (experiment.data.train, experiment.data.test)]
+    plain, left = floors_of_fit(experiment, fit, fit.model, fit.x, logs)
+    assert left == pytest.approx({joint: max(fit.rms("train")[joint], fit.rms("test")[joint]) for joint in fit.joints}, rel=1e-6)
+    bent = fit.x.copy()
+    bent[fit.model.names.index("viscous.elbow.Fv")] += 2.0  # N m s/rad
+    found, left = floors_of_fit(experiment, fit, fit.model, bent, logs)
+    assert left["elbow"] > 2.0 * fit.rms("test")["elbow"] and left["shoulder"] == pytest.approx(max(fit.rms("train")["shoulder"], fit.rms("test")["shoulder"]))
+    assert (found[1].rms, found[1].std) == (plain[1].rms, plain[1].std)
+    assert found[0].rms == pytest.approx(plain[0].rms)
