@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
 
 from . import log, long_log
@@ -15,16 +13,19 @@ from .robot import Robot
 from .specs import Experiment
 from .warned import noticed
 
+_SHOWN = 4  # joints by name: of a humanoid whose arm is identified thirty may move
 
-def elsewhere(experiment: Experiment, robot: Robot) -> Iterator[str]:
-    """What is wrong with the lock of each such joint, in words. A link that moves while its model
-    stands is in every joint's torque that carries it, and looks like one of their effects.
+
+def elsewhere(experiment: Experiment, robot: Robot) -> str:
+    """What is wrong with the locks of such joints, in words; empty where nothing is. A link that
+    moves while its model stands is in every joint's torque that carries it, and looks like one of
+    their effects.
 
     Of joints that `robot.lock` names somebody has said where they stand; of others only columns that
     go by a pattern of the joints' names are found.
     """
     types = {joint: robot.source.joints[joint].type for joint in robot.locked}
-    left = [joint for joint in robot.locked if joint not in experiment.robot.lock]
+    left, told = [joint for joint in robot.locked if joint not in experiment.robot.lock], []
     for spec in experiment.data.train if left else ():
         with noticed():
             found = _angles(experiment, spec, left, types)
@@ -35,11 +36,18 @@ def elsewhere(experiment: Experiment, robot: Robot) -> Iterator[str]:
             if np.abs(off).max(initial=0.0) > TRAVELS:
                 left.remove(joint)
                 unit = "m" if types[joint] == "prismatic" else "rad"
-                yield (
-                    f"joint {joint} is locked at {angle:.3g} {unit}, and {spec.name} has it from "
-                    f"{q.min():.3g} to {q.max():.3g}: name it in robot.joints (and in data.unused "
-                    "where its torque is not usable), or say in robot.lock where it stands"
+                told.append(
+                    f"{joint} at {angle:.3g} {unit}, which {spec.name} has from {q.min():.3g} to "
+                    f"{q.max():.3g}"
                 )
+    if not told:
+        return ""
+    shown = [*told[:_SHOWN], *([f"{len(told) - _SHOWN} more"] if len(told) > _SHOWN else [])]
+    return (
+        f"locked joints that move, or stand elsewhere: {'; '.join(shown)}. Name them in "
+        "robot.joints (and in data.unused where their torque is not usable), or say in robot.lock "
+        "where they stand"
+    )
 
 
 def _angles(experiment: Experiment, spec, joints: list[str], types: dict) -> dict[str, np.ndarray]:

@@ -112,8 +112,8 @@ def _fit(experiment: Experiment, filters: dict | None, strength: PriorWeight | N
         with _timed(seconds, "read", tell):
             train = measured.train if measured else read(experiment, machine, experiment.data.train, structure=structure, mapped=mapped)
         refuse_no_torque(train)
-        for text in locked_joints.elsewhere(experiment, machine) if filters is None else ():
-            warn(text)
+        if filters is None and (locks := locked_joints.elsewhere(experiment, machine)):
+            warn(locks)
         seen = samples_of("train", train) if filters is None else []
         provenance = [_provenance("train", log, spec) for log, spec in zip(train, experiment.data.train)]
         with _timed(seconds, "filters", tell):

@@ -130,11 +130,11 @@ def test_logs_of_which_no_row_counts_are_refused(experiment, cli):
 def test_a_joint_that_is_locked_and_moves_is_told(experiment, cli):
     folder = experiment(config={"robot.joints": ["shoulder"]})
     said = " ".join(cli("fit", folder).out.split())
-    assert "joint elbow is locked at 0 rad, and train.csv has it from -" in said and "name it in robot.joints" in said
+    assert "locked joints that move, or stand elsewhere: elbow at 0 rad, which train.csv has from -" in said and "Name them in robot.joints" in said
     # whoever says where it stands knows; and a column that goes by no name is not the elbow's
     for number, config in enumerate(({"robot.lock": {"elbow": 0.3}}, {"data.columns.position": ["q_shoulder"]}, {"data.columns.position": "q_shoulder"})):
         said = cli("fit", experiment(config={"robot.joints": ["shoulder"], **config}, name=f"other{number}"))
-        assert said.status == 0 and "is locked" not in said.out, said.err
+        assert said.status == 0 and "locked joints" not in said.out, said.err
 
 
 @pytest.mark.parametrize(("kind", "angle", "told"), [("revolute", 0.0, False), ("revolute", 0.3, True), ("revolute", 2.0 * np.pi, True), ("continuous", 2.0 * np.pi, False)])
@@ -143,9 +143,9 @@ def test_a_joint_that_is_locked_where_it_stands_is_not(experiment, cli, kind, an
     assert kind == "revolute" or turned(URDF) != URDF
     standing = lambda columns: columns | {"q_elbow": angle + 0.0 * columns["q_elbow"]}  # noqa: E731
     folder = experiment(config={"robot.joints": ["shoulder"]}, urdf=turned, train=standing, test=standing)
-    assert ("is locked" in cli("fit", folder).out) is told
+    assert ("locked joints" in cli("fit", folder).out) is told
     bare = experiment(config={"robot.joints": ["shoulder"]}, train=lambda c: {k: v for k, v in c.items() if k != "q_elbow"}, name="bare")
-    assert "is locked" not in cli("fit", bare).out
+    assert "locked joints" not in cli("fit", bare).out
 
 
 @pytest.mark.parametrize(
