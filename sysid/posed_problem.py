@@ -101,13 +101,13 @@ def pose(experiment: Experiment, model: Model, compressed: Compressed, moving: n
         prior: (bodies, 10).
         weights: (joints,) that multiply the rows of each joint, or None.
     """
-    spec = experiment
-    objective = posed(compressed.total(weights), DIVERGENCES[spec.prior.divergence](prior), number(spec), known_bodies(spec, model))
+    spec, total = experiment, compressed.total(weights)
+    objective = posed(total, DIVERGENCES[spec.prior.divergence](prior), number(spec), known_bodies(spec, model))
     size = 10 * model.bodies + len(model.coefficients)
     slopes = objective.triangle.shape[1] - 1 - size
     positive = np.array([c.positive for c in model.coefficients] + [False] * slopes, dtype=bool)
     moving = np.append(moving, np.ones(slopes, dtype=bool))
-    own = carried(objective, model, compressed, weights)
+    own = carried(total, model, int(compressed.rows.sum()))
     if own is not None:  # of a body the prior says what data do not
         moving[own.places.ravel() - 10 * model.bodies] = False
     held = ~moving | undetermined(objective, model, moving)
@@ -121,15 +121,18 @@ def pose(experiment: Experiment, model: Model, compressed: Compressed, moving: n
     return Problem(objective, coordinates, coordinates.theta(x), weights, own)
 
 
-def carried(objective: Objective, model: Model, compressed: Compressed, weights) -> Carried | None:
-    """The bodies among a model's coefficients that any log shows; None where there is none."""
+def carried(total: np.ndarray, model: Model, rows: int) -> Carried | None:
+    """The bodies among a model's coefficients that any log shows; None where there is none.
+
+    Args:
+        total: (size + 1, size + 1) triangle of the data, weighted, of so many rows.
+    """
     places = places_of(model.coefficients, 10 * model.bodies)
-    given = [one for one in places if objective.triangle[:, one].any() and all(model.coefficients[k - 10 * model.bodies].given is None for k in one)]
+    given = [one for one in places if total[:, one].any() and all(model.coefficients[k - 10 * model.bodies].given is None for k in one)]
     if not given:
         return None
     # what the best coefficients leave, bodies possible or not; of a log without noise a millionth of the torque
-    total, rows = compressed.total(weights), int(compressed.rows.sum())
-    variance = max(total[-1, -1] ** 2 / max(rows - compressed.size, 1), 1e-12 * np.sum(total[:, -1] ** 2) / max(rows, 1))
+    variance = max(total[-1, -1] ** 2 / max(rows - (len(total) - 1), 1), 1e-12 * np.sum(total[:, -1] ** 2) / max(rows, 1))
     return Carried(np.array(given), WEAK * max(variance, np.finfo(float).tiny))
 
 
