@@ -267,6 +267,13 @@ def test_what_only_the_weights_of_the_joints_leave_is_said_to_be_theirs(weighed,
     assert "weighting" not in verdicts(fit, (), [NOISE, NOISE], floors, weighed={"elbow": weighed})[1].says
 
 
+@pytest.mark.parametrize("level", [floor(None), floor()])
+def test_whose_misfit_bends_a_quiet_joint_is_told_though_its_floor_is_not_known(level):
+    """The shoulder's misfit is nine times the elbow's, whatever its own noise is: the joint that others are asked to blame."""
+    says = verdicts(fitted(2.0, shoulder=6.0), (), [NOISE, NOISE], [level, floor()], weighed={"elbow": 1.05, "shoulder": 6.0})[1].says
+    assert "the greater one of shoulder bends the bodies" in says
+
+
 @pytest.mark.parametrize(("took", "rest", "status"), [(0.85, NOISE, "missing"), (0.75, NOISE, "unknown"), (0.85, left(0.6), "unknown"), (None, NOISE, "unknown")])
 def test_what_takes_nearly_all_where_all_joints_count_alike_stands(took, rest, status):
     """A louder joint bends the bodies of a quiet one, whose error falls by little in a fit that weighs all alike, and whose floor nobody knows:
