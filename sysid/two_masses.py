@@ -86,10 +86,13 @@ def sprung(load, inertia, step: float, *, compliance: float, damping: float) -> 
     begun[0, 1] = begun[1, 2] = 1.0  # from any other first two samples
     found = dtbtrs(band, begun, uplo="L")[0]
     slow = float(np.median(still))
-    early = max(5, math.ceil(_FORGOTTEN * slow / max(damping, 1e-3)))
+    early = max(5.0, _FORGOTTEN * slow / max(damping, 1e-3))
     # a filter bends a log's ends, and the link's first turn with them: what rings after it is asked, where that is not forgotten yet
-    bent = min(int(2.0 * math.pi * slow), early // 4) if slow > 1.0 else 0
-    rings = np.diff(found[bent:early], 2, axis=0)
+    bent = min(2.0 * math.pi * slow, 0.25 * early) * min(max(slow - 1.0, 0.0), 1.0)
+    # samples come in and go one by one as the spring softens, each by and by: else what it does would jump with it
+    sample = np.arange(min(math.ceil(early), len(load)) - 2)
+    counts = np.clip(sample + 1.0 - bent, 0.0, 1.0) * np.clip(early - 2.0 - sample, 0.0, 1.0)
+    rings = counts[:, None] * np.diff(found[: len(sample) + 2], 2, axis=0)
     change = np.linalg.lstsq(rings[:, 1:], -rings[:, 0], rcond=1e-9)[0]
     return found[:, 0] + found[:, 1:] @ change
 

@@ -63,6 +63,21 @@ def test_what_a_filter_does_to_the_end_of_a_log_rings_little(damping):
     assert np.std((found - clean)[after]) < 0.02 * np.std(clean[after])
 
 
+@pytest.mark.parametrize("value, middle, size", [("compliance", 8e-4, 4e-5), ("compliance", 3.2e-5, 3e-6), ("damping", 0.2, 0.02)])
+def test_where_a_link_stands_never_jumps_with_its_spring(value, middle, size):
+    """Which samples say how the link swung when the log began hangs on the spring. Did they come in whole, one after the other, the slope
+    of a torque would be the jump over the step of a difference where one does, thousands of times the slope beside it: in a real log one block then
+    held the whole model. About 3.2e-5 a radian of the swing is a step."""
+    t, values = np.arange(0.0, 2.0, 0.004), {"compliance": 8e-4, "damping": 0.2}
+    loud = load(t) + np.random.default_rng(0).normal(size=len(t))
+    greatest = []
+    for count in (101, 1001):
+        at = middle + size * np.linspace(-1.0, 1.0, count)
+        found = [two_masses.sprung(loud, 0.5 + 0.0 * t, 0.004, **(values | {value: one})) for one in at]
+        greatest.append(np.abs(np.diff(found, axis=0)).max())
+    assert greatest[1] < 0.2 * greatest[0]  # a jump would stay as it is, however short the step
+
+
 def test_a_link_flies_between_the_teeth():
     """The load grows from zero at the back teeth: d = slope t^3 / (6 M) - b/2, until it strikes, and there it stays."""
     step, M, b, slope = 1e-3, 0.2, 0.02, 20.0
