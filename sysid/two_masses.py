@@ -62,9 +62,38 @@ def sprung(load, inertia, step: float, *, compliance: float, damping: float) -> 
     still = np.sqrt(np.maximum(compliance * np.asarray(inertia), 0.0)) / step
     if compliance <= 0.0 or len(load) < 3 or not still.any():
         return compliance * np.asarray(load)
+    still = np.broadcast_to(still, len(load))
+    asked = compliance * np.asarray(load)
+    found = _answered(asked, still, damping)
+    slow = float(np.median(still))
+    early = max(5.0, _FORGOTTEN * slow / max(damping, 1e-3))
+    # a filter bends a log's ends, and the link's first turn with them: what rings after it is asked, where that is not forgotten yet
+    bent = min(2.0 * math.pi * slow, 0.25 * early) * min(max(slow - 1.0, 0.0), 1.0)
+    # samples come in and go by and by as the spring softens: else what it does would jump, or run, with it
+    sample = np.arange(1, min(math.ceil(early), len(load)) - 1)
+    counts = _rising(sample / max(bent, 1.0) - 0.5) * _rising((early - 1.0 - sample) / (0.25 * early))
+    rings = counts[:, None] * np.diff(found[: len(sample) + 2], 2, axis=0)
+    change = np.linalg.lstsq(rings[:, 1:], -rings[:, 0], rcond=1e-9)[0]
+    found = found[:, 0] + found[:, 1:] @ change
+    if bent > 1.0:
+        # how it swings in that turn is what makes it still later, and says nothing of the spring: there it stands as what comes
+        # would have it, by the same recursion from the end of the log on
+        later = _rising(np.arange(1, len(load) + 1) / bent)
+        found = later * found + (1.0 - later) * _answered(asked[::-1], still[::-1], damping)[::-1, 0]
+    return found
+
+
+def _rising(share):
+    """From zero at zero and below to one at one and above, without a kink."""
+    share = np.clip(share, 0.0, 1.0)
+    return share * share * (3.0 - 2.0 * share)
+
+
+def _answered(asked, still, damping: float) -> np.ndarray:
+    """(n, 3) the recursion's answer to a deflection that is asked for (n,), begun where it is asked, and to first two samples of one
+    alone. still: (n,) over two pi the period of the resonance, in steps."""
     from scipy.linalg.lapack import dtbtrs
 
-    still = np.broadcast_to(still, len(load))
     turn = 1.0 / np.maximum(still, 1e-3)
     share = np.minimum(np.maximum(damping, turn - 1.0), 0.999)
     kept = np.exp(-share * turn)
@@ -74,27 +103,16 @@ def sprung(load, inertia, step: float, *, compliance: float, damping: float) -> 
     zeroth = 1.0 - one - two
     first = 1.0 - lag + one * lag + two * (1.0 + lag)
     second = 1.0 - 2.0 * lag + curved - one * curved - two * (1.0 + 2.0 * lag + curved)
-    asked = compliance * np.asarray(load)
-    right = asked.copy()
+    right = np.array(asked)
     right[2:] = (
         0.5 * (first + second)[1:-1] * asked[2:] + (zeroth - second)[1:-1] * asked[1:-1] + 0.5 * (second - first)[1:-1] * asked[:-2]
     )  # fmt: skip
-    band = np.zeros((3, len(load)))
+    band = np.zeros((3, len(asked)))
     band[0] = 1.0
     band[1, 1:-1], band[2, :-2] = -one[1:-1], -two[1:-1]
-    begun = np.stack([right, np.zeros(len(load)), np.zeros(len(load))], axis=1)
+    begun = np.stack([right, np.zeros(len(asked)), np.zeros(len(asked))], axis=1)
     begun[0, 1] = begun[1, 2] = 1.0  # from any other first two samples
-    found = dtbtrs(band, begun, uplo="L")[0]
-    slow = float(np.median(still))
-    early = max(5.0, _FORGOTTEN * slow / max(damping, 1e-3))
-    # a filter bends a log's ends, and the link's first turn with them: what rings after it is asked, where that is not forgotten yet
-    bent = min(2.0 * math.pi * slow, 0.25 * early) * min(max(slow - 1.0, 0.0), 1.0)
-    # samples come in and go one by one as the spring softens, each by and by: else what it does would jump with it
-    sample = np.arange(min(math.ceil(early), len(load)) - 2)
-    counts = np.clip(sample + 1.0 - bent, 0.0, 1.0) * np.clip(early - 2.0 - sample, 0.0, 1.0)
-    rings = counts[:, None] * np.diff(found[: len(sample) + 2], 2, axis=0)
-    change = np.linalg.lstsq(rings[:, 1:], -rings[:, 0], rcond=1e-9)[0]
-    return found[:, 0] + found[:, 1:] @ change
+    return dtbtrs(band, begun, uplo="L")[0]
 
 
 def played(load, inertia, step: float, *, b: float, teeth: float) -> np.ndarray:

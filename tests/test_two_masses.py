@@ -78,6 +78,23 @@ def test_where_a_link_stands_never_jumps_with_its_spring(value, middle, size):
     assert greatest[1] < 0.2 * greatest[0]  # a jump would stay as it is, however short the step
 
 
+@pytest.mark.parametrize("value", ["compliance", "damping"])
+@pytest.mark.parametrize("damping", [0.08, 0.2])
+def test_the_beginning_of_a_log_says_no_more_of_a_spring_than_the_rest(damping, value):
+    """How a link swung before the log began is found from noisy torque, and hangs on the spring: in simulated logs of a leg it said twenty times as much of
+    the damping as any other second did, all of it of how that noise bent the guess."""
+    t, values, step = np.arange(0.0, 8.0, 0.004), {"compliance": 1.5e-3, "damping": damping}, 1e-3
+    mass, most = 0.22 + 0.0 * t, []
+    for seed in range(8):
+        noisy = load(t) + np.random.default_rng(seed).normal(size=len(t))
+        found = [
+            two_masses.sprung(noisy, mass, 0.004, **(values | {value: (1.0 + sign * step) * values[value]})) for sign in (-1.0, 1.0)
+        ]
+        slope = np.abs(np.diff(found[1] - found[0], 2))
+        most.append(slope[:75].max() / slope[250:].max())
+    assert np.median(most) < 1.5
+
+
 def test_a_link_flies_between_the_teeth():
     """The load grows from zero at the back teeth: d = slope t^3 / (6 M) - b/2, until it strikes, and there it stays."""
     step, M, b, slope = 1e-3, 0.2, 0.02, 20.0
