@@ -19,6 +19,7 @@ from .motion import Piece
 from .robot import Robot
 
 _FORGOTTEN = 4.0  # times of decay: two per cent are left
+_UNTOLD = 1e-3  # of what a first swing rings: by so much it is held where it is, and wholly where no sample tells it
 _TURN = 0.5  # rad of the swing on the teeth in a step, at most
 
 
@@ -52,7 +53,9 @@ def sprung(load, inertia, step: float, *, compliance: float, damping: float) -> 
 
     The recursion has the equation's own poles and answers a load that is quadratic in time exactly, whatever the step; where
     a step holds no sixth of a cycle, the resonance is beyond what the samples show and only that answer is left. Nobody knows
-    how the link swung when the log began: so that it rings least until that is forgotten.
+    how the link swung when the log began: so that it rings least until that is forgotten. In its first turn it comes to stand
+    there from where the load that is still to come would have it, by the same recursion from the log's end on: backwards a
+    spring leads where it should lag, but how a link must be let go to be still later says nothing of the spring.
 
     Args:
         load: (n,) [N m]. inertia: (n,) [kg m²] of the link. step: seconds. compliance: [rad/(N m)]. damping: share of the
@@ -62,36 +65,53 @@ def sprung(load, inertia, step: float, *, compliance: float, damping: float) -> 
     still = np.sqrt(np.maximum(compliance * np.asarray(inertia), 0.0)) / step
     if compliance <= 0.0 or len(load) < 3 or not still.any():
         return compliance * np.asarray(load)
-    still = np.broadcast_to(still, len(load))
-    asked = compliance * np.asarray(load)
-    found = _answered(asked, still, damping)
-    slow = float(np.median(still))
-    early = max(5.0, _FORGOTTEN * slow / max(damping, 1e-3))
-    # a filter bends a log's ends, and the link's first turn with them: what rings after it is asked, where that is not forgotten yet
-    bent = min(2.0 * math.pi * slow, 0.25 * early) * min(max(slow - 1.0, 0.0), 1.0)
-    # samples come in and go by and by as the spring softens: else what it does would jump, or run, with it
-    sample = np.arange(1, min(math.ceil(early), len(load)) - 1)
-    counts = _rising(sample / max(bent, 1.0) - 0.5) * _rising((early - 1.0 - sample) / (0.25 * early))
-    rings = counts[:, None] * np.diff(found[: len(sample) + 2], 2, axis=0)
-    change = np.linalg.lstsq(rings[:, 1:], -rings[:, 0], rcond=1e-9)[0]
-    found = found[:, 0] + found[:, 1:] @ change
-    if bent > 1.0:
-        # how it swings in that turn is what makes it still later, and says nothing of the spring: there it stands as what comes
-        # would have it, by the same recursion from the end of the log on
-        later = _rising(np.arange(1, len(load) + 1) / bent)
-        found = later * found + (1.0 - later) * _answered(asked[::-1], still[::-1], damping)[::-1, 0]
+    still, asked = np.broadcast_to(still, len(load)), compliance * np.asarray(load)
+    found, slow = _begun(asked, still, damping), float(np.median(still))
+    turn = 2.0 * math.pi * slow * _told(slow)
+    if turn > 1.0:
+        later = _rising(np.arange(1, len(load) + 1) / turn)
+        found = later * found + (1.0 - later) * _begun(asked[::-1], still[::-1], damping)[::-1]
     return found
 
 
-def _rising(share):
-    """From zero at zero and below to one at one and above, without a kink."""
+def _begun(asked, still, damping: float) -> np.ndarray:
+    """(n,) [rad] the recursion's answer to a deflection (n,) that is asked for, begun so that it rings least.
+
+    Args:
+        still: (n,) period of the resonance over two pi, in steps.
+    """
+    found, slow = _answered(asked, still, damping), float(np.median(still))
+    early = max(5.0, _FORGOTTEN * slow / max(damping, 1e-3))
+    # a filter bends a log's ends, and the link's first turn with them: what rings after it is asked, where that is not forgotten yet
+    bent = min(2.0 * math.pi * slow, 0.25 * early) * _told(slow)
+    # samples count more and less by and by as the spring softens: else what it does would jump, or run, with it
+    sample = np.arange(1, min(math.ceil(early), len(asked)) - 1)
+    counts = _rising(sample / max(bent, 1.0) - 0.5) * _rising((early - 1.0 - sample) / (0.25 * early))
+    rings = np.diff(found[: len(sample) + 2], 2, axis=0)
+    # what no sample tells stays as it is
+    kept = _UNTOLD * np.diag(np.linalg.norm(rings[:, 1:], axis=0))
+    rings = np.vstack([counts[:, None] * rings, np.column_stack([np.zeros(2), kept])])
+    return found[:, 0] - found[:, 1:] @ np.linalg.lstsq(rings[:, 1:], rings[:, 0], rcond=1e-9)[0]
+
+
+def _told(slow: float) -> float:
+    """How far the samples show a resonance with a period of 2 pi `slow` steps: not below one, wholly above two."""
+    return min(max(slow - 1.0, 0.0), 1.0)
+
+
+def _rising(share: np.ndarray) -> np.ndarray:
+    """(n,) from zero where a share (n,) is zero or less to one where it is one or more, without a kink."""
     share = np.clip(share, 0.0, 1.0)
     return share * share * (3.0 - 2.0 * share)
 
 
 def _answered(asked, still, damping: float) -> np.ndarray:
-    """(n, 3) the recursion's answer to a deflection that is asked for (n,), begun where it is asked, and to first two samples of one
-    alone. still: (n,) over two pi the period of the resonance, in steps."""
+    """(n, 3) [rad]: the recursion's answer to a deflection (n,) that is asked for, begun where it is asked; and how a link swings
+    by itself from a first sample of one, and from a second.
+
+    Args:
+        still: (n,) period of the resonance over two pi, in steps.
+    """
     from scipy.linalg.lapack import dtbtrs
 
     turn = 1.0 / np.maximum(still, 1e-3)
@@ -111,7 +131,7 @@ def _answered(asked, still, damping: float) -> np.ndarray:
     band[0] = 1.0
     band[1, 1:-1], band[2, :-2] = -one[1:-1], -two[1:-1]
     begun = np.stack([right, np.zeros(len(asked)), np.zeros(len(asked))], axis=1)
-    begun[0, 1] = begun[1, 2] = 1.0  # from any other first two samples
+    begun[0, 1] = begun[1, 2] = 1.0
     return dtbtrs(band, begun, uplo="L")[0]
 
 

@@ -162,14 +162,15 @@ def by_weights(fit, joint: str, floor: float | None, weighed: dict[str, float]) 
 def loudest(errors: dict[str, float], floors, asked) -> str:
     """Of the joints that are `asked` what their error is, the one with the most above its floor.
 
-    Where a floor is not known, as a misfit is much greater than the noise, its estimate is as good
-    as one: what is above it is the misfit either way.
+    Of a floor that is not known the estimate counts, or what is noise in any case: a joint whose
+    misfit hides its noise is the one that bends others.
     """
     over = {
-        joint: error**2 - (floor.rms or floor.about or 0.0) ** 2
+        joint: error**2 - (floor.rms or floor.about or floor.low or 0.0) ** 2
         for (joint, error), floor, ask in zip(errors.items(), floors, asked)
         if ask
     }
+    over = {joint: more for joint, more in over.items() if more > 0.0}
     return max(over, key=over.get, default="")
 
 

@@ -49,13 +49,14 @@ def test_the_table_counts_what_is_visible_and_was_not_there_before():
         said = {"a": {"status": "missing", "claimed": claimed, "sets": [*claimed, *sets]}, "b": {"status": "missing", "claimed": list(elsewhere), "sets": []}}
         return {"robot": "arm", "name": "a", "effect": effect, "times": 1.0, "errors": {"before": 1.0, "planted": 2.0, "true": true}, "said": said}
 
-    said = planted_study.told(
-        [
-            plain, case("spring", ["spring"]), case("cogging", ["cable", "cogging"], elsewhere=["delay"]), case("stribeck", ["cable"], ["stribeck"]),
-            case("spring", []), case("spring", [], true=1.9), case("cable", ["cable"]),
-        ]
-    )  # fmt: skip
+    records = [
+        plain, case("spring", ["spring"]), case("cogging", ["cable", "cogging"], elsewhere=["delay"]), case("stribeck", ["cable"], ["stribeck"]),
+        case("spring", []), case("spring", [], true=1.9), case("cable", ["cable"]),
+    ]  # fmt: skip
+    said = planted_study.told(records)
     assert {k: said[k] for k in ("cases", "visible", "claimed", "first", "in a set", "there before", "elsewhere, more")} == {
         "cases": 6, "visible": 4, "claimed": 2, "first": 1, "in a set": 3, "there before": 1, "elsewhere, more": 1,
     }  # fmt: skip
     assert [m["case"] for m in said["missed"]] == ["arm, a, stribeck x 1", "arm, a, spring x 1"]
+    text = planted_study.page(said, records, "python a study")
+    assert "| of these claimed | 2 of 4 |" in text and text.count("| arm, a |") == 6 and text.count("**yes**") == 3
