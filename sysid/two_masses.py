@@ -53,9 +53,7 @@ def sprung(load, inertia, step: float, *, compliance: float, damping: float) -> 
 
     The recursion has the equation's own poles and answers a load that is quadratic in time exactly, whatever the step; where
     a step holds no sixth of a cycle, the resonance is beyond what the samples show and only that answer is left. Nobody knows
-    how the link swung when the log began: so that it rings least until that is forgotten. In its first turn it comes to stand
-    there from where the load that is still to come would have it, by the same recursion from the log's end on: backwards a
-    spring leads where it should lag, but how a link must be let go to be still later says nothing of the spring.
+    how the link swung when the log began: so that it rings least until that is forgotten.
 
     Args:
         load: (n,) [N m]. inertia: (n,) [kg m²] of the link. step: seconds. compliance: [rad/(N m)]. damping: share of the
@@ -65,38 +63,19 @@ def sprung(load, inertia, step: float, *, compliance: float, damping: float) -> 
     still = np.sqrt(np.maximum(compliance * np.asarray(inertia), 0.0)) / step
     if compliance <= 0.0 or len(load) < 3 or not still.any():
         return compliance * np.asarray(load)
-    still, asked = np.broadcast_to(still, len(load)), compliance * np.asarray(load)
-    found, slow = _begun(asked, still, damping), float(np.median(still))
-    turn = 2.0 * math.pi * slow * _told(slow)
-    if turn > 1.0:
-        later = _rising(np.arange(1, len(load) + 1) / turn)
-        found = later * found + (1.0 - later) * _begun(asked[::-1], still[::-1], damping)[::-1]
-    return found
-
-
-def _begun(asked, still, damping: float) -> np.ndarray:
-    """(n,) [rad] the recursion's answer to a deflection (n,) that is asked for, begun so that it rings least.
-
-    Args:
-        still: (n,) period of the resonance over two pi, in steps.
-    """
-    found, slow = _answered(asked, still, damping), float(np.median(still))
+    still = np.broadcast_to(still, len(load))
+    found, slow = _answered(compliance * np.asarray(load), still, damping), float(np.median(still))
     early = max(5.0, _FORGOTTEN * slow / max(damping, 1e-3))
     # a filter bends a log's ends, and the link's first turn with them: what rings after it is asked, where that is not forgotten yet
-    bent = min(2.0 * math.pi * slow, 0.25 * early) * _told(slow)
-    # samples count more and less by and by as the spring softens: else what it does would jump, or run, with it
-    sample = np.arange(1, min(math.ceil(early), len(asked)) - 1)
+    bent = min(2.0 * math.pi * slow, 0.25 * early) * min(max(slow - 1.0, 0.0), 1.0)
+    # samples count more and less by and by as the spring softens: else what it does would jump with it
+    sample = np.arange(1, min(math.ceil(early), len(load)) - 1)
     counts = _rising(sample / max(bent, 1.0) - 0.5) * _rising((early - 1.0 - sample) / (0.25 * early))
     rings = np.diff(found[: len(sample) + 2], 2, axis=0)
     # what no sample tells stays as it is
     kept = _UNTOLD * np.diag(np.linalg.norm(rings[:, 1:], axis=0))
     rings = np.vstack([counts[:, None] * rings, np.column_stack([np.zeros(2), kept])])
     return found[:, 0] - found[:, 1:] @ np.linalg.lstsq(rings[:, 1:], rings[:, 0], rcond=1e-9)[0]
-
-
-def _told(slow: float) -> float:
-    """How far the samples show a resonance with a period of 2 pi `slow` steps: not below one, wholly above two."""
-    return min(max(slow - 1.0, 0.0), 1.0)
 
 
 def _rising(share: np.ndarray) -> np.ndarray:
