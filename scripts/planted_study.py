@@ -8,7 +8,7 @@ log by `law` and not by the package, as large as 0.7 to 3 times the joint's erro
 It is visible where the model with that effect has 10 % less error on the test logs than the model without it. The diagnosis of the same logs
 with nothing planted says what was there before.
 
-Resumes: finished cases stand in a journal in --out, named after the seed and the state of the package's source.
+Resumes: finished cases stand in a journal in --out, named after the seed and the state of the package's source and of this script.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 os.environ["PYTHONPATH"] = os.pathsep.join([str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])])
 
-from scripts.real_logs import ROBOTS  # noqa: E402
+from scripts.real_logs import ROBOTS, path_of  # noqa: E402
 from sysid import fit_document, log, pipeline, robot, whole_files  # noqa: E402
 from sysid.addition import grown  # noqa: E402
 from sysid.diagnose.diagnosis import Diagnosis, diagnose  # noqa: E402
@@ -48,8 +48,7 @@ VISIBLE, WINDOW = 0.10, 0.1  # of that error; s
 
 def experiment_of(name: str):
     """A real robot's experiment; None where its logs are not there."""
-    (place,) = [place for own, place, _ in ROBOTS if own == name]
-    path = ROOT / place if place.startswith("configs/") else Path(os.environ.get("SYSID_DATA_DIR", "nowhere")) / place
+    (path,) = [path_of(place) for own, place, _ in ROBOTS if own == name]
     return pipeline.load(path) if path.exists() else None
 
 
@@ -152,16 +151,22 @@ def one(case: dict) -> dict:
         return {**case, "name": joint, "size": float(size), "errors": errors, "said": said(found)}
 
 
+def beside(records: list[dict]) -> list[tuple[dict, dict, bool]]:
+    """Of each case its record, what is said of the logs as they are, and whether what was planted is visible."""
+    as_they_are = {r["robot"]: r["said"] for r in records if "effect" not in r}
+    own = (r for r in records if "said" in r and "effect" in r)
+    return [(r, as_they_are[r["robot"]], r["errors"]["true"] <= (1.0 - VISIBLE) * r["errors"]["planted"]) for r in own]
+
+
 def told(records: list[dict]) -> dict:
     """How many visible effects are named, and what is claimed on other joints that is not claimed of the logs as they are."""
-    as_they_are = {r["robot"]: r["said"] for r in records if "effect" not in r}
     out = {"others": 0, "visible": 0, "claimed": 0, "first": 0, "in a set": 0, "there before": 0, "elsewhere, more": 0, "cases": 0, "missed": []}
-    for r in (r for r in records if "said" in r and "effect" in r):
-        own, before = r["said"][r["name"]], as_they_are[r["robot"]]
+    for r, before, visible in beside(records):
+        own = r["said"][r["name"]]
         out["cases"] += 1
         out["others"] += len(r["said"]) - 1
         out["elsewhere, more"] += sum(bool(set(v["claimed"]) - set(before[j]["claimed"])) for j, v in r["said"].items() if j != r["name"])
-        if r["errors"]["true"] > (1.0 - VISIBLE) * r["errors"]["planted"]:
+        if not visible:
             continue
         if r["effect"] in before[r["name"]]["claimed"]:
             out["there before"] += 1
@@ -180,17 +185,15 @@ def told(records: list[dict]) -> dict:
 def page(found: dict, records: list[dict], command: str) -> str:
     """The study as a page."""
     rows = []
-    as_they_are = {r["robot"]: r["said"] for r in records if "effect" not in r}
-    for r in sorted((r for r in records if "said" in r and "effect" in r), key=lambda r: (r["robot"], r["name"], r["effect"])):
-        e, own, before = r["errors"], r["said"][r["name"]], as_they_are[r["robot"]][r["name"]]
-        seen = "yes" if e["true"] <= (1.0 - VISIBLE) * e["planted"] else "no"
-        words = [", ".join(f"`{effect}`" for effect in v["claimed"]) or "nothing" for v in (before, own)]
+    for r, before, visible in sorted(beside(records), key=lambda one: (one[0]["robot"], one[0]["name"], one[0]["effect"])):
+        e, own, seen = r["errors"], r["said"][r["name"]], "yes" if visible else "no"
+        words = [", ".join(f"`{effect}`" for effect in v["claimed"]) or "nothing" for v in (before[r["name"]], own)]
         hit = "**yes**" if r["effect"] in own["claimed"] else "in a set" if r["effect"] in own["sets"] else "no"
         rows.append(
             f"| {r['robot']}, {r['name']} | `{r['effect']}` | {r['times']:.1f} | {e['before']:.3g} | {e['planted']:.3g} | {e['true']:.3g} | {seen} | "
             f"{words[0]} | {words[1]}; {own['status']} | {hit} |"
         )
-    visible = found["visible"]
+    count = found["visible"]
     lines = [
         "# Effects planted in real logs", "",
         "Written by `scripts/planted_study.py --publish`; nothing in it is edited by hand, and nothing in the code knows these logs.", "",
@@ -201,10 +204,10 @@ def page(found: dict, records: list[dict], command: str) -> str:
         "test logs than the model without it; what the diagnosis claims of the logs as they are stands beside what it claims with the effect planted.", "",
         "| | |", "|---|---:|",
         f"| planted | {found['cases']} |",
-        f"| visible, and not claimed of the logs as they are | {visible} |",
-        f"| of these claimed | {found['claimed']} of {visible} |",
-        f"| of these claimed first on the joint | {found['first']} of {visible} |",
-        f"| of these claimed, or in the set of a claim | {found['in a set']} of {visible} |",
+        f"| visible, and not claimed of the logs as they are | {count} |",
+        f"| of these claimed | {found['claimed']} of {count} |",
+        f"| of these claimed first on the joint | {found['first']} of {count} |",
+        f"| of these claimed, or in the set of a claim | {found['in a set']} of {count} |",
         f"| of all other joints, in all cases, those of which more is claimed than of the logs as they are | {found['elsewhere, more']} of {found['others']} |", "",
         "What robots lack already stands beside what was planted, so that more than one claim on a joint is no fault, and a larger misfit than the planted one may be told first.", "",
         "| joint | planted | times its error | error before | with it planted | with the true model | visible | claimed of the logs as they are | claimed | the planted one |",

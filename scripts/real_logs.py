@@ -56,6 +56,11 @@ def earlier(name: str, fit) -> list[str]:
     return lines
 
 
+def path_of(place: str) -> Path:
+    """A robot's experiment: a config of the project, or a folder of the data; it need not be there."""
+    return (ROOT if place.startswith("configs/") else Path(os.environ.get("SYSID_DATA_DIR") or "nowhere")) / place
+
+
 def looked_at(name: str, path: Path) -> dict:
     """The document of a diagnosis, with the seconds of CPU of fit and diagnosis."""
     with warnings.catch_warnings():
@@ -135,12 +140,11 @@ def main() -> None:
     parser.add_argument("--only", action="append", default=[], choices=[name for name, *_ in ROBOTS])
     parser.add_argument("--publish", action="store_true", help="write docs/real_logs.md too")
     options = parser.parse_args()
-    data = os.environ.get("SYSID_DATA_DIR")
     parts = []
     for name, place, known in ROBOTS:
         if options.only and name not in options.only:
             continue
-        path = ROOT / place if place.startswith("configs/") else Path(data or "nowhere") / place
+        path = path_of(place)
         if not path.exists():
             print(f"{name}: not there", file=sys.stderr)
             continue
