@@ -20,8 +20,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from . import eigen
+from .central_path import scaled_columns, scaled_gradient, scaling
 from .inertia.pseudo import to_pseudo
-from .interior import scaled_columns, scaled_gradient, scaling
 from .objective import Objective, add_blocks
 from .symmetric_matrices import coordinates, packed, unpacked
 

@@ -13,67 +13,22 @@ straight way lead, and how is it best bent.
 Source: Vandenberghe 2010, "The CVXOPT linear and quadratic cone program solvers"; Mehrotra 1992 (predictor-corrector).
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from scipy.linalg.lapack import dpotrf, dpotrs
 
-from .inertia.pseudo import from_pseudo, to_pseudo
+from .central_path import State, aimed, changed, gaps, reach, scale, scaled_columns, scaled_gradient, scaling, stepped
+from .inertia.pseudo import to_pseudo
 from .objective import Objective, add_blocks
-from .symmetric_matrices import BASIS, coordinates, packed, unpacked
+from .symmetric_matrices import packed
 
 # Share of the way to the boundary that a step must leave; near the end less, or the end comes two digits at a time.
 _LEAVE, _LEAST, _PER_GAP = 1e-2, 1e-6, 1e4
+_START = 0.1  # of the objective, each parameter's share: complementarity to begin with; with less, steps soon end at the boundary
+_GROWS = 2.0  # times the complementarity, or what is aimed at: a step that leaves more may lead round and round
 _POOR = 0.5  # a step of less than this share of its length is tried again without its bend
 _NEARLY = 1e-9  # the same, where the next step breaks down
 _FAINT = 1e-9  # of the torque: what a coefficient at nought may make of it where a search begins
 _NOTHING = 1e-12  # share of the objective that complementarity may leave at a bound
-
-_DIAGONAL = np.arange(4)
-
-
-def scaling(factors: np.ndarray) -> np.ndarray:
-    """T (bodies, 10, 10): columns are the changes of pi for unit changes F B_k F' of each body."""
-    changes = factors[:, None] @ BASIS @ np.swapaxes(factors, -1, -2)[:, None]
-    return np.swapaxes(from_pseudo(changes), -1, -2)
-
-
-def scaled_columns(root: np.ndarray, turn: np.ndarray, spread: np.ndarray) -> np.ndarray:
-    """R T (rows, size) for the bodies' T (bodies, 10, 10) and the coefficients' scales (coefficients,)."""
-    bodies, rows = len(turn), len(root)
-    out = np.empty_like(root)
-    blocks = np.swapaxes(root[:, : 10 * bodies].reshape(rows, bodies, 10), 0, 1) @ turn
-    out[:, : 10 * bodies] = np.swapaxes(blocks, 0, 1).reshape(rows, -1)
-    out[:, 10 * bodies :] = root[:, 10 * bodies :] * spread
-    return out
-
-
-def scaled_gradient(gradient: np.ndarray, turn: np.ndarray, spread: np.ndarray) -> np.ndarray:
-    """T' g (size,)."""
-    count = 10 * len(turn)
-    out = np.empty(len(gradient))
-    out[:count] = (np.swapaxes(turn, -1, -2) @ gradient[:count].reshape(-1, 10, 1)).ravel()
-    out[count:] = gradient[count:] * spread
-    return out
-
-
-@dataclass
-class _State:
-    x: np.ndarray
-    z: np.ndarray  # (bodies, 4, 4)
-    dual: np.ndarray  # (coefficients,), zero where a coefficient is free
-
-
-@dataclass
-class _Scaled:
-    """Nesterov-Todd: F with F^-1 J F^-T = F' Z F = diag(weights); for coefficients sqrt(c / z) and sqrt(c z)."""
-
-    factors: np.ndarray
-    inverse: np.ndarray  # F^-1
-    shrink: np.ndarray  # (2 bodies, 4, 4): the same twice, 1 / sqrt(weight_i weight_j)
-    weights: np.ndarray  # (bodies, 4)
-    spread: np.ndarray
-    root: np.ndarray
 
 
 def minimise(objective: Objective, positive: np.ndarray, held: np.ndarray, start: np.ndarray, *, tolerance: float, max_iterations: int = 100):
@@ -92,11 +47,11 @@ def minimise(objective: Objective, positive: np.ndarray, held: np.ndarray, start
     barrier = objective.barrier
     x = _inside(start, rows, target, bound, count)
     iterates, values, best, near = [x], [objective.value(x)], np.inf, False
-    mu = max(0.01 * values[0] / len(x), float(barriers.max()))
-    z = np.maximum(0.01 * values[0] / len(x), barriers)[:, :, None] * np.linalg.inv(to_pseudo(x[:count].reshape(-1, 10)))
+    mu = max(_START * values[0] / len(x), float(barriers.max()))
+    z = np.maximum(_START * values[0] / len(x), barriers)[:, :, None] * np.linalg.inv(to_pseudo(x[:count].reshape(-1, 10)))
     # bodies whose barriers weigh more and less come to their levels at their own pace
     every = {"axis": 1, "keepdims": True} if np.ptp(barriers) > 0.0 else {}
-    state = _State(x, z, np.where(bound, mu / np.where(bound, x[count:], 1.0), 0.0))
+    state = State(x, z, np.where(bound, mu / np.where(bound, x[count:], 1.0), 0.0))
     unit = np.concatenate([np.ones(count), np.where(bound, 1.0, 0.0)])
     size = 4 * objective.bodies + int(bound.sum())
     fixed = count + np.flatnonzero(held)
@@ -105,7 +60,7 @@ def minimise(objective: Objective, positive: np.ndarray, held: np.ndarray, start
         floor_c = _NOTHING * value / len(x)
         floor_j = barriers if barrier else floor_c
         try:
-            scaled = _scale(state, count, bound)
+            scaled = scale(state, count, bound)
         except np.linalg.LinAlgError:
             # the last step left what double precision can tell from the boundary; the one before may be the answer
             if near:
@@ -141,23 +96,31 @@ def minimise(objective: Objective, positive: np.ndarray, held: np.ndarray, start
                     return iterates, values, True
                 best = small
         # predictor: straight for the final targets; how far it gets sets how far the corrector aims
-        straight = _change(solve, slope, scaled, _aim(scaled, bound, floor_j, floor_c, None), fixed, bound)
-        ahead = (1.0 - min(1.0, _reach(straight, scaled, bound))) ** 3
+        straight = changed(solve, slope, scaled, aimed(scaled, bound, floor_j, floor_c, None), fixed, bound)
+        ahead = (1.0 - min(1.0, reach(straight, scaled, bound))) ** 3
         mu_j, mu_c = np.mean(scaled.weights**2, **every), squares_c.sum() / max(int(bound.sum()), 1)
         if not barrier:
             mu_j = mu_c = (np.sum(scaled.weights**2) + squares_c.sum()) / size
         # bodies under a barrier stay at its weight, however little is left of the coefficients' complementarity
         levels = np.maximum(ahead * mu_j, floor_j), max(ahead * mu_c, floor_c)
-        change = _change(solve, slope, scaled, _aim(scaled, bound, *levels, straight), fixed, bound)
+        change = changed(solve, slope, scaled, aimed(scaled, bound, *levels, straight), fixed, bound)
         keep = 1.0 - np.clip(_PER_GAP * loose / value, _LEAST, _LEAVE)
-        length = min(1.0, keep * _reach(change, scaled, bound))
+        length = min(1.0, keep * reach(change, scaled, bound))
         if length < _POOR:
             # far from the path the predictor knows nothing of the bend; without it the step may go further
-            plain = _change(solve, slope, scaled, _aim(scaled, bound, *levels, None), fixed, bound)
-            further = min(1.0, keep * _reach(plain, scaled, bound))
+            plain = changed(solve, slope, scaled, aimed(scaled, bound, *levels, None), fixed, bound)
+            further = min(1.0, keep * reach(plain, scaled, bound))
             if further > length:
                 change, length = plain, further
-        state = _moved(state, turn, scaled, change, length, bound, free, count)
+        most = _GROWS * np.maximum(gaps(scaled, bound), (4.0 * np.sum(levels[0] + 0.0 * scaled.weights[:, :1]), levels[1] * bound.sum()))
+        if (gaps(scaled, bound, change, length) > most).any():
+            # the bend is that of the whole straight way; where this ends early, so does the bend
+            aim = aimed(scaled, bound, *levels, straight, share=min(1.0, reach(straight, scaled, bound)))
+            change = changed(solve, slope, scaled, aim, fixed, bound)
+            length = min(1.0, keep * reach(change, scaled, bound))
+            while (gaps(scaled, bound, change, length) > most).any():
+                length *= 0.5
+        state = stepped(state, turn, scaled, change, length, bound, free, count)
         iterates.append(state.x)
         values.append(objective.value(state.x))
     # not converged: what was best stands last
@@ -186,83 +149,9 @@ def _prior_parts(objective: Objective):
     return linear, objective.weight * np.asarray(objective.divergence.hessian(objective.divergence.prior)), none
 
 
-def _scale(state: _State, count: int, bound) -> _Scaled:
-    both = np.linalg.cholesky(np.concatenate([to_pseudo(state.x[:count].reshape(-1, 10)), state.z]))
-    lower, upper = both[: len(state.z)], both[len(state.z) :]
-    u, weights, vt = np.linalg.svd(np.swapaxes(upper, -1, -2) @ lower)
-    root = np.sqrt(weights)
-    factors = lower @ np.swapaxes(vt, -1, -2) / root[:, None, :]
-    inverse = np.swapaxes(upper @ u, -1, -2) / root[:, :, None]
-    c, dual = np.where(bound, state.x[count:], 1.0), np.where(bound, state.dual, 1.0)
-    shrink = 1.0 / (root[:, :, None] * root[:, None, :])
-    return _Scaled(factors, inverse, np.concatenate([shrink, shrink]), weights, np.sqrt(c / dual), np.sqrt(c * dual))
-
-
 def _solver(system):
     """Solve with one factorization; by least squares where rounding made the system singular."""
     factor, fault = dpotrf(system, lower=1)
     if fault == 0:
         return lambda right: dpotrs(factor, right, lower=1)[0]
     return lambda right: np.linalg.lstsq(system, right, rcond=1e-14)[0]
-
-
-@dataclass
-class _Change:
-    """A step in scaled coordinates: of x, of the bodies and of their multipliers, of the coefficients' multipliers."""
-
-    step: np.ndarray
-    both: np.ndarray  # (2 bodies, 4, 4): changes of the bodies, then of their multipliers
-    dual: np.ndarray
-
-    @property
-    def body(self) -> np.ndarray:
-        return self.both[: len(self.both) // 2]
-
-    @property
-    def multiplier(self) -> np.ndarray:
-        return self.both[len(self.both) // 2 :]
-
-
-def _change(solve, slope, scaled: _Scaled, aim, fixed, bound) -> _Change:
-    right = aim - slope
-    right[fixed] = 0.0
-    step = solve(right)
-    count = 10 * len(scaled.weights)
-    both = unpacked(np.concatenate([step[:count], aim[:count] - step[:count]]))
-    both[len(scaled.weights) :, _DIAGONAL, _DIAGONAL] -= scaled.weights
-    return _Change(step, both, np.where(bound, aim[count:] - scaled.root - step[count:], 0.0))
-
-
-def _aim(scaled: _Scaled, bound, level_j, level_c: float, straight: _Change | None) -> np.ndarray:
-    """What body plus multiplier should change by, plus the multiplier: the right side of the scaled equations.
-
-    Complementarity asks Lambda o (dJ + dZ) = level - Lambda^2 - dJ o dZ; the last term is what the predictor
-    `straight` showed the product of both changes to be.
-    """
-    bodies = packed(level_j / scaled.weights)
-    c = np.where(bound, level_c / scaled.root, 0.0)
-    if straight is not None:
-        product = straight.body @ straight.multiplier
-        product = product + np.swapaxes(product, -1, -2)  # twice the symmetric part
-        bodies = bodies - coordinates(product / (scaled.weights[:, :, None] + scaled.weights[:, None, :])).ravel()
-        c = c - np.where(bound, straight.step[bodies.size :] * straight.dual / scaled.root, 0.0)
-    return np.concatenate([bodies, c])
-
-
-def _reach(change: _Change, scaled: _Scaled, bound) -> float:
-    """How far along a change the bodies and their multipliers, and the coefficients and theirs, stay positive."""
-    worst = np.linalg.eigvalsh(change.both * scaled.shrink)[:, 0].min()
-    own, dual = change.step[len(change.step) - len(bound) :] / scaled.root, change.dual / scaled.root
-    worst = min(worst, np.where(bound, own, 0.0).min(initial=0.0), dual.min(initial=0.0))
-    return 1.0 / max(-worst, 1e-12)
-
-
-def _moved(state, turn, scaled: _Scaled, change: _Change, length, bound, free, count) -> _State:
-    x = state.x.copy()
-    x[:count] += length * (turn @ change.step[:count].reshape(-1, 10, 1)).ravel()
-    x[count:] += np.where(free, length * scaled.spread * change.step[count:], 0.0)
-    moved = length * change.multiplier
-    moved[:, _DIAGONAL, _DIAGONAL] += scaled.weights
-    z = np.swapaxes(scaled.inverse, -1, -2) @ moved @ scaled.inverse
-    dual = np.where(bound, (scaled.root + length * change.dual) / scaled.spread, 0.0)
-    return _State(x, 0.5 * (z + np.swapaxes(z, -1, -2)), dual)

@@ -22,6 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from . import interior, symmetric_matrices
+from .central_path import scaled_columns, scaled_gradient
 from .inertia.divergence import affine_metric
 from .inertia.parameterization import Parameterization
 from .inertia.pseudo import to_pseudo
@@ -176,7 +177,7 @@ class _Problem:
         c, positive = x[count:], coordinates.positive
         chain = np.where(positive, c, 1.0)
         # (R Gamma)'(R Gamma), built from the triangle so that weak directions keep their digits
-        image = interior.scaled_columns(self.root, gamma, chain)
+        image = scaled_columns(self.root, gamma, chain)
         hessian = 2.0 * image.T @ image
         pulled = coordinates.parameterization.hessian(blocks, slope[:count].reshape(-1, 10))
         if objective.weight:
@@ -184,7 +185,7 @@ class _Problem:
         add_blocks(hessian, pulled)
         own = np.arange(count, len(theta))
         hessian[own, own] += np.where(positive, slope[count:] * c, 0.0)
-        gradient = interior.scaled_gradient(slope, gamma, chain)
+        gradient = scaled_gradient(slope, gamma, chain)
         at_zero = positive & (c < _ZERO * self.natural) & (slope[count:] > 0.0)
         frozen = own[at_zero | coordinates.held]
         gradient[frozen] = 0.0

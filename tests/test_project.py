@@ -23,7 +23,7 @@ ORDER = [
     "motion", "extent", "standstill", "preprocess", "long_motion", "blocks", "two_masses", "lowpass", "flexible", "effect_parameters", "effect_options", "effect", "deflection",
     "vocabulary", "formula", "effects", "own_effects",
     "per_level", "config_errors", "config", "addition", "model_parameters", "slides", "scales", "terms", "needed", "model", "listed_effects", "drives", "instants", "inverse_dynamics", "with_torque", "stretches", "rows", "objective", "projection", "landscape", "multistart", "source",
-    "reduction", "triangles", "linearised", "compress", "symmetric_matrices", "interior", "nearby", "certificate", "trust_region", "solve", "prior_weight", "uncertainty", "differences", "prediction", "carried", "posed_problem", "given_shapes", "estimate",
+    "reduction", "triangles", "linearised", "compress", "symmetric_matrices", "central_path", "interior", "nearby", "certificate", "trust_region", "solve", "prior_weight", "uncertainty", "differences", "prediction", "carried", "posed_problem", "given_shapes", "estimate",
     "long_prediction", "base_parameters", "held_apart", "masses", "plausible", "blows", "settled", "shape_search", "shape", "bumps", "filter_errors", "filters", "fit_document", "results", "earlier_fit", "shape_refinement", "notices", "experiment_logs", "locked_joints", "thinning",
     "experiment_file", "yaml_edit", "effect_entry", "urdf_export", "gains", "simulate", "rollout", "pipeline", "run", "export", "check", "init", "comparison",
     "transfer", "noise", "candidates", "candidate_columns", "design", "view", "failures", "unexplained", "borne_out", "shown", "diagnose", "changes", "online", "fleet", "statement", "loop", "report",
