@@ -8,9 +8,12 @@ possible bodies (six joints with a weak prior do that). There the same problem, 
 with multipliers Z_b of the bodies and z_i of the coefficients, has its optimum at J_b Z_b = gamma 1 for the
 log-det prior (its barrier is the prior) and at J_b Z_b = 0 for the others. Nesterov-Todd scaling makes a body and
 its multiplier the same diagonal matrix, so each step is one small symmetric system, solved twice: where does the
-straight way lead, and how is it best bent.
+straight way lead, and how is it best bent. Far from the optimum the straight way soon ends at the boundary, and the bend of all
+of it can lead round and round: where a step would leave much more complementarity than there was, as much of the bend is taken
+as the straight way goes.
 
-Source: Vandenberghe 2010, "The CVXOPT linear and quadratic cone program solvers"; Mehrotra 1992 (predictor-corrector).
+Source: Vandenberghe 2010, "The CVXOPT linear and quadratic cone program solvers"; Mehrotra 1992 (predictor-corrector); Salahi,
+Peng & Terlaky 2007 (where it fails); Colombo & Gondzio 2008 (a part of the bend).
 """
 
 import numpy as np
