@@ -9,7 +9,7 @@ import numpy as np
 
 from ..blocks import Belief
 from ..candidates import Candidate, candidates
-from ..view import View, falls
+from ..view import View
 from . import null
 from .evidence import Group
 from .projected import groups
@@ -21,11 +21,10 @@ HALF = 0.5  # of what functions of the motion predict: that much may be the effe
 @dataclass(frozen=True)
 class Asked:
     """The answer of all candidates under one model: {joint: (groups, statistics (groups,),
-    gains (groups,), null maxima (draws,))}; how far foreseen spreads are believed; the view."""
+    gains (groups,), null maxima (draws,))}; and how far foreseen spreads are believed."""
 
     by_joint: dict[int, tuple[list[Group], np.ndarray, np.ndarray, np.ndarray]]
     belief: Belief
-    view: View | None = None
 
     @cached_property
     def groups(self) -> list[Group]:
@@ -43,17 +42,6 @@ class Asked:
         return np.concatenate([found for _, _, found, _ in self.by_joint.values()])
 
     @cached_property
-    def falls(self) -> np.ndarray:
-        """(groups,) how far everything falls where a candidate comes in and all else settles anew;
-        minus infinity but at the values that take most."""
-        best, out = dict[tuple, int](), np.full(len(self.groups), -np.inf)
-        for k in np.argsort(self.gains, kind="stable"):
-            best[self.groups[k].candidate.kind] = int(k)
-        some = [k for k in best.values() if not self.groups[k].candidate.begins]
-        out[some] = falls(self.view, [self.groups[k] for k in some])
-        return out
-
-    @cached_property
     def maxima(self) -> np.ndarray:
         """(draws,) the greatest of all groups."""
         return np.max([found for *_, found in self.by_joint.values()], axis=0)
@@ -68,11 +56,10 @@ class Asked:
         return float(np.quantile(self.maxima, 1.0 - level)) if np.isfinite(least) else np.inf
 
     def told(self, k: int, settled: Group) -> Asked:
-        """The answers where the k-th group says what it says about where it has settled; gains are
-        what everything `falls` by."""
+        """The answers where the k-th group says what it says about where it has settled."""
         out, statistics = replace(self), self.statistics.copy()
         (statistics[k],) = null.statistics([settled], self.belief)
-        vars(out).update(statistics=statistics, gains=self.falls)
+        vars(out).update(statistics=statistics)
         return out
 
     def near(self, joint: int, gain: float, there: bool) -> tuple[Candidate, float] | None:
@@ -112,4 +99,4 @@ def ask(view: View, extra=(), tell=lambda share: None, *, before=None, anew=()) 
         # draws of one residual, the joint's own
         maxima = null.maxima(own, np.random.default_rng(joint + 1), belief)
         out[joint] = own, null.statistics(own, belief), np.array([g.taken for g in own]), maxima
-    return Asked(out, belief, view)
+    return Asked(out, belief)
