@@ -452,30 +452,6 @@ def test_blows_told_evenly_keep_the_level():
     assert all(chance(struck(seed, 0.3)) < 0.01 for seed in range(10))
 
 
-_FEW = np.array([0.43, 0.2, 0.14, 0.09, 0.03, 0.026, 0.015, 0.008, 0.002, 0.001])  # what a sensor's gain has in moves of an arm
-
-
-def few_moves(seed: int, size: float):
-    """A group that four of ten blocks hold nearly all of, and the prior a twentieth, with noise of one, `size` in its coefficient."""
-    rng = np.random.default_rng(seed)
-    squares = np.append(_FEW, 1.0 - _FEW.sum())[:, None, None]
-    scores = size * squares[:, :, 0] + rng.normal(size=(len(squares), 1)) * np.sqrt(squares[:, :, 0])
-    own = {"scores": scores, "loud": scores, "squares": squares, "loud_squares": squares}
-    return replace(struck(0, 0.0, False), **own, back=np.eye(1), sizes=np.ones(1), foreseen=np.eye(1))
-
-
-def test_what_rests_on_few_blocks_beside_a_prior_is_told_by_fewer():
-    """Evened over ten blocks the prior would tell most of it; over five it does not, and the level holds."""
-    group = few_moves(0, 0.0)
-    told = group.tested
-    share = np.einsum("bkk->b", told.squares)
-    assert not group.testable and told.testable and share[-1] < 0.5
-    assert share[:-1].max() <= 0.2 * share[:-1].sum() + 1e-9 < 0.3
-    p = np.array([chance(few_moves(seed, 0.0)) for seed in range(200)])
-    assert 0.01 <= np.mean(p < 0.05) <= 0.10 and 0.38 < np.mean(p < 0.5) < 0.62
-    assert np.mean([chance(few_moves(seed, 30.0)) < 0.01 for seed in range(20)]) > 0.9
-
-
 def test_noise_is_foreseen_without_what_a_blow_takes():
     """A column in one block that makes nearly all of the residual raises the spectrum of the residual, not of the noise: what is
     foreseen of the noise is what it would be without the column's effect."""

@@ -82,11 +82,11 @@ def many(squares: np.ndarray) -> np.ndarray:
     return (resting(squares) >= RESTING) & (most <= LEVERAGE)
 
 
-def evening(share: np.ndarray, times: float = 2.0) -> np.ndarray:
-    """Weights of blocks by their shares (blocks,), under which so many times the fewest take part:
-    no block counts more than the rest allows."""
+def evening(share: np.ndarray) -> np.ndarray:
+    """Weights of blocks by their shares (blocks,), under which twice the fewest take part: no block
+    counts more than the rest allows."""
     share = np.maximum(share, 0.0)  # rounding leaves less of what a block has nothing of
-    return np.minimum(1.0, even(share, times * RESTING) / np.maximum(share, 1e-300))
+    return np.minimum(1.0, even(share, 2.0 * RESTING) / np.maximum(share, 1e-300))
 
 
 def even(share: np.ndarray, parts: float) -> float:

@@ -106,17 +106,14 @@ class Group:
         turn = blocks.shared(self.squares[:-1], blocks.LEVERAGE)
         group = self if turn.shape[1] in (0, len(turn)) else self._turned(turn)
         share = np.einsum("bkk->b", group.squares[:-1])
-        weights = [blocks.evening(share, times) for times in (2.0, 1.0)]
-        if weights[0].min() == 1.0 or (group.testable and not self.candidate.blows):
+        weight = blocks.evening(share)
+        if weight.min() == 1.0 or (group.testable and not self.candidate.blows):
             return group
-        for weight in weights:
-            w = np.append(weight, 1.0)[:, None]
-            squares = group.squares * w[:, None]
-            if np.linalg.eigvalsh(squares[:-1].sum(0) - squares[-1]).min() >= 1e-6:
-                break
-        else:
-            return self  # the prior would tell most of it
+        w = np.append(weight, 1.0)[:, None]
+        squares = group.squares * w[:, None]
         values, vectors = eigen.symmetric(squares.sum(0))
+        if np.linalg.eigvalsh(squares[:-1].sum(0) - squares[-1]).min() < 1e-6:
+            return self  # the prior would tell most of it
         told = {"scores": w * group.scores, "loud": w * group.loud, "squares": squares}
         told["foreseen"] = group.foreseen * np.sum(weight**2 * share) / share.sum()
         told |= {"loud_squares": w[:, None] * group.loud_squares, "whole": group.whole or self}
