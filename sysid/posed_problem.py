@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -101,13 +102,21 @@ def pose(experiment: Experiment, model: Model, compressed: Compressed, moving: n
         prior: (bodies, 10).
         weights: (joints,) that multiply the rows of each joint, or None.
     """
-    spec, total = experiment, compressed.total(weights)
+    return replace(pose_triangle(experiment, model, compressed.total(weights), int(compressed.rows.sum()), moving, prior), weights=weights)
+
+
+def pose_triangle(experiment: Experiment, model: Model, total: np.ndarray, rows: int, moving: np.ndarray, prior: np.ndarray, signs: Sequence[bool] = ()) -> Problem:
+    """The same of the triangle (size + 1, size + 1) of the data, of so many rows.
+
+    Args:
+        signs: (slopes,) True for slopes that must not be negative; none by default.
+    """
+    spec = experiment
     objective = posed(total, DIVERGENCES[spec.prior.divergence](prior), number(spec), known_bodies(spec, model))
-    size = 10 * model.bodies + len(model.coefficients)
-    slopes = objective.triangle.shape[1] - 1 - size
-    positive = np.array([c.positive for c in model.coefficients] + [False] * slopes, dtype=bool)
+    slopes = total.shape[1] - 1 - 10 * model.bodies - len(model.coefficients)
+    positive = np.array([*(c.positive for c in model.coefficients), *(signs or slopes * [False])], dtype=bool)
     moving = np.append(moving, np.ones(slopes, dtype=bool))
-    own = carried(total, model, int(compressed.rows.sum()))
+    own = carried(total, model, rows)
     if own is not None:  # of a body the prior says what data do not
         moving[own.places.ravel() - 10 * model.bodies] = False
     held = ~moving | undetermined(objective, model, moving)
@@ -115,10 +124,9 @@ def pose(experiment: Experiment, model: Model, compressed: Compressed, moving: n
         held[own.places.ravel() - 10 * model.bodies] = False
     coordinates = Coordinates(PARAMETERIZATIONS[spec.model.inertia](), model.bodies, positive, held)
     x = np.concatenate([prior.ravel(), _starting_coefficients(model, objective, prior, positive, held)])
-    x[size:] = 0.0
     if own is not None:
         x[own.places] = BALL
-    return Problem(objective, coordinates, coordinates.theta(x), weights, own)
+    return Problem(objective, coordinates, coordinates.theta(x), None, own)
 
 
 def carried(total: np.ndarray, model: Model, rows: int) -> Carried | None:

@@ -9,8 +9,8 @@ from ruamel.yaml import YAML
 from sysid import blocks, pipeline
 from sysid.diagnose.ask import ask
 from sysid.diagnose.refits import refitted, settled
-from sysid.diagnose.ties import Choice, alike, chosen, holds, price_of
-from sysid.view import first_view, losses, slow_losses, weighed
+from sysid.diagnose.ties import Choice, chosen, price_of
+from sysid.view import alike, first_view, holds, losses, slow_losses, weighed
 from tests.evidences import posed, stacked, viewed
 
 
@@ -29,9 +29,19 @@ def test_losses_are_the_predictive_densitys_of_the_fold_that_refits_did_not_see(
         a = np.concatenate(p.a[:, own] * p.weights[:, None, None])
         covariance = np.eye(len(a)) + a @ np.linalg.inv(m.T @ m) @ a.T
         e = np.concatenate(left[own].T)
-        told = (e * np.linalg.solve(covariance, e)).reshape(2, -1).T
+        size, turn = np.linalg.eigh(covariance)  # row by row, what is left in units of all that is not known
+        told = ((turn / np.sqrt(size)) @ turn.T @ e).reshape(2, -1).T ** 2
+        assert found[fold == f].sum() == pytest.approx(e @ np.linalg.solve(covariance, e))
         for b in np.flatnonzero(fold == f):
             np.testing.assert_allclose(found[b], told[p.number[own] == b].sum(0), rtol=1e-7)
+
+
+def test_no_share_of_a_loss_is_beyond_what_it_was():
+    """A joint, or a block, that one fold tells alone has no loss below nought, which would make any change of it a share beyond all."""
+    for seed in range(10):
+        p = posed(np.random.default_rng(seed))
+        p.a[:] *= np.where(p.number < 2, 50.0, 1.0)[:, None]  # the first fold tells nearly all
+        assert (losses(viewed(p), p.number) >= 0.0).all()
 
 
 def test_losses_do_not_depend_on_units():

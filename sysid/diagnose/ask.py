@@ -9,7 +9,7 @@ import numpy as np
 
 from ..blocks import Belief
 from ..candidates import Candidate, candidates
-from ..view import View
+from ..view import View, falls
 from . import null
 from .evidence import Group
 from .projected import groups
@@ -21,10 +21,11 @@ HALF = 0.5  # of what functions of the motion predict: that much may be the effe
 @dataclass(frozen=True)
 class Asked:
     """The answer of all candidates under one model: {joint: (groups, statistics (groups,),
-    gains (groups,), null maxima (draws,))}; and how far foreseen spreads are believed."""
+    gains (groups,), null maxima (draws,))}; how far foreseen spreads are believed; the view."""
 
     by_joint: dict[int, tuple[list[Group], np.ndarray, np.ndarray, np.ndarray]]
     belief: Belief
+    view: View | None = None
 
     @cached_property
     def groups(self) -> list[Group]:
@@ -42,6 +43,17 @@ class Asked:
         return np.concatenate([found for _, _, found, _ in self.by_joint.values()])
 
     @cached_property
+    def falls(self) -> np.ndarray:
+        """(groups,) how far everything falls where a candidate comes in and all else settles anew;
+        minus infinity but at the values that take most."""
+        best, out = dict[tuple, int](), np.full(len(self.groups), -np.inf)
+        for k in np.argsort(self.gains, kind="stable"):
+            best[self.groups[k].candidate.kind] = int(k)
+        some = [k for k in best.values() if not self.groups[k].candidate.begins]
+        out[some] = falls(self.view, [self.groups[k] for k in some])
+        return out
+
+    @cached_property
     def maxima(self) -> np.ndarray:
         """(draws,) the greatest of all groups."""
         return np.max([found for *_, found in self.by_joint.values()], axis=0)
@@ -56,10 +68,11 @@ class Asked:
         return float(np.quantile(self.maxima, 1.0 - level)) if np.isfinite(least) else np.inf
 
     def told(self, k: int, settled: Group) -> Asked:
-        """The answers where the k-th group says what it says about where it has settled."""
+        """The answers where the k-th group says what it says about where it has settled; gains are
+        what everything `falls` by."""
         out, statistics = replace(self), self.statistics.copy()
         (statistics[k],) = null.statistics([settled], self.belief)
-        vars(out).update(statistics=statistics)
+        vars(out).update(statistics=statistics, gains=self.falls)
         return out
 
     def near(self, joint: int, gain: float, there: bool) -> tuple[Candidate, float] | None:
@@ -67,11 +80,14 @@ class Asked:
         as something on that joint surely is, among its own effects alone."""
         found, statistics, gains, own = self.by_joint.get(joint, ([], [], [], None))
         takes = [k for k, taken in enumerate(gains) if taken > HALF * gain and found[k].signed]
-        best = max(takes, key=lambda k: statistics[k], default=None)
-        if best is None:
+        if not takes:
             return None
+        best = max(takes, key=lambda k: np.nan_to_num(statistics[k], nan=-np.inf))
         p, alone = (null.chance(statistics[best], most) for most in (self.maxima, own))
-        return (found[best].candidate, p) if (alone if there else p) <= _MAY_BE else None
+        if (alone if there else p) <= _MAY_BE:
+            return found[best].candidate, p
+        untold = [k for k in takes if np.isnan(statistics[k])]  # nobody can say that it is not
+        return (found[max(untold, key=gains.__getitem__)].candidate, 1.0) if untold else None
 
     def of(self, candidate: Candidate) -> Group | None:
         """The group of a candidate, of the sign it may have, that takes most; None without one."""
@@ -99,4 +115,4 @@ def ask(view: View, extra=(), tell=lambda share: None, *, before=None, anew=()) 
         # draws of one residual, the joint's own
         maxima = null.maxima(own, np.random.default_rng(joint + 1), belief)
         out[joint] = own, null.statistics(own, belief), np.array([g.taken for g in own]), maxima
-    return Asked(out, belief)
+    return Asked(out, belief, view)

@@ -44,8 +44,8 @@ def statistics(groups: Sequence[Group], belief: blocks.Belief = NONE) -> np.ndar
 
 
 def chance(statistic: float, greatest: np.ndarray) -> float:
-    """Family-wise p-value of a statistic beside `maxima`."""
-    return float((1 + np.sum(greatest >= statistic)) / (1 + len(greatest)))
+    """Family-wise p-value of a statistic beside `maxima`; one of what cannot be tested."""
+    return float((1 + np.sum(~(greatest < statistic))) / (1 + len(greatest)))
 
 
 def maxima(

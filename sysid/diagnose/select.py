@@ -12,11 +12,11 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ..view import View
+from ..view import View, alike
 from .ask import Asked, ask
 from .refits import settled
 from .steps import Step, rejoined, revised, step_of
-from .ties import NEAR, Choice, alike, chosen, price_of
+from .ties import NEAR, Choice, chosen, price_of
 
 LEVEL = 0.01  # family-wise: how often anything is accused where nothing is there
 WORTH = 0.03  # of a joint's squared residual under the low-pass: 1.5 % of its root mean square
@@ -67,22 +67,32 @@ def _next(view: View, asked: Asked, level: float, worth: float, open_: list[Choi
     """
     threshold = asked.threshold(level)
     rivals = _rivals(view, asked, worth)
-    hopeful = [k for k, (clear, _) in rivals.items() if asked.statistics[clear] > threshold]
+    hopeful = [k for k, clear in rivals.items() if asked.statistics[clear] > threshold]
     if step := _standing(view, asked, rivals, hopeful, worth, open_):
         return step
-    for k in (k for k in _trials(rivals) if k not in hopeful):
+    heard = {asked.groups[k].candidate.kind for k in hopeful}
+    for k in (k for k in _trials(view, asked) if asked.groups[k].candidate.kind not in heard):
         found = settled(view, asked.groups[k])
         told = found and asked.told(k, found)
         if told and told.statistics[k] > threshold:
-            own = rivals | {k: (k, rivals[k][1])}
-            if step := _standing(view, told, own, [k], worth, open_):
+            own = {j: j for j in np.argsort(-told.gains).tolist()}
+            step = _standing(view, told, own, [k], worth, open_)
+            # with all else bent to it, it speaks for no rival where it is ruled out itself
+            own = asked.groups[k].candidate.kind
+            if step and own in [m.candidate.kind for m, _ in step.choice.members]:
                 return step
     return None
 
 
-def _trials(rivals: dict[int, tuple[int, float]]) -> list[int]:
-    """Those that take much, first who takes most."""
-    return [k for k, (_, part) in rivals.items() if part > _HIDES][:_TRIALS]
+def _trials(view: View, asked: Asked) -> list[int]:
+    """Those by which everything falls much where it settles anew, one of each effect on a joint,
+    first who takes most."""
+    dof, loss = view.model.robot.dof, np.sum(view.design.residual**2, axis=0)
+    left, out = [np.mean(loss[g.candidate.touches(dof)]) for g in asked.groups], dict[tuple, int]()
+    for k in np.argsort(-asked.falls, kind="stable").tolist():
+        if asked.falls[k] > _HIDES * left[k]:
+            out.setdefault(asked.groups[k].candidate.key, k)
+    return list(out.values())[:_TRIALS]
 
 
 def _standing(view: View, asked: Asked, rivals, hopeful, worth: float, open_) -> Step | None:
@@ -96,7 +106,7 @@ def _standing(view: View, asked: Asked, rivals, hopeful, worth: float, open_) ->
         found = chosen(view, [asked.groups[k] for k in short], np.random.default_rng(1))
         if found is not None:
             # of all that were compared one at least is there, though its sign may forbid its name
-            step = step_of(view, min(asked.p(rivals[k][0]) for k in short), found, worth)
+            step = step_of(view, min(asked.p(rivals[k]) for k in short), found, worth)
             if step is not None and found.decided:
                 return step
             if step is not None:
@@ -105,9 +115,9 @@ def _standing(view: View, asked: Asked, rivals, hopeful, worth: float, open_) ->
     return None
 
 
-def _rivals(view: View, asked: Asked, worth: float) -> dict[int, tuple[int, float]]:
+def _rivals(view: View, asked: Asked, worth: float) -> dict[int, int]:
     """Of each candidate that may be worth having, the shape values that take most, by falling gain:
-    with those that say best that it is there, and the share taken of a joint that it acts on."""
+    with those that say best that it is there."""
     own, known = dict[tuple, list[int]](), [(c.effect, c.joint) for c in view.model.coefficients]
     # what rests on few blocks stands out of none, and may be what another one speaks for
     few = np.array([not group.testable for group in asked.groups], dtype=bool)
@@ -126,13 +136,13 @@ def _rivals(view: View, asked: Asked, worth: float) -> dict[int, tuple[int, floa
         # else far from worth having, whatever a refit adds to it
         if asked.gains[k] >= 0.5 * worth * left.min():
             # it is there where any set of values says so that takes about what its best one does
-            out[k] = _clearest(asked, ks), asked.gains[k] / max(left.mean(), 1e-300)
+            out[k] = _clearest(asked, ks)
     return dict(sorted(out.items(), key=lambda one: -asked.gains[one[0]]))
 
 
 def _pair(view: View, asked: Asked, level: float, worth: float, asked_with) -> list[Step] | None:
     """Two effects each of which stands out with the other in the model, first what takes more."""
-    for k in _trials(_rivals(view, asked, worth)):
+    for k in _trials(view, asked):
         found = chosen(view, [asked.groups[k]], np.random.default_rng(1))
         trial = found and step_of(view, asked.p(k), found, worth)
         then = trial and asked_with(trial, trial.after, asked)

@@ -14,7 +14,7 @@ import numpy as np
 
 from .. import blocks
 from ..posed_problem import inverse
-from ..view import COMPARED, View, losses, makes, part_taken, slow_losses, taken, weighed
+from ..view import COMPARED, View, holds, losses, slow_losses, taken, weighed
 from .evidence import Group
 from .projected import groups_at
 from .refits import Member, refitted
@@ -161,25 +161,3 @@ def _least(members: list[Member], lost: np.ndarray) -> list[int]:
     for k in np.argsort(lost):
         kept.setdefault(members[k].candidate.key, int(k))
     return sorted(kept.values())
-
-
-def holds(view: View, general: Member, special: Member) -> bool:
-    """Whether one explanation only adds freedom to another: its columns hold the other's torque,
-    and it has more numbers."""
-    one, other = general.candidate, special.candidate
-    if one.nonlinear or one.parameters <= other.parameters or one.joint != other.joint:
-        return False
-    torque = special.view.source.predicted - view.source.predicted
-    return makes(view, one, general.shapes, torque)
-
-
-def alike(view: View, one: Group, other: Group) -> bool:
-    """Whether two candidates may explain the same: on one joint, or wherever they take the same
-    part of what a model leaves, the greater half of it at least: then one of them in the model
-    leaves the other little to do. What moves a joint changes all torques, and may take something
-    else."""
-    if one.candidate.joint == other.candidate.joint:
-        return True
-    both = ((g.candidate, g.shapes, g.coefficients) for g in (one, other))
-    first, second = (part_taken(view, *how) for how in both)
-    return bool(np.sum(first * second) ** 2 > 0.5 * np.sum(first**2) * np.sum(second**2))

@@ -1,10 +1,11 @@
 """What a diagnosis looks at: a model settled on the motion of logs, and its least squares."""
 
 from .design import Design, Sums, by_block, designed, instrumented, summed
+from .falls import falls
 from .joining import COMPARED, allowed, around, joined, shapes_in, shapes_of, weighed
 from .laws import law
 from .losses import losses, slow_losses, taken, took
-from .overlap import makes, part_taken, slow_part
+from .overlap import alike, holds, slow_part
 from .singles import greatest
 from .view import View, elsewhere, first_view, looked_at, too_short
 
@@ -13,20 +14,21 @@ __all__ = [
     "Design",
     "Sums",
     "View",
+    "alike",
     "allowed",
     "around",
     "by_block",
     "designed",
     "elsewhere",
+    "falls",
     "first_view",
     "greatest",
+    "holds",
     "instrumented",
     "joined",
     "law",
     "looked_at",
     "losses",
-    "makes",
-    "part_taken",
     "shapes_in",
     "shapes_of",
     "slow_losses",

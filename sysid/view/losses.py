@@ -8,7 +8,7 @@ import numpy as np
 
 from .. import blocks
 from ..lowpass import calm
-from .design import by_block, instrumented
+from .design import by_block, freed, instrumented
 from .view import View
 
 
@@ -16,6 +16,9 @@ def losses(view: View, number: np.ndarray) -> np.ndarray:
     """(blocks, dof) what a model leaves in each block `number` (n,), fitted on the other folds,
     times what it leaves fitted on all, less what the angles' noise makes: the quadratic form of the
     predictive density (Geisser & Eddy 1979), in which a fold that no other tells counts little.
+
+    Row by row it is the square of (1 - H)^(-1/2) r, with H what the fold has of the fit: the product
+    itself is one only of a fold, and its parts may be of either sign.
     """
     design, spans = view.design, by_block(number)
     fold = blocks.folds(len(spans))
@@ -24,10 +27,9 @@ def losses(view: View, number: np.ndarray) -> np.ndarray:
         own = np.flatnonzero(fold == f)
         rows = slice(spans[own[0]].start, spans[own[-1]].stop)
         a, r = design.columns[:, rows], design.residual[rows]
-        pull = np.einsum("jnk,nj->k", a, r)
-        rest = np.eye(a.shape[2]) - sum(one.T @ one for one in a)
-        change = np.linalg.lstsq(rest, pull, rcond=1e-10)[0]
-        told = (r + np.einsum("jnk,k->nj", a, change)) * r - design.rough_residual[rows] ** 2
+        squares = sum(one.T @ one for one in a)
+        change = freed(squares[None])[0] @ np.einsum("jnk,nj->k", a, r)
+        told = (r + np.einsum("jnk,k->nj", a, change)) ** 2 - design.rough_residual[rows] ** 2
         out[own] = np.add.reduceat(told, [spans[b].start - rows.start for b in own])
     return out
 

@@ -28,6 +28,20 @@ def makes(view: View, candidate: Candidate, shapes: dict[str, float], torque) ->
     return bool(alone > 0 and both < (1.0 - _SAME) * alone)
 
 
+def holds(view: View, general, special) -> bool:
+    """Whether one explanation only adds freedom to another: its columns hold the other's torque,
+    and it has more numbers.
+
+    Args:
+        general, special: a candidate each, its group with its shapes, and the view with it.
+    """
+    one, other = general.candidate, special.candidate
+    if one.nonlinear or one.parameters <= other.parameters or one.joint != other.joint:
+        return False
+    torque = special.view.source.predicted - view.source.predicted
+    return makes(view, one, general.shapes, torque)
+
+
 def part_taken(view: View, candidate: Candidate, shapes: dict[str, float], coefficients):
     """(dof, n) weighted torque that a candidate with coefficients (k,) takes of the residual, the
     model's own columns refitted."""
@@ -37,6 +51,22 @@ def part_taken(view: View, candidate: Candidate, shapes: dict[str, float], coeff
     out[joints] = own * view.weights[joints, None]
     absorbed = np.einsum("jnk,jn->k", design.columns, out)
     return out - np.einsum("jnk,k->jn", design.columns, absorbed)
+
+
+def alike(view: View, one, other) -> bool:
+    """Whether two candidates may explain the same: on one joint, or wherever they take the same
+    part of what a model leaves, the greater half of it at least: then one of them in the model
+    leaves the other little to do. What moves a joint changes all torques, and may take something
+    else.
+
+    Args:
+        one, other: a candidate each, its shapes and its coefficients (k,).
+    """
+    if one.candidate.joint == other.candidate.joint:
+        return True
+    both = ((g.candidate, g.shapes, g.coefficients) for g in (one, other))
+    first, second = (part_taken(view, *how) for how in both)
+    return bool(np.sum(first * second) ** 2 > 0.5 * np.sum(first**2) * np.sum(second**2))
 
 
 def slow_part(view: View, columns: np.ndarray) -> np.ndarray:

@@ -1,0 +1,70 @@
+"""How far everything falls where a candidate comes in and all else settles anew.
+
+Slopes say what bodies would give back where they stand. Those that were bent far to imitate what is
+missing stand at the edge of the possible bodies, where the prior is stiff and says that they cannot
+move: a candidate that would set them free takes nothing there, and nearly all where it has.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..candidate_columns import bounds_of, columns_of, grown
+from ..candidates import Candidate
+from ..model import moving_coefficients
+from ..posed_problem import pose_triangle
+from ..prior_weight import with_weight
+from ..projection import root
+from ..settled import condensed
+from .joining import COMPARED
+from .view import View
+
+_NOTHING = 1e-9  # of the greatest: what rounding leaves of a direction that no row tells
+
+
+def falls(view: View, asked: Sequence) -> np.ndarray:
+    """How far a view's objective falls (asked,) with the columns of each candidate at its shapes.
+
+    Args:
+        asked: a candidate each, and its shapes.
+    """
+    target = view.rows.tau.T[:, :, None]
+    full = np.concatenate([view.rows.columns, target], axis=2) * view.weights[:, None, None]
+    own = condensed(view.model, view.rows).total(view.weights)
+    norms = np.linalg.norm(own, axis=0)
+    norms = np.where(norms > 0.0, norms, 1.0)
+    known = full, own, np.linalg.pinv((own / norms).T, rcond=_NOTHING) / norms
+    left = [_least(view, *known, one.candidate, one.shapes) for one in asked]
+    return view.settled.objective - np.array(left)
+
+
+def _least(view: View, full, own, inverse, candidate: Candidate, shapes: dict[str, float]) -> float:
+    """The least objective with one candidate.
+
+    Args:
+        full: (dof, n, size + 1) weighted columns and torque. own, inverse: (size + 1, size + 1)
+            their triangle, and the inverse of its transpose on its range.
+    """
+    joints = candidate.touches(view.model.robot.dof)
+    cross, square = 0.0, 0.0
+    for j, values in zip(joints, columns_of(view.source, candidate, [shapes])[0]):
+        values = values * view.weights[j] * view.rows.use[:, [j]]
+        cross, square = cross + full[j].T @ values, square + values.T @ values
+    size, more = len(own) - 1, len(square)
+    # the same squares as the rows: all that an objective looks at
+    told = inverse @ cross
+    both = np.block([[own, told], [np.zeros((more, size + 1)), root(square - told.T @ told).T]])
+    triangle = both[:, [*range(size), *range(size + 1, size + 1 + more), size]]
+    model, signs = view.model, ()
+    if candidate.nonlinear:
+        known = bounds_of(view.model, candidate)
+        signs = [low >= s.start for s, low, *_ in known if s.start is not None][:more]
+    else:
+        model = grown(view.source, candidate, shapes)
+    experiment = with_weight(view.experiment, view.settled.problem.objective.weight)
+    moving, rows = moving_coefficients(model, view.motion), int(view.rows.use.sum())
+    problem = pose_triangle(experiment, model, triangle, rows, moving, view.prior, signs)
+    x = problem.from_nearby(np.append(view.settled.x, np.zeros(more)), COMPARED)
+    return problem.objective.value(problem.minimum(COMPARED) if x is None else x)
