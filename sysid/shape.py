@@ -86,13 +86,19 @@ def settle(
     tally = {}
     if grid:
         best, tally = search.started(best)
-        for term, (effect, joints) in enumerate(best.model.terms):
-            for joint in joints if isinstance(effect, Deflection) else ():
-                tried, count = _from_tries(best, motion, term, joint, weights)
-                tally[term, joint] = 1 + count
-                if tried is not None:
-                    best = min(best, solved(tried), key=lambda s: s.objective)
+        for place in _deflections(best.model):
+            tried, count = _from_tries(best, motion, *place, weights)
+            tally[place] = 1 + count
+            if tried is not None:
+                best = min(best, solved(tried), key=lambda s: s.objective)
     best = search.descended(best)
+    # tried before all else was found, a link may have stayed on its motor; a diagnosis has a fit
+    for place in _deflections(best.model) if grid and profile else ():
+        idle, others = _idle(best.model, *place)
+        tried = others or idle.shapes == best.model.shapes
+        tried = _from_tries(solved(idle), motion, *place, weights)[0] if tried else None
+        if tried is not None:
+            best = min(best, search.descended(solved(tried)), key=lambda s: s.objective)
     if strikes:
         best, more = blows.searched(best, motion, weights, attempted, search.descended, tolerance)
         tally |= {place: count + tally.get(place, 1) for place, count in more.items()}
@@ -133,6 +139,18 @@ def _loose(model: Model, held, pinned) -> np.ndarray:
 
 def _bodies(found: Settled) -> np.ndarray:
     return found.x[: 10 * found.model.bodies].reshape(-1, 10)
+
+
+def _deflections(model: Model) -> list[tuple[int, int]]:
+    """The terms and joints that let a link stand apart from its motor."""
+    return [(term, joint) for term, (effect, joints) in enumerate(model.terms) for joint in joints if isinstance(effect, Deflection)]
+
+
+def _idle(model: Model, term: int, joint: int) -> tuple[Model, bool]:
+    """The model with a deflection at nothing, and whether it has free values of anything else that moves a joint, or reads it."""
+    values = [(k, v) for k, v in enumerate(model.shape_values) if not v.held and v.shape.start is not None]
+    own = {k: v.shape.start for k, v in values if (v.term, v.joint) == (term, joint)}
+    return model.with_some_shapes(own), any(not isinstance(model.terms[v.term][0], Deflection) for _, v in values)
 
 
 def _from_tries(found: Settled, motion: Motion, term: int, joint: int, weights) -> tuple[Model | None, int]:
