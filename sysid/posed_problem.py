@@ -114,7 +114,7 @@ def pose_triangle(experiment: Experiment, model: Model, total: np.ndarray, rows:
     spec = experiment
     objective = posed(total, DIVERGENCES[spec.prior.divergence](prior), number(spec), known_bodies(spec, model))
     slopes = total.shape[1] - 1 - 10 * model.bodies - len(model.coefficients)
-    positive = np.array([*(c.positive for c in model.coefficients), *(signs or slopes * [False])], dtype=bool)
+    positive = np.array([*(c.positive for c in model.coefficients), *(signs if len(signs) else slopes * [False])], dtype=bool)
     moving = np.append(moving, np.ones(slopes, dtype=bool))
     own = carried(total, model, rows)
     if own is not None:  # of a body the prior says what data do not

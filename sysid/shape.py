@@ -94,9 +94,9 @@ def settle(
     best = search.descended(best)
     # tried before all else was found, a link may have stayed on its motor; a diagnosis has a fit
     for place in _deflections(best.model) if grid and profile else ():
-        idle, others = _idle(best.model, *place)
-        tried = others or idle.shapes == best.model.shapes
-        tried = _from_tries(solved(idle), motion, *place, weights)[0] if tried else None
+        idle = _idle(best.model, *place)
+        tried, count = _from_tries(solved(idle), motion, *place, weights) if idle else (None, 0)
+        tally[place] += count
         if tried is not None:
             best = min(best, search.descended(solved(tried)), key=lambda s: s.objective)
     if strikes:
@@ -146,11 +146,13 @@ def _deflections(model: Model) -> list[tuple[int, int]]:
     return [(term, joint) for term, (effect, joints) in enumerate(model.terms) for joint in joints if isinstance(effect, Deflection)]
 
 
-def _idle(model: Model, term: int, joint: int) -> tuple[Model, bool]:
-    """The model with a deflection at nothing, and whether it has free values of anything else that moves a joint, or reads it."""
+def _idle(model: Model, term: int, joint: int) -> Model | None:
+    """The model with a deflection at nothing, where it is left so or others move or read joints."""
     values = [(k, v) for k, v in enumerate(model.shape_values) if not v.held and v.shape.start is not None]
     own = {k: v.shape.start for k, v in values if (v.term, v.joint) == (term, joint)}
-    return model.with_some_shapes(own), any(not isinstance(model.terms[v.term][0], Deflection) for _, v in values)
+    others = any(not isinstance(model.terms[v.term][0], Deflection) for _, v in values)
+    out = model.with_some_shapes(own)
+    return out if others or out.shapes == model.shapes else None
 
 
 def _from_tries(found: Settled, motion: Motion, term: int, joint: int, weights) -> tuple[Model | None, int]:

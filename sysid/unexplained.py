@@ -6,6 +6,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from .candidates import Candidate
 from .model_parameters import ROBOT
 
@@ -100,6 +102,14 @@ def cause(
             f"alike, and {whose} bends the bodies that they share; with {WEIGHED}, it would be "
             f"{_times(weighed, floor)}"
         )
+    if smeared(errors, floor):
+        half, *left = floor.halved
+        worst = int(np.argmax(errors))
+        return (
+            f"its error is {_times(errors[worst], floor)}, and that angles are smoothed over "
+            f"{2.0 * half:g} s makes most of that; with `window: {half:g}` under `preprocess:` in "
+            f"the experiment file it would be {_times(left[worst], floor)}"
+        )
     if floor.reached(errors[0]):
         return (
             "the training logs are explained and the test logs are not: the model does not carry "
@@ -112,6 +122,17 @@ def cause(
         f"its error{where} is {_times(error, floor)}, and nothing in the motion of these logs "
         "predicts the rest"
     )
+
+
+def smeared(errors: Sequence[float], floor) -> bool:
+    """Whether most of what stands above a NoiseFloor, on the training logs and on the test logs, goes
+    where angles are smoothed over half of their window: accelerations that jump are smeared, and
+    nothing is missing."""
+    if floor.rms is None or floor.halved is None:
+        return False
+    parts = [both for both in zip(errors, floor.halved[1:]) if not floor.reached(both[0])]
+    gone = (e**2 - half**2 > _MOST * (e**2 - floor.rms**2) for e, half in parts)
+    return bool(parts) and all(gone)
 
 
 def not_all(effect: str, share: float) -> str:

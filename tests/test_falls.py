@@ -7,8 +7,9 @@ import pytest
 
 from sysid import config, pipeline
 from sysid.candidate_columns import at_start
-from sysid.candidates import candidates
-from sysid.diagnose.ask import ask
+from sysid.candidates import candidates, own_effects
+from sysid.diagnose.ask import Asked, ask
+from sysid.trusted import trust
 from sysid.view import falls, first_view, joined
 
 
@@ -50,6 +51,72 @@ def test_so_it_does_where_a_body_is_known_or_carried(bound, key):
     assert fall == pytest.approx(left, abs=2e-4 * bound.settled.objective)
     if key == ("spring", 1):
         assert fall > 0.4 * bound.settled.objective
+
+
+def test_a_problem_with_a_candidate_is_the_views_own(bound, monkeypatch):
+    """The same weight of the prior, and of that of what an effect carries."""
+    own, posed = bound.settled.problem, []
+    nearby = type(own).from_nearby
+    monkeypatch.setattr(type(own), "from_nearby", lambda problem, *how: posed.append(problem) or nearby(problem, *how))
+    asked = [SimpleNamespace(candidate=c, shapes={}) for c in candidates(bound.model) if c.name in ("spring", "torque_bias", "cable")]
+    assert np.all(falls(bound, asked) >= -1e-6 * bound.settled.objective)
+    assert len(posed) == len(asked) and {one.objective.weight for one in posed} == {own.objective.weight}
+    assert (own.carried is None) == bool(bound.experiment.prior.known)
+    assert {one.carried and one.carried.weight for one in posed} == {own.carried and own.carried.weight}
+
+
+SENSORS = """
+from sysid.effect import SensorEffect, Shape
+
+class Lagged(SensorEffect):
+    name, unit, why = "lagged", "N m", "a sensor that follows itself"
+    e = Shape("1", -0.5, 0.5, start=0.0, says="share")
+    T = Shape("s", 0.001, 0.05, says="time constant")
+
+    def sensed(self, torque, step, *, e, T):
+        return (1.0 + e) * torque
+
+class Below(SensorEffect):
+    name, unit, why = "below", "N m", "a signal that can only be too small"
+    e = Shape("1", -0.5, 0.0, start=0.0, says="share")
+
+    def sensed(self, torque, step, *, e):
+        return (1.0 + e) * torque
+"""
+
+
+def test_effects_of_the_users_own_that_read_torque(simulated):
+    """One with a value that only says how; and one that may not rise: it falls no further than its bound lets it, either way."""
+    path = simulated("falls", "spring:elbow:size=2") / "config.yaml"
+    (path.parent / "reads.py").write_text(SENSORS)
+    trust(path.parent / "reads.py")
+    experiment = config.loads(path.read_text().replace("model:\n", "model:\n  candidates: ['reads.py:Lagged', 'reads.py:Below']\n"), path)
+    seen = first_view(experiment, pipeline.fit(experiment))
+    found = ask(seen, own_effects(experiment)).groups
+    by_name = {name: [g for g in found if g.candidate.name == name] for name in ("lagged", "below", "torque_gain")}
+    assert by_name["lagged"] and by_name["below"]
+    gains = {g.candidate.joint: fall for g, fall in zip(by_name["torque_gain"], falls(seen, by_name["torque_gain"]))}
+    tolerance = 1e-3 * seen.settled.objective
+    for group, fall in zip(by_name["lagged"], falls(seen, by_name["lagged"])):
+        assert fall == pytest.approx(gains[group.candidate.joint], abs=tolerance)
+    for group, fall in zip(by_name["below"], falls(seen, by_name["below"])):
+        assert fall == pytest.approx(gains[group.candidate.joint] if group.c[0] < 0.0 else 0.0, abs=tolerance)
+
+
+def test_what_no_block_can_test_may_be_what_is_left(view):
+    """The likeliest that a test leaves standing, else who takes most of what cannot be tested; what the tests rule out is none."""
+    groups = [g for g in ask(view).groups if g.candidate.joint == 1 and g.signed][:2]
+
+    def near(*statistics):
+        n = len(statistics)
+        asked = Asked({1: (groups[:n], np.array(statistics), np.array([2.0, 3.0])[:n], np.linspace(0.0, 4.0, 1000))}, None)
+        return asked.near(1, 3.0, False)
+
+    assert near(0.5) is None
+    assert near(0.5, np.nan) == (groups[1].candidate, 1.0)
+    assert near(np.nan) == (groups[0].candidate, 1.0)
+    candidate, p = near(3.99, np.nan)
+    assert candidate is groups[0].candidate and p < 0.01
 
 
 def test_a_softness_below_nought_is_none(view):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from scripts.blind_parts import cases, robots
-from sysid import borne_out, pipeline
+from sysid import borne_out, config, pipeline
 from sysid.blocks import Belief
 from sysid.candidates import Candidate, candidates
 from sysid.comparison import Difference
@@ -26,7 +26,7 @@ from sysid.simulate import simulate, write
 from sysid.statement.document import _verdict, dependences
 from sysid.statement.words import elsewhere
 from sysid.transfer import Transfer
-from sysid.unexplained import Refused, changed
+from sysid.unexplained import Refused, changed, smeared
 from sysid.view import first_view
 from sysid.vocabulary import find
 
@@ -98,7 +98,9 @@ def test_an_effect_of_the_whole_robot_stands_under_either_prior(monkeypatch, und
     assert (borne_out.in_doubt(before, after, shown, candidate) is None) is stands
 
 
-@pytest.mark.parametrize(("effect", "all_", "stands"), [("encoder_offset", -0.03, True), ("encoder_offset", -0.008, False), ("encoder_offset", 0.0, False), ("warmup", -0.03, False)])
+@pytest.mark.parametrize(
+    ("effect", "all_", "stands"), [("encoder_offset", -0.03, True), ("encoder_offset", -0.008, False), ("encoder_offset", 0.0, False), ("warmup", -0.03, False)]
+)
 def test_what_moves_a_joint_may_show_in_the_torque_of_another(monkeypatch, effect, all_, stands):
     """The error of its own joint hardly falls, that of all together by three standard errors, or less than one."""
     monkeypatch.setattr(borne_out.comparison, "compare", lambda *_: [Difference("", "", "elbow", -0.001, 0.01)])
@@ -244,7 +246,9 @@ def test_error_above_the_floor_that_nothing_predicts_is_unresolved():
     assert "backlash" not in elbow(2.0, refused=[Refused(effect="backlash", joint="shoulder", why="x")]).says
 
 
-@pytest.mark.parametrize(("joint", "share", "status"), [("elbow", 0.9, "unresolved"), ("*", 0.9, "unresolved"), ("elbow", 0.1, "unknown"), ("shoulder", 0.9, "unknown")])
+@pytest.mark.parametrize(
+    ("joint", "share", "status"), [("elbow", 0.9, "unresolved"), ("*", 0.9, "unresolved"), ("elbow", 0.1, "unknown"), ("shoulder", 0.9, "unknown")]
+)
 def test_what_test_logs_bear_out_under_the_low_pass_and_no_fit_does_is_not_called_a_law_that_nobody_knows(joint, share, status):
     """What functions of the motion predict then is that effect: half of it at least."""
     what = SimpleNamespace(name="elasticity", joint=1)
@@ -274,7 +278,9 @@ def test_whose_misfit_bends_a_quiet_joint_is_told_though_its_floor_is_not_known(
     assert "the greater one of shoulder bends the bodies" in says
 
 
-@pytest.mark.parametrize(("took", "rest", "status"), [(0.85, NOISE, "missing"), (0.75, NOISE, "unknown"), (0.85, left(0.6), "unknown"), (None, NOISE, "unknown")])
+@pytest.mark.parametrize(
+    ("took", "rest", "status"), [(0.85, NOISE, "missing"), (0.75, NOISE, "unknown"), (0.85, left(0.6), "unknown"), (None, NOISE, "unknown")]
+)
 def test_what_takes_nearly_all_where_all_joints_count_alike_stands(took, rest, status):
     """A louder joint bends the bodies of a quiet one, whose error falls by little in a fit that weighs all alike, and whose floor nobody knows:
     under the low-pass, each joint weighed by its own, one effect takes more than four fifths of it."""
@@ -437,9 +443,7 @@ def asked_of_elbow(error: float, *, gain: float = 0.3, chance: float = 1e-3, nea
         seen.append(j)
         return Law(chance, "q_elbow and qd_shoulder", gain)
 
-    found = verdicts(
-        fitted(error), [], [NOISE, NOISE], [floor(), floor()], (), (), weighed, agreed, lambda j, own, there: near if own > 0 else None, beyond
-    )
+    found = verdicts(fitted(error), [], [NOISE, NOISE], [floor(), floor()], (), (), weighed, agreed, lambda j, own, there: near if own > 0 else None, beyond)
     return found[1], seen
 
 
@@ -504,7 +508,9 @@ def test_where_a_law_stands_out_with_the_effect_in_the_model_too_the_effect_is_n
     assert (found.says == told) is (status == "unknown")
     assert (found.may is None) is (status == "unknown") and found.left.single == pytest.approx(0.3)
     # what ridges predicted without it is nothing that they predict with it
-    ridged = verdicts(fitted(3.0), [], [NOISE, left(0.5)], [floor(), floor()], near=lambda j, own, there: (stribeck, 0.02), beyond=lambda *_: Law(1e-6, "q", 0.001))
+    ridged = verdicts(
+        fitted(3.0), [], [NOISE, left(0.5)], [floor(), floor()], near=lambda j, own, there: (stribeck, 0.02), beyond=lambda *_: Law(1e-6, "q", 0.001)
+    )
     assert ridged[1].status == "unresolved"
     # where no law stands out without it, nobody looks for one with it
     asked_of_elbow(3.0, chance=0.5, near=(stribeck, 0.02), beyond=beyond)
@@ -548,3 +554,39 @@ def test_an_effect_is_near_that_stands_at_five_per_cent_and_takes_half():
     assert asked.near(0, 10.0, False) is None and asked.near(0, 10.0, True)[0].name == "spring"
     assert asked.near(0, 14.0, True) is None  # cogging may be chance there as well
     assert asked.near(0, 10.0, True)[1] > 0.05  # its family-wise p-value is that among all
+
+
+# ---- angles that are smoothed over too long
+
+
+@pytest.mark.parametrize(
+    "errors, halves, said",
+    # both above the floor of 1 and mostly gone; one at it anyway; one that stays; more than before; half of it
+    [
+        ((2.0, 3.0), (1.1, 1.2), True),
+        ((1.0, 3.0), (1.0, 1.2), True),
+        ((2.0, 3.0), (1.1, 2.9), False),
+        ((2.0, 3.0), (2.2, 3.1), False),
+        ((1.0, 3.0), (1.0, 5.0**0.5), False),
+    ],
+)
+def test_what_smoothing_makes_of_an_error(errors, halves, said):
+    floor = NoiseFloor(1.0, 0.01, "spectral", "", 0.9, 1.1)
+    assert smeared(errors, replace(floor, halved=(0.05, *halves))) == said
+    assert not smeared(errors, floor) and not smeared((1.0, 1.0), replace(floor, halved=(0.05, 1.0, 1.0)))
+    assert not smeared(errors, replace(floor, rms=None, halved=(0.05, *halves)))
+
+
+def test_a_window_that_is_too_long_is_said_and_the_one_that_is_said_will_do(simulated):
+    """Speeds that are trapezoids, with nothing hidden: acceleration jumps, and 0.2 s smear it."""
+    path = simulated("trapezoids", seed=1, duration=12.0, motion="moves") / "config.yaml"
+    text = path.read_text().replace("window: 0.1", "window: 0.2")
+    found = diagnose(config.loads(text, path))
+    assert not found.claims and {v.status for v in found.verdict} == {"unresolved"}
+    for one in found.verdict:
+        assert "smoothed over 0.2 s" in one.says and "`window: 0.1`" in one.says
+    (shorter,) = {re.search(r"`window: (\S+)`", v.says)[1] for v in found.verdict}
+    then = diagnose(config.loads(text.replace("window: 0.2", f"window: {shorter}"), path))
+    assert {v.status for v in then.verdict} == {"complete"}
+    for joint, floor in found.floors.items():  # what was told came, or less: it was told of the same bodies
+        assert 0.9 * floor.halved[2] < then.fit.rms("test")[joint] < 1.01 * floor.halved[2]

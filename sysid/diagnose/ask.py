@@ -45,10 +45,10 @@ class Asked:
     @cached_property
     def falls(self) -> np.ndarray:
         """(groups,) how far everything falls where a candidate comes in and all else settles anew;
-        minus infinity but at the values that take most."""
+        minus infinity but at the values that take most, of those of the sign it may have."""
         best, out = dict[tuple, int](), np.full(len(self.groups), -np.inf)
-        for k in np.argsort(self.gains, kind="stable"):
-            best[self.groups[k].candidate.kind] = int(k)
+        for k in sorted(range(len(out)), key=lambda k: (self.groups[k].signed, self.gains[k])):
+            best[self.groups[k].candidate.kind] = k
         some = [k for k in best.values() if not self.groups[k].candidate.begins]
         out[some] = falls(self.view, [self.groups[k] for k in some])
         return out
@@ -76,8 +76,8 @@ class Asked:
         return out
 
     def near(self, joint: int, gain: float, there: bool) -> tuple[Candidate, float] | None:
-        """The effect on a joint that may be there and takes half of a gain: the likeliest; there:
-        as something on that joint surely is, among its own effects alone."""
+        """The effect on a joint that may be there and takes half of a gain: the likeliest, else who
+        takes most of what no block can test; there: as something surely is, among its own alone."""
         found, statistics, gains, own = self.by_joint.get(joint, ([], [], [], None))
         takes = [k for k, taken in enumerate(gains) if taken > HALF * gain and found[k].signed]
         if not takes:

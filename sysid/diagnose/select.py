@@ -76,10 +76,8 @@ def _next(view: View, asked: Asked, level: float, worth: float, open_: list[Choi
         told = found and asked.told(k, found)
         if told and told.statistics[k] > threshold:
             own = {j: j for j in np.argsort(-told.gains).tolist()}
-            step = _standing(view, told, own, [k], worth, open_)
-            # with all else bent to it, it speaks for no rival where it is ruled out itself
-            own = asked.groups[k].candidate.kind
-            if step and own in [m.candidate.kind for m, _ in step.choice.members]:
+            kind = asked.groups[k].candidate.kind
+            if step := _standing(view, told, own, [k], worth, open_, kind):
                 return step
     return None
 
@@ -95,8 +93,9 @@ def _trials(view: View, asked: Asked) -> list[int]:
     return list(out.values())[:_TRIALS]
 
 
-def _standing(view: View, asked: Asked, rivals, hopeful, worth: float, open_) -> Step | None:
-    """The first that joins of those that stand out, by falling gain, each beside its rivals."""
+def _standing(view, asked: Asked, rivals, hopeful, worth: float, open_, trial=None) -> Step | None:
+    """The first that joins of those that stand out, by falling gain, each beside its rivals. With
+    all else bent to a trial of that kind, it speaks for none where it is ruled out itself."""
     while hopeful:
         top = hopeful[0]
         # whoever takes as much as one that is there may be what is there
@@ -104,7 +103,7 @@ def _standing(view: View, asked: Asked, rivals, hopeful, worth: float, open_) ->
         short = [k for k in near if alike(view, asked.groups[k], asked.groups[top])]
         short = [top, *short][:_SHORTLIST]
         found = chosen(view, [asked.groups[k] for k in short], np.random.default_rng(1))
-        if found is not None:
+        if found and trial in (None, *(m.candidate.kind for m, _ in found.members)):
             # of all that were compared one at least is there, though its sign may forbid its name
             step = step_of(view, min(asked.p(rivals[k]) for k in short), found, worth)
             if step is not None and found.decided:

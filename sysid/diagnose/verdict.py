@@ -11,7 +11,7 @@ from ..candidates import Candidate
 from ..estimate import Fit
 from ..flexible import Law, Unknown
 from ..transfer import Transfer
-from ..unexplained import by_weights, cause, explains, in_vain, loudest, noisy, not_all
+from ..unexplained import by_weights, cause, explains, in_vain, loudest, noisy, not_all, smeared
 from .ask import HALF
 from .claims import Claim
 from .select import LEVEL, WORTH
@@ -91,6 +91,7 @@ def verdicts(
         # noise than an error of another, so that what does not carry over is no noise
         whole = (1.0 + _LEFT) * explains(first, then, min(*both, noise)) >= 1.0
         whole |= noisy(*pairs[1], floors[j]) or floors[j].reached(both[0])
+        whole |= smeared(both, floors[j])
         # where a floor is known, other weights say how much of the rest loud joints make
         unsaid = took is not None and floors[j].rms is None
         whole |= unsaid and (1.0 + _LEFT) * took[j] >= 1.0

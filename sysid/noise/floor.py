@@ -35,7 +35,8 @@ class NoiseFloor:
 
     method: "repeats", "spectral" or "none". detail: how it was found, or why not. low, high: at
         least and at most [N m or N], None where nothing is known. about: the estimate that was too
-        unsure to be `rms`, None where there is none.
+        unsure to be `rms`, None where there is none. halved: half of the angles' window [s], and
+        the errors that it leaves on the training logs and on the test logs; where it was asked.
     """
 
     rms: float | None
@@ -45,6 +46,7 @@ class NoiseFloor:
     low: float | None = None
     high: float | None = None
     about: float | None = None
+    halved: tuple[float, float, float] | None = None
 
     def reached(self, error: float) -> bool:
         """Whether an error is at it, as far as it is known."""

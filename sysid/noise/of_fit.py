@@ -1,16 +1,18 @@
 """The noise floors of a fit's joints, as the fit sees their torque."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
+from ..errors import SysidError
 from ..estimate import Fit
 from ..filters import settled
 from ..log import Log
 from ..model import Model
 from ..prediction import Prediction, predict
 from ..preprocess import on_both_sides, prepare
-from ..specs import Experiment
+from ..specs import Experiment, PreprocessSpec
 from .floor import DOUBT, NoiseFloor
 from .of_angles import of_angles
 from .of_pieces import filtered, floors_of
@@ -48,4 +50,19 @@ def floors_of_fit(
     if np.any(more := left > (1.0 + DOUBT) * most):
         other, _ = floors(fit.model, fit.x)
         found = [b if worse else a for a, b, worse in zip(found, other, more)]
+    if not all(one.reached(error) for one, error in zip(found, most)):
+        found = _halved(found, spec, fit, logs)
     return filtered(found, on_both_sides(spec, pieces[0].step)), dict(zip(fit.joints, left))
+
+
+def _halved(found: list[NoiseFloor], spec: PreprocessSpec, fit: Fit, logs) -> list[NoiseFloor]:
+    """Floors with what the fit leaves where angles are smoothed over half of their window."""
+    if spec.filter != "savitzky-golay" or spec.torque == "low-pass":
+        return found
+    half = spec.model_copy(update={"window": spec.window / 2})
+    try:
+        motions = [prepare(part, half, fit.joints) for part in logs]
+    except SysidError:  # shorter than its polynomial
+        return found
+    errors = np.transpose([predict(fit.model, fit.x, one).errors()["rms"] for one in motions])
+    return [replace(f, halved=(half.window, *own)) for f, own in zip(found, errors.tolist())]

@@ -8,11 +8,13 @@ move: a candidate that would set them free takes nothing there, and nearly all w
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from ..candidate_columns import bounds_of, columns_of, grown
 from ..candidates import Candidate
+from ..effect import SensorEffect
 from ..model import moving_coefficients
 from ..posed_problem import pose_triangle
 from ..prior_weight import with_weight
@@ -48,8 +50,12 @@ def _least(view: View, full, own, inverse, candidate: Candidate, shapes: dict[st
             their triangle, and the inverse of its transpose on its range.
     """
     joints = candidate.touches(view.model.robot.dof)
+    columns, signs = columns_of(view.source, candidate, [shapes])[0], []
+    if candidate.nonlinear:
+        turn, signs = _bounds(view, candidate, columns.shape[2])
+        columns = columns * turn
     cross, square = 0.0, 0.0
-    for j, values in zip(joints, columns_of(view.source, candidate, [shapes])[0]):
+    for j, values in zip(joints, columns):
         values = values * view.weights[j] * view.rows.use[:, [j]]
         cross, square = cross + full[j].T @ values, square + values.T @ values
     size, more = len(own) - 1, len(square)
@@ -57,14 +63,23 @@ def _least(view: View, full, own, inverse, candidate: Candidate, shapes: dict[st
     told = inverse @ cross
     both = np.block([[own, told], [np.zeros((more, size + 1)), root(square - told.T @ told).T]])
     triangle = both[:, [*range(size), *range(size + 1, size + 1 + more), size]]
-    model, signs = view.model, ()
-    if candidate.nonlinear:
-        known = bounds_of(view.model, candidate)
-        signs = [low >= s.start for s, low, *_ in known if s.start is not None][:more]
-    else:
-        model = grown(view.source, candidate, shapes)
-    experiment = with_weight(view.experiment, view.settled.problem.objective.weight)
+    model = view.model if candidate.nonlinear else grown(view.source, candidate, shapes)
+    before = view.settled.problem
+    experiment = with_weight(view.experiment, before.objective.weight)
     moving, rows = moving_coefficients(model, view.motion), int(view.rows.use.sum())
     problem = pose_triangle(experiment, model, triangle, rows, moving, view.prior, signs)
+    if problem.carried is not None and before.carried is not None:  # the noise is the view's
+        heard = replace(problem.carried, weight=before.carried.weight)
+        problem = replace(problem, carried=heard)
     x = problem.from_nearby(np.append(view.settled.x, np.zeros(more)), COMPARED)
     return problem.objective.value(problem.minimum(COMPARED) if x is None else x)
+
+
+def _bounds(view: View, candidate: Candidate, more: int) -> tuple[np.ndarray, list[bool]]:
+    """Of slopes: the sign (more,) by which they may not be negative, and whether they may not."""
+    sensor, turn, signs = isinstance(candidate.effect, SensorEffect), np.ones(more), [False] * more
+    known = [one for one in bounds_of(view.model, candidate) if sensor or one[0].start is not None]
+    for k, (shape, low, high, _) in enumerate(known[:more]):
+        if shape.start is not None and (low >= shape.start or high <= shape.start):
+            turn[k], signs[k] = (1.0 if low >= shape.start else -1.0), True
+    return turn, signs
