@@ -65,10 +65,10 @@ def tell_still(motion: Motion, spec) -> None:
 
 
 def tell_left_out(motion: Motion, spec) -> None:
-    """How many rows of each joint's reversals are left out."""
+    """How many rows of each joint's reversals and of jumps of acceleration are left out."""
     shares = [f"{joint} {100 * count / motion.samples:.0f} %" for joint, count in zip(motion.joints, motion.left_out) if count and joint not in (*motion.unused, *motion.still)]
     if spec.standstill == "auto" and shares:
-        warn(f"rows around each joint's reversals and standstill, where the filter smears friction's jump, are left out of its fit and its error: {', '.join(shares)}; preprocess.standstill: keep uses every row")
+        warn(f"rows around each joint's reversals and standstill and around jumps of acceleration, which the filter smears, are left out of its fit and its error: {', '.join(shares)}; preprocess.standstill: keep uses every row")
 
 
 def tell_events(part: str, motion: Motion) -> list[dict]:

@@ -113,16 +113,28 @@ class Smoother:
         """
         if not self.reach:
             return 0, 0.0
+        t, middle, qd, qdd = self.of_a_jump()
+        error = (qdd - np.heaviside(t, 0.5))[middle]
+        most = _LEFT_OF_A_JUMP * np.sum(error**2)
+        return int(np.count_nonzero(self.bent_beyond(both) > most)), 2.0 * abs(float(qd[len(t) // 2, 0]))
+
+    def of_a_jump(self) -> tuple[np.ndarray, slice, np.ndarray, np.ndarray]:
+        """Of an acceleration that jumps from none to one: times (n, 1) [s] from there, the rows to be used, and qd and qdd (n, 1) as the
+        filter gives them."""
         t = self.step * np.arange(-6 * self.reach, 6 * self.reach + 1)[:, None]
-        middle = slice(3 * self.reach, -3 * self.reach)
-        _, qd, qdd = self.differentiate(0.5 * np.maximum(t, 0.0) ** 2)
+        return t, slice(3 * self.reach, -3 * self.reach), *self.differentiate(0.5 * np.maximum(t, 0.0) ** 2)[1:]
+
+    def bent_beyond(self, both: bool) -> np.ndarray:
+        """Sums of squares (n,) of what the filter makes of such a jump in rows that are as many samples from it or more.
+
+        Args:
+            both: as of `smear`.
+        """
+        t, middle, _, qdd = self.of_a_jump()
         error = qdd - np.heaviside(t, 0.5)
         square = (self(error) if both else error)[middle, 0] ** 2
         half = len(square) // 2
-        # by distance from the jump
-        beyond = np.cumsum(np.append(square[half], square[half + 1 :] + square[half - 1 :: -1])[::-1])[::-1]
-        most = _LEFT_OF_A_JUMP * np.sum(error[middle] ** 2)
-        return int(np.count_nonzero(beyond > most)), 2.0 * abs(float(qd[len(t) // 2, 0]))
+        return np.cumsum(np.append(square[half], square[half + 1 :] + square[half - 1 :: -1])[::-1])[::-1]
 
     def differentiate(self, q) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """q, qd, qdd (n, dof) of measured angles (n, dof); the first and last `reach` rows are not to be used."""

@@ -2,7 +2,7 @@
 with the log.
 
 A span has a fixed number of rows, whatever fits in memory: what is usual in a log (for events, for
-jumps of its torque, for the noise of its angles) is what is usual in a span of it. Filters see
+jumps of accelerations, for the noise of its angles) is what is usual in a span of it. Filters see
 beyond its ends: a span is read with as many rows of its neighbours as they need, and these stand
 outside its `core`.
 """

@@ -23,8 +23,8 @@ def without_standstill(piece: Piece, threshold, reach: int) -> Piece:
 
 
 def clear_of_reversals(pieces, spec: PreprocessSpec) -> list[Piece]:
-    """The pieces without each joint's rows that the filter has bent about its reversals and jumps of its torque, or in which it
-    may stand still.
+    """The pieces without each joint's rows that the filter has bent about its reversals and about jumps of accelerations, or in
+    which it may stand still.
 
     A joint may stand where its speed changes sign; where it is less than the filter makes of a stop amid accelerations as
     large as those about it; and where the angle travels less, while the filter sees it, than its own noise would make it.
@@ -33,13 +33,12 @@ def clear_of_reversals(pieces, spec: PreprocessSpec) -> list[Piece]:
     if spec.filter == "none":
         threshold = standstill_speed(pieces)
         return [without_standstill(piece, np.where(turns(piece.qd), np.inf, threshold), 0) for piece in pieces]
-    out = []
-    for piece in pieces:
-        smoother = Smoother(spec, piece.step)
-        piece = replace(piece, blur=Blur(*smoother.smear(piece.smoother is not None), smoother.reach))
-        still = _may_stand(piece, piece.qd, piece.qdd, piece.noise) | jumps(piece.measured, smoother.reach)
-        out.append(_without(piece, still, piece.blur.reach))
-    return out
+    smoothers = [Smoother(spec, piece.step) for piece in pieces]
+    pieces = [replace(p, blur=Blur(*own.smear(p.smoother is not None), own.reach)) for p, own in zip(pieces, smoothers)]
+    still = [_may_stand(piece, piece.qd, piece.qdd, piece.noise) for piece in pieces]
+    moving = [_apart(own, piece.blur.reach) & (True if piece.use is None else piece.use) for own, piece in zip(still, pieces)]
+    bent = jumps(pieces, smoothers, moving)
+    return [replace(piece, use=own & ~rows) for piece, own, rows in zip(pieces, moving, bent)]
 
 
 def sliding(piece: Piece, over: np.ndarray) -> np.ndarray:

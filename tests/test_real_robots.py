@@ -93,8 +93,8 @@ def test_kinova_without_its_spikes_and_bursts_has_less_than_half_of_the_error():
 def test_odrive_ripples_at_7_14_and_28_periods_a_turn():
     """Known of the motor from static maps: 0.87, 0.29 and 0.46 A at 0.03 turns/s, at 0.04 N m/A."""
     said, _ = diagnosed("odrive")
-    last = [f for f in said["findings"] if f["joins_as_step"]][-1]
-    assert last["effect"] == "cogging" and "lines=" in last["command"]
+    last = [f for f in said["findings"] if f["joins_as_step"] and f["effect"] == "cogging"][-1]
+    assert "lines=" in last["command"]
     values = {name.split(".")[-1]: p["value"] for name, p in last["parameters"].items()}
     size = {round(line * values["k"], 1): np.hypot(values[f"a{line}"], values[f"b{line}"]) for line in range(1, last["options"]["lines"] + 1)}
     for periods, ampere in ((7, 0.87), (14, 0.29), (28, 0.46)):
