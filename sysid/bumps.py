@@ -28,7 +28,7 @@ from .running import running
 from .specs import EffectSpec
 from .stretches import stretches
 
-_EFFECTS = ("viscous", "coulomb", "torque_bias")  # what any joint has
+_EFFECTS = ("viscous", "coulomb", "torque_bias", "armature")  # what any joint has
 _NEARBY = 0.5  # s to either side whose median a burst must exceed
 _OFTEN = 3.0  # s of log to a burst: what comes more often is how the machine moves, and no accident
 _SHARE = 0.2  # of how far torque goes within twice a burst's time: of a quick move less is left
