@@ -111,11 +111,25 @@ def chosen(
         return PriorWeight(USUAL, auto=True)
     begin = None if before is None or before.errors is None else before.value
     found = strongest(held_apart(experiment, model, data, moving, prior), begin)
-    if experiment.solver.weighting != "noise":
+    weights = joint_weights(with_weight(experiment, found.value), model, data, moving, prior)
+    if weights is None:
         return found
-    whole = pose(with_weight(experiment, found.value), model, data, moving, prior)
-    weights = noise_weights(data, solved(whole, found.value))
     return strongest(held_apart(experiment, model, data, moving, prior, weights))
+
+
+def joint_weights(
+    experiment: Experiment, model: Model, data: Compressed, moving, prior
+) -> np.ndarray | None:
+    """(joints,) by which each joint's rows count, under a weight of the prior that is a number; None
+    where all count alike.
+
+    Args:
+        moving: (coefficients,) bool. prior: (bodies, 10).
+    """
+    if experiment.solver.weighting != "noise":
+        return None
+    whole = pose(experiment, model, data, moving, prior)
+    return noise_weights(data, solved(whole, experiment.prior.weight))
 
 
 def strongest(apart: HeldApart, begin: float | None = None) -> PriorWeight:

@@ -86,7 +86,7 @@ class SolverSpec(Spec):
 
     tolerance: Annotated[float, AfterValidator(_finite), Field(gt=0, lt=1)] = 1.0e-8
     max_iterations: Annotated[int, Field(ge=1)] = 200
-    weighting: Literal["none", "noise"] = "none"
+    weighting: Literal["auto", "none", "noise"] = AUTO
     handover: Annotated[float, AfterValidator(_finite), Field(ge=0, le=1)] = 0.5
 
 
@@ -101,6 +101,11 @@ class Experiment(Spec):
     prior: PriorSpec = PriorSpec()
     solver: SolverSpec = SolverSpec()
     path: Path = Field(default=Path("experiment.yaml"), exclude=True)
+
+    def model_post_init(self, _context: Any) -> None:
+        if self.solver.weighting == AUTO:  # where the prior's weight is given, it is beside the sum of squares as it stands
+            weighting = "noise" if self.prior.weight == AUTO else "none"
+            object.__setattr__(self, "solver", self.solver.model_copy(update={"weighting": weighting}))
 
     def __repr__(self) -> str:
         effects = ", ".join(effect.name for effect in self.model.effects) or "bodies alone"

@@ -22,7 +22,7 @@ HIDDEN = "backlash:elbow:b=0.012"
 @pytest.fixture(scope="module")
 def fitted(simulated):
     folder = simulated("play", HIDDEN, seed=6, duration=15.0)
-    file = edited(folder, "with", model={"effects": ["viscous", "coulomb", {"backlash": {"joints": ["elbow"]}}]})
+    file = edited(folder, "with", model={"effects": ["viscous", "coulomb", {"backlash": {"joints": ["elbow"]}}, "armature"]})
     (truth,) = json.loads((folder / "truth.json").read_text())["hidden"]
     return pipeline.fit(load(file)), truth["values"]["b"]
 
@@ -42,14 +42,14 @@ def test_a_wrong_hollow_is_left(fitted, begun):
     motion = pipeline.prepare(pipeline.read(fit.experiment, fit.model.robot, fit.experiment.data.train), fit.experiment.preprocess, fit.joints)
     (own,) = striking(fit.model).values()
     off = fit.model.with_shapes([s * (begun if k == own[0] else 1.0) for k, s in enumerate(fit.model.shapes)])
-    held = shape.settle(fit.experiment, off, motion, fit.prior, hold=True)
+    held = shape.settle(fit.experiment, off, motion, fit.prior, weights=fit.weights, hold=True)
     problems = []
 
     def solved(model):
         problems.append(model.shapes)
-        return shape.settle(fit.experiment, model, motion, fit.prior, hold=True)
+        return shape.settle(fit.experiment, model, motion, fit.prior, weights=fit.weights, hold=True)
 
-    found, tally = struck(held, motion, None, solved, wide=True)
+    found, tally = struck(held, motion, fit.weights, solved, wide=True)
     assert found.objective < 0.95 * held.objective and 0 < len(problems) < 30
     assert sum(tally.values()) > 300
     assert found.model.shapes[own[0]] == pytest.approx(fit.model.shapes[own[0]], rel=0.1)
@@ -76,7 +76,7 @@ def test_a_load_that_is_renewed_costs_nothing(fitted):
 @pytest.mark.parametrize("held", [{"teeth": 30.0}, {"b": 0.012}])
 def test_one_value_is_looked_for_where_the_other_is_held(simulated, held):
     folder = simulated("play", HIDDEN, seed=6, duration=15.0)
-    file = edited(folder, f"held_{next(iter(held))}", model={"effects": ["viscous", "coulomb", {"backlash": {"joints": ["elbow"], **held}}]})
+    file = edited(folder, f"held_{next(iter(held))}", model={"effects": ["viscous", "coulomb", {"backlash": {"joints": ["elbow"], **held}}, "armature"]})
     fit = pipeline.fit(load(file))
     assert len(striking(fit.model)[2, 1]) == 1
     found = fit.model.shapes_of(2, 1)

@@ -43,8 +43,10 @@ def test_contract_example(tmp_path):
     assert found.robot.transmission == {} and found.prior.weight == 0.01 and found.solver.tolerance == 1e-8
     # everything that the example says of columns, units, filter, model, prior and solver is a default
     empty = load(tmp_path, "")
-    for section in ("preprocess", "model", "solver"):
+    for section in ("preprocess", "model"):
         assert getattr(found, section) == getattr(empty, section)
+    # but for joints' weights, which go with a weight of the prior that nobody gives
+    assert empty.solver.weighting == "noise" and found.solver == empty.solver.model_copy(update={"weighting": "none"})
     assert empty.prior.weight == "auto" and empty.prior.model_copy(update={"weight": 0.01}) == found.prior
     assert found.data.columns == empty.data.columns and found.data.units == empty.data.units and found.robot.gravity == empty.robot.gravity
 

@@ -31,9 +31,7 @@ def bumped(text="h*exp(-((q-c)/w)**2)", values=(("c", -0.4), ("w", 0.15)), coulo
     joint = machine.joints.index("elbow_joint")
     piece = prepare([log], experiment.preprocess, machine.joints).pieces[0]
     effect = structure.terms[-1][0]
-    whole = SimpleNamespace(
-        **{**vars(piece), "q": segment.q, "qd": 0 * segment.q, "qdd": 0 * segment.q, "t": segment.t}
-    )
+    whole = SimpleNamespace(**{**vars(piece), "q": segment.q, "qd": 0 * segment.q, "qdd": 0 * segment.q, "t": segment.t})
     segment.tau[:, joint] += 2.0 * effect.columns(whole, joint, **dict(values))[0]
     motion = prepare([log], experiment.preprocess, machine.joints)
     return (
@@ -51,9 +49,7 @@ def test_a_landscape_is_what_solving_gives(weights):
     by is what the solver finds.
     """
     experiment, model, motion, prior, joint = bumped()
-    settled = lambda at: shape.settle(
-        experiment, model.with_shapes(at), motion, prior, weights=weights, hold=True
-    )  # noqa: E731
+    settled = lambda at: shape.settle(experiment, model.with_shapes(at), motion, prior, weights=weights, hold=True)  # noqa: E731
     found = settled((0.1, 0.3))
     seen = landscape(found, motion, 2, joint, weights)
     places = np.array([[0.1, 0.3], [-0.4, 0.15], [-0.3, 0.4], [0.5, 0.05], [-0.6, 1.0]])
@@ -62,10 +58,7 @@ def test_a_landscape_is_what_solving_gives(weights):
     assert abs(seen.gains(places[:1])[0]) < 1e-8 * found.objective
     system, right = seen.slopes(places[2])
     step = 1e-5
-    slope = [
-        (seen.gains((places[2] + d)[None]) - seen.gains((places[2] - d)[None]))[0] / (2 * step)
-        for d in step * np.eye(2)
-    ]
+    slope = [(seen.gains((places[2] + d)[None]) - seen.gains((places[2] - d)[None]))[0] / (2 * step) for d in step * np.eye(2)]
     np.testing.assert_allclose(right, slope, rtol=1e-3)
 
 
@@ -79,9 +72,7 @@ def test_a_coefficient_at_zero_answers_as_the_bound_has_it():
 
 
 def pinned(found, motion, joint, how) -> float:
-    return float(
-        landscape(found, motion, 2, joint, None, pinned=how).gains(np.array([[-0.4, 0.15]]))[0]
-    )
+    return float(landscape(found, motion, 2, joint, None, pinned=how).gains(np.array([[-0.4, 0.15]]))[0])
 
 
 def test_the_best_of_many_hollows_is_found():
@@ -142,9 +133,7 @@ def test_hollows_corners_jumps_and_waves(name):
 
 def test_what_is_no_number_is_passed_by():
     seen = made(lambda x, a: np.sqrt(np.where(x + a[0] >= 0, x + a[0], np.nan)), [-3.0], [3.0])
-    seen = Landscape(
-        **{**vars(seen), "target": np.sqrt(np.linspace(-1, 1, 400) + 1.5), "objective": 300.0}
-    )
+    seen = Landscape(**{**vars(seen), "target": np.sqrt(np.linspace(-1, 1, 400) + 1.5), "objective": 300.0})
     found, _ = multistart.places(seen, seen, [np.linspace(-3.0, 3.0, 13)], [seen.here])
     assert found[0].values[0] == pytest.approx(1.5, abs=1e-4)
 
@@ -155,7 +144,7 @@ def too_little_friction():
     prior. Its friction grows with a power of the speed.
     """
     effects = ["viscous", "coulomb", {"sublinear_viscous": {"joints": ["elbow_joint"]}}]
-    experiment = config.experiment({"robot": {"urdf": UR5}, "model": {"effects": effects}})
+    experiment = config.experiment({"robot": {"urdf": UR5}, "model": {"effects": effects}, "solver": {"weighting": "none"}})
     machine, _, prior = pipeline.build(experiment)
     friction = {"viscous": -0.3, "coulomb": -1.0}
     log = arm_log(machine, np.random.default_rng(3), seconds=6.0, noise=0.1, **friction)

@@ -46,7 +46,7 @@ def test_only_the_coupled_joint_loses_rows():
 def test_friction_of_a_second_contact_is_within_its_deviation(simulated):
     """Where both joints' speeds sum to nothing the contact sticks for a while: counted, it would have less friction than it has."""
     folder = simulated("coupled", "joint_coupling:elbow:Ia=0.2,Fv=0.1,Fs=0.4,Fd=0", seed=4, duration=20.0)
-    file = edited(folder, "with", model={"effects": ["viscous", "coulomb", {"joint_coupling": {"joints": ["elbow"]}}]})
+    file = edited(folder, "with", model={"effects": ["viscous", "coulomb", "armature", {"joint_coupling": {"joints": ["elbow"]}}]})
     fit = pipeline.fit(load(file))
     (truth,) = json.loads((folder / "truth.json").read_text())["hidden"]
     found = fit.parameters_of("joint_coupling", 1)

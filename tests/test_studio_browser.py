@@ -180,7 +180,7 @@ def test_from_open_to_the_floor_by_clicks_alone(opened):
     expect(page.locator("#verdict .card.missing")).to_have_count(0, timeout=WAIT)
     page.wait_for_function(DONE, timeout=WAIT)
     after, level = held_out(page, "hip")
-    assert f"{before:.4g} → {after:.4g} N m RMS" in ahead  # what the preview said came
+    assert f"{before:#.4g} → {after:#.4g} N m RMS" in ahead  # what the preview said came
     assert after < 0.6 * before and after < 1.15 * level
     expect(page.locator("#verdict .card", has=page.locator("h3", has_text="hip"))).to_contain_text("complete")
     expect(page.locator("#steps .answer tr", has_text="hip")).to_contain_text("−")

@@ -44,7 +44,7 @@ def words(line: str) -> str:
 def close(shown: str, found: str) -> bool:
     """Whether a number came out as it is shown: to 3 %, or to two units of its last digit."""
     a, b = Decimal(shown), Decimal(found)
-    if 0 < abs(a) < Decimal("1e-4"):
+    if 0 < a < Decimal("1e-4"):
         return b != 0 and abs(a.log10() - b.log10()) <= 2  # a probability: its size matters
     last = Decimal(1).scaleb(a.as_tuple().exponent)
     return abs(a - b) <= max(Decimal("0.03") * abs(a), 2 * last)

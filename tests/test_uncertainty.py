@@ -1,6 +1,7 @@
 """Standard deviations against the scatter of repeated experiments, and what `from_data` says."""
 
 import numpy as np
+import pytest
 from scipy.signal import lfilter
 
 from sysid import estimate, posed_problem, uncertainty
@@ -12,7 +13,7 @@ from sysid.log import Log, Segment
 from sysid.preprocess import prepare
 from sysid.reduction import triangle
 from sysid.regressor import torque
-from sysid.specs import Experiment
+from sysid.specs import Experiment, PriorSpec, SolverSpec
 from sysid.triangles import Compressed, Factor
 from tests.problems import arm, fourier_motion, leg
 from tests.robots import load, urdf
@@ -90,6 +91,21 @@ def test_noise_weighting_gives_quiet_joints_their_say():
     weighted = experiment.model_copy(update={"solver": experiment.solver.model_copy(update={"weighting": "noise"})})
     fit = estimate.identify(weighted, structure, motion, data, prior)
     assert fit.weights is not None and fit.solution.converged and fit.certificate.globally_optimal
+
+
+@pytest.mark.parametrize(
+    "prior, said, weighting",
+    [
+        ({}, {}, "noise"),
+        ({"weight": 1e-2}, {}, "none"),
+        ({"weight": 1e-2}, {"weighting": "noise"}, "noise"),
+        ({"weight": "auto"}, {"weighting": "none"}, "none"),
+    ],
+)
+def test_joints_count_by_their_noise_where_nobody_weighs_the_prior(prior, said, weighting):
+    """The paper's sum of squares has a weight beside it; a simulation writes none into its file."""
+    experiment = Experiment(prior=PriorSpec(**prior), solver=SolverSpec(**said))
+    assert experiment.solver.weighting == weighting
 
 
 def test_deviations_are_right_under_white_noise():

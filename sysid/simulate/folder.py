@@ -153,7 +153,7 @@ def _config(experiment: Experiment, robot: Robot, logs: list[str]) -> str:
         "preprocess": preprocess.model_dump(exclude_none=True),
         "model": {"inertia": experiment.model.inertia, "effects": effects},
         "prior": {**experiment.prior.model_dump(exclude_none=True), "weight": AUTO, "source": "urdf"},
-        "solver": experiment.solver.model_dump(exclude_none=True),
+        "solver": experiment.solver.model_dump(exclude_none=True, exclude={"weighting"}),
     }
     stream = io.StringIO()
     writer = YAML()
