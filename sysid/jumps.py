@@ -33,9 +33,9 @@ def jumps(
     pieces: Sequence[Piece], smoothers: Sequence[Smoother], counts: Sequence[np.ndarray]
 ) -> list[np.ndarray]:
     """Of each piece the rows (n, dof) bool that the filter bends for a joint's torque where an
-    acceleration jumps: about each jump that makes an error greater than that torque's noise, as far
-    as the filter sees, or less is left beyond than the noise of a single row. Most of
-    what the torque itself does there must be such a wave.
+    acceleration jumps: about each jump that makes an error greater than that torque's noise, until
+    less is left beyond than the noise of a single row, or as far as the filter sees. Most of what
+    the torque itself does there must be such a wave.
 
     Args:
         counts: of each piece the rows (n, dof) bool in which a joint moves and is not disturbed.

@@ -6,8 +6,9 @@ The whole curve of what `prior.weight: auto` chooses from, on the same stretches
 import numpy as np
 
 from ..blocks import within_one_error
-from ..held_apart import held_apart, judged
+from ..held_apart import held_apart, joint_weights, judged
 from ..model import Model
+from ..prior_weight import number, with_weight
 from ..specs import Experiment
 from ..triangles import Compressed
 
@@ -16,7 +17,8 @@ WEIGHTS = tuple(10.0 ** np.arange(-6, 7).astype(float))
 
 def one(experiment: Experiment, model: Model, data: Compressed, prior, moving, weight: float) -> dict:
     """Held-out squared error of every fold and joint at one weight: {"squares": [[...], ...], "rows": [[...], ...]}."""
-    apart = held_apart(experiment, model, data, moving, prior)
+    weights = joint_weights(with_weight(experiment, number(experiment)), model, data, moving, prior)
+    apart = held_apart(experiment, model, data, moving, prior, weights)
     squares = apart.squares(weight, tolerance=experiment.solver.tolerance)
     return {"squares": squares.tolist(), "rows": apart.rows.tolist()}
 
