@@ -12,9 +12,9 @@ from .compress import compress
 from .drives import rescaled
 from .effect import NotFinite
 from .estimate import Fit, identify
-from .held_apart import joint_weights, prior_strength
+from .held_apart import prior_strength
 from .linearised import Linearised
-from .model import Model, moving_coefficients
+from .model import Model
 from .motion import Motion
 from .multistart import Searched, finite
 from .prior_weight import PriorWeight, is_auto, with_weight
@@ -22,14 +22,13 @@ from .specs import Experiment
 
 _PASSES, _NEAR = 3, 0.1  # refinements on all rows; of a standard deviation, or of a value's range
 _PART = 0.25  # of a step that led uphill
-_LOUDER = 0.2  # of the logarithm of a joint's error: so much more or less hardly moves what all share
 _ROUNDS = 3  # of a prior's weight and the shape values under it
 
 
 def refined(experiment: Experiment, structure: Model, motion: Motion, prior, near: Model | None = None) -> tuple[Model, Linearised | None, tuple[Searched, ...], PriorWeight | None]:
     """The model measured by a motion, its shape values found: on rows that fit in memory, then by Gauss-Newton steps on all
-    of them. Its slopes there, None where no shape value is free, and what was done to find them. And the prior's weight, None where it
-    had no part in it.
+    of them. Its slopes there, None where no shape value is free, and what was done to find them. And the prior's weight, None
+    where it had no part in it.
 
     Args:
         near: the model with shape values that are not far from the best, where that is known.
@@ -37,21 +36,18 @@ def refined(experiment: Experiment, structure: Model, motion: Motion, prior, nea
     structure = finite(structure.measured_by(motion), motion)
     if not (structure.shape_values or structure.uses_load):
         return structure, None, (), None
-    strength, weights, by_noise = None, None, experiment.solver.weighting == "noise"
-    weighed = experiment
-    if is_auto(experiment) or by_noise:
+    strength = None
+    if is_auto(experiment):
         begun = Linearised(structure, np.append(prior.ravel(), np.zeros(len(structure.coefficients))))
-        data = compress(begun if structure.gains else structure, motion)
-        strength = prior_strength(experiment, structure, motion, data, prior)
-        weighed = with_weight(experiment, strength.value)
-        weights = joint_weights(weighed, structure, data.first(structure.size), moving_coefficients(structure, motion), prior)
+        strength = prior_strength(experiment, structure, motion, compress(begun if structure.gains else structure, motion), prior)
+    weighed = experiment if strength is None else with_weight(experiment, strength.value)
     if near is None:
-        found = shape.settle(weighed, structure, motion, prior, weights=weights, profile=True, strikes=True)
+        found = shape.settle(weighed, structure, motion, prior, profile=True, strikes=True)
     else:  # the search has been made
-        found = shape.settle(weighed, structure.with_shapes(near.shapes), motion, prior, weights=weights, grid=False, strikes=True)
+        found = shape.settle(weighed, structure.with_shapes(near.shapes), motion, prior, grid=False, strikes=True)
     bodies, searched = found.x[: 10 * structure.bodies].reshape(-1, 10), found.searched
     if (scaled := rescaled(found.model, weighed, bodies, prior)) is not found.model:
-        found = shape.settle(weighed, scaled, motion, prior, weights=weights, grid=False)
+        found = shape.settle(weighed, scaled, motion, prior, grid=False)
     structure, slopes = found.model, Linearised(found.model, found.x)
     if not slopes.free:
         return structure, None, searched, None
@@ -65,12 +61,10 @@ def refined(experiment: Experiment, structure: Model, motion: Motion, prior, nea
             return best[1], best[2], searched, best[3]  # of a formula, the last step left its domain
         for _ in range(_ROUNDS if number == 0 else 0):  # what was missing before is in the model now
             before, strength = strength, prior_strength(experiment, structure, motion, data, prior, strength)
-            weighed, lacked = with_weight(experiment, strength.value), weights
-            if by_noise:  # a joint that lacked an effect was loud for it
-                weights = joint_weights(weighed, structure, data.first(structure.size), moving_coefficients(structure, motion), prior)
-            if before is None or (before.value == strength.value and _alike(weights, lacked)):
+            weighed = with_weight(experiment, strength.value)
+            if before is None or before.value == strength.value:
                 break
-            again = shape.settle(weighed, structure, motion, prior, weights=weights, grid=False, profile=True)
+            again = shape.settle(weighed, structure, motion, prior, grid=False, profile=True)
             searched = tuple(one.checked_again(other) for one, other in zip(searched, again.searched))
             structure, slopes = again.model, Linearised(again.model, again.x)
             data = compress(slopes, motion)
@@ -105,11 +99,6 @@ def refined(experiment: Experiment, structure: Model, motion: Motion, prior, nea
         if not far:
             break
     return structure, slopes, searched, strength
-
-
-def _alike(weights, others) -> bool:
-    """Whether joints' weights (joints,), or None, are the same but for a part."""
-    return weights is None or bool(np.all(np.abs(np.log(weights / others)) < _LOUDER))
 
 
 def scattered(fit: Fit, motion: Motion) -> Fit:
