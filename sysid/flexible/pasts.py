@@ -63,24 +63,32 @@ def dragged(values: np.ndarray, widths: np.ndarray) -> np.ndarray:
 
 def fading(values: np.ndarray, step: float) -> np.ndarray:
     """A signal (n,) behind lags of several spans (spans, n), at rest before it began."""
-    from scipy.signal import lfilter  # takes long to import, and is seldom asked for
-
     keep = np.exp(-step / np.array(_SPANS))
-    return np.stack([lfilter([1.0 - a], [1.0, -a], values) for a in keep])
+    return np.stack([_recursive([1.0 - a], [1.0, -a], values) for a in keep])
 
 
 def swinging(push: np.ndarray, step: float) -> np.ndarray:
     """The accelerations (swings, n) of what a spring and a damper hold on a joint whose own (n,) is
     given."""
-    from scipy.signal import bilinear, lfilter
-
-    out = []
+    out, twice = [], 2.0 / step
     for omega in 2.0 * np.pi * np.array(_SWINGS):
         if omega * step < 0.5 * np.pi:  # four samples a swing
-            drag = 2.0 * _DAMPING * omega
-            law = bilinear([drag, omega**2], [1.0, drag, omega**2], fs=1.0 / step)
-            out.append(lfilter(*law, push))
+            # (drag s + omega²) / (s² + drag s + omega²), s by Tustin's rule
+            drag, square = 2.0 * _DAMPING * omega * twice, omega**2
+            over = [drag + square, 2.0 * square, square - drag]
+            under = [over[0] + twice**2, over[1] - 2.0 * twice**2, over[2] + twice**2]
+            out.append(_recursive(over, under, push))
     return np.array(out).reshape(-1, len(push))
+
+
+def _recursive(over, under, values: np.ndarray) -> np.ndarray:
+    """A signal (n,) through the filter of two polynomials of the unit delay, from rest: the
+    solution of a banded system (scipy.signal alone takes half a second to import)."""
+    from scipy.linalg.lapack import dtbtrs
+
+    right = np.convolve(values, over)[: len(values)]
+    band = np.repeat(np.array(under)[:, None], len(values), axis=1)
+    return dtbtrs(band, right, uplo="L")[0]
 
 
 def turned(motion: np.ndarray, step: float) -> np.ndarray:

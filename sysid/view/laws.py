@@ -26,7 +26,7 @@ def law(view: View, j: int, more: View | None = None) -> flexible.Law:
     known = {name: np.concatenate([own[name] for own in motions]) for name in view.variables}
     rest = view.model.robot.joints[j], use, np.concatenate(pieces), view.step
     asked = lambda: flexible.products(known, *rest)  # noqa: E731
-    found = greatest(views, j, asked, np.random.default_rng(j))
+    found = greatest(views, j, asked, j)
     if found is None:
         return flexible.Law(1.0, "", 0.0)
     return flexible.Law(found.chance, found.words, found.share)

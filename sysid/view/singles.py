@@ -24,7 +24,8 @@ from .stationary import drawn
 Columns = Callable[[], Iterable[tuple[list[str], np.ndarray]]]
 
 _DRAWS = 200  # of noise: quartiles of a maximum are known to a tenth of its deviation
-_LEAST = 50  # of a long log
+_LEAST = 50  # of a long log; and of any at first, which say where there is no need of more
+_CLEAR = 0.05  # a chance that no more draws would bring below a thousandth
 _MOST = 2e6  # draws times rows, up to where fewer draws are made
 
 
@@ -40,17 +41,26 @@ class Single:
     share: float
 
 
-def greatest(views, j: int, asked: Columns, rng: np.random.Generator) -> Single | None:
+def greatest(views, j: int, asked: Columns, seed: int) -> Single | None:
     """Of the columns (n, k) of joint j that `asked()` brings, with words of each, some at a time;
     None where the first view can ask none.
 
-    The probability goes on beyond the draws.
+    The probability goes on beyond the draws, of which few are made where they leave no doubt that
+    nothing is there (Besag & Clifford 1991).
 
     Args:
         views: one, or one and the same model settled on other logs. The rows of columns are theirs,
             one view's after the other's, behind each those of its rough motion.
     """
-    draws = min(_draws(view) for view in views)
+    most, found = min(_draws(view) for view in views), None
+    for draws in (_LEAST, most) if most > _LEAST else (most,):
+        found = _greatest(views, j, asked, np.random.default_rng(seed), draws)
+        if found is None or found.chance > _CLEAR:
+            break
+    return found
+
+
+def _greatest(views, j: int, asked: Columns, rng, draws: int) -> Single | None:
     askers = [_Asker(view, j, rng, draws) for view in views]
     ends = np.cumsum([len(asker.residual) for asker in askers for _ in range(2)])[:-1]
     found: list[list[_Told]] = [[] for _ in views]
