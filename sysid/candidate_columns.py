@@ -15,6 +15,7 @@ from .effect import Effect, MotionEffect, SensorEffect
 from .model import Model
 from .model_parameters import ROBOT
 from .motion import Piece
+from .tangents import tangents
 
 _STEP = 1e-4  # of what the bounds of a shape value span: a difference's
 
@@ -212,7 +213,7 @@ def _slopes(source, candidate: Candidate, shapes: dict[str, float]) -> np.ndarra
     ]
     held = tuple(((v.term, v.joint, v.shape.name), 0.0) for v in idle)
     held_model = replace(model, held=(*model.held, *held))
-    slopes = row.tangents(
+    slopes = tangents(
         held_model,
         source.motion,
         source.x,

@@ -8,7 +8,7 @@ import numpy as np
 from .effect import NotFinite
 from .model import Model
 from .motion import Piece
-from .rows import difference_step
+from .tangents import difference_step
 
 
 @dataclass(frozen=True)

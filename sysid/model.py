@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
 
 from . import regressor, two_masses
 from .deflection import Deflection
 from .effect import Effect, MotionEffect, SensorEffect, TorqueEffect, WrenchEffect
+from .kept_columns import depends, once, stands
 from .model_parameters import ROBOT
 from .motion import Motion, Piece, never_move
 from .needed import acting, add_over, needed
@@ -24,7 +25,6 @@ class Model(Terms):
     """A robot and the effects on its joints, with the torque that they need. Immutable; estimates live in `Fit`."""
 
     _links: dict = field(default_factory=dict, repr=False, compare=False)  # no shape value changes it
-    _rigid: dict = field(default_factory=dict, repr=False, compare=False)  # the bodies' columns, which no torque effect changes
 
     def support(self, joint: int, piece: Piece | None = None) -> np.ndarray:
         """Indices of the parameters that can enter the torque of a joint, in a piece's log or in any, ascending."""
@@ -65,16 +65,20 @@ class Model(Terms):
         torque, how far a link stands behind its motor."""
         if not any(effect.memory for effect, _ in self.terms):
             return {}
-        whole = piece.part(slice(0, len(piece.t)))
-        out = {
-            (term, joint): effect.apart(*self._link_side(piece, joint), whole, **self.shapes_of(term, joint))
-            for term, (effect, joints) in enumerate(self.terms)
-            if isinstance(effect, Deflection)
-            for joint in joints
-        }
-        columns = [term for term, (effect, _) in enumerate(self.terms) if effect.memory and not isinstance(effect, Deflection)]
-        part = self._seen(piece, slice(0, len(piece.t)), out, [self.terms[term][0] for term in columns]) if columns else None
-        return out | {(term, joint): self.terms[term][0].columns(part, joint, **self.shapes_of(term, joint)) for term in columns for joint in self.terms[term][1]}
+        alive, robot = (self.robot, self.terms), id(self.robot)
+        whole = cache(lambda: piece.part(slice(0, len(piece.t))))
+        out = {}
+        for term, (effect, joints) in enumerate(self.terms):
+            for joint in joints if isinstance(effect, Deflection) else ():
+                apart = lambda: effect.apart(*self._link_side(piece, joint), whole(), **self.shapes_of(term, joint))  # noqa: B023, E731
+                out[term, joint] = once(piece, ("apart", robot, id(effect), joint), stands(self, term, joint), alive, apart)
+        looking = [(term, effect, joints) for term, (effect, joints) in enumerate(self.terms) if effect.memory and not isinstance(effect, Deflection)]
+        part = cache(lambda: self._seen(piece, slice(0, len(piece.t)), dict(out), [effect for _, effect, _ in looking]))
+        for term, effect, joints in looking:
+            for joint in joints:
+                columns = lambda: effect.columns(part(), joint, **self.shapes_of(term, joint))  # noqa: B023, E731
+                out[term, joint] = once(piece, ("columns", robot, id(effect), joint), depends(self, term, joint), alive, columns)
+        return out
 
     def _link_side(self, piece: Piece, joint: int) -> tuple[np.ndarray, np.ndarray]:
         """Load and inertia of a joint's link over a whole piece."""
@@ -109,6 +113,10 @@ class Model(Terms):
             part = replace(part, needed=needed(self, piece, part, rows, remembered))
         return part
 
+    def seen_at(self, piece: Piece, rows: slice, remembered: dict) -> Piece:
+        """Rows of a piece as effects that look back to no start of a log see them."""
+        return self._seen(piece, rows, remembered, self._at_once)
+
     @cached_property
     def _at_once(self) -> list[Effect]:
         """The effects that look back to no start of a log."""
@@ -125,18 +133,17 @@ class Model(Terms):
                 piece.kept[key] = self.robot, self._bodies, load
         return load
 
-    def columns(self, piece: Piece, rows: slice, remembered: dict | None = None, *, keep: bool = False) -> list[np.ndarray]:
+    def columns(self, piece: Piece, rows: slice, remembered: dict | None = None) -> list[np.ndarray]:
         """For each joint the columns (support in this piece, n) of the rows `rows` of a piece, filtered where its torque is.
 
         Args:
             rows: a slice, or the rows' numbers where nothing looks beside them (filter, `reach`).
             remembered: `remembered(piece)`, where it is at hand.
-            keep: the bodies' columns for whoever asks again for these rows, of this model or of one that grew from it.
         """
-        wide, inner = self._widened(piece, rows)
+        wide, inner = self.widened(piece, rows)
         if remembered is None:
             remembered = self.remembered(piece)
-        part = self._seen(piece, wide, remembered, self._at_once)
+        part = self.seen_at(piece, wide, remembered)
         by_joint: list[list[np.ndarray]] = [[] for _ in self.robot.joints]
         for term, (effect, joints) in enumerate(self.terms):
             for joint in joints if effect.present(piece) else ():
@@ -151,7 +158,7 @@ class Model(Terms):
         own = [piece.settled(self.sensed(np.concatenate(one), piece, joint), inner, joint, first) if one else None for joint, one in enumerate(by_joint)]
         room = [0 if one is None else len(one) for one in own]
         out = []
-        for joint, (rigid, effects) in enumerate(zip(self._bodies_of(piece, rows, part, wide, inner, keep, room), own)):
+        for joint, (rigid, effects) in enumerate(zip(self._bodies_of(piece, part, wide, inner, room), own)):
             size = len(self._support_of_bodies[joint])
             if len(rigid) == size:
                 rigid = rigid if effects is None else np.concatenate([rigid, effects])
@@ -166,26 +173,16 @@ class Model(Terms):
         count = 10 * self.bodies
         return [own[own < count] for own in (self.support(joint) for joint in range(self.robot.dof))]
 
-    def _bodies_of(self, piece: Piece, rows: slice, part: Piece, wide: slice, inner: slice, keep: bool, room: list[int]) -> list[np.ndarray]:
+    def _bodies_of(self, piece: Piece, part: Piece, wide: slice, inner: slice, room: list[int]) -> list[np.ndarray]:
         """The bodies' columns (support, n) in each joint's torque at rows of a piece, seen as `part`, filtered; with `room` for as many
         more where nothing is to be done to them."""
-        # with what they were made of, so that nothing else comes to its place
-        key = (id(piece.q), id(piece.smoother), rows.start, rows.stop, rows.step) if isinstance(rows, slice) else None
-        sensors = [effect for effect, _ in self.terms if isinstance(effect, SensorEffect)]
-        moved = any(isinstance(effect, MotionEffect) for effect, _ in self.terms) or any(not effect.constant_gain for effect in sensors)
-        gained = lambda out: [self.sensed(own, piece, joint) for joint, own in enumerate(out)]  # noqa: E731
-        if not moved and key in self._rigid:
-            return gained(self._rigid[key][2])
-        plain = piece.smoother is None and not sensors and not keep and inner == slice(None)
+        plain = piece.smoother is None and inner == slice(None) and not any(isinstance(effect, SensorEffect) for effect, _ in self.terms)
         spare = room if plain else [0] * self.robot.dof
         inertial = regressor.by_joint(self.robot, part.q, part.qd, part.qdd, gravity=part.gravity, deflection=part.deflection, room=spare)
         if plain:
             return inertial
         first = wide.start if isinstance(wide, slice) else 0
-        out = [piece.settled(self.sensed(own, piece, joint) if moved else own, inner, joint, first) for joint, own in enumerate(inertial)]
-        if keep and not moved:
-            self._rigid[key] = (piece.q, piece.smoother, out)
-        return out if moved else gained(out)
+        return [piece.settled(self.sensed(own, piece, joint), inner, joint, first) for joint, own in enumerate(inertial)]
 
     def torque(self, piece: Piece, pi, c, stride: int = 1) -> np.ndarray:
         """Predicted torque (samples, dof) over a piece's core, of bodies pi (bodies, 10) and coefficients c.
@@ -196,8 +193,8 @@ class Model(Terms):
         out = np.empty((-(-piece.samples // stride), self.robot.dof))
         remembered, effects = self.remembered(piece), list(acting(self, c))
         for rows in chunks(piece, stride * max(1, (_CHUNK if piece.smoother is None else 4 * _CHUNK) // stride)):
-            wide, inner = self._widened(piece, slice(rows.start, rows.stop, stride))
-            part = self._seen(piece, wide, remembered, self._at_once)
+            wide, inner = self.widened(piece, slice(rows.start, rows.stop, stride))
+            part = self.seen_at(piece, wide, remembered)
             predicted = regressor.torque(self.robot, pi, part.q, part.qd, part.qdd, gravity=part.gravity, deflection=part.deflection)
             add_over(predicted, effects, piece, part, wide, remembered, self.robot)
             predicted = predicted.T
@@ -215,7 +212,7 @@ class Model(Terms):
                 values = effect.sensed(values, piece.step, **self.shapes_of(term, joint))
         return values
 
-    def _widened(self, piece: Piece, rows: slice) -> tuple[slice, slice]:
+    def widened(self, piece: Piece, rows: slice) -> tuple[slice, slice]:
         """Rows with the margin that filters and effects need for them to come out as over the whole piece, and where the
         rows stand among these."""
         margin = self.reach

@@ -78,7 +78,7 @@ def build(experiment: Experiment) -> tuple[Robot, Model, np.ndarray]:
 @single_threaded
 def fit(
     experiment: Experiment, *, filters: dict | None = None, strength: PriorWeight | None = None, progress: Progress | None = None, measured: Read | None = None,
-    near: Model | None = None, workers: int = 1, scheduler: str | None = None,
+    near: Model | None = None, before: Model | None = None, workers: int = 1, scheduler: str | None = None,
 ) -> Fit:
     """Identify an experiment: everything from its logs to its errors on held-out data.
 
@@ -87,6 +87,7 @@ def fit(
             are compared again, and the weight of the prior is chosen where the experiment says so.
         measured: its logs, where they are at hand.
         near: its model with shape values that are not far from the best, where that is known: no others are searched.
+        before: a model that its own grew from, whose shape values were found on the same logs: only the others start from many places.
         workers, scheduler: as of `workers.crew`: who reads, filters, compresses and predicts. What is found does not depend on it.
 
     Raises:
@@ -95,12 +96,12 @@ def fit(
     """
     tell = progress or (lambda stage, share: None)
     if workers == 1 and scheduler is None:
-        return _fit(experiment, filters, strength, tell, measured, near, None)
+        return _fit(experiment, filters, strength, tell, measured, (near, before), None)
     with crew(workers, scheduler, lambda text: tell(text, 0.0)) as mapped:
-        return _fit(experiment, filters, strength, tell, measured, near, mapped)
+        return _fit(experiment, filters, strength, tell, measured, (near, before), mapped)
 
 
-def _fit(experiment: Experiment, filters: dict | None, strength: PriorWeight | None, tell: Progress, measured: Read | None, near: Model | None, mapped: Mapped | None) -> Fit:
+def _fit(experiment: Experiment, filters: dict | None, strength: PriorWeight | None, tell: Progress, measured: Read | None, known: tuple[Model | None, Model | None], mapped: Mapped | None) -> Fit:
     experiment = experiment if strength is None else with_weight(experiment, strength.value)
     seconds: dict[str, float] = {}
     with noticed() as notices:
@@ -132,7 +133,7 @@ def _fit(experiment: Experiment, filters: dict | None, strength: PriorWeight | N
         tell_left_out(motion, preprocess)
         disturbed = tell_events("train", motion)
         with _timed(seconds, "shape", tell):
-            structure, slopes, searched, weight = refined(experiment, structure, motion, prior, near)
+            structure, slopes, searched, weight = refined(experiment, structure, motion, prior, *known)
         with _timed(seconds, "compress", tell):  # the regressor is built and reduced chunk by chunk, never whole
             compressed = compress(slopes or structure, motion, progress=lambda share: tell("compress", share))
         with _timed(seconds, "weight", tell):
@@ -205,7 +206,7 @@ def _under(strength: PriorWeight, found: Fit, measured: Read | None) -> Fit:
 
 def fit_grown(experiment: Experiment, before: Fit, **how) -> Fit:
     """The first of the two fits of `refit`."""
-    return fit(with_weight(experiment, AUTO) if before.strength.auto else experiment, **how)
+    return fit(with_weight(experiment, AUTO) if before.strength.auto else experiment, before=before.model, **how)
 
 
 def predict_log(found: Fit, log: str | LogSpec, *, levels: Mapping[str, str] | None = None) -> Prediction:

@@ -1,4 +1,4 @@
-"""Model x motion -> rows that stand in memory: a thinned log's columns, and the derivative of its torque in shape values.
+"""Model x motion -> rows that stand in memory: a thinned log's columns, and what effects would add to them.
 
 Triangles hold all of a log but only for one set of shape values. Rows are what a search over these works on, and
 what a diagnosis asks its questions of: few enough to keep, spread over the whole motion.
@@ -11,21 +11,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from . import regressor
-from .effect import NotFinite, TorqueEffect
+from .effect import NotFinite
 from .model import Model
 from .motion import Motion, Piece
 from .slides import counted
 from .stretches import stretches
 from .two_masses import link_load
 
-_ROUNDED = 1e-12  # of a torque: what rounding, and the cube of a step of 1e-4, leave of a difference
-
 
 @dataclass(frozen=True)
 class Rows:
     """Every `stride`-th row of a motion.
 
-    columns (dof, n, size) and tau (n, dof), zero where a row does not count for a joint; use (n, dof) bool; t (n,) [s];
+    columns (dof, n, size; in memory samples last) and tau (n, dof), zero where a row does not count for a joint; use (n, dof) bool; t (n,) [s];
     log (n,) the number of the log; piece (n,) the number of the piece and index (n,) the row in it.
     """
 
@@ -85,12 +83,14 @@ def telling(model: Model, motion: Motion, found: Rows) -> Rows:
 def stack(model: Model, motion: Motion, stride: int) -> Rows:
     """The rows of a motion under a model."""
     found = telling(model, motion, measured(motion, stride))
-    columns = np.zeros((model.robot.dof, len(found.tau), model.size))
+    columns = np.zeros((model.robot.dof, model.size, len(found.tau)))  # samples last, as they come and as a product wants them
     for here, parts in stretches(model, motion, stride):
         for joint, (support, values) in enumerate(parts):
-            columns[joint, here, support] = values
-    columns[~found.use.T] = 0.0
-    return replace(found, columns=columns)
+            columns[joint, support, here] = values
+    for own, use in zip(columns, found.use.T):
+        if not use.all():
+            own[:, ~use] = 0.0
+    return replace(found, columns=np.swapaxes(columns, 1, 2))
 
 
 def predicted(model: Model, motion: Motion, x, stride: int) -> np.ndarray:
@@ -100,56 +100,9 @@ def predicted(model: Model, motion: Motion, x, stride: int) -> np.ndarray:
     return np.concatenate([model.torque(piece, pi, c, stride) for piece in motion.pieces])
 
 
-def tangents(model: Model, motion: Motion, x, stride: int, use: np.ndarray, middle: np.ndarray | None = None) -> np.ndarray:
-    """d torque / d shape (dof, n, shapes) at parameters x: by differences, as an effect says what it does, not its slope.
-
-    A step is a small share of what the bounds span, towards the inside; zero for values that the user holds. Where an effect of the
-    motion does nothing yet, on both sides: what is even in a value has no slope there.
-
-    Args:
-        middle: `predicted(model, motion, x, stride)`, where it is at hand.
-    """
-    values = model.shape_values
-    out = np.zeros((model.robot.dof, len(use), len(values)))
-    if not values:
-        return out
-    pieces = None
-    for k, value in enumerate(values):
-        if value.held:
-            continue
-        step, effect = difference_step(value, model.shapes[k]), model.terms[value.term][0]
-        if isinstance(effect, TorqueEffect):  # all else stays
-            pieces = moved(model, motion) if pieces is None else pieces
-            at = model.shapes_of(value.term, value.joint)
-            asked = lambda h: signatures(model, motion, pieces, effect, value.joint, [at, {**at, value.shape.name: model.shapes[k] + h}], stride, use)  # noqa: B023, E731
-            try:
-                here, there = asked(step)
-            except NotFinite:  # at the end of a formula's domain: the slope of the other side
-                step = -step
-                here, there = asked(step)
-            own = [i for i, c in enumerate(model.coefficients) if (c.term, c.joint) == (value.term, value.joint)]
-            out[value.joint, :, k] = (there - here) @ np.asarray(x)[10 * model.bodies :][own] / step
-            continue
-        if middle is None:
-            middle = predicted(model, motion, x, stride)
-        if (slope := model.gain_slope(k, step)) is not None:
-            out[value.joint, :, k] = slope * middle[:, value.joint] * use[:, value.joint]
-            continue
-        nudged = lambda h: predicted(model.with_shapes([s + h * (i == k) for i, s in enumerate(model.shapes)]), motion, x, stride)  # noqa: B023, E731
-        both = model.shapes[k] == value.shape.start and value.low <= model.shapes[k] - step <= value.high
-        change = 0.5 * (nudged(step) - nudged(-step)) if both else nudged(step) - middle
-        if np.abs(change).max(initial=0.0) > _ROUNDED * np.abs(middle).max(initial=0.0):
-            out[:, :, k] = (change / step * use).T
-    return out
-
-
-def difference_step(value, at: float) -> float:
-    """The step of a difference in a shape value, away from the nearer bound."""
-    if value.shape.least:
-        size = 1e-4 * max(abs(at), value.shape.least)
-    else:
-        size = 1e-4 * (abs(at) if value.shape.start is None and at else value.high - value.low)
-    return size if at + size <= value.high else -size
+def whole(motion: Motion) -> list[Piece]:
+    """The pieces without their low-pass, all of their rows."""
+    return [replace(piece, smoother=None, core=slice(0, len(piece.t))) for piece in motion.pieces]
 
 
 def seen(model: Model, motion: Motion) -> list:

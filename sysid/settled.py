@@ -40,8 +40,9 @@ def condensed(model: Model, rows: row.Rows) -> Compressed:
     for joint in range(model.robot.dof):
         support = model.support(joint)
         kept = rows.use[:, joint]
-        stacked = np.concatenate([rows.columns[joint][kept][:, support], rows.tau[kept, joint, None]], axis=1)
-        factors.append(Factor(joint, 0, support, triangle(stacked), int(kept.sum())))
+        own = rows.columns[joint].T[support]
+        stacked = np.vstack([own if kept.all() else own[:, kept], rows.tau[kept, joint]])
+        factors.append(Factor(joint, 0, support, triangle(stacked.T), int(kept.sum())))
     return Compressed(model.size, model.robot.dof, tuple(factors), len(rows.t))
 
 

@@ -10,6 +10,7 @@ place would bring its noise into the columns.
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import replace
 from functools import partial
 
@@ -17,7 +18,7 @@ import numpy as np
 
 from . import blows, eigen, multistart
 from . import rows as row
-from .deflection import Deflection
+from .deflection_starts import deflections, from_tries, idle
 from .effect import NotFinite
 from .estimate import Fit
 from .inertia import DIVERGENCES
@@ -26,10 +27,11 @@ from .model import Model
 from .motion import Motion
 from .objective import add_blocks
 from .prior_weight import number, with_weight
-from .projection import Projection, inverted, prior_hessian
+from .projection import inverted
 from .settled import Settled, poses
-from .shape_search import Search
+from .shape_search import Block, Search
 from .specs import Experiment
+from .tangents import tangents
 from .triangles import Compressed
 
 _MOST_ROWS, _STEPS, _TRIES, _SETTLED = 6000, 12, 6, 1e-7
@@ -40,7 +42,7 @@ _LEAST_SHARE = 0.25  # of the way to another load
 
 def settle(
     experiment: Experiment, model: Model, motion: Motion, prior: np.ndarray, *, weights=None, stride: int | None = None, grid: bool = True,
-    hold: bool = False, profile: bool = False, strikes: bool = False, tolerance: float = _SETTLED,
+    hold: bool = False, profile: bool = False, strikes: bool = False, tolerance: float = _SETTLED, found: Collection[Block] = (),
 ) -> Settled:  # fmt: skip
     """Find a model's shape values and its load on a motion.
 
@@ -48,6 +50,7 @@ def settle(
         weights: (joints,) that multiply the rows of each joint, or None.
         stride: which rows; by default as many as suffice.
         grid: start values that have no start of their own from many places; without it the model's own are where the search begins.
+        found: blocks of values that are where a search found them, before the model grew: they start there alone.
         hold: leave the shape values and the load as the model has them.
         profile: check the objective's profile over each value.
         strikes: look all about the values of effects by which a link strikes.
@@ -85,17 +88,17 @@ def settle(
     search = Search(motion, weights, attempted, lambda found: _descended(found, motion, attempted, weights, tolerance))
     tally = {}
     if grid:
-        best, tally = search.started(best)
-        for place in _deflections(best.model):
-            tried, count = _from_tries(best, motion, *place, weights)
+        best, tally = search.started(best, found)
+        for place in deflections(best.model):
+            tried, count = from_tries(best, motion, *place, weights)
             tally[place] = 1 + count
             if tried is not None:
                 best = min(best, solved(tried), key=lambda s: s.objective)
     best = search.descended(best)
     # tried before all else was found, a link may have stayed on its motor; a diagnosis has a fit
-    for place in _deflections(best.model) if grid and profile else ():
-        idle = _idle(best.model, *place)
-        tried, count = _from_tries(solved(idle), motion, *place, weights) if idle else (None, 0)
+    for place in deflections(best.model) if grid and profile else ():
+        without = idle(best.model, *place)
+        tried, count = from_tries(solved(without), motion, *place, weights) if without else (None, 0)
         tally[place] += count
         if tried is not None:
             best = min(best, search.descended(solved(tried)), key=lambda s: s.objective)
@@ -139,43 +142,6 @@ def _loose(model: Model, held, pinned) -> np.ndarray:
 
 def _bodies(found: Settled) -> np.ndarray:
     return found.x[: 10 * found.model.bodies].reshape(-1, 10)
-
-
-def _deflections(model: Model) -> list[tuple[int, int]]:
-    """The terms and joints that let a link stand apart from its motor."""
-    return [(term, joint) for term, (effect, joints) in enumerate(model.terms) for joint in joints if isinstance(effect, Deflection)]
-
-
-def _idle(model: Model, term: int, joint: int) -> Model | None:
-    """The model with a deflection at nothing, where it is left so or others move or read joints."""
-    values = [(k, v) for k, v in enumerate(model.shape_values) if not v.held and v.shape.start is not None]
-    own = {k: v.shape.start for k, v in values if (v.term, v.joint) == (term, joint)}
-    others = any(not isinstance(model.terms[v.term][0], Deflection) for _, v in values)
-    out = model.with_some_shapes(own)
-    return out if others or out.shapes == model.shapes else None
-
-
-def _from_tries(found: Settled, motion: Motion, term: int, joint: int, weights) -> tuple[Model | None, int]:
-    """The model with the best of the values that a deflection says to try, where it does nothing yet and none is held: on the
-    other side of a resonance no step from there arrives. And how many were tried."""
-    model, rows = found.model, found.rows
-    effect = model.terms[term][0]
-    own = {v.shape.name: k for k, v in enumerate(model.shape_values) if (v.term, v.joint) == (term, joint)}
-    values = [model.shape_values[k] for k in own.values()]
-    tried = effect.tries({v.shape.name: (v.low, v.high) for v in values})
-    busy = any(v.held or model.shapes[k] != v.shape.start for k, v in zip(own.values(), values) if v.held or v.shape.start is not None)
-    if busy or not tried:
-        return None, 0
-    scale = np.ones(model.robot.dof) if weights is None else np.asarray(weights)
-    projection = Projection(rows.columns, rows.residual(found.x), prior_hessian(found), scale)
-    gains = []
-    for change in row.secants(model, motion, row.bent(model, motion, found.x, joint), effect, tried, found.stride, rows.use):
-        c, _, _, gain, _ = projection.step(change[:, :, None], joint)
-        gains.append(gain if c[0] > 0 else 0.0)
-    if not max(gains) > 0:
-        return None, len(tried)
-    best = {own[name]: at for name, at in tried[int(np.argmax(gains))].items()}
-    return model.with_some_shapes(best), len(tried)
 
 
 def _descended(best: Settled, motion: Motion, solved, weights, tolerance: float) -> Settled:
@@ -257,7 +223,7 @@ def _normal(found: Settled, motion: Motion, free, scale):
     rows = found.rows
     residual = rows.residual(found.x)
     predicted = rows.tau - residual  # where rows count: elsewhere no slope does
-    slopes = row.tangents(found.model, motion, found.x, found.stride, rows.use, predicted)[:, :, free]
+    slopes = tangents(found.model, motion, found.x, found.stride, rows.use, predicted)[:, :, free]
     loose = _loose(found.model, found.problem.coordinates.held, at_zero(found))
     objective = found.problem.objective  # of all these columns, weighted
     base = objective.hessian(found.x) if objective.weight else objective.data_hessian()

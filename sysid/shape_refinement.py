@@ -25,13 +25,15 @@ _PART = 0.25  # of a step that led uphill
 _ROUNDS = 3  # of a prior's weight and the shape values under it
 
 
-def refined(experiment: Experiment, structure: Model, motion: Motion, prior, near: Model | None = None) -> tuple[Model, Linearised | None, tuple[Searched, ...], PriorWeight | None]:
+def refined(experiment: Experiment, structure: Model, motion: Motion, prior, near: Model | None = None, before: Model | None = None) -> tuple[Model, Linearised | None, tuple[Searched, ...], PriorWeight | None]:
     """The model measured by a motion, its shape values found: on rows that fit in memory, then by Gauss-Newton steps on all
     of them. Its slopes there, None where no shape value is free, and what was done to find them. And the prior's weight, None
     where it had no part in it.
 
     Args:
         near: the model with shape values that are not far from the best, where that is known.
+        before: one that it grew from, whose shape values were found: they are where these are looked for, and profiles say whether
+            what came with them leads elsewhere.
     """
     structure = finite(structure.measured_by(motion), motion)
     if not (structure.shape_values or structure.uses_load):
@@ -42,7 +44,8 @@ def refined(experiment: Experiment, structure: Model, motion: Motion, prior, nea
         strength = prior_strength(experiment, structure, motion, compress(begun if structure.gains else structure, motion), prior)
     weighed = experiment if strength is None else with_weight(experiment, strength.value)
     if near is None:
-        found = shape.settle(weighed, structure, motion, prior, profile=True, strikes=True)
+        begun, known = _begun(structure, before)
+        found = shape.settle(weighed, begun, motion, prior, profile=True, strikes=True, found=known)
     else:  # the search has been made
         found = shape.settle(weighed, structure.with_shapes(near.shapes), motion, prior, grid=False, strikes=True)
     bodies, searched = found.x[: 10 * structure.bodies].reshape(-1, 10), found.searched
@@ -99,6 +102,15 @@ def refined(experiment: Experiment, structure: Model, motion: Motion, prior, nea
         if not far:
             break
     return structure, slopes, searched, strength
+
+
+def _begun(structure: Model, before: Model | None) -> tuple[Model, set[tuple[int, int]]]:
+    """A model with the shape values of one that it grew from, and the blocks (term, joint) that have all of theirs there."""
+    known = {} if before is None else {v.name: at for v, at in zip(before.shape_values, before.shapes)}
+    values = list(enumerate(structure.shape_values))
+    at = {k: float(np.clip(known[v.name], v.low, v.high)) for k, v in values if v.name in known and not v.held}
+    new = {(v.term, v.joint) for k, v in values if k not in at and not v.held}
+    return structure.with_some_shapes(at), {(v.term, v.joint) for _, v in values} - new
 
 
 def scattered(fit: Fit, motion: Motion) -> Fit:

@@ -42,11 +42,13 @@ class Search:
     solved: Callable
     descended: Callable
 
-    def started(self, best) -> tuple:
-        """The best of many places of each block in turn, and {block: how many}."""
+    def started(self, best, found=()) -> tuple:
+        """The best of many places of each block in turn, and {block: how many}; of blocks that were
+        found before, where they are."""
         tally = {}
         for block in blocks(best.model, self.motion):
-            best, tally[block] = self._from_places(best, block)
+            if block not in found:
+                best, tally[block] = self._from_places(best, block)
         return best, tally
 
     def _from_places(self, best, block: Block) -> tuple:

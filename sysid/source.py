@@ -8,9 +8,10 @@ from functools import cached_property
 import numpy as np
 
 from . import rows as row
-from .effect import MotionEffect, SensorEffect
+from .effect import MotionEffect
 from .model import Model
 from .motion import Motion, Piece
+from .tangents import tangents
 
 
 @dataclass(frozen=True)
@@ -63,7 +64,7 @@ class Source:
         """Of each whole piece, slopes (3, dof, n) of the torque before sensors in the angle, speed and
         acceleration of a joint as measured: the same for whatever says that it moved otherwise."""
         if joint not in self._shifted:
-            out, model, x = [], self._unsensed, self.x
+            out, model, x = [], self.model.unsensed, self.x
             own = model.robot.turned(joint)
             moves = any(isinstance(effect, MotionEffect) for effect, _ in model.terms)
             # what the link carries is known: it moves as if behind its motor, the other way
@@ -115,19 +116,10 @@ class Source:
         return [self._torque(self.model, piece, self.x) for piece in self._whole]
 
     @cached_property
-    def _unsensed(self) -> Model:
-        """The model without its sensors, which have no parameters in x."""
-        model = self.model
-        for effect, joints in self.model.terms:
-            for joint in joints if isinstance(effect, SensorEffect) else ():
-                model = model.without(effect.name, joint)
-        return model
-
-    @cached_property
     def _base(self) -> list[np.ndarray]:
-        if self._unsensed is self.model:
+        if self.model.unsensed is self.model:
             return self.unfiltered
-        return [self._torque(self._unsensed, piece, self.x) for piece in self._whole]
+        return [self._torque(self.model.unsensed, piece, self.x) for piece in self._whole]
 
     def _torque(self, model: Model, piece: Piece, x: np.ndarray) -> np.ndarray:
         bodies, rest = np.split(x, [10 * model.bodies])
@@ -136,14 +128,14 @@ class Source:
     @cached_property
     def _whole(self) -> list[Piece]:
         """The pieces without their low-pass, all of their rows."""
-        return [replace(p, smoother=None, core=slice(0, len(p.t))) for p in self.motion.pieces]
+        return row.whole(self.motion)
 
     def full(self, columns: np.ndarray) -> np.ndarray:
         """The model's columns with the slopes of its free shape values after them."""
         free = [k for k, value in enumerate(self.model.shape_values) if not value.held]
         if not free:
             return columns
-        slopes = row.tangents(
+        slopes = tangents(
             self.model, self.motion, self.x, self.stride, self.use, self.predicted
         )
         return np.concatenate([columns, slopes[:, :, free]], axis=2)

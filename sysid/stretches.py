@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from .kept_columns import kept_columns
 from .model import Model, chunks
 from .motion import Motion
 
@@ -18,14 +19,14 @@ def stretches(model: Model, motion: Motion, stride: int, *, keep: bool = True) -
     and their columns (support, n).
 
     Args:
-        keep: as of `Model.columns`.
+        keep: what does not change for whoever asks again.
     """
     at = 0
     for piece in motion.pieces:
         remembered, supports = model.remembered(piece), [model.support(joint, piece) for joint in range(model.robot.dof)]
         # a stretch holds a whole number of strides, so that the kept rows go on where the last stretch ended
         for rows in chunks(piece, stride * max(1, (_STRETCH if keep else _PASSING) // stride)):
-            parts = model.columns(piece, slice(rows.start, rows.stop, stride), remembered, keep=keep)
+            parts = (kept_columns if keep else Model.columns)(model, piece, slice(rows.start, rows.stop, stride), remembered)
             size = parts[0].shape[-1]
             yield slice(at, at + size), list(zip(supports, parts))
             at += size

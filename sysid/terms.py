@@ -11,7 +11,7 @@ import numpy as np
 
 from . import regressor, units
 from .deflection import Deflection
-from .effect import Effect, TorqueEffect, WrenchEffect
+from .effect import Effect, SensorEffect, TorqueEffect, WrenchEffect
 from .effect_parameters import Shape
 from .errors import SysidError
 from .inertia import PARAMETERS, UNITS
@@ -131,6 +131,12 @@ class Terms:
     def without(self, name: str, joint: int) -> Self:
         """The model without an effect on a joint, at every level where it is per group."""
         return self._kept(lambda effect, j: (effect.name, j) != (name, joint))
+
+    @cached_property
+    def unsensed(self) -> Self:
+        """The model without its sensors, which have no parameters but shape values; itself where it has none."""
+        kept = lambda effect, joint: not isinstance(effect, SensorEffect)  # noqa: E731
+        return self._kept(kept) if any(isinstance(effect, SensorEffect) for effect, _ in self.terms) else self
 
     def _kept(self, wanted) -> Self:
         """The model with those of its effects and joints that are wanted."""

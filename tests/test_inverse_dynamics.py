@@ -78,7 +78,7 @@ def grown(machine, piece, names) -> tuple[Model, np.ndarray]:
 
 def slowly(model: Model, piece: Piece, x) -> np.ndarray:
     """The same by what predicts logs, without what looks back."""
-    kept = replace(model, _links={}, _rigid={})
+    kept = replace(model, _links={})
     c, k = [], 10 * model.bodies
     for found, joints in model.terms:
         size = len(found.coefficients()) * len(joints)

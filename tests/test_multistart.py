@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from sysid import config, multistart, pipeline, shape, shape_refinement
+from sysid import config, multistart, pipeline, shape, shape_refinement, vocabulary
 from sysid.compress import compress
 from sysid.estimate import identify
 from sysid.landscape import Landscape, at_zero, landscape
@@ -84,6 +84,20 @@ def test_the_best_of_many_hollows_is_found():
         ("formula.elbow_joint.w", False),
     ]
     assert all(s.starts > 300 and s.profile > 10 for s in found.searched)
+
+
+def test_what_a_search_found_before_the_model_grew_starts_there_alone():
+    """What is new starts from many places, and where what was found is no longer best a profile
+    says so."""
+    experiment, model, motion, prior, joint = bumped()
+    grown = model.with_effect(vocabulary.find("stribeck").given(), (joint,))
+    new = grown.shape_values[-1].name
+    anew, before = (shape_refinement.refined(experiment, grown, motion, prior, None, one) for one in (None, model.with_shapes((-0.4, 0.15))))
+    np.testing.assert_allclose(before[0].shapes[:2], anew[0].shapes[:2], rtol=1e-4)
+    assert {s.name: s.starts > 1 for s in before[2]} == {v.name: v.name == new for v in grown.shape_values}
+    assert all(s.starts > 1 for s in anew[2])
+    astray = shape_refinement.refined(experiment, grown, motion, prior, None, model.with_shapes((1.0, 0.1)))
+    np.testing.assert_allclose(astray[0].shapes[:2], [-0.4, 0.15], atol=0.01)
 
 
 def test_where_a_profile_is_lower_the_search_goes_on():

@@ -8,6 +8,7 @@ from .. import rows
 from ..effect import MotionEffect
 from ..model import Model
 from ..model_parameters import ROBOT
+from ..tangents import tangents
 from ..vocabulary import find
 
 _PER_JOINT = ("coulomb", "viscous", "torque_bias")
@@ -30,7 +31,7 @@ def signatures(structure: Model, x, motion, stride: int, use) -> dict[tuple[str,
             if any(term.name == name for term, _ in structure.terms):
                 continue
             grown = structure.with_effect(effect, (ROBOT,))
-            out[name, ROBOT] = rows.tangents(grown, motion, x, stride, use)[:, :, grown.last_shapes]
+            out[name, ROBOT] = tangents(grown, motion, x, stride, use)[:, :, grown.last_shapes]
         else:
             out[name, ROBOT] = rows.signature(
                 structure, motion, pieces, effect, ROBOT, {}, stride, use
