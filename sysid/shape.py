@@ -10,7 +10,7 @@ place would bring its noise into the columns.
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from dataclasses import replace
 from functools import partial
 
@@ -60,32 +60,17 @@ def settle(
         NotFinite: an effect is no finite number wherever it was tried.
     """
     stride = stride or row.stride_for(motion, _MOST_ROWS)
-    lighter = with_weight(experiment, number(experiment) / stride)
-    posed = poses(lighter, model, motion, prior, weights, stride)
-
-    last: list[np.ndarray] = []  # where the candidate before was least: the next is not far
-
-    def solved(candidate: Model) -> Settled:
-        rows, problem = posed(candidate)
-        x = problem.from_nearby(last[0], lighter.solver.tolerance) if last else None
-        if x is None:
-            x = problem.solve(lighter).x
-        last[:] = [x]
-        return Settled(candidate, x, problem, rows, stride, problem.objective.value(x))
-
-    def attempted(candidate: Model) -> Settled | None:
-        try:
-            return solved(candidate)
-        except NotFinite:
-            return None
-
+    solved, attempted = _solver(experiment, model, motion, prior, weights, stride)
+    # fewer rows say where a profile is worth looking at
+    coarse = row.stride_for(motion, multistart.ROWS)
+    rough = _solver(experiment, model, motion, prior, weights, coarse)[1] if coarse > stride else attempted
     best = attempted(model) or solved(multistart.finite(model, motion))
     if hold:
         return best
     # of what strikes on the way downhill alone, where that is lower: with other bodies' load it strikes at other times
     if model.uses_load and (model.reference is None or not blows.striking(model)):
         best = solved(best.model.referring_to(best.x))
-    search = Search(motion, weights, attempted, lambda found: _descended(found, motion, attempted, weights, tolerance))
+    search = Search(motion, weights, attempted, lambda found: _descended(found, motion, attempted, weights, tolerance), rough)
     tally = {}
     if grid:
         best, tally = search.started(best, found)
@@ -109,6 +94,30 @@ def settle(
         best, searched = search.profiled(best, tally)
         best = replace(best, searched=searched)
     return best
+
+
+def _solver(experiment: Experiment, model: Model, motion: Motion, prior: np.ndarray, weights, stride: int) -> tuple[Callable, Callable]:
+    """What solves for everything linear in a model that grows from this one, on the rows that a stride keeps; and the same, with None
+    where an effect is no finite number."""
+    lighter = with_weight(experiment, number(experiment) / stride)
+    posed = poses(lighter, model, motion, prior, weights, stride)
+    last: list[np.ndarray] = []  # where the candidate before was least: the next is not far
+
+    def solved(candidate: Model) -> Settled:
+        rows, problem = posed(candidate)
+        x = problem.from_nearby(last[0], lighter.solver.tolerance) if last else None
+        if x is None:
+            x = problem.solve(lighter).x
+        last[:] = [x]
+        return Settled(candidate, x, problem, rows, stride, problem.objective.value(x))
+
+    def attempted(candidate: Model) -> Settled | None:
+        try:
+            return solved(candidate)
+        except NotFinite:
+            return None
+
+    return solved, attempted
 
 
 def correction(fit: Fit, data: Compressed) -> np.ndarray:

@@ -35,12 +35,14 @@ class Search:
 
     weights: (joints,) or None. solved: a model with everything linear solved for, None where an
     effect is no finite number. descended: what was found with all shape values gone downhill.
+    rough: the same as `solved` on fewer rows, which say where a profile is worth looking at.
     """
 
     motion: Motion
     weights: np.ndarray | None
     solved: Callable
     descended: Callable
+    rough: Callable
 
     def started(self, best, found=()) -> tuple:
         """The best of many places of each block in turn, and {block: how many}; of blocks that were
@@ -109,10 +111,13 @@ class Search:
         return best, counts
 
     def _along_value(self, best, k: int, value) -> tuple:
-        values = np.linspace(value.low, value.high, _POINTS)
-        found = [self.solved(best.model.with_some_shapes({k: at})) for at in values]
-        lowest = min((f for f in found if f is not None), key=lambda f: f.objective, default=None)
-        return self._gone_on(best, lowest), _POINTS
+        values = [best.model.shapes[k], *np.linspace(value.low, value.high, _POINTS)]
+        tried = [self.rough(best.model.with_some_shapes({k: at})) for at in values]
+        found = [one for one in tried if one is not None]
+        lowest = min(found, key=lambda one: one.objective, default=None)
+        if lowest is tried[0]:
+            return best, _POINTS
+        return self._gone_on(best, self.solved(lowest.model)), _POINTS
 
     def _gone_on(self, best, found):
         """The better of two, the search gone on from the other where it is lower."""
