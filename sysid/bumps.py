@@ -10,7 +10,7 @@ for no other moment confirms it.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -55,12 +55,52 @@ def bumps(robot: Robot, logs: Sequence[Log], *, among: int = 1) -> list[Event]:
     if (motion := lowpassed(calm, robot.joints, cutoff, known=own_band)) is None:
         return shown
     model = build(robot, [EffectSpec(name=name) for name in _EFFECTS])
-    stride = stride_of(motion, cutoff)
+    stride, playing = stride_of(motion, cutoff), set[int]()
+    while (seen := _seen(robot, model, motion, stride, shown, among, playing)).often:
+        # what a joint does alone time and again is its own: the others say what else there is
+        if not (alone := [j for j in range(robot.dof) if (j,) in seen.members]):
+            return shown
+        playing.add(max(alone, key=lambda j: seen.members.count((j,))))
+        if len(playing) > robot.dof - 2:
+            return shown
+    found = seen.found
+    for event, near in zip(shown, seen.places):
+        # where no row counts it costs none
+        if not seen.counted[near].any() or seen.most[near].max() > 0.5 * seen.level:
+            found = _merged(found, event)
+    return found
+
+
+@dataclass(frozen=True)
+class _Seen:
+    """Bursts of logs: the events that they make, and the joints of each; `often` if they come too
+    often. places: rows (n,) about each event that signals show. counted (n, dof) bool: rows that
+    count; most (n, dof): how surprising what is left there is; level: from where on it is."""
+
+    found: list[Event]
+    members: list[tuple[int, ...]]
+    often: bool
+    places: list[np.ndarray]
+    counted: np.ndarray
+    most: np.ndarray
+    level: float
+
+
+def _seen(
+    robot, model: Model, motion: Motion, stride: int, shown, among: int, but: set[int]
+) -> _Seen:
+    """The greatest bursts first, and the fit made again without them.
+
+    Args:
+        but: joints whose equations are not looked at.
+    """
     rows, parts = apart(model, motion, stride)
+    for j in but:
+        rows.use[:, j], rows.tau[:, j], parts[j][1][:] = False, 0.0, 0.0
     step = stride * motion.pieces[0].step
     span = len(rows.t) * step
     level = np.log(span / BURST * robot.dof * among / CHANCE)
-    found, kinds = [], _kinds(motion)[rows.piece]
+    found, kinds, joined = list[Event](), _kinds(motion)[rows.piece], list[tuple[int, ...]]()
     names = [piece.source for piece in motion.pieces]
     counted, most = rows.use.copy(), np.full(rows.use.shape, -1.0)
     source, aside = np.array(names)[rows.piece], np.zeros(len(rows.t), dtype=bool)
@@ -69,27 +109,25 @@ def bumps(robot: Robot, logs: Sequence[Log], *, among: int = 1) -> list[Event]:
     ]
     for near in places:
         aside |= near  # a fit that has not seen them says whether they follow it
-    while sum(not _same(shown, event) for event in found) * _OFTEN <= span:
+    often = lambda: sum(not _same(shown, event) for event in found) * _OFTEN > span  # noqa: E731
+    while not often():
         more, strange = _bursts(rows, parts, kinds, aside, step, level)
         most = np.maximum(most, strange)
         for a, b, members in more:
             start, stop = float(rows.t[a]), float(rows.t[b])
             joints = tuple(robot.joints[j] for j in members)
-            event = Event("knock", names[rows.piece[a]], start, stop, joints, "both")
-            found = _merged(found, event)  # what rings on
+            joined.append(tuple(members))
+            # what rings on
+            found = _merged(
+                found, Event("knock", names[rows.piece[a]], start, stop, joints, "both")
+            )
             # what is left of the others is seen without them
             rows.use[a : b + 1], rows.tau[a : b + 1] = False, 0.0
             for _, columns in parts:
                 columns[:, a : b + 1] = 0.0
         if not more:
             break
-    else:
-        return shown
-    for event, near in zip(shown, places):
-        # where no row counts it costs none
-        if not counted[near].any() or most[near].max() > 0.5 * level:
-            found = _merged(found, event)
-    return found
+    return _Seen(found, joined, often(), places, counted, most, level)
 
 
 def _same(events: list[Event], one: Event) -> list[Event]:

@@ -84,6 +84,21 @@ def test_bursts_that_keep_coming_are_how_the_machine_moves(leg, tmp_path):
     assert bumps(machine, [log for log in logs if log.path.stem == "train"]) == []
 
 
+def test_pushes_of_an_arm_with_play_are_found(leg, tmp_path):
+    """Play jars its joint more often than anybody knocks: the other joints say what else there was."""
+    experiment, machine, *_ = leg
+    made = simulate(machine, hide=[hidden("backlash:abad:b=0.0063")], seed=154, duration=3.5, rate=1000.0, logs=6, knocks=1)
+    write(made, experiment, tmp_path / "logs")
+    machine, logs = read(pipeline.load(tmp_path / "logs"))
+    hit = 0
+    for log in logs:
+        done = [e for e in made.logs[log.path.stem].events if e["kind"] == "knock"]
+        for event in (e for e in log.events if e.kind == "knock"):
+            assert any(event.start < one["stop"] + 0.1 and one["start"] < event.stop + 0.1 for one in done)
+            hit += 1
+    assert hit >= 3
+
+
 def test_times_are_the_logs_own(pushed):
     _, logs = read(pushed[0])
     assert all(isinstance(e, Event) and isinstance(e.start, float) and np.isfinite(e.stop) for log in logs for e in log.events)

@@ -114,7 +114,9 @@ def test_grid_of_cogging_misses_no_line():
 
 
 @pytest.mark.parametrize("lines", [1, 2])
-@pytest.mark.parametrize("tried", [[7.0], [1.0, 5.0, 7.0], [3.0, 2.0, 9.0, 120.0, 1.0], [9.0, 7.0, 5.0, 3.0], *(list(np.linspace(1.0, 120.0, n)) for n in (2, 4, 5, 480))])
+@pytest.mark.parametrize(
+    "tried", [[7.0], [1.0, 5.0, 7.0], [3.0, 2.0, 9.0, 120.0, 1.0], [9.0, 7.0, 5.0, 3.0], *(list(np.linspace(1.0, 120.0, n)) for n in (2, 4, 5, 480))]
+)
 def test_ripples_of_many_pitches_at_once_are_those_of_each(lines, tried):
     piece, ripple = small_piece(), vocabulary.find("cogging").given(lines=lines)
     found = ripple.columns_at(piece, 1, [{"k": k} for k in tried])
@@ -358,6 +360,23 @@ def test_presliding_is_the_recurrence_of_its_samples():
     np.testing.assert_allclose(vocabulary.find("presliding").columns(piece, 2, x0=0.02)[0], out, atol=1e-12)
 
 
+def test_a_log_that_begins_in_motion_begins_with_contacts_that_have_slid():
+    """Of logs cut out of a motion, friction is that of the motion as far as their first sample tells: they
+    are off by a fraction of what they would be, did each begin with contacts at rest."""
+    machine = robot.load(robot_spec.RobotSpec(urdf=UR5))
+    t, q, qd, qdd = fourier_motion(np.random.default_rng(5), 30.0, 100.0, machine.dof)
+    found, x0 = vocabulary.find("presliding"), 0.02
+    off, at_rest = [], []
+    for start in np.random.default_rng(1).integers(300, 2800, 40):
+        for joint in range(machine.dof):
+            whole = found.columns(piece_of(machine, t[: start + 100], q[: start + 100], qd[: start + 100], qdd[: start + 100]), joint, x0=x0)[0][start:]
+            cut = slice(start, start + 100)
+            own = piece_of(machine, t[cut], q[cut], qd[cut], qdd[cut])
+            off.append(found.columns(own, joint, x0=x0)[0] - whole)
+            at_rest.append(found.columns(replace(own, qd=0.0 * own.qd), joint, x0=x0)[0] - whole)
+    assert np.sqrt(np.mean(np.square(off))) < 0.35 * np.sqrt(np.mean(np.square(at_rest)))
+
+
 def small_piece():
     """Three joints, four samples, by hand: joint 1 forwards, backwards, at rest, forwards."""
     q, qd, qdd, load = (np.zeros((4, 3)) for _ in range(4))
@@ -409,7 +428,9 @@ def test_what_a_joint_needs_is_its_load_and_what_else_acts_on_it():
     wanted = load[:, 1] + 0.3 * piece.qd[:, 1] + 0.7 * piece.direction(1) + 0.2 * piece.qdd[:, 1] + 0.4 * z
     np.testing.assert_allclose(seen.needed[:, 1], wanted, rtol=1e-12, atol=1e-12)
     rows = slice(20, 60, 4)
-    np.testing.assert_allclose(model.with_reference(machine.prior, c).columns(piece, rows)[1][-1], (np.sign(wanted) * np.maximum(np.abs(wanted) - 2.0, 0.0))[rows], atol=1e-12)
+    np.testing.assert_allclose(
+        model.with_reference(machine.prior, c).columns(piece, rows)[1][-1], (np.sign(wanted) * np.maximum(np.abs(wanted) - 2.0, 0.0))[rows], atol=1e-12
+    )
     assert model.with_reference(machine.prior).seen(piece).needed is None
 
 

@@ -10,6 +10,8 @@ class Presliding(TorqueEffect):
     """Contacts bend like bristles before they slide, so that friction builds up over an angle after each reversal.
 
     Between two reversals z = d + (z_0 - d) exp(-travel/x0), d the direction: exact, whatever the speed.
+    Nobody logged what the contacts did before: a joint that moves when a log begins has come as far as it has since it was last without
+    speed, were its acceleration always that of the first sample. There it stood or turned, which nobody knows either: half bent back.
     """
 
     name = "presliding"
@@ -40,8 +42,10 @@ class Presliding(TorqueEffect):
         begun = np.concatenate([[0.0], travelled[first[1:] - 1]])
         strokes, count = np.diff(begun, append=travelled[-1]), np.diff(first, append=len(way))
         since, ways, out = travelled - np.repeat(begun, count), way[first].tolist(), []
+        speed, push, goes = motion.qd[0, joint], motion.qdd[0, joint], motion.direction(joint)[0]
+        come = 0.5 * speed**2 / (goes * push) if goes * push > 0.0 else np.inf
         for x0 in (shapes["x0"] for shapes in tried):
-            z, starts = 0.0, []
+            z, starts = goes * (1.0 - 1.5 * np.exp(-come / x0)), []
             for direction, kept in zip(ways, np.exp(-strokes / x0).tolist()):
                 starts.append(z)
                 z = direction + (z - direction) * kept
