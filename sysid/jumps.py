@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -24,6 +25,7 @@ from .smoother import Smoother
 
 _TOP = 0.95  # of the largest about it: a jump stands within a few samples of there
 _MOST = 0.5  # of the square of what a torque does there, which is a jump's wave
+_LATE = 0.03  # s: as far as effects have torque stamped too late or too early
 _ROUNDS = 4  # of two jumps within a window the greater hides a part of the other
 _ROUNDING = 1e-12  # of what a second pass takes away of a jump by one, squared; of a wave's ends
 _NORMAL = 0.6745  # median of a Gaussian's absolute values
@@ -62,8 +64,11 @@ def jumps(
         # where a posture has another inertia each jump's own torque says how much
         inertia = np.linalg.lstsq(moved, torque, rcond=None)[0]
         noise = np.median(np.abs(rest[~sure] if np.sum(~sure) >= SHORT else rest)) / _NORMAL
+        here = [one.near & use for use, one in zip(own, seen)]
+        waves = [(h * (s.jumps @ inertia), h * s.told[:, j]) for h, s in zip(here, seen)]
+        late = _late(waves, round(_LATE / seen[0].response.smoother.step))
         for one in seen:
-            one.found[:, j] = _bent(one, j, inertia, noise)
+            one.found[:, j] = _bent(one, j, inertia, noise, late)
     return out
 
 
@@ -87,6 +92,11 @@ class _Seen:
     sure: np.ndarray
     found: np.ndarray
 
+    @cached_property
+    def near(self) -> np.ndarray:
+        """(n,) bool: rows whose filter sees a jump."""
+        return running(self.sure.astype(float), 2 * self.response.near + 1, "max") > 0.0
+
 
 def _seen(piece: Piece, response: _Response, moves: np.ndarray, found: np.ndarray) -> _Seen | None:
     """None where no acceleration jumps."""
@@ -107,9 +117,9 @@ def _seen(piece: Piece, response: _Response, moves: np.ndarray, found: np.ndarra
     return _Seen(response, piece.measured, moves, of_angle, limits, moved, told, rest, sure, found)
 
 
-def _bent(seen: _Seen, j: int, inertia: np.ndarray, noise: float) -> np.ndarray:
+def _bent(seen: _Seen, j: int, inertia: np.ndarray, noise: float, late: int) -> np.ndarray:
     """(n,) bool: the rows about jumps that bend the torque of joint j, of a usual inertia (dof,), by
-    more than its noise. The greatest thereabouts is one, and what is left without it may show
+    more than its noise, `late` samples after these. The greatest thereabouts is one, and what is left without it may show
     others.
 
     Source: Högbom 1974 (CLEAN).
@@ -119,10 +129,10 @@ def _bent(seen: _Seen, j: int, inertia: np.ndarray, noise: float) -> np.ndarray:
     sizes, n = seen.jumps @ inertia, len(told)
     least = max(noise, response.kept * max(quantum(tau) / np.sqrt(12.0), NOTHING * np.std(tau)))
     there = seen.moves[:, j].astype(float)
+    near, told = seen.near, _shifted(told, late)
     products = (there * sizes**2, there * told**2, there * sizes * told)
     own, whole, both = (running(each, 2 * reach + 1, "mean") for each in products)
     gain = np.abs(ratio(np.where(both**2 > _MOST * own * whole, both, 0.0), own))
-    near = running(seen.sure.astype(float), 2 * reach + 1, "max") > 0.0
     sizes, out = np.where(near, sizes, 0.0), np.zeros(n, dtype=bool)
     unsure = float(np.linalg.norm(seen.limits * inertia))
     for _ in range(_ROUNDS):
@@ -133,7 +143,7 @@ def _bent(seen: _Seen, j: int, inertia: np.ndarray, noise: float) -> np.ndarray:
         if not len(at):
             break
         far = np.searchsorted(-response.beyond, -((least / (gain[at] * size[at])) ** 2))
-        out |= _within(at, far, n)
+        out |= _within(at + late, far, n)
         for k, jump in zip(at.tolist(), sizes[at].tolist()):
             low, high = max(0, k - response.memory), min(n, k + response.memory + 1)
             start = low - k + response.memory
@@ -142,11 +152,32 @@ def _bent(seen: _Seen, j: int, inertia: np.ndarray, noise: float) -> np.ndarray:
     return out
 
 
+def _late(parts: list[tuple[np.ndarray, np.ndarray]], most: int) -> int:
+    """How many samples a torque's waves come after the jumps that make them, up to some; none but
+    where that leaves less than half of what else is not theirs.
+
+    Args:
+        parts: of each piece, how far its torque jumps (n,), as accelerations have it and as it is.
+    """
+    lags = range(-most, most + 1)
+    alike = np.square([sum(own @ _shifted(told, lag) for own, told in parts) for lag in lags])
+    whole = sum(own @ own for own, _ in parts) * sum(told @ told for _, told in parts)
+    best = int(np.argmax(alike))
+    return lags[best] if whole - alike[best] < (1.0 - _MOST) * (whole - alike[most]) else 0
+
+
+def _shifted(values: np.ndarray, by: int) -> np.ndarray:
+    """Values (n,) as they are `by` samples later; zero beyond their ends."""
+    out = np.roll(values, -by)
+    out[len(out) - by if by > 0 else 0 : None if by > 0 else -by] = 0.0
+    return out
+
+
 def _within(at: np.ndarray, reach: np.ndarray, n: int) -> np.ndarray:
     """(n,) bool: the rows that are less than `reach` (k,) rows from one of `at` (k,)."""
     edges = np.zeros(n + 1, dtype=int)
-    np.add.at(edges, np.maximum(at - reach + 1, 0), 1)
-    np.add.at(edges, np.minimum(at + reach, n), -1)
+    np.add.at(edges, np.clip(at - reach + 1, 0, n), 1)
+    np.add.at(edges, np.clip(at + reach, 0, n), -1)
     return np.cumsum(edges[:-1]) > 0
 
 

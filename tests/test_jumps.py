@@ -69,6 +69,20 @@ def test_the_true_model_leaves_the_noise_where_an_acceleration_jumps():
     assert 1.0 - piece.use.mean() < 18 * 0.1 / 12.0 + 0.01
 
 
+@pytest.mark.parametrize("samples", [-28, -15, -4, 0, 12, 25])
+def test_torque_that_is_logged_late_is_left_out_late(samples):
+    """As long as a delay may be; what the true model, delayed, leaves is the noise."""
+    t, q, qdd = moves()
+    late = np.roll(qdd, samples)
+    tau = INERTIA * late + NOISE * np.random.default_rng(0).normal(size=len(t))
+    (piece,) = motion(tau, q, t).pieces
+    kept = slice(piece.core.start + 30, piece.core.stop - 30)
+    rest = (piece.tau[:, 0] - INERTIA * np.roll(piece.qdd[:, 0], samples))[kept][piece.use[kept, 0]]
+    assert np.sqrt(np.mean(rest**2)) == pytest.approx(NOISE, rel=0.1)
+    # no more goes than of torque that is in time, but for where the joint turns round
+    assert 1.0 - piece.use.mean() < 18 * 0.1 / 12.0 + 0.03
+
+
 @pytest.mark.parametrize("rate", [100.0, 250.0, 1000.0])
 @pytest.mark.parametrize("filtered, period", [("savitzky-golay", 1.0), ("butterworth", 4.0)])
 def test_moves_so_short_that_half_of_the_rows_are_bent(rate, filtered, period):
