@@ -57,7 +57,8 @@ def bumps(robot: Robot, logs: Sequence[Log], *, among: int = 1) -> list[Event]:
     model = build(robot, [EffectSpec(name=name) for name in _EFFECTS])
     stride, playing = stride_of(motion, cutoff), set[int]()
     while (seen := _seen(robot, model, motion, stride, shown, among, playing)).often:
-        # what a joint does alone time and again is its own: the others say what else there is
+        # what a joint does alone time and again is its own: the others say what else there is, two of
+        # them at once, and what signals show on it stands
         if not (alone := [j for j in range(robot.dof) if (j,) in seen.members]):
             return shown
         playing.add(max(alone, key=lambda j: seen.members.count((j,))))
@@ -66,7 +67,8 @@ def bumps(robot: Robot, logs: Sequence[Log], *, among: int = 1) -> list[Event]:
     found = seen.found
     for event, near in zip(shown, seen.places):
         # where no row counts it costs none
-        if not seen.counted[near].any() or seen.most[near].max() > 0.5 * seen.level:
+        judged = not any(robot.joints[j] in event.joints for j in playing)
+        if not judged or not seen.counted[near].any() or seen.most[near].max() > 0.5 * seen.level:
             found = _merged(found, event)
     return found
 
@@ -111,7 +113,7 @@ def _seen(
         aside |= near  # a fit that has not seen them says whether they follow it
     often = lambda: sum(not _same(shown, event) for event in found) * _OFTEN > span  # noqa: E731
     while not often():
-        more, strange = _bursts(rows, parts, kinds, aside, step, level)
+        more, strange = _bursts(rows, parts, kinds, aside, step, level, alone=not but)
         most = np.maximum(most, strange)
         for a, b, members in more:
             start, stop = float(rows.t[a]), float(rows.t[b])
@@ -145,9 +147,10 @@ def _merged(found: list[Event], event: Event) -> list[Event]:
     return [*rest, replace(event, start=start, stop=stop, joints=joints)]
 
 
-def _bursts(rows: Rows, parts, kinds, aside, step: float, level: float):
+def _bursts(rows: Rows, parts, kinds, aside, step: float, level: float, alone: bool):
     """First and last row, and joints, of what stands out of what least squares leave; and how
-    surprising what is left is (n, dof) where it is no small share of how far torque goes."""
+    surprising what is left is (n, dof) where it is no small share of how far torque goes. alone:
+    whether one joint may stand out, as its neighbours do not answer to its own blows."""
     left, weights = _left(rows, parts, kinds, aside)
     size, wide = np.abs(left), 2 * max(1, round(2.0 * BURST / step)) + 1
     own = np.stack([_surprise(a, u, rows.piece, step) for a, u in zip(size.T, rows.use.T)], axis=1)
@@ -161,7 +164,8 @@ def _bursts(rows: Rows, parts, kinds, aside, step: float, level: float):
         )
         far = size[at] > _SHARE * weights * np.maximum(goes, 0.0)
         strange[at] = np.where(far & rows.use[at], own[at], -1.0)
-        for a, b in [*_together(own[at], step, level), *_outweighing(own, size, at, level)]:
+        single = _outweighing(own, size, at, level) if alone else []
+        for a, b in [*_together(own[at], step, level), *single]:
             members = np.flatnonzero(own[at[a : b + 1]].max(axis=0) > 0.5 * level)
             tells = strange[at[a : b + 1]].max() > 0.5 * level
             a, b = int(at[a]), int(at[b])

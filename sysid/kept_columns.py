@@ -64,7 +64,7 @@ def kept_columns(model, piece: Piece, rows: slice, remembered: dict) -> list[np.
         if all(effect.constant_gain for _, effect in sensors):
             found = asked(("bodies", joint), moves, lambda: settled(rigid()[joint], joint))
             return model.sensed(found, piece, joint)
-        bare = lambda: asked(("bare bodies", joint), moves, lambda: rigid()[joint])  # noqa: E731
+        bare = lambda: asked(("bare bodies", joint, wide.start, wide.stop), moves, lambda: rigid()[joint])  # noqa: E731
         state = moves, sensing(model, piece, joint)
         return asked(("bodies", joint), state, lambda: settled(model.sensed(bare(), piece, joint), joint))
 
@@ -109,7 +109,8 @@ def depends(model: Terms, term: int, joint: int) -> tuple:
     """All that an effect of a joint (-1: of the robot) makes of a motion depends on, but for the motion itself."""
     effect = model.terms[term][0]
     load = _load(model) if effect.uses_load else None
-    rest = (model.shapes, tuple((model.referred or {}).items())) if effect.uses_needed else None
+    others = tuple((id(other), joints) for other, joints in model.terms)
+    rest = (others, model.shapes, tuple((model.referred or {}).items())) if effect.uses_needed else None
     return _values(model, term, joint), moving(model), load, rest
 
 

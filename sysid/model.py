@@ -73,7 +73,8 @@ class Model(Terms):
                 apart = lambda: effect.apart(*self._link_side(piece, joint), whole(), **self.shapes_of(term, joint))  # noqa: B023, E731
                 out[term, joint] = once(piece, ("apart", robot, id(effect), joint), stands(self, term, joint), alive, apart)
         looking = [(term, effect, joints) for term, (effect, joints) in enumerate(self.terms) if effect.memory and not isinstance(effect, Deflection)]
-        part = cache(lambda: self._seen(piece, slice(0, len(piece.t)), dict(out), [effect for _, effect, _ in looking]))
+        known = dict(out)
+        part = cache(lambda: self._seen(piece, slice(0, len(piece.t)), known, [effect for _, effect, _ in looking]))
         for term, effect, joints in looking:
             for joint in joints:
                 columns = lambda: effect.columns(part(), joint, **self.shapes_of(term, joint))  # noqa: B023, E731

@@ -72,6 +72,10 @@ class Piece:
     blur: Blur | None = None
     kept: dict = field(init=False, default_factory=dict, repr=False, compare=False)
 
+    def __getstate__(self) -> dict:
+        """What is kept stays where it was made: another process has no use for it."""
+        return {**vars(self), "kept": {}}
+
     def direction(self, joint: int) -> np.ndarray:
         """sign(qd) (n,) of a joint, zero where the filter of a constant angle leaves nothing but rounding."""
         qd = self.qd[:, joint]

@@ -25,14 +25,14 @@ _PART = 0.25  # of a step that led uphill
 _ROUNDS = 3  # of a prior's weight and the shape values under it
 
 
-def refined(experiment: Experiment, structure: Model, motion: Motion, prior, near: Model | None = None, before: Model | None = None) -> tuple[Model, Linearised | None, tuple[Searched, ...], PriorWeight | None]:
+def refined(experiment: Experiment, structure: Model, motion: Motion, prior, near: Model | None = None, smaller: Model | None = None) -> tuple[Model, Linearised | None, tuple[Searched, ...], PriorWeight | None]:
     """The model measured by a motion, its shape values found: on rows that fit in memory, then by Gauss-Newton steps on all
     of them. Its slopes there, None where no shape value is free, and what was done to find them. And the prior's weight, None
     where it had no part in it.
 
     Args:
         near: the model with shape values that are not far from the best, where that is known.
-        before: one that it grew from, whose shape values were found: they are where these are looked for, and profiles say whether
+        smaller: one that it grew from, whose shape values were found: they are where these are looked for, and profiles say whether
             what came with them leads elsewhere.
     """
     structure = finite(structure.measured_by(motion), motion)
@@ -44,8 +44,8 @@ def refined(experiment: Experiment, structure: Model, motion: Motion, prior, nea
         strength = prior_strength(experiment, structure, motion, compress(begun if structure.gains else structure, motion), prior)
     weighed = experiment if strength is None else with_weight(experiment, strength.value)
     if near is None:
-        begun, known = _begun(structure, before)
-        found = shape.settle(weighed, begun, motion, prior, profile=True, strikes=True, found=known)
+        start, known = _begun(structure, smaller)
+        found = shape.settle(weighed, start, motion, prior, profile=True, strikes=True, found=known)
     else:  # the search has been made
         found = shape.settle(weighed, structure.with_shapes(near.shapes), motion, prior, grid=False, strikes=True)
     bodies, searched = found.x[: 10 * structure.bodies].reshape(-1, 10), found.searched
@@ -104,13 +104,21 @@ def refined(experiment: Experiment, structure: Model, motion: Motion, prior, nea
     return structure, slopes, searched, strength
 
 
-def _begun(structure: Model, before: Model | None) -> tuple[Model, set[tuple[int, int]]]:
-    """A model with the shape values of one that it grew from, and the blocks (term, joint) that have all of theirs there."""
-    known = {} if before is None else {v.name: at for v, at in zip(before.shape_values, before.shapes)}
-    values = list(enumerate(structure.shape_values))
-    at = {k: float(np.clip(known[v.name], v.low, v.high)) for k, v in values if v.name in known and not v.held}
-    new = {(v.term, v.joint) for k, v in values if k not in at and not v.held}
-    return structure.with_some_shapes(at), {(v.term, v.joint) for _, v in values} - new
+def _begun(structure: Model, smaller: Model | None) -> tuple[Model, set[tuple[int, int]]]:
+    """A model with the shape values that were found of one that it grew from, and the blocks (term, joint) that have all of theirs
+    there: of effects that are the same, and not where the user has another start or other bounds by now."""
+    known = {} if smaller is None else {(v.name, _same(smaller, v)): at for v, at in zip(smaller.shape_values, smaller.shapes) if not v.held}
+    free = {k: v for k, v in enumerate(structure.shape_values) if not v.held}
+    found = {k: known.get((v.name, _same(structure, v))) for k, v in free.items() if v.begin is None}
+    at = {k: value for k, value in found.items() if value is not None and free[k].low <= value <= free[k].high}
+    new = {(v.term, v.joint) for k, v in free.items() if k not in at}
+    return structure.with_some_shapes(at), {(v.term, v.joint) for v in free.values()} - new
+
+
+def _same(model: Model, value) -> tuple:
+    """What an effect with a shape value is, but for its joint and its values."""
+    effect = model.terms[value.term][0]
+    return type(effect).__name__, effect.equation, tuple(str(getattr(effect, name, None)) for name in effect.options)
 
 
 def scattered(fit: Fit, motion: Motion) -> Fit:

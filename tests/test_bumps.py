@@ -97,6 +97,10 @@ def test_pushes_of_an_arm_with_play_are_found(leg, tmp_path):
             assert any(event.start < one["stop"] + 0.1 and one["start"] < event.stop + 0.1 for one in done)
             hit += 1
     assert hit >= 3
+    # what its own signals show of the joint that jars is nothing that the others could belie
+    shown = Event("knock", logs[0].name, 0.9, 0.93, ("abad",), "torque")
+    told = bumps(machine, [replace(log, events=(shown,) if log is logs[0] else ()) for log in logs[:-1]])
+    assert any("abad" in event.joints and event.start <= 0.93 and event.stop >= 0.9 for event in told)
 
 
 def test_times_are_the_logs_own(pushed):

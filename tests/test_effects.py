@@ -377,6 +377,15 @@ def test_a_log_that_begins_in_motion_begins_with_contacts_that_have_slid():
     assert np.sqrt(np.mean(np.square(off))) < 0.35 * np.sqrt(np.mean(np.square(at_rest)))
 
 
+def test_contacts_of_a_log_that_begins_at_rest_are_not_bent_by_the_noise_of_its_first_sample():
+    machine = robot.load(robot_spec.RobotSpec(urdf=UR5))
+    t, still, rng = np.arange(0.0, 2.0, 0.005), np.zeros((400, machine.dof)), np.random.default_rng(0)
+    for _ in range(20):
+        q, qd, qdd = 2e-5 * rng.normal(size=still.shape), 1e-3 * rng.normal(size=still.shape), 0.1 * rng.normal(size=still.shape)
+        piece = replace(piece_of(machine, t, q, qd, qdd), noise=np.full(machine.dof, 2e-5))
+        assert abs(vocabulary.find("presliding").columns(piece, 1, x0=0.02)[0, 0]) < 1e-12
+
+
 def small_piece():
     """Three joints, four samples, by hand: joint 1 forwards, backwards, at rest, forwards."""
     q, qd, qdd, load = (np.zeros((4, 3)) for _ in range(4))

@@ -1,5 +1,6 @@
 """Columns that are kept are those that would be made anew, whatever changed since they were."""
 
+import pickle
 from dataclasses import replace
 
 import numpy as np
@@ -55,14 +56,27 @@ def test_whatever_changes_columns_are_those_made_anew(kind, names, stride):
     model, x = grown(machine, piece, names)
     rng = np.random.default_rng(stride)
     for turn in range(12):
-        if turn % 4 == 3:  # other bodies behind the load
-            model = model.referring_to(x * rng.uniform(0.8, 1.2, len(x)))
+        if turn == 6:  # an effect less: what is needed is less
+            model = model.without("coulomb", 1)
+        elif turn % 4 == 3:  # other bodies behind the load
+            own = x[: model.size]
+            model = model.referring_to(own * rng.uniform(0.8, 1.2, len(own)))
         else:  # one or two values, and back again
             which = rng.choice(len(model.shapes), 2)
             model = model.with_some_shapes({int(k): model.shapes[k] * rng.uniform(0.97, 1.03) for k in which})
         got = kept_columns(model, piece, rows, model.remembered(piece))
         for own, expected in zip(got, anew(model, piece, rows), strict=True):
             np.testing.assert_allclose(own, expected, rtol=0, atol=1e-12 * max(1.0, np.abs(expected).max()))
+
+
+def test_what_is_kept_stays_in_its_process():
+    machine, found = pieces()
+    piece = found["plain"]
+    model, _ = grown(machine, piece, ["stribeck"])
+    before = len(pickle.dumps(piece))
+    kept_columns(model, piece, slice(0, len(piece.t)), {})
+    assert piece.kept and len(pickle.dumps(piece)) == before
+    assert pickle.loads(pickle.dumps(piece)).kept == {}
 
 
 def test_of_one_value_that_changes_only_its_columns_are_made_again(monkeypatch):

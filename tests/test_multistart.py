@@ -96,6 +96,12 @@ def test_what_a_search_found_before_the_model_grew_starts_there_alone():
     np.testing.assert_allclose(before[0].shapes[:2], anew[0].shapes[:2], rtol=1e-4)
     assert {s.name: s.starts > 1 for s in before[2]} == {v.name: v.name == new for v in grown.shape_values}
     assert all(s.starts > 1 for s in anew[2])
+    # what is another formula, or begins elsewhere by now, is new
+    same, text = {"joints": ["elbow_joint"]}, "h*exp(-((q-c)/w)**2)"
+    for entry, kept in (({"formula": text}, True), ({"formula": text, "c": {"start": 0.3}}, False), ({"formula": "h*exp(-((q-c)/(2*w))**2)"}, False)):
+        other = build(model.robot, config.experiment({"robot": {"urdf": UR5}, "model": {"effects": ["viscous", "coulomb", {**entry, **same}]}}).model.effects)
+        start, found = shape_refinement._begun(other.measured_by(motion), model.with_shapes((-0.4, 0.15)))
+        assert bool(found) == kept and (start.shapes[0] == -0.4) == kept
     astray = shape_refinement.refined(experiment, grown, motion, prior, None, model.with_shapes((1.0, 0.1)))
     np.testing.assert_allclose(astray[0].shapes[:2], [-0.4, 0.15], atol=0.01)
 

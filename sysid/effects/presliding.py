@@ -4,14 +4,18 @@ import numpy as np
 
 from ..effect import TorqueEffect
 from ..effect_parameters import Linear, Shape
+from ..motion import NOISE_TRAVEL
+
+_BEGINNING = 0.05  # s of a log that say whether a joint moves when it begins
 
 
 class Presliding(TorqueEffect):
     """Contacts bend like bristles before they slide, so that friction builds up over an angle after each reversal.
 
     Between two reversals z = d + (z_0 - d) exp(-travel/x0), d the direction: exact, whatever the speed.
-    Nobody logged what the contacts did before: a joint that moves when a log begins has come as far as it has since it was last without
-    speed, were its acceleration always that of the first sample. There it stood or turned, which nobody knows either: half bent back.
+    Nobody logged what the contacts did before. A joint that moves when a log begins has come, since it last had no speed, as far as its first
+    speed and acceleration say. There its contacts are taken to be bent half way against the motion, between not at all (it stood) and
+    wholly (it turned round).
     """
 
     name = "presliding"
@@ -42,8 +46,7 @@ class Presliding(TorqueEffect):
         begun = np.concatenate([[0.0], travelled[first[1:] - 1]])
         strokes, count = np.diff(begun, append=travelled[-1]), np.diff(first, append=len(way))
         since, ways, out = travelled - np.repeat(begun, count), way[first].tolist(), []
-        speed, push, goes = motion.qd[0, joint], motion.qdd[0, joint], motion.direction(joint)[0]
-        come = 0.5 * speed**2 / (goes * push) if goes * push > 0.0 else np.inf
+        goes, come = _come(motion, joint)
         for x0 in (shapes["x0"] for shapes in tried):
             z, starts = goes * (1.0 - 1.5 * np.exp(-come / x0)), []
             for direction, kept in zip(ways, np.exp(-strokes / x0).tolist()):
@@ -52,3 +55,14 @@ class Presliding(TorqueEffect):
             start = np.repeat(starts, count)
             out.append((way + (start - way) * np.exp(-since / x0))[None])
         return np.stack(out)
+
+
+def _come(motion, joint: int) -> tuple[float, float]:
+    """Which way a joint moves when a log begins, zero where it stands, and how far it has come since it last had no speed."""
+    first = motion.q[: 1 + round(_BEGINNING / motion.step), joint]
+    if not abs(first[-1] - first[0]) > NOISE_TRAVEL * motion.noise[joint]:
+        return 0.0, np.inf
+    speed, goes = motion.qd[0, joint], motion.direction(joint)[0]
+    push = goes * motion.qdd[0, joint]
+    # beyond any x0 where it slows down, or hardly gains speed
+    return goes, 0.5 * speed**2 / push if push > 1e-9 * speed**2 else np.inf

@@ -86,6 +86,8 @@ def _recursive(over, under, values: np.ndarray) -> np.ndarray:
     solution of a banded system (scipy.signal alone takes half a second to import)."""
     from scipy.linalg.lapack import dtbtrs
 
+    if not len(values):
+        return np.zeros(0)
     right = np.convolve(values, over)[: len(values)]
     band = np.repeat(np.array(under)[:, None], len(values), axis=1)
     return dtbtrs(band, right, uplo="L")[0]
