@@ -13,6 +13,7 @@ import pytest
 
 import sysid
 from sysid import pipeline
+from sysid.addition import grown
 from sysid.datasets import DATASETS
 from sysid.transfer import transfers
 
@@ -91,11 +92,12 @@ def test_kinova_without_its_spikes_and_bursts_has_less_than_half_of_the_error():
 
 
 def test_odrive_ripples_at_7_14_and_28_periods_a_turn():
-    """Known of the motor from static maps: 0.87, 0.29 and 0.46 A at 0.03 turns/s, at 0.04 N m/A."""
-    said, _ = diagnosed("odrive")
+    """Known of the motor from static maps: 0.87, 0.29 and 0.46 A at 0.03 turns/s, at 0.04 N m/A; of it alone, as the command adds it."""
+    said, fit = diagnosed("odrive")
     last = [f for f in said["findings"] if f["joins_as_step"] and f["effect"] == "cogging"][-1]
-    assert "lines=" in last["command"]
-    values = {name.split(".")[-1]: p["value"] for name, p in last["parameters"].items()}
+    assert "lines=" in last["command"] and last["parameters"]["cogging.axis0.k"]["value"] == pytest.approx(7.0, abs=0.05)
+    after = sysid.fit(grown(fit.experiment, "cogging", ["axis0"], last["options"]))
+    values = {name.split(".")[-1]: value for name, (value, *_) in after.parameters_of("cogging", 0).items()}
     size = {round(line * values["k"], 1): np.hypot(values[f"a{line}"], values[f"b{line}"]) for line in range(1, last["options"]["lines"] + 1)}
     for periods, ampere in ((7, 0.87), (14, 0.29), (28, 0.46)):
         (own,) = [a for k, a in size.items() if abs(k - periods) < 0.1 * periods / 7]
