@@ -119,8 +119,8 @@ def _seen(piece: Piece, response: _Response, moves: np.ndarray, found: np.ndarra
 
 def _bent(seen: _Seen, j: int, inertia: np.ndarray, noise: float, late: int) -> np.ndarray:
     """(n,) bool: the rows about jumps that bend the torque of joint j, of a usual inertia (dof,), by
-    more than its noise, `late` samples after these. The greatest thereabouts is one, and what is left without it may show
-    others.
+    more than its noise, `late` samples after these. The greatest thereabouts is one, and what is
+    left without it may show others.
 
     Source: Högbom 1974 (CLEAN).
     """
@@ -168,8 +168,11 @@ def _late(parts: list[tuple[np.ndarray, np.ndarray]], most: int) -> int:
 
 def _shifted(values: np.ndarray, by: int) -> np.ndarray:
     """Values (n,) as they are `by` samples later; zero beyond their ends."""
-    out = np.roll(values, -by)
-    out[len(out) - by if by > 0 else 0 : None if by > 0 else -by] = 0.0
+    out = np.zeros_like(values)
+    if by < 0:
+        out[-by:] = values[:by]
+    else:
+        out[: len(out) - by] = values[by:]
     return out
 
 
