@@ -64,11 +64,13 @@ def jumps(
         # where a posture has another inertia each jump's own torque says how much
         inertia = np.linalg.lstsq(moved, torque, rcond=None)[0]
         noise = np.median(np.abs(rest[~sure] if np.sum(~sure) >= SHORT else rest)) / _NORMAL
-        here = [one.near & use for use, one in zip(own, seen)]
-        waves = [(h * (s.jumps @ inertia), h * s.told[:, j]) for h, s in zip(here, seen)]
-        late = _late(waves, round(_LATE / seen[0].response.smoother.step))
+        late = {one.step: 0 for one in seen}
+        for step in late:
+            alike = [(one.near & use, one) for use, one in zip(own, seen) if one.step == step]
+            waves = [(h * (one.jumps @ inertia), h * one.told[:, j]) for h, one in alike]
+            late[step] = _late(waves, round(_LATE / step))
         for one in seen:
-            one.found[:, j] = _bent(one, j, inertia, noise, late)
+            one.found[:, j] = _bent(one, j, inertia, noise, late[one.step])
     return out
 
 
@@ -91,6 +93,11 @@ class _Seen:
     rest: np.ndarray
     sure: np.ndarray
     found: np.ndarray
+
+    @property
+    def step(self) -> float:
+        """From row to row [s]."""
+        return self.response.smoother.step
 
     @cached_property
     def near(self) -> np.ndarray:
