@@ -25,6 +25,7 @@ from .smoother import Smoother
 
 _TOP = 0.95  # of the largest about it: a jump stands within a few samples of there
 _MOST = 0.5  # of the square of what a torque does there, which is a jump's wave
+_WHOLLY = 0.99  # of a torque, that is a wave: noise and a filter's edge leave no more
 _LATE = 0.03  # s: as far as effects have torque stamped too late or too early
 _ROUNDS = 4  # of two jumps within a window the greater hides a part of the other
 _ROUNDING = 1e-12  # of what a second pass takes away of a jump by one, squared; of a wave's ends
@@ -53,45 +54,33 @@ def jumps(
             if response and (one := _seen(piece, response, moves, found)):
                 seen.append(one)
     for j in range(pieces[0].q.shape[1] if seen else 0):
-        own = [one.moves[:, j] for one in seen]
-        if not any(np.any(use & one.sure) for use, one in zip(own, seen)):
+        rest = np.concatenate([one.rest[one.moves[:, j], j] for one in seen])
+        sure = np.concatenate([one.sure[one.moves[:, j]] for one in seen])
+        if not sure.any():
             continue
-        parts = [
-            (one.moved[use], one.told[use, j], one.rest[use, j], one.sure[use])
-            for use, one in zip(own, seen)
-        ]
-        moved, torque, rest, sure = (np.concatenate(each) for each in zip(*parts))
-        # where a posture has another inertia each jump's own torque says how much
-        inertia = np.linalg.lstsq(moved, torque, rcond=None)[0]
         noise = np.median(np.abs(rest[~sure] if np.sum(~sure) >= SHORT else rest)) / _NORMAL
-        late = {one.step: 0 for one in seen}
-        for step in late:
-            alike = [(one.near & use, one) for use, one in zip(own, seen) if one.step == step]
-            waves = [(h * (one.jumps @ inertia), h * one.told[:, j]) for h, one in alike]
-            late[step] = _late(waves, round(_LATE / step))
-        for one in seen:
-            one.found[:, j] = _bent(one, j, inertia, noise, late[one.step])
+        for step in {one.step for one in seen}:
+            alike = [one for one in seen if one.step == step]
+            late = _late(alike, j, noise)
+            for one in alike:
+                one.found[:, j] = _bent(one, j, noise, late)
     return out
 
 
 @dataclass(frozen=True)
 class _Seen:
     """Of a piece, whose torque is `tau` (n, dof) and in which joints move in the rows `moves` (n,
-    dof): the `jumps` (n, dof) of its accelerations, `limits` (dof,) up to which their noise may be
-    all there is, and `moved` (n, dof), those beyond; `told` (n, dof) of its torque; `rest` (n, dof)
-    of the torque beyond the filter's band, as large as white noise in it, as the fit sees it;
-    `sure` (n,) bool, where any acceleration jumps; `found` (n, dof), where its bent rows are told.
+    dof): the jumps `size` (n, dof) of its accelerations, each joint's in units of what noise may
+    be; `told` (n, dof) of its torque; `rest` (n, dof) of the torque beyond the filter's band, as
+    large as white noise in it, as the fit sees it; `found` (n, dof), where its bent rows are told.
     """
 
     response: _Response
     tau: np.ndarray
     moves: np.ndarray
-    jumps: np.ndarray
-    limits: np.ndarray
-    moved: np.ndarray
+    size: np.ndarray
     told: np.ndarray
     rest: np.ndarray
-    sure: np.ndarray
     found: np.ndarray
 
     @property
@@ -99,10 +88,59 @@ class _Seen:
         """From row to row [s]."""
         return self.response.smoother.step
 
+    @property
+    def sure(self) -> np.ndarray:
+        """(n,) bool, where any acceleration jumps."""
+        return (np.abs(self.size) > 1.0).any(axis=1)
+
     @cached_property
-    def near(self) -> np.ndarray:
-        """(n,) bool: rows whose filter sees a jump."""
-        return running(self.sure.astype(float), 2 * self.response.near + 1, "max") > 0.0
+    def tops(self) -> tuple[np.ndarray, np.ndarray]:
+        """The rows (jumps,) in which accelerations jump, and by how much (jumps, dof). The greatest
+        thereabouts is one, and what is left without it may show others.
+
+        Source: Högbom 1974 (CLEAN).
+        """
+        reach, memory = self.response.near, self.response.memory
+        near = running(self.sure.astype(float), 2 * reach + 1, "max") > 0.0
+        left, at, by = np.where(near[:, None], self.size, 0.0), [], []
+        for _ in range(_ROUNDS):
+            size = np.linalg.norm(left, axis=1) * near
+            top = (size > 1.0) & (size >= _TOP * running(size, 2 * reach + 1, "max"))
+            found = [first + int(np.argmax(size[first : last + 1])) for first, last in runs(top)]
+            if not found:
+                break
+            at, by = at + found, by + [*left[found]]
+            for k in found:  # of two within a window each may have a part of the other
+                jump, low, high = left[k].copy(), max(0, k - memory), min(len(left), k + memory + 1)
+                start = low - k + memory
+                left[low:high] -= self.response.alike[start : start + high - low, None] * jump
+        return np.array(at, dtype=int), np.reshape(by, (len(at), self.size.shape[1]))
+
+    @cached_property
+    def waves(self) -> np.ndarray:
+        """(jumps, window) of each jump the wave about it, of the accelerations as they jump there."""
+        at, by = self.tops
+        along = by / np.linalg.norm(by, axis=1, keepdims=True)
+        return np.einsum("kwj,kj->kw", _about(self.size, at, self.response.near), along)
+
+    def bends(self, j: int, noise: float, lags: range) -> tuple[np.ndarray, np.ndarray]:
+        """Of each jump, so many samples later (lags, jumps): by how much, at most, a torque of its
+        size is bent, times what the fit sees of the noise of joint j's; zero where its torque has
+        no such wave; and how surprising it is that it has."""
+        (at, by), reach, response = self.tops, self.response.near, self.response
+        waves = self.waves * _about(self.moves[:, j].astype(float), at, reach)
+        far = max(-lags.start, lags[-1])
+        told = _about(self.told[:, j] * self.moves[:, j], at, reach + far)
+        told = np.lib.stride_tricks.sliding_window_view(told, 2 * reach + 1, axis=1)
+        told = told[:, far + lags.start : far + lags.stop]
+        both, whole = np.einsum("kw,klw->lk", waves, told), np.einsum("klw,klw->lk", told, told)
+        own = np.sum(waves**2, axis=1)
+        theirs = ratio(both**2, own * whole)
+        torque = np.abs(ratio(both, own)) * np.linalg.norm(by, axis=1)
+        bends = np.where(theirs > _MOST, torque, 0.0)
+        # with two degrees of freedom beside a wave that is the chance of as much of one
+        chance = np.log((1.0 - _MOST) / (1.0 - np.minimum(theirs, _WHOLLY)))
+        return bends, np.where(bends > response.over * noise, chance, 0.0)
 
 
 def _seen(piece: Piece, response: _Response, moves: np.ndarray, found: np.ndarray) -> _Seen | None:
@@ -113,74 +151,46 @@ def _seen(piece: Piece, response: _Response, moves: np.ndarray, found: np.ndarra
         if own.any():
             noise[j] = min(noise[j], np.median(np.abs(of_angle[own, j])) / _NORMAL)
     limits = np.sqrt(2.0 * np.log(of_angle.size / CHANCE)) * noise
-    moved = np.where(np.abs(of_angle) > limits, of_angle, 0.0)
-    jumping, sure = moved.any(axis=0), moved.any(axis=1)
-    if not sure.any():
+    size = ratio(of_angle, limits)
+    if not (jumping := (np.abs(size) > 1.0).any(axis=0)).any():
         return None
     level = running(piece.measured, 2 * SPIKE + 1, "median", "edge")  # a spike comes back
     told = response.jumps(level - response.taken(level)) / response.passed
     rest = response.taken(piece.measured) / response.rest * response.kept
-    of_angle, limits = of_angle * jumping, limits * jumping
-    return _Seen(response, piece.measured, moves, of_angle, limits, moved, told, rest, sure, found)
+    return _Seen(response, piece.measured, moves, size * jumping, told, rest, found)
 
 
-def _bent(seen: _Seen, j: int, inertia: np.ndarray, noise: float, late: int) -> np.ndarray:
-    """(n,) bool: the rows about jumps that bend the torque of joint j, of a usual inertia (dof,), by
-    more than its noise, `late` samples after these. The greatest thereabouts is one, and what is
-    left without it may show others.
-
-    Source: Högbom 1974 (CLEAN).
-    """
-    response, tau, told = seen.response, seen.tau[:, j], seen.told[:, j]
-    reach = response.near
-    sizes, n = seen.jumps @ inertia, len(told)
+def _bent(seen: _Seen, j: int, noise: float, late: int) -> np.ndarray:
+    """(n,) bool: the rows about jumps that bend the torque of joint j by more than its noise,
+    `late` samples after these. What a jump is in its torque, that torque says."""
+    response, tau = seen.response, seen.tau[:, j]
     least = max(noise, response.kept * max(quantum(tau) / np.sqrt(12.0), NOTHING * np.std(tau)))
-    there = seen.moves[:, j].astype(float)
-    near, told = seen.near, _shifted(told, late)
-    products = (there * sizes**2, there * told**2, there * sizes * told)
-    own, whole, both = (running(each, 2 * reach + 1, "mean") for each in products)
-    gain = np.abs(ratio(np.where(both**2 > _MOST * own * whole, both, 0.0), own))
-    sizes, out = np.where(near, sizes, 0.0), np.zeros(n, dtype=bool)
-    unsure = float(np.linalg.norm(seen.limits * inertia))
-    for _ in range(_ROUNDS):
-        size = np.abs(sizes)
-        top = (size > unsure) & (size >= _TOP * running(size, 2 * reach + 1, "max"))
-        top &= gain * size > response.over * least
-        at = np.array([a + int(np.argmax(size[a : b + 1])) for a, b in runs(top)], dtype=int)
-        if not len(at):
-            break
-        far = np.searchsorted(-response.beyond, -((least / (gain[at] * size[at])) ** 2))
-        out |= _within(at + late, far, n)
-        for k, jump in zip(at.tolist(), sizes[at].tolist()):
-            low, high = max(0, k - response.memory), min(n, k + response.memory + 1)
-            start = low - k + response.memory
-            sizes[low:high] -= jump * response.alike[start : start + high - low]
-        sizes = np.where(near, sizes, 0.0)
-    return out
+    (torque,) = seen.bends(j, least, range(late, late + 1))[0]
+    bends = torque > response.over * least
+    far = np.searchsorted(-response.beyond, -((least / torque[bends]) ** 2))
+    return _within(seen.tops[0][bends] + late, far, len(tau))
 
 
-def _late(parts: list[tuple[np.ndarray, np.ndarray]], most: int) -> int:
-    """How many samples a torque's waves come after the jumps that make them, up to some; none but
-    where that leaves less than half of what else is not theirs.
+def _late(seen: list[_Seen], j: int, noise: float) -> int:
+    """How many samples the waves of joint j's torque come after the jumps that make them; none but
+    where so many agree on that as chance hardly makes.
 
     Args:
-        parts: of each piece, how far its torque jumps (n,), as accelerations have it and as it is.
+        seen: pieces of one rate.
     """
+    most = round(_LATE / seen[0].step)
     lags = range(-most, most + 1)
-    alike = np.square([sum(own @ _shifted(told, lag) for own, told in parts) for lag in lags])
-    whole = sum(own @ own for own, _ in parts) * sum(told @ told for _, told in parts)
-    best = int(np.argmax(alike))
-    return lags[best] if whole - alike[best] < (1.0 - _MOST) * (whole - alike[most]) else 0
+    chance = sum(one.bends(j, noise, lags)[1].sum(axis=1) for one in seen)
+    best = int(np.argmax(chance))
+    return lags[best] if chance[best] > chance[most] + np.log(len(lags) / CHANCE) else 0
 
 
-def _shifted(values: np.ndarray, by: int) -> np.ndarray:
-    """Values (n,) as they are `by` samples later; zero beyond their ends."""
-    out = np.zeros_like(values)
-    if by < 0:
-        out[-by:] = values[:by]
-    else:
-        out[: len(out) - by] = values[by:]
-    return out
+def _about(values: np.ndarray, at: np.ndarray, reach: int) -> np.ndarray:
+    """(k, 2 reach + 1, ...) of values (n, ...) about the rows `at` (k,); zero beyond their ends."""
+    rows = at[:, None] + np.arange(-reach, reach + 1)
+    inside = (rows >= 0) & (rows < len(values))
+    inside = inside.reshape(*inside.shape, *np.ones(values.ndim - 1, dtype=int))
+    return np.where(inside, values[np.clip(rows, 0, len(values) - 1)], 0.0)
 
 
 def _within(at: np.ndarray, reach: np.ndarray, n: int) -> np.ndarray:

@@ -136,8 +136,9 @@ def _second(size, at, way: int) -> np.ndarray:
 
 
 def ratio(values, scale) -> np.ndarray:
-    """values / scale (n,), zero where the scale is."""
-    return np.divide(values, scale, out=np.zeros(len(values)), where=scale > 0.0)
+    """values / scale, zero where the scale is."""
+    out = np.zeros(np.broadcast_shapes(np.shape(values), np.shape(scale)))
+    return np.divide(values, scale, out=out, where=scale > 0.0)
 
 
 def _thereabouts(values) -> np.ndarray:
