@@ -6,15 +6,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from . import comparison
+from . import blocks, comparison
 from .candidates import Candidate
-from .effect import Effect
 from .estimate import Fit
 from .model_parameters import ROBOT
 from .unexplained import Refused, changed
 
 CLEAR = 2.0  # standard deviations
-Number = tuple[float, float, str]  # value, standard deviation, unit
 _LIKELY = 0.05  # less is not listed
 _NOTHING = 5e-3  # of an error: a hundredth of its square, the least that is told in per cent
 
@@ -34,11 +32,11 @@ def in_doubt(before: Fit, after: Fit, told: Fit, candidate: Candidate) -> str | 
         change, shown = (next(d for d in one if d.joint == own[0]) for one in changes)
         unit = before.rms("test")[own[0]]
         rise = changed(change.delta_rms / max(unit, 1e-300))
-        still = any(-d.delta_rms < CLEAR * d.se for d in (change, shown))
+        still = all(-d.delta_rms < CLEAR * d.se for d in (change, shown))
     # a fit that weighs all joints alike may trade a quiet one's own error for what a loud one gains
     if not fell and still:
         return "the fit's own error does not fall with it"
-    if not whole and still and not size_told(candidate.effect, told.parameters_of(*candidate.key)):
+    if not whole and still and not size_told(told, *candidate.key):
         return "its size is nothing beside its deviation, nor the fall of the test error beside its own"
     # what moves a joint may show in the torque of those that it carries, or that carry it
     wide = len(candidate.touches(2)) > 1 and comparison.falls(before, after, _NOTHING)
@@ -62,23 +60,22 @@ def in_doubt(before: Fit, after: Fit, told: Fit, candidate: Candidate) -> str | 
     return None
 
 
-def size_told(effect: Effect, numbers: dict[str, Number]) -> bool:
-    """Whether any of an effect's `sizes` is more than its standard deviation can make."""
-    known = [(at, std) for at, std, _ in sizes(effect, numbers).values() if np.isfinite(std)]
-    return any(abs(at) > CLEAR * std for at, std in known)
-
-
-def sizes(effect: Effect, numbers: dict[str, Number]) -> dict[str, Number]:
-    """Of an effect's parameters those that say how large it is: how far they are from where it does
-    nothing. Beyond which torque a signal bends, or how fast warmth comes, is no size.
-
-    Args:
-        numbers: {name: (value, std, unit)}, as `Fit.parameters_of` has them, of one joint or more.
-    """
-    nothing = {c.name: 0.0 for c in effect.coefficients()}
-    nothing |= {s.name: s.start for s in effect.shapes() if s.start is not None}
-    own = ((n, n.rpartition(".")[2].partition("[")[0], *size) for n, size in numbers.items())
-    return {n: (at - nothing[word], *rest) for n, word, at, *rest in own if word in nothing}
+def size_told(fit: Fit, effect: str, joint: int) -> bool:
+    """Whether the parameters of an effect on a joint's number (-1: of the robot) that say how large
+    it is are together farther from where it does nothing than their deviations can make. Beyond
+    which torque a signal bends, or how fast warmth comes, is no size."""
+    model, blocks_ = fit.model, fit.compressed.blocks
+    own = [k for k, c in enumerate(model.coefficients) if (c.effect, c.joint) == (effect, joint)]
+    at = 10 * model.bodies + np.array(own, dtype=int)
+    if blocks.clear(fit.coefficients[own], fit.uncertainty.covariance[np.ix_(at, at)], blocks_):
+        return True
+    values = [(k, v) for k, v in enumerate(model.shape_values) if v.shape.start is not None]
+    values = [
+        (k, v) for k, v in values if (model.terms[v.term][0].name, v.joint) == (effect, joint)
+    ]
+    at = [k for k, _ in values]
+    away = np.array([model.shapes[k] - v.shape.start for k, v in values])
+    return blocks.clear(away, fit.shape_covariance[np.ix_(at, at)], blocks_)
 
 
 def undecided(members: Sequence[tuple[Candidate, float]], fit: Fit) -> Refused:

@@ -216,19 +216,17 @@ def document(added: Added) -> dict:
         "added": name, "experiment": str(added.experiment.path), "rms_test_before": added.before.rms("test"), "rms_test_after": added.after.rms("test"),
         "refused": added.refused, "says": added.says,
         "differences": [{"joint": d.joint, "delta_rms": d.delta_rms, "se": fit_document.number(d.se)} for d in added.differences],
-        "parameters": own, "untold": _untold(added, name, own), "converged": found["converged"], "notices": found["notices"],
+        "parameters": own, "untold": _untold(added, name), "converged": found["converged"], "notices": found["notices"],
     }  # fmt: skip
 
 
-def _untold(added: Added, name: str, parameters: list[dict]) -> str:
+def _untold(added: Added, name: str) -> str:
     """What to know of an effect whose size is nothing beside its deviations and that lowers no error; empty of others."""
-    numbers = {p["name"]: (p["value"], float("nan") if p["std"] is None else p["std"], p["unit"]) for p in parameters}
+    model, before = added.after.model, {*added.before.model.names, *(v.name for v in added.before.model.shape_values)}
+    new = {(c.effect, c.joint) for c in model.coefficients if c.name not in before}
+    new |= {(model.terms[v.term][0].name, v.joint) for v in model.shape_values if v.name not in before}
     falls = any(-d.delta_rms > d.se for d in added.differences)
-    if added.refused or not numbers or falls:
-        return ""
-    (first, *_), terms = numbers, added.after.model.terms
-    own = next(effect for effect, _ in terms if first.startswith(f"{effect.name}."))
-    if size_told(own, numbers):
+    if added.refused or not new or falls or any(size_told(added.after, *own) for own in new):
         return ""
     return (
         f"nothing in these logs speaks for {name}: its size is nothing beside its standard deviation, and no held-out error falls by more than its "

@@ -2,10 +2,12 @@
 
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
-from sysid import comparison, vocabulary
-from sysid.borne_out import in_doubt, size_told, sizes
+from sysid import blocks, comparison, vocabulary
+from sysid.blocks import parameters
+from sysid.borne_out import in_doubt, size_told
 from sysid.candidates import Candidate
 from sysid.comparison import Difference
 
@@ -61,17 +63,60 @@ def test_a_quiet_joints_own_error_may_rise_where_that_on_the_test_logs_clearly_f
     assert (said == "the fit's own error does not fall with it") is refused and (said is None) is not refused
 
 
-def test_how_large_an_effect_is_says_what_vanishes_with_it():
-    """Of a saturation its share, not the limit beyond which it acts; of a delay the delay; of warm friction what falls, not how fast."""
-    numbers = {"torque_saturation": ("e", "limit"), "delay": ("d",), "warmup": ("dFv", "dFc", "T"), "elasticity": ("compliance", "damping")}
-    said = {"torque_saturation": {"e"}, "delay": {"d"}, "warmup": {"dFv", "dFc"}, "elasticity": {"compliance"}}
-    for name, words in numbers.items():
-        found = sizes(vocabulary.find(name), {f"{name}.hip.{word}": (2.0, 0.5, "") for word in words})
-        assert {key.rpartition(".")[2] for key in found} == said[name] and set(found.values()) == {(2.0, 0.5, "")}
+def fitted(effect: str, sizes: dict[str, tuple[float, float]], shapes: dict[str, tuple[float, float]], together: float = 0.0):
+    """A fit as far as `size_told` looks at it, of an effect on joint 1: {word: (value, deviation)} of coefficients, which are correlated
+    by `together`, and of shape values."""
+    own = vocabulary.find(effect)
+    values = [SimpleNamespace(term=0, joint=1, shape=shape) for shape in own.shapes() if shape.name in shapes]
+    kinds = [SimpleNamespace(effect=effect, joint=joint) for joint in (0, 1) for _ in sizes]
+    model = SimpleNamespace(bodies=1, coefficients=kinds, shape_values=values, terms=[(own, None)], shapes=[shapes[v.shape.name][0] for v in values])
+    spread = np.array([std for _, std in sizes.values()])
+    alike = np.full((len(sizes),) * 2, together) + (1.0 - together) * np.eye(len(sizes))
+    covariance = np.eye(10 + 2 * len(sizes))
+    covariance[10 + len(sizes) :, 10 + len(sizes) :] = alike * np.outer(spread, spread)
+    return SimpleNamespace(
+        model=model, coefficients=np.array([100.0] * len(sizes) + [value for value, _ in sizes.values()]), compressed=SimpleNamespace(blocks=60),
+        uncertainty=SimpleNamespace(covariance=covariance), shape_covariance=np.diag([shapes[v.shape.name][1] ** 2 for v in values]),
+    )  # fmt: skip
 
 
-@pytest.mark.parametrize(("share", "told"), [((0.3, 0.1), True), ((0.1, 0.3), False), ((0.3, float("nan")), False)])
-def test_a_limit_that_is_told_is_no_size_that_is(share, told):
+@pytest.mark.parametrize(
+    ("effect", "sizes", "shapes", "told"),
+    [
+        # of a saturation its share, not the limit beyond which it acts; of a delay the delay; of warm friction what falls, not how fast
+        ("torque_saturation", {"e": (0.3, 0.1)}, {"limit": (8.0, 1.0)}, True),
+        ("torque_saturation", {"e": (0.1, 0.3)}, {"limit": (8.0, 1.0)}, False),
+        ("torque_saturation", {"e": (0.3, float("nan"))}, {"limit": (8.0, 1.0)}, False),
+        ("delay", {}, {"d": (0.003, 0.001)}, True),
+        ("delay", {}, {"d": (0.001, 0.001)}, False),
+        ("warmup", {"dFv": (0.1, 0.1), "dFc": (0.1, 0.1)}, {"T": (8.0, 1.0)}, False),
+        ("elasticity", {}, {"compliance": (1e-4, 1e-5), "damping": (0.3, 1.0)}, True),
+        ("elasticity", {}, {"compliance": (1e-5, 1e-5), "damping": (0.3, 0.01)}, False),
+        # what several say together: three of 1.9 deviations are no chance, one of three that is 2.2 may be
+        ("joint_coupling", {"Ia": (1.9, 1.0), "Fv": (1.9, 1.0), "Fs": (1.9, 1.0)}, {}, True),
+        ("joint_coupling", {"Ia": (2.2, 1.0), "Fv": (0.1, 1.0), "Fs": (0.1, 1.0)}, {}, False),
+    ],
+)
+def test_a_size_that_is_told_is_what_vanishes_with_the_effect(effect, sizes, shapes, told):
     """As everywhere that says whether a size is told: the diagnosis, `sysid add`, what the weights of joints hide."""
-    numbers = {"torque_saturation.hip.e": (*share, "1"), "torque_saturation.hip.limit": (8.0, 1.0, "N m")}
-    assert size_told(vocabulary.find("torque_saturation"), numbers) is told
+    assert size_told(fitted(effect, sizes, shapes), effect, 1) is told
+
+
+def test_sizes_that_trade_with_each_other_are_told_together():
+    """Of two that are as likely both less as both more, half a deviation each is nothing; one more and one less is much."""
+    for b, told in ((0.5, False), (-0.5, True)):
+        found = fitted("joint_coupling", {"Fv": (0.5, 1.0), "Fs": (b, 1.0)}, {}, together=0.98)
+        assert size_told(found, "joint_coupling", 1) is told
+
+
+@pytest.mark.parametrize("k", [1, 2, 5])
+@pytest.mark.parametrize("count", [12, 60])
+def test_values_that_are_noise_are_clear_as_seldom_as_one_is(k, count):
+    """One in twenty-two, of a covariance as well known as that of so many blocks and their neighbours."""
+    rng, hits, draws, freedom = np.random.default_rng(k), 0, 4000, round(parameters._freedom(count))
+    for _ in range(draws):
+        mixed = rng.normal(size=(k, k))
+        rows = rng.normal(size=(freedom, k)) @ mixed
+        known = rows.T @ rows / freedom * blocks.widening(count) ** 2
+        hits += blocks.clear(rng.normal(size=k) @ mixed, known, count)
+    assert abs(hits / draws - 0.0455) < 4.0 * np.sqrt(0.0455 / draws) + 0.01

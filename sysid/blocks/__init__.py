@@ -37,7 +37,7 @@ from .numbering import (
     numbered,
     summed,
 )
-from .parameters import covariance, widening
+from .parameters import clear, covariance, widening
 from .redrawn import left_out, normal_scores, ratio_at, redrawn
 from .rivals import SAME, chances, confidence_set, price, within_one_error
 
@@ -51,6 +51,7 @@ __all__ = [
     "SAME",
     "SHORTEST",
     "believed",
+    "clear",
     "chances",
     "confidence_set",
     "covariance",

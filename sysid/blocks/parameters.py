@@ -36,6 +36,7 @@ _MOST_NEIGHBOURS, _BLOCKS_FOR_ONE, _FEWEST = 4, 10, 3
 # Of the noise's variance: directions that have less are the prior's, and are left as they are.
 _NOISELESS = 1e-6
 _FLAT = 1e-12  # eigenvalues that are none, as a share of the largest
+_ALIKE = 1e-9  # of the largest: values so alike say one thing
 _TWO = 0.9772498680518208  # of the normal law lies below two deviations
 
 
@@ -88,8 +89,44 @@ def widening(blocks: int) -> float:
     """What two deviations of Student's law are to two of the normal one."""
     from scipy.special import stdtrit
 
-    freedom = blocks / (1.0 + 2.0 * sum(weight**2 for weight in _weights(blocks).values()))
-    return float(stdtrit(max(freedom, 1.0), _TWO)) / 2.0
+    return float(stdtrit(max(_freedom(blocks), 1.0), _TWO)) / 2.0
+
+
+def clear(values: np.ndarray, covariance: np.ndarray, blocks: int) -> bool:
+    """Whether values (k,) are together farther from zero than two standard deviations of a single
+    one reach: values that trade with each other may each be nothing beside its own. Those without a
+    deviation take no part.
+
+    Args:
+        covariance: (k, k), as of `covariance`, of so many blocks.
+
+    Source: Hotelling 1931.
+    """
+    from scipy.special import fdtri
+
+    variance = np.diagonal(covariance)
+    known = np.isfinite(variance) & (variance > 0.0)
+    k, freedom = int(known.sum()), max(_freedom(blocks), 1.0)
+    if not k or freedom <= k - 1.0:
+        return False
+    spread = np.sqrt(variance[known])
+    alike = covariance[np.ix_(known, known)] / np.outer(spread, spread)
+    shares, directions = eigen.symmetric(alike)
+    told = shares > _ALIKE * shares[-1]
+    far = np.sum((directions[:, told].T @ (values[known] / spread)) ** 2 / shares[told])
+
+    def squared(m: int) -> float:
+        """What m values are beyond with the chance of one normal one beyond two deviations."""
+        rest = freedom - m + 1.0
+        return m * freedom / rest * fdtri(m, rest, 2.0 * _TWO - 1.0)
+
+    # a deviation is told in units by which two of them are as likely as two of a normal one
+    return bool(far > 4.0 * squared(k) / squared(1))
+
+
+def _freedom(blocks: int) -> float:
+    """Degrees of freedom of a covariance of so many blocks."""
+    return blocks / (1.0 + 2.0 * sum(weight**2 for weight in _weights(blocks).values()))
 
 
 def _weights(blocks: int) -> dict[int, float]:

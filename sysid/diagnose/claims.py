@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 from .. import pipeline
 from ..addition import grown, spelled
-from ..borne_out import in_doubt
+from ..borne_out import in_doubt, size_told
 from ..estimate import Fit
 from ..experiment_logs import Read
 from ..failures import taken
@@ -44,9 +44,9 @@ class Claim:
 
     def beside_all(self, step: Step, last: Fit) -> Claim:
         """The claim of a step, with the parameters that the fit of all claims gives it."""
-        numbers = last.parameters_of(*self.head.candidate.key)
-        head = replace(self.head, parameters=numbers)
-        return replace(self, step=step, findings=(head, *self.findings[1:]))
+        key = self.head.candidate.key
+        told = {"parameters": last.parameters_of(*key), "size_told": size_told(last, *key)}
+        return replace(self, step=step, findings=(replace(self.head, **told), *self.findings[1:]))
 
 
 def claimed(

@@ -12,7 +12,6 @@ The whole loop on one page:
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
 
@@ -113,8 +112,7 @@ def diagnose(
         return Diagnosis(fit, dict(zip(fit.joints, found)), *told, tuple(refused), notices)
 
 
-def _notices(claims, refused) -> Iterator[str]:
-    yield from (f"{r.effect} on {r.joint} is not claimed: {r.why}" for r in refused)
-    for head, weights in ((c.head, c.after.weights) for c in claims):
-        if weights is None and not borne_out.size_told(head.candidate.effect, head.parameters):
-            yield hidden_by_weights(head.effect, head.joint)
+def _notices(claims, refused) -> list[str]:
+    small = [c.head for c in claims if c.after.weights is None and not c.head.size_told]
+    told = [f"{r.effect} on {r.joint} is not claimed: {r.why}" for r in refused]
+    return told + [hidden_by_weights(head.effect, head.joint) for head in small]

@@ -9,6 +9,7 @@ import numpy as np
 
 from .. import comparison
 from ..addition import command, spelled
+from ..borne_out import size_told
 from ..estimate import Fit
 from .refits import Member
 from .steps import Step
@@ -21,8 +22,8 @@ class Finding:
     joint: its name, or `*`. p: family-wise p-value of its set; probability: of being the best of
     its set. rms_before, rms_after: on the test logs, on its joint (over all joints for `*`), of the
     fits without it and with it. parameters: {name: (value, std or NaN, unit)} of the fit with it,
-    of a claim with all that is claimed. step: which step of the search it heads, or None. command:
-    what adds it.
+    of a claim with all that is claimed; size_told: whether they say how large it is. step: which
+    step of the search it heads, or None. command: what adds it.
     """
 
     member: Member
@@ -33,6 +34,7 @@ class Finding:
     rms_after: float
     fall_se: float
     parameters: dict[str, tuple[float, float, str]]
+    size_told: bool
     step: int | None
     command: str
 
@@ -63,5 +65,5 @@ def finding(
     se = float(np.sqrt(np.nansum([differences[j] ** 2 for j in own]) / len(own)))
     heads = number if member is step.choice.head else None
     added = command(before.experiment.path, *spelled(candidate, joint))
-    numbers = after.parameters_of(*candidate.key)
-    return Finding(member, joint, step.p, chance, *errors, se, numbers, heads, added)
+    numbers = after.parameters_of(*candidate.key), size_told(after, *candidate.key)
+    return Finding(member, joint, step.p, chance, *errors, se, *numbers, heads, added)

@@ -7,7 +7,6 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..addition import spelled
-from ..borne_out import size_told
 from ..diagnose.claims import Claim
 from ..diagnose.diagnosis import Diagnosis
 from ..diagnose.findings import Finding
@@ -89,7 +88,7 @@ def finding(f: Finding, claim: Claim, found: Diagnosis) -> dict:
             name: {"value": number(v), "std": number(s), "unit": u}
             for name, (v, s, u) in f.parameters.items()
         },
-        "size_told": size_told(f.candidate.effect, f.parameters),
+        "size_told": f.size_told,
         "tied_with": ties(claim, f),
         "separate_by": f.candidate.effect.separate_by,
         "command": f.command,
