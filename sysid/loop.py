@@ -84,7 +84,7 @@ def add(
         after = config.loads(text, file)
         pipeline.build(after)
     before_fit = pipeline.fit(experiment, progress=progress)
-    after_fit, compared = pipeline.refit(after, before_fit, progress=progress)
+    after_fit, compared, _ = pipeline.refit(after, before_fit, progress=progress)
     differences = tuple(comparison.compare(before_fit, after_fit, ("before", "after")))
     rises = comparison.rises(before_fit, compared, joints)
     if rises and not force:

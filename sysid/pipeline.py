@@ -176,19 +176,20 @@ def _fit(experiment: Experiment, filters: dict | None, strength: PriorWeight | N
     )  # fmt: skip
 
 
-def refit(experiment: Experiment, before: Fit, *, filters: dict | None = None, **how) -> tuple[Fit, Fit]:
-    """Fit an experiment that grew from a fitted one: as its file says, and under that one's prior, by which the two are compared.
+def refit(experiment: Experiment, before: Fit, *, filters: dict | None = None, **how) -> tuple[Fit, Fit, Fit]:
+    """Fit an experiment that grew from a fitted one: as its file says; under that one's prior; and that one under this fit's prior.
 
-    Where the weight of the prior is chosen, what was missing before may let it be another: the second fit is the first
-    where it is the same, and else has its shape values, which a prior of the bodies hardly moves.
+    Two models are compared under one prior. Where its weight is chosen, what was missing before may let it be another: the
+    second and the third fit are the first and the one before where it is the same, and else have their shape values, which a
+    prior of the bodies hardly moves.
 
     Args:
         filters, how: as of `fit`.
     """
-    after = fit_grown(experiment, before, filters=filters, **how)
+    after, logs = fit_grown(experiment, before, filters=filters, **how), how.get("measured")
     if after.strength.value == before.strength.value:
-        return after, after
-    return after, _under(before.strength, after, how.get("measured"))
+        return after, after, before
+    return after, _under(before.strength, after, logs), _under(after.strength, before, logs)
 
 
 def _under(strength: PriorWeight, found: Fit, measured: Read | None) -> Fit:

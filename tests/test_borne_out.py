@@ -5,23 +5,20 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from sysid import blocks, comparison, vocabulary
+from sysid import blocks, borne_out, comparison, vocabulary
 from sysid.blocks import parameters
-from sysid.borne_out import in_doubt, size_told
+from sysid.borne_out import doubted, in_doubt, size_told
 from sysid.candidates import Candidate
 from sysid.comparison import Difference
 
 
 class Told(SimpleNamespace):
-    """A fit as far as `in_doubt` looks at it: the error of its joint, and its parameters {name: (value, std, unit)}."""
+    """A fit as far as `in_doubt` looks at it: the error of its joint."""
 
     joints = ("shoulder", "elbow")
 
     def rms(self, part):
         return {"shoulder": 1.0, "elbow": self.error}
-
-    def parameters_of(self, effect, joint):
-        return {"cogging.elbow.a1": (5.0, 1.0, "N m"), "cogging.elbow.k": (30.0, 0.1, "1/rad")}
 
 
 def judged(monkeypatch, paid: tuple[float, float], own: float = -0.1, by_own: float = 0.01) -> str:
@@ -31,6 +28,7 @@ def judged(monkeypatch, paid: tuple[float, float], own: float = -0.1, by_own: fl
     before, after, told = (Told(error=error) for error in (1.0, 0.8, 0.8))
     change = {id(after): paid[0], id(told): paid[1]}
     fall = {id(after): -0.1, id(told): own}
+    monkeypatch.setattr(borne_out, "size_told", lambda *_: True)
     monkeypatch.setattr(comparison, "compare", lambda _, one: (Difference("a", "b", "elbow", fall[id(one)], 0.02),))
     monkeypatch.setattr(comparison, "together", lambda _, one, weighed=False: Difference("a", "b", "*", change[id(one)] if weighed else by_own, 0.002))
     return in_doubt(before, after, told, Candidate(vocabulary.find("cogging"), 1, ())) or ""
@@ -61,6 +59,27 @@ def test_a_quiet_joints_own_error_may_rise_where_that_on_the_test_logs_clearly_f
     monkeypatch.setattr(comparison, "together", lambda *_, **__: Difference("a", "b", "*", -0.01, 0.002))
     said = in_doubt(before, after, after, Candidate(vocabulary.find("cogging"), 1, ()))
     assert (said == "the fit's own error does not fall with it") is refused and (said is None) is not refused
+
+
+@pytest.mark.parametrize(
+    ("before", "own", "shown", "refused"),
+    [
+        (0.01, -0.1, -0.05, False),  # held back under the prior of the fit before, and clear under its own
+        (-0.1, 0.01, -0.05, False),
+        (0.01, 0.01, -0.05, True),  # only a weaker prior lowers the error, with it or without it
+        (0.01, -0.1, 0.05, True),  # clear, and yet `sysid add` shows an error that rises
+    ],
+)
+def test_an_effect_is_borne_out_under_either_prior(monkeypatch, before, own, shown, refused):
+    """By how much the error changes under the prior of the fit before, under that of the fit with it, and from the one to the other."""
+    first, after, without, told = (Told(error=error) for error in (1.0, 0.8, 1.0, 0.8))
+    change = {(id(first), id(after)): before, (id(without), id(told)): own, (id(first), id(told)): shown}
+    monkeypatch.setattr(borne_out, "size_told", lambda *_: True)
+    monkeypatch.setattr(comparison, "compare", lambda a, b, *_: (Difference("a", "b", "elbow", change[id(a), id(b)], 0.02),))
+    monkeypatch.setattr(comparison, "together", lambda *_, **__: Difference("a", "b", "*", -0.01, 0.002))
+    candidate = Candidate(vocabulary.find("cogging"), 1, ())
+    assert bool(doubted(first, after, without, told, candidate)) is refused
+    assert bool(doubted(first, after, first, after, candidate)) is (before > 0.0)  # under one prior there is one comparison
 
 
 def fitted(effect: str, sizes: dict[str, tuple[float, float]], shapes: dict[str, tuple[float, float]], together: float = 0.0):

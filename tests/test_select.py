@@ -249,8 +249,8 @@ def test_what_the_test_logs_refuse_is_not_claimed(simulated, tmp_path):
 
 def test_where_fits_refuse_the_head_the_next_of_its_set_is_claimed(simulated, monkeypatch):
     """Logs that cannot tell a bias from friction that differs with the direction cannot refuse both by refusing one."""
-    real = claims.in_doubt
-    monkeypatch.setattr(claims, "in_doubt", lambda *given: "not it" if given[-1].name == "torque_bias" else real(*given))
+    real = claims.doubted
+    monkeypatch.setattr(claims, "doubted", lambda *given: "not it" if given[-1].name == "torque_bias" else real(*given))
     experiment = pipeline.load(simulated(*BIAS))
     found = diagnose(experiment)
     (claim,) = found.claims
@@ -259,21 +259,22 @@ def test_where_fits_refuse_the_head_the_next_of_its_set_is_claimed(simulated, mo
     assert [f.effect for f in claim.findings] == ["asymmetric_coulomb", "torque_bias"]
     assert claim.head.command.split()[3] == "asymmetric_coulomb" and claim.after.parameters_of("asymmetric_coulomb", 1)
     assert [name for name, *_ in claim.set] == ["asymmetric_coulomb", "torque_bias"]
-    monkeypatch.setattr(claims, "in_doubt", lambda *given: f"not {given[-1].name}")
+    monkeypatch.setattr(claims, "doubted", lambda *given: f"not {given[-1].name}")
     (refused,) = diagnose(experiment).refused
     assert (refused.effect, refused.why) == ("torque_bias", "not torque_bias")
 
 
 def test_what_is_refused_alone_is_asked_again_beside_what_stands(simulated, monkeypatch):
     """The search found the first beside the second: fits may bear it out only with that one in the model."""
-    real, asked = claims.in_doubt, []
+    real, asked = claims.doubted, []
 
-    def in_doubt(before, after, told, candidate):
+    def doubted(before, *others):
+        candidate = others[-1]
         asked.append(candidate.name)
         alone = candidate.name == asked[0] and not before.model.terms[-1][0].name == "load_friction"
-        return "too much else is missing" if alone else real(before, after, told, candidate)
+        return "too much else is missing" if alone else real(before, *others)
 
-    monkeypatch.setattr(claims, "in_doubt", in_doubt)
+    monkeypatch.setattr(claims, "doubted", doubted)
     found = diagnose(pipeline.load(simulated(*TWO)))
     first, second = ("cogging", "load_friction")
     assert asked == [first, second, first]
@@ -287,7 +288,8 @@ def test_what_is_refused_alone_is_asked_again_beside_what_stands(simulated, monk
 def test_another_variant_of_what_joined_later_may_stand_for_a_head_that_is_refused(monkeypatch, borne, torque, filter_):
     """Of one effect on a joint one variant is claimed; and what is claimed is not told as refused as well."""
     soft, play, other = (
-        Candidate(vocabulary.find(name).given(encoder=encoder), 1, (("encoder", encoder),)) for name, encoder in (("elasticity", "motor"), ("backlash", "motor"), ("backlash", "joint"))
+        Candidate(vocabulary.find(name).given(encoder=encoder), 1, (("encoder", encoder),))
+        for name, encoder in (("elasticity", "motor"), ("backlash", "motor"), ("backlash", "joint"))
     )
     one, two, three = (Member(SimpleNamespace(candidate=c), None, None) for c in (soft, play, other))
     choice = lambda *members: Choice(members[0], tuple((m, 1.0 / len(members)) for m in members), None)  # noqa: E731

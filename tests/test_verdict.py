@@ -74,7 +74,7 @@ def elbow(first: float, claims=(), *, rest=NOISE, level=None, refused=(), train=
     ],
 )  # fmt: skip
 def test_what_is_nothing_in_size_and_error_is_not_claimed(monkeypatch, fall, told, size, all_, stands):
-    """Errors are told to 0.01, the size to 0.1; one that is not determined, and what is no size, says nothing. Nor what the other joints pay for.
+    """Errors are told to 0.01, the size to 0.1. Nor what the other joints pay for.
 
     The fall is that under the prior of the fit before, and the one that `sysid add` shows.
     """
@@ -82,8 +82,7 @@ def test_what_is_nothing_in_size_and_error_is_not_claimed(monkeypatch, fall, tol
     falls = lambda before, one: [Difference("", "", "elbow", -(told if one is shown else fall), 0.01)]  # noqa: E731
     monkeypatch.setattr(borne_out.comparison, "compare", falls)
     monkeypatch.setattr(borne_out.comparison, "together", lambda *_, **__: Difference("", "", "*", all_, 0.01))
-    sizes = {"dFc": (size, 0.1, "N m"), "dFv": (3.0, float("nan"), "N m s/rad"), "T": (3.0, 0.1, "s")}
-    shown.parameters_of = lambda effect, joint: {f"warmup.elbow.{word}": own for word, own in sizes.items()}
+    monkeypatch.setattr(borne_out, "size_told", lambda fit, *_: fit is shown and abs(size) > 2.0 * 0.1)
     candidate = Candidate(find("warmup"), 1, ())
     assert (borne_out.in_doubt(fitted(1.0, train=1.0), after, shown, candidate) is None) is stands
 
@@ -105,8 +104,8 @@ def test_what_moves_a_joint_may_show_in_the_torque_of_another(monkeypatch, effec
     """The error of its own joint hardly falls, that of all together by three standard errors, or less than one."""
     monkeypatch.setattr(borne_out.comparison, "compare", lambda *_: [Difference("", "", "elbow", -0.001, 0.01)])
     monkeypatch.setattr(borne_out.comparison, "together", lambda *_, **__: Difference("", "", "*", all_, 0.01))
+    monkeypatch.setattr(borne_out, "size_told", lambda *_: True)
     after = fitted(1.0, train=0.9)
-    after.parameters_of = lambda effect, joint: {"d": (0.5, 0.1, "rad")}
     candidate = Candidate(find(effect), 1, ())
     assert (borne_out.in_doubt(fitted(1.0, train=1.0), after, after, candidate) is None) is stands
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 from .. import pipeline
 from ..addition import grown, spelled
-from ..borne_out import in_doubt, size_told
+from ..borne_out import doubted, size_told
 from ..estimate import Fit
 from ..experiment_logs import Read
 from ..failures import taken
@@ -106,9 +106,9 @@ def _borne_out(near: list[Member], last: Fit, with_: Callable):
     who is in them; and why they do not bear out the head, None where they do."""
     fits, whys = {}, []
     for member in near:
-        after, compared = with_(pipeline.refit, member)  # and under the last one's prior
+        after, *others = with_(pipeline.refit, member)  # and under one prior, the last one's or its
         fits[id(member)] = after
-        whys.append(in_doubt(last, compared, after, member.candidate))
+        whys.append(doubted(last, *others, after, member.candidate))
         if whys[-1] is None:
             return member, fits, whys[0]
     return None, fits, whys[0]

@@ -6,7 +6,7 @@ from ..addition import LIKELY, apart, designs, likely
 from ..estimate import Fit
 from ..given_shapes import given_shapes, said_of_shapes
 from ..statement import text
-from ..statement.words import either, followed, near, percent, refused, untold
+from ..statement.words import either, followed, near, otherwise, percent, refused, untold
 from .section import Section
 from .words import (
     SPACE,
@@ -94,7 +94,9 @@ def _card(found: dict, fit: Fit, document: dict) -> dict:
     if status == "explained":
         names = [either(c, document) for c in found["by"]]
     fall = ""
-    if status in ("explained", "missing") or heads or (status == "unresolved" and claims):
+    last = document["claims"][-1]["rms_test_after"] if claims else {}
+    falls = status == "unresolved" and last and otherwise(joint, document["joints"], last)
+    if status in ("explained", "missing") or heads or falls:
         fall = _fall(found, fit, document)
     several = len(claims) > 1
     says = found.get("says") or ""

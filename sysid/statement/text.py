@@ -13,6 +13,7 @@ from .words import (
     followed,
     listed,
     near,
+    otherwise,
     percent,
     placed,
     quantity,
@@ -73,7 +74,7 @@ def verdict(of: Told, width: int) -> list[tuple[str, list[str]]]:
 
 def _joint(v: dict, of: Told, width: int, said: dict[str, str]) -> list[str]:
     joint, status = v["joint"], v["status"]
-    seen = of.document["joints"][joint]["rms"]["test"] is not None  # a row of it counts
+    falls = otherwise(joint, of.document["joints"], of.after)
     known = {f["command"]: f for f in of.document["findings"]}
     heads = [known[command] for command in v.get("commands", []) if command in known]
     words = [either(f, of.document, joint) for f in heads]
@@ -88,7 +89,7 @@ def _joint(v: dict, of: Told, width: int, said: dict[str, str]) -> list[str]:
         "explained": lambda: (
             f"by {all_of([either(c, of.document) for c in v['by']])}; {_fall(v, of)}"
         ),
-        "unresolved": lambda: v["says"] + (f"; {_fall(v, of)}" if of.sets and seen else ""),
+        "unresolved": lambda: v["says"] + (f"; {_fall(v, of)}" if of.sets and falls else ""),
         "missing": lambda: f"{named or v['effect']}; {_fall(v, of)}",
         "unknown": lambda: (
             "no effect of the catalogue explains what is left"

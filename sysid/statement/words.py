@@ -123,6 +123,16 @@ def wrapped(words: str, width: int, indent: str) -> list[str]:
     return [line.replace("\u00a0", " ") for line in lines]
 
 
+def otherwise(joint: str, joints: dict[str, dict], after: dict[str, float]) -> bool:
+    """Whether a joint's held-out error is another, for a reader, with all that is named.
+
+    Args:
+        joints: the document's. after: {joint: held-out RMS with it}.
+    """
+    before = joints[joint]["rms"]["test"]
+    return bool(before) and abs(1.0 - after[joint] / before) >= _HARDLY
+
+
 def elsewhere(joint: str, joints: dict[str, dict], after: dict[str, float], units) -> str:
     """The joint whose held-out error falls most with an effect on another, where that one's own
     hardly does: what moves a joint may show in the torque of those that it carries.
