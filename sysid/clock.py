@@ -92,6 +92,12 @@ class Left:
         known, most = np.flatnonzero(self.below <= _ENDS * usual), round(1.0 / (usual * self.step))
         return slice(min(int(known[0]), most), max(int(known[-1]) + 1, rows - most))
 
+    @property
+    def spread(self) -> float:
+        """How far to either side [s] what all joints did at once may have been spread: half a period
+        of the lowest frequency above which errors were read off."""
+        return 0.5 / float(np.min(self.below))
+
     def of(self, rows: slice) -> Left:
         """Of some of the rows."""
         return replace(self, below=self.below[rows], doubt=self.doubt[:, rows])

@@ -18,6 +18,7 @@ from functools import cached_property
 
 import numpy as np
 
+from .clock_jumps import spread
 from .motion import Piece
 from .outliers import CHANCE, NOTHING, SHORT, SPIKE, quantum, ratio, runs
 from .running import running
@@ -56,7 +57,7 @@ def jumps(
     for j in range(pieces[0].q.shape[1] if seen else 0):
         rest = np.concatenate([one.rest[one.moves[:, j], j] for one in seen])
         sure = np.concatenate([one.sure[one.moves[:, j]] for one in seen])
-        if not sure.any():
+        if not len(rest):
             continue
         noise = np.median(np.abs(rest[~sure] if np.sum(~sure) >= SHORT else rest)) / _NORMAL
         for step in {one.step for one in seen}:
@@ -69,16 +70,18 @@ def jumps(
 
 @dataclass(frozen=True)
 class _Seen:
-    """Of a piece, whose torque is `tau` (n, dof) and in which joints move in the rows `moves` (n,
-    dof): the jumps `size` (n, dof) of its accelerations, each joint's in units of what noise may
-    be; `told` (n, dof) of its torque; `rest` (n, dof) of the torque beyond the filter's band, as
-    large as white noise in it, as the fit sees it; `found` (n, dof), where its bent rows are told.
+    """Of a piece in which joints move in the rows `moves` (n, dof): the jumps `size` (n, dof) of its
+    accelerations, each joint's in units of what noise may be; its torque without spikes, `level`
+    (n, dof), and how far it jumps, `told` (n, dof); `rest` (n, dof) of the torque beyond the
+    filter's band, as large as white noise in it, as the fit sees it; `found` (n, dof), where its
+    bent rows are told.
     """
 
     response: _Response
-    tau: np.ndarray
+    piece: Piece
     moves: np.ndarray
     size: np.ndarray
+    level: np.ndarray
     told: np.ndarray
     rest: np.ndarray
     found: np.ndarray
@@ -152,23 +155,30 @@ def _seen(piece: Piece, response: _Response, moves: np.ndarray, found: np.ndarra
             noise[j] = min(noise[j], np.median(np.abs(of_angle[own, j])) / _NORMAL)
     limits = np.sqrt(2.0 * np.log(of_angle.size / CHANCE)) * noise
     size = ratio(of_angle, limits)
-    if not (jumping := (np.abs(size) > 1.0).any(axis=0)).any():
+    jumping = (np.abs(size) > 1.0).any(axis=0)
+    if not jumping.any() and not piece.clock:
         return None
     level = running(piece.measured, 2 * SPIKE + 1, "median", "edge")  # a spike comes back
     told = response.jumps(level - response.taken(level)) / response.passed
     rest = response.taken(piece.measured) / response.rest * response.kept
-    return _Seen(response, piece.measured, moves, size * jumping, told, rest, found)
+    return _Seen(response, piece, moves, size * jumping, level, told, rest, found)
 
 
 def _bent(seen: _Seen, j: int, noise: float, late: int) -> np.ndarray:
     """(n,) bool: the rows about jumps that bend the torque of joint j by more than its noise,
     `late` samples after these. What a jump is in its torque, that torque says."""
-    response, tau = seen.response, seen.tau[:, j]
+    response, tau, piece = seen.response, seen.piece.measured[:, j], seen.piece
     least = max(noise, response.kept * max(quantum(tau) / np.sqrt(12.0), NOTHING * np.std(tau)))
     (torque,) = seen.bends(j, least, range(late, late + 1))[0]
     bends = torque > response.over * least
     far = np.searchsorted(-response.beyond, -((least / torque[bends]) ** 2))
-    return _within(seen.tops[0][bends] + late, far, len(tau))
+    out = _within(seen.tops[0][bends] + late, far, len(tau))
+    if piece.clock:
+        reach, own = int(np.ceil(piece.clock / piece.step)), seen.told[:, j] * seen.moves[:, j]
+        at, torque = spread(own, response.over * least, seen.level[:, j], piece.qdd, reach)
+        far = np.searchsorted(-response.beyond, -((least / torque) ** 2)) + reach
+        out |= _within(at, far, len(tau))
+    return out
 
 
 def _late(seen: list[_Seen], j: int, noise: float) -> int:

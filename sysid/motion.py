@@ -39,7 +39,8 @@ class Piece:
 
     `weight` (n, dof) is what each row counts in the filter of both sides, None where all count alike: an average over what counts.
 
-    `blur` is what the filter makes of reversals, where rows about them are left out for it.
+    `blur` is what the filter makes of reversals, where rows about them are left out for it. `clock` [s] is how far to either side the
+    correction of its stamps may have spread what all joints did at once; zero where stamps were right.
 
     `kept` is for what is made of these rows once for all who ask; it goes with the piece.
 
@@ -70,6 +71,7 @@ class Piece:
     deflection: np.ndarray | None = None
     weight: np.ndarray | None = None
     blur: Blur | None = None
+    clock: float = 0.0
     kept: dict = field(init=False, default_factory=dict, repr=False, compare=False)
 
     def __getstate__(self) -> dict:

@@ -211,10 +211,10 @@ def simulated(tmp_path_factory, planar):
 
     made = {}
 
-    def make(name: str, *hide, seed: int = 1, duration: float = 12.0, **more) -> Path:
+    def make(name: str, *hide, seed: int = 1, duration: float = 12.0, rate: float = 500.0, **more) -> Path:
         if name not in made:
             told = [simulate.hidden(h) if isinstance(h, str) else h for h in hide]
-            found = simulate.simulate(planar, hide=told, seed=seed, duration=duration, rate=500.0, **more)
+            found = simulate.simulate(planar, hide=told, seed=seed, duration=duration, rate=rate, **more)
             made[name] = tmp_path_factory.mktemp("simulated") / name
             spec = robot_spec.RobotSpec(urdf=str(_planar(tmp_path_factory)))
             simulate.write(found, specs.Experiment(robot=spec), made[name])
@@ -272,9 +272,7 @@ def write_mat73(path: Path, variables: dict) -> None:
         for name, value in variables.items():
             store(file, name, value)
     with path.open("r+b") as file:
-        file.write(
-            b"MATLAB 7.3 MAT-file, Platform: GLNXA64, Created on: Mon Jan  1 00:00:00 2024 HDF5 schema 1.00 .".ljust(116) + bytes(8) + b"\x00\x02IM"
-        )
+        file.write(b"MATLAB 7.3 MAT-file, Platform: GLNXA64, Created on: Mon Jan  1 00:00:00 2024 HDF5 schema 1.00 .".ljust(116) + bytes(8) + b"\x00\x02IM")
 
 
 def write_mat5(path: Path, variables: dict, *, compressed: bool = True) -> None:
