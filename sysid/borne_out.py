@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -17,16 +17,18 @@ _LIKELY = 0.05  # less is not listed
 _NOTHING = 5e-3  # of an error: a hundredth of its square, the least that is told in per cent
 
 
-def doubted(before: Fit, after: Fit, without: Fit, told: Fit, candidate: Candidate) -> str | None:
+def doubted(
+    before: Fit, after: Fit, without: Callable[[], Fit], told: Fit, candidate: Candidate
+) -> str | None:
     """Why fits do not bear out a candidate under either prior, None where they do: one that was
     chosen without it may have bodies make up for it, so that they hold it back as it joins.
 
     Args:
-        without, told: of models without it and with it under one prior, that of `sysid add`; as
+        without: fits the model of the fit before under the prior of told, that of `sysid add`; as
             before and after are under that of the fit before.
     """
     why = in_doubt(before, after, told, candidate)
-    if why is None or without is before or in_doubt(without, told, told, candidate):
+    if why is None or told is after or in_doubt(without(), told, told, candidate):
         return why
     own = None if candidate.joint == ROBOT else list(candidate.judged_by(before.joints))
     return why if comparison.rises(before, told, own) else None
@@ -79,18 +81,20 @@ def size_told(fit: Fit, effect: str, joint: int) -> bool:
     """Whether the parameters of an effect on a joint's number (-1: of the robot) that say how large
     it is are together farther from where it does nothing than their deviations can make. Beyond
     which torque a signal bends, or how fast warmth comes, is no size."""
-    model, blocks_ = fit.model, fit.compressed.blocks
+    model, count, first = fit.model, fit.compressed.blocks, 10 * fit.model.bodies
     own = [k for k, c in enumerate(model.coefficients) if (c.effect, c.joint) == (effect, joint)]
-    at = 10 * model.bodies + np.array(own, dtype=int)
-    if blocks.clear(fit.coefficients[own], fit.uncertainty.covariance[np.ix_(at, at)], blocks_):
+    own = [k for k in own if np.isfinite(fit.uncertainty.std[first + k])]
+    known = fit.uncertainty.covariance[np.ix_(at := first + np.array(own, dtype=int), at)]
+    if blocks.clear(fit.coefficients[own], known, count):
         return True
     values = [(k, v) for k, v in enumerate(model.shape_values) if v.shape.start is not None]
     values = [
         (k, v) for k, v in values if (model.terms[v.term][0].name, v.joint) == (effect, joint)
     ]
-    at = [k for k, _ in values]
+    values = [(k, v) for k, v in values if np.isfinite(fit.shape_std[k])]
     away = np.array([model.shapes[k] - v.shape.start for k, v in values])
-    return blocks.clear(away, fit.shape_covariance[np.ix_(at, at)], blocks_)
+    known = fit.shape_covariance[np.ix_(at := [k for k, _ in values], at)]
+    return blocks.clear(away, known, count)
 
 
 def undecided(members: Sequence[tuple[Candidate, float]], fit: Fit) -> Refused:

@@ -95,8 +95,8 @@ class Left:
     @property
     def spread(self) -> float:
         """How far to either side [s] what all joints did at once may have been spread: half a period
-        of the lowest frequency above which errors were read off."""
-        return 0.5 / float(np.min(self.below))
+        of the usual frequency above which errors were read off."""
+        return 0.5 / float(np.median(self.below))
 
     def of(self, rows: slice) -> Left:
         """Of some of the rows."""

@@ -10,9 +10,32 @@ Source: Frisch & Waugh 1933 (what is left of both without level and slope, compa
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
-MOST = 0.5  # of the square of what a torque does there, which is a jump's
+from .motion import Piece
+from .outliers import CHANCE, SPIKE
+from .running import running
+
+SHARE = 0.35  # of a step's square, without what is slow: what a ramp of 0.6 half periods has of it
+_SLOW = 3  # order of the polynomial that a smooth motion is in two periods
+_NORMAL = 0.6745  # median of a Gaussian's absolute values
+
+
+def without_spread(piece: Piece) -> Piece:
+    """A piece under a low-pass on both sides without the rows about jumps of acceleration that the
+    correction of its clock has spread; itself where stamps were right."""
+    if not piece.clock:
+        return piece
+    level = running(piece.measured, 2 * SPIKE + 1, "median", "edge")
+    told, reach = level - piece.tau, int(np.ceil(piece.clock / piece.step))
+    least = np.sqrt(2.0 * np.log(told.size / CHANCE)) * np.median(np.abs(told), axis=0) / _NORMAL
+    use = np.ones(told.shape, dtype=bool) if piece.use is None else piece.use.copy()
+    for j, own in enumerate(told.T):
+        for k in spread(own, least[j], level[:, j], piece.qdd, reach)[0].tolist():
+            use[max(0, k - reach) : k + reach + 1, j] = False
+    return replace(piece, use=use)
 
 
 def spread(
@@ -25,28 +48,22 @@ def spread(
             its noise may be. torque: (n,) as logged, without spikes; qdd: (n, dof); both are
             compared a period, 2 `reach` rows, to either side, and half of one at a log's ends.
     """
-    at = _greatest(np.abs(told), least, reach)
-    at = at[(at >= reach) & (at < len(told) - reach)]
+    size = np.abs(told)
+    size[:reach] = size[max(len(size) - reach, 0) :] = 0.0
+    # the greatest within half a period
+    at = np.flatnonzero((size > least) & (size >= running(size, 2 * reach + 1, "max")))
     about = [slice(max(0, k - 2 * reach), k + 2 * reach + 1) for k in at.tolist()]
-    alike = [_most_alike(_beside_line(torque[own]), _beside_line(qdd[own])) for own in about]
-    at = at[np.array(alike, dtype=float) > MOST]
-    return at, np.abs(told[at])
+    alike = [_most_alike(_fast(torque[own]), _fast(qdd[own])) for own in about]
+    at = at[np.array(alike, dtype=float) > SHARE]
+    return at, size[at]
 
 
-def _beside_line(values: np.ndarray) -> np.ndarray:
-    """Values (n, ...) without their level and slope."""
-    rows = np.arange(len(values), dtype=float)
-    line = np.linalg.qr(np.stack([np.ones_like(rows), rows], axis=1))[0]
-    return values - line @ (line.T @ values)
-
-
-def _greatest(size: np.ndarray, least: float, apart: int) -> np.ndarray:
-    """The rows of values (n,) above some, the greatest first, none so near to a greater one."""
-    size, out = size.copy(), list[int]()
-    while size[k := int(np.argmax(size))] > least:
-        out.append(k)
-        size[max(0, k - apart) : k + apart + 1] = 0.0
-    return np.array(out, dtype=int)
+def _fast(values: np.ndarray) -> np.ndarray:
+    """Values (n, ...) without the polynomial of the third order that is nearest: what a smooth motion
+    does in so short a time."""
+    rows = np.linspace(-1.0, 1.0, len(values))
+    slow = np.linalg.qr(np.vander(rows, _SLOW + 1))[0]
+    return values - slow @ (slow.T @ values)
 
 
 def _most_alike(torque: np.ndarray, qdd: np.ndarray) -> float:

@@ -120,6 +120,14 @@ class _Seen:
         return np.array(at, dtype=int), np.reshape(by, (len(at), self.size.shape[1]))
 
     @cached_property
+    def apart(self) -> np.ndarray:
+        """(jumps,) bool: the greatest thereabouts, whose waves share no row: others say it again."""
+        (at, by), size = self.tops, np.zeros(len(self.size))
+        np.maximum.at(size, at, np.linalg.norm(by, axis=1))
+        most = running(size, 4 * self.response.near + 1, "max")[at]
+        return np.linalg.norm(by, axis=1) >= most
+
+    @cached_property
     def waves(self) -> np.ndarray:
         """(jumps, window) of each jump the wave about it, of the accelerations as they jump there."""
         at, by = self.tops
@@ -190,7 +198,7 @@ def _late(seen: list[_Seen], j: int, noise: float) -> int:
     """
     most = round(_LATE / seen[0].step)
     lags = range(-most, most + 1)
-    chance = sum(one.bends(j, noise, lags)[1].sum(axis=1) for one in seen)
+    chance = sum(one.bends(j, noise, lags)[1] @ one.apart for one in seen)
     best = int(np.argmax(chance))
     return lags[best] if chance[best] > chance[most] + np.log(len(lags) / CHANCE) else 0
 

@@ -176,8 +176,8 @@ def _fit(experiment: Experiment, filters: dict | None, strength: PriorWeight | N
     )  # fmt: skip
 
 
-def refit(experiment: Experiment, before: Fit, *, filters: dict | None = None, **how) -> tuple[Fit, Fit, Fit]:
-    """Fit an experiment that grew from a fitted one: as its file says; under that one's prior; and that one under this fit's prior.
+def refit(experiment: Experiment, before: Fit, *, filters: dict | None = None, **how) -> tuple[Fit, Fit, Callable[[], Fit]]:
+    """Fit an experiment that grew from a fitted one: as its file says; under that one's prior; and, if asked for, that one under this fit's prior.
 
     Two models are compared under one prior. Where its weight is chosen, what was missing before may let it be another: the
     second and the third fit are the first and the one before where it is the same, and else have their shape values, which a
@@ -188,8 +188,8 @@ def refit(experiment: Experiment, before: Fit, *, filters: dict | None = None, *
     """
     after, logs = fit_grown(experiment, before, filters=filters, **how), how.get("measured")
     if after.strength.value == before.strength.value:
-        return after, after, before
-    return after, _under(before.strength, after, logs), _under(after.strength, before, logs)
+        return after, after, lambda: before
+    return after, _under(before.strength, after, logs), lambda: _under(after.strength, before, logs)
 
 
 def _under(strength: PriorWeight, found: Fit, measured: Read | None) -> Fit:
@@ -206,7 +206,7 @@ def _under(strength: PriorWeight, found: Fit, measured: Read | None) -> Fit:
 
 
 def fit_grown(experiment: Experiment, before: Fit, **how) -> Fit:
-    """The first of the two fits of `refit`."""
+    """The first of the fits of `refit`."""
     return fit(with_weight(experiment, AUTO) if before.strength.auto else experiment, before=before.model, **how)
 
 

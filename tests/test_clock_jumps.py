@@ -24,8 +24,9 @@ def test_errors_are_near_the_noise_where_stamps_were_wrong(simulated, monkeypatc
     assert all(a < b for a, b in zip(without, over())) and np.mean(without) < 1.5 < np.mean(over())
 
 
-def test_what_a_torque_does_by_itself_is_no_jump():
-    """Steps of friction or of a load, and a ripple, while accelerations are as smooth as may be: one place in twenty may look like one."""
+@pytest.mark.parametrize("inertia", [0.2, 1.0, 2.0, 5.0])
+def test_what_a_torque_does_by_itself_is_no_jump(inertia):
+    """Steps of friction or of a load, as large as what inertia makes and less, while accelerations are smooth: one in twenty may look like one."""
     rng, hits, tried = np.random.default_rng(5), 0, 0
     t = np.arange(0.0, 20.0, 1.0 / RATE)
     for _ in range(40):
@@ -35,7 +36,7 @@ def test_what_a_torque_does_by_itself_is_no_jump():
         torque = np.sum([rng.choice([-1.0, 1.0]) * 3.0 * (np.arange(len(t)) >= k) for k in at], axis=0) + 0.05 * rng.normal(size=len(t))
         told = np.zeros(len(t))
         told[at] = 3.0
-        hits, tried = hits + len(spread(told, 1.0, torque + 0.2 * qdd[:, 0], qdd, REACH)[0]), tried + len(at)
+        hits, tried = hits + len(spread(told, 1.0, torque + inertia * qdd[:, 0], qdd, REACH)[0]), tried + len(at)
     assert hits <= 0.05 * tried, (hits, tried)
 
 

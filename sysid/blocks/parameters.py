@@ -36,6 +36,7 @@ _MOST_NEIGHBOURS, _BLOCKS_FOR_ONE, _FEWEST = 4, 10, 3
 # Of the noise's variance: directions that have less are the prior's, and are left as they are.
 _NOISELESS = 1e-6
 _FLAT = 1e-12  # eigenvalues that are none, as a share of the largest
+_MANY = 1e6  # degrees of freedom of noise that is taken as white
 _ALIKE = 1e-9  # of the largest: values so alike say one thing
 _TWO = 0.9772498680518208  # of the normal law lies below two deviations
 
@@ -89,44 +90,48 @@ def widening(blocks: int) -> float:
     """What two deviations of Student's law are to two of the normal one."""
     from scipy.special import stdtrit
 
-    return float(stdtrit(max(_freedom(blocks), 1.0), _TWO)) / 2.0
+    return float(stdtrit(_freedom(blocks), _TWO)) / 2.0
 
 
 def clear(values: np.ndarray, covariance: np.ndarray, blocks: int) -> bool:
-    """Whether values (k,) are together farther from zero than two standard deviations of a single
-    one reach: values that trade with each other may each be nothing beside its own. Those without a
-    deviation take no part.
+    """Whether any of values (k,), or all together, are farther from zero than chance makes a single
+    one as seldom as two deviations: values that trade with each other may each be nothing beside
+    its own. Half of that chance is for each of the two questions.
 
     Args:
-        covariance: (k, k), as of `covariance`, of so many blocks.
+        covariance: (k, k), as of `covariance`, of so many blocks; values without a deviation take
+            no part.
 
-    Source: Hotelling 1931.
+    Source: Hotelling 1931; Dunn 1961 (the largest of several).
     """
     from scipy.special import fdtri
 
     variance = np.diagonal(covariance)
     known = np.isfinite(variance) & (variance > 0.0)
-    k, freedom = int(known.sum()), max(_freedom(blocks), 1.0)
-    if not k or freedom <= k - 1.0:
+    if not known.any():
         return False
-    spread = np.sqrt(variance[known])
-    alike = covariance[np.ix_(known, known)] / np.outer(spread, spread)
+    spread, level = np.sqrt(variance[known]), 2.0 * (1.0 - _TWO)
+    z, alike = values[known] / spread, covariance[np.ix_(known, known)] / np.outer(spread, spread)
     shares, directions = eigen.symmetric(alike)
     told = shares > _ALIKE * shares[-1]
-    far = np.sum((directions[:, told].T @ (values[known] / spread)) ** 2 / shares[told])
+    m, k, freedom = int(told.sum()), len(z), _freedom(blocks) if blocks >= _FEWEST else _MANY
 
-    def squared(m: int) -> float:
-        """What m values are beyond with the chance of one normal one beyond two deviations."""
+    def squared(m: int, chance: float) -> float:
+        """What the square of m values together is beyond with some chance, in units in which a
+        deviation is told: two are as likely as two of a normal one."""
         rest = freedom - m + 1.0
-        return m * freedom / rest * fdtri(m, rest, 2.0 * _TWO - 1.0)
+        own = m * freedom / rest * fdtri(m, rest, 1.0 - chance) if rest > 0.0 else np.inf
+        return 4.0 * own / fdtri(1, freedom, 1.0 - level)
 
-    # a deviation is told in units by which two of them are as likely as two of a normal one
-    return bool(far > 4.0 * squared(k) / squared(1))
+    if m == 1:
+        return bool(np.max(z**2) > squared(1, level))
+    together = np.sum((directions[:, told].T @ z) ** 2 / shares[told])
+    return bool(np.max(z**2) > squared(1, 0.5 * level / k) or together > squared(m, 0.5 * level))
 
 
 def _freedom(blocks: int) -> float:
     """Degrees of freedom of a covariance of so many blocks."""
-    return blocks / (1.0 + 2.0 * sum(weight**2 for weight in _weights(blocks).values()))
+    return max(blocks / (1.0 + 2.0 * sum(w**2 for w in _weights(blocks).values())), 1.0)
 
 
 def _weights(blocks: int) -> dict[int, float]:

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..clock_jumps import without_spread
 from ..events import Event, mended, usable
 from ..gaussian import HIGHEST, Gaussian
 from ..log import Log
@@ -49,18 +50,15 @@ def lowpassed(
         for segment in log.segments:
             # spikes are mended before the low-pass, which would spread them; of the rest, rows see
             # what both low-passes see
-            clean = (
-                replace(segment, tau=mended(segment, log.events, joints)) if log.events else segment
-            )
+            clean = replace(segment, tau=mended(segment, log.events, joints))
             if (piece := _piece(number, log, clean, cutoff)) is not None:
                 seen = _sight(piece, segment.step)
                 sights.append(math.ceil(seen / piece.step))
-                pieces.append(
-                    without_events(piece, log.events, joints, seen, seen) if log.events else piece
-                )
+                pieces.append(without_events(piece, log.events, joints, seen, seen))
     if not pieces:
         return None
     disturbed = share_left_out(pieces)
+    pieces = [without_spread(piece) for piece in pieces]
     threshold = standstill_speed(pieces)
     # where the speed changes its sign between two samples, the angles' noise says in which:
     # friction's jump is as uncertain
@@ -197,4 +195,5 @@ def _piece(number: int, log: Log, segment, cutoff: float) -> Piece | None:
         noise=noise,
         source=log.name,
         levels=log.levels,
+        clock=0.0 if segment.clock is None else segment.clock.spread,
     )
