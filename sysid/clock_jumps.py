@@ -20,6 +20,7 @@ from .running import running
 
 SHARE = 0.35  # of a step's square, without what is slow: what a ramp of 0.6 half periods has of it
 _SLOW = 3  # order of the polynomial that a smooth motion is in two periods
+LIGHT = 0.02  # of a torque's spread over an acceleration's: an arm's inertia is more
 _NORMAL = 0.6745  # median of a Gaussian's absolute values
 
 
@@ -31,15 +32,17 @@ def without_spread(piece: Piece) -> Piece:
     level = running(piece.measured, 2 * SPIKE + 1, "median", "edge")
     told, reach = level - piece.tau, int(np.ceil(piece.clock / piece.step))
     least = np.sqrt(2.0 * np.log(told.size / CHANCE)) * np.median(np.abs(told), axis=0) / _NORMAL
+    light = LIGHT * np.std(level, axis=0) / np.maximum(np.std(piece.qdd, axis=0), 1e-300)
     use = np.ones(told.shape, dtype=bool) if piece.use is None else piece.use.copy()
     for j, own in enumerate(told.T):
-        for k in spread(own, least[j], level[:, j], piece.qdd, reach)[0].tolist():
+        about = level[:, j], piece.qdd, reach, (j, light[j])
+        for k in spread(own, least[j], *about)[0].tolist():
             use[max(0, k - reach) : k + reach + 1, j] = False
     return replace(piece, use=use)
 
 
 def spread(
-    told: np.ndarray, least: float, torque, qdd, reach: int
+    told: np.ndarray, least: float, torque, qdd, reach: int, inertia: tuple[int, float] = (0, 0.0)
 ) -> tuple[np.ndarray, np.ndarray]:
     """The rows (jumps,) where a torque jumps together with an acceleration, and by how much (jumps,).
 
@@ -47,13 +50,14 @@ def spread(
         told: (n,) how far the torque jumps at each row, zero where that does not count; least: what
             its noise may be. torque: (n,) as logged, without spikes; qdd: (n, dof); both are
             compared a period, 2 `reach` rows, to either side, and half of one at a log's ends.
+            inertia: the joint's number, and the least that its torque is beside its acceleration.
     """
     size = np.abs(told)
     size[:reach] = size[max(len(size) - reach, 0) :] = 0.0
     # the greatest within half a period
     at = np.flatnonzero((size > least) & (size >= running(size, 2 * reach + 1, "max")))
     about = [slice(max(0, k - 2 * reach), k + 2 * reach + 1) for k in at.tolist()]
-    alike = [_most_alike(_fast(torque[own]), _fast(qdd[own])) for own in about]
+    alike = [_most_alike(_fast(torque[own]), _fast(qdd[own]), *inertia) for own in about]
     at = at[np.array(alike, dtype=float) > SHARE]
     return at, size[at]
 
@@ -66,7 +70,10 @@ def _fast(values: np.ndarray) -> np.ndarray:
     return values - slow @ (slow.T @ values)
 
 
-def _most_alike(torque: np.ndarray, qdd: np.ndarray) -> float:
-    """The largest share of a torque's square (n,) that one of the accelerations (n, dof) has."""
+def _most_alike(torque: np.ndarray, qdd: np.ndarray, own: int, least: float) -> float:
+    """The largest share of a torque's square (n,) that one of the accelerations (n, dof) has; none
+    of a torque that is too small for its own joint's."""
+    if np.linalg.norm(torque) < least * np.linalg.norm(qdd[:, own]):
+        return 0.0
     squares = np.sum(qdd**2, axis=0) * np.sum(torque**2)
     return float(np.max((torque @ qdd) ** 2 / np.maximum(squares, 1e-300), initial=0.0))

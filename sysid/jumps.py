@@ -18,7 +18,7 @@ from functools import cached_property
 
 import numpy as np
 
-from .clock_jumps import spread
+from .clock_jumps import LIGHT, spread
 from .motion import Piece
 from .outliers import CHANCE, NOTHING, SHORT, SPIKE, quantum, ratio, runs
 from .running import running
@@ -71,7 +71,7 @@ def jumps(
 @dataclass(frozen=True)
 class _Seen:
     """Of a piece in which joints move in the rows `moves` (n, dof): the jumps `size` (n, dof) of its
-    accelerations, each joint's in units of what noise may be; its torque without spikes, `level`
+    accelerations, each joint's in units of what noise may be, `limits` (dof,); its torque without spikes, `level`
     (n, dof), and how far it jumps, `told` (n, dof); `rest` (n, dof) of the torque beyond the
     filter's band, as large as white noise in it, as the fit sees it; `found` (n, dof), where its
     bent rows are told.
@@ -81,6 +81,7 @@ class _Seen:
     piece: Piece
     moves: np.ndarray
     size: np.ndarray
+    limits: np.ndarray
     level: np.ndarray
     told: np.ndarray
     rest: np.ndarray
@@ -90,6 +91,16 @@ class _Seen:
     def step(self) -> float:
         """From row to row [s]."""
         return self.response.smoother.step
+
+    @cached_property
+    def light(self) -> np.ndarray:
+        """(dof,) the least inertia that can be a joint's: what moves it with less than a fiftieth of what
+        its torque does for as much acceleration in the whole log is no inertia."""
+        out = np.zeros(len(self.limits))
+        for j, rows in enumerate(self.moves.T):
+            if rows.any() and (spread_ := np.std(self.piece.qdd[rows, j])) > 0.0:
+                out[j] = LIGHT * np.std(self.piece.measured[rows, j]) / spread_
+        return out
 
     @property
     def sure(self) -> np.ndarray:
@@ -148,7 +159,10 @@ class _Seen:
         own = np.sum(waves**2, axis=1)
         theirs = ratio(both**2, own * whole)
         torque = np.abs(ratio(both, own)) * np.linalg.norm(by, axis=1)
-        bends = np.where(theirs > _MOST, torque, 0.0)
+        # a torque in time with an acceleration may be as small as it will
+        heavy = torque >= self.light[j] * self.limits[j] * np.abs(by[:, j])
+        heavy |= (np.array(lags) == 0)[:, None]
+        bends = np.where((theirs > _MOST) & heavy, torque, 0.0)
         # with two degrees of freedom beside a wave that is the chance of as much of one
         chance = np.log((1.0 - _MOST) / (1.0 - np.minimum(theirs, _WHOLLY)))
         return bends, np.where(bends > response.over * noise, chance, 0.0)
@@ -169,7 +183,7 @@ def _seen(piece: Piece, response: _Response, moves: np.ndarray, found: np.ndarra
     level = running(piece.measured, 2 * SPIKE + 1, "median", "edge")  # a spike comes back
     told = response.jumps(level - response.taken(level)) / response.passed
     rest = response.taken(piece.measured) / response.rest * response.kept
-    return _Seen(response, piece, moves, size * jumping, level, told, rest, found)
+    return _Seen(response, piece, moves, size * jumping, limits, level, told, rest, found)
 
 
 def _bent(seen: _Seen, j: int, noise: float, late: int) -> np.ndarray:
@@ -183,7 +197,8 @@ def _bent(seen: _Seen, j: int, noise: float, late: int) -> np.ndarray:
     out = _within(seen.tops[0][bends] + late, far, len(tau))
     if piece.clock:
         reach, own = int(np.ceil(piece.clock / piece.step)), seen.told[:, j] * seen.moves[:, j]
-        at, torque = spread(own, response.over * least, seen.level[:, j], piece.qdd, reach)
+        inertia = j, seen.light[j]
+        at, torque = spread(own, response.over * least, seen.level[:, j], piece.qdd, reach, inertia)
         far = np.searchsorted(-response.beyond, -((least / torque) ** 2)) + reach
         out |= _within(at, far, len(tau))
     return out

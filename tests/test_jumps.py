@@ -185,6 +185,17 @@ def test_an_inertia_that_depends_on_the_posture(posture, samples):
     assert rms(slice(None)) > 1.5 * NOISE and rms(use) < 1.1 * NOISE
 
 
+@pytest.mark.parametrize(("inertia", "said"), [(0.3, True), (0.003, False)])
+def test_a_torque_that_follows_an_acceleration_by_far_less_than_inertia_does_is_no_jump(inertia, said):
+    """A light motor whose ripple and controller move both, with friction and a load that are all its torque; in time and late."""
+    rng = np.random.default_rng(13)
+    t, q, qdd = moves()
+    slow = 5.0 * np.sin(1.3 * t) * np.sign(np.sin(0.7 * t) + 1.5)
+    for late in (0, 8):
+        rows, _ = found(t, q, slow + inertia * np.roll(qdd, late) + 1e-4 * rng.normal(size=len(t)))
+        assert bool(rows.any()) is said
+
+
 @pytest.mark.parametrize("filtered", ["savitzky-golay", "butterworth"])
 def test_the_ends_of_a_smooth_motion_are_no_jumps(filtered):
     """Where a filter sees one side only it takes something away of any motion that bends."""
