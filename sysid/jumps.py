@@ -71,10 +71,10 @@ def jumps(
 @dataclass(frozen=True)
 class _Seen:
     """Of a piece in which joints move in the rows `moves` (n, dof): the jumps `size` (n, dof) of its
-    accelerations, each joint's in units of what noise may be, `limits` (dof,); its torque without spikes, `level`
-    (n, dof), and how far it jumps, `told` (n, dof); `rest` (n, dof) of the torque beyond the
-    filter's band, as large as white noise in it, as the fit sees it; `found` (n, dof), where its
-    bent rows are told.
+    accelerations, each joint's in units of what noise may be, `limits` (dof,); its torque without
+    spikes, `level` (n, dof), and how far it jumps, `told` (n, dof); `rest` (n, dof) of the torque
+    beyond the filter's band, as large as white noise in it, as the fit sees it; `found` (n, dof),
+    where its bent rows are told.
     """
 
     response: _Response
