@@ -44,7 +44,7 @@ def without_spread(piece: Piece) -> Piece:
 def spread(
     told: np.ndarray, least: float, torque, qdd, reach: int, inertia: tuple[int, float] = (0, 0.0)
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The rows (jumps,) where a torque jumps together with an acceleration, and by how much (jumps,).
+    """The rows (jumps,) where a torque jumps as an acceleration does, and by how much (jumps,).
 
     Args:
         told: (n,) how far the torque jumps at each row, zero where that does not count; least: what
@@ -63,8 +63,8 @@ def spread(
 
 
 def _fast(values: np.ndarray) -> np.ndarray:
-    """Values (n, ...) without the polynomial of the third order that is nearest: what a smooth motion
-    does in so short a time."""
+    """Values (n, ...) without the nearest polynomial of the third order: what a smooth motion does
+    in so short a time."""
     rows = np.linspace(-1.0, 1.0, len(values))
     slow = np.linalg.qr(np.vander(rows, _SLOW + 1))[0]
     return values - slow @ (slow.T @ values)

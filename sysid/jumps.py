@@ -70,11 +70,11 @@ def jumps(
 
 @dataclass(frozen=True)
 class _Seen:
-    """Of a piece in which joints move in the rows `moves` (n, dof): the jumps `size` (n, dof) of its
-    accelerations, each joint's in units of what noise may be, `limits` (dof,); its torque without
-    spikes, `level` (n, dof), and how far it jumps, `told` (n, dof); `rest` (n, dof) of the torque
-    beyond the filter's band, as large as white noise in it, as the fit sees it; `found` (n, dof),
-    where its bent rows are told.
+    """Of a piece in which joints move in the rows `moves` (n, dof): the jumps `size` (n, dof) of
+    its accelerations, each joint's in units of what noise may be, `limits` (dof,); its torque
+    without spikes, `level` (n, dof), and how far it jumps, `told` (n, dof); `rest` (n, dof) of the
+    torque beyond the filter's band, as large as white noise in it, as the fit sees it; `found` (n,
+    dof), where its bent rows are told.
     """
 
     response: _Response
@@ -94,8 +94,8 @@ class _Seen:
 
     @cached_property
     def light(self) -> np.ndarray:
-        """(dof,) the least inertia that can be a joint's: what moves it with less than a fiftieth of what
-        its torque does for as much acceleration in the whole log is no inertia."""
+        """(dof,) the least inertia that can be a joint's: what moves it with less than a fiftieth
+        of what its torque does for as much acceleration in the whole log is none."""
         out = np.zeros(len(self.limits))
         for j, rows in enumerate(self.moves.T):
             if rows.any() and (spread_ := np.std(self.piece.qdd[rows, j])) > 0.0:
@@ -132,7 +132,7 @@ class _Seen:
 
     @cached_property
     def apart(self) -> np.ndarray:
-        """(jumps,) bool: the greatest thereabouts, whose waves share no row: others say it again."""
+        """(jumps,) bool: the greatest thereabouts, whose waves share no row."""
         (at, by), size = self.tops, np.zeros(len(self.size))
         np.maximum.at(size, at, np.linalg.norm(by, axis=1))
         most = running(size, 4 * self.response.near + 1, "max")[at]
@@ -140,7 +140,7 @@ class _Seen:
 
     @cached_property
     def waves(self) -> np.ndarray:
-        """(jumps, window) of each jump the wave about it, of the accelerations as they jump there."""
+        """(jumps, window) of each the wave about it, of the accelerations as they jump there."""
         at, by = self.tops
         along = by / np.linalg.norm(by, axis=1, keepdims=True)
         return np.einsum("kwj,kj->kw", _about(self.size, at, self.response.near), along)
