@@ -5,7 +5,7 @@ in part for the clock's: of a jump, which they make together, the correction tak
 leaves it spread over half a period to either side. No wave of a filter is left there. But the
 torque has its step, and about it accelerations change as the torque does.
 
-Source: Frisch & Waugh 1933 (what is left of both without level and slope, compared).
+Source: Frisch & Waugh 1933 (what is left of both without what is slow, compared).
 """
 
 from __future__ import annotations

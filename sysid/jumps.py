@@ -95,7 +95,7 @@ class _Seen:
     @cached_property
     def light(self) -> np.ndarray:
         """(dof,) the least inertia that can be a joint's: what moves it with less than a fiftieth
-        of what its torque does for as much acceleration in the whole log is none."""
+        of what its torque does for as much acceleration in the whole piece is none."""
         out = np.zeros(len(self.limits))
         for j, rows in enumerate(self.moves.T):
             if rows.any() and (spread_ := np.std(self.piece.qdd[rows, j])) > 0.0:
@@ -169,7 +169,7 @@ class _Seen:
 
 
 def _seen(piece: Piece, response: _Response, moves: np.ndarray, found: np.ndarray) -> _Seen | None:
-    """None where no acceleration jumps."""
+    """None where no acceleration jumps and no clock was corrected."""
     of_angle = response.jumps(piece.qdd)
     noise = response.noise * piece.noise
     for j, own in enumerate(moves.T):  # what jumps inflates both
