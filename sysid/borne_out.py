@@ -87,11 +87,14 @@ def size_told(fit: Fit, effect: str, joint: int) -> bool:
     known = fit.uncertainty.covariance[np.ix_(at := first + np.array(own, dtype=int), at)]
     if blocks.clear(fit.coefficients[own], known, count):
         return True
-    values = [(k, v) for k, v in enumerate(model.shape_values) if v.shape.start is not None]
+    whose = [(model.terms[v.term][0].name, v.joint) for v in model.shape_values]
     values = [
-        (k, v) for k, v in values if (model.terms[v.term][0].name, v.joint) == (effect, joint)
+        (k, v)
+        for k, v in enumerate(model.shape_values)
+        if whose[k] == (effect, joint)
+        and v.shape.start is not None
+        and np.isfinite(fit.shape_std[k])
     ]
-    values = [(k, v) for k, v in values if np.isfinite(fit.shape_std[k])]
     away = np.array([model.shapes[k] - v.shape.start for k, v in values])
     known = fit.shape_covariance[np.ix_(at := [k for k, _ in values], at)]
     return blocks.clear(away, known, count)

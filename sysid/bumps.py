@@ -50,10 +50,14 @@ def bumps(robot: Robot, logs: Sequence[Log], *, among: int = 1) -> list[Event]:
         logs: with the events that their signals show. among: as of `outliers.spikes`.
     """
     shown = [event for log in logs for event in log.events if event.kind == "knock"]
-    calm = [replace(log, events=tuple(e for e in log.events if e.kind != "knock")) for log in logs]
     # a knock is sudden in all joints as well: it is to be seen where a clock's correction has had it
     calm = [
-        replace(log, segments=tuple(replace(s, clock=None) for s in log.segments)) for log in calm
+        replace(
+            log,
+            events=tuple(e for e in log.events if e.kind != "knock"),
+            segments=tuple(replace(s, clock=None) for s in log.segments),
+        )
+        for log in logs
     ]
     cutoff = widest(logs, known=(own_band := band(logs)))
     if (motion := lowpassed(calm, robot.joints, cutoff, known=own_band)) is None:

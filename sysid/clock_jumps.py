@@ -15,13 +15,12 @@ from dataclasses import replace
 import numpy as np
 
 from .motion import Piece
-from .outliers import CHANCE, SPIKE
+from .outliers import CHANCE, NORMAL, SPIKE
 from .running import running
 
 SHARE = 0.35  # of a step's square, without what is slow: what a ramp of 0.6 half periods has of it
 _SLOW = 3  # order of the polynomial that a smooth motion is in two periods
 LIGHT = 0.02  # of a torque's spread over an acceleration's: an arm's inertia is more
-_NORMAL = 0.6745  # median of a Gaussian's absolute values
 
 
 def without_spread(piece: Piece) -> Piece:
@@ -31,14 +30,28 @@ def without_spread(piece: Piece) -> Piece:
         return piece
     level = running(piece.measured, 2 * SPIKE + 1, "median", "edge")
     told, reach = level - piece.tau, int(np.ceil(piece.clock / piece.step))
-    least = np.sqrt(2.0 * np.log(told.size / CHANCE)) * np.median(np.abs(told), axis=0) / _NORMAL
-    light = LIGHT * np.std(level, axis=0) / np.maximum(np.std(piece.qdd, axis=0), 1e-300)
+    least = np.sqrt(2.0 * np.log(told.size / CHANCE)) * np.median(np.abs(told), axis=0) / NORMAL
     use = np.ones(told.shape, dtype=bool) if piece.use is None else piece.use.copy()
     for j, own in enumerate(told.T):
-        about = level[:, j], piece.qdd, reach, (j, light[j])
-        for k in spread(own, least[j], *about)[0].tolist():
-            use[max(0, k - reach) : k + reach + 1, j] = False
+        about = level[:, j], piece.qdd, reach, (j, light(level[:, j], piece.qdd[:, j]))
+        at, _ = spread(own, least[j], *about)
+        use[:, j] &= ~within(at, np.full(len(at), reach + 1), len(own))
     return replace(piece, use=use)
+
+
+def light(torque: np.ndarray, qdd: np.ndarray) -> float:
+    """The least inertia that can be a joint's, of its torque (n,) and its acceleration (n,): what
+    moves it with less than a fiftieth of what its torque does for as much acceleration is none."""
+    size = np.std(qdd) if len(qdd) else 0.0
+    return float(LIGHT * np.std(torque) / size) if size > 0.0 else 0.0
+
+
+def within(at: np.ndarray, reach: np.ndarray, n: int) -> np.ndarray:
+    """(n,) bool: the rows that are less than `reach` (k,) rows from one of `at` (k,)."""
+    edges = np.zeros(n + 1, dtype=int)
+    np.add.at(edges, np.clip(at - reach + 1, 0, n), 1)
+    np.add.at(edges, np.clip(at + reach, 0, n), -1)
+    return np.cumsum(edges[:-1]) > 0
 
 
 def spread(

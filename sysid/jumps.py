@@ -18,9 +18,9 @@ from functools import cached_property
 
 import numpy as np
 
-from .clock_jumps import LIGHT, spread
+from .clock_jumps import light, spread, within
 from .motion import Piece
-from .outliers import CHANCE, NOTHING, SHORT, SPIKE, quantum, ratio, runs
+from .outliers import CHANCE, NORMAL, NOTHING, SHORT, SPIKE, quantum, ratio, runs
 from .running import running
 from .smoother import Smoother
 
@@ -30,7 +30,6 @@ _WHOLLY = 0.99  # of a torque, that is a wave: noise and a filter's edge leave n
 _LATE = 0.03  # s: as far as effects have torque stamped too late or too early
 _ROUNDS = 4  # of two jumps within a window the greater hides a part of the other
 _ROUNDING = 1e-12  # of what a second pass takes away of a jump by one, squared; of a wave's ends
-_NORMAL = 0.6745  # median of a Gaussian's absolute values
 
 
 def jumps(
@@ -59,7 +58,7 @@ def jumps(
         sure = np.concatenate([one.sure[one.moves[:, j]] for one in seen])
         if not len(rest):
             continue
-        noise = np.median(np.abs(rest[~sure] if np.sum(~sure) >= SHORT else rest)) / _NORMAL
+        noise = np.median(np.abs(rest[~sure] if np.sum(~sure) >= SHORT else rest)) / NORMAL
         for step in {one.step for one in seen}:
             alike = [one for one in seen if one.step == step]
             late = _late(alike, j, noise)
@@ -94,13 +93,9 @@ class _Seen:
 
     @cached_property
     def light(self) -> np.ndarray:
-        """(dof,) the least inertia that can be a joint's: what moves it with less than a fiftieth
-        of what its torque does for as much acceleration in the whole piece is none."""
-        out = np.zeros(len(self.limits))
-        for j, rows in enumerate(self.moves.T):
-            if rows.any() and (spread_ := np.std(self.piece.qdd[rows, j])) > 0.0:
-                out[j] = LIGHT * np.std(self.piece.measured[rows, j]) / spread_
-        return out
+        """(dof,) as of `light`, of the rows in which a joint moves."""
+        own = zip(self.piece.measured.T, self.piece.qdd.T, self.moves.T)
+        return np.array([light(torque[rows], qdd[rows]) for torque, qdd, rows in own])
 
     @property
     def sure(self) -> np.ndarray:
@@ -174,7 +169,7 @@ def _seen(piece: Piece, response: _Response, moves: np.ndarray, found: np.ndarra
     noise = response.noise * piece.noise
     for j, own in enumerate(moves.T):  # what jumps inflates both
         if own.any():
-            noise[j] = min(noise[j], np.median(np.abs(of_angle[own, j])) / _NORMAL)
+            noise[j] = min(noise[j], np.median(np.abs(of_angle[own, j])) / NORMAL)
     limits = np.sqrt(2.0 * np.log(of_angle.size / CHANCE)) * noise
     size = ratio(of_angle, limits)
     jumping = (np.abs(size) > 1.0).any(axis=0)
@@ -194,13 +189,13 @@ def _bent(seen: _Seen, j: int, noise: float, late: int) -> np.ndarray:
     (torque,) = seen.bends(j, least, range(late, late + 1))[0]
     bends = torque > response.over * least
     far = np.searchsorted(-response.beyond, -((least / torque[bends]) ** 2))
-    out = _within(seen.tops[0][bends] + late, far, len(tau))
+    out = within(seen.tops[0][bends] + late, far, len(tau))
     if piece.clock:
         reach, own = int(np.ceil(piece.clock / piece.step)), seen.told[:, j] * seen.moves[:, j]
         inertia = j, seen.light[j]
         at, torque = spread(own, response.over * least, seen.level[:, j], piece.qdd, reach, inertia)
         far = np.searchsorted(-response.beyond, -((least / torque) ** 2)) + reach
-        out |= _within(at, far, len(tau))
+        out |= within(at, far, len(tau))
     return out
 
 
@@ -224,14 +219,6 @@ def _about(values: np.ndarray, at: np.ndarray, reach: int) -> np.ndarray:
     inside = (rows >= 0) & (rows < len(values))
     inside = inside.reshape(*inside.shape, *np.ones(values.ndim - 1, dtype=int))
     return np.where(inside, values[np.clip(rows, 0, len(values) - 1)], 0.0)
-
-
-def _within(at: np.ndarray, reach: np.ndarray, n: int) -> np.ndarray:
-    """(n,) bool: the rows that are less than `reach` (k,) rows from one of `at` (k,)."""
-    edges = np.zeros(n + 1, dtype=int)
-    np.add.at(edges, np.clip(at - reach + 1, 0, n), 1)
-    np.add.at(edges, np.clip(at + reach, 0, n), -1)
-    return np.cumsum(edges[:-1]) > 0
 
 
 @dataclass(frozen=True)

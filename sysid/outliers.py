@@ -25,6 +25,7 @@ RESTING = 0.05  # of the usual speed: what is slower rests
 _ABOUT = 4  # steps to either side of a spike that it is compared with
 _BLOCK = 64  # samples of which a median is the level thereabouts
 BURST = 0.05  # s: a knock's time
+NORMAL = 0.6745  # median of a Gaussian's absolute values
 NOTHING = 1e-3  # share of a torque's spread that disturbs nothing
 # z75 - z50 of white noise, from 200 000 samples: 0.42 to 0.53, the wider the pulse the less
 _WHITE = 0.53

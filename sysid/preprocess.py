@@ -157,7 +157,7 @@ def _piece(number: int, segment: Segment, spec: PreprocessSpec) -> Piece | None:
         log=number, step=segment.step, t=segment.t[rows], q=q[rows], qd=qd[rows], qdd=qdd[rows], tau=tau[rows],
         measured=segment.tau[rows], signals={name: values[rows] for name, values in segment.signals.items()}, use=None,
         smoother=sides, core=core, rest=np.zeros(q.shape[1]),
-        noise=np.sqrt(np.mean((segment.q[rows] - q[rows]) ** 2, axis=0)), sight=None if sides is not None or spec.filter == "none" else smoother, clock=0.0 if segment.clock is None else segment.clock.spread,
+        noise=np.sqrt(np.mean((segment.q[rows] - q[rows]) ** 2, axis=0)), sight=None if sides is not None or spec.filter == "none" else smoother, clock=segment.spread,
     )  # fmt: skip
 
 

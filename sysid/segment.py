@@ -24,3 +24,8 @@ class Segment:
     signals: dict[str, np.ndarray]
     clock: Left | None = None
     core: slice | None = None
+
+    @property
+    def spread(self) -> float:
+        """How far to either side [s] the correction of its stamps may have spread what all joints did at once; zero where they were right."""
+        return 0.0 if self.clock is None else self.clock.spread

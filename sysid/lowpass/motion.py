@@ -195,5 +195,5 @@ def _piece(number: int, log: Log, segment, cutoff: float) -> Piece | None:
         noise=noise,
         source=log.name,
         levels=log.levels,
-        clock=0.0 if segment.clock is None else segment.clock.spread,
+        clock=segment.spread,
     )

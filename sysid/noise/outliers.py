@@ -13,6 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..nonnegative import least_squares
+from ..outliers import NORMAL
 from ..running import running
 from .stretches import Run, bridged, moving
 
@@ -25,7 +26,6 @@ _MOST = 0.25  # of the rows; where more stand out, they are no exception
 _SLOW, _MOST_SLOW, _LARGER = 0.12, 0.25, 2.0
 _ALIKE = 10  # groups of values by the size of the noise about them
 _KNOWN = 4.0  # the most that its square is larger than drawn
-_NORMAL = 0.6745  # median of a standard Gaussian's absolute value
 
 
 def without(
@@ -45,7 +45,7 @@ def without(
         steps_of = [_step(v, k, width) for v, k in zip(values, kept)]
         sizes = [np.abs(d[~np.isnan(d)]) for d in steps_of]
         sizes = np.concatenate(sizes) if sizes else np.zeros(0)
-        if not len(sizes) or not (typical := float(np.median(sizes)) / _NORMAL) > 0.0:
+        if not len(sizes) or not (typical := float(np.median(sizes)) / NORMAL) > 0.0:
             continue
         usual = [np.full(len(d), typical) for d in steps_of]
         if drawn is not None:
@@ -87,7 +87,7 @@ def usual(values, drawn, steps, bandwidth: float):
     row; None where nothing is drawn."""
     if drawn is None:
         return None
-    typical = float(np.median(np.abs(np.concatenate(values)))) / _NORMAL
+    typical = float(np.median(np.abs(np.concatenate(values)))) / NORMAL
     local = [_local(v, 0.5 / (bandwidth * step)) for v, step in zip(drawn, steps)]
     found = _by_local(values, local, typical, [1.0] * len(local)) if typical > 0.0 else None
     return found if found is not None and all((v > 0.0).all() for v in found) else None
@@ -122,7 +122,7 @@ def _white_and_more(
         return 1.0, 0.0
     ends = len(size) * np.arange(1, _ALIKE) // _ALIKE
     bins = np.split(np.argpartition(size, ends), ends)
-    usual = np.array([np.median(every[own]) / _NORMAL for own in bins]) ** 2
+    usual = np.array([np.median(every[own]) / NORMAL for own in bins]) ** 2
     # the middle one here as well: at the ends of a log a few may be ten times as large
     square = np.array([np.median(size[own]) for own in bins]) ** 2
     shape = np.stack([np.full(_ALIKE, typical**2), square], axis=1)
