@@ -1,9 +1,12 @@
-"""Jumps of acceleration in logs whose stamps were corrected.
+"""Jumps of acceleration that a log has at another time than the torque's.
 
 What all joints do at once within a period of the frequency above which a clock was read off passes
 in part for the clock's: of a jump, which they make together, the correction takes a part away and
 leaves it spread over half a period to either side. No wave of a filter is left there. But the
 torque has its step, and about it accelerations change as the torque does.
+
+Where stamps were right the torque is logged from sample to sample, and drives change it more often:
+when between two samples it jumped no log tells, while the angles have moved from then on.
 
 Source: Frisch & Waugh 1933 (what is left of both without what is slow, compared).
 """
@@ -23,19 +26,25 @@ _SLOW = 3  # order of the polynomial that a smooth motion is in two periods
 LIGHT = 0.02  # of a torque's spread over an acceleration's: an arm's inertia is more
 
 
-def without_spread(piece: Piece) -> Piece:
-    """A piece under a low-pass on both sides without the rows about jumps of acceleration that the
-    correction of its clock has spread; itself where stamps were right."""
-    if not piece.clock:
-        return piece
-    level = running(piece.measured, 2 * SPIKE + 1, "median", "edge")
-    told, reach = level - piece.tau, int(np.ceil(piece.clock / piece.step))
-    least = np.sqrt(2.0 * np.log(told.size / CHANCE)) * np.median(np.abs(told), axis=0) / NORMAL
+def without_jumps(piece: Piece, step: float) -> Piece:
+    """A piece under a low-pass on both sides without the rows about jumps of acceleration that were
+    logged at another time than the torque's: by the correction of its clock, or within the time
+    from sample to sample, `step` [s], of which a log does not tell when in it a torque jumped."""
+    low, level = piece.smoother, running(piece.measured, 2 * SPIKE + 1, "median", "edge")
+    told = level - piece.tau
+    noise = np.median(np.abs(told), axis=0) / NORMAL
+    least = np.sqrt(2.0 * np.log(told.size / CHANCE)) * noise
+    reach = int(np.ceil(piece.clock / piece.step)) or low.reach
+    # what the low-pass leaves of a step that comes as much later or earlier, and of noise
+    error = step / np.sqrt(12.0) * low.weights[low.reach :] / piece.step
+    kept = np.sqrt(np.sum(low.weights**2) * step / piece.step)
     use = np.ones(told.shape, dtype=bool) if piece.use is None else piece.use.copy()
     for j, own in enumerate(told.T):
         about = level[:, j], piece.qdd, reach, (j, light(level[:, j], piece.qdd[:, j]))
-        at, _ = spread(own, least[j], *about)
-        use[:, j] &= ~within(at, np.full(len(at), reach + 1), len(own))
+        at, size = spread(own, least[j], *about)
+        # a step is twice as high as what it differs from its low-pass by
+        far = np.sum(2.0 * np.outer(size, error) > kept * noise[j], axis=1)
+        use[:, j] &= ~within(at, np.full(len(at), reach + 1) if piece.clock else far, len(own))
     return replace(piece, use=use)
 
 

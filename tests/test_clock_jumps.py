@@ -1,12 +1,15 @@
 """Jumps of accelerations are found where a clock's correction has spread them; what a torque does by itself is none."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from sysid import jumps, pipeline
 from sysid.clock_jumps import spread
+from sysid.log import Log, Segment
+from sysid.lowpass import lowpassed
 
 RATE = 100.0
 SIZES = np.array([1.0, -0.6, 0.4])  # of three joints that move together
@@ -51,3 +54,31 @@ def test_a_jump_that_was_spread_is_found_in_its_place():
         for joints in (SIZES, np.array([0.0, 0.0, 1.0])):
             at, by = spread(told, 0.5, torque, level[:, None] * joints, REACH)
             assert sorted(at.tolist()) == found and (by == 2.0).all()
+
+
+def moved(every: int, seed: int, noise: float):
+    """Errors under a low-pass of a joint that starts, stops and turns at times of its own, of which every so many tenths of a
+    millisecond are logged, and which rows count; the torque's noise is of one sample of `every`."""
+    rng, step, n = np.random.default_rng(seed), 1e-4, 200_000
+    ends = np.sort(rng.choice(n, 16, replace=False))
+    ends = np.concatenate([[0], ends[np.diff(ends, prepend=-n) > 6000], [n]])
+    qdd = np.repeat(rng.choice([-3.0, 1.0, 2.0, 4.0], len(ends) - 1), np.diff(ends))
+    qd = np.concatenate([[0.0], np.cumsum(qdd)[:-1]]) * step + 50.0  # it never turns back
+    q = np.concatenate([[0.0], np.cumsum(qd + 0.5 * qdd * step)[:-1]]) * step
+    t, q, torque = step * np.arange(n)[::every], q[::every], 2.0 * qdd[::every]
+    torque = torque + noise * rng.normal(size=len(t))
+    (piece,) = lowpassed([Log("made", Path("made"), "", (Segment(t, step * every, q[:, None], torque[:, None], None, None, {}),))], ("a",), 15.0).pieces
+    error = (piece.tau - 2.0 * piece.smoother(piece.qdd, axis=0))[piece.core, 0]
+    return error, np.ones(len(error), bool) if piece.use is None else piece.use[piece.core, 0]
+
+
+@pytest.mark.parametrize("every, seed", [(20, 1), (20, 2), (50, 3), (100, 4)])
+def test_a_log_does_not_tell_when_between_two_samples_a_torque_jumped(every, seed):
+    """The errors of rows that count are their noise; of the others, far more. Where noise is greater than that, all count."""
+    error, counts = moved(every, seed, 0.01)
+    low = lambda values: np.sqrt(np.mean(values**2))  # noqa: E731
+    usual = 1.4826 * np.median(np.abs(error))
+    assert 0.5 < np.mean(counts) < 0.99
+    assert low(error[counts]) < 1.5 * usual < 5.0 * usual < low(error[~counts])
+    _, counts = moved(every, seed, 10.0)
+    assert counts.all()

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..clock_jumps import without_spread
+from ..clock_jumps import without_jumps
 from ..events import Event, mended, usable
 from ..gaussian import HIGHEST, Gaussian
 from ..log import Log
@@ -46,25 +46,26 @@ def lowpassed(
     """
     pieces: list[Piece] = []
     sights: list[int] = []  # rows
+    steps: list[float] = []
     for number, log in enumerate(logs):
         for segment in log.segments:
-            # spikes are mended before the low-pass, which would spread them; of the rest, rows see
-            # what both low-passes see
+            # spikes are mended before low-passes spread them; of the rest, rows see what these see
             clean = replace(segment, tau=mended(segment, log.events, joints))
             if (piece := _piece(number, log, clean, cutoff)) is not None:
                 seen = _sight(piece, segment.step)
                 sights.append(math.ceil(seen / piece.step))
+                steps.append(segment.step)
                 pieces.append(without_events(piece, log.events, joints, seen, seen))
     if not pieces:
         return None
     disturbed = share_left_out(pieces)
-    pieces = [without_spread(piece) for piece in pieces]
+    pieces = [without_jumps(*each) for each in zip(pieces, steps)]
     threshold = standstill_speed(pieces)
     # where the speed changes its sign between two samples, the angles' noise says in which:
     # friction's jump is as uncertain
     still = [np.where(turns(piece.qd), np.inf, threshold) for piece in pieces]
-    moving = [without_standstill(*each) for each in zip(pieces, still, sights)]
-    motion = assembled(joints, moving, unused=unused_of(logs))
+    pieces = [without_standstill(*each) for each in zip(pieces, still, sights)]
+    motion = assembled(joints, pieces, unused=unused_of(logs))
     events = tuple(event for log in logs for event in log.events)
     own_band = band(logs) if known is None else known
     return replace(motion, events=events, disturbed=disturbed, band=own_band)
