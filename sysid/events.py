@@ -8,6 +8,7 @@ brake       one joint's torque repeats exactly while it rests: not the torque th
 frozen      one joint's torque or angle repeats exactly while it moves: the reading stood still
 missing     one joint's torque never changes though it moves: none was logged, or another signal
 saturation  as frozen, at the highest or lowest torque of the log: told, but not left out
+slip        an angle steps between two samples as no motion does: told, and taken out of the angle
 mask        no event: a stretch that the user leaves out (`masks`)
 """
 
@@ -26,10 +27,11 @@ from .segment import Segment
 WORDS = {
     "knock": "knock", "spike": "torque spike", "brake": "closed brake", "frozen": "frozen value",
     "missing": "missing torque",
-    "saturation": "flat top", "mask": "masked stretch",
+    "saturation": "flat top", "slip": "step of an angle", "mask": "masked stretch",
 }  # fmt: skip
 KINDS = tuple(WORDS)
-TOLD = ("saturation",)  # not left out
+#: told alone: no row is left out for them
+TOLD = {"saturation": "not left out", "slip": "taken out of the angle"}
 _PASSES = 3  # over the spikes: without the largest, those beside them stand out
 _SHOWN = 4  # times of each kind and log that a notice gives
 
@@ -50,7 +52,7 @@ class Event:
 
 
 def find(
-    segment: Segment, joints: Sequence[str], *, log: str = "", among: int = 1
+    segment: Segment, joints: Sequence[str], *, log: str = "", among: int = 1, angles=None
 ) -> tuple[Event, ...]:
     """The events of a segment, in order of time.
 
@@ -58,6 +60,7 @@ def find(
         segment: a stretch of a log. joints: its joints' names, in order. log: the log's name.
         among: how many parts its log has that are looked at by themselves: a false event is as
             seldom in all of them as in a log that is looked at as one.
+        angles: (n, dof) without their slips, by default the segment's.
     """
     found: list[Event] = []
 
@@ -85,7 +88,8 @@ def find(
             tell("brake", 0, len(q) - 1, [j])
         for first, last in held_angle(q):
             tell("frozen", first, last, [j], "position")
-    struck = knocks(segment.q, calm, segment.step, spiked=segment.tau, among=among)
+    moved = segment.q if angles is None else angles
+    struck = knocks(moved, calm, segment.step, spiked=segment.tau, among=among)
     for first, last, members in struck:
         tell("knock", first, last, members, "both")
     return ordered(found)
@@ -194,16 +198,20 @@ def told(events: Sequence[Event], left_out: float, part: str) -> list[str]:
     Args:
         left_out: the share of the part's rows that does not count for them.
     """
-    masked, kept = ([e for e in events if (e.kind in TOLD) == stays] for stays in (False, True))
-    out = []
+    masked, out = [e for e in events if e.kind not in TOLD], []
     if masked:
         own = [e.kind == "mask" for e in masked]
         why = "masked" if all(own) else "disturbed or masked" if any(own) else "disturbed"
         share = f"{100 * left_out:.1f} % of the {part} rows left out as {why}"
         keeps = "" if any(own) else "; preprocess.events: keep keeps them"
         out.append(f"{share}: {_summary(masked)}{keeps}")
-    if kept:
-        out.append(f"flat tops of the torque on {part} logs, not left out: {_summary(kept)}")
+    said = {
+        "saturation": "flat tops of the torque",
+        "slip": "samples that were taken early or late, or of an encoder that slipped",
+    }
+    for kind, words in said.items():
+        if own := [e for e in events if e.kind == kind]:
+            out.append(f"{words}, on {part} logs, {TOLD[kind]}: {_summary(own)}")
     return out
 
 
@@ -223,8 +231,9 @@ def _summary(events: Sequence[Event]) -> str:
 
 def plural(kind: str, count: int) -> str:
     """The word for so many events of a kind."""
-    word = WORDS.get(kind, kind)
-    return word if count == 1 else word + ("es" if word.endswith("ch") else "s")
+    first, *rest = WORDS.get(kind, kind).split(" of ")
+    ending = "" if count == 1 else "es" if first.endswith("ch") else "s"
+    return " of ".join([first + ending, *rest])
 
 
 def _where(log: str, events: Sequence[Event]) -> str:

@@ -14,6 +14,7 @@ from .free_memory import released
 from .log_spec import LogSpec
 from .model import Model
 from .robot import Robot
+from .slips import without_slips
 from .spans import Spans
 from .specs import Experiment
 from .warned import noticed
@@ -77,15 +78,36 @@ def _disturbed(machine: Robot, read: list[logs.Log], *, among: int = 1) -> list[
     Args:
         among: how many parts their log has, where these are the spans of one.
     """
-    told = lambda log, e: not (e.signal == "torque" and set(e.joints) <= set(log.unused))  # noqa: E731
-    own = lambda log: (e for s in log.segments for e in events.find(s, machine.joints, log=log.name, among=among) if told(log, e))  # noqa: E731
-    found = [replace(log, events=(*log.events, *own(log))) for log in read]
+    found = [_shown(machine, log, among) for log in read]
     if among > 1:  # what is looked for in signals leaves half a span's memory free between what is held
         released()
     felt = bumps(machine, found, among=among)
     other = [[e for e in log.events if e.kind != "knock"] for log in found]
     knocks = [[e for e in felt if e.log == log.name] for log in found]
     return [replace(log, events=events.ordered([*own, *more])) for log, own, more in zip(found, other, knocks)]
+
+
+def _shown(machine: Robot, log: logs.Log, among: int) -> logs.Log:
+    """A log with what its signals show of disturbances, and without its angles' slips."""
+    found, segments = list(log.events), []
+    for segment in log.segments:
+        angles, steps = segment.q, []
+        if segment.clock is None:  # stamps that were wrong have been corrected
+            angles, steps = without_slips(segment.q, segment.step)
+        own = events.find(segment, machine.joints, log=log.name, among=among, angles=angles)
+        own = [*own, *_slips(segment.t, steps, machine.joints, log.name)]
+        found += [e for e in own if not (e.signal == "torque" and set(e.joints) <= set(log.unused))]
+        segments.append(segment if angles is segment.q else replace(segment, q=angles))
+    return replace(log, events=tuple(found), segments=tuple(segments))
+
+
+def _slips(t, found: list[list[tuple[int, int]]], joints: tuple[str, ...], log: str) -> list[events.Event]:
+    """One event of all joints whose angles step at the same sample."""
+    members: dict[tuple[int, int], list[str]] = {}
+    for joint, places in zip(joints, found):
+        for place in places:
+            members.setdefault(place, []).append(joint)
+    return [events.Event("slip", log, float(t[a]), float(t[b]), tuple(own), "position") for (a, b), own in members.items()]
 
 
 def _disturbed_in_spans(machine: Robot, log: logs.Log, driven: Collection[str]) -> logs.Log:
@@ -103,7 +125,8 @@ def _of_span(machine: Robot, log: logs.Log, number: int) -> tuple[list[events.Ev
     released()
     span = log.segments.around(number, _BESIDE)
     (own,) = _disturbed(machine, [replace(log, segments=(replace(span, core=None),))], among=len(log.segments))
-    return events.clipped(own.events, *span.t[[span.core.start, span.core.stop - 1]]), span.step, events.extent(span)
+    kept = [event for event in own.events if event.kind != "slip"]  # a fit reads the spans anew
+    return events.clipped(kept, *span.t[[span.core.start, span.core.stop - 1]]), span.step, events.extent(span)
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ..events import WORDS, plural
+from ..events import TOLD, WORDS, plural
 from .text import Told
 from .words import listed, percent, wrapped
 
@@ -90,7 +90,7 @@ def events(document: dict, width: int) -> list[str]:
             if e["stop"] - e["start"] < 0.01
             else f"{e['start']:.2f} to {e['stop']:.2f} s"
         )
-        told = " (not left out)" if e["kind"] == "saturation" else ""
+        told = f" ({TOLD[e['kind']]})" if e["kind"] in TOLD else ""
         out += wrapped(
             f"  {WORDS.get(e['kind'], e['kind'])}, {e['log']}, {span}: "
             f"{', '.join(e['joints'])}{told}",
@@ -107,7 +107,7 @@ def _many(kind: str, log: str, some: list[dict]) -> str:
     joints = [joint for e in some for joint in e["joints"]]
     on = ", ".join(f"{joint} {joints.count(joint)}" for joint in dict.fromkeys(joints))
     span = f"{min(e['start'] for e in some):.2f} to {max(e['stop'] for e in some):.2f} s"
-    told = " (not left out)" if kind == "saturation" else ""
+    told = f" ({TOLD[kind]})" if kind in TOLD else ""
     words = f"{len(some)} {plural(kind, len(some))}, {log}, {span}: {on}{told}"
     return f"{words}; each in diagnosis.json"
 

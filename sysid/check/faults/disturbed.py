@@ -31,6 +31,11 @@ _KINDS = {
         "the reading of {joint} stood still while it moved",
         "a fit leaves these rows out; mend the logger, which writes a value twice",
     ),
+    "slip": (
+        "clock_jitter",
+        "the angle of {joint} steps between two samples, as where one is taken early or late",
+        "a fit takes these steps out; log the time at which each value was measured",
+    ),
     "saturation": (
         "saturation",
         "the torque of {joint} has flat tops at its extreme",
@@ -42,7 +47,7 @@ _AGAIN = 0.2  # of the rows: that many which only repeat the row before
 
 
 def find(look: Look) -> Iterator[Fault]:
-    """spikes, knock, brake_closed, values_held, saturation."""
+    """spikes, knock, brake_closed, values_held, clock_jitter, saturation."""
     for log in look.logs:
         groups: dict[tuple[str, str], list] = {}
         # torque that is missing is `effort_missing`
