@@ -60,6 +60,9 @@ def in_doubt(before: Fit, after: Fit, told: Fit, candidate: Candidate) -> str | 
     if change.delta_rms > -_NOTHING * unit and not wide:
         falls = "hardly falls" if change.delta_rms < 0.0 else "does not fall"
         return f"with it the error on the test logs {falls} ({rise})"
+    if not whole and (other := comparison.spoiled(before, (after, told), own)):
+        rise = changed(other[0].delta_rms / before.rms("test")[other[0].joint])
+        return f"with it the test error of {other[0].joint} rises ({rise}) by more than any joint's falls"
     # what is told is the error of the other fit: where it rises, nobody sees an error fall
     if whole:
         risen = comparison.rises(before, told, None)

@@ -5,6 +5,7 @@ squared residuals are summed block by block over the same blocks, and the standa
 difference of their RMS is that of leaving one block out (jackknife).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -106,6 +107,20 @@ def rises(first: Fit, second: Fit, joints: list[str] | None) -> tuple[Difference
     return tuple(
         d for d in judged if d.delta_rms > max(d.se, _ROUNDING * was[d.joint]) and (joints is None or d.joint in joints)
     )
+
+
+def spoiled(first: Fit, others: Sequence[Fit], joints: list[str] | None) -> tuple[Difference, ...]:
+    """Joints beside an effect's own whose held-out error rises under each of other fits, by more than twice its standard error and by
+    a greater share than any joint's falls; none where the effect has no joint of its own (None)."""
+    if joints is None:
+        return ()
+    found, was = [], first.rms("test")
+    for other in others:
+        changes = {d.joint: d for d in compare(first, other)}
+        shares = {joint: d.delta_rms / was[joint] for joint, d in changes.items() if was[joint] > 0.0}
+        fell = max([0.0, *(-share for share in shares.values())])
+        found.append({j: d for j, d in changes.items() if j not in joints and shares.get(j, 0.0) > fell and d.delta_rms > 2.0 * d.se})
+    return tuple(d for j, d in found[0].items() if all(j in other for other in found))
 
 
 def _sums(first: Fit, second: Fit, names: tuple[str, str]):

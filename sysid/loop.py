@@ -64,7 +64,8 @@ def add(
     """Write an effect into an experiment file, or into a folder's config.yaml, refit, and say what that changed.
 
     The file is written last: where the effect cannot be, the fit fails, or the held-out error of the effect's joints (of all
-    joints where it has none of its own) rises by more than its standard error, everything stays as it was.
+    joints where it has none of its own) rises by more than its standard error, or another joint's rises clearly and by more than any
+    joint's falls, everything stays as it was.
 
     Args:
         force: write it also where the error rises.
@@ -86,7 +87,7 @@ def add(
     before_fit = pipeline.fit(experiment, progress=progress)
     after_fit, compared, _ = pipeline.refit(after, before_fit, progress=progress)
     differences = tuple(comparison.compare(before_fit, after_fit, ("before", "after")))
-    rises = comparison.rises(before_fit, compared, joints)
+    rises = comparison.rises(before_fit, compared, joints) or comparison.spoiled(before_fit, (compared, after_fit), joints)
     if rises and not force:
         return Added(after, before_fit, after_fit, differences, rises, refused=True)
     with state.locked(file):

@@ -45,6 +45,23 @@ def test_an_effect_is_refused_where_the_others_pay_for_it_however_they_count(mon
     assert ("of all joints together rises" in judged(monkeypatch, (0.01, 0.01), by_own=by_own)) is refused
 
 
+@pytest.mark.parametrize(
+    ("others", "fall", "refused"),
+    [((0.3, 0.3), -0.1, True), ((0.3, -0.01), -0.1, False), ((0.03, 0.03), -0.1, False), ((0.3, 0.3), -0.4, False), ((0.05, 0.05), -0.02, False)],
+)
+def test_an_effect_is_refused_that_spoils_another_joint(monkeypatch, others, fall, refused):
+    """By more than it is worth anywhere, clearly, and as either fit has it."""
+    before, after, told = (Told(error=error) for error in (1.0, 0.8, 0.8))
+    rises = {id(after): others[0], id(told): others[1]}
+    both = lambda _, one, *names: (Difference("a", "b", "shoulder", rises[id(one)], 0.03), Difference("a", "b", "elbow", fall, 0.01))  # noqa: E731
+    monkeypatch.setattr(borne_out, "size_told", lambda *_: True)
+    monkeypatch.setattr(comparison, "compare", both)
+    monkeypatch.setattr(comparison, "together", lambda *_, **__: Difference("a", "b", "*", -0.01, 0.002))
+    said = in_doubt(before, after, told, Candidate(vocabulary.find("cogging"), 1, ())) or ""
+    assert ("test error of shoulder rises (+30 %) by more than any joint's falls" in said) is refused
+    assert bool(comparison.spoiled(before, (after, told), ["elbow"])) is refused and not comparison.spoiled(before, (after, told), None)
+
+
 @pytest.mark.parametrize(("own", "refused"), [(-0.001, False), (0.001, True)])
 def test_an_effect_is_refused_where_its_joints_error_rises_as_add_fits_it(monkeypatch, own, refused):
     """Under the prior of the fit before it the error falls, which nobody sees who adds it."""

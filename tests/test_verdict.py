@@ -200,9 +200,13 @@ def test_what_the_motion_predicts_and_no_effect_does_is_unknown():
     assert elbow(2.0, rest=left(0.6 * WORTH)).status == "unresolved"
 
 
-@pytest.mark.parametrize(("taken", "share", "status"), [(0.2, 0.5, "unknown"), (0.6, 0.5, "unknown"), (0.7, 0.5, "missing"), (0.2, 0.05, "missing")])
-def test_the_greater_part_gives_the_name(taken, share, status):
-    """An effect took a share of all; of the rest functions of the motion predict a share still."""
+@pytest.mark.parametrize(
+    ("taken", "share", "status"),
+    [(0.2, 0.5, "unknown"), (0.6, 0.5, "unknown"), (0.7, 0.5, "unknown"), (0.9, 0.3, "missing"), (0.2, 0.05, "unknown"), (0.4, 0.05, "missing")],
+)
+def test_nearly_all_gives_the_name(taken, share, status):
+    """An effect took a share of all; of the rest functions of the motion predict a share still, which may be a tenth of that: another
+    law that an effect only resembles leaves more."""
     found = elbow(3.0, [claim("cogging", "elbow", [0.0, taken], fitted(1.6))], rest=left(share))
     assert found.status == status and found.left is not None
     said = _verdict(found)
@@ -361,8 +365,8 @@ def test_a_tone_alone_is_unknown_and_its_share_is_said():
     assert said["depends_on"] == [{"variable": "a steady tone", "share": 0.4}] and said["share_left"] == pytest.approx(0.4)
     # and it is weighed against what effects took
     assert elbow(3.0, [claim("cogging", "elbow", [0.0, 0.1], fitted(1.6))], rest=hum).status == "unknown"
-    assert elbow(3.0, [claim("cogging", "elbow", [0.0, 0.6], fitted(1.6))], rest=hum).status == "unknown"  # 0.16 of 0.76 is a fifth
-    assert elbow(3.0, [claim("cogging", "elbow", [0.0, 0.62], fitted(1.6))], rest=hum).status == "missing"
+    assert elbow(3.0, [claim("cogging", "elbow", [0.0, 0.78], fitted(1.6))], rest=hum).status == "unknown"  # 0.088 beside 0.78
+    assert elbow(3.0, [claim("cogging", "elbow", [0.0, 0.82], fitted(1.6))], rest=hum).status == "missing"
 
 
 # ---- what a log could have shown
@@ -462,7 +466,7 @@ def test_blocks_are_asked_of_joints_above_their_floors_alone():
 
 def test_a_law_stands_beside_what_is_claimed():
     """Ridge regression says little of what an effect left, one function much: the effect is not all."""
-    some = [claim("torque_gain", "elbow", [0.0, 0.6], fitted(1.3))]
+    some = [claim("torque_gain", "elbow", [0.0, 0.8], fitted(1.3))]
     by = lambda share: verdicts(fitted(3.0), some, [NOISE, left(0.2)], [floor(), floor()], law=lambda j: Law(1e-9, "q_elbow and q_shoulder", share))[1]  # noqa: E731
     assert by(0.3).status == "missing" and by(0.9).status == "unknown" and by(0.9).left.share == pytest.approx(0.9)
 
@@ -472,7 +476,7 @@ def test_what_explains_the_training_logs_alone_may_be_another_law():
     some = [claim("joint_coupling", "elbow", [0.0, 0.87], fitted(1.9, train=1.02))]
     by = lambda share: verdicts(fitted(3.2, train=1.9), some, [NOISE, left(0.2)], [floor(), floor()], law=lambda j: Law(1e-9, "qd_elbow", share))[1]  # noqa: E731
     assert by(0.99).status == "unknown" and by(0.99).explained == pytest.approx(0.72, abs=0.01)
-    assert by(0.3).status == "missing"
+    assert by(0.2).status == "missing"
 
 
 @pytest.mark.parametrize(("gain", "chance"), [(0.3, 0.2), (0.5 * WORTH, 1e-3)])
@@ -579,7 +583,7 @@ def test_what_smoothing_makes_of_an_error(errors, halves, said):
 
 def test_a_window_that_is_too_long_is_said_and_the_one_that_is_said_will_do(simulated):
     """Speeds that are trapezoids, with nothing hidden: acceleration jumps, and 0.2 s smear it where rows about jumps count."""
-    path = simulated("trapezoids", seed=1, duration=12.0, motion="moves") / "config.yaml"
+    path = simulated("trapezoids", seed=1, duration=20.0, motion="moves") / "config.yaml"
     text = path.read_text().replace("window: 0.1", "window: 0.2")
     found = diagnose(config.loads(text.replace("standstill: auto", "standstill: mask"), path))
     assert not found.claims and {v.status for v in found.verdict} == {"unresolved"}

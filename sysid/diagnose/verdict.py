@@ -16,7 +16,7 @@ from .ask import HALF
 from .claims import Claim
 from .select import LEVEL, WORTH
 
-_LEFT = 0.25  # of what effects took: they explain it, 80 % of all that anything does
+_LEFT, _PREDICTED = 0.25, 0.1  # of what effects took: of all else, and of what functions predict
 
 
 @dataclass(frozen=True)
@@ -24,13 +24,13 @@ class Verdict:
     """One joint's verdict.
 
     status: complete (nothing is left above the noise), missing (`claims`: what is claimed, first
-    the first), explained (by the claims of other joints' equations), unknown (the motion predicts
-    what is left, or claims take less than 80 % of it, and no effect does), unresolved (error
-    stands above the floor, or the floor is not known, and these logs do not say why). explained:
+    the first), explained (by the claims of other joints' equations), unknown (of what is left the
+    motion predicts a tenth of what claims took, or these take less than 80 % of all), unresolved
+    (error stands above the floor, or the floor is not known, and nothing says why). explained:
     share of the joint's misfit on the test logs that all claims take, NaN where there is none.
-    left: what functions of the motion predict of the rest; None where nothing. says: why something
-    is left. may: the effect that may be it. even: whether most of the rest is how the fit weighs
-    its joints. carries: that the model does not carry over to the test logs, where it does not.
+    left: what functions of the motion predict of the rest, or None. says: why something is left.
+    may: the effect that may be it. even: whether most of the rest is how the fit weighs its joints.
+    carries: that the model does not carry over to the test logs, where it does not.
     """
 
     joint: str
@@ -60,13 +60,12 @@ def verdicts(
     """The verdict on every joint.
 
     Args:
-        fit: of the experiment as it is. left: what functions of the motion predict with all claims
-            in the model. floors: of each joint's noise. carried: whether the model with all claims
-            carries over, of each joint. weighed: {joint: RMS where each counts by its noise}.
-            law: the function that stands out most of what is left of a joint. near: the effect that
-            may be what is left, or predicted of it. beyond: the function that stands out most with
-            such an effect in the model. took: what all claims take of each joint's squared residual
-            on the test logs, under the low-pass, where a loud joint bends no quiet one.
+        fit: of the experiment as it is. left: what functions of the motion predict with all claims.
+            floors: of each joint's noise. carried: whether the model with all claims carries over,
+            of each joint. weighed: {joint: RMS where each counts by its noise}.
+            law: the function that stands out most of what is left of a joint; beyond: the same with
+            such an effect in the model as `near` says may be what is left, or predicted of it.
+            took: what all claims take of each joint's square on the test logs, low-passed.
     """
     last = claims[-1].after if claims else fit
     errors = last.rms("train"), last.rms("test")
@@ -103,17 +102,18 @@ def verdicts(
         looks = near(j, part * seen.total, bool(remains))
         looks = looks or in_vain(refused, fit.joints, j, HALF * part)
         # of whichever logs they explain less of: where these do not carry over, another law may
-        taken = max(min(sum(c.step.shares[j] for c in own), explained), 0.0)
-        little = remains is None or remains.share * max(1.0 - taken, 0.0) <= _LEFT * taken
+        taken = max(min(sum(c.step.shares[j] for c in own or others), explained), 0.0)
+        little = remains is None or remains.share * max(1.0 - taken, 0.0) <= _PREDICTED * taken
         further = beyond(j, looks[0]) if looks and remains and beyond and not own else None
         further = further if further and further.predicts(among, WORTH) else None
+        done = others and not own and remains and whole and little
         if own and (whole or evens[j]) and little:
             told = ("missing", own, explained, remains)
-        elif own or (remains and (further or not looks)):
+        elif not done and (own or (remains and (further or not looks))):
             why = not_all(looks[0].name, further.share) if further else ""
             why = why if remains else cause(both, floors[j])
             told = ("unknown", own or others, explained, remains, why)
-        elif remains or not (reaches[j] and first > 0.0):
+        elif not done and (remains or not (reaches[j] and first > 0.0)):
             without = weighed[joint] if evens[j] else None
             effect, p = looks or (None, 1.0)
             may = effect if p > LEVEL else None  # what stands above the level was fitted, in vain

@@ -136,6 +136,9 @@ def _floor(floor) -> dict:
 
 def _verdict(v: Verdict, path="config.yaml") -> dict:
     out: dict = {"joint": v.joint, "status": v.status}
+    # where all error may be noise, what falls is all that is more
+    share = number(min(v.explained, 1.0)) if np.isfinite(v.explained) else None
+    share = 1.0 if v.status == "missing" and share is None else share
     if v.status in ("missing", "unknown") and v.claims:
         first = v.claims[0]
         named = {
@@ -143,7 +146,7 @@ def _verdict(v: Verdict, path="config.yaml") -> dict:
             "tied_with": ties(first, first.head),
             "command": first.head.command,
             "set": chances(confidence_set(first)),
-            "explained": number(v.explained),
+            "explained": share,
         }
         also = [c.head.effect for c in v.claims[1:]]
         part = {"also": [first.head.effect, *also], "explained": named["explained"]}
@@ -151,13 +154,9 @@ def _verdict(v: Verdict, path="config.yaml") -> dict:
         out["commands"] = [c.head.command for c in v.claims]
     elif v.status == "unknown":
         out["also"] = []
-    if v.status == "missing" and out["explained"] is None:
-        out["explained"] = 0.0
     if v.status == "explained":
-        out |= {
-            "by": [{"effect": c.head.effect, "joint": c.head.joint} for c in v.claims],
-            "explained": number(v.explained),
-        }
+        by = [{"effect": c.head.effect, "joint": c.head.joint} for c in v.claims]
+        out |= {"by": by, "explained": share}
     if v.says or v.carries:
         out["says"] = "; ".join(words for words in (v.says, v.carries) if words)
     if v.may is not None:
