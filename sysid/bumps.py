@@ -2,9 +2,9 @@
 
 An arm that gives way to a push moves smoothly, and a smooth torque drives it: only what its
 equations leave is the push. It stands in those of several joints at once and nowhere else, while
-what a model lacks on one joint stays in that joint's equation. But a push may drive one joint alone:
-what outweighs all the rest of a log in a moment of it says nothing of how the joint moves otherwise,
-for no other moment confirms it.
+what a model lacks on one joint stays in that joint's equation. But a push may drive one joint: what
+outweighs in a moment all that is usual in seconds says nothing of how the joint moves otherwise,
+as no other moment confirms it.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ def bumps(robot: Robot, logs: Sequence[Log], *, among: int = 1) -> list[Event]:
     """The knocks of logs of a robot: in what rigid bodies with friction, fitted to them, leave.
 
     The size of what is left, under the low-pass of a diagnosis, over the usual: the larger of the
-    joint's own and of what is about it. A knock is where it surprises on two joints, or on one where
+    joint's own and of what is about it. A knock is where it surprises on two joints, or on one if
     its square is more than that of all that is usual on that joint. A quick move among slow ones is
     none, be it that the signals showed it: of how far torque goes meanwhile little is left, as
     equations follow it but for what they lack. Nor is torque at its limit.
@@ -50,7 +50,7 @@ def bumps(robot: Robot, logs: Sequence[Log], *, among: int = 1) -> list[Event]:
         logs: with the events that their signals show. among: as of `outliers.spikes`.
     """
     shown = [event for log in logs for event in log.events if event.kind == "knock"]
-    # a knock is sudden in all joints as well: it is to be seen where a clock's correction has had it
+    # a knock is sudden in all joints as well: it is to be seen where a clock's correction had it
     calm = [
         replace(
             log,
@@ -65,8 +65,8 @@ def bumps(robot: Robot, logs: Sequence[Log], *, among: int = 1) -> list[Event]:
     model = build(robot, [EffectSpec(name=name) for name in _EFFECTS])
     stride, playing = stride_of(motion, cutoff), set[int]()
     while (seen := _seen(robot, model, motion, stride, shown, among, playing)).often:
-        # what a joint does alone time and again is its own: the others say what else there is, two of
-        # them at once, and what signals show on it stands
+        # what a joint does alone time and again is its own: the others say what else there is, two
+        # of them at once, and what signals show on it stands
         if not (alone := [j for j in range(robot.dof) if (j,) in seen.members]):
             return shown
         playing.add(max(alone, key=lambda j: seen.members.count((j,))))
@@ -172,7 +172,7 @@ def _bursts(rows: Rows, parts, kinds, aside, step: float, level: float, alone: b
         )
         far = size[at] > _SHARE * weights * np.maximum(goes, 0.0)
         strange[at] = np.where(far & rows.use[at], own[at], -1.0)
-        single = _outweighing(own, size, at, level) if alone else []
+        single = _outweighing(own, size, rows.use, at, step, level) if alone else []
         for a, b in [*_together(own[at], step, level), *single]:
             members = np.flatnonzero(own[at[a : b + 1]].max(axis=0) > 0.5 * level)
             tells = strange[at[a : b + 1]].max() > 0.5 * level
@@ -214,12 +214,15 @@ def _together(surprises, step: float, level: float) -> list[tuple[int, int]]:
     return bursts(np.sort(wide, axis=1)[:, -2], level)
 
 
-def _outweighing(surprises, size, at, level: float) -> list[tuple[int, int]]:
-    """Where a joint's burst, of rows `at`, has a greater square than all its rows (n, dof) without
-    any burst."""
+def _outweighing(surprises, size, use, at, step: float, level: float) -> list[tuple[int, int]]:
+    """Where a joint's burst, of rows `at`, has a greater square than what is usual on that joint:
+    in the time in which one may come, or in all where they come oftener."""
     out = []
-    for s, square in zip(surprises.T, np.square(size).T):
-        calm = np.sum(square) - sum(np.sum(square[a : b + 1]) for a, b in bursts(s, level))
+    for s, square, rows in zip(surprises.T, np.square(size).T, use.sum(axis=0)):
+        every = bursts(s, level)
+        calm = np.sum(square) - sum(np.sum(square[a : b + 1]) for a, b in every)
+        if len(every) * _OFTEN < rows * step:
+            calm *= min(2.0 * _OFTEN / (rows * step), 1.0)
         out += [(a, b) for a, b in bursts(s[at], level) if np.sum(square[at[a : b + 1]]) > calm]
     return out
 

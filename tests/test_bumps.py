@@ -8,7 +8,7 @@ import pytest
 
 from sysid import experiment_logs, pipeline
 from sysid import rows as rows_of
-from sysid.bumps import apart, bumps
+from sysid.bumps import _outweighing, apart, bumps
 from sysid.events import Event
 from sysid.listed_effects import build
 from sysid.lowpass import lowpassed
@@ -144,6 +144,19 @@ def test_what_outweighs_all_the_rest_on_one_joint_is_a_push(leg, tmp_path):
     (event,) = bumps(machine, [pulsed(log, 5.0, 1, 3.0)])
     assert event.joints == (machine.joints[1],) and 4.9 < event.start < 5.06 < event.stop + 0.06 < 5.3
     assert bumps(machine, [pulsed(log, 5.0, 1, 0.1)]) == []
+
+
+@pytest.mark.parametrize("seconds", [6.0, 20.0, 200.0])
+def test_a_longer_log_hides_no_push(seconds):
+    """One burst, of the square that is usual in seven seconds or in five; and in many bursts, one of them as great, where all counts."""
+    step, level = 0.01, 12.0
+    n = round(seconds / step)
+    for as_much, found in ((7.0, True), (5.0, False)):
+        size, surprises, use = np.ones((n, 1)), np.zeros((n, 1)), np.ones((n, 1), dtype=bool)
+        size[300], surprises[300] = np.sqrt(as_much / step), 2.0 * level
+        assert bool(_outweighing(surprises, size, use, np.arange(n), step, level)) is found
+        size[150::200], surprises[150::200] = 5.0, 2.0 * level
+        assert bool(_outweighing(surprises, size, use, np.arange(n), step, level)) is (found and seconds < 7.0)
 
 
 def clipped(log, joint: int, share: float):
