@@ -34,6 +34,7 @@ KINDS = tuple(WORDS)
 TOLD = {"saturation": "not left out", "slip": "taken out of the angle"}
 _PASSES = 3  # over the spikes: without the largest, those beside them stand out
 _SHOWN = 4  # times of each kind and log that a notice gives
+_AGAIN = 4  # knocks of a joint in one part of an experiment: more than accidents
 
 
 @dataclass(frozen=True)
@@ -205,6 +206,8 @@ def told(events: Sequence[Event], left_out: float, part: str) -> list[str]:
         share = f"{100 * left_out:.1f} % of the {part} rows left out as {why}"
         keeps = "" if any(own) else "; preprocess.events: keep keeps them"
         out.append(f"{share}: {_summary(masked)}{keeps}")
+        if said := again([joint for e in masked if e.kind == "knock" for joint in e.joints]):
+            out.append(f"{said} ({part} logs)")
     said = {
         "saturation": "flat tops of the torque",
         "slip": "samples that were taken early or late, or of an encoder that slipped",
@@ -213,6 +216,18 @@ def told(events: Sequence[Event], left_out: float, part: str) -> list[str]:
         if own := [e for e in events if e.kind == kind]:
             out.append(f"{words}, on {part} logs, {TOLD[kind]}: {_summary(own)}")
     return out
+
+
+def again(struck: Sequence[str]) -> str:
+    """What may strike where few joints are knocked time and again: `struck` has all joints of every
+    knock; empty where none is, or where all are, as by somebody who pushes the arm."""
+    most = max(map(struck.count, struck), default=0)
+    who = [joint for joint in dict.fromkeys(struck) if struck.count(joint) == most]
+    if most < _AGAIN or 2 * len(who) > len(set(struck)):
+        return ""
+    where = " and ".join([", ".join(who[:-1]), who[-1]] if len(who) > 1 else who)
+    why = "where nobody pushed, its own play or an end stop strikes, and a diagnosis with"
+    return f"{most} knocks are on {where}: {why} `events: keep` under `preprocess:` can name it"
 
 
 def _summary(events: Sequence[Event]) -> str:

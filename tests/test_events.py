@@ -11,7 +11,7 @@ import pytest
 from scipy.signal import lfilter
 
 from sysid import config, experiment_logs, pipeline
-from sysid.events import Event, extent, find, mended, told, unlogged, usable
+from sysid.events import Event, again, extent, find, mended, told, unlogged, usable
 from sysid.log import Log, Segment
 from sysid.lowpass import lowpassed
 from sysid.preprocess import prepare
@@ -38,9 +38,7 @@ def motion(seconds=12.0, step=STEP, bits=None):
     return t, q, qd, qdd
 
 
-def segment(
-    *, seed=0, noise=0.1, colour=0.0, step=STEP, bits=None, grain=0.0, seconds=12.0
-) -> Segment:
+def segment(*, seed=0, noise=0.1, colour=0.0, step=STEP, bits=None, grain=0.0, seconds=12.0) -> Segment:
     """Inertia, gravity, and friction that jumps at reversals, with white or coloured torque noise."""
     t, q, qd, qdd = motion(seconds, step, bits)
     tau = 0.5 * qdd + 4.0 * np.sin(q) + 0.3 * qd + 1.5 * np.sign(qd)
@@ -55,9 +53,7 @@ def segment(
 def with_knock(made: Segment, at: float, size=2.5, bits=None) -> Segment:
     """All joints ring at 30 Hz for some 80 ms, in torque and, by a milliradian, in their angles."""
     since = made.t - at
-    ring = np.where(
-        since >= 0, np.exp(-since.clip(0) / 0.04) * np.sin(2 * np.pi * 30 * since), 0.0
-    )[:, None]
+    ring = np.where(since >= 0, np.exp(-since.clip(0) / 0.04) * np.sin(2 * np.pi * 30 * since), 0.0)[:, None]
     q = made.q + 1e-3 * ring
     if bits is not None:
         q = 2 * np.pi / 2**bits * np.round(q / (2 * np.pi / 2**bits))
@@ -85,25 +81,18 @@ def test_stops_and_starts_of_all_joints_at_once_are_no_events():
     """Point to point in trapezoids of speed: torque and acceleration jump on every joint at the same instants."""
     t = STEP * np.arange(12000)
     phase = np.mod(t, 2.0)
-    qdd = 8.0 * (
-        np.where((phase > 0.2) & (phase < 0.4), 1, 0)
-        - np.where((phase > 1.0) & (phase < 1.2), 1, 0)
-    )
+    qdd = 8.0 * (np.where((phase > 0.2) & (phase < 0.4), 1, 0) - np.where((phase > 1.0) & (phase < 1.2), 1, 0))
     qd = np.cumsum(qdd) * STEP
     qd = np.where(np.abs(qd) < 1e-9, 0.0, qd)
     q = np.cumsum(qd) * STEP
     sides = np.array([1.0, 0.7, -1.2])
     rng = np.random.default_rng(3)
-    tau = (
-        (2.0 * qdd + np.tanh(qd / 0.2))[:, None] * sides + 3.0 + 0.1 * rng.normal(size=(len(t), 3))
-    )
+    tau = (2.0 * qdd + np.tanh(qd / 0.2))[:, None] * sides + 3.0 + 0.1 * rng.normal(size=(len(t), 3))
     angles = q[:, None] * sides + 1e-5 * rng.normal(size=(len(t), 3))
     assert find(Segment(t, STEP, angles, tau, None, None, {}), JOINTS) == ()
 
 
-@pytest.mark.parametrize(
-    "conditions", [{}, {"colour": 0.02, "seed": 5}, {"bits": 12}, {"step": 0.004}]
-)
+@pytest.mark.parametrize("conditions", [{}, {"colour": 0.02, "seed": 5}, {"bits": 12}, {"step": 0.004}])
 def test_knocks_are_found_where_they_are(conditions):
     bits = conditions.get("bits")
     size = 2.5 if bits is None else 5.0  # a coarse encoder leaves it to the torque to show it
@@ -165,34 +154,19 @@ def test_a_disturbance_of_one_joint_alone_is_no_knock():
     assert find(replace(made, tau=tau), JOINTS) == ()
 
 
-@pytest.mark.parametrize(
-    "conditions", [{}, {"colour": 0.02, "seed": 5}, {"grain": 0.05}, {"step": 0.004, "noise": 0.3}]
-)
+@pytest.mark.parametrize("conditions", [{}, {"colour": 0.02, "seed": 5}, {"grain": 0.05}, {"step": 0.004, "noise": 0.3}])
 def test_spikes_are_found_sample_by_sample(conditions):
     made = segment(**conditions)
     n, tau = len(made.t), made.tau.copy()
     size = 30 * max(0.1, conditions.get("noise", 0.0))
-    where = [
-        (j, round(n * share) + 31 * j, width)
-        for share in (0.2, 0.4, 0.6, 0.8)
-        for j, width in enumerate((1, 2, 3))
-    ]
+    where = [(j, round(n * share) + 31 * j, width) for share in (0.2, 0.4, 0.6, 0.8) for j, width in enumerate((1, 2, 3))]
     for j, row, width in where:
         tau[row : row + width, j] += size * (-1) ** row
     found = find(replace(made, tau=tau), JOINTS, log="x")
-    assert [event.kind for event in found] == ["spike"] * 12 and {event.log for event in found} == {
-        "x"
-    }
-    expected = {
-        (JOINTS[j], round(made.t[row], 6), round(made.t[row + width - 1], 6))
-        for j, row, width in where
-    }
-    assert {
-        (event.joints[0], round(event.start, 6), round(event.stop, 6)) for event in found
-    } == expected
-    np.testing.assert_allclose(
-        mended(replace(made, tau=tau), found, JOINTS), made.tau, atol=size / 3
-    )
+    assert [event.kind for event in found] == ["spike"] * 12 and {event.log for event in found} == {"x"}
+    expected = {(JOINTS[j], round(made.t[row], 6), round(made.t[row + width - 1], 6)) for j, row, width in where}
+    assert {(event.joints[0], round(event.start, 6), round(event.stop, 6)) for event in found} == expected
+    np.testing.assert_allclose(mended(replace(made, tau=tau), found, JOINTS), made.tau, atol=size / 3)
 
 
 def test_what_is_found_does_not_depend_on_units_or_offsets():
@@ -275,25 +249,18 @@ def test_rows_that_events_reach_are_left_out():
         (piece,) = prepare([log(made, events=events)], spec, JOINTS).pieces
         return piece.t[~piece.use[:, JOINTS.index(joint)]], piece
 
-    t, piece = lost(
-        PreprocessSpec(window=0.1, standstill="keep"), "c"
-    )  # 50 ms to either side: the knock, whichever joint shows it, the brake, the angle
+    t, piece = lost(PreprocessSpec(window=0.1, standstill="keep"), "c")  # 50 ms to either side: the knock, whichever joint shows it, the brake, the angle
     np.testing.assert_allclose([t[0], t[t < 5][-1]], [2.95, 3.25], atol=1e-9)
     np.testing.assert_allclose([t[(t > 5) & (t < 8.5)][0], t[t < 8.5][-1]], [7.0, 8.0], atol=1e-9)
     np.testing.assert_allclose([t[t > 8.5][0], t[-1]], [8.95, 9.15], atol=1e-9)
     t, _ = lost(PreprocessSpec(window=0.1, standstill="keep"), "b")
     np.testing.assert_allclose(t[(t > 4) & (t < 6)], [5.0, 5.001], atol=1e-9)
-    t, _ = lost(
-        PreprocessSpec(window=0.1, torque="same", standstill="keep"), "c"
-    )  # columns see filtered angles, torque its own filter
+    t, _ = lost(PreprocessSpec(window=0.1, torque="same", standstill="keep"), "c")  # columns see filtered angles, torque its own filter
     np.testing.assert_allclose([t[0], t[t < 5][-1]], [2.9, 3.3], atol=1e-9)
     np.testing.assert_allclose([t[(t > 5) & (t < 8.5)][0], t[t < 8.5][-1]], [6.95, 8.05], atol=1e-9)
     both = PreprocessSpec(window=0.1, standstill=0.5)
     t, piece = lost(both, "b")
-    assert (
-        not piece.use[np.abs(piece.qd) < 0.5].any()
-        and np.isin(np.round([3.1, 5.0], 6), np.round(t, 6)).all()
-    )
+    assert not piece.use[np.abs(piece.qd) < 0.5].any() and np.isin(np.round([3.1, 5.0], 6), np.round(t, 6)).all()
 
 
 def test_spikes_do_not_spread_through_a_filter():
@@ -301,15 +268,10 @@ def test_spikes_do_not_spread_through_a_filter():
     spiked = changed(made, tau=(slice(5000, 5001), 1, made.tau[5000, 1] + 30.0))
     (spike,) = find(spiked, JOINTS, log="made.csv")
     spec = PreprocessSpec(window=0.1, torque="same", standstill="keep")
-    clean, seen = (
-        prepare([log(s, events=e)], spec, JOINTS).pieces[0]
-        for s, e in ((made, ()), (spiked, (spike,)))
-    )
+    clean, seen = (prepare([log(s, events=e)], spec, JOINTS).pieces[0] for s, e in ((made, ()), (spiked, (spike,))))
     np.testing.assert_allclose(seen.tau, clean.tau, atol=0.02)
     assert np.sum(~seen.use) == 1
-    clean, seen = (
-        lowpassed([log(s, events=e)], JOINTS, 15.0) for s, e in ((made, ()), (spiked, (spike,)))
-    )
+    clean, seen = (lowpassed([log(s, events=e)], JOINTS, 15.0) for s, e in ((made, ()), (spiked, (spike,))))
     np.testing.assert_allclose(seen.pieces[0].tau, clean.pieces[0].tau, atol=0.02)
 
 
@@ -325,13 +287,9 @@ def test_the_view_of_the_diagnosis_leaves_events_out():
 
 
 def test_a_log_without_events_keeps_every_row_and_one_with_them_does_not_disturb_the_others():
-    assert (
-        prepare([log(segment())], PreprocessSpec(standstill="keep"), JOINTS).pieces[0].use is None
-    )
+    assert prepare([log(segment())], PreprocessSpec(standstill="keep"), JOINTS).pieces[0].use is None
     spike = Event("spike", "made.csv", 5.0, 5.0, ("b",))
-    one, two = prepare(
-        [log(segment(), events=[spike]), log(segment())], PreprocessSpec(standstill="keep"), JOINTS
-    ).pieces
+    one, two = prepare([log(segment(), events=[spike]), log(segment())], PreprocessSpec(standstill="keep"), JOINTS).pieces
     assert np.sum(~one.use) == 1 and two.use.all()
 
 
@@ -365,9 +323,7 @@ def test_a_fit_says_what_it_left_out(experiment, cli):
     clean = json.loads(cli("fit", experiment(name="clean"), "--json").out)
     assert kept["events"] == clean["events"] == []
     assert kept["rms"]["train"]["shoulder"] > 5 * clean["rms"]["train"]["shoulder"]
-    np.testing.assert_allclose(
-        document["rms"]["train"]["shoulder"], clean["rms"]["train"]["shoulder"], rtol=0.02
-    )
+    np.testing.assert_allclose(document["rms"]["train"]["shoulder"], clean["rms"]["train"]["shoulder"], rtol=0.02)
 
 
 def test_the_paper_s_experiments_keep_every_row():
@@ -393,9 +349,7 @@ def real(name: str) -> dict[str, tuple[tuple[Event, ...], Log]]:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         machine = pipeline.build(experiment)[0]
-        logs = experiment_logs.read(
-            experiment, machine, [*experiment.data.train, *experiment.data.test]
-        )
+        logs = experiment_logs.read(experiment, machine, [*experiment.data.train, *experiment.data.test])
     return {one.name: one for one in logs}
 
 
@@ -477,11 +431,22 @@ def test_an_actuator_s_torque_may_be_the_same_throughout(experiment):
     third = len(whole.t) // 3
     gone = replace(
         plain,
-        segments=tuple(
-            replace(whole, t=whole.t[rows], q=whole.q[rows], tau=whole.tau[rows])
-            for rows in (slice(0, third), slice(third, None))
-        ),
+        segments=tuple(replace(whole, t=whole.t[rows], q=whole.q[rows], tau=whole.tau[rows]) for rows in (slice(0, third), slice(third, None))),
     )
     (log,) = experiment_logs.with_events(machine, [gone])
     (event,) = [event for event in log.events if event.kind == "missing"]
     assert (event.start, event.stop) == (whole.t[0], whole.t[-1])
+
+
+@pytest.mark.parametrize(
+    ("struck", "who"),
+    [
+        ("abc" * 5, ""), ("b" * 3, ""), ("b" * 4 + "ac" * 3, "4 knocks are on b:"), ("bbbbcccca", ""), ("bbbbccccad", "4 knocks are on b and c:"), ("", ""),
+    ],
+)  # fmt: skip
+def test_what_strikes_one_joint_again_and_again_may_be_its_own_play(struck, who):
+    """All joints are pushed by somebody."""
+    said = again(list(struck))
+    assert said.startswith(who) and bool(said) is bool(who)
+    knocks_ = [Event("knock", "made.csv", float(k), k + 0.1, (joint,), "both") for k, joint in enumerate(struck)]
+    assert any(who and notice.startswith(who) and notice.endswith("(training logs)") for notice in told(knocks_, 0.01, "training")) is bool(who)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ..events import TOLD, WORDS, plural
+from ..events import TOLD, WORDS, again, plural
 from .text import Told
 from .words import listed, percent, wrapped
 
@@ -100,6 +100,8 @@ def events(document: dict, width: int) -> list[str]:
     more = len(shown) - _EVENTS
     if more > 0:
         out.append(f"  and {more} more: see diagnosis.json")
+    said = again([j for e in document["events"] if e["kind"] == "knock" for j in e["joints"]])
+    out += wrapped(f"  {said}", width, "    ") if said else []
     return ["events in the logs, left out", *out] if out else []
 
 
