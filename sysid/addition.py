@@ -6,6 +6,8 @@ import shlex
 from collections.abc import Sequence
 from pathlib import Path
 
+import yaml
+
 from .specs import EffectSpec, Experiment
 
 #: below it a probability is told as "less than"
@@ -16,7 +18,8 @@ def spelled(candidate, joint: str) -> tuple[str, list[str] | None, dict]:
     """A candidate as an experiment file names it: word, joints, options."""
     spec = getattr(candidate.effect, "spelled", None)
     name, own = (candidate.name, {}) if spec is None else spec
-    return name, None if joint == "*" else [joint], {**own, **dict(candidate.options)}
+    options = {k: list(v) if isinstance(v, tuple) else v for k, v in candidate.options}
+    return name, None if joint == "*" else [joint], {**own, **options}
 
 
 def grown(
@@ -57,13 +60,18 @@ def typed(path: Path) -> Path:
     return path.parent if path.name == "config.yaml" else path
 
 
+def flow(value) -> str:
+    """An option's value as YAML has it on one line."""
+    return yaml.safe_dump(list(value), default_flow_style=True, width=10**6).strip() if isinstance(value, (list, tuple)) else str(value)
+
+
 def command(path, effect: str, joints: list[str] | None, options: dict) -> str:
     """What is typed to add an effect to the experiment in a file."""
     words = ["sysid", "add", str(typed(path)), effect]
     for joint in joints or []:
         words += ["--joint", joint]
     for name, value in options.items():
-        words += ["--option", f"{name}={value}"]
+        words += ["--option", f"{name}={flow(value)}"]
     return shlex.join(words)
 
 

@@ -104,9 +104,9 @@ class Candidate:
         return (self.parameters, self.name not in _PLAIN, self.name)
 
 
-def candidates(model: Model, extra=()) -> list[Candidate]:
+def candidates(model: Model, extra=(), logs: Sequence[str] = ()) -> list[Candidate]:
     """Every effect that a model lacks, joint by joint; `extra` effects of the user's own come with
-    the vocabulary."""
+    the vocabulary, and what may be in some of the training logs alone, of those names."""
     robot = model.robot
     there = {(effect.name, joint) for effect, joints in model.terms for joint in joints}
     out = []
@@ -115,10 +115,14 @@ def candidates(model: Model, extra=()) -> list[Candidate]:
             if (effect.name, joint) in there:
                 out += _richer(model, effect.name, joint)
                 continue
-            for options in effect.variants(robot, joint):
+            for options in [*effect.variants(robot, joint), *effect.among(logs)]:
                 bound = effect.given(**options).bound(robot, joint)
-                out.append(Candidate(bound, joint, tuple(options.items())))
+                out.append(Candidate(bound, joint, _fixed(options)))
     return out
+
+
+def _fixed(options: dict) -> tuple[tuple[str, object], ...]:
+    return tuple((k, tuple(v) if isinstance(v, list) else v) for k, v in options.items())
 
 
 def _richer(model: Model, name: str, joint: int) -> list[Candidate]:
@@ -138,7 +142,7 @@ def _richer(model: Model, name: str, joint: int) -> list[Candidate]:
         Candidate(
             effect.given(**options).bound(model.robot, joint),
             joint,
-            tuple(options.items()),
+            _fixed(options),
             (tuple(at.items()),),
         )
         for options, at in effect.richer(**{v.shape.name: at for v, at in own})

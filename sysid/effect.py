@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import copy
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cache
 from types import MappingProxyType
 from typing import ClassVar
@@ -126,6 +126,10 @@ class Effect(ABC):
     def variants(self, robot, joint: int) -> list[dict]:
         """The options under which it is worth trying on a joint (-1 where its scope is the robot), simplest first."""
         return [{}]
+
+    def among(self, logs: Sequence[str]) -> list[dict]:
+        """The options under which it is worth trying in some of an experiment's training logs alone, by their names."""
+        return []
 
     def richer(self, **shapes: float) -> list[tuple[dict, dict[str, float]]]:
         """What may take its place where the model has it: options, with the shape values at which to try these.

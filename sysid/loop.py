@@ -85,9 +85,13 @@ def add(
         after = config.loads(text, file)
         pipeline.build(after)
     before_fit = pipeline.fit(experiment, progress=progress)
-    after_fit, compared, _ = pipeline.refit(after, before_fit, progress=progress)
+    after_fit, compared, without = pipeline.refit(after, before_fit, progress=progress)
     differences = tuple(comparison.compare(before_fit, after_fit, ("before", "after")))
-    rises = comparison.rises(before_fit, compared, joints) or comparison.spoiled(before_fit, (compared, after_fit), joints)
+    rises = comparison.rises(before_fit, compared, joints)
+    # a prior that was chosen without it may hold bodies against it: under its own, and as the user sees it, the error falls
+    if rises and compared is not after_fit and not any(comparison.rises(one, after_fit, joints) for one in (before_fit, without())):
+        rises = ()
+    rises = rises or comparison.spoiled(before_fit, (compared, after_fit), joints)
     if rises and not force:
         return Added(after, before_fit, after_fit, differences, rises, refused=True)
     with state.locked(file):

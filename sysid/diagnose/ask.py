@@ -102,7 +102,7 @@ def ask(view: View, extra=(), tell=lambda share: None, *, before=None, anew=()) 
         tell: is called with the share done. before: answers under the model that this one grew
             from. anew: the joints where it changed something: of all others the answers stand.
     """
-    asked = candidates(view.model, extra)
+    asked = candidates(view.model, extra, sorted({piece.source for piece in view.motion.pieces}))
     joints = sorted({c.joint for c in asked})
     out = {j: before.by_joint[j] for j in joints if before is not None and j not in anew}
     made = {joint: found for joint, (found, *_) in out.items()}

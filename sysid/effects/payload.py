@@ -8,6 +8,8 @@ from ..effect_parameters import Linear, called
 from ..inertia import PARAMETERS, UNITS
 from ..regressor import body_motions, wrench_columns
 
+_MOST = 8  # logs that are tried: of more, each is a small part
+
 
 class Payload(LinkEffect):
     """A rigid body held by a link during some logs, as possible as the links are; its ten parameters stand about that link's frame.
@@ -34,6 +36,13 @@ class Payload(LinkEffect):
         chosen = super().given(**options)
         texts(chosen, "logs")
         return chosen
+
+    def among(self, logs):
+        """In one of them, or in all but one."""
+        if not 1 < len(logs) <= _MOST:
+            return []
+        one = [[name] for name in logs]
+        return [{"logs": own} for own in [*one, *([n for n in logs if n not in own] for own in one if len(logs) > 2)]]
 
     @property
     def instantaneous(self):

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from ..statement.words import option
 from .section import Section
 from .words import chance, known, level, number, percentage, placed
 
@@ -47,7 +48,7 @@ def _suspect(k: int, f: dict) -> dict:
         for name, p in f["parameters"].items()
         if p["value"] is not None
     ]
-    options = [f"{name} = {value}" for name, value in f["options"].items()]
+    options = [f"{name} = {option(value)}" for name, value in f["options"].items()]
     return {
         "number": k,
         "effect": f["effect"],

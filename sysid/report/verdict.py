@@ -6,7 +6,7 @@ from ..addition import LIKELY, apart, designs, likely
 from ..estimate import Fit
 from ..given_shapes import given_shapes, said_of_shapes
 from ..statement import text
-from ..statement.words import either, followed, near, otherwise, percent, refused, untold
+from ..statement.words import either, followed, near, option, otherwise, percent, refused, untold
 from .section import Section
 from .words import (
     SPACE,
@@ -164,7 +164,9 @@ def _claim(head: dict, tied: list[dict], joint: str, several: bool) -> dict:
     return {
         "effect": head["effect"],
         "figures": ": ".join(part for part in (takes, ", ".join(values)) if part),
-        "options": [f"{n} {v}: {head['options_say'][n]}" for n, v in head["options"].items()],
+        "options": [
+            f"{n} {option(v)}: {head['options_say'][n]}" for n, v in head["options"].items()
+        ],
         "untold": "" if head["size_told"] else _first(untold(head["parameters"])),
         "summary": summary,
         "from": _first(text.untold_from(head["probability"])).replace(" %", f"{SPACE}%"),

@@ -13,6 +13,7 @@ from .words import (
     followed,
     listed,
     near,
+    option,
     otherwise,
     percent,
     placed,
@@ -162,7 +163,7 @@ def _head(f: dict, of: Told, joint: str, width: int, said: dict[str, str]) -> li
     words = f"  {f['effect']}{takes}{numbers}"
     out = wrapped(words, width, "    ") if takes or values else []
     for name, value in f["options"].items():
-        out += wrapped(f"  {name} {value}: {f['options_say'][name]}", width, "    ")
+        out += wrapped(f"  {name} {option(value)}: {f['options_say'][name]}", width, "    ")
     if not f["size_told"]:
         out += wrapped(f"  {untold(f['parameters'])}", width, "    ")
     others = [m for m in of.sets[f["command"]] if m[:2] != (f["effect"], f["joint"])]
@@ -180,7 +181,7 @@ def _head(f: dict, of: Told, joint: str, width: int, said: dict[str, str]) -> li
 
 
 def _with_options(f: dict) -> str:
-    own = [f"{name} {value}" for name, value in f["options"].items()]
+    own = [f"{name} {option(value)}" for name, value in f["options"].items()]
     return f"{f['effect']} with {listed(own or ['none'], 'and')}"
 
 

@@ -70,6 +70,11 @@ def quantity(variable: str) -> str:
     return f"the {word} of {joint}" if word and joint else variable
 
 
+def option(value) -> str:
+    """The value of an option."""
+    return ", ".join(map(str, value)) if isinstance(value, (list, tuple)) else str(value)
+
+
 def valued(name: str, p: dict) -> str:
     """A parameter {value, std, unit} with its deviation and its unit, where it has these."""
     std = "" if p["std"] is None else f" +- {p['std']:.2g}"
