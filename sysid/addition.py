@@ -62,7 +62,9 @@ def typed(path: Path) -> Path:
 
 def flow(value) -> str:
     """An option's value as YAML has it on one line."""
-    return yaml.safe_dump(list(value), default_flow_style=True, width=10**6).strip() if isinstance(value, (list, tuple)) else str(value)
+    if not isinstance(value, (list, tuple)):
+        return str(value)
+    return yaml.safe_dump(list(value), default_flow_style=True, allow_unicode=True, width=10**6).strip()
 
 
 def command(path, effect: str, joints: list[str] | None, options: dict) -> str:

@@ -31,7 +31,8 @@ def doubted(
     if why is None or told is after or in_doubt(without(), told, told, candidate):
         return why
     own = None if candidate.joint == ROBOT else list(candidate.judged_by(before.joints))
-    return why if comparison.rises(before, told, own) else None
+    risen = comparison.rises(before, told, own) or comparison.spoiled(before, (after, told), own)
+    return why if risen else None
 
 
 def in_doubt(before: Fit, after: Fit, told: Fit, candidate: Candidate) -> str | None:

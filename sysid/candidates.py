@@ -73,9 +73,9 @@ class Candidate:
 
     @property
     def by_name(self) -> bool:
-        """Whether its options are those that the effect has where none is given."""
-        own = type(self.effect)
-        return all(getattr(own, name, None) in (None, value) for name, value in self.options)
+        """Whether its options are those that the effect has where none is given, in all logs."""
+        own, some = type(self.effect), any(isinstance(value, tuple) for _, value in self.options)
+        return not some and all(getattr(own, k, None) in (None, v) for k, v in self.options)
 
     @property
     def swings(self) -> bool:

@@ -193,11 +193,12 @@ def usable(
     return use
 
 
-def told(events: Sequence[Event], left_out: float, part: str) -> list[str]:
+def told(events: Sequence[Event], left_out: float, part: str, joints: int) -> list[str]:
     """What a user is told of the events of a part, "training" or "test".
 
     Args:
-        left_out: the share of the part's rows that does not count for them.
+        left_out: the share of the part's rows that does not count for them. joints: how many the
+            robot has.
     """
     masked, out = [e for e in events if e.kind not in TOLD], []
     if masked:
@@ -206,7 +207,7 @@ def told(events: Sequence[Event], left_out: float, part: str) -> list[str]:
         share = f"{100 * left_out:.1f} % of the {part} rows left out as {why}"
         keeps = "" if any(own) else "; preprocess.events: keep keeps them"
         out.append(f"{share}: {_summary(masked)}{keeps}")
-        if said := again([joint for e in masked if e.kind == "knock" for joint in e.joints]):
+        if said := again([j for e in masked if e.kind == "knock" for j in e.joints], joints):
             out.append(f"{said} ({part} logs)")
     said = {
         "saturation": "flat tops of the torque",
@@ -218,12 +219,12 @@ def told(events: Sequence[Event], left_out: float, part: str) -> list[str]:
     return out
 
 
-def again(struck: Sequence[str]) -> str:
+def again(struck: Sequence[str], joints: int) -> str:
     """What may strike where few joints are knocked time and again: `struck` has all joints of every
-    knock; empty where none is, or where all are, as by somebody who pushes the arm."""
+    knock; empty where none is, or where most of the robot's are, as by somebody who pushes it."""
     most = max(map(struck.count, struck), default=0)
     who = [joint for joint in dict.fromkeys(struck) if struck.count(joint) == most]
-    if most < _AGAIN or 2 * len(who) > len(set(struck)):
+    if most < _AGAIN or 2 * len(who) > max(joints, 2):
         return ""
     where = " and ".join([", ".join(who[:-1]), who[-1]] if len(who) > 1 else who)
     why = "where nobody pushed, its own play or an end stop strikes, and a diagnosis with"

@@ -92,7 +92,8 @@ def _shown(machine: Robot, log: logs.Log, among: int) -> logs.Log:
     found, segments = list(log.events), []
     for segment in log.segments:
         angles, steps = segment.q, []
-        if segment.clock is None:  # stamps that were wrong have been corrected
+        # stamps that were wrong have been corrected; a span of a long log is read anew, as it is
+        if among == 1 and segment.clock is None:
             angles, steps = without_slips(segment.q, segment.step)
         own = events.find(segment, machine.joints, log=log.name, among=among, angles=angles)
         own = [*own, *_slips(segment.t, steps, machine.joints, log.name)]
@@ -125,8 +126,7 @@ def _of_span(machine: Robot, log: logs.Log, number: int) -> tuple[list[events.Ev
     released()
     span = log.segments.around(number, _BESIDE)
     (own,) = _disturbed(machine, [replace(log, segments=(replace(span, core=None),))], among=len(log.segments))
-    kept = [event for event in own.events if event.kind != "slip"]  # a fit reads the spans anew
-    return events.clipped(kept, *span.t[[span.core.start, span.core.stop - 1]]), span.step, events.extent(span)
+    return events.clipped(own.events, *span.t[[span.core.start, span.core.stop - 1]]), span.step, events.extent(span)
 
 
 @dataclass(frozen=True)

@@ -47,7 +47,7 @@ def refuse_no_row(motion: Motion) -> None:
     """Raises LogError: no row of any joint counts."""
     counted = [joint for joint, out in zip(motion.joints, motion.left_out) if out < motion.samples and joint not in motion.unused]
     if not counted:
-        why = events.told(motion.events, motion.disturbed, "training")
+        why = events.told(motion.events, motion.disturbed, "training", len(motion.joints))
         raise LogError(f"no row of the training logs counts{''.join(f'; {one}' for one in why[:1])}", do="give logs in which the joints move and their torque is measured")
 
 
@@ -73,7 +73,7 @@ def tell_left_out(motion: Motion, spec) -> None:
 
 def tell_events(part: str, motion: Motion) -> list[dict]:
     """The events of a part as documents have them; the user is told."""
-    for notice in events.told(motion.events, motion.disturbed, {"train": "training"}.get(part, part)):
+    for notice in events.told(motion.events, motion.disturbed, {"train": "training"}.get(part, part), len(motion.joints)):
         warn(notice)
     return [{"part": part, "kind": e.kind, "log": e.log, "start": e.start, "stop": e.stop, "joints": list(e.joints), "signal": e.signal} for e in motion.events]
 

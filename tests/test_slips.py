@@ -63,6 +63,29 @@ def test_a_motion_has_none(grain):
             assert not any(found) and same is q
 
 
+@pytest.mark.parametrize("rate", [250.0, 500.0, 1000.0])
+@pytest.mark.parametrize("how", ["late", "twice"])
+def test_a_late_sample_or_one_that_is_written_twice_is_no_slip(rate, how):
+    """It is beside the others alone, which go on as they were: nothing that stays is taken out."""
+    for seed in range(3):
+        rng, n = np.random.default_rng(seed), round(12.0 * rate)
+        t = np.repeat(np.arange(n)[:, None] / rate, DOF, axis=1)
+        for k in rng.choice(np.arange(30, n - 30), n // 150, replace=False):
+            t[k] = t[k - 1] if how == "twice" else t[k] - 0.5 / rate
+        q = motion(t, seed) + 2e-6 * rng.normal(size=t.shape)
+        mended, found = without_slips(q, 1.0 / rate)
+        assert sum(map(len, found)) <= 2 and np.abs(mended - q).max() < 1e-3
+
+
+@pytest.mark.parametrize("step", [5e-3, 1e-2, 2e-2])
+def test_a_joint_that_sticks_and_slips_has_none(step):
+    """A hundredth of a radian a second, in jumps of two milliradians that take 15 ms; nor where samples are too far apart to tell."""
+    t = np.arange(0.0, 30.0, step)
+    jumps = 0.2 * np.floor(t / 0.2) + np.clip((t % 0.2) / 0.015, 0.0, 1.0) * 0.2
+    q = 0.01 * (jumps + 0.05 * t)[:, None] + 1e-6 * np.random.default_rng(1).normal(size=(len(t), 1))
+    assert not any(without_slips(q, step)[1])
+
+
 @pytest.mark.parametrize("how", [{"motion": "moves", "knocks": 2}, {"motion": "moves", "brakes": True}, {"spikes": 0.3}, {"motion": "sines"}])
 def test_logs_with_other_faults_have_none(simulated, how):
     """Stops, knocks, brakes, friction that turns its sign; at two rates."""

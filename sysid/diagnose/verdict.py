@@ -120,7 +120,7 @@ def verdicts(
             why = cause(both, floors[j], effect, may, without, louder)
             why += "".join({r.effect: f"; {r.told}" for r in refused if r.joint == joint}.values())
             told = ("unresolved", others, explained, remains, why, may, evens[j])
-        elif floors[j].reached(first) or not claims:
+        elif not claims or (floors[j].reached(first) and not done):
             told = ("complete",)
         else:
             who = others or (max(claims, key=lambda c, j=j: c.step.shares[j]),)

@@ -138,7 +138,7 @@ def _verdict(v: Verdict, path="config.yaml") -> dict:
     out: dict = {"joint": v.joint, "status": v.status}
     # where all error may be noise, what falls is all that is more
     share = number(min(v.explained, 1.0)) if np.isfinite(v.explained) else None
-    share = 1.0 if v.status == "missing" and share is None else share
+    share = 1.0 if v.status in ("missing", "explained") and share is None else share
     if v.status in ("missing", "unknown") and v.claims:
         first = v.claims[0]
         named = {

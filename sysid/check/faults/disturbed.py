@@ -34,7 +34,7 @@ _KINDS = {
     "slip": (
         "clock_jitter",
         "the angle of {joint} steps between two samples, as where one is taken early or late",
-        "a fit takes these steps out; log the time at which each value was measured",
+        "a fit takes these steps out but with `events: keep`; log when each value was measured",
     ),
     "saturation": (
         "saturation",
