@@ -103,7 +103,7 @@ def events(document: dict, width: int) -> list[str]:
     struck = [j for e in document["events"] if e["kind"] == "knock" for j in e["joints"]]
     said = again(struck, len(document["joints"]))
     out += wrapped(f"  {said}", width, "    ") if said else []
-    return ["events in the logs, left out but where it says otherwise", *out] if out else []
+    return ["events in the logs, left out", *out] if out else []
 
 
 def _many(kind: str, log: str, some: list[dict]) -> str:
