@@ -23,6 +23,7 @@ sys.path.insert(0, str(ROOT))
 from sysid import comparison, pipeline, whole_files  # noqa: E402
 from sysid.addition import grown  # noqa: E402
 from sysid.diagnose.diagnosis import diagnose  # noqa: E402
+from sysid.events import TOLD  # noqa: E402
 from sysid.statement.document import document  # noqa: E402
 
 #: name, experiment (a config, or a folder of the data), what its source and others know of it
@@ -129,7 +130,8 @@ def _events(events: list[dict]) -> str:
     words = []
     for (part, kind), own in counts.items():
         shown = ", ".join(f"{e['log']} {e['start']:.2f} s" for e in own[:3]) + (", ..." if len(own) > 3 else "")
-        words.append(f"{len(own)} {kind} in the {part} logs ({shown})")
+        stays = f", {TOLD[kind]}," if kind in TOLD else ""
+        words.append(f"{len(own)} {kind}{stays} in the {part} logs ({shown})")
     return "Events, left out: " + "; ".join(words) + "."
 
 
