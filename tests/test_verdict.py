@@ -357,6 +357,28 @@ def test_predictable_is_a_level_and_a_share():
     assert asked(replace(NOISE, tone=2.0 * WORTH), 2) and not asked(replace(NOISE, tone=0.9 * WORTH), 2)
 
 
+@pytest.mark.parametrize(
+    ("first", "then", "taken", "rest", "status"),
+    [(3.0, 1.1, 0.99, 0.05, "explained"), (3.0, 1.2, 0.9, 0.05, "explained"), (3.0, 1.2, 0.8, 0.9, "unknown"), (3.0, 1.9, 0.6, 0.05, "unknown"), (1.2, 1.12, 0.9, 0.05, "explained")],
+)  # fmt: skip
+def test_a_joint_that_anothers_effect_explains_but_for_a_little_is_explained(first, then, taken, rest, status):
+    """And not `complete`, be it that its error before is near to the floor."""
+    found = elbow(first, [claim("cogging", "shoulder", [0.5, taken], fitted(then))], rest=left(rest))
+    assert found.status == status
+    if status == "explained":
+        assert _verdict(found)["by"] == [{"effect": "cogging", "joint": "shoulder"}] and 0.0 < _verdict(found)["explained"] <= 1.0
+
+
+@pytest.mark.parametrize("low", [0.5, 2.0, 3.5])
+def test_a_share_that_is_told_is_one(low):
+    """Where the floor is not known, or all of the error may be noise."""
+    level = replace(floor(None), low=low, about=low)
+    found = elbow(3.0, [claim("cogging", "shoulder", [0.5, 0.9], fitted(1.1))], rest=left(0.05), level=level)
+    assert found.status == "explained" and 0.0 < _verdict(found)["explained"] <= 1.0
+    own = elbow(3.0, [claim("cogging", "elbow", [0.0, 0.95], fitted(1.1))], level=level)
+    assert own.status == "missing" and 0.0 < _verdict(own)["explained"] <= 1.0
+
+
 def test_a_tone_alone_is_unknown_and_its_share_is_said():
     hum = replace(NOISE, tone=0.4, shares={"a steady tone": 0.4})
     found = elbow(2.0, rest=hum)
