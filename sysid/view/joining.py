@@ -8,8 +8,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..blows import LEAST
 from ..candidate_columns import columns_of, grown
 from ..candidates import Candidate
+from ..model import Model
 from ..posed_problem import inverse
 from ..settled import placed
 from .design import designed
@@ -37,7 +39,17 @@ def joined(
     for candidate, shapes in added:
         source = replace(source, model=grown(source, candidate, shapes))
     how = {"tolerance": COMPARED, "strikes": strikes, "like": like}
-    return _again(view, source.model, (like or view).weights, **how)
+    starts = [source.model, *([_next_to_none(source.model)] if strikes else [])]
+    found = [_again(view, model, (like or view).weights, **how) for model in starts]
+    return min(found, key=lambda one: one.settled.objective)
+
+
+def _next_to_none(model: Model) -> Model:
+    """A model in which what joined last strikes next to nothing: wherever else it begins, a hollow
+    may hold it."""
+    own = range(*model.last_shapes.indices(len(model.shapes)))
+    values = {k: v for k in own if (v := model.shape_values[k]).shape.start is not None}
+    return model.with_some_shapes({k: max(v.low, v.high / LEAST) for k, v in values.items()})
 
 
 def allowed(view: View, candidate: Candidate) -> bool:
