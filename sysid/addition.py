@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import shlex
 from collections.abc import Sequence
 from pathlib import Path
-
-import yaml
 
 from .specs import EffectSpec, Experiment
 
@@ -61,10 +60,8 @@ def typed(path: Path) -> Path:
 
 
 def flow(value) -> str:
-    """An option's value as YAML has it on one line."""
-    if not isinstance(value, (list, tuple)):
-        return str(value)
-    return yaml.safe_dump(list(value), default_flow_style=True, allow_unicode=True, width=10**6).strip()
+    """An option's value as YAML has it on one line; of a list as JSON has it, which YAML reads."""
+    return json.dumps(list(value), ensure_ascii=False) if isinstance(value, (list, tuple)) else str(value)
 
 
 def command(path, effect: str, joints: list[str] | None, options: dict) -> str:

@@ -37,7 +37,7 @@ def test_a_load_in_one_log_is_named_with_it(folder, loaded):
     assert [(f["effect"], f["joint"], f["options"]) for f in heads] == [("payload", "*", {"logs": ("loaded.csv",)})]
     assert {v["status"] for v in found["verdict"]} == {"missing"} and {v["effect"] for v in found["verdict"]} == {"payload"}
     words = shlex.split(heads[0]["command"])
-    assert words[-2:] == ["--option", "logs=[loaded.csv]"]
+    assert words[-2:] == ["--option", 'logs=["loaded.csv"]']
     added = loop.add(folder, "payload", None, {"logs": ["loaded.csv"]}, out=folder / "runs")
     assert not added.refused and "loaded.csv" in experiment_file.read(folder / "config.yaml").decode()
     (before,) = (p["value"] for name, p in heads[0]["parameters"].items() if name.endswith(".m"))
