@@ -5,6 +5,7 @@ import re
 import shutil
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -127,7 +128,14 @@ def texts(tree):
 
 def test_pages_are_files_not_strings():
     """HTML, CSS and JavaScript stand in templates/ and static/."""
-    found = [f"{'.'.join(parts)} line {node.lineno}: {kind}" for parts, tree in modules() if parts[0] not in XML for node in texts(tree) for kind, pattern in PAGE.items() if pattern.search(node.value)]
+    found = [
+        f"{'.'.join(parts)} line {node.lineno}: {kind}"
+        for parts, tree in modules()
+        if parts[0] not in XML
+        for node in texts(tree)
+        for kind, pattern in PAGE.items()
+        if pattern.search(node.value)
+    ]
     assert not found, found
 
 
@@ -339,3 +347,24 @@ def test_project_speaks_of_itself_alone():
         text = path.read_text(errors="replace")
         for pattern in patterns:
             assert pattern not in text, f"{name} holds {pattern}"
+
+
+#: what a package is imported as, where that is not its name, and what comes with it
+IMPORTED = {"pin": ("pinocchio", "coal"), "jinja2": ("jinja2", "markupsafe"), "distributed": ("distributed", "dask"), "ruamel.yaml": ("ruamel",)}
+#: asked for by name where a user wants their formats, and told to install
+WANTED = {"mujoco", "pydrake"}
+
+
+def test_a_plain_installation_brings_all_that_is_imported():
+    """The tests' tools bring more: what only they bring stops a user at the first command."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    extras = project["optional-dependencies"]
+    asked = [*project["dependencies"], *(one for extra, own in extras.items() if extra != "test" for one in own)]
+    words = [re.match(r"[A-Za-z0-9_.-]+", one)[0] for one in asked]
+    there = {name for word in words for name in IMPORTED.get(word, (word.replace("-", "_"),))}
+    found = set()
+    for _, tree in modules():
+        for node in ast.walk(tree):
+            found |= {a.name.split(".")[0] for a in node.names} if isinstance(node, ast.Import) else set()
+            found |= {node.module.split(".")[0]} if isinstance(node, ast.ImportFrom) and not node.level else set()
+    assert found - set(sys.stdlib_module_names) - {"sysid"} <= there | WANTED
