@@ -20,7 +20,7 @@ from .projection import Projection, prior_hessian
 # end of the next stage. First all over the range: what goes downhill may stop in a hollow of a play that is next to none.
 _STAGES = ((np.inf, 81, np.inf, 3), (1.3, 17, np.inf, 3), (1.08, 21, 1.5, 5), (1.008, 9, 1.1, 5))
 _NEAR = 2  # stages from here on look about what was found before
-LEAST = 500.0  # times less than the most it may be: less is nothing to look about
+_LEAST = 500.0  # times less than the most it may be: less is nothing to look about
 _TOGETHER = 128  # sets whose torque is made at once
 _SOLVED = 4  # of the best values, which are solved with every bound kept
 _AGAIN = 3  # searches, one after the other
@@ -79,6 +79,11 @@ def struck(found, motion, weights, solved, *, wide: bool):
     return found, tally
 
 
+def least_of(value) -> float:
+    """The least of a value at which what strikes is worth looking about."""
+    return max(value.low, value.high / _LEAST)
+
+
 def _highest(gains: np.ndarray, sets: np.ndarray) -> list[int]:
     """The sets that gain most, each with another first value; none that gains nothing."""
     order = np.argsort(-gains, kind="stable")
@@ -111,7 +116,7 @@ def _sets(model: Model, own: list[int], far: float, count: int, others: float, f
     for k in own:
         value, at = model.shape_values[k], model.shapes[k]
         first = value.shape.start is not None
-        least, wide = max(value.low, value.high / LEAST) if first else value.low, far if first else others
+        least, wide = least_of(value) if first else value.low, far if first else others
         if first and at < least and np.isfinite(far):
             return None
         low, high = (least, value.high) if wide == np.inf else (max(least, at / wide), min(value.high, at * wide))

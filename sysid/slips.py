@@ -17,6 +17,7 @@ import numpy as np
 
 from .frequencies import low
 from .outliers import SHORT, quantum, spikes
+from .smoother import smoothed
 
 _PASSES = 3  # over the speed: without its largest spikes those beside them stand out
 _LONGEST = 2  # intervals: an acceleration that jumps makes a pulse of three
@@ -34,21 +35,20 @@ _SLOW = 1.0  # Hz
 def without_slips(q: np.ndarray, step: float) -> tuple[np.ndarray, list[list[tuple[int, int]]]]:
     """Angles (n, dof) of samples `step` [s] apart without their steps, and of each joint the first
     and the last sample before which its angle steps; the angles themselves where none does."""
-    found, steps = _found(q) if step <= _SLOWEST else ([[] for _ in q.T], None)
+    found, steps = _found(q, step)
     if not any(found):
         return q, found
     offset = np.concatenate([np.zeros((1, q.shape[1])), np.cumsum(steps, axis=0)])
     return q - (offset - low(offset, _SLOW, step)), found
 
 
-def _found(q: np.ndarray) -> tuple[list[list[tuple[int, int]]], np.ndarray]:
+def _found(q: np.ndarray, step: float) -> tuple[list[list[tuple[int, int]]], np.ndarray]:
     """Where each joint's angle steps, as of `without_slips`, and by how much (n - 1, dof) after each
     sample."""
-    none = [[] for _ in range(q.shape[1])]
-    if len(q) <= SHORT:
-        return none, np.zeros((max(len(q) - 1, 0), q.shape[1]))
-    speed, grain = np.diff(q, axis=0), np.array([quantum(own) for own in q.T])
-    calm, found = speed.copy(), none
+    speed, found = np.diff(q, axis=0), [[] for _ in q.T]
+    if step > _SLOWEST or len(q) <= SHORT:
+        return found, np.zeros_like(speed)
+    calm, grain = speed.copy(), [quantum(own) for own in q.T]
     for _ in range(_PASSES):
         more = spikes(calm - _smooth(calm))
         for j, own in enumerate(more):
@@ -75,10 +75,10 @@ def _staying(steps: np.ndarray, found: list) -> list[tuple[int, int]]:
     or of a value that was written twice; their steps (n - 1,) are put to zero."""
     apart = [k for k in range(1, len(found)) if found[k][0] - found[k - 1][1] > _BESIDE]
     out = []
-    for first, last in zip([0, *apart], [*apart, len(found)]):
+    for first, last in zip([0, *apart], [*apart, len(found)]) if found else ():
         own = found[first:last]
-        inside = steps[own[0][0] : own[-1][1] + 1] if own else steps[:0]
-        if own and abs(inside.sum()) > _STAYS * np.abs(inside).max():
+        inside = steps[own[0][0] : own[-1][1] + 1]
+        if abs(inside.sum()) > _STAYS * np.abs(inside).max():
             out += own
         else:
             inside[:] = 0.0
@@ -113,6 +113,4 @@ def _rough(q: np.ndarray) -> float:
 
 def _smooth(values: np.ndarray) -> np.ndarray:
     """What smooth motion has of values (n, ...)."""
-    from scipy.signal import savgol_filter
-
-    return savgol_filter(values, 2 * _SMOOTH + 1, _ORDER, axis=0)
+    return smoothed(values.T, _SMOOTH, _ORDER).T

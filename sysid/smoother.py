@@ -61,10 +61,26 @@ def rate(values, step: float, half: float, order: int) -> np.ndarray:
         same = np.zeros_like(wider)  # the narrower window about each place of the wider one
         same[: whole + 1, :-2], same[whole + 1, 1:-1], same[whole + 2 :, 2:] = slopes[: whole + 1], slopes[whole], slopes[whole:]
         slopes = same + (half - whole) * (wider - same)
-    length, middle = len(slopes), len(slopes) // 2
-    out = np.moveaxis(_convolved(np.moveaxis(values, -1, 0), slopes[middle]), 0, -1)
-    out[..., :middle] = values[..., :length] @ slopes[:middle].T
-    out[..., -middle:] = values[..., -length:] @ slopes[-middle:].T
+    return _windowed(values, slopes)
+
+
+def smoothed(values, half: int, order: int) -> np.ndarray:
+    """Values (..., n) of the polynomial fitted to `half` samples on either side; of the first and the last window, at either end.
+
+    Args:
+        half: at most (n - 1) / 2.
+    """
+    u, rows = _fitted(half, order)
+    return _windowed(values, np.vander(u, order + 1, increasing=True) @ rows)
+
+
+def _windowed(values, weights) -> np.ndarray:
+    """What weights (k, k) of a window make of values (..., n) at each of its samples: of the window about a value at its middle, of
+    the first and the last window at either end."""
+    length, middle = len(weights), len(weights) // 2
+    out = np.moveaxis(_convolved(np.moveaxis(values, -1, 0), weights[middle]), 0, -1)
+    out[..., :middle] = values[..., :length] @ weights[:middle].T
+    out[..., -middle:] = values[..., -length:] @ weights[-middle:].T
     return out
 
 

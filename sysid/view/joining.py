@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..blows import LEAST
+from ..blows import least_of
 from ..candidate_columns import columns_of, grown
 from ..candidates import Candidate
 from ..model import Model
@@ -47,9 +47,8 @@ def joined(
 def _next_to_none(model: Model) -> Model:
     """A model in which what joined last strikes next to nothing: wherever else it begins, a hollow
     may hold it."""
-    own = range(*model.last_shapes.indices(len(model.shapes)))
-    values = {k: v for k in own if (v := model.shape_values[k]).shape.start is not None}
-    return model.with_some_shapes({k: max(v.low, v.high / LEAST) for k, v in values.items()})
+    own = list(enumerate(model.shape_values))[model.last_shapes]
+    return model.with_some_shapes({k: least_of(v) for k, v in own if v.shape.start is not None})
 
 
 def allowed(view: View, candidate: Candidate) -> bool:
