@@ -13,7 +13,7 @@ from .events import Event
 from .smoother import Smoother
 from .workers import Mapped
 
-_NO_WEIGHT = 1e-9
+NO_WEIGHT = 1e-9
 # A joint never moves where its filtered angle travels less than its own noise would make it, or than this [rad or m].
 _NEVER_MOVES, NOISE_TRAVEL = 1e-6, 6.0
 
@@ -91,7 +91,7 @@ class Piece:
         if self.weight is None:
             return self.smoother.at(values, rows)
         own = self.weight[first : first + values.shape[-1], joint]
-        return self.smoother.at(values * own, rows) / np.maximum(self.smoother.at(own, rows), _NO_WEIGHT)
+        return self.smoother.at(values * own, rows) / np.maximum(self.smoother.at(own, rows), NO_WEIGHT)
 
     def part(self, rows: slice) -> Piece:
         """The rows `rows`, without margins."""

@@ -6,11 +6,14 @@ what a diagnosis asks its questions of: few enough to keep, spread over the whol
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import groupby
 
 import numpy as np
 
 from . import regressor
+from .both_sides import settled
 from .effect import NotFinite
 from .model import Model
 from .motion import Motion, Piece
@@ -138,7 +141,8 @@ def bent(model: Model, motion: Motion, x, joint: int, pieces: list | None = None
     pi, out = np.asarray(x)[: 10 * model.bodies].reshape(-1, 10), []
     carried = model.robot.carried(joint)
     own, alone = np.where(carried[:, None], pi, 0.0), not (carried & model.robot.turned(joint)).any()
-    for part in seen(model, motion) if pieces is None else pieces:
+    for parts in _alike(seen(model, motion) if pieces is None else pieces):
+        part = _joined(parts)
         needed = lambda behind: regressor.torque(model.robot, own, part.q, part.qd, part.qdd, gravity=part.gravity, deflection=behind)  # noqa: B023, E731
         base, slopes = needed(part.deflection), []
         for order, nudge in enumerate(NUDGES):
@@ -148,8 +152,25 @@ def bent(model: Model, motion: Motion, x, joint: int, pieces: list | None = None
         inertia = -slopes[-1][joint]  # of the link alone: its rotor stays with the motor
         plain = alone and part.deflection is None and part.gravity is None
         load = base[:, joint] if plain else link_load(model.robot, pi, part, joint)
-        out.append(Bent(np.stack(slopes), load, inertia, part))
+        ends = np.cumsum([len(one.q) for one in parts])[:-1]
+        each = (np.split(values, ends, axis=-1) for values in (np.stack(slopes), load, inertia))
+        out += [Bent(*known, one) for *known, one in zip(*each, parts)]
     return out
+
+
+def _alike(pieces: list[Piece]) -> Iterator[list[Piece]]:
+    """Pieces that stand one after the other under one gravity, all with a link that stands apart from its motor or none."""
+    how = lambda piece: (piece.deflection is None, None if piece.gravity is None else tuple(piece.gravity))  # noqa: E731
+    return (list(own) for _, own in groupby(pieces, how))
+
+
+def _joined(pieces: list[Piece]) -> Piece:
+    """What rigid bodies see of pieces, as one: they look at a row alone, and short pieces cost their calls."""
+    if len(pieces) == 1:
+        return pieces[0]
+    q, qd, qdd = (np.concatenate([getattr(piece, name) for piece in pieces]) for name in ("q", "qd", "qdd"))
+    deflection = None if pieces[0].deflection is None else np.concatenate([piece.deflection for piece in pieces], axis=1)
+    return replace(pieces[0], q=q, qd=qd, qdd=qdd, deflection=deflection)
 
 
 def secants(model: Model, motion: Motion, known: list[Bent], effect, tried: list[dict], stride: int, use: np.ndarray, apart=None) -> np.ndarray:
@@ -174,11 +195,7 @@ def sensed(model: Model, piece: Piece, torque: np.ndarray) -> np.ndarray:
 
 def low_passed(motion: Motion, torque: list[np.ndarray], stride: int) -> np.ndarray:
     """What sensors show of torque (..., dof, n) over each whole piece, on the rows that a stride keeps, as both sides are seen."""
-    out = []
-    for piece, rows, whole in zip(motion.pieces, starts(motion, stride), torque):
-        each = [piece.settled(whole[..., j, :], rows, j) for j in range(whole.shape[-2])]
-        out.append(np.stack(each, axis=-2))
-    return np.concatenate(out, axis=-1)
+    return settled(motion.pieces, torque, starts(motion, stride), range(torque[0].shape[-2]))
 
 
 def signature(model: Model, motion: Motion, pieces: list, effect, joint: int, shapes: dict, stride: int, use: np.ndarray) -> np.ndarray:
@@ -195,7 +212,7 @@ def signatures(model: Model, motion: Motion, pieces: list, effect, joint: int, t
     """`signature` at several shape values at once, (tried, joints, n, k): its own joint's or every joint's. In memory samples come last,
     as a product with them wants it."""
     out, joints = [], range(model.robot.dof) if joint < 0 else [joint]
-    for piece, part, rows in zip(motion.pieces, pieces, starts(motion, stride)):
+    for piece, part in zip(motion.pieces, pieces):
         if joint < 0:
             values = np.stack([effect.columns(part, model.robot, **shapes) for shapes in tried], axis=1)
         else:
@@ -203,9 +220,9 @@ def signatures(model: Model, motion: Motion, pieces: list, effect, joint: int, t
         # (joints, tried, k, n): everything that follows is linear and the same for each
         sets, count = values.shape[1:3], values.shape[-1]
         read = [model.sensed(own.reshape(-1, count), piece, j) for j, own in zip(joints, values)]
-        kept = [piece.settled(own, rows, j) for j, own in zip(joints, read)]
-        out.append((np.stack(kept) if len(kept) > 1 else kept[0]).reshape(len(kept), *sets, kept[0].shape[-1]))
-    joined = np.concatenate(out, axis=-1) if len(out) > 1 else out[0]
+        out.append(np.stack(read, axis=1) if len(read) > 1 else read[0][:, None])
+    joined = np.swapaxes(settled(motion.pieces, out, starts(motion, stride), joints), 0, 1)
+    joined = joined.reshape(len(joints), *sets, joined.shape[-1])
     counts = use[:, joints].T[:, None, None]
     return np.transpose(joined if counts.all() else joined * counts, (1, 0, 3, 2))
 

@@ -8,12 +8,15 @@ import numpy as np
 import pytest
 
 from sysid import listed_effects, regressor, robot
+from sysid.both_sides import settled
 from sysid.compress import compress
 from sysid.config import experiment
 from sysid.filters import lowpassed
 from sysid.gaussian import Gaussian
 from sysid.log import Log, Segment
+from sysid.motion import Piece
 from sysid.preprocess import on_both_sides, prepare, under_lowpass
+from sysid.rows import bent
 from sysid.specs import EffectSpec, PreprocessSpec
 from tests.conftest import CONFIG, URDF
 
@@ -99,3 +102,38 @@ def test_servos_are_low_passed_where_nothing_is_said_of_filters(said, expected):
     servo = {"actuator": {"a": {"command": "c", "kp": 3.0}}}
     assert lowpassed(experiment(servo | said)) is expected
     assert not lowpassed(experiment({}))
+
+
+@pytest.mark.parametrize("stride", [1, 3, 7])
+@pytest.mark.parametrize("cutoff", [3.0, 40.0])
+def test_many_pieces_at_once_are_seen_as_each_alone(stride, cutoff):
+    """Also such as are shorter than the filter, of which some rows count for nothing, and of which no row is asked."""
+    rng, none, low = np.random.default_rng(7), np.zeros(2), Gaussian(cutoff, 0.004)
+    pieces, values, rows = [], [], []
+    for n, weighed in ((1, True), (2, False), (5, True), (300, True), (40, False), (3, True)):
+        zero, weight = np.zeros((n, 2)), rng.random((n, 2)).round() if weighed else None
+        shared = (zero,) * 5
+        pieces.append(Piece(0, 0.004, zero[:, 0], *shared, {}, None, low, slice(0, n), none, none, weight=weight))
+        values.append(rng.normal(size=(4, 2, n)))
+        rows.append(slice(n // 3, n - n // 4 if n != 40 else n // 3, stride))
+    alone = [np.stack([p.settled(v[:, j], own, j) for j in (0, 1)], axis=1) for p, v, own in zip(pieces, values, rows)]
+    np.testing.assert_allclose(settled(pieces, values, rows, (0, 1)), np.concatenate(alone, axis=-1), atol=1e-12)
+
+
+def test_what_a_joint_that_gives_changes_is_the_same_of_pieces_at_once(machine, log):
+    """Pieces under one gravity are one to rigid bodies; one that is tilted is not."""
+    motion = prepare([log], SPEC, machine.joints)
+    (piece,) = motion.pieces
+    cut = [
+        piece.part(slice(0, 700)),
+        replace(piece.part(slice(700, 900)), gravity=np.array([1.0, 0.0, -9.0])),
+        piece.part(slice(900, 2000)),
+        piece.part(slice(2000, 2200)),
+    ]
+    model = structure(machine)
+    known = bent(model, replace(motion, pieces=tuple(cut)), true(machine), 1)
+    for one, own in zip(known, cut):
+        (alone,) = bent(model, replace(motion, pieces=(own,)), true(machine), 1)
+        assert len(one.seen.t) == len(own.t)
+        for name in ("slopes", "load", "inertia"):
+            np.testing.assert_allclose(getattr(one, name), getattr(alone, name), atol=1e-9)
