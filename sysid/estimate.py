@@ -153,10 +153,9 @@ def identify(experiment: Experiment, model: Model, motion: Motion, data: Compres
     fixed[count:] = held
     for body in known_bodies(experiment, model):
         fixed[10 * body : 10 * body + 10] = True
-    fixed[[count + k for k in certificate.at_zero]] = True
     slopes = data.size - model.size
     objective = problem.objective if not slopes else posed(data.total(problem.weights), problem.objective.divergence, problem.objective.weight, known_bodies(experiment, model))
-    sure = uncertainty.estimate(objective, data, np.append(solution.x, np.zeros(slopes)), np.append(fixed, np.zeros(slopes, dtype=bool)), problem.weights)
+    sure = uncertainty.estimate(objective, data, np.append(solution.x, np.zeros(slopes)), np.append(fixed, np.zeros(slopes, dtype=bool)), problem.weights, [count + k for k in certificate.at_zero])
     shape_std = np.full(len(model.shape_values), np.nan)
     shape_std[[k for k, value in enumerate(model.shape_values) if not value.held][:slopes]] = sure.std[model.size :]
     shape_covariance = np.full((len(shape_std), len(shape_std)), np.nan)

@@ -12,6 +12,7 @@ its weight over that of a prior that claims as much, or one.
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import log_ndtr
 
 from . import blocks, eigen
 from .objective import Objective, add_blocks
@@ -32,15 +33,17 @@ class Uncertainty:
     from_data: np.ndarray
 
 
-def estimate(objective: Objective, compressed: Compressed, x: np.ndarray, fixed: np.ndarray, weights) -> Uncertainty:
+def estimate(objective: Objective, compressed: Compressed, x: np.ndarray, fixed: np.ndarray, weights, bound=()) -> Uncertainty:
     """Uncertainty at the optimum x (size,).
 
     Args:
-        fixed: (size,) bool, parameters that were held, or sit at a bound; they get no std.
+        fixed: (size,) bool, parameters that were held; they get no std.
         weights: (joints,) of the fit, or None.
+        bound: numbers of those that sit at zero, which they may not pass. They get none either, but are not known for it.
     """
     size = len(x)
-    free = np.flatnonzero(~fixed)
+    bound = np.array(bound, dtype=int)
+    free = np.setdiff1d(np.flatnonzero(~fixed), bound)
     data = objective.data_hessian()
     prior = add_blocks(np.zeros((size, size)), objective.prior_hessian(x)) if objective.weight else np.zeros((size, size))
     misfit = objective.misfit(x)
@@ -51,6 +54,8 @@ def estimate(objective: Objective, compressed: Compressed, x: np.ndarray, fixed:
     inverse, undetermined = _inverse(data[pick] + prior[pick])
     covariance = np.full((size, size), np.nan)
     covariance[pick] = _noise(compressed, x, weights, data[pick], prior[pick], free) * _widened(compressed, free) + 2.0 * variance * claim * inverse @ prior[pick] @ inverse
+    if len(bound):
+        covariance[pick] += _of_bound(objective, compressed, x, weights, data, prior, inverse, free, bound)
     total = np.diagonal(inverse)
     from_noise = np.einsum("ij,jk,ki->i", inverse, data[pick], inverse)
     share = np.zeros(size)
@@ -58,6 +63,26 @@ def estimate(objective: Objective, compressed: Compressed, x: np.ndarray, fixed:
     std = np.full(size, np.nan)
     std[free] = np.where(undetermined, np.nan, np.sqrt(np.clip(np.diagonal(covariance)[free], 0.0, None)))
     return Uncertainty(covariance, std, share)
+
+
+def _of_bound(objective, compressed: Compressed, x, weights, data, prior, inverse, free, bound) -> np.ndarray:
+    """(free, free) what is added by parameters that are at zero and may be above it: friction that went to zero, as others do all that
+    it would, makes these no surer.
+
+    Without its bound a parameter would be where its slope points, below zero, with a deviation s. What is above zero of that law has the
+    second moment s^2 (1 + z^2 - z phi(z) / Phi(-z)), z deviations below zero, and the others follow it as the Hessian says.
+    """
+    both, count = np.concatenate([free, bound]), len(free)
+    hessian = (data + prior)[np.ix_(both, both)]
+    follow = -inverse @ hessian[:count, count:]
+    own, undetermined = _inverse(hessian[count:, count:] + hessian[count:, :count] @ follow)
+    square = _noise(compressed, x, weights, data[np.ix_(both, both)], prior[np.ix_(both, both)], both) * _widened(compressed, both)
+    square = square[count:, count:]
+    deviation = np.sqrt(np.clip(np.diagonal(square), 0.0, None))
+    z = np.clip(own @ objective.gradient(x)[bound], 0.0, None) / np.where(deviation > 0.0, deviation, np.inf)
+    beyond = np.exp(-0.5 * z**2 - log_ndtr(-z)) / np.sqrt(2.0 * np.pi)
+    share = np.where(undetermined, 0.0, np.sqrt(np.clip(1.0 + z**2 - z * beyond, 0.0, 1.0)))
+    return follow @ (np.outer(share, share) * square) @ follow.T
 
 
 def _widened(compressed: Compressed, free) -> np.ndarray:

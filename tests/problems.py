@@ -34,9 +34,10 @@ def fourier_motion(rng: np.random.Generator, seconds: float, rate: float, dof: i
     return t, (a * np.sin(phase)).sum(0), (a * w * np.cos(phase)).sum(0), -(a * w**2 * np.sin(phase)).sum(0)
 
 
-def arm_log(machine, rng, *, seconds=20.0, rate=200.0, noise=0.3, pi=None, viscous=2.0, coulomb=1.0) -> Log:
+def arm_log(machine, rng, *, seconds=20.0, rate=200.0, noise=0.3, pi=None, viscous=2.0, coulomb=1.0, wide=1.0) -> Log:
     """A log of a robot whose bodies are pi, with friction and white torque noise."""
-    t, q, qd, qdd = fourier_motion(rng, seconds, rate, machine.dof)
+    t, *motion = fourier_motion(rng, seconds, rate, machine.dof)
+    q, qd, qdd = (wide * values for values in motion)
     tau = regressor.torque(machine, machine.prior if pi is None else pi, q, qd, qdd) + viscous * qd + coulomb * np.sign(qd)
     tau += noise * rng.normal(size=tau.shape)
     return Log("made", Path("made"), "", (Segment(t, 1.0 / rate, q, tau, None, None, {}),))

@@ -15,6 +15,7 @@ from sysid.reduction import triangle
 from sysid.regressor import torque
 from sysid.specs import Experiment, PriorSpec, SolverSpec
 from sysid.triangles import Compressed, Factor
+from sysid.vocabulary import find
 from tests.problems import arm, fourier_motion, leg
 from tests.robots import load, urdf
 
@@ -142,3 +143,26 @@ def test_deviations_are_right_under_white_noise():
     np.testing.assert_allclose(corrected.mean(axis=0) / known, 1.0, atol=0.15)
     np.testing.assert_allclose(along.mean() / (direction @ covariance @ direction), 1.0, atol=0.15)
     assert np.abs(np.log(plain.mean(axis=0) / known)).max() > 0.2
+
+
+def test_what_takes_the_place_of_friction_at_zero_is_no_surer_for_it(tmp_path):
+    """Over half a turn friction of the angle is nearly friction: where that goes to zero, its terms are what it and they are together."""
+    rng = np.random.default_rng(3)
+    machine = load(tmp_path, urdf(rng, links=1).replace('"prismatic"', '"revolute"'))
+    experiment = Experiment.model_validate({"prior": {"weight": 1e-2}})
+    model = build(machine, experiment.model.effects).with_effect(find("position_friction").given(harmonics=2), (0,))
+    t, q, qd, qdd = fourier_motion(rng, 20, 200, 1)
+    q, qd, qdd = (0.5 * values / np.abs(q).max() for values in (q, qd, qdd))
+    true = 0.3 * qd + np.sign(qd) * (0.3 + 0.1 * np.cos(q) + 0.1 * np.sin(q))
+    clean, own = torque(machine, machine.prior, q, qd, qdd) + true, [model.names.index(f"position_friction.{machine.joints[0]}.{k}") for k in ("a1", "b1")]
+    zero, off = 0, []
+    for _ in range(40):
+        log = Log("made", tmp_path, "", (Segment(t, 1 / 200, q, clean + 0.2 * rng.normal(size=clean.shape), None, None, {}),))
+        motion = prepare([log], experiment.preprocess, machine.joints)
+        fit = estimate.identify(experiment, model, motion, compress(model, motion), np.array(machine.prior))
+        bound = [10 * model.bodies + k for k in fit.certificate.at_zero]
+        zero += bool(bound)
+        assert np.isnan(fit.uncertainty.std[bound]).all() and np.isnan(fit.uncertainty.covariance[bound]).all()
+        off.append((fit.x[own] - 0.1) / fit.uncertainty.std[own])
+    assert 8 <= zero <= 36  # else nothing is asked here
+    assert (np.abs(off) < 2.0).mean(axis=0).min() > 0.85
