@@ -1,4 +1,5 @@
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -441,3 +442,19 @@ def test_no_model_s_floor_is_above_what_another_leaves(simulated):
     assert left["elbow"] > 2.0 * fit.rms("test")["elbow"] and left["shoulder"] == pytest.approx(max(fit.rms("train")["shoulder"], fit.rms("test")["shoulder"]))
     assert (found[1].rms, found[1].std) == (plain[1].rms, plain[1].std)
     assert found[0].rms == pytest.approx(plain[0].rms)
+
+
+def test_a_floor_that_one_log_s_error_denies_is_not_given(simulated):
+    """Noise that the test logs do not have is louder in the training logs, or misfit: nobody can say which."""
+    experiment = pipeline.load(simulated("clean"))
+    fit = pipeline.fit(experiment)
+    logs = [experiment_logs.read(experiment, fit.model.robot, part) for part in (experiment.data.train, experiment.data.test)]
+    test = fit.predictions["test"]
+    shrunk = {}
+    for share in (1.0, 0.9, 0.5):
+        shown = replace(test, measured=test.predicted + share * (test.measured - test.predicted))
+        shrunk[share] = floors_of_fit(experiment, replace(fit, predictions={**fit.predictions, "test": shown}), fit.model, fit.x, logs)[0]
+    assert all(one.rms is not None for share in (1.0, 0.9) for one in shrunk[share])
+    for one, known in zip(shrunk[0.5], shrunk[1.0]):
+        assert one.rms is None and "the error on the test logs" in one.detail
+        assert one.about == pytest.approx(0.5 * known.rms, rel=0.15)

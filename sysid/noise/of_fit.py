@@ -1,5 +1,6 @@
 """The noise floors of a fit's joints, as the fit sees their torque."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -16,6 +17,9 @@ from ..specs import Experiment, PreprocessSpec
 from .floor import DOUBT, NoiseFloor
 from .of_angles import of_angles
 from .of_pieces import filtered, floors_of
+from .repeats import block_rms
+
+_MOST = 200_000  # rows that tell an error
 
 
 def floors_of_fit(
@@ -52,7 +56,30 @@ def floors_of_fit(
         found = [b if worse else a for a, b, worse in zip(found, other, more)]
     if not all(one.reached(error) for one, error in zip(found, most)):
         found = _halved(found, spec, fit, logs)
-    return filtered(found, on_both_sides(spec, pieces[0].step)), dict(zip(fit.joints, left))
+    found = filtered(found, on_both_sides(spec, pieces[0].step))
+    return [_in_every_log(floor, fit, j) for j, floor in enumerate(found)], dict(
+        zip(fit.joints, left)
+    )
+
+
+def _in_every_log(found: NoiseFloor, fit: Fit, joint: int) -> NoiseFloor:
+    """A floor that no part of the logs denies: where one is left with clearly less than what all
+    have as noise, that is louder in the others, or misfit stands in it."""
+    if found.rms is None:
+        return found
+    for part, told in fit.predictions.items():
+        left = told.thinned(_MOST).of_joint(joint)[2]
+        squares = left[np.isfinite(left)] ** 2
+        if not len(squares):
+            continue
+        error, doubt = block_rms(squares)
+        if found.rms - (1.0 + DOUBT) * error > 2.0 * math.hypot(found.std, doubt):
+            why = (
+                f"not determined: it would be {found.rms / error:.2g} times the error on the {part} logs,"
+                f" so that the noise is louder in other logs, or misfit stands in it ({found.detail})"
+            )
+            return NoiseFloor(None, None, "none", why, None, found.high, error, found.halved)
+    return found
 
 
 def _halved(found: list[NoiseFloor], spec: PreprocessSpec, fit: Fit, logs) -> list[NoiseFloor]:
