@@ -127,6 +127,18 @@ class Fit(WithTorque):
         return dict(zip(self.joints, self.predictions[part].errors()["rms"].tolist()))
 
 
+def _room(model: Model, x, positive, slopes: int) -> np.ndarray:
+    """(2, parameters and free shape values) how far down and up each may go."""
+    out = np.full((2, len(x) + slopes), np.inf)
+    own = 10 * model.bodies + np.flatnonzero(positive)
+    out[0, own] = np.maximum(x[own], 0.0)
+    free = [k for k, value in enumerate(model.shape_values) if not value.held][:slopes]
+    for place, k in enumerate(free, len(x)):
+        value, at = model.shape_values[k], model.shapes[k]
+        out[:, place] = max(at - value.low, 0.0), max(value.high - at, 0.0)
+    return out
+
+
 def identify(experiment: Experiment, model: Model, motion: Motion, data: Compressed, prior: np.ndarray, callback=None, near=None) -> Fit:
     """Solve, certify and say how sure; the predictions are added by the pipeline.
 
@@ -155,7 +167,7 @@ def identify(experiment: Experiment, model: Model, motion: Motion, data: Compres
         fixed[10 * body : 10 * body + 10] = True
     slopes = data.size - model.size
     objective = problem.objective if not slopes else posed(data.total(problem.weights), problem.objective.divergence, problem.objective.weight, known_bodies(experiment, model))
-    sure = uncertainty.estimate(objective, data, np.append(solution.x, np.zeros(slopes)), np.append(fixed, np.zeros(slopes, dtype=bool)), problem.weights, [count + k for k in certificate.at_zero])
+    sure = uncertainty.estimate(objective, data, np.append(solution.x, np.zeros(slopes)), np.append(fixed, np.zeros(slopes, dtype=bool)), problem.weights, [count + k for k in certificate.at_zero], _room(model, solution.x, problem.coordinates.positive, slopes))
     shape_std = np.full(len(model.shape_values), np.nan)
     shape_std[[k for k, value in enumerate(model.shape_values) if not value.held][:slopes]] = sure.std[model.size :]
     shape_covariance = np.full((len(shape_std), len(shape_std)), np.nan)

@@ -12,7 +12,6 @@ its weight over that of a prior that claims as much, or one.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import log_ndtr
 
 from . import blocks, eigen
 from .objective import Objective, add_blocks
@@ -33,13 +32,14 @@ class Uncertainty:
     from_data: np.ndarray
 
 
-def estimate(objective: Objective, compressed: Compressed, x: np.ndarray, fixed: np.ndarray, weights, bound=()) -> Uncertainty:
+def estimate(objective: Objective, compressed: Compressed, x: np.ndarray, fixed: np.ndarray, weights, bound=(), room=None) -> Uncertainty:
     """Uncertainty at the optimum x (size,).
 
     Args:
         fixed: (size,) bool, parameters that were held; they get no std.
         weights: (joints,) of the fit, or None.
         bound: numbers of those that sit at zero, which they may not pass. They get none either, but are not known for it.
+        room: (2, size) how far each may go down and up, infinite where nothing holds it; None: nowhere.
     """
     size = len(x)
     bound = np.array(bound, dtype=int)
@@ -55,7 +55,7 @@ def estimate(objective: Objective, compressed: Compressed, x: np.ndarray, fixed:
     covariance = np.full((size, size), np.nan)
     covariance[pick] = _noise(compressed, x, weights, data[pick], prior[pick], free) * _widened(compressed, free) + 2.0 * variance * claim * inverse @ prior[pick] @ inverse
     if len(bound):
-        covariance[pick] += _of_bound(objective, compressed, x, weights, data, prior, inverse, free, bound)
+        covariance[pick] += _of_bound(objective, compressed, x, weights, data, prior, inverse, free, bound, room)
     total = np.diagonal(inverse)
     from_noise = np.einsum("ij,jk,ki->i", inverse, data[pick], inverse)
     share = np.zeros(size)
@@ -65,12 +65,12 @@ def estimate(objective: Objective, compressed: Compressed, x: np.ndarray, fixed:
     return Uncertainty(covariance, std, share)
 
 
-def _of_bound(objective, compressed: Compressed, x, weights, data, prior, inverse, free, bound) -> np.ndarray:
+def _of_bound(objective, compressed: Compressed, x, weights, data, prior, inverse, free, bound, room) -> np.ndarray:
     """(free, free) what is added by parameters that are at zero and may be above it: friction that went to zero, as others do all that
     it would, makes these no surer.
 
-    Without its bound a parameter would be where its slope points, below zero, with a deviation s. What is above zero of that law has the
-    second moment s^2 (1 + z^2 - z phi(z) / Phi(-z)), z deviations below zero, and the others follow it as the Hessian says.
+    Without its bound a parameter would be where its slope points, below zero, with a deviation. Of that normal law the part counts that
+    is above zero, as far as none of the others, which follow as the Hessian says, comes to a bound of its own.
     """
     both, count = np.concatenate([free, bound]), len(free)
     hessian = (data + prior)[np.ix_(both, both)]
@@ -79,10 +79,24 @@ def _of_bound(objective, compressed: Compressed, x, weights, data, prior, invers
     square = _noise(compressed, x, weights, data[np.ix_(both, both)], prior[np.ix_(both, both)], both) * _widened(compressed, both)
     square = square[count:, count:]
     deviation = np.sqrt(np.clip(np.diagonal(square), 0.0, None))
-    z = np.clip(own @ objective.gradient(x)[bound], 0.0, None) / np.where(deviation > 0.0, deviation, np.inf)
-    beyond = np.exp(-0.5 * z**2 - log_ndtr(-z)) / np.sqrt(2.0 * np.pi)
-    share = np.where(undetermined, 0.0, np.sqrt(np.clip(1.0 + z**2 - z * beyond, 0.0, 1.0)))
+    known = ~undetermined & (deviation > 0.0)
+    below = np.clip(own @ objective.gradient(x)[bound], 0.0, None)
+    most = np.full(len(bound), np.inf) if room is None else _before_bounds(follow, *room[:, free])
+    share = [_root_mean_square(*own) if told else 0.0 for *own, told in zip(below, most, deviation, known)]
     return follow @ (np.outer(share, share) * square) @ follow.T
+
+
+def _before_bounds(follow, down, up) -> np.ndarray:
+    """How far (bound,) parameters may go up until one of those (free,) that follow has gone as far down or up as it may."""
+    tall = [np.where(follow < 0.0, down[:, None], up[:, None]), np.maximum(np.abs(follow), 1e-300)]
+    return np.min(tall[0] / tall[1], axis=0, initial=np.inf)
+
+
+def _root_mean_square(below: float, most: float, deviation: float) -> float:
+    """Of the part of a normal law about -`below` that lies between zero and `most`, about zero, in deviations."""
+    u = np.linspace(0.0, min(most / deviation, _FAR), _POINTS)
+    weight = np.exp(-u * (0.5 * u + below / deviation))
+    return float(np.sqrt(np.sum(weight * u**2) / np.sum(weight)))
 
 
 def _widened(compressed: Compressed, free) -> np.ndarray:
@@ -94,6 +108,7 @@ def _widened(compressed: Compressed, free) -> np.ndarray:
     return np.outer(share, share)
 
 
+_FAR, _POINTS = 6.0, 400  # deviations of a normal law, and steps over them
 _FLAT = 1e-12  # eigenvalues that are none, as a share of the largest
 
 
