@@ -134,7 +134,10 @@ def gaps(scaled: Scaled, bound, change: Change | None = None, length: float = 0.
 
 
 def reach(change: Change, scaled: Scaled, bound) -> float:
-    """How far along a change the bodies and their multipliers, and the coefficients and theirs, stay positive."""
+    """How far along a change the bodies and their multipliers, and the coefficients and theirs, stay positive; nowhere along one that
+    is no number."""
+    if not np.isfinite(change.both).all():
+        return 0.0
     worst = np.linalg.eigvalsh(change.both * scaled.shrink)[:, 0].min()
     own, dual = change.step[len(change.step) - len(bound) :] / scaled.root, change.dual / scaled.root
     worst = min(worst, np.where(bound, own, 0.0).min(initial=0.0), dual.min(initial=0.0))

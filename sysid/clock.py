@@ -93,6 +93,12 @@ class Left:
         return slice(min(int(known[0]), most), max(int(known[-1]) + 1, rows - most))
 
     @property
+    def fast(self) -> np.ndarray:
+        """(n,) bool: rows about which the motion was fast, so that little of the clock's errors was
+        read off: what is left of them is faster than elsewhere, as at a log's ends."""
+        return self.below > _ENDS * float(np.median(self.below))
+
+    @property
     def spread(self) -> float:
         """How far to either side [s] what all joints did at once may have been spread: half a period
         of the usual frequency above which errors were read off."""

@@ -166,6 +166,27 @@ def mended(segment: Segment, events: Sequence[Event], joints: Sequence[str]) -> 
     return tau
 
 
+def with_clock(found: Sequence[Event], segment: Segment) -> Sequence[Event]:
+    """Events of which a knock is as long as the motion about it does not tell the segment's clock:
+    the errors of stamps that stay there make of an acceleration several times what they do
+    elsewhere."""
+    if segment.clock is None or not any(event.kind == "knock" for event in found):
+        return found
+    t, fast = segment.t, np.concatenate([[False], segment.clock.fast, [False]])
+    ends = np.flatnonzero(np.diff(fast))
+    runs = np.stack([t[ends[::2]], t[ends[1::2] - 1]], axis=1)
+    return [
+        _as_long(event, runs, segment.spread) if event.kind == "knock" else event for event in found
+    ]
+
+
+def _as_long(event: Event, runs: np.ndarray, near: float) -> Event:
+    """An event as long as those of some runs (k, 2) [s] that come near it."""
+    own = runs[(runs[:, 0] <= event.stop + near) & (runs[:, 1] >= event.start - near)]
+    start, stop = own[:, 0].min(initial=event.start), own[:, 1].max(initial=event.stop)
+    return replace(event, start=float(start), stop=float(stop))
+
+
 def usable(
     t, joints: Sequence[str], events: Sequence[Event], *, angles: float = 0.0, torque: float = 0.0
 ) -> np.ndarray:

@@ -34,6 +34,7 @@ _FAINT = 1e-9  # of the torque: what a coefficient at nought may make of it wher
 _NOTHING = 1e-12  # share of the objective that complementarity may leave at a bound
 
 
+@np.errstate(over="ignore", invalid="ignore", divide="ignore")  # numbers that are none end the search
 def minimise(objective: Objective, positive: np.ndarray, held: np.ndarray, start: np.ndarray, *, tolerance: float, max_iterations: int = 100):
     """Minimise from a strictly possible x = start (size,).
 
@@ -100,6 +101,8 @@ def minimise(objective: Objective, positive: np.ndarray, held: np.ndarray, start
                 best = small
         # predictor: straight for the final targets; how far it gets sets how far the corrector aims
         straight = changed(solve, slope, scaled, aimed(scaled, bound, floor_j, floor_c, None), fixed, bound)
+        if not np.isfinite(straight.both).all():  # a body is so thin that nothing is left of its metric: what was found stands
+            break
         ahead = (1.0 - min(1.0, reach(straight, scaled, bound))) ** 3
         mu_j, mu_c = np.mean(scaled.weights**2, **every), squares_c.sum() / max(int(bound.sum()), 1)
         if not barrier:
@@ -123,6 +126,8 @@ def minimise(objective: Objective, positive: np.ndarray, held: np.ndarray, start
             length = min(1.0, keep * reach(change, scaled, bound))
             while (gaps(scaled, bound, change, length) > most).any():
                 length *= 0.5
+        if not np.isfinite(change.both).all():
+            break
         state = stepped(state, turn, scaled, change, length, bound, free, count)
         iterates.append(state.x)
         values.append(objective.value(state.x))

@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from .errors import ConfigError, LogError
-from .events import Event, mended, usable
+from .events import Event, mended, usable, with_clock
 from .gaussian import HIGHEST, Gaussian
 from .log import Log
 from .motion import Motion, Piece, never_move
@@ -63,7 +63,7 @@ def piece_of(number: int, log: Log, segment: Segment, spec: PreprocessSpec, join
     if (piece := _piece(number, clean, spec)) is None:
         return None
     own = replace(piece, source=log.name, levels=log.levels)
-    return without_events(own, log.events, joints, *_reaches(spec, segment.step)) if log.events else own
+    return without_events(own, with_clock(log.events, segment), joints, *_reaches(spec, segment.step)) if log.events else own
 
 
 def without_still_rows(piece: Piece, spec: PreprocessSpec, threshold) -> Piece:

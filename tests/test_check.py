@@ -192,3 +192,28 @@ def test_a_channel_that_nothing_was_connected_to_is_no_torque(made, tmp_path, se
         assert errors == ({"effort_missing"} if scale is None else set())
         if scale is None:
             assert not any(f.fault == "mass_implausible" for f in found)
+
+
+def turned(logs, file: str, column: str):
+    """A log of a folder with a column of the other sign."""
+    table = pl.read_csv(logs / file)
+    table.with_columns(-pl.col(column)).write_csv(logs / file)
+
+
+@pytest.mark.parametrize("wrong", [["train_2.csv"], ["test.csv"], ["train_1.csv", "train_3.csv"], []])
+def test_a_torque_that_one_log_has_with_the_other_sign_is_named_with_its_log(wrong, made, tmp_path):
+    """Of two against two those are wrong against which friction drives."""
+    logs = shutil.copytree(made(logs=3, duration=6.0), tmp_path / "logs")
+    for file in wrong:
+        turned(logs, file, "tau_elbow")
+    found = [f for f in check.check(pipeline.load(logs)) if f.severity == "error"]
+    assert {(f.fault, f.joint, f.log) for f in found} == {("sign_flipped", "elbow", file) for file in wrong}
+
+
+def test_a_load_in_one_log_is_no_wrong_sign(made, tmp_path):
+    """Two kilograms more in the hand leave other torques in that log, and no other sign."""
+    logs = shutil.copytree(made(logs=3, duration=6.0), tmp_path / "logs")
+    table = pl.read_csv(logs / "train_2.csv")
+    pull = 2.0 * 9.81 * 0.4 * np.sin(table["q_shoulder"] + table["q_elbow"])
+    table.with_columns((pl.col("tau_elbow") - pull).alias("tau_elbow")).write_csv(logs / "train_2.csv")
+    assert not [f for f in check.check(pipeline.load(logs)) if f.fault == "sign_flipped"]

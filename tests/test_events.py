@@ -11,7 +11,8 @@ import pytest
 from scipy.signal import lfilter
 
 from sysid import config, experiment_logs, pipeline
-from sysid.events import Event, again, extent, find, mended, told, unlogged, usable
+from sysid.clock import Left
+from sysid.events import Event, again, extent, find, mended, told, unlogged, usable, with_clock
 from sysid.log import Log, Segment
 from sysid.lowpass import lowpassed
 from sysid.preprocess import prepare
@@ -452,3 +453,18 @@ def test_what_strikes_one_joint_again_and_again_may_be_its_own_play(struck, who)
     notices = told(knocks_, 0.01, "training", 4)
     assert any(who and notice.startswith(who) and notice.endswith("(training logs)") for notice in notices) is bool(who)
     assert again(["a"] * 5, 1).startswith("5 knocks are on a:")
+
+
+def test_a_knock_is_as_long_as_the_clock_is_not_told_about_it():
+    """Where stamps jitter, the errors that stay beside a knock make of an acceleration several times what they do elsewhere."""
+    t = 0.01 * np.arange(1000)
+    below = np.full(1000, 4.0)
+    below[470:560] = 16.0  # about the knock at 5 s
+    below[800:830] = 16.0  # a fast move, far from any
+    left = Left(1e-3, (25.0, 16.0, 4.0), below, np.zeros((3, 1000)), 0.01)
+    zero = np.zeros((1000, 2))
+    segment = Segment(t, 0.01, zero, zero, None, None, {}, clock=left)
+    found = [Event("knock", "log", 5.0, 5.1, ("a", "b"), "both"), Event("spike", "log", 5.0, 5.0, ("a",)), Event("knock", "log", 2.0, 2.1, ("a", "b"), "both")]
+    long, spike, other = with_clock(found, segment)
+    assert (long.start, long.stop) == pytest.approx((4.70, 5.59)) and (spike, other) == (found[1], found[2])
+    assert with_clock(found, replace(segment, clock=None)) == found

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sysid import held_apart
+from sysid import held_apart, interior
 from sysid.interior import minimise
 from sysid.model import moving_coefficients
 from sysid.nearby import from_nearby
-from tests.problems import arm, leg
+from tests.problems import arm, leg, posed
 
 WEIGHTS = (1e-4, 1e-2, 1.0, 1e2)
 
@@ -78,3 +78,19 @@ def test_what_is_not_near_is_another_methods():
     start[: 10 * problem.objective.bodies] *= 1e6
     objective = replace(problem.objective, weight=1e-9)
     assert from_nearby(objective, c.positive, c.held, start, tolerance=1e-6) is None
+
+
+@pytest.mark.parametrize("call", [1, 6, 9])
+def test_a_step_that_is_no_number_ends_the_search_where_it_was_best(call, monkeypatch):
+    """A body so thin that its metric overflows leaves no direction: what was found till then stands."""
+    made, real = [], interior.changed
+
+    def changed(*args):
+        made.append(real(*args))
+        one = made[-1]
+        return replace(one, step=np.nan * one.step, both=np.nan * one.both) if len(made) >= call else one
+
+    monkeypatch.setattr(interior, "changed", changed)
+    _, problem = posed(leg())
+    x = problem.minimum(1e-8)
+    assert len(made) >= call and np.isfinite(x).all() and np.isfinite(problem.objective.value(x))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -102,9 +103,17 @@ class Look:
     def seen(self) -> Seen | None:
         """The training motion under a low-pass, with the columns of rigid bodies and of what any
         joint has; None where the logs are too short."""
-        train = [log.log for log in self.part("train")]
-        cutoff = widest(train, known=(own_band := band(train)))
-        motion = lowpassed(train, self.robot.joints, cutoff, known=own_band)
+        return self._seen(self.part("train"))
+
+    @cached_property
+    def every(self) -> Seen | None:
+        """The same of all logs, in the order of `logs`."""
+        return self._seen(self.logs)
+
+    def _seen(self, logged: Sequence[Logged]) -> Seen | None:
+        read = [log.log for log in logged]
+        cutoff = widest(read, known=(own_band := band(read)))
+        motion = lowpassed(read, self.robot.joints, cutoff, known=own_band)
         if motion is None or motion.samples < FEWEST:
             return None
         model, stride = self._plain, stride_of(motion, cutoff)

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..clock_jumps import without_jumps
-from ..events import Event, mended, usable
+from ..events import Event, mended, usable, with_clock
 from ..gaussian import HIGHEST, Gaussian
 from ..log import Log
 from ..motion import Motion, Piece
@@ -45,8 +45,7 @@ def lowpassed(
         known: their `band`, where it is at hand.
     """
     pieces: list[Piece] = []
-    sights: list[int] = []  # rows
-    steps: list[float] = []
+    sights, steps = list[int](), list[float]()  # rows, seconds
     for number, log in enumerate(logs):
         for segment in log.segments:
             # spikes are mended before low-passes spread them; of the rest, rows see what these see
@@ -55,7 +54,8 @@ def lowpassed(
                 seen = _sight(piece, segment.step)
                 sights.append(math.ceil(seen / piece.step))
                 steps.append(segment.step)
-                pieces.append(without_events(piece, log.events, joints, seen, seen))
+                events = with_clock(log.events, segment)
+                pieces.append(without_events(piece, events, joints, seen, seen))
     if not pieces:
         return None
     disturbed = share_left_out(pieces)
