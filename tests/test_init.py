@@ -671,8 +671,11 @@ def test_wrapped_angles_are_told(experiment, cli):
     wrapped = lambda c: c | {"q_elbow": (c["q_elbow"] + np.pi + 2.9) % (2 * np.pi) - np.pi}
     folder = experiment(train=wrapped, test=wrapped)
     found, _ = begun(cli, folder, [folder / "train.csv", folder / "test.csv"])
-    assert any("the angle of elbow jumps by a turn" in note for note in found["look"])
-    assert "# LOOK: the angle of elbow" in (folder / "mine/config.yaml").read_text()
+    notes = [note for note in found["look"] if "the angle of elbow jumps by a turn" in note]
+    assert len(notes) == 2 and all("first at" in note for note in notes)  # of each log once, and where
+    text = (folder / "mine/config.yaml").read_text()
+    assert "# LOOK: the angle of elbow" in text
+    assert "deg" not in text.split("units:")[-1].split("\n\n")[0]  # a turn of 6.28 is rad, whatever torques such angles would go with
 
 
 def test_what_a_person_sees(experiment, cli):

@@ -59,11 +59,12 @@ def draft(reference: str, names: list[str], folder: Path, wishes: Wishes) -> Dra
     angles = _angles(data, found, robot)
     used, chosen = joints.chosen(robot, found, data, arm, angles.value)
     clock = units.clock(data, found, wishes.rate)
-    notes = (*machine.notes, *broken, *passed, *mended, *_wraps(data, used, robot, angles.value))
+    wrapped = _wraps(data, used, robot, angles.value)
+    notes = (*machine.notes, *broken, *passed, *mended, *wrapped)
     out = Draft(urdf, {}, notes, found.rest)
     out = out.having(*machine.guesses, *chosen, *_parts(data, clock, folder, wishes))
     out = out.having(*clock, *_columns(found, used), angles, *_drive(found, used))
-    return physics.held_against(out, found, folder)
+    return physics.held_against(out, found, folder, wrapped)
 
 
 def _moved(reference: str, folder: Path) -> str:

@@ -86,8 +86,13 @@ def factors(look: Look, *, certain: bool) -> dict[str, float] | None:
     return {joint: float(f"{value or usual:.3g}") for joint, value in zip(look.robot.joints, own)}
 
 
-def held_against(out: Draft, found: Signals, folder: Path) -> Draft:
-    """The draft with units that the robot's equations tell, and what `sysid check` finds in it."""
+def held_against(out: Draft, found: Signals, folder: Path, wrapped: tuple[str, ...] = ()) -> Draft:
+    """The draft with units that the robot's equations tell, and what `sysid check` finds in it.
+
+    Args:
+        wrapped: what is told of angles that jump by a turn: of the unit that their size says, which
+            is theirs. A check that says it too says where.
+    """
     path, amperes = folder / "config.yaml", out.guesses.get("data.units.torque")
     servos = found.torque.meaning.signal == "command"
     if amperes:  # in N m, until the factors are found
@@ -95,7 +100,7 @@ def held_against(out: Draft, found: Signals, folder: Path) -> Draft:
     with noticed():
         look = looked(config.experiment(out.tree, path))
         angles = out.guesses["data.units.position"]
-        small = angles.value == "rad" and not found.position.meaning.unit
+        small = angles.value == "rad" and not found.position.meaning.unit and not wrapped
         how = {"currents": amperes is not None or servos, "alone": angles.alone}
         if small and (turned := in_degrees(look, **how)):
             out = out.having(replace(angles, doubt=""), _degrees(look, angles, turned))
@@ -111,6 +116,8 @@ def held_against(out: Draft, found: Signals, folder: Path) -> Draft:
             allowed="columns of torque in N m",
             do="log torques, or write data.units.torque_constant into an experiment file",
         )
+    if any(fault.fault == "angle_wrap" for fault in faults):
+        out = replace(out, notes=tuple(note for note in out.notes if note not in wrapped))
     return replace(out, notes=(*out.notes, *dict.fromkeys(f"{f.says}: {f.do}" for f in faults)))
 
 
