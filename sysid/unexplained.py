@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .candidates import Candidate
+from .estimate import Fit
 from .model_parameters import ROBOT
 
 _MOST = 0.5  # of what stands above a floor, or of a square
@@ -60,6 +61,12 @@ def in_vain(refused: Sequence[Refused], joints, j: int, least: float):
     ]
     best = max(own, key=lambda r: r.shares[j], default=None)
     return best and (best.candidate, best.p)
+
+
+def raw(fit: Fit) -> bool:
+    """Whether a fit's torque is as logged: a low-pass goes with a filter."""
+    spec = fit.experiment.preprocess
+    return spec.torque == "raw" and spec.filter != "none"
 
 
 def cause(

@@ -47,8 +47,32 @@ def test_a_load_in_one_log_is_named_with_it(folder, loaded):
     assert abs(mass[0] - truth) < 3.0 * mass[1]
 
 
+def test_a_load_that_a_test_log_carries_too_is_named_with_both(simulated, loaded, tmp_path):
+    """Two of three training logs with it, and the test log: without that its error would rise, and the load be refused."""
+    out = tmp_path / "case"
+    shutil.copytree(simulated("holds none", seed=6, duration=10.0), out)
+    for k, seed in enumerate((7, 8)):
+        shutil.copy(simulated(f"holds a load {seed}", "payload:*", seed=6, duration=5.0 + k) / "train.csv", out / f"loaded_{k}.csv")
+    shutil.copy(loaded / "test.csv", out / "test.csv")
+    text = (out / "config.yaml").read_text()
+    (out / "config.yaml").write_text(text.replace("train: [train.csv]", "train: [loaded_0.csv, train.csv, loaded_1.csv]"))
+    found = document(diagnose(pipeline.load(out)))
+    heads = [f for f in found["findings"] if f["joins_as_step"] is not None]
+    logs = ["loaded_0.csv", "loaded_1.csv", "test.csv"]
+    assert [(f["effect"], sorted(f["options"]["logs"])) for f in heads] == [("payload", logs)]
+    assert shlex.split(heads[0]["command"])[-1] == f"logs={json.dumps(logs)}"
+    for joint in found["joints"].values():
+        assert joint["status"] == "missing" and joint["rms"]["test"] > 1.2 * joint["noise_floor"]
+    added = loop.add(out, "payload", None, {"logs": logs}, out=out / "runs")
+    assert not added.refused
+    for joint, own in found["joints"].items():
+        assert added.after.rms("test")[joint] < 1.1 * own["noise_floor"] + 2.0 * own["noise_floor_se"]
+
+
 def test_which_logs_are_tried():
     effect = Payload()
     assert effect.among(["a"]) == [] and effect.among([str(k) for k in range(9)]) == []
     assert effect.among(["a", "b"]) == [{"logs": ["a"]}, {"logs": ["b"]}]
-    assert effect.among(["a", "b", "c"])[3:] == [{"logs": ["b", "c"]}, {"logs": ["a", "c"]}, {"logs": ["a", "b"]}]
+    assert effect.among(["a", "b", "c"])[3:] == [{"logs": ["a", "b"]}, {"logs": ["a", "c"]}, {"logs": ["b", "c"]}]
+    assert len(effect.among(list("abcd"))) == 14 and {"logs": ["b", "d"]} in effect.among(list("abcd"))
+    assert [len(one["logs"]) for one in effect.among(list("abcde"))] == [1] * 5 + [4] * 5

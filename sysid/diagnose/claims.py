@@ -14,11 +14,12 @@ from dataclasses import dataclass, replace
 from .. import pipeline
 from ..addition import grown, spelled
 from ..borne_out import doubted, size_told
+from ..carriers import with_tests
 from ..estimate import Fit
 from ..experiment_logs import Read
 from ..failures import taken
 from ..motion import Motion
-from ..unexplained import Refused
+from ..unexplained import Refused, raw
 from .findings import Finding, finding
 from .refits import Member
 from .steps import Step, rejoined
@@ -70,6 +71,7 @@ def claimed(
         there = {claim.step.candidate.key for claim in stands.values()}
         if number in stands or step.candidate.key in there or last is refused.get(number, [0])[0]:
             continue
+        step = replace(step, choice=with_tests(step.choice, last, test))
         # with the head refused the least likely member may be it
         first, *other = step.choice.members[:_FITTED]
         free = lambda one: one.key not in there and one.kind not in heads  # noqa: B023, E731
@@ -79,9 +81,7 @@ def claimed(
         refused.pop(number, None)
         if head is None:
             shares = taken(step.before.settled, step.after.settled, test)
-            spec = fit.experiment.preprocess
-            raw = spec.torque == "raw" and spec.filter != "none"  # a low-pass goes with a filter
-            refused[number] = last, Refused(*own, step.candidate, step.p, shares, raw)
+            refused[number] = last, Refused(*own, step.candidate, step.p, shares, raw(fit))
             continue
         if why:
             refused[~number] = last, Refused(*own)

@@ -1,5 +1,7 @@
 """A load that some logs carry."""
 
+from itertools import combinations
+
 import numpy as np
 
 from ..effect import LinkEffect
@@ -8,7 +10,7 @@ from ..effect_parameters import Linear, called
 from ..inertia import PARAMETERS, UNITS
 from ..regressor import body_motions, wrench_columns
 
-_MOST = 8  # logs that are tried: of more, each is a small part
+_MOST, _EVERY = 8, 4  # logs that are tried: of more, each is a small part; and of which any may have it together
 
 
 class Payload(LinkEffect):
@@ -38,11 +40,11 @@ class Payload(LinkEffect):
         return chosen
 
     def among(self, logs):
-        """In one of them, or in all but one."""
+        """In one of them, or in all but one; of few in any, but not in all."""
         if not 1 < len(logs) <= _MOST:
             return []
-        one = [[name] for name in logs]
-        return [{"logs": own} for own in [*one, *([n for n in logs if n not in own] for own in one if len(logs) > 2)]]
+        counts = range(1, len(logs)) if len(logs) <= _EVERY else (1, len(logs) - 1)
+        return [{"logs": list(own)} for count in counts for own in combinations(logs, count)]
 
     @property
     def instantaneous(self):

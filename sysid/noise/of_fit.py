@@ -74,10 +74,9 @@ def _in_every_log(found: NoiseFloor, fit: Fit, joint: int) -> NoiseFloor:
             continue
         error, doubt = block_rms(squares)
         if found.rms - (1.0 + DOUBT) * error > 2.0 * math.hypot(found.std, doubt):
-            why = (
-                f"not determined: it would be {found.rms / error:.2g} times the error on the {part} logs,"
-                f" so that the noise is louder in other logs, or misfit stands in it ({found.detail})"
-            )
+            times = f"{found.rms / error:.2g} times the error on the {part} logs"
+            why = "the noise is louder in other logs, or misfit stands in it"
+            why = f"not determined: it would be {times}, so that {why} ({found.detail})"
             return NoiseFloor(None, None, "none", why, None, found.high, error, found.halved)
     return found
 

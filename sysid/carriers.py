@@ -1,0 +1,56 @@
+"""Which test logs have what training logs say that only some of these have: a load may be in any log."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from . import rows as row
+from .candidates import Candidate
+from .estimate import Fit
+from .motion import Motion
+
+
+def with_tests(choice, fit: Fit, test: Motion):
+    """A choice of which what is in some training logs alone is also in the test logs that have it, as the training logs' own values for
+    it say.
+
+    A log has it or has not; no other number of it is looked for there.
+
+    Args:
+        choice: a head and members, refitted on the training logs. test: the test logs under a low-pass.
+    """
+    every = {id(member): _with_tests(member, fit, test) for member, _ in choice.members}
+    members = tuple((every[id(member)], p) for member, p in choice.members)
+    return replace(choice, head=every.get(id(choice.head), choice.head), members=members)
+
+
+def _with_tests(member, fit: Fit, test: Motion):
+    candidate = member.candidate
+    if "logs" not in dict(candidate.options) or not (more := _carriers(candidate, member.view, fit, test)):
+        return member
+    logs = (*dict(candidate.options)["logs"], *more)
+    return replace(member, group=replace(member.group, candidate=_in(candidate, logs, fit)))
+
+
+def _carriers(candidate: Candidate, view, fit: Fit, test: Motion) -> list[str]:
+    """The test logs whose error falls where an effect is in them, of the size that a view of the training logs gives it."""
+    trained = {piece.source for piece in view.motion.pieces}
+    names = [name for name in dict.fromkeys(piece.source for piece in test.pieces) if name not in trained]
+    found, first = row.measured(test, 1), 10 * view.model.bodies
+    own = [first + k for k, c in enumerate(view.model.coefficients) if (c.effect, c.joint) == candidate.key]
+    effect, model = _in(candidate, names, fit).effect, fit.model
+    columns = row.signature(model, test, row.seen(model, test), effect, candidate.joint, {}, 1, found.use)
+    left = (found.tau - row.predicted(model, test, fit.x, 1)) * found.use
+    weight = 1.0 / np.maximum(list(fit.rms("train").values()), 1e-300)
+    gain = np.sum((left**2 - (left - (columns @ view.x[own]).T) ** 2) * weight**2, axis=1)
+    source = np.array([piece.source for piece in test.pieces])[found.piece]
+    return [name for name in names if gain[source == name].sum() > 0.0]
+
+
+def _in(candidate: Candidate, logs, fit: Fit) -> Candidate:
+    """A candidate in some logs."""
+    options = dict(candidate.options) | {"logs": tuple(logs)}
+    effect = candidate.effect.given(**options | {"logs": list(logs)}).bound(fit.model.robot, candidate.joint)
+    return replace(candidate, effect=effect, options=tuple(options.items()))
