@@ -168,7 +168,7 @@ def _fit(experiment: Experiment, filters: dict | None, strength: PriorWeight | N
         if not scale_is_told(experiment, machine.joints):
             warn("no joint's torque is known in N m: these logs tell masses, friction and gains up to one common factor, which the prior's masses choose; one known gain, or a payload of known mass, settles it")
         tell("left", 0.0)
-        for text in implausible(replace(found, predictions=predictions)):
+        for text in implausible(replace(found, predictions=predictions), motion.still, provenance):
             warn(text)
     return replace(
         found, masses=masses.document(heavy), predictions=predictions, samples=samples, left_out=left_out, seconds=seconds, filters=chosen,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -10,17 +10,75 @@ from .estimate import Fit
 
 _EFFORT, _FEWEST = 1.5, 3  # times what the URDF allows the drive, and in how many samples
 ASK = "are its columns, signs and units right? `sysid check` says"
+_BLOCKS = 10  # of a log, whose means say how far its own may be off
+_CHANCE = 1e-3  # of a log that stands apart from the others, were there nothing
+_SHARE = 0.1  # of a joint's squared error that its logs' means must make
+_MOST = 200_000  # rows that tell a mean
 
 
-def implausible(fit: Fit) -> Iterator[str]:
-    """Joints that the model explains worse than their mean, torque beyond the drive's. Of masses see `masses`."""
+def implausible(fit: Fit, still: Sequence[str] = (), logs: Sequence[dict] = ()) -> Iterator[str]:
+    """Joints that the model explains worse than their mean, that stand in the test logs, whose error is another in each log; torque
+    beyond the drive's. Of masses see `masses`.
+
+    Args:
+        still: joints that stand in the test logs. logs: what logs there are, part and name of each, as documents have them.
+    """
     test = fit.predictions["test"].errors()
-    worse = [f"{joint} (R2 {r2:.2g})" for joint, r2 in zip(fit.joints, test["r2"]) if r2 < 0.0]
+    stands = [joint for joint in fit.joints if joint in still]
+    worse = [f"{joint} (R2 {r2:.2g})" for joint, r2 in zip(fit.joints, test["r2"]) if r2 < 0.0 and joint not in stands]
     if worse:
         yield f"implausible: the model is worse than none on the test logs of {', '.join(worse)}; {ASK}"
+    if moved := [joint for joint in stands if np.isfinite(test["r2"][fit.joints.index(joint)]) and joint not in _held(fit)]:
+        yield (
+            f"the test logs do not show {', '.join(moved)} in motion: the error there is friction at rest, which no model tells, and "
+            "says nothing of the model; hold out a log in which it moves"
+        )
+    yield from _apart(fit, logs, stands)
     robot, greatest = fit.model.robot, fit.predictions["train"].greatest(_FEWEST)
     for j, joint in enumerate(fit.joints):
         allowed = robot.source.joints[joint].effort
         torque = greatest[:, j]
         if np.sum(torque > _EFFORT * allowed) >= _FEWEST:
             yield f"implausible: the torque of {joint} reaches {torque.max():.4g}, the URDF allows its drive {allowed:.4g}; {ASK}"
+
+
+def _held(fit: Fit) -> set[str]:
+    """Joints whose friction is held, as they stand in the training logs, too."""
+    own = zip(fit.model.coefficients, fit.held)
+    return {fit.joints[c.joint] for c, held in own if held and c.effect == "coulomb" and c.joint >= 0}
+
+
+def _apart(fit: Fit, logs: Sequence[dict], still: Sequence[str]) -> Iterator[str]:
+    """Joints whose error has another mean in some logs, where that is much of it."""
+    from scipy.special import stdtrit
+
+    named = [(part, k, own["log"]) for part in ("train", "test") for k, own in enumerate(o for o in logs if o["part"] == part)]
+    if len(named) < 2:
+        return
+    parts = {part: told.thinned(_MOST) for part, told in fit.predictions.items()}
+    for j, joint in enumerate(fit.joints):
+        if joint in still:
+            continue
+        left = {part: told.of_joint(j)[2] for part, told in parts.items()}
+        each = [_mean(left[part][(parts[part].log == k) & np.isfinite(left[part])]) for part, k, _ in named]
+        known = [(name, *own) for (*_, name), own in zip(named, each) if own is not None]
+        if len(known) < 2:
+            continue
+        means, errors, counts, squares = np.array([own[1:] for own in known]).T
+        middle = means - np.average(means, weights=counts)
+        far = np.abs(middle) > stdtrit(_BLOCKS - 1, 1.0 - 0.5 * _CHANCE / len(known)) * errors
+        if far.any() and np.sum(counts * middle**2) > _SHARE * np.sum(squares):
+            unit = fit.predictions["test"].units[j]
+            said = ", ".join(f"{mean:+.2g} {unit} in {name}" for (name, *_), mean, own in zip(known, middle, far) if own)
+            yield (
+                f"what is left of {joint} is another in some logs, in the mean {said}: a torque's zero that was set anew, a load, or what hangs "
+                "on the place; `data.groups`, and an effect that is `per:` a group, give each its own"
+            )
+
+
+def _mean(left: np.ndarray) -> tuple[float, float, int, float] | None:
+    """Mean of an error (n,), its standard error by blocks of time, rows and sum of squares; None of too few."""
+    if len(left) < 2 * _BLOCKS:
+        return None
+    means = [part.mean() for part in np.array_split(left, _BLOCKS)]
+    return float(left.mean()), float(np.std(means, ddof=1) / np.sqrt(_BLOCKS)), len(left), float(left @ left)
