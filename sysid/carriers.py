@@ -38,12 +38,16 @@ def _carriers(candidate: Candidate, view, fit: Fit, test: Motion) -> list[str]:
     """The test logs whose error falls where an effect is in them, of the size that a view of the training logs gives it."""
     trained = {piece.source for piece in view.motion.pieces}
     names = [name for name in dict.fromkeys(piece.source for piece in test.pieces) if name not in trained]
+    if not names:
+        return []
     found, first = row.measured(test, 1), 10 * view.model.bodies
     own = [first + k for k, c in enumerate(view.model.coefficients) if (c.effect, c.joint) == candidate.key]
-    effect, model = _in(candidate, names, fit).effect, fit.model
+    # with the bodies that stand beside it: those of a model without it have a part of it already
+    effect, model = _in(candidate, names, fit).effect, view.model
     columns = row.signature(model, test, row.seen(model, test), effect, candidate.joint, {}, 1, found.use)
-    left = (found.tau - row.predicted(model, test, fit.x, 1)) * found.use
-    weight = 1.0 / np.maximum(list(fit.rms("train").values()), 1e-300)
+    left = (found.tau - row.predicted(model, test, view.x, 1)) * found.use
+    error = np.array(list(fit.rms("train").values()))
+    weight = np.where(error > 0.0, 1.0 / np.maximum(error, 1e-300), 0.0)
     gain = np.sum((left**2 - (left - (columns @ view.x[own]).T) ** 2) * weight**2, axis=1)
     source = np.array([piece.source for piece in test.pieces])[found.piece]
     return [name for name in names if gain[source == name].sum() > 0.0]

@@ -181,9 +181,11 @@ def with_clock(found: Sequence[Event], segment: Segment) -> Sequence[Event]:
 
 
 def _as_long(event: Event, runs: np.ndarray, near: float) -> Event:
-    """An event as long as those of some runs (k, 2) [s] that come near it."""
+    """An event as long as those of some runs (k, 2) [s] that come near it, within twice as much."""
     own = runs[(runs[:, 0] <= event.stop + near) & (runs[:, 1] >= event.start - near)]
     start, stop = own[:, 0].min(initial=event.start), own[:, 1].max(initial=event.stop)
+    # beyond a period of the usual frequency it is the motion that is fast
+    start, stop = max(start, event.start - 2.0 * near), min(stop, event.stop + 2.0 * near)
     return replace(event, start=float(start), stop=float(stop))
 
 

@@ -81,15 +81,19 @@ def _of_bound(objective, compressed: Compressed, x, weights, data, prior, invers
     deviation = np.sqrt(np.clip(np.diagonal(square), 0.0, None))
     known = ~undetermined & (deviation > 0.0)
     below = np.clip(own @ objective.gradient(x)[bound], 0.0, None)
-    most = np.full(len(bound), np.inf) if room is None else _before_bounds(follow, *room[:, free])
+    # one that follows by less than a hundredth of its own doubt, or stands at a bound itself, holds nothing back
+    spread = np.sqrt(np.clip(np.diagonal(inverse), 0.0, None))
+    moves = np.abs(follow) * np.sqrt(np.clip(np.diagonal(own), 0.0, None)) > _FAINT * spread[:, None]
+    most = np.full(len(bound), np.inf) if room is None else _before_bounds(np.where(moves, follow, 0.0), *room[:, free])
     share = [_root_mean_square(*own) if told else 0.0 for *own, told in zip(below, most, deviation, known)]
     return follow @ (np.outer(share, share) * square) @ follow.T
 
 
 def _before_bounds(follow, down, up) -> np.ndarray:
     """How far (bound,) parameters may go up until one of those (free,) that follow has gone as far down or up as it may."""
-    tall = [np.where(follow < 0.0, down[:, None], up[:, None]), np.maximum(np.abs(follow), 1e-300)]
-    return np.min(tall[0] / tall[1], axis=0, initial=np.inf)
+    there = (follow != 0.0) & (np.minimum(down, up) > 0.0)[:, None]
+    way = np.where(follow < 0.0, down[:, None], up[:, None])
+    return np.min(np.where(there, way / np.where(there, np.abs(follow), 1.0), np.inf), axis=0, initial=np.inf)
 
 
 def _root_mean_square(below: float, most: float, deviation: float) -> float:
@@ -109,6 +113,7 @@ def _widened(compressed: Compressed, free) -> np.ndarray:
 
 
 _FAR, _POINTS = 6.0, 400  # deviations of a normal law, and steps over them
+_FAINT = 0.01  # of its own deviation: so little of what follows is none
 _FLAT = 1e-12  # eigenvalues that are none, as a share of the largest
 
 

@@ -210,10 +210,21 @@ def test_a_torque_that_one_log_has_with_the_other_sign_is_named_with_its_log(wro
     assert {(f.fault, f.joint, f.log) for f in found} == {("sign_flipped", "elbow", file) for file in wrong}
 
 
-def test_a_load_in_one_log_is_no_wrong_sign(made, tmp_path):
-    """Two kilograms more in the hand leave other torques in that log, and no other sign."""
+@pytest.mark.parametrize("what", ["load", "offset"])
+def test_a_load_or_an_offset_that_turns_a_torque_is_no_wrong_sign(what, made, tmp_path):
+    """Most of the torque has the other sign in one log, and friction brakes there as in the others."""
     logs = shutil.copytree(made(logs=3, duration=6.0), tmp_path / "logs")
-    table = pl.read_csv(logs / "train_2.csv")
-    pull = 2.0 * 9.81 * 0.4 * np.sin(table["q_shoulder"] + table["q_elbow"])
-    table.with_columns((pl.col("tau_elbow") - pull).alias("tau_elbow")).write_csv(logs / "train_2.csv")
-    assert not [f for f in check.check(pipeline.load(logs)) if f.fault == "sign_flipped"]
+    for file, sign in (("train_1.csv", 1.0), ("train_2.csv", -1.0), ("train_3.csv", 1.0), ("test.csv", 1.0)):
+        table = pl.read_csv(logs / file)
+        more = 40.0 * np.sin(table["q_shoulder"] + table["q_elbow"]) if what == "load" else pl.lit(16.0)
+        table.with_columns((pl.col("tau_elbow") + sign * more).alias("tau_elbow")).write_csv(logs / file)
+    assert not [f for f in check.check(pipeline.load(logs)) if f.fault == "sign_flipped" and f.log]
+
+
+@pytest.mark.parametrize("wrong", ["train_1.csv", "train_2.csv"])
+def test_a_log_without_torque_has_no_vote(wrong, made, tmp_path):
+    logs = shutil.copytree(made(logs=2, duration=6.0), tmp_path / "logs")
+    turned(logs, wrong, "tau_elbow")
+    table = pl.read_csv(logs / "test.csv")
+    table.with_columns((0.0 * pl.col("tau_elbow")).alias("tau_elbow")).write_csv(logs / "test.csv")
+    assert {(f.joint, f.log) for f in check.check(pipeline.load(logs)) if f.fault == "sign_flipped"} == {("elbow", wrong)}

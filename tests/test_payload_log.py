@@ -52,7 +52,7 @@ def test_a_load_that_a_test_log_carries_too_is_named_with_both(simulated, loaded
     out = tmp_path / "case"
     shutil.copytree(simulated("holds none", seed=6, duration=10.0), out)
     for k, seed in enumerate((7, 8)):
-        shutil.copy(simulated(f"holds a load {seed}", "payload:*", seed=6, duration=5.0 + k) / "train.csv", out / f"loaded_{k}.csv")
+        shutil.copy(simulated(f"holds a load {seed}", "payload:*", seed=6, duration=10.0 - k) / "train.csv", out / f"loaded_{k}.csv")
     shutil.copy(loaded / "test.csv", out / "test.csv")
     text = (out / "config.yaml").read_text()
     (out / "config.yaml").write_text(text.replace("train: [train.csv]", "train: [loaded_0.csv, train.csv, loaded_1.csv]"))
@@ -67,6 +67,21 @@ def test_a_load_that_a_test_log_carries_too_is_named_with_both(simulated, loaded
     assert not added.refused
     for joint, own in found["joints"].items():
         assert added.after.rms("test")[joint] < 1.1 * own["noise_floor"] + 2.0 * own["noise_floor_se"]
+
+
+def test_test_logs_that_are_parts_of_training_logs_are_no_others(folder, tmp_path):
+    """No other log can be said to carry it; where the load is, is known."""
+    out = shutil.copytree(folder, tmp_path / "case")
+    text = (folder.parent / "case" / "config.yaml").read_text()
+    train = "train: [train.csv, {file: loaded.csv, start: 0, stop: 6}]"
+    text = text[: text.index("  train:")] + f"  {train}\n" + text[text.index("  test:") :]
+    (out / "config.yaml").write_text(text.replace("test: [test.csv]", "test: [{file: loaded.csv, start: 6}]").replace("  - payload", "  # - payload"))
+    experiment = pipeline.load(out)
+    if any(effect.name == "payload" for effect in experiment.model.effects):
+        loop_free = [effect for effect in experiment.model.effects if effect.name != "payload"]
+        experiment = experiment.model_copy(update={"model": experiment.model.model_copy(update={"effects": loop_free})})
+    heads = [f for f in document(diagnose(experiment))["findings"] if f["joins_as_step"] is not None]
+    assert [(f["effect"], f["options"]) for f in heads] == [("payload", {"logs": ("loaded.csv",)})]
 
 
 def test_which_logs_are_tried():

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from scipy.signal import lfilter
+from scipy.stats import norm
 
 from sysid import estimate, posed_problem, uncertainty
 from sysid.blocks import parameters
@@ -166,3 +167,13 @@ def test_what_takes_the_place_of_friction_at_zero_is_no_surer_for_it(tmp_path):
         off.append((fit.x[own] - 0.1) / fit.uncertainty.std[own])
     assert 8 <= zero <= 36  # else nothing is asked here
     assert (np.abs(off) < 2.0).mean(axis=0).min() > 0.85
+
+
+def test_what_stands_at_a_bound_of_its_own_or_hardly_follows_holds_nothing_back():
+    follow = np.array([[-0.5, 0.2], [1e-9, 0.0], [0.3, -0.1]])
+    down, up = np.array([1.0, 0.0, 2.0]), np.array([np.inf, 3.0, 0.6])
+    np.testing.assert_allclose(uncertainty._before_bounds(follow, down, up), [2.0, 20.0])
+    assert uncertainty._root_mean_square(0.0, np.inf, 2.0) == pytest.approx(1.0, rel=0.01)  # a half normal law
+    assert uncertainty._root_mean_square(0.0, 0.02, 2.0) == pytest.approx(0.01 / np.sqrt(3.0), rel=0.01)  # an even one
+    z = 2.0
+    assert uncertainty._root_mean_square(4.0, np.inf, 2.0) == pytest.approx(np.sqrt(1.0 + z**2 - z * norm.pdf(z) / norm.sf(z)), rel=0.01)

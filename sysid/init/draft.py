@@ -64,7 +64,9 @@ def draft(reference: str, names: list[str], folder: Path, wishes: Wishes) -> Dra
     out = Draft(urdf, {}, notes, found.rest)
     out = out.having(*machine.guesses, *chosen, *_parts(data, clock, folder, wishes))
     out = out.having(*clock, *_columns(found, used), angles, *_drive(found, used))
-    return physics.held_against(out, found, folder, wrapped)
+    # a joint in degrees may turn by so much between samples; one that stays within a turn is in rad
+    rad = wrapped if not angles.alone and units.within_a_turn(data, used, _sliding(robot)) else ()
+    return physics.held_against(out, found, folder, wrapped, rad=bool(rad))
 
 
 def _moved(reference: str, folder: Path) -> str:

@@ -86,12 +86,14 @@ def factors(look: Look, *, certain: bool) -> dict[str, float] | None:
     return {joint: float(f"{value or usual:.3g}") for joint, value in zip(look.robot.joints, own)}
 
 
-def held_against(out: Draft, found: Signals, folder: Path, wrapped: tuple[str, ...] = ()) -> Draft:
+def held_against(
+    out: Draft, found: Signals, folder: Path, wrapped: tuple[str, ...] = (), *, rad: bool = False
+) -> Draft:
     """The draft with units that the robot's equations tell, and what `sysid check` finds in it.
 
     Args:
-        wrapped: what is told of angles that jump by a turn: of the unit that their size says, which
-            is theirs. A check that says it too says where.
+        wrapped: what is told of angles that jump by a turn; a check that says it too says where.
+        rad: that these jumps say that all are in rad.
     """
     path, amperes = folder / "config.yaml", out.guesses.get("data.units.torque")
     servos = found.torque.meaning.signal == "command"
@@ -100,7 +102,7 @@ def held_against(out: Draft, found: Signals, folder: Path, wrapped: tuple[str, .
     with noticed():
         look = looked(config.experiment(out.tree, path))
         angles = out.guesses["data.units.position"]
-        small = angles.value == "rad" and not found.position.meaning.unit and not wrapped
+        small = angles.value == "rad" and not found.position.meaning.unit and not rad
         how = {"currents": amperes is not None or servos, "alone": angles.alone}
         if small and (turned := in_degrees(look, **how)):
             out = out.having(replace(angles, doubt=""), _degrees(look, angles, turned))

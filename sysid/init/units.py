@@ -136,6 +136,18 @@ def wraps(q: dict[str, np.ndarray], slides: dict[str, bool], unit: str) -> dict[
     return {joint: int(found.sum()) for joint, found in jumps.items() if found.any()}
 
 
+def within_a_turn(data: list[Logged], used: list[str], slides: dict[str, bool]) -> bool:
+    """Whether the angles of all joints that jump by 2 pi stay within a turn of zero, as what was
+    wrapped does, and go by little from sample to sample otherwise."""
+    logged = [{joint: one.q[joint] for joint in used if joint in one.q} for one in data]
+    jumping = {joint for q in logged for joint in wraps(q, slides, "rad")}
+    each = [q[joint] for q in logged for joint in jumping if joint in q]
+    return bool(each) and all(
+        np.abs(q).max() < 1.1 * _TURN and np.quantile(np.abs(np.diff(q)), 0.9) < 0.1 * _TURN
+        for q in each
+    )
+
+
 def rate_of(q: dict[str, np.ndarray], qd: dict[str, np.ndarray]) -> float | None:
     """Samples a second of a log without a clock, from angles and speeds in the same unit: the rate
     at which the speeds integrate to the angles. None where nothing moves or they do not agree.

@@ -1,5 +1,5 @@
-"""Whether a joint's torque has in one log the sign that it has in the others: what the same bodies and
-friction leave of all logs says so, however far the URDF's are from them.
+"""Whether a joint's torque has in one log the sign that it has in the others: what the same bodies
+and friction leave of all logs says so, however far the URDF's are from them.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ AFTER, SENSELESS = 2, ("wrong_unit", "angle_wrap")
 # log that they turn: a factor of two in what is left.
 _LEAVES = 0.25
 _ROUNDS = 20
+_FRICTION = (("coulomb", True), ("viscous", True))  # of the joint itself
 
 
 def find(look: Look) -> Iterator[Fault]:
@@ -41,12 +42,12 @@ def turned(seen: Seen, j: int, count: int) -> tuple[list[int], float]:
     that is left with these turned, as a share of what is left as they are.
 
     Least squares of one set of parameters with a sign for each log leaves y'y - s'M s, with M of
-    what each log's torque has along the columns. Turned all at once they leave the same: it is the
-    fewer that are wrong, and of as many those against which friction drives.
+    what each log's torque has along the columns. Turned all at once they leave the same, and a load
+    or an offset may turn a torque that is right: those are wrong in which friction drives the
+    joint, while it brakes in the others.
     """
-    rows = seen.rows
-    use = rows.use[:, j]
-    columns, tau, log = rows.columns[j][use], rows.tau[use, j], rows.log[use]
+    use = seen.rows.use[:, j]
+    columns, tau, log = seen.rows.columns[j][use], seen.rows.tau[use, j], seen.rows.log[use]
     length = np.linalg.norm(columns, axis=0)
     there = np.flatnonzero(length > 0.0)
     columns = columns[:, there] / length[there]
@@ -59,14 +60,38 @@ def turned(seen: Seen, j: int, count: int) -> tuple[list[int], float]:
     least, plain = left(signs), left(first)
     if not 0.0 < least < _LEAVES * plain:
         return [], 1.0
-    if signs.sum() < 0.0 or (signs.sum() == 0.0 and _driven(seen, there, solve @ along @ signs, j)):
-        signs = -signs
+    named = [(c.effect, c.joint == j) for c in seen.model.coefficients]
+    place = 10 * seen.model.bodies + np.arange(len(named))
+    friction = np.isin(there, place[[own in _FRICTION for own in named]])
+    coulomb = np.isin(there, place[[own == _FRICTION[0] for own in named]])
+    brakes = [
+        _braking(columns[own], tau[own], friction, coulomb)
+        for own in (signs[log] > 0.0, signs[log] < 0.0)
+    ]
+    if brakes[0] < 0.0 < brakes[1]:
+        signs, brakes = -signs, brakes[::-1]
+    if not brakes[1] < 0.0 < brakes[0]:
+        return [], 1.0
     each = [
         k
         for k in np.flatnonzero(signs < 0.0)
         if left(np.where(np.arange(count) == k, -signs, signs)) > least / _LEAVES
     ]
     return [int(k) for k in each], float(np.sqrt(least / plain))
+
+
+def _braking(columns, tau, friction, coulomb) -> float:
+    """What friction has along the direction of motion in some rows, by least squares of these
+    alone: less than nothing where it drives, and nothing where it is less than what is left.
+
+    Args:
+        columns: (n, k) of one size, tau (n,). friction, coulomb: (k,) bool.
+    """
+    if len(tau) < 2 * columns.shape[1]:
+        return 0.0
+    found = np.linalg.lstsq(columns, tau, rcond=1e-8)[0]
+    own, left = columns[:, friction] @ found[friction], tau - columns @ found
+    return float(columns[:, coulomb].sum(axis=1) @ own) if own @ own > left @ left else 0.0
 
 
 def _alike(system) -> np.ndarray:
@@ -83,13 +108,3 @@ def _descended(signs, left) -> np.ndarray:
             break
         signs = best
     return signs
-
-
-def _driven(seen: Seen, there, found, j: int) -> bool:
-    """Whether friction, of parameters found (there,), drives the joint."""
-    friction = [
-        10 * seen.model.bodies + k
-        for k, c in enumerate(seen.model.coefficients)
-        if c.joint == j and c.positive
-    ]
-    return bool(found[np.isin(there, friction)].sum() < 0.0)
