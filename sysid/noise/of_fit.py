@@ -56,16 +56,15 @@ def floors_of_fit(
         found = [b if worse else a for a, b, worse in zip(found, other, more)]
     if not all(one.reached(error) for one, error in zip(found, most)):
         found = _halved(found, spec, fit, logs)
-    sides = on_both_sides(spec, pieces[0].step)
-    alike = 1 if sides is None else 2 * sides.reach + 1
-    given = [_in_both(one, fit, j, alike) for j, one in enumerate(filtered(found, sides))]
-    return given, dict(zip(fit.joints, left))
+    sides, given = on_both_sides(spec, pieces[0].step), dict(zip(fit.joints, left))
+    if sides is not None:  # what comes through is foreseen of white noise, and no more than about
+        return filtered(found, sides), given
+    return [_in_both(one, fit, j) for j, one in enumerate(found)], given
 
 
-def _in_both(found: NoiseFloor, fit: Fit, joint: int, alike: int) -> NoiseFloor:
+def _in_both(found: NoiseFloor, fit: Fit, joint: int) -> NoiseFloor:
     """A floor that neither the training logs nor the test logs deny: where they are left with
-    clearly less than what all have as noise, that is louder elsewhere, or misfit stands in it.
-    alike: so many rows stand one for another, as the fit's filter sees them together."""
+    clearly less than what all have as noise, that is louder elsewhere, or misfit stands in it."""
     if found.rms is None:
         return found
     for part, told in fit.predictions.items():
@@ -74,7 +73,6 @@ def _in_both(found: NoiseFloor, fit: Fit, joint: int, alike: int) -> NoiseFloor:
         if not len(squares):
             continue
         error, doubt = block_rms(squares)
-        doubt = max(doubt, error / math.sqrt(2.0 * max(len(squares) / alike, 1.0)))
         if found.rms - (1.0 + DOUBT) * error > 2.0 * math.hypot(found.std, doubt):
             times = f"{found.rms / max(error, 1e-300):.2g} times the error on the {part} logs"
             why = "the noise is louder in other logs, or misfit stands in it"
