@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from .deflection import Deflection
 from .effect import Effect, MotionEffect, SensorEffect, WrenchEffect
 from .listed_effects import found as found_effect
 from .model import Model
 from .model_parameters import ROBOT, place
+from .robot import Robot
 from .specs import Experiment, is_own
 from .vocabulary import find, vocabulary
 
@@ -116,13 +117,14 @@ def candidates(model: Model, extra=(), logs: Sequence[str] = ()) -> list[Candida
                 out += _richer(model, effect.name, joint)
                 continue
             for options in [*effect.variants(robot, joint), *effect.among(logs)]:
-                bound = effect.given(**options).bound(robot, joint)
-                out.append(Candidate(bound, joint, _fixed(options)))
+                out.append(made(effect, joint, options, robot))
     return out
 
 
-def _fixed(options: dict) -> tuple[tuple[str, object], ...]:
-    return tuple((k, tuple(v) if isinstance(v, list) else v) for k, v in options.items())
+def made(effect: Effect, joint: int, options: dict, robot: Robot) -> Candidate:
+    """An effect on a joint with options."""
+    fixed = tuple((k, tuple(v) if isinstance(v, list) else v) for k, v in options.items())
+    return Candidate(effect.given(**options).bound(robot, joint), joint, fixed)
 
 
 def _richer(model: Model, name: str, joint: int) -> list[Candidate]:
@@ -139,12 +141,7 @@ def _richer(model: Model, name: str, joint: int) -> list[Candidate]:
         return []
     low = {v.shape.name: v.low for v, _ in own}
     return [
-        Candidate(
-            effect.given(**options).bound(model.robot, joint),
-            joint,
-            _fixed(options),
-            (tuple(at.items()),),
-        )
+        replace(made(effect, joint, options, model.robot), begins=(tuple(at.items()),))
         for options, at in effect.richer(**{v.shape.name: at for v, at in own})
         if all(value >= low[name] for name, value in at.items())
     ]

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from . import rows as row
-from .candidates import Candidate
+from .candidates import Candidate, made
 from .estimate import Fit
 from .motion import Motion
 
@@ -55,6 +55,4 @@ def _carriers(candidate: Candidate, view, fit: Fit, test: Motion) -> list[str]:
 
 def _in(candidate: Candidate, logs, fit: Fit) -> Candidate:
     """A candidate in some logs."""
-    options = dict(candidate.options) | {"logs": tuple(logs)}
-    effect = candidate.effect.given(**options | {"logs": list(logs)}).bound(fit.model.robot, candidate.joint)
-    return replace(candidate, effect=effect, options=tuple(options.items()))
+    return made(candidate.effect, candidate.joint, dict(candidate.options) | {"logs": list(logs)}, fit.model.robot)

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from .blocks import averaged
 from .estimate import Fit
 
 _EFFORT, _FEWEST = 1.5, 3  # times what the URDF allows the drive, and in how many samples
@@ -80,5 +81,4 @@ def _mean(left: np.ndarray) -> tuple[float, float, int, float] | None:
     """Mean of an error (n,), its standard error by blocks of time, rows and sum of squares; None of too few."""
     if len(left) < 2 * _BLOCKS:
         return None
-    means = [part.mean() for part in np.array_split(left, _BLOCKS)]
-    return float(left.mean()), float(np.std(means, ddof=1) / np.sqrt(_BLOCKS)), len(left), float(left @ left)
+    return *averaged(left, _BLOCKS), len(left), float(left @ left)

@@ -14,6 +14,7 @@ from .coefficients import gains, moves, taking_part
 from .deviations import (
     LEVERAGE,
     RESTING,
+    averaged,
     even,
     evening,
     jackknife,
@@ -50,6 +51,7 @@ __all__ = [
     "RESTING",
     "SAME",
     "SHORTEST",
+    "averaged",
     "believed",
     "clear",
     "chances",

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from .. import eigen
-from .numbering import summed
+from .numbering import numbered, summed
 
 RESTING = 5.0  # blocks that a test must rest on
 LEVERAGE = 0.9  # of a direction: what one block may hold of it
@@ -22,6 +22,14 @@ def standard_error(values):
     if count < 2:
         return np.full(values.shape[1:], np.nan)[()]
     return np.sqrt(count * np.var(values, axis=0, ddof=1))
+
+
+def averaged(values, blocks: int) -> tuple[float, float]:
+    """Mean of values (n,) that stand in order of time, and its standard error by so many blocks."""
+    at = np.arange(len(values))
+    number = numbered(at, np.zeros_like(at), shortest=np.inf, fewest=blocks)
+    means = summed(number, values) / np.bincount(number)
+    return float(np.mean(values)), float(standard_error(means)) / len(means)
 
 
 def z_score(differences) -> float:

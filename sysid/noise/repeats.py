@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from ..blocks import numbered, standard_error, summed
+from ..blocks import averaged
 from .stretches import moving
 
 # rms difference of each joint's positions, share of its range; and how far away it must have been
@@ -53,11 +53,8 @@ def scatter(signals, kept, periods) -> tuple[float, float] | None:
 
 def block_rms(squares: np.ndarray) -> tuple[float, float]:
     """RMS and its standard error, from blocks of time."""
-    at = np.arange(len(squares))
-    number = numbered(at, np.zeros_like(at), shortest=np.inf, fewest=min(_BLOCKS, len(squares)))
-    means = summed(number, squares) / np.bincount(number)
-    rms = math.sqrt(squares.mean())
-    error = float(standard_error(means)) / len(means) * math.sqrt(_INDEPENDENT)
+    mean, error = averaged(squares, min(_BLOCKS, len(squares)))
+    rms, error = math.sqrt(mean), error * math.sqrt(_INDEPENDENT)
     return rms, error / (2.0 * rms + _TINY)
 
 
