@@ -166,6 +166,7 @@ def test_nuisances_are_drawn_one_to_three_and_can_be_simulated(tmp_path):
         assert ("brakes" in kinds) <= (options.get("motion") == "moves")
 
 
+@pytest.mark.long
 def test_a_case_with_nuisances_from_end_to_end():
     case = next(c for c in cases.cases(1) if c.key == "planar/control/0")
     options = {"logs": 2, "duration": 4.0, "rate": 100.0, "jitter": 1.0, "spikes": 0.5, "knocks": 1}
@@ -185,6 +186,7 @@ def test_a_case_with_nuisances_from_end_to_end():
     assert set(found["floors"]) == set(robots.JOINTS["planar"])
 
 
+@pytest.mark.long
 def test_an_encoder_that_is_off_is_no_noise(tmp_path):
     from sysid import pipeline
     from sysid.simulate import Hidden, simulate, write

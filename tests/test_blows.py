@@ -27,6 +27,7 @@ def fitted(simulated):
     return pipeline.fit(load(file)), truth["values"]["b"]
 
 
+@pytest.mark.long
 def test_the_width_of_play_is_within_its_deviation(fitted):
     fit, truth = fitted
     value, std, _ = fit.parameters_of("backlash", 1)["backlash.elbow.b"]
@@ -35,6 +36,7 @@ def test_the_width_of_play_is_within_its_deviation(fitted):
     assert std > 0.003 * truth
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("begun", [1.3, 1e-6])
 def test_a_wrong_hollow_is_left(fitted, begun):
     """Also that of a play that is next to none, at which a way downhill may end."""
@@ -73,6 +75,7 @@ def test_a_load_that_is_renewed_costs_nothing(fitted):
     assert max(costs) > 0.0  # some loads would
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("held", [{"teeth": 30.0}, {"b": 0.012}])
 def test_one_value_is_looked_for_where_the_other_is_held(simulated, held):
     folder = simulated("play", HIDDEN, seed=6, duration=15.0)
@@ -104,6 +107,7 @@ def test_only_what_strikes_is_looked_at(fitted):
     assert striking(fit.model.without("backlash", 1)) == {}
 
 
+@pytest.mark.long
 def test_a_search_finds_the_hollow_of_the_width(simulated):
     """From where all are asked, slopes lead to the next hollow, in which the play may take nothing; into which, the last digit of a
     sum decides. The width is as sure as it is said to be."""

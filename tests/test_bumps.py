@@ -59,6 +59,7 @@ def test_pushes_that_no_signal_shows_are_found_and_left_out(pushed):
     assert all(not log.events for log in read(plain)[1])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("hide", [(), ("backlash:hip:b=0.02",), ("torque_saturation:knee:limit=2.0",), ("stribeck:abad",)])
 def test_what_a_joint_does_by_itself_is_no_push(leg, tmp_path, hide):
     experiment, machine, *_ = leg
@@ -84,6 +85,7 @@ def test_bursts_that_keep_coming_are_how_the_machine_moves(leg, tmp_path):
     assert bumps(machine, [log for log in logs if log.path.stem == "train"]) == []
 
 
+@pytest.mark.long
 def test_pushes_of_an_arm_with_play_are_found(leg, tmp_path):
     """Play jars its joint more often than anybody knocks: the other joints say what else there was."""
     experiment, machine, *_ = leg
@@ -168,6 +170,7 @@ def clipped(log, joint: int, share: float):
     return replace(log, events=(), segments=(replace(segment, tau=tau),))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("seed", "joint", "share"), [(6, 0, 0.8), (6, 2, 0.6), (7, 1, 0.7), (11, 2, 0.7)])
 def test_torque_at_its_limit_is_no_push(leg, tmp_path, seed, joint, share):
     """It should have gone further, and is as great as anywhere; beside it a push is one."""

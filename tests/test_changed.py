@@ -130,6 +130,7 @@ def test_many_logs_are_asked_at_once(fitted, cli, tmp_path):
     assert cli("fleet", fitted, "--level", "robot=r1").status == 2
 
 
+@pytest.mark.long
 def test_processes_change_nothing(fitted):
     logs = [str(fitted / log) for log in ("same.csv", "loaded.csv", "rough.csv", "test.csv", "train.csv")]
     logs += [f"{folder}/../{folder.split('/')[-1]}/{log}" for folder in [str(fitted)] for log in ("same.csv", "loaded.csv", "rough.csv", "test.csv", "train.csv")]

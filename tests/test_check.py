@@ -46,6 +46,7 @@ def planted(fault: str, folder, tmp_path, seed: int):
     return logs, {spoiled.joint} if isinstance(spoiled.joint, str) else set(spoiled.joint)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("fault", FAULTS)
 def test_every_fault_is_found_where_it_is(fault, made, tmp_path):
     if fault in faults.MADE:

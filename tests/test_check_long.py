@@ -118,6 +118,7 @@ PLANTED = {
 }  # fmt: skip
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("row", [MIDDLE, EDGE])
 @pytest.mark.parametrize("fault", PLANTED)
 def test_what_is_wrong_in_a_long_log_is_found_with_its_time(

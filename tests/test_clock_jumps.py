@@ -16,6 +16,7 @@ SIZES = np.array([1.0, -0.6, 0.4])  # of three joints that move together
 REACH = 10
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_errors_are_near_the_noise_where_stamps_were_wrong(simulated, monkeypatch, seed):
     """Moves as a slow logger has them, whose stamps are a millisecond beside its values: with those rows, and without them."""

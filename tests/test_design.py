@@ -178,6 +178,7 @@ def designed(poor):
     return design(pipeline.load(poor[0]), duration=8.0, separate=[("stribeck", "shoulder"), ("spring", "shoulder")], processes=1)
 
 
+@pytest.mark.long
 def test_a_design_keeps_to_every_limit_as_an_independent_check_sees_it(poor, designed):
     """Positions, speeds, torque by Pinocchio and friction by hand, at a kilohertz."""
     machine = poor[1]
@@ -232,6 +233,7 @@ def test_ros_reads_small_numbers_as_numbers():
     assert reader.load(folder._numbers(values)) == values.tolist()
 
 
+@pytest.mark.long
 def test_the_same_seed_is_the_same_motion_in_any_number_of_processes(poor, designed, monkeypatch):
     monkeypatch.setattr(search, "_WORTH", 0.0)
     again = design(pipeline.load(poor[0]), duration=8.0, separate=[("stribeck", "shoulder"), ("spring", "shoulder")], processes=2)
@@ -304,6 +306,7 @@ def test_what_is_played_is_looked_at_between_two_looks(poor, arm, monkeypatch):
     assert looked[-1] == 1 and set(looked[:-1]) == {problem.CLOSE}
 
 
+@pytest.mark.long
 def test_pairs_are_told_apart_or_said_not_to_be(poor, designed):
     (pair,) = designed.pairs
     assert {pair.a, pair.b} == {"stribeck:shoulder", "spring:shoulder"} and pair.probability > 0.9

@@ -72,6 +72,7 @@ def fitted(poor):
     return pipeline.fit(pipeline.load(poor))
 
 
+@pytest.mark.long
 def test_likelier_suspects_count_for_more(poor, fitted):
     """Twins that no motion tells apart: nothing is promised of them, unless the old logs have told."""
     experiment, twins = pipeline.load(poor), [("torque_bias", "elbow", 0.5), ("asymmetric_coulomb", "elbow", 0.5)]
@@ -99,6 +100,7 @@ def test_the_tie_of_a_diagnosis_is_asked_by_itself(poor, fitted, monkeypatch):
     assert base(None, None).known.suspects == ()
 
 
+@pytest.mark.long
 def test_the_command_takes_the_tie_of_its_run_folder(poor, fitted, tmp_path, cli):
     """Where the experiment is as it was; `none` is the motion that tells most."""
     experiment = pipeline.load(poor)

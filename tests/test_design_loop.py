@@ -11,6 +11,7 @@ from tests.test_tutorial import LEFT_OUT, ROOT, blocks, prepare, run, words
 PAGE = ROOT / "docs" / "design_loop.md"
 
 
+@pytest.mark.long
 def test_a_tie_is_designed_away(tmp_path, monkeypatch):
     page = PAGE.read_text(encoding="utf-8")
     prepare(tmp_path)

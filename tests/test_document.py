@@ -67,6 +67,7 @@ def found(request, diagnosed):
     return diagnosed(*CASES[request.param], **more)
 
 
+@pytest.mark.long
 def test_the_document_keeps_its_shape(found):
     said = document(found, "runs/x")
     assert json.loads(json.dumps(said, allow_nan=False)) == said and said["run"] == "runs/x"

@@ -175,6 +175,7 @@ def test_the_closed_loop_let_go_follows_the_log(servo_fit):
     assert wrong["joint_1"] > 10.0 * servo_fit.rollout["joint_1"]
 
 
+@pytest.mark.long
 def test_a_missing_spring_is_named_without_any_torque(tmp_path):
     """Put in by MuJoCo, on one of two servos of which nothing but commands and angles is logged."""
     text = SERVOS.format(dof=2, entries=entries(2, kp="free", kd="free", delay="free"))

@@ -262,6 +262,7 @@ def views(planar):
     return [view_of(planar, ["viscous"], seed) for seed in range(12)]
 
 
+@pytest.mark.long
 def test_the_noise_of_the_angles_is_taken_off(views):
     """Nothing is hidden; the angles' noise stands in columns and residual alike, and parameters that take it up bend
     others. With the noise drawn once more and taken off, the mean of every coefficient is nothing within its error."""

@@ -19,6 +19,7 @@ def view(simulated):
     return first_view(experiment, pipeline.fit(experiment))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("key", [("spring", 1), ("spring", 0), ("torque_bias", 0), ("joint_coupling", 1), ("quadratic_drag", 1), ("load_friction", 0)])
 def test_everything_falls_as_far_as_in_the_refit(view, key):
     """The same least: of bodies that give way, of friction that stays at nought or leaves it."""
@@ -132,6 +133,7 @@ def test_no_candidate_makes_everything_rise(view):
     assert np.all(found >= -1e-4 * view.settled.objective)
 
 
+@pytest.mark.long
 def test_most_falls_with_what_is_missing(simulated):
     """In moves with stops bodies imitate a coupling: by its slopes it stands in no clear place, where all has settled anew it is first."""
     experiment = pipeline.load(simulated("falls-coupled", "joint_coupling:elbow:size=1", seed=4, duration=8.0, motion="moves"))

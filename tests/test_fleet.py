@@ -218,6 +218,7 @@ def said(mixed, tmp_path_factory):
     return document, page.read_text()
 
 
+@pytest.mark.long
 def test_odd_robots_are_found_named_and_sized(said):
     document, _ = said
     assert {e["robot"] for e in document["odd"]} == {"r4", "r9"}
@@ -254,6 +255,7 @@ def test_the_page_says_it_and_escapes(said):
     assert "http://" not in page.split('<script type="text/plain"')[0].replace("http://www.w3.org", "")
 
 
+@pytest.mark.long
 def test_the_command_line_leaves_another_robot_out_by_name(planar, tmp_path, cli):
     folder = robots(planar, tmp_path / "robots", 5)
     (folder / "r2" / "config.yaml").write_text("model: {effects: [viscous]}\n")

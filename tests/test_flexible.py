@@ -285,6 +285,7 @@ def test_a_law_is_nearly_one_of_the_products_and_stands_out_of_noise_that_is_lar
     assert found.share <= 1.3 * np.sum(own**2) / np.sum(view.design.residual[:, 1] ** 2)  # of the law, not of the noise
 
 
+@pytest.mark.long
 def test_nothing_stands_out_of_noise():
     """As often as the level says, white or coloured, of noise that remembers a tenth of a block and less."""
     for memory in (0.001, 0.04, 0.1):

@@ -21,6 +21,7 @@ def folder(tmp_path_factory):
     return experiment(tmp_path_factory.mktemp("groups"))
 
 
+@pytest.mark.long
 def test_an_effect_that_joins_per_group_takes_the_place_of_the_shared_one(folder, cli, tmp_path):
     file = folder / "shared.yaml"
     file.write_text("# kept\n" + dump(tree(["viscous", "coulomb", PER_PAYLOAD[2]])))
@@ -40,6 +41,7 @@ def test_an_effect_that_joins_per_group_takes_the_place_of_the_shared_one(folder
     ]
 
 
+@pytest.mark.long
 def test_a_diagnosis_holds_the_model_at_each_log_s_levels(tmp_path, planar):
     """An arm with a payload in one log and without in the other, and a spring on its elbow in both:
     the payload is known, the spring is what is missing."""
@@ -69,6 +71,7 @@ def test_a_diagnosis_holds_the_model_at_each_log_s_levels(tmp_path, planar):
     assert abs(mass - LOAD[0]) < 0.1 * LOAD[0]
 
 
+@pytest.mark.long
 def test_a_known_payload_is_no_fault_of_the_logs(folder, cli):
     """Check's own equations have what the experiment says differs: without it the heavy payload
     looks like a torque that was never there."""
@@ -82,6 +85,7 @@ def test_a_known_payload_is_no_fault_of_the_logs(folder, cli):
         assert (said.status, "commanded_torque" in faults) == (status, not per), faults
 
 
+@pytest.mark.long
 def test_a_motion_is_designed_for_one_level(folder, cli, tmp_path):
     """What the level's own parameters gain is more than what others do, which learn of the bodies
     alone."""

@@ -695,6 +695,7 @@ def test_what_a_person_sees(experiment, cli):
 REAL = Path(os.environ.get("SYSID_DATA_DIR", "nowhere")).resolve()  # tests work elsewhere
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("name", "unit", "torque"),
     [("kr300", "deg", "A"), ("rokae", "rad", "N m"), ("kinova", "rad", "N m")],
@@ -720,6 +721,7 @@ def test_logs_of_labs(tmp_path, cli, name, unit, torque):
     assert left[0] < 1.05 * left[1]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("urdf", "count", "locked"),
     [

@@ -36,6 +36,7 @@ def test_an_edit_made_while_add_runs_is_kept(experiment, cli, monkeypatch):
     assert file.read_text() == edited
 
 
+@pytest.mark.long
 def test_of_two_additions_at_once_none_is_lost(experiment, cli, monkeypatch, tmp_path):
     folder = experiment(config=TEXT)
     fit, busy = pipeline.fit, []
@@ -209,6 +210,7 @@ def test_a_discovery_that_fails_leaves_the_steps(experiment, cli, monkeypatch):
     assert {p.relative_to(made.run): p.read_bytes() for p in made.run.rglob("*") if p.is_file()} == before
 
 
+@pytest.mark.long
 def test_a_discovery_goes_on_from_what_was_added(experiment, cli):
     folder = experiment(config=TEXT)
     cli("add", folder, "torque_bias", "--joint", "*", "--force", "--quiet")

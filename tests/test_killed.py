@@ -121,6 +121,7 @@ def test_killed_at_a_hundred_moments(experiment, tmp_path, name):
     survived(name, folder, tmp_path, [whole * (rng.uniform(0.0, 1.05) if k % 2 else rng.uniform(0.8, 1.05)) for k in range(100)])
 
 
+@pytest.mark.long
 def test_killed_between_any_two_writes(experiment, tmp_path):
     """`add` ends before each of its renames in turn: what stands then is whole, and the next run puts it right."""
     folder = experiment(config=TEXT)
@@ -157,6 +158,7 @@ def test_two_at_once(experiment, tmp_path):
     assert [s["added"] for s in loop.read_history(tmp_path / "run")][-1] == names[-1]
 
 
+@pytest.mark.long
 def test_a_full_disk(experiment, tmp_path):
     """Files may not grow beyond some kB: what stood stands, one line, and the next run with room works."""
     folder = experiment(config=TEXT)
@@ -185,6 +187,7 @@ def test_a_folder_that_may_only_be_read(experiment, cli, tmp_path):
     assert (folder / "config.yaml").read_text() == TEXT
 
 
+@pytest.mark.long
 def test_a_file_that_cannot_be_replaced_leaves_the_history(experiment, cli, monkeypatch, tmp_path):
     """The same for root: the last write fails, and what was told of it before is taken back."""
     from sysid import experiment_file
@@ -213,6 +216,7 @@ def test_without_a_home(experiment, tmp_path):
     assert not (folder / "nonexistent").exists() and not Path("~").exists()
 
 
+@pytest.mark.long
 def test_nothing_is_left_in_the_temporary_folder(experiment, arm_logs, tmp_path):
     """A packed log, in spans: both are in temporary files, which a killed fit leaves and the next one removes; and no other's."""
     folder, tmp = experiment(config=TEXT), tmp_path / "temporary"
@@ -267,6 +271,7 @@ def test_no_diagnosis_of_another_model_is_left_by_a_kill(experiment, monkeypatch
     assert (out / "diagnosis.json").exists() and (out / "fit.json").read_text() == old
 
 
+@pytest.mark.long
 def test_a_killed_init_leaves_nothing(experiment, tmp_path):
     """What it worked in goes with the next run."""
     folder = experiment(config=TEXT)

@@ -1,5 +1,7 @@
 """The study of knocks: what it counts."""
 
+import pytest
+
 from scripts import knock_study
 
 
@@ -12,6 +14,7 @@ def test_arms_are_pushed_by_halves_in_every_motion():
     }
 
 
+@pytest.mark.long
 def test_a_push_and_a_log_without_one():
     told = knock_study.trial({**knock_study.case(3, 9), "robot": "planar", "motion": "exciting", "effect": None, "pushed": True})
     assert told["logs"] == 2 and told["pushes"] == 6 and told["found"] >= 3 and told["false"] == 0

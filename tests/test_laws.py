@@ -105,6 +105,7 @@ def test_nothing_stands_out_on_both_where_nothing_is(quiet):
     assert min(law(view, j, more).chance for j in range(2)) > 0.01
 
 
+@pytest.mark.long
 def test_a_law_with_a_past_stands_out_more_where_it_holds_on_test_logs_as_well(simulated):
     view, more = both_views(simulated("laws-contact", settling_contact(0.09), seed=4))
     alone, both = law(view, 1), law(view, 1, more)

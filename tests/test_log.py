@@ -317,6 +317,7 @@ def cheetah(n: int) -> dict[str, list[np.ndarray]]:
 NO_LEG = not (CONFIGS / "../data/cheetah3/leg.urdf").exists()
 
 
+@pytest.mark.long
 @pytest.mark.skipif(NO_LEG, reason="data/cheetah3/leg.urdf is not there")
 @pytest.mark.parametrize("write", [write_mat5, write_mat73])
 def test_public_log(tmp_path, cli, write):

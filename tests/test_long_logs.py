@@ -59,6 +59,7 @@ FILTERS = [
 ]  # fmt: skip
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("filter_", FILTERS, ids=str)
 def test_a_log_in_spans_is_fitted_as_the_log_as_one(filter_, monkeypatch):
     spec = experiment(preprocess={**EVERY_ROW, **filter_})
@@ -86,6 +87,7 @@ def test_a_log_in_spans_is_fitted_as_the_log_as_one(filter_, monkeypatch):
         np.testing.assert_allclose(other.states.q, one.states.q, atol=1e-12)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("standstill", ["auto", "mask", 0.05])
 def test_rows_are_left_out_as_of_the_log_as_one(standstill, short_spans):
     """All but jumps, which are judged by what is usual in a span: here the torque has none."""
@@ -121,6 +123,7 @@ def test_rows_are_left_out_as_of_the_log_as_one(standstill, short_spans):
     np.testing.assert_allclose(found.pieces[0].rest, one.pieces[0].rest, rtol=1e-9)
 
 
+@pytest.mark.long
 def test_a_file_is_read_in_parts_as_in_memory(short_spans, tmp_path):
     """Whatever its row groups, with a gap, a piece of it, and a clock in ns since 1970."""
     table = leg_table()
@@ -170,6 +173,7 @@ def test_bad_values_are_told_with_their_row(short_spans, tmp_path):
             sysid.fit(experiment(path))
 
 
+@pytest.mark.long
 def test_the_run_folder_is_the_same(short_spans, tmp_path, monkeypatch):
     spec = experiment()
     found = sysid.fit(spec)
@@ -202,6 +206,7 @@ def test_models_that_look_back_have_the_log_whole(short_spans):
     assert len(read.segments) == 1 and isinstance(read.segments, tuple)
 
 
+@pytest.mark.long
 def test_a_mask_is_one_event_however_many_spans_it_goes_through(short_spans, monkeypatch):
     name = experiment().data.train[0].name
     mask = {"log": name, "start": 0.5, "stop": 3.0}
@@ -248,6 +253,7 @@ def test_a_false_event_is_as_seldom_in_all_spans_as_in_one_log():
     assert size[0] < found[0] < found[1] < size[-1]
 
 
+@pytest.mark.long
 def test_models_are_compared_on_logs_in_spans_as_on_logs_as_one(monkeypatch):
     """And no prediction is read into memory whole."""
     spec = experiment(preprocess=EVERY_ROW)
@@ -273,6 +279,7 @@ def test_spans_are_whole_and_none_is_short(n):
     assert len(sizes) == -(-n // 1000)
 
 
+@pytest.mark.long
 def test_predictions_in_files_are_told_in_few_rows(short_spans, monkeypatch):
     monkeypatch.setattr(long_prediction, "ROWS", 300)
     fit = pipeline.fit(experiment())
@@ -334,6 +341,7 @@ def test_of_many_long_logs_no_more_rows_are_kept_than_of_one(many, monkeypatch):
         assert log.segments[0].t[0] == 0.0 and log.segments[-1].t[-1] == segment.t[-1]
 
 
+@pytest.mark.long
 def test_a_diagnosis_of_a_part_of_the_logs_finds_what_is_missing(tmp_path, monkeypatch):
     """A long log of which a half is looked at; its claim is fitted on all of it."""
     hidden = ["--hide", "stribeck:knee:size=2", "--duration", "40", "--out", str(tmp_path)]
@@ -351,6 +359,7 @@ def test_a_diagnosis_of_a_part_of_the_logs_finds_what_is_missing(tmp_path, monke
     assert "was asked of" in found.notices[0]
 
 
+@pytest.mark.long
 def test_a_robot_of_a_fleet_says_the_same_of_logs_in_spans(monkeypatch):
     spec = experiment(preprocess=EVERY_ROW)
     kind = members.first(spec)

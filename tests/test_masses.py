@@ -39,6 +39,7 @@ def driven(extra, *effects: str):
     return replace(fit, strength=strength), seen
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("extra", "effect"),
     [
@@ -119,6 +120,7 @@ def geared(seed: int):
     return changed
 
 
+@pytest.mark.long
 def test_a_fit_and_a_check_name_armature_and_adding_it_cures(experiment, cli):
     folder = experiment(
         config={"prior.weight": "auto", "robot.rotors": []}, train=geared(0), test=geared(1)

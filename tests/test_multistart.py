@@ -86,6 +86,7 @@ def test_the_best_of_many_hollows_is_found():
     assert all(s.starts > 300 and s.profile > 10 for s in found.searched)
 
 
+@pytest.mark.long
 def test_what_a_search_found_before_the_model_grew_starts_there_alone():
     """What is new starts from many places, and where what was found is no longer best a profile
     says so."""

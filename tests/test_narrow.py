@@ -46,6 +46,7 @@ def whole(out: str, names) -> None:
                 assert not re.search(rf"(?<!\w){re.escape(name[:k])}\W*$", line), (name, line)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "command", [["fit"], ["diagnose"], ["add", "cogging", "--force"], ["discover", "--max-steps", "1"], ["compare"], ["history"]], ids=lambda c: c[0]
 )  # fmt: skip
@@ -69,6 +70,7 @@ ROBOTS = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_no_command_cuts_a_name_of_an_arm(narrow, cli, tmp_path, robot):
     file = tmp_path / f"{robot}.yaml"

@@ -24,6 +24,7 @@ def run(cell: str, names: dict):
     return None if last is None else eval(compile(last, "cell", "eval"), names)
 
 
+@pytest.mark.long
 def test_the_notebook_s_cells_run(tmp_path, monkeypatch):
     pytest.importorskip("mujoco")
     for name in ("configs", "data"):

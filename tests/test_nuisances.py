@@ -100,6 +100,7 @@ def test_moves_stop_and_sines_are_sines(leg):
         assert 0.04 < np.sqrt(-slope) / (2.0 * np.pi) / motion.quickness(leg) < 0.16
 
 
+@pytest.mark.long
 def test_a_braked_joint_repeats_itself_and_reads_nothing(shop):
     for log in shop.logs.values():
         found = events(log, "brake")
@@ -121,6 +122,7 @@ def test_a_braked_joint_repeats_itself_and_reads_nothing(shop):
         assert (braked.mean(0) > 0.05).all() and (np.mean(log.tau[~braked] == 0.0) < 0.02)
 
 
+@pytest.mark.long
 def test_a_brake_holds_what_its_motor_cannot(arm):
     """Its joint is still though others swing, and no integral has run away when it opens."""
     found = simulate(arm, seed=6, duration=15.0, rate=RATE, motion="moves", brakes=True, encoder=0)
@@ -132,6 +134,7 @@ def test_a_brake_holds_what_its_motor_cannot(arm):
     )
 
 
+@pytest.mark.long
 def test_spikes_are_where_they_are_said_to_be(arm):
     """With and without them, the log differs there and nowhere else."""
     clean, spiked = (
@@ -156,6 +159,7 @@ def test_spikes_are_where_they_are_said_to_be(arm):
         assert 20 <= len(events(log, "spike")) <= 60  # 2 a second and joint over 10 s: 40
 
 
+@pytest.mark.long
 def test_a_knock_shows_on_several_joints_and_moves_them(leg):
     plain, knocked = (
         simulate(leg, seed=3, duration=8.0, motion="moves", knocks=knocks) for knocks in (0, 2)
@@ -215,6 +219,7 @@ def test_a_coarse_current_comes_in_steps(arm, current):
     assert (found.train.noise > plain.train.noise).all()
 
 
+@pytest.mark.long
 def test_several_logs_are_a_folder_that_fits(cli, tmp_path):
     (tmp_path / "arm.urdf").write_text(URDF)
     bench = tmp_path / "arm.yaml"
@@ -302,6 +307,7 @@ def test_words_of_a_hidden_effect_are_checked():
             hidden(wrong)
 
 
+@pytest.mark.long
 def test_a_brake_that_never_opens_leaves_a_truth_that_json_can_hold(leg):
     """Short logs of moves, in some of which a joint never leaves its place: nothing of it is noisy."""
     silent = 0

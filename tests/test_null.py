@@ -50,6 +50,7 @@ def asked(p, tau, one, two):
     return grouped(view, one) + grouped(view, two)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("noise", [white, uneven, alike_in_blocks, coloured])
 def test_noise_is_accused_as_often_as_the_level_says(noise):
     """Family-wise: whether the greatest statistic of nine groups stands above the null's quantile."""

@@ -39,6 +39,7 @@ def cells(html: str, label: str) -> dict[str, list[str]]:
     return out
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("joint", [EVIL, "elbow"])
 def test_a_held_out_error_is_the_same_everywhere(shown, joint):
     folder, run, own, terminal = shown
@@ -71,6 +72,7 @@ def test_a_held_out_error_is_the_same_everywhere(shown, joint):
     assert len(re.findall(rf"{re.escape(joint)}.*\b{re.escape(f'{error:.4g}')}\b", terminal)) >= 2
 
 
+@pytest.mark.long
 def test_a_preview_a_verdict_and_an_addition_say_one_number(shown):
     _, run, own, _ = shown
     said = json.loads((run / "diagnosis.json").read_text())

@@ -31,6 +31,7 @@ def folder(simulated, loaded, tmp_path_factory):
     return out
 
 
+@pytest.mark.long
 def test_a_load_in_one_log_is_named_with_it(folder, loaded):
     found = document(diagnose(pipeline.load(folder)))
     heads = [f for f in found["findings"] if f["joins_as_step"] is not None]
@@ -47,6 +48,7 @@ def test_a_load_in_one_log_is_named_with_it(folder, loaded):
     assert abs(mass[0] - truth) < 3.0 * mass[1]
 
 
+@pytest.mark.long
 def test_a_load_that_a_test_log_carries_too_is_named_with_both(simulated, loaded, tmp_path):
     """Two of three training logs with it, and the test log: without that its error would rise, and the load be refused."""
     out = tmp_path / "case"
@@ -69,6 +71,7 @@ def test_a_load_that_a_test_log_carries_too_is_named_with_both(simulated, loaded
         assert added.after.rms("test")[joint] < 1.1 * own["noise_floor"] + 2.0 * own["noise_floor_se"]
 
 
+@pytest.mark.long
 def test_test_logs_that_are_parts_of_training_logs_are_no_others(folder, tmp_path):
     """No other log can be said to carry it; where the load is, is known."""
     out = shutil.copytree(folder, tmp_path / "case")

@@ -22,6 +22,7 @@ def said(folder) -> list[str]:
     return [text for text in pipeline.fit(pipeline.load(folder)).notices if "another in some logs" in text or "in motion" in text or "implausible" in text]
 
 
+@pytest.mark.long
 def test_logs_that_differ_in_nothing_are_not_said_to(folder):
     assert said(folder) == []
 

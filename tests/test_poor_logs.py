@@ -16,6 +16,7 @@ from sysid.simulate import simulate, write
 from sysid.triangles import Compressed, Factor
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("seed", "duration", "rate", "encoder"),
     # of each there is a joint without a row, a part of the log without one, a column in one block alone, or an error of nought
@@ -54,6 +55,7 @@ def test_a_joint_without_rows_has_an_empty_triangle():
     assert np.sum((total @ np.append(x, -1.0)) ** 2) == pytest.approx(data.squares(x)[1])
 
 
+@pytest.mark.long
 def test_poor_logs_are_drawn_again_and_end_in_a_document_or_a_line(capsys):
     assert fuzz_logs.drawn(1, 7) == fuzz_logs.drawn(1, 7) != fuzz_logs.drawn(1, 8)
     assert fuzz_logs.main(["--number", "4", "--seed", "1"]) == 0

@@ -215,6 +215,7 @@ def test_what_cannot_be_filtered_is_said():
         assert len(prepare([short], PreprocessSpec(), ("a",)).pieces) == 1
 
 
+@pytest.mark.long
 def test_auto_window_follows_the_noise_and_the_motion():
     """More encoder noise wants a wider window, and the choice is made on held-out stretches of the training log."""
     from dataclasses import replace
@@ -237,6 +238,7 @@ def test_auto_window_follows_the_noise_and_the_motion():
     assert chosen[2e-3] > 2 * chosen[1e-6]
 
 
+@pytest.mark.long
 def test_a_low_pass_follows_the_noise_too():
     """What an angle's noise becomes as acceleration asks for a lower cutoff; torque is held against what was logged, so that none wins
     by what it smooths away. Where one is given, nothing is chosen."""

@@ -80,6 +80,7 @@ def diagnosed(name: str):
     return document(found), found.fit
 
 
+@pytest.mark.long
 def test_kinova_without_its_spikes_and_bursts_has_less_than_half_of_the_error():
     experiment = sysid.load(folder("kinova"))
     kept = experiment.model_copy(update={"preprocess": experiment.preprocess.model_copy(update={"events": "keep"})})
@@ -91,6 +92,7 @@ def test_kinova_without_its_spikes_and_bursts_has_less_than_half_of_the_error():
         assert event["part"] == "test" and event["start"] < at < event["stop"] and len(event["joints"]) >= 4
 
 
+@pytest.mark.long
 def test_odrive_ripples_at_7_14_and_28_periods_a_turn():
     """Known of the motor from static maps: 0.87, 0.29 and 0.46 A at 0.03 turns/s, at 0.04 N m/A; of it alone, as the command adds it."""
     said, fit = diagnosed("odrive")
@@ -104,6 +106,7 @@ def test_odrive_ripples_at_7_14_and_28_periods_a_turn():
         assert own == pytest.approx(0.04 * ampere, rel=0.15)
 
 
+@pytest.mark.long
 def test_kr300_has_no_warmth_in_ten_seconds():
     """It stands, breaks away and stops: friction at low speed, which friction that falls with time can imitate."""
     said, _ = diagnosed("kr300")
@@ -112,6 +115,7 @@ def test_kr300_has_no_warmth_in_ten_seconds():
     assert "warmup" not in {m["effect"] for v in said["verdict"] for m in v.get("set", [])}
 
 
+@pytest.mark.long
 def test_schunk_s_short_runs_do_not_carry_the_model_over():
     folder = Path(os.environ.get("SYSID_DATA_DIR") or "nowhere") / "schunk"
     if not folder.exists():

@@ -113,6 +113,7 @@ def parse_errors(source: str) -> list:
     return parser.errors
 
 
+@pytest.mark.long
 def test_page_parses_without_error(text, missing, clean):
     assert not parse_errors(text) and parse_errors(text.replace("</table>", "</p>", 1))
     for found, said in (missing, clean, tied(missing)):

@@ -44,6 +44,7 @@ def typed(monkeypatch, capsys, *words):
     return capsys.readouterr().out
 
 
+@pytest.mark.long
 def test_a_report_after_a_diagnosis_questions_nothing(asked, tmp_path, monkeypatch, capsys):
     _, count = asked
     said = json.loads(typed(monkeypatch, capsys, "report", "arm", "--json"))

@@ -64,6 +64,7 @@ def test_a_standstill_is_no_sample_of_another():
     assert not list(same([of("a", "train", (np.arange(400.0), *held)), of("b", "test", (np.arange(400.0), *held))]))
 
 
+@pytest.mark.long
 def test_check_and_fit_say_so(tmp_path):
     experiment, machine = experiment_of("planar", tmp_path)
     folder = tmp_path / "logs"

@@ -73,6 +73,7 @@ def near(finding, folder, word: str, truly: float | None = None, share: float = 
 # ---- what is named
 
 
+@pytest.mark.long
 def test_nothing_hidden_nothing_accused(diagnosed):
     found = diagnosed("control")
     assert [v.status for v in found.verdict] == ["complete", "complete"] and found.claims == () and found.refused == ()
@@ -91,6 +92,7 @@ def test_stribeck_friction_is_named_on_its_joint(diagnosed, simulated):
     assert {name: unit for name, (_, _, unit) in first.parameters.items()} == {"stribeck.shoulder.dF": "N m", "stribeck.shoulder.vs": "rad/s"}
 
 
+@pytest.mark.long
 def test_a_tilt_that_one_joint_takes_for_an_offset_is_told_beside_it(diagnosed, simulated):
     """Of an arm in one plane, turning the base in that plane is turning the first joint's zero; turning it out of the plane is
     even: no torque says its sign, and a fit by slopes never moves it off nought."""
@@ -107,6 +109,7 @@ def test_a_tilt_that_one_joint_takes_for_an_offset_is_told_beside_it(diagnosed, 
     assert told["gravity_tilt.*.pitch"] == pytest.approx(-0.1, rel=0.1)
 
 
+@pytest.mark.long
 def test_a_bias_and_asymmetric_friction_cannot_be_told_apart(diagnosed, simulated):
     """With Coulomb friction in the model they are one column: both are said, the plainer first."""
     found = diagnosed(*BIAS)
@@ -166,6 +169,7 @@ def test_every_step_is_there_and_worth_having(diagnosed, case):
         assert names[k] == [*names[k - 1], found.claims[k - 1].head.effect]
 
 
+@pytest.mark.long
 def test_what_is_there_and_not_worth_having_does_not_join(simulated):
     """A bias that makes most of the error is there; where more is asked for than it takes, it does not join."""
     experiment = pipeline.load(simulated(*BIAS))
@@ -247,6 +251,7 @@ def test_what_the_test_logs_refuse_is_not_claimed(simulated, tmp_path):
     assert any(refused["why"] in notice for notice in found.said["notices"])
 
 
+@pytest.mark.long
 def test_where_fits_refuse_the_head_the_next_of_its_set_is_claimed(simulated, monkeypatch):
     """Logs that cannot tell a bias from friction that differs with the direction cannot refuse both by refusing one."""
     real = claims.doubted
@@ -264,6 +269,7 @@ def test_where_fits_refuse_the_head_the_next_of_its_set_is_claimed(simulated, mo
     assert (refused.effect, refused.why) == ("torque_bias", "not torque_bias")
 
 
+@pytest.mark.long
 def test_what_is_refused_alone_is_asked_again_beside_what_stands(simulated, monkeypatch):
     """The search found the first beside the second: fits may bear it out only with that one in the model."""
     real, asked = claims.doubted, []
@@ -336,6 +342,7 @@ def product(q, qd, qdd, t, load, memory):
 PRODUCT = ("product", product)
 
 
+@pytest.mark.long
 def test_an_effect_outside_the_catalogue_is_not_named(diagnosed):
     found = diagnosed(*PRODUCT, seed=2, duration=14.0)
     own = verdict(found, "elbow")
@@ -362,6 +369,7 @@ class Crosstalk(TorqueEffect):
 '''
 
 
+@pytest.mark.long
 def test_an_effect_from_a_file_takes_part(simulated):
     folder = simulated("other_angle", by_other_angle, duration=14.0)
     (folder / "my_effects.py").write_text(OWN)
@@ -374,6 +382,7 @@ def test_an_effect_from_a_file_takes_part(simulated):
     assert "my_effects.py:Crosstalk" in own.claims[0].head.command
 
 
+@pytest.mark.long
 def test_a_formula_takes_part_and_survives_its_discovery(simulated, tmp_path):
     folder = simulated(*PRODUCT, seed=2, duration=14.0)
     file = edited(folder, "formula", model={"candidates": [{"formula": "a*q*q_shoulder", "name": "product"}]})
@@ -388,6 +397,7 @@ def test_a_formula_takes_part_and_survives_its_discovery(simulated, tmp_path):
     assert value["value"] == pytest.approx(3.0, rel=0.1)
 
 
+@pytest.mark.long
 def test_a_ripple_of_several_lines_is_named_with_them(simulated, tmp_path):
     """k = 9 with its double and its fourth multiple, made by a formula: no sine of the angle is left out, none is put in."""
 
@@ -406,6 +416,7 @@ def test_a_ripple_of_several_lines_is_named_with_them(simulated, tmp_path):
         assert np.hypot(values[f"a{line}"], values[f"b{line}"]) == pytest.approx(truly, abs=0.1)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("terms", [1, 3])
 def test_friction_of_the_angle_has_as_many_harmonics_as_it_shows(simulated, terms):
     """By formulas of the simulator, not by the effect: one harmonic is named with one, whose coefficients are then numbers."""
@@ -424,6 +435,7 @@ def test_friction_of_the_angle_has_as_many_harmonics_as_it_shows(simulated, term
             assert abs(value - expected) < 3.0 * std and (terms > 1 or std < 0.1), (word, k, value, std)
 
 
+@pytest.mark.long
 def test_friction_that_falls_at_low_speed_only_is_no_warmth(simulated):
     """What a joint has beyond its friction while it breaks away, once, at the start: less at speed is no part of warmth."""
 
@@ -434,6 +446,7 @@ def test_friction_that_falls_at_low_speed_only_is_no_warmth(simulated):
     assert "warmup" not in {c.head.effect for c in found.claims}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("seed", "dry"), [(3, True), (4, True), (7, False)])
 def test_warmth_that_changes_one_kind_of_friction_alone_is_warmth(simulated, seed, dry):
     """Noise makes the other one's change negative every other time, by no more than chance."""
@@ -447,6 +460,7 @@ def test_warmth_that_changes_one_kind_of_friction_alone_is_warmth(simulated, see
     assert abs(value - 0.5) < 3.0 * std < 0.5
 
 
+@pytest.mark.long
 def test_an_option_survives_its_discovery(simulated, tmp_path):
     """Friction that follows the angle in proportion to speed is `position_friction` with an option."""
     law = lambda q, qd, qdd, t, load, memory: np.array([0.0, 0.3 * qd[1] * (1.0 + np.sin(3.0 * q[1]))])  # noqa: E731
@@ -465,6 +479,7 @@ def test_an_option_survives_its_discovery(simulated, tmp_path):
     assert after.rms("test")["elbow"] < fit.rms("test")["elbow"]
 
 
+@pytest.mark.long
 def test_what_was_beaten_is_asked_again_once_another_has_joined(tmp_path):
     """While the gain is missing its work speaks for a tilted base, which beats the offset; with the gain in the model it does not."""
     experiment, machine, *_ = simulate.load(Path(__file__).resolve().parent.parent / "configs" / "cheetah3.yaml")
@@ -475,6 +490,7 @@ def test_what_was_beaten_is_asked_again_once_another_has_joined(tmp_path):
     assert sorted(step.candidate.key for step in steps) == [("encoder_offset", 0), ("torque_gain", 0)]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", [5])
 def test_two_effects_that_hide_each_other_are_both_named(simulated, monkeypatch, seed):
     """In a short log what each does is the other's noise: alone neither stands out."""
@@ -488,6 +504,7 @@ def test_two_effects_that_hide_each_other_are_both_named(simulated, monkeypatch,
     assert not keys <= {step.candidate.key for step in search(view)[0]}
 
 
+@pytest.mark.long
 def test_what_takes_much_may_say_that_it_is_there_only_about_where_it_settled(simulated, monkeypatch):
     """No statistic by slopes where nothing is done yet stands out; that of the delay where it settled does."""
     experiment = pipeline.load(simulated("settled-delay", "delay:elbow:d=0.02"))

@@ -2,9 +2,12 @@
 
 import json
 
+import pytest
+
 from scripts import servo_study
 
 
+@pytest.mark.long
 def test_the_study_of_one_arm(capsys):
     options = ["--arms", "1", "--seed", "3", "--seconds", "5", "--cases", "link,nothing", "--json"]
     assert servo_study.main(options) == 0
@@ -16,6 +19,7 @@ def test_the_study_of_one_arm(capsys):
     assert "link     kp" in servo_study.table([arm], ("link", "nothing"))
 
 
+@pytest.mark.long
 def test_a_servo_that_lags_is_no_late_one(tmp_path):
     """One joint that follows its command by 50 ms, all of it damping: at such a delay next to no torque is left, and the
     columns explain none of that."""

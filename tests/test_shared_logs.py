@@ -54,6 +54,7 @@ def same(one, other) -> None:
         np.testing.assert_array_equal(theirs.states.index, ours.states.index)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("how", [{}, {"torque": "low-pass", "window": 0.03, "cutoff": 150.0}])
 def test_long_logs_are_fitted_alike_by_any_number_of_workers(how, short_spans, cluster):
     spec = experiment(preprocess=how)
@@ -62,6 +63,7 @@ def test_long_logs_are_fitted_alike_by_any_number_of_workers(how, short_spans, c
     same(one, two)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("how", [{"window": "auto"}, {"filter": "butterworth", "cutoff": 20.0}, {}])
 def test_filters_are_compared_where_the_workers_are(how, short_spans, cluster, monkeypatch):
     """One that is chosen before the logs go through it, one that is given meanwhile."""
@@ -73,6 +75,7 @@ def test_filters_are_compared_where_the_workers_are(how, short_spans, cluster, m
     same(one, two)
 
 
+@pytest.mark.long
 def test_models_that_have_their_logs_whole_are_fitted_alike(cluster):
     spec = experiment()
     stribeck = type(spec.model.effects[0])(name="stribeck", joints=["knee"])
@@ -81,6 +84,7 @@ def test_models_that_have_their_logs_whole_are_fitted_alike(cluster):
     same(sysid.fit(spec), sysid.fit(spec, scheduler=address(cluster)))
 
 
+@pytest.mark.long
 def test_a_worker_that_dies_changes_nothing(short_spans, cluster):
     one = sysid.fit(experiment())
     before = set(cluster.scheduler_info()["workers"])
@@ -97,6 +101,7 @@ def test_a_log_that_cannot_be_read_is_named(short_spans, cluster, tmp_path):
         sysid.fit(experiment(tmp_path / "bad.parquet"), scheduler=address(cluster))
 
 
+@pytest.mark.long
 def test_another_machine_sends_what_it_predicts(monkeypatch, tmp_path):
     """One that does not see the folder in which this process gathers predictions."""
     monkeypatch.setattr(spans, "SPAN", SHORT)
@@ -113,6 +118,7 @@ def test_another_machine_sends_what_it_predicts(monkeypatch, tmp_path):
     assert pl.read_parquet(tmp_path / "sent.parquet").equals(pl.read_parquet(here.files[0]))
 
 
+@pytest.mark.long
 def test_the_command_takes_workers(tmp_path):
     from typer.testing import CliRunner
 

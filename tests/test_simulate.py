@@ -366,6 +366,7 @@ def bench(tmp_path):
     return file
 
 
+@pytest.mark.long
 def test_the_folder_of_a_control_is_fitted_to_its_noise(cli, bench, tmp_path):
     said = cli("simulate", bench, "--seed", "2", "--duration", "12", "--json", out=tmp_path / "log")
     assert said.status == 0, said.err

@@ -4,6 +4,7 @@ import json
 from types import SimpleNamespace
 
 import numpy as np
+import pytest
 
 from sysid import pipeline, vocabulary
 from sysid.config import load
@@ -43,6 +44,7 @@ def test_only_the_coupled_joint_loses_rows():
     assert counted(SimpleNamespace(terms=model.terms[:1]), own) is None
 
 
+@pytest.mark.long
 def test_friction_of_a_second_contact_is_within_its_deviation(simulated):
     """Where both joints' speeds sum to nothing the contact sticks for a while: counted, it would have less friction than it has."""
     folder = simulated("coupled", "joint_coupling:elbow:Ia=0.2,Fv=0.1,Fs=0.4,Fd=0", seed=4, duration=20.0)

@@ -86,6 +86,7 @@ def test_a_joint_that_sticks_and_slips_has_none(step):
     assert not any(without_slips(q, step)[1])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("how", [{"motion": "moves", "knocks": 2}, {"motion": "moves", "brakes": True}, {"spikes": 0.3}, {"motion": "sines"}])
 def test_logs_with_other_faults_have_none(simulated, how):
     """Stops, knocks, brakes, friction that turns its sign; at two rates."""

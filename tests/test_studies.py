@@ -81,6 +81,7 @@ def test_every_start_is_the_identity():
         np.testing.assert_allclose(PARAMETERIZATIONS[name]().parameters(bodies.start(name)), body_motions.IDENTITY, atol=1e-14)
 
 
+@pytest.mark.long
 def test_study_of_bodies_is_what_the_paper_compares(tmp_path):
     found = commands.study_bodies(tmp_path, count=40, seed=5, jobs=1, reading=bodies.Reading(), progress=quiet)
     assert found["bodies"] == 40 and set(found["parameterizations"]) == set(bodies.NONLINEAR)
@@ -98,6 +99,7 @@ def test_study_of_bodies_is_what_the_paper_compares(tmp_path):
     assert names == {"journal.jsonl", "study.json", "bodies.parquet", "figure1_iterations.png", "figure1_iterations.svg", "symmetric_bodies.png", "symmetric_bodies.svg"}
 
 
+@pytest.mark.long
 def test_killed_and_resumed_is_byte_identical(tmp_path):
     command = [sys.executable, "-m", "sysid", "study", "restarts", str(LEG), "--restarts", "12", "--json", "--out"]
     whole = subprocess.run([*command, str(tmp_path / "whole")], cwd=ROOT, capture_output=True, text=True, check=True)
@@ -134,6 +136,7 @@ def test_interruption_is_one_line_and_keeps_what_was_done(tmp_path):
     assert journal.read_bytes().count(b"\n") >= 2
 
 
+@pytest.mark.long
 def test_number_of_processes_does_not_matter(tmp_path):
     found = [commands.study_bodies(tmp_path / str(jobs), count=12, seed=3, jobs=jobs, reading=bodies.Reading(), progress=quiet) for jobs in _made(tmp_path, (1, 2))]
     assert without_timings(found[0]) == without_timings(found[1])
@@ -170,6 +173,7 @@ def test_restarts_end_in_one_certified_point(tmp_path, inertia):
     assert (tmp_path / "figure3_restarts.svg").exists() and (tmp_path / "restarts.parquet").exists()
 
 
+@pytest.mark.long
 def test_newton_alone_in_log_cholesky_coordinates_ends_there_too(tmp_path):
     """The paper's claim itself: without the interior-point method, every start still reaches the one optimum."""
     spec = load(LEG)
@@ -180,6 +184,7 @@ def test_newton_alone_in_log_cholesky_coordinates_ends_there_too(tmp_path):
     assert found["newton_iterations"] == found["iterations"]
 
 
+@pytest.mark.long
 def test_restarts_on_a_real_robot(tmp_path):
     if DATASETS["ur10e"].missing():
         pytest.skip("ur10e is not in the data folder; `sysid fetch ur10e` brings it, or SYSID_DATA_DIR names where it is")
@@ -198,6 +203,7 @@ def test_prior_weight_by_cross_validation(tmp_path):
     assert (tmp_path / "prior_weight.png").exists()
 
 
+@pytest.mark.long
 def test_study_mistakes_are_one_line(tmp_path):
     for arguments in (["study", "bodies", "--about", "elsewhere"], ["study", "restarts", str(LEG), "--inertia", "magic"], ["study", "restarts", "nowhere.yaml"], ["study", "bodies", "--bodies", "0"]):
         done = subprocess.run([sys.executable, "-m", "sysid", *arguments, "--out", str(tmp_path / "out")], cwd=ROOT, capture_output=True, text=True, env=os.environ)

@@ -133,6 +133,7 @@ class studio:
 # ---- the way a user goes
 
 
+@pytest.mark.long
 def test_add_for_real_error_falls_and_undo_is_at_hand(arm, tmp_path):
     folder = shutil.copytree(arm[0], tmp_path / "arm")
     before = (folder / "config.yaml").read_bytes()
@@ -159,6 +160,7 @@ def test_add_for_real_error_falls_and_undo_is_at_hand(arm, tmp_path):
     assert (own.run / "fit.json").is_file() and (own.run / "diagnosis.json").is_file()
 
 
+@pytest.mark.long
 def test_all_steps_that_are_named_are_one_change(arm, tmp_path):
     folder = shutil.copytree(arm[0], tmp_path / "arm")
     before = (folder / "config.yaml").read_bytes()
@@ -208,6 +210,7 @@ def test_charts_are_answered_before_the_diagnosis(arm, tmp_path, monkeypatch):
     go_on.set()
 
 
+@pytest.mark.long
 def test_a_preview_does_not_wait_for_the_end_of_the_diagnosis(arm, tmp_path, monkeypatch):
     begun, seen, told = threading.Event(), threading.Event(), []
     from sysid.studio import session
@@ -683,6 +686,7 @@ def test_rows_of_a_model_with_other_edges_are_laid_where_they_belong(gap):
         np.testing.assert_array_equal(laid[there], values)
 
 
+@pytest.mark.long
 def test_a_diagnosis_that_stands_is_not_made_again(arm, tmp_path, monkeypatch):
     from sysid.statement import kept
     from sysid.studio import session

@@ -201,6 +201,7 @@ def test_from_open_to_the_floor_by_clicks_alone(opened):
     assert "stribeck" in Path(report.value.path()).read_text()
 
 
+@pytest.mark.long
 def test_two_tabs_keyboard_and_mistakes(opened):
     from playwright.sync_api import expect
 
@@ -231,6 +232,7 @@ def test_two_tabs_keyboard_and_mistakes(opened):
     expect(third.locator("#notice")).to_contain_text("modle", timeout=15_000)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("opened", ["evil"], indirect=True)
 def test_names_that_look_like_markup_show_as_text(opened):
     from playwright.sync_api import expect
@@ -279,6 +281,7 @@ def test_the_browser_knows_every_declaration(browser):
     assert len(every) > 300 and not unknown
 
 
+@pytest.mark.long
 def test_a_phone_shows_it_without_sideways_scrolling(browser, opened):
     page = opened()
     page.wait_for_function(DONE, timeout=WAIT)
@@ -287,6 +290,7 @@ def test_a_phone_shows_it_without_sideways_scrolling(browser, opened):
     assert page.evaluate("document.documentElement.scrollWidth") <= 390
 
 
+@pytest.mark.long
 def test_on_paper_every_chart_is_drawn(opened):
     """Those that nobody scrolled to as well: paper does not wait for an answer of the server."""
     page = opened()
@@ -301,6 +305,7 @@ def test_on_paper_every_chart_is_drawn(opened):
     page.evaluate("dispatchEvent(new Event('afterprint'))")
 
 
+@pytest.mark.long
 def test_any_effect_is_added_by_keyboard_alone(opened):
     from playwright.sync_api import expect
 
@@ -341,6 +346,7 @@ def test_any_effect_is_added_by_keyboard_alone(opened):
     assert opened.file.read_text() == text
 
 
+@pytest.mark.long
 def test_one_of_several_experiments_is_picked(browser, leg, tmp_path):
     from playwright.sync_api import expect
 
@@ -392,6 +398,7 @@ def dragged(page, name, across, down=(0.5, 0.5)):
     page.mouse.up()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("opened", ["fresh"], indirect=True)
 def test_one_joint_from_all_sides(opened):
     """The charts stand before the diagnosis; zoom brings every sample; one cursor and one brush; a link keeps it all."""
@@ -466,6 +473,7 @@ def test_one_joint_from_all_sides(opened):
     assert content  # the last of them
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("opened", ["fresh held"], indirect=True)
 def test_an_effect_is_tried_while_the_diagnosis_is_at_work(opened):
     """What would it give? Asked before the verdict stands (how soon it is answered: test_studio.py); what was typed stays when it comes."""
@@ -498,6 +506,7 @@ window.moved = [];
 """
 
 
+@pytest.mark.long
 def test_a_button_does_not_slip_from_under_the_hand(opened):
     """Once the verdict stands, what comes late comes where its room was kept: a press that began on a button ends on it."""
     context = opened().context
@@ -510,6 +519,7 @@ def test_a_button_does_not_slip_from_under_the_hand(opened):
     assert len(page.evaluate("window.moved")) == 1, page.evaluate("window.moved")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("opened", ["questioned held"], indirect=True)
 def test_what_was_added_is_seen_beside_what_was_before(opened):
     """After an addition the falling error is the first thing seen, and both models stand in the same chart."""
@@ -543,6 +553,7 @@ def opened_by_tab(page, wanted, most=300):
     raise AssertionError(f"{wanted} cannot be reached by keyboard")
 
 
+@pytest.mark.long
 def test_from_open_to_an_added_effect_by_keyboard_alone(opened):
     from playwright.sync_api import expect
 
@@ -561,6 +572,7 @@ def test_from_open_to_an_added_effect_by_keyboard_alone(opened):
     opened_by_tab(page, "document.activeElement.id === 'undo'", 400)
 
 
+@pytest.mark.long
 def test_the_remedies(opened):
     """Any effect with its options and a formula previewed; a stretch masked and unmasked; each with its error in words."""
     from playwright.sync_api import expect
@@ -599,6 +611,7 @@ def test_the_remedies(opened):
     assert opened.file.read_text() == text
 
 
+@pytest.mark.long
 def test_a_motion_is_designed_from_the_page(opened):
     from playwright.sync_api import expect
 
@@ -615,6 +628,7 @@ def test_a_motion_is_designed_from_the_page(opened):
     assert Path(taken.value.path()).read_text().startswith("t,q_abad")
 
 
+@pytest.mark.long
 def test_what_may_be_it_is_tried_and_added_from_its_card(opened):
     """The server's own words bring the buttons, which the studio's tests of documents see; here the page is given them."""
     from playwright.sync_api import expect
@@ -633,6 +647,7 @@ def test_what_may_be_it_is_tried_and_added_from_its_card(opened):
     assert "cogging: {joints: [knee], lines: 1}" in opened.file.read_text()
 
 
+@pytest.mark.long
 def test_charts_of_a_report_are_taken_along(browser, leg, tmp_path, monkeypatch):
     """From the file itself, opened from the disk: PNG, SVG, CSV of every kind of chart."""
     import csv

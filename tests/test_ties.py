@@ -81,6 +81,7 @@ def test_a_refit_has_the_effect_in_it_and_loses_less(biased):
     assert member.losses.shape == (view.blocks.max() + 1, 2)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("hide", "key", "value"),
     [("torque_bias:elbow:b=0.4", ("torque_bias", 1), 0.4), ("delay:elbow:d=0.02", ("delay", 1), 0.02), ("torque_saturation:elbow:limit=1.5", ("torque_saturation", 1), -1.0)],
@@ -309,6 +310,7 @@ def test_torques_that_are_read_late_are_told_apart_by_what_is_as_slow_as_the_mot
     assert {m.candidate.name for m, _ in found.members} == {"current_lag", "delay"} and found.head.candidate.name == "delay"  # bent least
 
 
+@pytest.mark.long
 def test_what_is_mostly_noise_is_asked_by_what_is_as_slow_as_the_motion(simulated, diagnosed):
     """With twelve bits at the joint a torque's rate is mostly noise of the angles, under a low-pass of ten hertz. What of it is as slow
     as the motion tells that the torque is late, and not whether it is a lag or a delay."""

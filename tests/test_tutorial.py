@@ -77,6 +77,7 @@ def prepare(folder: Path) -> None:
         (folder / name).symlink_to(ROOT / name)
 
 
+@pytest.mark.long
 def test_the_tutorial_s_commands_give_what_it_shows(tmp_path, monkeypatch):
     prepare(tmp_path)
     monkeypatch.chdir(tmp_path)

@@ -160,6 +160,7 @@ def test_the_simulator_s_link_is_where_it_is_said_to_be(arm, what):
     assert error(found) < most and error(still) > 1.0
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("effect, hide, word, truly, near, most, seed", [
     ("elasticity", "elasticity:elbow:K=250,D=0.8", "compliance", 1 / 250, 0.05, 1.15, 2),
     # rows about jumps of an acceleration are left out, and with them most blows, which tell the width of the play best: of seeds 3
@@ -230,6 +231,7 @@ def test_a_link_is_seen_as_the_angles_were(spec):
     assert np.abs(plain[2]).max() > 3.0 * np.abs(own).max()  # blows there are
 
 
+@pytest.mark.long
 def test_a_soft_joint_is_found_beside_an_encoder_off_its_axis(simulated):
     """Tried before anything else is found, a link seems to stay on its motor: it is tried again where the rest is known, as a fit begun at what was simulated finds it."""
     path = simulated("soft-and-off-axis", "elasticity:shoulder:size=1.1", "encoder_eccentricity:shoulder:size=0.9", seed=2, duration=10.0) / "config.yaml"

@@ -21,6 +21,7 @@ from tests.problems import arm, fourier_motion, leg
 from tests.robots import load, urdf
 
 
+@pytest.mark.long
 def test_std_is_the_scatter_of_repeated_experiments_with_coloured_noise(tmp_path):
     """Torque noise with a memory of 50 samples: a plain formula would be several times too sure."""
     rng = np.random.default_rng(0)

@@ -304,6 +304,7 @@ def test_what_is_left_with_other_weights_may_still_be_unknown():
     assert found.status == "unresolved" and "it would be 1.4 times the noise floor" in found.says
 
 
+@pytest.mark.long
 def test_the_weights_do_what_the_verdict_says_of_them(tmp_path):
     """An elbow six times as quiet as the shoulder, in slow noise: what is said of its error holds when it is done."""
     experiment, machine = robots.experiment_of("planar", tmp_path)
@@ -446,6 +447,7 @@ def test_every_effect_has_its_size_or_is_absorbed(control):
     assert found["quadratic_drag", 0].at == found["delay", 0].at == {}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("effect", "joint", "values"), [("quadratic_drag", 0, "c={}"), ("spring", 1, "k={},q0=0")])
 def test_twice_the_size_is_found_and_a_fifth_is_not(control, simulated, effect, joint, values):
     """The set holds it: at that size more than one effect may explain it."""
@@ -603,6 +605,7 @@ def test_what_smoothing_makes_of_an_error(errors, halves, said):
     assert not smeared(errors, replace(floor, rms=None, halved=(0.05, *halves)))
 
 
+@pytest.mark.long
 def test_a_window_that_is_too_long_is_said_and_the_one_that_is_said_will_do(simulated):
     """Speeds that are trapezoids, with nothing hidden: acceleration jumps, and 0.2 s smear it where rows about jumps count."""
     path = simulated("trapezoids", seed=1, duration=20.0, motion="moves") / "config.yaml"

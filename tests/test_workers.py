@@ -30,6 +30,7 @@ def two():
         yield mapped, told, distributed.default_client().scheduler.address
 
 
+@pytest.mark.long
 def test_a_worker_that_dies_is_replaced_and_changes_nothing(two, tmp_path):
     mapped, told, _ = two
     found = list(mapped(squared, [(k, str(tmp_path)) for k in range(8)]))
@@ -57,6 +58,7 @@ def test_workers_are_told_how_often_to_look_after_themselves(two):
         assert list(two[0](config.get, [(key,)])) == ["1s"]
 
 
+@pytest.mark.long
 def test_a_fleet_does_not_depend_on_who_fits(two, planar, tmp_path):
     folder = robots(planar, tmp_path, 4)
     (folder / "r3" / "train.csv").write_text("nothing")
