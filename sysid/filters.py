@@ -68,7 +68,7 @@ def begun(
     """
     spec, low = experiment.preprocess, lowpassed(experiment)
     if low and (_servos(experiment) or "cutoff" in _given(spec)):
-        return lambda: _of_the_motion(experiment, model, logs, prior)
+        return lambda: of_the_motion(experiment, model, logs, prior)
     said = {"filter": spec.filter, "torque": spec.torque, "standstill": spec.standstill}
     if spec.filter == "none":
         return lambda: {**said, "chosen": "given", "held_out": []}
@@ -94,7 +94,7 @@ def begun(
         chosen = {key: value}
         if automatic:
             if not tried and low:  # too short to hold a part of them out
-                return _of_the_motion(experiment, model, logs, prior)
+                return of_the_motion(experiment, model, logs, prior)
             if not tried:
                 raise SysidError(f"no {key} suits the logs", where="preprocess", do=f"give {key} a number")
             best = _best(tried, key, _USUAL[key])
@@ -143,7 +143,7 @@ def lowpassed(experiment: Experiment) -> bool:
     return spec.filter != "none" and (spec.torque == "low-pass" or (_servos(experiment) and not spec.model_fields_set & {"filter", "window", "cutoff", "torque"}))
 
 
-def _of_the_motion(experiment: Experiment, model: Model, logs: Sequence[Log], prior) -> dict:
+def of_the_motion(experiment: Experiment, model: Model, logs: Sequence[Log], prior) -> dict:
     """The filters that a motion asks for: both sides as far as its joints' speeds go, or an octave beyond where its slowest servo swings,
     as from there on noise of the angles, which inertia makes torque of, grows with the square of frequency; the angles far beyond.
     """

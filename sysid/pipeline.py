@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from . import config, drives, gains, groups, listed_effects, locked_joints, masses, robot, rollout
+from . import config, drives, gains, groups, late, listed_effects, locked_joints, masses, robot, rollout
 from . import filters as filtering
 from . import log as logs
 from .compress import compress
@@ -46,7 +46,7 @@ from .plausible import implausible
 from .prediction import Prediction, predict
 from .prior_weight import PriorWeight, with_weight
 from .robot import Robot
-from .shape_refinement import refined, scattered
+from .shape_refinement import scattered
 from .spec_values import AUTO
 from .specs import Experiment
 from .threads import single_threaded
@@ -127,19 +127,21 @@ def _fit(experiment: Experiment, filters: dict | None, strength: PriorWeight | N
         with _timed(seconds, "preprocess", tell):
             motion = prepare(train, preprocess, machine.joints, mapped)
             chosen = comparing() if later else chosen
+            slow = late.slow_view(experiment, preprocess, structure, train, prior, mapped)
             del train, comparing  # the filtered motion holds all that is needed from here on
         refuse_no_row(motion)
         tell_still(motion, experiment.preprocess)
         tell_left_out(motion, preprocess)
         disturbed = tell_events("train", motion)
         with _timed(seconds, "shape", tell):
-            structure, slopes, searched, weight = refined(experiment, structure, motion, prior, *known)
+            shaped = late.refined(experiment, structure, motion, slow, prior, *known)
+            structure, slopes, weight = shaped.model, shaped.slopes, shaped.strength
         with _timed(seconds, "compress", tell):  # the regressor is built and reduced chunk by chunk, never whole
             compressed = compress(slopes or structure, motion, progress=lambda share: tell("compress", share))
         with _timed(seconds, "weight", tell):
             weight = weight or prior_strength(experiment, structure, motion, compressed, prior)
         with _timed(seconds, "solve", tell):
-            found = identify(with_weight(experiment, weight.value), structure, motion, compressed, prior)
+            found = identify(with_weight(experiment, weight.value), structure, motion, compressed, prior, told=shaped.told)
             found = scattered(replace(found, strength=strength or weight), motion)
         if not found.physically_consistent:
             names = [body.name for body, possible in zip(machine.bodies, is_consistent(found.pi)) if not possible]
@@ -152,7 +154,7 @@ def _fit(experiment: Experiment, filters: dict | None, strength: PriorWeight | N
         with _timed(seconds, "predict", tell):
             predictions = {"train": predicted(structure, found.x, motion)}
             samples, left_out = {"train": motion.samples}, {"train": _left_out(motion)}
-            del motion
+            del motion, slow
         with _timed(seconds, "test", tell):
             held_out = measured.test if measured else read(experiment, machine, experiment.data.test, structure=structure, mapped=mapped)
             provenance += [_provenance("test", log, spec) for log, spec in zip(held_out, experiment.data.test)]
@@ -172,7 +174,7 @@ def _fit(experiment: Experiment, filters: dict | None, strength: PriorWeight | N
             warn(text)
     return replace(
         found, masses=masses.document(heavy), predictions=predictions, samples=samples, left_out=left_out, seconds=seconds, filters=chosen,
-        logs=tuple(provenance), notices=tuple(notices), events=tuple(disturbed), drives=tuple(told), rollout=let_go, searched=searched,
+        logs=tuple(provenance), notices=tuple(notices), events=tuple(disturbed), drives=tuple(told), rollout=let_go, searched=shaped.searched,
     )  # fmt: skip
 
 

@@ -9,7 +9,10 @@ strong, it claims no more than that they are within a factor of the URDF's (`pri
 its weight over that of a prior that claims as much, or one.
 """
 
-from dataclasses import dataclass
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -30,6 +33,19 @@ class Uncertainty:
     covariance: np.ndarray
     std: np.ndarray
     from_data: np.ndarray
+
+    def told_elsewhere(self, stds: Mapping[int, float]) -> Uncertainty:
+        """The same where some parameters are as sure as other rows say, {number: standard
+        deviation}: all others follow them as they do here."""
+        covariance = self.covariance
+        for k, std in stds.items():
+            own = covariance[k, k]
+            if own > 0.0:
+                way = covariance[k] / own
+                covariance = covariance + (std**2 - own) * np.outer(way, way)
+        known = np.isfinite(self.std)
+        spread = np.sqrt(np.clip(np.diagonal(covariance), 0.0, None))
+        return replace(self, covariance=covariance, std=np.where(known, spread, self.std))
 
 
 def estimate(objective: Objective, compressed: Compressed, x: np.ndarray, fixed: np.ndarray, weights, bound=(), room=None) -> Uncertainty:
