@@ -229,3 +229,15 @@ def test_a_log_without_torque_has_no_vote(wrong, made, tmp_path):
     table = pl.read_csv(logs / "test.csv")
     table.with_columns((0.0 * pl.col("tau_elbow")).alias("tau_elbow")).write_csv(logs / "test.csv")
     assert {(f.joint, f.log) for f in check.check(pipeline.load(logs)) if f.fault == "sign_flipped"} == {("elbow", wrong)}
+
+
+@pytest.mark.parametrize("joint, what", [("shoulder", "size"), ("elbow", "size"), ("elbow", "negative"), ("shoulder", "lifted"), ("elbow", "lifted")])
+def test_a_torque_without_a_sign_is_named(joint, what, made, tmp_path):
+    """A torque that is never below zero as an offset lifts it has its sign."""
+    logs = shutil.copytree(made(), tmp_path / "logs")
+    how = {"size": pl.Expr.abs, "negative": lambda tau: -tau.abs(), "lifted": lambda tau: tau - tau.min()}[what]
+    for name in ("train.csv", "test.csv"):
+        table = pl.read_csv(logs / name)
+        table.with_columns(how(pl.col(f"tau_{joint}")).alias(f"tau_{joint}")).write_csv(logs / name)
+    found = [(f.joint, "without its sign" in f.says) for f in check.check(pipeline.load(logs)) if f.fault == "sign_flipped"]
+    assert found == ([] if what == "lifted" else [(joint, True)])
