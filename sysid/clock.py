@@ -43,6 +43,7 @@ _MOST = 3.0  # deviations of the clock
 _MOTION = 2.0
 _ENDS = 2.0  # times the usual frequency: the errors' part of an acceleration is six times as large
 _ORDERED = 0.45  # of the way to a neighbour: samples keep their order
+_AGREED = 0.5  # of a clock's power, that different joints must agree on where stamps say nothing
 
 
 @dataclass(frozen=True)
@@ -119,12 +120,14 @@ class Left:
         return out + faster
 
 
-def corrected(t: np.ndarray, q: np.ndarray) -> Clock:
+def corrected(t: np.ndarray, q: np.ndarray, *, written: bool = True) -> Clock:
     """When samples of angles q (n, dof) with stamps t (n,) [s] were taken; as these say, where the
     angles do not tell.
 
     Args:
         t: (n,) [s], ascending, without a gap.
+        written: the stamps vary. Of a logger that writes an even time whatever the clock was,
+            another one is believed where different joints agree on it.
     """
     step = float(np.median(np.diff(t)))
     moves = np.ptp(q, axis=0) > 1e-3 * np.ptp(q, axis=0).max()
@@ -132,7 +135,7 @@ def corrected(t: np.ndarray, q: np.ndarray) -> Clock:
     if len(t) < _FEWEST or not moves.any():
         return Clock(t)
     bands, density = _bands(t, q, step)
-    if not bands:
+    if not bands or not (written or _agreed(t, q, bands[0])):
         return Clock(t)
     room = _ORDERED * np.diff(t, prepend=t[0] - step, append=t[-1] + step)
     late = np.zeros(len(t))
@@ -145,6 +148,20 @@ def corrected(t: np.ndarray, q: np.ndarray) -> Clock:
     off, deviation = float(np.sqrt(np.mean(late**2))), float(np.sqrt(density))
     doubt = _by_band([doubt for _, doubt in told], [_kept(band * step) for band in bands])
     return Clock(t + late, off, deviation, tuple(bands), below, doubt)
+
+
+def _agreed(t, q, frequency: float) -> bool:
+    """Whether the clock's power above a frequency is that of products of different joints. Noise of
+    the angles that grows with their speeds, a coarse encoder's at low speed, is each joint's own,
+    and has no mean product with another's."""
+    beside, speed = _beside(t, q, _evenly(t, q), frequency)
+    noise, off = _components(beside, speed)
+    if not off > 0.0:
+        return False
+    weight = 1.0 / np.maximum(noise, _LEAST * off * np.max(speed**2, axis=0))
+    late, told = beside * speed * weight, speed**2 * weight
+    of_others = lambda x: float(np.sum(np.sum(x, axis=1) ** 2 - np.sum(x**2, axis=1)))  # noqa: E731
+    return of_others(late) > _AGREED * off * of_others(told) > 0.0
 
 
 def _by_band(doubt: list[np.ndarray], kept: list[float]) -> np.ndarray:

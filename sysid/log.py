@@ -21,13 +21,14 @@ from .log_spec import DataSpec, LogSpec
 from .recording import Recording, recorded
 from .rounded_stamps import off_steady
 from .segment import Segment
+from .slips import SLOWEST
 from .spans import Spans
 from .warned import warn
 
 # A step longer than this many median steps is a hole that interpolation would invent motion for.
 GAP_STEPS = 10.0
-# Of a step: stamps that are off by less are right.
-_TOLD = 1e-3
+# Of a step: stamps that are off by less are right; and even ones, which say nothing of it, by less than the other.
+_TOLD, _EVEN = 1e-3, 1e-2
 # Of what stamps are rounded to: as much beside a line is a steady clock's own rounding. Twice that is most likely a steady one's
 # too, which ran late now and then, unless the angles tell otherwise.
 _ROUNDED = 0.505
@@ -213,8 +214,9 @@ def _segments(t, signals, where: str, breaks: Iterable[int] = ()):
         if b - a < 2:
             continue
         rounding = off_steady(clock, step)
-        true = corrected(clock, part["q"]) if rounding > _ROUNDED else Clock(clock)
-        told, left = true.off > _TOLD * step, None
+        written = rounding > _ROUNDED
+        true = corrected(clock, part["q"], written=written) if written or step > SLOWEST else Clock(clock)
+        told, left = true.off > (_TOLD if written else _EVEN) * step, None
         if not told and rounding <= 2.0 * _ROUNDED:
             mean = (clock[-1] - clock[0]) / (len(clock) - 1)
             yield segment(clock[0] + mean * np.arange(len(clock)), mean, part)
@@ -231,7 +233,7 @@ def _segments(t, signals, where: str, breaks: Iterable[int] = ()):
             clock, part = clock[rows], {name: values[rows] for name, values in part.items()}
         resampled += 1
         yield replace(segment(clock, own, part), clock=left)
-    if resampled:
+    if resampled and np.delete(steps, cuts - 1).min() < 0.999 * np.delete(steps, cuts - 1).max():
         warn(f"{where}: steps of {np.delete(steps, cuts - 1).min():.4g} to {np.delete(steps, cuts - 1).max():.4g} s were resampled to a uniform {own:.4g} s", above=2)
     if off > 0.0:
         said = f"{where}: the time stamps are off by {1e3 * off:.2g} ms (RMS), as the joints' angles show, and were corrected"

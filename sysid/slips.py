@@ -23,7 +23,7 @@ _PASSES = 3  # over the speed: without its largest spikes those beside them stan
 _LONGEST = 2  # intervals: an acceleration that jumps makes a pulse of three
 _MOST = 0.75  # of a sample's way: no clock jumps by more than a sample
 _BESIDE, _STAYS = 3, 0.5  # samples; of the greatest of steps that near, what they add up to
-_SLOWEST = 5e-3  # s from sample to sample: in more a joint may start and stop (stick-slip, play)
+SLOWEST = 5e-3  # s from sample to sample: in more a joint may start and stop (stick-slip, play)
 _GRAINS = 3.0  # steps of the encoder: two of them are rounding's
 _SMOOTH, _ORDER = 10, 3  # samples to either side, in which a motion is a polynomial of that order
 # Of the square of what is not smooth about a step. White noise of 42 samples loses so much by one
@@ -46,7 +46,7 @@ def _found(q: np.ndarray, step: float) -> tuple[list[list[tuple[int, int]]], np.
     """Where each joint's angle steps, as of `without_slips`, and by how much (n - 1, dof) after each
     sample."""
     speed, found = np.diff(q, axis=0), [[] for _ in q.T]
-    if step > _SLOWEST or len(q) <= SHORT:
+    if step > SLOWEST or len(q) <= SHORT:
         return found, np.zeros_like(speed)
     calm, grain = speed.copy(), [quantum(own) for own in q.T]
     for _ in range(_PASSES):

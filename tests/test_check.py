@@ -241,3 +241,16 @@ def test_a_torque_without_a_sign_is_named(joint, what, made, tmp_path):
         table.with_columns(how(pl.col(f"tau_{joint}")).alias(f"tau_{joint}")).write_csv(logs / name)
     found = [(f.joint, "without its sign" in f.says) for f in check.check(pipeline.load(logs)) if f.fault == "sign_flipped"]
     assert found == ([] if what == "lifted" else [(joint, True)])
+
+
+def test_samples_that_were_taken_beside_their_even_stamps_are_told(made, tmp_path):
+    """The logger writes an even time."""
+    folder = made(rate=100.0, jitter=1.0)
+    logs = shutil.copytree(folder, tmp_path / "logs")
+    for name in ("train.csv", "test.csv"):
+        table = pl.read_csv(logs / name)
+        even = np.linspace(table["t"].min(), table["t"].max(), len(table)).round(6)
+        table.with_columns(pl.Series("t", even)).write_csv(logs / name)
+    told = {f.log: f.says for f in check.check(pipeline.load(logs)) if f.fault == "clock_jitter"}
+    assert set(told) == {"train.csv", "test.csv"} and all("even" in says for says in told.values())
+    assert not [f for f in check.check(pipeline.load(made(rate=100.0))) if f.fault == "clock_jitter"]

@@ -45,6 +45,22 @@ def test_values_older_than_their_stamps_are_put_where_they_belong(seed, dof):
     assert np.all(np.diff(found) > 0)
 
 
+def test_even_stamps_are_doubted_where_joints_agree():
+    """A logger that writes an even time, whenever it took its samples; against noise of each joint's own that grows with its speed."""
+    rng = np.random.default_rng(11)
+    stamps = STEP * np.arange(2000)
+    off = 6e-4 * rng.standard_normal(len(stamps))
+    clock = corrected(stamps, motion(stamps + off, 4), written=False)
+    assert 3e-4 < clock.off < 8e-4 and rms(np.diff(clock.t - stamps - off, 2)) < 0.3 * rms(np.diff(off, 2))
+    q = motion(stamps, 4)
+    own = np.gradient(q, stamps, axis=0) * 6e-4 * rng.standard_normal(q.shape)
+    assert corrected(stamps, q + own).off > 3e-4  # stamps that vary would be taken at that word
+    assert corrected(stamps, q + own, written=False).off == 0.0
+    grain = 2.0 * np.pi / 2**12
+    for coarse in (np.round(q / grain) * grain, q[:, :1] + own[:, :1]):
+        assert corrected(stamps, coarse, written=False).off == 0.0
+
+
 def test_a_clock_that_is_right_stays_as_it_is():
     """Angles with a little noise of their own: what moves the stamps is less than what the noise is worth in time."""
     instants = taken(3)

@@ -52,6 +52,23 @@ def find(look: Look) -> Iterator[Fault]:
                 times=(log.tally.worst.at,),
                 rows=log.tally.late.count,
             )
+        elif off := max(
+            (s.clock.deviation for s in log.log.segments if s.clock is not None), default=0.0
+        ):
+            yield Fault(
+                "clock_jitter",
+                WARNING,
+                (
+                    f"the stamps of {log.log.name} are even and its samples were not: its joints' "
+                    f"angles agree that they were taken {1e3 * off:.2g} ms (RMS) off their stamps"
+                ),
+                (
+                    "log with the time at which the values were taken; what the angles show of "
+                    "their time is corrected"
+                ),
+                log=log.log.name,
+                rows=log.samples,
+            )
         fastest = band([log.log])
         if fastest * log.step * _CYCLE > 1.0 and log.step * _FAST > 1.0:
             yield Fault(
