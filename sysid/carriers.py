@@ -9,6 +9,8 @@ import numpy as np
 from . import rows as row
 from .candidates import Candidate, made
 from .estimate import Fit
+from .inertia.consistency import is_consistent
+from .inertia.pseudo import from_central
 from .motion import Motion
 
 
@@ -45,12 +47,19 @@ def _carriers(candidate: Candidate, view, fit: Fit, test: Motion) -> list[str]:
     # with the bodies that stand beside it: those of a model without it have a part of it already
     effect, model = _in(candidate, names, fit).effect, view.model
     columns = row.signature(model, test, row.seen(model, test), effect, candidate.joint, {}, 1, found.use)
+    size = view.x[own] if not model.coefficients[own[0] - first].of_body else _possible(view.x[own])
     left = (found.tau - row.predicted(model, test, view.x, 1)) * found.use
     error = np.array(list(fit.rms("train").values()))
     weight = np.where(error > 0.0, 1.0 / np.maximum(error, 1e-300), 0.0)
-    gain = np.sum((left**2 - (left - (columns @ view.x[own]).T) ** 2) * weight**2, axis=1)
+    gain = np.sum((left**2 - (left - (columns @ size).T) ** 2) * weight**2, axis=1)
     source = np.array([piece.source for piece in test.pieces])[found.piece]
     return [name for name in names if gain[source == name].sum() > 0.0]
+
+
+def _possible(pi: np.ndarray) -> np.ndarray:
+    """A load (10,) as its mass and where that is say it, where its moments of inertia are those of no body: in a view coefficients
+    have no bounds, and slow arms hardly tell moments."""
+    return pi if pi[0] <= 0.0 or is_consistent(pi) else from_central(pi[0], pi[1:4] / pi[0], np.zeros((3, 3)))
 
 
 def _in(candidate: Candidate, logs, fit: Fit) -> Candidate:

@@ -11,6 +11,7 @@ import numpy as np
 from ..blows import least_of
 from ..candidate_columns import columns_of, grown
 from ..candidates import Candidate
+from ..inertia import PARAMETERS
 from ..model import Model
 from ..posed_problem import inverse
 from ..settled import placed
@@ -54,22 +55,26 @@ def _next_to_none(model: Model) -> Model:
 def allowed(view: View, candidate: Candidate) -> bool:
     """Whether a candidate that joined does anything at all, with coefficients that may not be
     negative and are not, or one of them is not and the others by no more than chance: of what acts
-    by two of which one is nothing, noise makes this one negative every other time."""
+    by two of which one is nothing, noise makes this one negative every other time. A body's mass may
+    not be negative: some logs with a load are all others without."""
     model, first = view.model, 10 * view.model.bodies
     own = [k for k, c in enumerate(model.coefficients) if (c.effect, c.joint) == candidate.key]
     bound = first + np.array([k for k in own if model.coefficients[k].positive], dtype=int)
     below = bound[view.x[bound] <= 0.0]
     if 0 < len(below) and (len(below) == len(bound) or _clearly(view, below)):
         return False
+    bodies = [first + k for k in own if model.coefficients[k].of_body]
+    if bodies and _clearly(view, np.array(bodies[:: len(PARAMETERS)])):
+        return False
     starts = [(v.shape.start, at) for v, at in _own(view, candidate) if v.shape.start is not None]
     return not starts or any(at != start for start, at in starts)
 
 
-def _clearly(view: View, below: np.ndarray) -> bool:
+def _clearly(view: View, own: np.ndarray) -> bool:
     """Whether any of these parameters is below nought by more than blocks of time, each left out,
     move it."""
-    moves = view.sums.scores @ view.design.turn[below].T
-    return bool((view.x[below] < -_CHANCE * np.sqrt(np.sum(moves**2, axis=0))).any())
+    moves = view.sums.scores @ view.design.turn[own].T
+    return bool((view.x[own] < -_CHANCE * np.sqrt(np.sum(moves**2, axis=0))).any())
 
 
 def weighed(view: View, weights=None) -> View:
