@@ -14,6 +14,7 @@ from .unexplained import Refused, changed
 
 CLEAR = 2.0  # standard deviations
 _LIKELY = 0.05  # less is not listed
+_WORTH = 1.5e-2  # of an error: what is worth having, three per cent of its square (`select`)
 _NOTHING = 5e-3  # of an error: a hundredth of its square, the least that is told in per cent
 
 
@@ -54,8 +55,11 @@ def in_doubt(before: Fit, after: Fit, told: Fit, candidate: Candidate) -> str | 
     # a fit that weighs all joints alike may trade a quiet one's own error for what a loud one gains
     if not fell and still:
         return "the fit's own error does not fall with it"
-    if not whole and still and not size_told(told, *candidate.key):
-        return "its size is nothing beside its deviation, nor the fall of the test error beside its own"
+    little = change.delta_rms > -_WORTH * unit
+    if not whole and (still or little) and not size_told(told, *candidate.key):
+        falls = "nor the fall of the test error beside its own"
+        falls = falls if still else f"and the test error falls by less than {100.0 * _WORTH:.2g} %"
+        return f"its size is nothing beside its deviation, {falls}"
     # what moves a joint may show in the torque of those that it carries, or that carry it
     wide = len(candidate.touches(2)) > 1 and comparison.falls(before, after, _NOTHING)
     if change.delta_rms > -_NOTHING * unit and not wide:

@@ -229,7 +229,7 @@ def _bands(t, q, step: float) -> tuple[list[float], float]:
             break
         found.append(frequency)
         frequency *= _FINER
-    return found, first[0]
+    return found, 0.0 if first is None else first[0]
 
 
 def _kept(frequency: float) -> float:

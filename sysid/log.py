@@ -215,7 +215,7 @@ def _segments(t, signals, where: str, breaks: Iterable[int] = ()):
             continue
         rounding = off_steady(clock, step)
         written = rounding > _ROUNDED
-        true = corrected(clock, part["q"], written=written) if written or step > SLOWEST else Clock(clock)
+        true = corrected(clock, part["q"], written=written) if written or step > 0.99 * SLOWEST else Clock(clock)
         told, left = true.off > (_TOLD if written else _EVEN) * step, None
         if not told and rounding <= 2.0 * _ROUNDED:
             mean = (clock[-1] - clock[0]) / (len(clock) - 1)

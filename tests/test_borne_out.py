@@ -172,3 +172,14 @@ def test_values_of_many_deviations_are_clear_however_few_the_blocks(k, count):
     assert not blocks.clear(np.full(k, 0.5), np.eye(k), count)
     assert blocks.clear(np.full(k, 2.1), np.ones((k, k)), count) and not blocks.clear(np.full(k, 1.9), np.ones((k, k)), count)
     assert not blocks.clear(one, np.diag([np.nan, *np.ones(k - 1)]), count)
+
+
+@pytest.mark.parametrize(("fall", "told", "refused"), [(-0.012, False, True), (-0.012, True, False), (-0.03, False, False)])
+def test_of_an_untold_size_a_fall_that_is_not_worth_having_says_nothing(monkeypatch, fall, told, refused):
+    """The test error falls by six standard errors, and by less than 1.5 %; a drift of 3 % in friction was called a coupling for as much."""
+    before, after = Told(error=1.0), Told(error=1.0 + fall)
+    monkeypatch.setattr(borne_out, "size_told", lambda *_: told)
+    monkeypatch.setattr(comparison, "compare", lambda *_: (Difference("a", "b", "elbow", fall, 0.002),))
+    monkeypatch.setattr(comparison, "together", lambda *_, weighed=False: Difference("a", "b", "*", fall, 0.002))
+    why = in_doubt(before, after, after, Candidate(vocabulary.find("cogging"), 1, ())) or ""
+    assert ("falls by less than 1.5 %" in why) is refused and (refused or not why)

@@ -61,6 +61,12 @@ def test_even_stamps_are_doubted_where_joints_agree():
         assert corrected(stamps, coarse, written=False).off == 0.0
 
 
+def test_of_samples_seconds_apart_no_clock_is_told():
+    stamps = 2.0 * np.arange(400)
+    for written in (True, False):
+        assert corrected(stamps, motion(0.01 * stamps), written=written).off == 0.0
+
+
 def test_a_clock_that_is_right_stays_as_it_is():
     """Angles with a little noise of their own: what moves the stamps is less than what the noise is worth in time."""
     instants = taken(3)

@@ -3,13 +3,18 @@
 import json
 import shlex
 import shutil
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
-from sysid import experiment_file, loop, pipeline
+from sysid import carriers, experiment_file, loop, pipeline
+from sysid.candidates import Candidate
 from sysid.diagnose.diagnosis import diagnose
 from sysid.effects.payload import Payload
+from sysid.inertia.pseudo import rotational_inertia, sphere
 from sysid.statement.document import document
+from sysid.view import allowed
 
 
 @pytest.fixture(scope="module")
@@ -94,3 +99,25 @@ def test_which_logs_are_tried():
     assert effect.among(["a", "b", "c"])[3:] == [{"logs": ["a", "b"]}, {"logs": ["a", "c"]}, {"logs": ["b", "c"]}]
     assert len(effect.among(list("abcd"))) == 14 and {"logs": ["b", "d"]} in effect.among(list("abcd"))
     assert [len(one["logs"]) for one in effect.among(list("abcde"))] == [1] * 5 + [4] * 5
+
+
+@pytest.mark.parametrize(("mass", "may"), [(0.7, True), (-0.7, False), (-0.01, True)])
+def test_the_logs_without_a_load_do_not_carry_its_negative(mass, may):
+    """Some logs with a load and all others without it make the same columns, as bodies are free; noise alone may make a mass negative."""
+    rng = np.random.default_rng(2)
+    coefficients = [SimpleNamespace(effect="payload", joint=-1, positive=False, of_body=True) for _ in range(10)]
+    model = SimpleNamespace(bodies=0, coefficients=coefficients, shape_values=(), shapes=(), terms=())
+    sums = SimpleNamespace(scores=0.02 * rng.normal(size=(20, 10)))
+    x = np.append(mass, rng.normal(size=9))
+    view = SimpleNamespace(model=model, x=x, sums=sums, design=SimpleNamespace(turn=np.eye(10)))
+    assert allowed(view, Candidate(Payload(), -1, ())) is may
+
+
+def test_a_load_is_looked_for_as_a_body_that_can_be():
+    """Its mass and where it is, where moments of inertia are none of a body; else as it is."""
+    ball = sphere(0.8, [0.0, 0.02, 0.1], 0.05)
+    np.testing.assert_array_equal(carriers._possible(ball), ball)
+    wrong = ball - np.array([0.0] * 4 + [0.5, 0.5, 0.5, 0.0, 0.0, 0.0])
+    found = carriers._possible(wrong)
+    np.testing.assert_allclose(found[:4], ball[:4])
+    np.testing.assert_allclose(rotational_inertia(found), 0.8 * np.array([[0.0104, 0.0, 0.0], [0.0, 0.01, -0.002], [0.0, -0.002, 0.0004]]), atol=1e-12)
