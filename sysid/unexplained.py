@@ -120,7 +120,7 @@ def cause(
     if floor.reached(errors[0]):
         return (
             "the training logs are explained and the test logs are not: the model does not carry "
-            "over to them"
+            "over to them, or their noise is louder, as that of a coarse encoder in slow motion"
         )
     where = ""
     if floor.reached(error):
