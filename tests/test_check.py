@@ -254,3 +254,13 @@ def test_samples_that_were_taken_beside_their_even_stamps_are_told(made, tmp_pat
     told = {f.log: f.says for f in check.check(pipeline.load(logs)) if f.fault == "clock_jitter"}
     assert set(told) == {"train.csv", "test.csv"} and all("even" in says for says in told.values())
     assert not [f for f in check.check(pipeline.load(made(rate=100.0))) if f.fault == "clock_jitter"]
+
+
+def test_one_joint_s_torque_before_its_gear_is_worth_a_word(made, tmp_path):
+    """A sixth of what the masses need, on one joint of two: its unit, or the URDF's masses."""
+    logs = shutil.copytree(made(), tmp_path / "logs")
+    for name in ("train.csv", "test.csv"):
+        table = pl.read_csv(logs / name)
+        table.with_columns(pl.col("tau_elbow") / 6.0).write_csv(logs / name)
+    (found,) = [f for f in check.check(pipeline.load(logs)) if f.fault == "wrong_unit"]
+    assert (found.joint, found.severity) == ("elbow", "warning") and "gear" in found.do

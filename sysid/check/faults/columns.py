@@ -9,7 +9,7 @@ from itertools import combinations
 import numpy as np
 
 from ..equations import LIKELY, Equations, Reading, Scored
-from ..fault import ERROR, Fault
+from ..fault import ERROR, WARNING, Fault
 from ..look import Look
 
 AFTER, SENSELESS = 2, ("wrong_unit", "angle_wrap")
@@ -134,6 +134,12 @@ def _factors(look: Look, equations: Equations, reading: Reading, scored: Scored)
         says = f"the torque of {name} is {_times(own)} what the URDF's masses need"
         thousand = _THOUSAND[0] < max(own, 1.0 / own) < _THOUSAND[1]
         if not (every or thousand):
+            if np.log(scored.left[j] / free.left[j]) > _BETTER:
+                do = (
+                    "is it the motor's, before a gear? give it in N m, on the joint's side; else "
+                    "the URDF's masses beyond this joint are far off"
+                )
+                yield Fault("wrong_unit", WARNING, says, do, name)
             continue
         if thousand:
             yield Fault("wrong_unit", ERROR, says, "is it in mN m, or kN m? give it in N m", name)
