@@ -43,6 +43,7 @@ _MOST = 3.0  # deviations of the clock
 _MOTION = 2.0
 _ENDS = 2.0  # times the usual frequency: the errors' part of an acceleration is six times as large
 _ORDERED = 0.45  # of the way to a neighbour: samples keep their order
+_SAME = 0.999  # correlation of speeds: joints that move in proportion
 _AGREED = 0.5  # of a clock's power, that different joints must agree on where stamps say nothing
 
 
@@ -153,8 +154,12 @@ def corrected(t: np.ndarray, q: np.ndarray, *, written: bool = True) -> Clock:
 def _agreed(t, q, frequency: float) -> bool:
     """Whether the clock's power above a frequency is that of products of different joints. Noise of
     the angles that grows with their speeds, a coarse encoder's at low speed, is each joint's own,
-    and has no mean product with another's."""
+    and has no mean product with another's: where joints have encoders of their own. Of joints that
+    move in proportion one counts."""
     beside, speed = _beside(t, q, _evenly(t, q), frequency)
+    alike = np.abs(np.corrcoef(speed.T)) if speed.shape[1] > 1 else np.ones((1, 1))
+    own = [j for j in range(len(alike)) if not np.any(alike[j, :j] > _SAME)]
+    beside, speed = beside[:, own], speed[:, own]
     noise, off = _components(beside, speed)
     if not off > 0.0:
         return False

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -140,14 +140,14 @@ def _room(model: Model, x, positive, slopes: int) -> np.ndarray:
     return out
 
 
-def identify(experiment: Experiment, model: Model, motion: Motion, data: Compressed, prior: np.ndarray, callback=None, near=None, told: Mapping[int, float] | None = None) -> Fit:
+def identify(experiment: Experiment, model: Model, motion: Motion, data: Compressed, prior: np.ndarray, callback=None, near=None, told: tuple[Sequence[int], np.ndarray] | None = None) -> Fit:
     """Solve, certify and say how sure; the predictions are added by the pipeline.
 
     Args:
         near: (size,) where the optimum is not far from, where that is known; the search begins at the prior otherwise.
         data: the training logs; where it holds slopes of shape values after the model's own parameters, these count in
             the uncertainty.
-        told: {number of a shape value: standard deviation} of those that other rows than these told.
+        told: numbers of shape values that other rows than these told, and their covariance.
     """
     experiment = with_weight(experiment, number(experiment))
     compressed = data if data.size == model.size else data.first(model.size)
@@ -171,7 +171,7 @@ def identify(experiment: Experiment, model: Model, motion: Motion, data: Compres
     objective = problem.objective if not slopes else posed(data.total(problem.weights), problem.objective.divergence, problem.objective.weight, known_bodies(experiment, model))
     sure = uncertainty.estimate(objective, data, np.append(solution.x, np.zeros(slopes)), np.append(fixed, np.zeros(slopes, dtype=bool)), problem.weights, [count + k for k in certificate.at_zero], _room(model, solution.x, problem.coordinates.positive, slopes))
     free = [k for k, value in enumerate(model.shape_values) if not value.held][:slopes]
-    sure = sure.told_elsewhere({model.size + free.index(k): std for k, std in (told or {}).items() if k in free})
+    sure = sure.told_elsewhere([model.size + free.index(k) for k in told[0]], told[1]) if told else sure
     shape_std = np.full(len(model.shape_values), np.nan)
     shape_std[free] = sure.std[model.size :]
     shape_covariance = np.full((len(shape_std), len(shape_std)), np.nan)

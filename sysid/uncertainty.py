@@ -11,7 +11,7 @@ its weight over that of a prior that claims as much, or one.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -34,16 +34,18 @@ class Uncertainty:
     std: np.ndarray
     from_data: np.ndarray
 
-    def told_elsewhere(self, stds: Mapping[int, float]) -> Uncertainty:
-        """The same where some parameters are as sure as other rows say, {number: standard
-        deviation}: all others follow them as they do here."""
-        covariance = self.covariance
-        for k, std in stds.items():
-            own = covariance[k, k]
-            if own > 0.0:
-                way = covariance[k] / own
-                covariance = covariance + (std**2 - own) * np.outer(way, way)
+    def told_elsewhere(self, numbers: Sequence[int], square: np.ndarray) -> Uncertainty:
+        """The same where some parameters have the covariance (k, k) that other rows tell: all
+        others follow them as they do here."""
         known = np.isfinite(self.std)
+        own = np.array([n for n, k in enumerate(numbers) if known[k]], dtype=int)
+        if not len(own):
+            return self
+        at, inner = np.array(numbers)[own], np.flatnonzero(known)
+        covariance = self.covariance.copy()
+        before = covariance[np.ix_(at, at)]
+        way = covariance[np.ix_(inner, at)] @ np.linalg.pinv(before, hermitian=True)
+        covariance[np.ix_(inner, inner)] += way @ (square[np.ix_(own, own)] - before) @ way.T
         spread = np.sqrt(np.clip(np.diagonal(covariance), 0.0, None))
         return replace(self, covariance=covariance, std=np.where(known, spread, self.std))
 

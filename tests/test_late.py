@@ -47,22 +47,29 @@ def test_a_second_view_is_for_what_is_late_alone(simulated):
     assert late.slow_view(experiment, other, model, logs, prior) is None
 
 
-def test_what_other_rows_tell_takes_its_own_deviation_and_the_rest_follows():
-    """Of y = G x + e, x as sure as it is said to be, in closed form."""
+def test_what_other_rows_tell_takes_its_own_covariance_and_the_rest_follows():
+    """Of y = G x + e, x as sure as it is said to be, in closed form; two that hardly differ here, and do there."""
     rng = np.random.default_rng(3)
-    gain, root = rng.normal(size=(4, 1)), rng.normal(size=(4, 4))
-    noise = root @ root.T
+    gain, root = rng.normal(size=(4, 2)), rng.normal(size=(4, 4))
 
-    def joint(variance: float) -> np.ndarray:
-        whole = np.zeros((5, 5))
-        whole[:4, :4] = gain @ gain.T * variance + noise
-        whole[:4, 4] = whole[4, :4] = gain[:, 0] * variance
-        whole[4, 4] = variance
-        return whole
+    def joint(square) -> np.ndarray:
+        return np.block([[gain @ square @ gain.T + root @ root.T, gain @ square], [square @ gain.T, square]])
 
-    before = joint(0.04)
-    found = Uncertainty(before, np.sqrt(np.diagonal(before)), np.ones(5)).told_elsewhere({4: 0.7})
-    np.testing.assert_allclose(found.covariance, joint(0.49))
-    np.testing.assert_allclose(found.std, np.sqrt(np.diagonal(joint(0.49))))
-    unknown = Uncertainty(before, np.array([np.nan, 1.0, 1.0, 1.0, 1.0]), np.ones(5)).told_elsewhere({})
-    assert np.isnan(unknown.std[0]) and np.isfinite(unknown.std[1:]).all()
+    here, there = np.array([[1.0, 0.999], [0.999, 1.0]]), np.array([[1.0, -2.0], [-2.0, 25.0]])
+    before = joint(here)
+    found = Uncertainty(before, np.sqrt(np.diagonal(before)), np.ones(6)).told_elsewhere([4, 5], there)
+    np.testing.assert_allclose(found.covariance, joint(there), atol=1e-9)
+    np.testing.assert_allclose(found.std, np.sqrt(np.diagonal(joint(there))))
+    lacking = np.where(np.arange(6) == 0, np.nan, np.sqrt(np.diagonal(before)))
+    unknown = Uncertainty(before, lacking, np.ones(6)).told_elsewhere([4, 5], there)
+    assert np.isnan(unknown.std[0])
+    np.testing.assert_allclose(unknown.std[1:], found.std[1:])
+    assert Uncertainty(before, lacking, np.ones(6)).told_elsewhere([], np.zeros((0, 0))).covariance is before
+
+
+def test_of_fine_angles_and_a_short_log_all_frequencies_tell(simulated):
+    """What the slow ones tell much worse, and not otherwise, is left where it is, no surer than they differ."""
+    folder = simulated("late and short", "delay:elbow:d=0.006", seed=14, duration=3.0, encoder=0)
+    fit = pipeline.fit(load(edited(folder, "with", model={"effects": [*EFFECTS, {"delay": {"joints": ["elbow"]}}]})))
+    found, std, _ = fit.parameters_of("delay", 1)["delay.elbow.d"]
+    assert abs(found - 0.006) < 2.0 * std and std < 2.0e-4

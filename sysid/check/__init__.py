@@ -56,16 +56,16 @@ def _found(look) -> Iterator[Fault]:
     names = sorted(module.name for module in iter_modules(faults.__path__))
     modules = [import_module(f"{faults.__name__}.{name}") for name in names]
     grave: set[str] = set()
-    said: dict[tuple[str, str, str], int] = {}
+    signs: dict[str, int] = {}
     # what a later one looks at, an earlier one's errors may have made senseless
     for module in sorted(modules, key=lambda module: module.AFTER):
         if grave.isdisjoint(module.SENSELESS):
             for fault in module.find(look):
                 if fault.joint in look.experiment.data.unused and fault.fault not in _OF_ANGLES:
                     continue
-                own = fault.fault, fault.joint, fault.log
-                if module.AFTER > said.setdefault(own, module.AFTER):
-                    continue  # what has no sign cannot have the wrong one
+                if fault.fault == "sign_flipped":
+                    if module.AFTER > signs.setdefault(fault.joint, module.AFTER):
+                        continue  # what has none, or another in some logs, has no wrong one
                 grave |= {fault.fault} if fault.severity == ERROR else set()
                 yield fault
 

@@ -14,6 +14,7 @@ _STEPS = (2e-5, 0.5)  # s from sample to sample: no logger of a robot is faster 
 # Samples in a cycle of the fastest motion, and a second: accelerations need some, and what friction
 # does at a reversal none more than that
 _CYCLE, _FAST = 20.0, 120.0
+_EVEN = 1e-3  # of a step: stamps that are off by less are even
 
 
 def find(look: Look) -> Iterator[Fault]:
@@ -52,15 +53,13 @@ def find(look: Look) -> Iterator[Fault]:
                 times=(log.tally.worst.at,),
                 rows=log.tally.late.count,
             )
-        elif off := max(
-            (s.clock.deviation for s in log.log.segments if s.clock is not None), default=0.0
-        ):
+        elif jitter < _EVEN * log.step and (off := _off(log)):
             yield Fault(
                 "clock_jitter",
                 WARNING,
                 (
                     f"the stamps of {log.log.name} are even and its samples were not: its joints' "
-                    f"angles agree that they were taken {1e3 * off:.2g} ms (RMS) off their stamps"
+                    f"angles agree that they were taken about {1e3 * off:.2g} ms off their stamps"
                 ),
                 (
                     "log with the time at which the values were taken; what the angles show of "
@@ -82,6 +81,11 @@ def find(look: Look) -> Iterator[Fault]:
                 log=log.log.name,
                 rows=log.samples,
             )
+
+
+def _off(log: Logged) -> float:
+    """Deviation [s] of a stamp's error, zero where none was corrected."""
+    return max((s.clock.deviation for s in log.log.segments if s.clock is not None), default=0.0)
 
 
 def _unit(log: Logged) -> Fault:
