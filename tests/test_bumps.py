@@ -191,6 +191,7 @@ def test_pushes_behind_a_greater_one_are_found(leg, tmp_path):
     assert [round(event.start) for event in sorted(bumps(machine, [both]), key=lambda e: e.start)] == [5, 8]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", [1, 4, 9])
 def test_a_quick_move_among_slow_ones_is_no_knock(planar, tmp_path, seed, monkeypatch):
     """The signals show one; the robot's equations follow it."""

@@ -471,6 +471,7 @@ def test_a_load_is_that_of_the_motion_that_the_links_make():
     np.testing.assert_allclose(model.columns(piece, rows)[2][-1], (np.abs(load) * np.sign(piece.qd))[rows, 2], rtol=1e-9)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("seed", "limit"), [(3, 22.0), (8, 24.0)])
 def test_a_reading_that_clips_has_one_limit_whatever_rubs(planar, tmp_path, seed, limit):
     """Friction and the motor's inertia are read as well: of the load alone the limit would be another at every speed."""

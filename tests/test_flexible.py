@@ -272,6 +272,7 @@ def test_a_joint_that_stands_has_no_products_of_its_own():
     assert np.isfinite(values).all() and not any(word.endswith("qd_shoulder") for word in words)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", LAWS)
 def test_a_law_is_nearly_one_of_the_products_and_stands_out_of_noise_that_is_larger(name):
     own, variable = LAWS[name]

@@ -9,6 +9,7 @@ from scripts import fuzz_readers
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="measures a child's memory")
 
 
+@pytest.mark.long
 def test_what_is_broken_is_said_in_one_line(tmp_path):
     """In a process of its own: what forks must not have Polars' threads."""
     import subprocess

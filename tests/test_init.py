@@ -82,6 +82,7 @@ def from_csv():
     return {}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", FORMATS)
 def test_no_yaml_by_hand(written, cli, kind, from_csv):
     folder, logs = written(kind)

@@ -46,6 +46,7 @@ def anew(model: Model, piece, rows):
     return fresh.columns(piece, rows)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", ["plain", "filtered"])
 @pytest.mark.parametrize("names", [MANY, STILL], ids=["many", "still"])
 @pytest.mark.parametrize("stride", [1, 3])

@@ -101,6 +101,7 @@ def length(name: str, folder: Path, out: Path) -> float:
     return time.monotonic() - begin
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["add"])
 def test_killed_at_some_moments(experiment, tmp_path, name):
     """A few moments, spread over a run; the study below takes a hundred of every command."""

@@ -210,6 +210,7 @@ def test_a_correction_on_all_rows_is_the_step_on_those_in_memory():
     np.testing.assert_allclose(shape.correction(fit, data), right / system[0], rtol=1e-3)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("effects", [[], [{"load_friction": {"joints": ["shoulder_pan_joint"]}}]])
 def test_a_correction_that_makes_it_worse_is_taken_back(effects, monkeypatch):
     """Whether the model looks at the load or not: a step on all rows may be far too long."""

@@ -73,6 +73,7 @@ def fitted(tmp_path_factory, arm_logs):
     return pipeline.fit(pipeline.load(folder))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("name", "write", "config"), FORMATS.values(), ids=FORMATS)
 def test_the_same_recording_gives_the_same_parameters(
     experiment, arm_logs, fitted, name, write, config

@@ -83,6 +83,7 @@ def swapped(path, old, new):
     path.write_text(changed)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("what", CHANGES)
 def test_what_changed_is_questioned_anew(asked, tmp_path, what):
     folder, count = asked
@@ -102,6 +103,7 @@ def test_a_comment_or_a_newer_date_changes_nothing(asked, tmp_path):
     assert len(count) == 1
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("edit", [
     lambda text: text.replace('"complete"', '"missing"'), lambda text: text[: len(text) // 2],
     lambda text: "{}", lambda text: "[]", lambda text: "[" * 100_000,

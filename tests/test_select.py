@@ -144,6 +144,7 @@ def test_a_robot_a_hundred_times_lighter_is_asked_alike(diagnosed, simulated, tm
     assert abs(value - 0.004) < 3.0 * std < 0.001
 
 
+@pytest.mark.long
 def test_two_effects_on_two_joints_are_both_named(diagnosed, simulated):
     found, folder = diagnosed(*TWO), simulated(*TWO)
     assert [verdict(found, joint).claims[0].head.effect for joint in ("shoulder", "elbow")] == ["load_friction", "cogging"]

@@ -160,6 +160,7 @@ def test_journal_with_other_settings_starts_anew(tmp_path):
     other.close()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("inertia", ["log-cholesky", "exponential", "eigenvalue"])
 def test_restarts_end_in_one_certified_point(tmp_path, inertia):
     spec = load(LEG)

@@ -82,6 +82,7 @@ def test_where_nothing_can_be_remembered_it_runs_this_once(stranger, cli, monkey
     assert cli("fit", stranger, "--trust", "--quiet").status == 0
 
 
+@pytest.mark.long
 @pytest.mark.skipif(sys.platform == "win32", reason="no terminal of this kind")
 @pytest.mark.parametrize(("answer", "status"), [(b"y\n", 0), (b"\n", 2)])
 def test_who_is_there_is_asked(stranger, tmp_path, answer, status):

@@ -137,6 +137,7 @@ def arm(tmp_path_factory):
     return robot.load(robot_spec.RobotSpec(urdf=str(file)))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("what", ["elasticity:elbow:K=60,D=0.3", "elasticity:elbow:K=200,D=1", "backlash:elbow:b=0.01", "backlash:elbow:b=0.004"])
 def test_the_simulator_s_link_is_where_it_is_said_to_be(arm, what):
     """True bodies, the motors' true motion; the simulator integrates motor and link under true torque. What counts is torque: the
