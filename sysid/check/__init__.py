@@ -63,9 +63,9 @@ def _found(look) -> Iterator[Fault]:
             for fault in module.find(look):
                 if fault.joint in look.experiment.data.unused and fault.fault not in _OF_ANGLES:
                     continue
-                if fault.fault == "sign_flipped":
-                    if module.AFTER > signs.setdefault(fault.joint, module.AFTER):
-                        continue  # what has none, or another in some logs, has no wrong one
+                signed = fault.fault == "sign_flipped"
+                if signed and module.AFTER > signs.setdefault(fault.joint, module.AFTER):
+                    continue  # what has none, or another in some logs, has no wrong one
                 grave |= {fault.fault} if fault.severity == ERROR else set()
                 yield fault
 

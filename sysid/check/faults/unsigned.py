@@ -9,6 +9,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ...uncertainty import whitening
 from ..fault import ERROR, Fault
 from ..look import Look, Seen
 
@@ -59,9 +60,7 @@ def mirrored(seen: Seen, j: int) -> float:
     columns = seen.columns(j)[use]
     if len(tau) < 4 * columns.shape[1]:
         return 1.0
-    values, vectors = np.linalg.eigh(columns.T @ columns)
-    kept = values > 1e-10 * values[-1]
-    basis = columns @ (vectors[:, kept] / np.sqrt(values[kept]))
+    basis = columns @ whitening(columns.T @ columns)
     bodies = 10 * seen.model.bodies
     needed = seen.rows.columns[j][use, :bodies] @ seen.model.robot.prior.ravel()
     speed = seen.rows.of(seen.motion, "qd")[use, j]
