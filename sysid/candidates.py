@@ -121,6 +121,30 @@ def candidates(model: Model, extra=(), logs: Sequence[str] = ()) -> list[Candida
     return out
 
 
+def together(groups, robot: Robot) -> list[Candidate]:
+    """Of what was asked in single logs only, in those that have most of it together: of its first
+    coefficient as each log alone tells it, for two logs up to all but one.
+
+    Args:
+        groups: candidates that were asked, with their `coefficients`.
+    """
+    asked: dict[tuple, dict[tuple, tuple]] = {}
+    for group in groups:
+        options = dict(group.candidate.options)
+        if logs := options.pop("logs", None):
+            own = asked.setdefault((*group.candidate.key, *options.items()), {})
+            own[logs] = group.coefficients[0], group.candidate
+    out = []
+    for own in asked.values():
+        ranked = sorted(own, key=lambda logs: own[logs][0], reverse=True)
+        if max(map(len, ranked)) == 1:
+            _, one = own[ranked[0]]
+            for count in range(2, len(ranked)):
+                options = dict(one.options) | {"logs": [log for (log,) in sorted(ranked[:count])]}
+                out.append(made(one.effect, one.joint, options, robot))
+    return out
+
+
 def made(effect: Effect, joint: int, options: dict, robot: Robot) -> Candidate:
     """An effect on a joint with options."""
     fixed = tuple((k, tuple(v) if isinstance(v, list) else v) for k, v in options.items())

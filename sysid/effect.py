@@ -128,7 +128,8 @@ class Effect(ABC):
         return [{}]
 
     def among(self, logs: Sequence[str]) -> list[dict]:
-        """The options under which it is worth trying in some of an experiment's training logs alone, by their names."""
+        """The options under which it is worth trying in some of an experiment's training logs alone, by their names. Where each is
+        tried alone, logs that have much of its first coefficient are then tried together."""
         return []
 
     def richer(self, **shapes: float) -> list[tuple[dict, dict[str, float]]]:

@@ -3,13 +3,14 @@ words."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from .candidates import Candidate
 from .estimate import Fit
+from .failures import taken
 from .model_parameters import ROBOT
 
 _MOST = 0.5  # of what stands above a floor, or of a square
@@ -61,6 +62,22 @@ def in_vain(refused: Sequence[Refused], joints, j: int, least: float):
     ]
     best = max(own, key=lambda r: r.shares[j], default=None)
     return best and (best.candidate, best.p)
+
+
+def of_few_blocks(groups, refitted: Callable, view, test, j: int, least: float):
+    """The Candidate that takes most of joint j's squared residual on the test logs, under the
+    low-pass, and at least such a share, of those that training logs show in too few places to ask
+    them; with a p-value of one, as test logs may not choose. None where there is none.
+
+    Args:
+        groups: of the joint. refitted: makes a Member, or None, of one. view: the model without
+            them. test: Motion.
+    """
+    few = sorted((g for g in groups if g.signed and not g.testable), key=lambda g: g.taken)
+    members = [m for g in {g.candidate.kind: g for g in few}.values() if (m := refitted(g))]
+    shares = {m.candidate: taken(view.settled, m.view.settled, test)[j] for m in members}
+    best = max(shares, key=shares.get, default=None)
+    return (best, 1.0) if best and shares[best] >= least else None
 
 
 def raw(fit: Fit) -> bool:
@@ -206,6 +223,13 @@ def changed(share: float) -> str:
     """A change as a share of what it was, in per cent with its sign."""
     percent = round(100.0 * share, 2) + 0.0  # no zero has a sign of its own
     return f"{percent:+.0f} %" if abs(percent) > 99.5 else f"{percent:+.2g} %"
+
+
+def notices(claims, refused: Sequence[Refused]) -> list[str]:
+    """What to know beside claims, and of what is not claimed."""
+    heads = [c.head for c in claims if c.after.weights is None and not c.head.size_told]
+    told = [f"{r.effect} on {r.joint} is not claimed: {r.why}" for r in refused]
+    return told + [hidden_by_weights(head.effect, head.joint) for head in heads]
 
 
 def hidden_by_weights(effect: str, joint: str) -> str:

@@ -345,3 +345,13 @@ def test_ridges_are_solved_in_single_precision_where_that_is_enough(least, close
     for own, strength in zip(found.T, ridges):
         told = rows @ np.linalg.solve(system + strength * np.eye(120), right)
         assert np.max(np.abs(rows @ own - told)) < close * np.std(told)
+
+
+def test_a_tone_that_the_angles_noise_has_as_well_is_none_of_the_torque():
+    """A coarse encoder at a steady speed makes a line, and makes it again in another phase where its rounding is drawn once more."""
+    rng = np.random.default_rng(3)
+    line = lambda phase: 0.5 * np.sin(2.0 * np.pi * 7.3 * KNOWN["time"] + phase)  # noqa: E731
+    residual, use = rng.normal(size=N) + line(0.4), np.ones(N, bool)
+    ask = lambda noise: unknown(KNOWN, "elbow", residual, use, FOLD, np.zeros(N, int), STEP, np.random.default_rng(0), noise)  # noqa: E731
+    assert ask(0.1 * rng.normal(size=N)).tone == pytest.approx(0.11, abs=0.03)
+    assert ask(0.1 * rng.normal(size=N) + line(2.0)).tone == 0.0

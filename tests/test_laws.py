@@ -56,6 +56,14 @@ def test_the_noise_of_the_angles_is_drawn_anew_on_each_log(quiet):
     assert abs(np.corrcoef(one, other)[0, 1]) < 0.3
 
 
+def test_rows_count_where_both_draws_know_the_sign_of_a_speed(quiet):
+    """A row that one draw leaves out would be noise in the other, and where it turns round once more friction's jump is."""
+    for view in quiet:
+        for plain, rough in zip(view.motion.pieces, view.rough.pieces):
+            np.testing.assert_array_equal(plain.use, rough.use)
+            assert (np.sign(plain.qd) == np.sign(rough.qd))[plain.use].all() and plain.use.any()
+
+
 def cut(log, *slices, **changes):
     """A log whose one segment is cut into several, a second apart."""
     (own,) = log.segments

@@ -9,12 +9,14 @@ import numpy as np
 import pytest
 
 from sysid import carriers, experiment_file, loop, pipeline
-from sysid.candidates import Candidate
+from sysid.candidates import Candidate, made, together
 from sysid.diagnose.diagnosis import diagnose
 from sysid.effects.payload import Payload
 from sysid.inertia.pseudo import rotational_inertia, sphere
 from sysid.statement.document import document
 from sysid.view import allowed
+from sysid.vocabulary import find
+from tests.problems import arm
 
 
 @pytest.fixture(scope="module")
@@ -98,7 +100,7 @@ def test_which_logs_are_tried():
     assert effect.among(["a", "b"]) == [{"logs": ["a"]}, {"logs": ["b"]}]
     assert effect.among(["a", "b", "c"])[3:] == [{"logs": ["a", "b"]}, {"logs": ["a", "c"]}, {"logs": ["b", "c"]}]
     assert len(effect.among(list("abcd"))) == 14 and {"logs": ["b", "d"]} in effect.among(list("abcd"))
-    assert [len(one["logs"]) for one in effect.among(list("abcde"))] == [1] * 5 + [4] * 5
+    assert [one["logs"] for one in effect.among(list("abcde"))] == [[log] for log in "abcde"]
 
 
 @pytest.mark.parametrize(("mass", "may"), [(0.7, True), (-0.7, False), (-0.01, True)])
@@ -121,3 +123,14 @@ def test_a_load_is_looked_for_as_a_body_that_can_be():
     found = carriers._possible(wrong)
     np.testing.assert_allclose(found[:4], ball[:4])
     np.testing.assert_allclose(rotational_inertia(found), 0.8 * np.array([[0.0104, 0.0, 0.0], [0.0, 0.01, -0.002], [0.0, -0.002, 0.0004]]), atol=1e-12)
+
+
+def test_logs_that_have_most_of_it_are_asked_together():
+    """Of five logs each is asked alone; then the two with most of it, three, and four."""
+    robot, masses = arm()[1].robot, {"a": 0.1, "b": 0.7, "c": -0.2, "d": 0.8, "e": 0.6}
+    group = lambda logs, mass: SimpleNamespace(candidate=made(Payload(), -1, {"logs": list(logs)}, robot), coefficients=[mass, 9.0])  # noqa: E731
+    asked = [group(log, mass) for log, mass in masses.items()]
+    other = SimpleNamespace(candidate=made(find("gravity_tilt"), -1, {}, robot), coefficients=[5.0])
+    assert [dict(one.options)["logs"] for one in together([*asked, other], robot)] == [("b", "d"), ("b", "d", "e"), ("a", "b", "d", "e")]
+    # of few all were asked already
+    assert together([group("a", 1.0), group("b", 2.0), group("c", 2.0), group("ab", 2.0)], robot) == [] == together([other], robot)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from scripts.blind_parts import cases, robots
-from sysid import borne_out, config, pipeline
+from sysid import borne_out, config, pipeline, unexplained
 from sysid.blocks import Belief
 from sysid.candidates import Candidate, candidates
 from sysid.comparison import Difference
@@ -463,7 +463,7 @@ def test_twice_the_size_is_found_and_a_fifth_is_not(control, simulated, effect, 
 # ---- asked once more, of joints above their floors
 
 
-def asked_of_elbow(error: float, *, gain: float = 0.3, chance: float = 1e-3, near=None, weighed=None, beyond=None):
+def asked_of_elbow(error: float, *, gain: float = 0.3, chance: float = 1e-3, near=None, weighed=None, beyond=None, **more):
     """The elbow's verdict where ridge regression says nothing; the joints that were asked what their blocks agree on."""
     seen = []
 
@@ -471,7 +471,7 @@ def asked_of_elbow(error: float, *, gain: float = 0.3, chance: float = 1e-3, nea
         seen.append(j)
         return Law(chance, "q_elbow and qd_shoulder", gain)
 
-    found = verdicts(fitted(error), [], [NOISE, NOISE], [floor(), floor()], (), (), weighed, agreed, lambda j, own, there: near if own > 0 else None, beyond)
+    found = verdicts(fitted(error), [], [NOISE, NOISE], [floor(), floor()], (), (), weighed, agreed, lambda j, own, there: near if own > 0 else None, beyond=beyond, **more)
     return found[1], seen
 
 
@@ -486,6 +486,44 @@ def test_blocks_are_asked_of_joints_above_their_floors_alone():
     # nor where the weights of the fit are all of it
     found, seen = asked_of_elbow(3.0, weighed={"shoulder": 1.0, "elbow": 1.01})
     assert found.status == "unresolved" and seen == []
+
+
+def test_what_training_logs_show_in_too_few_places_is_asked_of_the_test_logs():
+    """A law stands out on both, and no effect of the training logs' blocks: what takes half as much on the test logs may be it."""
+    stribeck, asked = Candidate(find("stribeck"), 1, ()), []
+
+    def few(j: int, least: float):
+        asked.append((j, least))
+        return (stribeck, 1.0) if least <= 0.15 else None
+
+    found, _ = asked_of_elbow(3.0, gain=0.3, few=few)
+    assert asked == [(1, pytest.approx(0.15))] and (found.status, found.may) == ("unresolved", stribeck)
+    found, _ = asked_of_elbow(3.0, gain=0.5, few=few)
+    assert (found.status, found.may) == ("unknown", None)
+    asked.clear()
+    asked_of_elbow(1.0, few=few)
+    asked_of_elbow(3.0, near=(stribeck, 0.02), few=few)
+    assert asked == []  # at the floor, and where blocks say what it may be
+
+
+def test_of_those_that_test_logs_alone_can_ask_the_one_that_takes_most(monkeypatch):
+    groups = [SimpleNamespace(candidate=SimpleNamespace(kind=kind), signed=signed, testable=testable, taken=taken) for kind, signed, testable, taken in (
+        ("a", True, False, 1.0), ("a", True, False, 2.0), ("b", True, False, -3.0), ("c", True, True, 9.0), ("d", False, False, 9.0), ("e", True, False, 0.0)
+    )]  # fmt: skip
+    shares = {"a": 0.2, "b": 0.6}
+    monkeypatch.setattr(unexplained, "taken", lambda before, after, test: [0.0, shares[after]])
+    seen = []
+
+    def refitted(group):
+        seen.append((group.candidate.kind, group.taken))
+        kind = group.candidate.kind
+        return SimpleNamespace(candidate=kind, view=SimpleNamespace(settled=kind)) if kind in shares else None
+
+    view = SimpleNamespace(settled="before")
+    assert unexplained.of_few_blocks(groups, refitted, view, "test", 1, 0.5) == ("b", 1.0)
+    assert sorted(seen) == [("a", 2.0), ("b", -3.0), ("e", 0.0)]
+    assert unexplained.of_few_blocks(groups, refitted, view, "test", 1, 0.7) is None
+    assert unexplained.of_few_blocks([], refitted, view, "test", 1, 0.0) is None
 
 
 def test_a_law_stands_beside_what_is_claimed():

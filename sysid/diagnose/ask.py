@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from ..blocks import Belief
-from ..candidates import Candidate, candidates
+from ..candidates import Candidate, candidates, together
 from ..view import View, falls
 from . import null
 from .evidence import Group
@@ -76,18 +76,15 @@ class Asked:
         return out
 
     def near(self, joint: int, gain: float, there: bool) -> tuple[Candidate, float] | None:
-        """The effect on a joint that may be there and takes half of a gain: the likeliest, else who
-        takes most of what no block can test; there: as something surely is, among its own alone."""
+        """The likeliest effect on a joint that may be there and takes half of a gain; there: as
+        something surely is, among its own alone."""
         found, statistics, gains, own = self.by_joint.get(joint, ([], [], [], None))
         takes = [k for k, taken in enumerate(gains) if taken > HALF * gain and found[k].signed]
         if not takes:
             return None
         best = max(takes, key=lambda k: np.nan_to_num(statistics[k], nan=-np.inf))
         p, alone = (null.chance(statistics[best], most) for most in (self.maxima, own))
-        if (alone if there else p) <= _MAY_BE:
-            return found[best].candidate, p
-        untold = [k for k in takes if np.isnan(statistics[k])]  # nobody can say that it is not
-        return (found[max(untold, key=gains.__getitem__)].candidate, 1.0) if untold else None
+        return (found[best].candidate, p) if (alone if there else p) <= _MAY_BE else None
 
     def of(self, candidate: Candidate) -> Group | None:
         """The group of a candidate, of the sign it may have, that takes most; None without one."""
@@ -109,6 +106,7 @@ def ask(view: View, extra=(), tell=lambda share: None, *, before=None, anew=()) 
     new = [joint for joint in joints if joint not in made]
     for number, joint in enumerate(new):  # whose columns stand in memory together
         made[joint] = groups(view, [c for c in asked if c.joint == joint], new)
+        made[joint] += groups(view, together(made[joint], view.model.robot), new)
         tell((number + 1) / len(new))
     belief = null.believed([group for own in made.values() for group in own])
     for joint, own in ((joint, made[joint]) for joint in new):

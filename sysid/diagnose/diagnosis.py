@@ -13,7 +13,7 @@ The whole loop on one page:
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 
@@ -27,7 +27,7 @@ from ..noise import NoiseFloor, floors_of_fit
 from ..shown import ShownDiagnosis
 from ..specs import Experiment
 from ..transfer import transfers
-from ..unexplained import hidden_by_weights
+from ..unexplained import notices, of_few_blocks
 from ..view import View, elsewhere, first_view, law, too_short
 from ..warned import noticed
 from . import claims as claiming
@@ -87,8 +87,8 @@ def diagnose(
         if (test := lowpassed(measured.test, fit.joints, view.cutoff)) is None:
             raise too_short()
         claims, refused = claiming.claimed(steps, fit, whole, test, tell)
-        open_ = [[(m.candidate, p) for m, p in choice.members] for choice in undecided[-1:]]
-        refused += [borne_out.undecided(members, fit) for members in open_]
+        likely = (((m.candidate, p) for m, p in choice.members) for choice in undecided[-1:])
+        refused += [borne_out.undecided(list(members), fit) for members in likely]
         after, last = (claims[-1].step.after, claims[-1].after) if claims else (view, fit)
         first, then = (HeldOut(one.settled, test) for one in (view, after))
         parts = measured.train, measured.test
@@ -100,19 +100,17 @@ def diagnose(
             with_it = group and again() and refitted(after, group)
             return with_it and law(with_it.view, j, elsewhere(with_it.view, measured.test))
 
+        def few(j: int, least: float):
+            groups, refit = then_asked.by_joint.get(j, [()])[0], partial(refitted, after)
+            return of_few_blocks(groups, refit, after, test, j, least)
+
         more = refused, transfers(last), weighed, lambda j: law(after, j, again()), then_asked.near
-        said = verdicts(fit, claims, after.unknown, found, *more, beyond, fallen(first, then))
+        said = verdicts(fit, claims, after.unknown, found, *more, few, beyond, fallen(first, then))
         errors = last.rms("test").values()
         levels = np.array([e if f.rms is None else f.rms for f, e in zip(found, errors)])
         where = failures(first, fit.predictions["test"].thinned(thinning.MOST), levels)
         could = detectable(view, asked, candidates(view.model, extra))
-        part = () if whole else measured.notices
-        events, notices = (*view.motion.events, *test.events), (*part, *_notices(claims, refused))
+        events, part = (*view.motion.events, *test.events), () if whole else measured.notices
         told = tuple(claims), tuple(said), tuple(could), tuple(where), events, view, first, then
-        return Diagnosis(fit, dict(zip(fit.joints, found)), *told, tuple(refused), notices)
-
-
-def _notices(claims, refused) -> list[str]:
-    small = [c.head for c in claims if c.after.weights is None and not c.head.size_told]
-    told = [f"{r.effect} on {r.joint} is not claimed: {r.why}" for r in refused]
-    return told + [hidden_by_weights(head.effect, head.joint) for head in small]
+        say = tuple(refused), (*part, *notices(claims, refused))
+        return Diagnosis(fit, dict(zip(fit.joints, found)), *told, *say)

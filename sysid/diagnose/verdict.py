@@ -54,6 +54,7 @@ def verdicts(
     weighed: dict[str, float] | None = None,
     law: Callable[[int], Law] | None = None,
     near: Callable[[int, float, bool], tuple[Candidate, float] | None] = lambda *_: None,
+    few: Callable[[int, float], tuple[Candidate, float] | None] = lambda *_: None,
     beyond: Callable[[int, Candidate], Law | None] | None = None,
     took: Sequence[float] | None = None,
 ) -> list[Verdict]:
@@ -64,7 +65,8 @@ def verdicts(
             floors: of each joint's noise. carried: whether the model with all claims carries over,
             of each joint. weighed: {joint: RMS where each counts by its noise}.
             law: the function that stands out most of what is left of a joint; beyond: the same with
-            such an effect in the model as `near` says may be what is left, or predicted of it.
+            such an effect in the model as `near` says may be what is left, or predicted of it, or
+            `few`, of such a share of the test logs where training logs can ask no more.
             took: what all claims take of each joint's square on the test logs, low-passed.
     """
     last = claims[-1].after if claims else fit
@@ -101,6 +103,7 @@ def verdicts(
         part = remains.share if remains else 1.0
         looks = near(j, part * seen.total, bool(remains))
         looks = looks or in_vain(refused, fit.joints, j, HALF * part)
+        looks = looks or (asked[j] and few(j, HALF * part)) or None
         # of whichever logs they explain less of: where these do not carry over, another law may
         taken = max(min(sum(c.step.shares[j] for c in own or others), explained), 0.0)
         little = remains is None or remains.share * max(1.0 - taken, 0.0) <= _PREDICTED * taken

@@ -40,10 +40,10 @@ class Payload(LinkEffect):
         return chosen
 
     def among(self, logs):
-        """In one of them, or in all but one; of few in any, but not in all."""
+        """In any of few, but not in all; of more in each alone: where it is then follows from how much of it each has."""
         if not 1 < len(logs) <= _MOST:
             return []
-        counts = range(1, len(logs)) if len(logs) <= _EVERY else (1, len(logs) - 1)
+        counts = range(1, len(logs)) if len(logs) <= _EVERY else (1,)
         return [{"logs": list(own)} for count in counts for own in combinations(logs, count)]
 
     @property

@@ -104,6 +104,7 @@ def unknown(
     piece,
     step: float,
     rng: np.random.Generator,
+    noise=0.0,
 ) -> Unknown:
     """What a flexible function of the motion takes of a joint's residual, over folds that it was
     not fitted on.
@@ -112,6 +113,7 @@ def unknown(
         known: {q_joint, qd_joint, qdd_joint, load_joint of every joint, time: (n,)}. residual:
             (n,), zero where `use` (n,) is not set.
         fold: (n,) number of each row's fold. piece: (n,) of its piece, ascending.
+        noise: (n,) what the noise of the angles, drawn once more, adds to the residual.
     """
     spans = stretches(fold, known["time"], piece)
     told_by = groups(known, joint, piece, step, rng)
@@ -128,20 +130,22 @@ def unknown(
     )
     total = max(float(np.sum(residual**2)), 1e-300)
     shares = {name: float(one[1].sum() / total) for name, one in tried.items() if name != "*"}
-    share, by_chance = _tone(residual, step)
+    share, by_chance = _tone(residual, noise, step)
     if by_chance < TONE:
         shares["a steady tone"] = share
     return Unknown(gain, told, shares, residual, chance, tone=share if by_chance < TONE else 0.0)
 
 
-def _tone(residual, step: float) -> tuple[float, float]:
+def _tone(residual, noise, step: float) -> tuple[float, float]:
     """The share of a residual's square that its strongest line holds, and the probability of such a
     line above the spectrum about it, were it noise of any smooth colour (Fisher 1929, against a
-    local median)."""
+    local median), with lines that `noise` has as well: a coarse encoder at a steady speed."""
     n = len(residual)
-    power = np.abs(np.fft.rfft(residual * np.hanning(n))) ** 2
+    power, lines = (np.abs(np.fft.rfft(r * np.hanning(n))) ** 2 for r in (residual, noise))
     width = max(9, int(2.0 * n * step) | 1)  # two hertz
     level = running(power, width, "median") / np.log(2.0)
+    # in which phase its grain is met is chance, and moves a line by less than it is wide
+    level += running(lines, 5, "max")
     ratio = np.where(
         np.arange(len(power)) > n * step, power / np.maximum(level, 1e-300), 0.0
     )  # slower than 1 Hz is drift

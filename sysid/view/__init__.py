@@ -5,9 +5,10 @@ from .falls import falls
 from .joining import COMPARED, allowed, around, joined, shapes_in, shapes_of, weighed
 from .laws import law
 from .losses import losses, slow_losses, taken, took
+from .opened import elsewhere, first_view, too_short
 from .overlap import alike, holds, slow_part
 from .singles import greatest
-from .view import View, elsewhere, first_view, looked_at, too_short
+from .view import View, looked_at
 
 __all__ = [
     "COMPARED",

@@ -4,7 +4,7 @@ angles adds to it; and their sums over blocks. Frozen data; the functions stand 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -72,11 +72,7 @@ def designed(found: Settled, weights, source: Source, rough: Source, left=None) 
         residual = left
     change = turn @ (turn.T @ change)
     residual = residual - np.einsum("jnk,k->nj", columns, change)
-    # near a reversal the noise, drawn again, would leave out other rows, and a row that is missing
-    # is no noise: those count that count in the source
-    pieces = zip(rough.motion.pieces, source.motion.pieces)
-    motion = replace(rough.motion, pieces=tuple(replace(r, use=p.use) for r, p in pieces))
-    noisy = row.stack(found.model, motion, rough.stride)
+    noisy = row.stack(found.model, rough.motion, rough.stride)
     more = rough.full(noisy.columns) * weighted - columns
     x = np.append(found.x, np.zeros(size - own)) + change
     # a clock that is late shifts the measured torque as well
