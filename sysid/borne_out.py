@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from . import blocks, comparison
+from .addition import grown, spelled
 from .candidates import Candidate
 from .estimate import Fit
 from .model_parameters import ROBOT
@@ -16,6 +17,18 @@ CLEAR = 2.0  # standard deviations
 _LIKELY = 0.05  # less is not listed
 _WORTH = 1.5e-2  # of an error: what is worth having, three per cent of its square (`select`)
 _NOTHING = 5e-3  # of an error: a hundredth of its square, the least that is told in per cent
+
+
+def tried(how: Callable, candidate: Candidate, last: Fit, **known):
+    """What `how`, `pipeline.refit` or another of its kind, makes of a fit's experiment with a
+    candidate, written as `sysid add` writes it.
+
+    Args:
+        known: as of `how`.
+    """
+    name, joints, options = spelled(candidate, candidate.where(last.joints))
+    spec = grown(last.experiment, name, joints, options, every=last.joints)
+    return how(spec, last, **known)
 
 
 def doubted(

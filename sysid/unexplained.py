@@ -14,6 +14,7 @@ from .failures import taken
 from .model_parameters import ROBOT
 
 _MOST = 0.5  # of what stands above a floor, or of a square
+_FITTED = 0.1  # of what is left on test logs: a fit is made to see whether it takes more there
 WEIGHED = "`weighting: noise` under `solver:` in the experiment file"
 LOW_PASS = "`torque: low-pass` under `preprocess:` in the experiment file"
 
@@ -64,20 +65,31 @@ def in_vain(refused: Sequence[Refused], joints, j: int, least: float):
     return best and (best.candidate, best.p)
 
 
-def of_few_blocks(groups, refitted: Callable, view, test, j: int, least: float):
+def of_few_blocks(
+    groups,
+    refitted: Callable,
+    view,
+    test,
+    j: int,
+    least: float,
+    fitted: Callable[[Candidate], float] = lambda _: 0.0,
+):
     """The Candidate that takes most of joint j's squared residual on the test logs, under the
     low-pass, and at least such a share, of those that training logs show in too few places to ask
     them; with a p-value of one, as test logs may not choose. None where there is none.
 
     Args:
         groups: of the joint. refitted: makes a Member, or None, of one. view: the model without
-            them. test: Motion.
+            them. test: Motion. fitted: the share of the joint's misfit that goes as a fit has it,
+            about reversals too, where a low-pass shows none: half of it is enough.
     """
     few = sorted((g for g in groups if g.signed and not g.testable), key=lambda g: g.taken)
     members = [m for g in {g.candidate.kind: g for g in few}.values() if (m := refitted(g))]
     shares = {m.candidate: taken(view.settled, m.view.settled, test)[j] for m in members}
     best = max(shares, key=shares.get, default=None)
-    return (best, 1.0) if best and shares[best] >= least else None
+    if best and (shares[best] >= least or (shares[best] > _FITTED and fitted(best) >= _MOST)):
+        return best, 1.0
+    return None
 
 
 def raw(fit: Fit) -> bool:

@@ -312,11 +312,11 @@ def test_another_variant_of_what_joined_later_may_stand_for_a_head_that_is_refus
     monkeypatch.setattr(claims, "taken", lambda *views: np.zeros(2))
     monkeypatch.setattr(claims, "rejoined", lambda first, own: own)
     monkeypatch.setattr(claims.pipeline, "fit_grown", lambda *given, **how: SimpleNamespace())
-    monkeypatch.setattr(claims, "grown", lambda *given, **how: None)
+    monkeypatch.setattr(claims, "tried", lambda *given, **how: SimpleNamespace())
     monkeypatch.setattr(claims, "finding", lambda before, after, member, *rest: SimpleNamespace(effect=member.candidate.name, joint="elbow"))
     monkeypatch.setattr(claims.Claim, "beside_all", lambda claim, step, last: claim)
     fit.experiment, fit.filters = SimpleNamespace(preprocess=SimpleNamespace(torque=torque, filter=filter_)), None
-    stands, refused = claims.claimed(found, fit, None, None, None)
+    stands, refused = claims.claimed(found, fit, None)
     assert asked == ([[soft, play]] if borne else [[soft, play], [other]])
     assert [claim.head.effect for claim in stands] == ["backlash"] * borne
     assert [r.effect for r in refused] == ["elasticity"] + ["backlash"] * (not borne)

@@ -524,6 +524,13 @@ def test_of_those_that_test_logs_alone_can_ask_the_one_that_takes_most(monkeypat
     assert sorted(seen) == [("a", 2.0), ("b", -3.0), ("e", 0.0)]
     assert unexplained.of_few_blocks(groups, refitted, view, "test", 1, 0.7) is None
     assert unexplained.of_few_blocks([], refitted, view, "test", 1, 0.0) is None
+    # about reversals, which a low-pass shows none of, a fit may say more
+    assert unexplained.of_few_blocks(groups, refitted, view, "test", 1, 0.7, {"b": 0.8}.get) == ("b", 1.0)
+    assert unexplained.of_few_blocks(groups, refitted, view, "test", 1, 0.7, {"b": 0.4}.get) is None
+    shares["b"] = 0.05
+    assert unexplained.of_few_blocks(groups, refitted, view, "test", 1, 0.7, {"a": 0.9}.get) == ("a", 1.0)
+    shares["a"] = 0.05
+    assert unexplained.of_few_blocks(groups, refitted, view, "test", 1, 0.7, {"a": 0.9}.get) is None
 
 
 def test_a_law_stands_beside_what_is_claimed():

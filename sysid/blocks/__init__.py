@@ -25,7 +25,7 @@ from .deviations import (
     standard_error,
     z_score,
 )
-from .moderated import Belief, believed
+from .moderated import UNTOLD, Belief, believed
 from .numbering import (
     FEWEST,
     MOST,
@@ -43,6 +43,7 @@ from .redrawn import left_out, normal_scores, ratio_at, redrawn
 from .rivals import SAME, chances, confidence_set, price, within_one_error
 
 __all__ = [
+    "UNTOLD",
     "Belief",
     "FEWEST",
     "LEVERAGE",

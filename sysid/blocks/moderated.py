@@ -60,6 +60,9 @@ def _beyond(ratio, own, freedom: float):
     return np.stack([np.interp(r, _SIZES, p) for r, p in zip(ratio.T, known)], axis=1)
 
 
+UNTOLD = Belief()  # blocks alone count
+
+
 def believed(seen, foreseen, own, most: float = _MOST) -> Belief:
     """Read off all sums of a log.
 

@@ -12,11 +12,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from .. import pipeline
-from ..addition import grown, spelled
-from ..borne_out import doubted, size_told
+from ..borne_out import doubted, size_told, tried
 from ..carriers import with_tests
 from ..estimate import Fit
-from ..experiment_logs import Read
 from ..failures import taken
 from ..motion import Motion
 from ..unexplained import Refused, raw
@@ -51,19 +49,17 @@ class Claim:
 
 
 def claimed(
-    steps: list[Step], fit: Fit, measured: Read | None, test: Motion, tell: pipeline.Progress
+    steps: list[Step], fit: Fit, test: Motion, **known
 ) -> tuple[list[Claim], list[Refused]]:
     """Fit each step's head, and the best of what is tied with it, on top of what stands before it.
 
     Args:
-        fit: of the experiment as it is. measured: its logs; None: read anew. test: low-passed.
+        fit: of the experiment as it is. test: logs, low-passed. known: as of `pipeline.refit`.
     """
     stands, refused, last = dict[int, Claim](), dict[int, tuple[Fit, Refused]](), fit
 
     def with_(how: Callable, member: Member):
-        name, joints, options = spelled(member.candidate, member.candidate.where(fit.joints))
-        spec = grown(last.experiment, name, joints, options, every=fit.joints)
-        return how(spec, last, filters=fit.filters, progress=tell, measured=measured)
+        return tried(how, member.candidate, last, **known)
 
     heads = [step.candidate.kind for step in steps]
     # what was refused is asked once more with all that stand: the search found it beside them

@@ -27,7 +27,7 @@ from ..noise import NoiseFloor, floors_of_fit
 from ..shown import ShownDiagnosis
 from ..specs import Experiment
 from ..transfer import transfers
-from ..unexplained import notices, of_few_blocks
+from ..unexplained import explains, notices, of_few_blocks
 from ..view import View, elsewhere, first_view, law, too_short
 from ..warned import noticed
 from . import claims as claiming
@@ -86,7 +86,8 @@ def diagnose(
         steps, asked, then_asked, undecided = select.search(view, extra, level=level, tell=tell)
         if (test := lowpassed(measured.test, fit.joints, view.cutoff)) is None:
             raise too_short()
-        claims, refused = claiming.claimed(steps, fit, whole, test, tell)
+        known = {"filters": fit.filters, "progress": tell, "measured": whole}
+        claims, refused = claiming.claimed(steps, fit, test, **known)
         likely = (((m.candidate, p) for m, p in choice.members) for choice in undecided[-1:])
         refused += [borne_out.undecided(list(members), fit) for members in likely]
         after, last = (claims[-1].step.after, claims[-1].after) if claims else (view, fit)
@@ -101,8 +102,13 @@ def diagnose(
             return with_it and law(with_it.view, j, elsewhere(with_it.view, measured.test))
 
         def few(j: int, least: float):
+            def fitted(candidate: Candidate) -> float:
+                then = borne_out.tried(pipeline.fit_grown, candidate, last, **known)
+                pair = (one.rms("test")[fit.joints[j]] for one in (last, then))
+                return explains(*pair, found[j].rms or 0.0)
+
             groups, refit = then_asked.by_joint.get(j, [()])[0], partial(refitted, after)
-            return of_few_blocks(groups, refit, after, test, j, least)
+            return of_few_blocks(groups, refit, after, test, j, least, fitted)
 
         more = refused, transfers(last), weighed, lambda j: law(after, j, again()), then_asked.near
         said = verdicts(fit, claims, after.unknown, found, *more, few, beyond, fallen(first, then))

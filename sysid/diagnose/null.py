@@ -19,8 +19,6 @@ import numpy as np
 from .. import blocks
 from .evidence import Group
 
-NONE = blocks.Belief()
-
 
 def believed(groups: Sequence[Group]) -> blocks.Belief:
     """How far the spread that noise of one spectrum foresees is right, over all groups."""
@@ -34,7 +32,7 @@ def _spreads(groups: Sequence[Group]) -> np.ndarray:
     return np.array([g.spreads for g in groups]).reshape(-1, 3).T
 
 
-def statistics(groups: Sequence[Group], belief: blocks.Belief = NONE) -> np.ndarray:
+def statistics(groups: Sequence[Group], belief: blocks.Belief = blocks.UNTOLD) -> np.ndarray:
     """(groups,) T of each, on the scale of a normal variable; NaN where it cannot be tested."""
     groups = [g.tested for g in groups]
     spread, rest = belief.moderated(*_spreads(groups))
@@ -51,7 +49,7 @@ def chance(statistic: float, greatest: np.ndarray) -> float:
 def maxima(
     groups: Sequence[Group],
     rng: np.random.Generator,
-    belief: blocks.Belief = NONE,
+    belief: blocks.Belief = blocks.UNTOLD,
     *,
     draws: int = 1000,
 ) -> np.ndarray:

@@ -68,6 +68,15 @@ def again(segment, noise, cutoff: float, rng: np.random.Generator):
     return replace(segment, q=q, tau=tau)
 
 
+def on_same_rows(motion, rough) -> tuple:
+    """A motion and the same with the noise of its angles once more, with the rows that count in
+    both: where either has a joint turn round nobody knows the sign of its speed, and a row that is
+    missing in one of them is no noise."""
+    known = [p.use & r.use for p, r in zip(motion.pieces, rough.pieces, strict=True)]
+    both = ([replace(p, use=u) for p, u in zip(m.pieces, known)] for m in (motion, rough))
+    return tuple(replace(m, pieces=tuple(p)) for m, p in zip((motion, rough), both))
+
+
 def rougher(segment, noise, cutoff: float, rng: np.random.Generator) -> np.ndarray:
     """The angles (n, dof) of a segment with their noise once more.
 

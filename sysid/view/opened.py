@@ -12,7 +12,7 @@ from .. import experiment_logs
 from ..effect import NotFinite
 from ..errors import LogError
 from ..estimate import Fit
-from ..lowpass import again, band, lowpassed, narrowed, stride_of, widest
+from ..lowpass import again, band, lowpassed, narrowed, on_same_rows, stride_of, widest
 from ..notices import samples_of
 from ..posed_problem import inverse
 from ..prior_weight import USUAL, weakest, with_weight
@@ -41,8 +41,8 @@ def first_view(experiment: Experiment, fit: Fit, logs=None) -> View:
     if fit.strength.auto:
         # with weights of a geometric mean of one, every joint's residual has this variance
         rms = np.array(list(fit.rms("train").values()))
-        alike = (rms * inverse(rms))[rms > 0.0]
-        variance = float(np.median(alike)) ** 2 if len(alike) else np.inf
+        on_same_rows = (rms * inverse(rms))[rms > 0.0]
+        variance = float(np.median(on_same_rows)) ** 2 if len(on_same_rows) else np.inf
         experiment = with_weight(experiment, min(USUAL, weakest(variance)))
     if logs is None:
         logs = experiment_logs.read(experiment, fit.model.robot, experiment.data.train)
@@ -83,12 +83,7 @@ def _motions(logs, joints, cutoff: float, own: float, seed: int = 0):
     noise = np.max([piece.noise for piece in motion.pieces], axis=0)
     drawn = lambda s: again(s, noise, cutoff, rng)  # noqa: E731
     noisy = [replace(log, segments=tuple(map(drawn, log.segments))) for log in logs]
-    rough = lowpassed(noisy, joints, cutoff, known=own)
-    # where either draw has a joint turn round, nobody knows the sign of its speed; and a row that
-    # is missing is no noise
-    known = [p.use & r.use for p, r in zip(motion.pieces, rough.pieces)]
-    both = ([replace(p, use=u) for p, u in zip(m.pieces, known)] for m in (motion, rough))
-    return tuple(replace(m, pieces=tuple(p)) for m, p in zip((motion, rough), both))
+    return on_same_rows(motion, lowpassed(noisy, joints, cutoff, known=own))
 
 
 def elsewhere(view: View, logs, but=()) -> View | None:
