@@ -76,19 +76,22 @@ class Asked:
         return out
 
     def near(self, joint: int, gain: float, there: bool) -> tuple[Candidate, float] | None:
-        """The likeliest effect on a joint that may be there and takes half of a gain; there: as
-        something surely is, among its own alone."""
+        """The effect on a joint that may be there and takes half of a gain: the likeliest, else who
+        takes most of what no block can test; there: as something surely is, among its own alone."""
         found, statistics, gains, own = self.by_joint.get(joint, ([], [], [], None))
         takes = [k for k, taken in enumerate(gains) if taken > HALF * gain and found[k].signed]
         if not takes:
             return None
         best = max(takes, key=lambda k: np.nan_to_num(statistics[k], nan=-np.inf))
         p, alone = (null.chance(statistics[best], most) for most in (self.maxima, own))
-        return (found[best].candidate, p) if (alone if there else p) <= _MAY_BE else None
+        if (alone if there else p) <= _MAY_BE:
+            return found[best].candidate, p
+        untold = [k for k in takes if np.isnan(statistics[k])]  # nobody can say that it is not
+        return (found[max(untold, key=gains.__getitem__)].candidate, 1.0) if untold else None
 
     def of(self, candidate: Candidate) -> Group | None:
         """The group of a candidate, of the sign it may have, that takes most; None without one."""
-        own = [g for g in self.groups if g.candidate.kind == candidate.kind and g.signed]
+        own = (g for g in self.groups if g.candidate.kind == candidate.kind and g.signed)
         return max(own, key=lambda group: group.taken, default=None)
 
 
@@ -102,8 +105,7 @@ def ask(view: View, extra=(), tell=lambda share: None, *, before=None, anew=()) 
     asked = candidates(view.model, extra, sorted({piece.source for piece in view.motion.pieces}))
     joints = sorted({c.joint for c in asked})
     out = {j: before.by_joint[j] for j in joints if before is not None and j not in anew}
-    made = {joint: found for joint, (found, *_) in out.items()}
-    new = [joint for joint in joints if joint not in made]
+    made, new = {j: found for j, (found, *_) in out.items()}, [j for j in joints if j not in out]
     for number, joint in enumerate(new):  # whose columns stand in memory together
         made[joint] = groups(view, [c for c in asked if c.joint == joint], new)
         made[joint] += groups(view, together(made[joint], view.model.robot), new)

@@ -104,16 +104,15 @@ def diagnose(
         def few(j: int, least: float):
             def fitted(candidate: Candidate) -> float:
                 then = borne_out.tried(pipeline.fit_grown, candidate, last, **known)
-                pair = (one.rms("test")[fit.joints[j]] for one in (last, then))
-                return explains(*pair, found[j].rms or 0.0)
+                errors = (one.rms("test")[fit.joints[j]] for one in (last, then))
+                return explains(*errors, found[j].rms or 0.0)
 
-            groups, refit = then_asked.by_joint.get(j, [()])[0], partial(refitted, after)
-            return of_few_blocks(groups, refit, after, test, j, least, fitted)
+            own = then_asked.by_joint.get(j, [()])[0]
+            return of_few_blocks(own, partial(refitted, after), after, test, j, least, fitted)
 
         more = refused, transfers(last), weighed, lambda j: law(after, j, again()), then_asked.near
         said = verdicts(fit, claims, after.unknown, found, *more, few, beyond, fallen(first, then))
-        errors = last.rms("test").values()
-        levels = np.array([e if f.rms is None else f.rms for f, e in zip(found, errors)])
+        levels = np.array([f.rms or e for f, e in zip(found, last.rms("test").values())])
         where = failures(first, fit.predictions["test"].thinned(thinning.MOST), levels)
         could = detectable(view, asked, candidates(view.model, extra))
         events, part = (*view.motion.events, *test.events), () if whole else measured.notices
