@@ -6,12 +6,12 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from . import blocks, comparison
+from . import blocks, comparison, pipeline
 from .addition import grown, spelled
 from .candidates import Candidate
 from .estimate import Fit
 from .model_parameters import ROBOT
-from .unexplained import Refused, changed
+from .unexplained import Refused, changed, explains
 
 CLEAR = 2.0  # standard deviations
 _LIKELY = 0.05  # less is not listed
@@ -29,6 +29,16 @@ def tried(how: Callable, candidate: Candidate, last: Fit, **known):
     name, joints, options = spelled(candidate, candidate.where(last.joints))
     spec = grown(last.experiment, name, joints, options, every=last.joints)
     return how(spec, last, **known)
+
+
+def misfit_taken(last: Fit, j: int, floor, known: dict, candidate: Candidate) -> float:
+    """The share of joint j's misfit on the test logs that goes where a candidate is in a fit.
+
+    Args:
+        floor: its NoiseFloor. known: as of `pipeline.fit_grown`.
+    """
+    both = last, tried(pipeline.fit_grown, candidate, last, **known)
+    return explains(*(one.rms("test")[last.joints[j]] for one in both), floor.rms or 0.0)
 
 
 def doubted(

@@ -51,12 +51,27 @@ def _held(fit: Fit) -> set[str]:
 
 def _apart(fit: Fit, logs: Sequence[dict], still: Sequence[str]) -> Iterator[str]:
     """Joints whose error has another mean in some logs, where that is much of it."""
+    for joint, (share, _, said) in other_means(fit, logs, still).items():
+        if share > _SHARE:
+            yield (
+                f"what is left of {joint} is another in some logs, in the mean {said}: a torque's zero that was set anew, a load, or what hangs "
+                "on the place; `data.groups`, and an effect that is `per:` a group, give each its own"
+            )
+
+
+def other_means(fit: Fit, logs: Sequence[dict], still: Sequence[str] = ()) -> dict[str, tuple[float, float, str]]:
+    """{joint: (the share of its squared error that its logs' means make, their mean square, these in words)}, of joints whose error
+    has clearly another mean in some logs.
+
+    Args:
+        logs, still: as of `implausible`.
+    """
     from scipy.special import stdtrit
 
     named = [(part, k, own["log"]) for part in ("train", "test") for k, own in enumerate(o for o in logs if o["part"] == part)]
     if len(named) < 2:
-        return
-    parts = {part: told.thinned(_MOST) for part, told in fit.predictions.items()}
+        return {}
+    parts, out = {part: told.thinned(_MOST) for part, told in fit.predictions.items()}, {}
     for j, joint in enumerate(fit.joints):
         if joint in still:
             continue
@@ -68,13 +83,11 @@ def _apart(fit: Fit, logs: Sequence[dict], still: Sequence[str]) -> Iterator[str
         means, errors, counts, squares = np.array([own[1:] for own in known]).T
         middle = means - np.average(means, weights=counts)
         far = np.abs(middle) > stdtrit(_BLOCKS - 1, 1.0 - 0.5 * _CHANCE / len(known)) * errors
-        if far.any() and np.sum(counts * middle**2) > _SHARE * np.sum(squares):
-            unit = fit.predictions["test"].units[j]
+        if far.any():
+            unit, square = fit.predictions["test"].units[j], np.sum(counts * middle**2)
             said = ", ".join(f"{mean:+.2g} {unit} in {name}" for (name, *_), mean, own in zip(known, middle, far) if own)
-            yield (
-                f"what is left of {joint} is another in some logs, in the mean {said}: a torque's zero that was set anew, a load, or what hangs "
-                "on the place; `data.groups`, and an effect that is `per:` a group, give each its own"
-            )
+            out[joint] = float(square / max(np.sum(squares), 1e-300)), float(square / np.sum(counts)), said
+    return out
 
 
 def _mean(left: np.ndarray) -> tuple[float, float, int, float] | None:

@@ -12,6 +12,7 @@ from .candidates import Candidate
 from .estimate import Fit
 from .failures import taken
 from .model_parameters import ROBOT
+from .plausible import other_means
 
 _MOST = 0.5  # of what stands above a floor, or of a square
 _FITTED = 0.1  # of what is left on test logs: a fit is made to see whether it takes more there
@@ -158,6 +159,22 @@ def cause(
         f"its error{where} is {_times(error, floor)}, and nothing in the motion of these logs "
         "predicts the rest"
     )
+
+
+def by_log(fit: Fit, floors) -> dict[str, str]:
+    """{joint: why} of joints of whose error above the NoiseFloor, or above none where it is not
+    known, most is another mean in each log."""
+    out = {}
+    for joint, (share, square, said) in other_means(fit, fit.logs).items():
+        floor = floors[fit.joints.index(joint)]
+        noise = (floor.rms or floor.low or 0.0) ** 2
+        if square > _MOST * (square / share - noise):
+            out[joint] = (
+                f"most of what is left is another mean in each log ({said}): a torque's zero that "
+                "was set anew, a load, or what hangs on the place; what else is left these logs do "
+                "not say before that is known"
+            )
+    return out
 
 
 def smeared(errors: Sequence[float], floor) -> bool:

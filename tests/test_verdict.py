@@ -506,6 +506,25 @@ def test_what_training_logs_show_in_too_few_places_is_asked_of_the_test_logs():
     assert asked == []  # at the floor, and where blocks say what it may be
 
 
+def test_another_mean_in_each_log_is_no_law():
+    """What functions of the motion predict by saying which log it is."""
+    found, _ = asked_of_elbow(3.0, means={"elbow": "another mean in each log"})
+    assert found.status == "unresolved" and found.says.startswith("another mean in each log") and found.left is not None
+    found, _ = asked_of_elbow(3.0, means={"shoulder": "another mean in each log"})
+    assert found.status == "unknown"
+    found, _ = asked_of_elbow(3.0, near=(Candidate(find("stribeck"), 1, ()), 0.02), means={"elbow": "another mean"})
+    assert found.status == "unresolved" and found.says.startswith("what is left may be stribeck")
+
+
+@pytest.mark.parametrize(("square", "floor", "said"), [(0.5, 0.9, True), (0.5, 0.5, True), (0.2, 0.5, False), (0.2, None, False), (0.6, None, True)])
+def test_a_mean_by_log_is_told_where_it_is_most_of_what_is_no_noise(monkeypatch, square, floor, said):
+    monkeypatch.setattr(unexplained, "other_means", lambda fit, logs: {"elbow": (square / 1.0, square, "+1 in a.csv")})
+    fit = SimpleNamespace(joints=("shoulder", "elbow"), logs=())
+    level = SimpleNamespace(rms=None if floor is None else floor**0.5, low=None)
+    found = unexplained.by_log(fit, [None, level])
+    assert list(found) == ["elbow"] * said and (not said or "+1 in a.csv" in found["elbow"])
+
+
 def test_of_those_that_test_logs_alone_can_ask_the_one_that_takes_most(monkeypatch):
     groups = [SimpleNamespace(candidate=SimpleNamespace(kind=kind), signed=signed, testable=testable, taken=taken) for kind, signed, testable, taken in (
         ("a", True, False, 1.0), ("a", True, False, 2.0), ("b", True, False, -3.0), ("c", True, True, 9.0), ("d", False, False, 9.0), ("e", True, False, 0.0)

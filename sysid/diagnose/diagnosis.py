@@ -27,7 +27,7 @@ from ..noise import NoiseFloor, floors_of_fit
 from ..shown import ShownDiagnosis
 from ..specs import Experiment
 from ..transfer import transfers
-from ..unexplained import explains, notices, of_few_blocks
+from ..unexplained import by_log, notices, of_few_blocks
 from ..view import View, elsewhere, first_view, law, too_short
 from ..warned import noticed
 from . import claims as claiming
@@ -102,16 +102,13 @@ def diagnose(
             return with_it and law(with_it.view, j, elsewhere(with_it.view, measured.test))
 
         def few(j: int, least: float):
-            def fitted(candidate: Candidate) -> float:
-                then = borne_out.tried(pipeline.fit_grown, candidate, last, **known)
-                errors = (one.rms("test")[fit.joints[j]] for one in (last, then))
-                return explains(*errors, found[j].rms or 0.0)
-
+            fitted = partial(borne_out.misfit_taken, last, j, found[j], known)
             own = then_asked.by_joint.get(j, [()])[0]
             return of_few_blocks(own, partial(refitted, after), after, test, j, least, fitted)
 
         more = refused, transfers(last), weighed, lambda j: law(after, j, again()), then_asked.near
-        said = verdicts(fit, claims, after.unknown, found, *more, few, beyond, fallen(first, then))
+        rest = few, beyond, fallen(first, then), by_log(last, found)
+        said = verdicts(fit, claims, after.unknown, found, *more, *rest)
         levels = np.array([f.rms or e for f, e in zip(found, last.rms("test").values())])
         where = failures(first, fit.predictions["test"].thinned(thinning.MOST), levels)
         could = detectable(view, asked, candidates(view.model, extra))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -57,17 +57,17 @@ def verdicts(
     few: Callable[[int, float], tuple[Candidate, float] | None] = lambda *_: None,
     beyond: Callable[[int, Candidate], Law | None] | None = None,
     took: Sequence[float] | None = None,
+    means: Mapping[str, str] | tuple = (),
 ) -> list[Verdict]:
     """The verdict on every joint.
 
     Args:
         fit: of the experiment as it is. left: what functions of the motion predict with all claims.
-            floors: of each joint's noise. carried: whether the model with all claims carries over,
-            of each joint. weighed: {joint: RMS where each counts by its noise}.
-            law: the function that stands out most of what is left of a joint; beyond: the same with
-            such an effect in the model as `near` says may be what is left, or predicted of it, or
-            `few`, of such a share of the test logs where training logs can ask no more.
-            took: what all claims take of each joint's square on the test logs, low-passed.
+            floors: of each joint's noise. carried: whether the model with all claims carries over.
+            weighed: {joint: RMS where each counts by its noise}. law: the function that stands out
+            most of what is left of a joint; beyond: the same with what `near`, or by test logs
+            alone `few`, says may be it in the model. took: what all claims take of each joint's
+            square on the test logs, low-passed. means: {joint: why} where most is a mean by log.
     """
     last = claims[-1].after if claims else fit
     errors = last.rms("train"), last.rms("test")
@@ -94,8 +94,7 @@ def verdicts(
         whole |= noisy(*pairs[1], floors[j]) or floors[j].reached(both[0])
         whole |= smeared(both, floors[j])
         # where a floor is known, other weights say how much of the rest loud joints make
-        unsaid = took is not None and floors[j].rms is None
-        whole |= unsaid and (1.0 + _LEFT) * took[j] >= 1.0
+        whole |= took is not None and floors[j].rms is None and (1.0 + _LEFT) * took[j] >= 1.0
         seen, among = left[j], sum(asked)
         if law and asked[j] and then > 0.0:
             seen = seen.with_law(law(j), among, WORTH)
@@ -112,7 +111,7 @@ def verdicts(
         done = others and not own and remains and whole and little
         if own and (whole or evens[j]) and little:
             told = ("missing", own, explained, remains)
-        elif not done and (own or (remains and (further or not looks))):
+        elif not done and (own or (remains and (further or not looks) and joint not in means)):
             why = not_all(looks[0].name, further.share) if further else ""
             why = why if remains else cause(both, floors[j])
             told = ("unknown", own or others, explained, remains, why)
@@ -121,6 +120,7 @@ def verdicts(
             effect, p = looks or (None, 1.0)
             may = effect if p > LEVEL else None  # what stands above the level was fitted, in vain
             why = cause(both, floors[j], effect, may, without, louder)
+            why = why if looks else dict(means).get(joint, why)
             why += "".join({r.effect: f"; {r.told}" for r in refused if r.joint == joint}.values())
             told = ("unresolved", others, explained, remains, why, may, evens[j])
         elif not claims or (floors[j].reached(first) and not done):
