@@ -22,7 +22,9 @@ SPIKE = 3  # samples: "one or a few"
 FEWEST = 7  # samples that a parabola and its rest need
 SHORT = 8 * FEWEST  # samples: a log with fewer has no usual
 RESTING = 0.05  # of the usual speed: what is slower rests
+_AGAIN = 0.1  # of the values: by chance next to none of a billion are the same
 _ABOUT = 4  # steps to either side of a spike that it is compared with
+_EDGE = 0.2  # of what stays behind it: what is found is six usual steps, and more than that
 _BLOCK = 64  # samples of which a median is the level thereabouts
 BURST = 0.05  # s: a knock's time
 NORMAL = 0.6745  # median of a Gaussian's absolute values
@@ -44,11 +46,16 @@ def surprise(z, white: float, among=None, tail: float = 1.0) -> np.ndarray:
 
 
 def quantum(values) -> float:
-    """The step in which values (n,) are told: the first percentile of the gaps between them."""
-    own = np.unique(values)
-    gaps = np.diff(own)
-    gaps = gaps[gaps > 1e-9 * np.abs(own).max(initial=0.0)]
-    return float(np.quantile(gaps, 0.01)) if len(gaps) else 0.0
+    """The step in which values (n,) are told: the first percentile of the gaps between them, or, of
+    values of which many come again, between those that do: a clock that was made even has put
+    others between two levels."""
+    rounding = 1e-9 * np.abs(values).max(initial=0.0)
+    if not rounding > 0.0:
+        return 0.0
+    own, counts = np.unique(np.round(values / rounding), return_counts=True)
+    told = [own, own[counts > 1]] if counts[counts > 1].sum() > _AGAIN * len(values) else [own]
+    gaps = [np.diff(one) for one in told if len(one) > 1]
+    return float(max((np.quantile(one, 0.01) for one in gaps), default=0.0) * rounding)
 
 
 def runs(flags) -> list[tuple[int, int]]:
@@ -68,9 +75,11 @@ def spikes(tau, *, among: int = 1) -> list[list[tuple[int, int]]]:
 
     Of up to `SPIKE` samples that are entered and left by steps of opposite sign, min(|in|, |out|)
     over the usual step: the larger of the log's, of those thereabouts and of half of those next to
-    it on either side. So the peak of a fast smooth wave, entered and left by steps like those
-    beside it, is none, nor is an edge. Where a log has k spikes, chance is allowed k times as many:
-    no more than a share `CHANCE` of what is found is false.
+    it on either side, of steps the same way before it and after it, and of a share of what stays
+    behind it. So the peak of a fast smooth wave, entered and left by steps like those beside it,
+    is none, nor is an edge, nor what rises and falls in several steps or goes beyond where it
+    stays, as a torque does that breaks a joint away. Where a log has k spikes, chance is allowed k
+    times as many: no more than a share `CHANCE` of what is found is false.
 
     Args:
         among: how many parts its log has that are looked at by themselves, of all of which `CHANCE`
@@ -123,6 +132,11 @@ def _pulses(tau):
         out = into + width
         beside = np.maximum(_second(size, into, -1), _second(size, out, 1))
         scale = np.maximum(usual[into], 0.5 * beside)  # by which a wave's peak comes to 2 at most
+        # what rises and falls in several steps, and what stays, an edge that goes beyond its end
+        way = np.sign(step[into])
+        slopes = np.minimum(way * step[into - 1], -way * step[out + 1])
+        before, after = (_middle(tau, at, to) for at, to in ((into, -1), (out + 1, 1)))
+        scale = np.maximum(scale, np.maximum(slopes, _EDGE * np.abs(after - before)))
         z = ratio(np.minimum(size[into], size[out]), scale)
         # what lies between two spikes is nearer to the usual than they are
         inside = np.min([away[into + k] for k in range(1, width + 1)], axis=0)
@@ -134,6 +148,11 @@ def _second(size, at, way: int) -> np.ndarray:
     a, b, c, d = (size[at + way * k] for k in range(1, _ABOUT + 1))
     smaller, larger = (np.minimum(a, b), np.minimum(c, d)), (np.maximum(a, b), np.maximum(c, d))
     return np.minimum(np.maximum(*smaller), np.minimum(*larger))
+
+
+def _middle(tau, at, way: int) -> np.ndarray:
+    """The middle of the samples beside each, this one first."""
+    return np.median([tau[at + way * k] for k in range(_ABOUT - 1)], axis=0)
 
 
 def ratio(values, scale) -> np.ndarray:

@@ -15,6 +15,7 @@ from sysid.clock import Left
 from sysid.events import Event, again, extent, find, mended, told, unlogged, usable, with_clock
 from sysid.log import Log, Segment
 from sysid.lowpass import lowpassed
+from sysid.outliers import quantum
 from sysid.preprocess import prepare
 from sysid.repeats import held_angle, held_torque
 from sysid.specs import PreprocessSpec
@@ -225,6 +226,27 @@ def test_frozen_torque_frozen_angles_and_flat_tops():
     assert usable(made.t, JOINTS, flat).all()  # told, not left out
     notice = told(flat, 0.0, "test", 3)
     assert len(notice) == 1 and "not left out" in notice[0]
+
+
+@pytest.mark.parametrize("shape", [[-0.4, -1.9, -3.2, -2.6, -1.4, -0.9, -0.8], [-0.3, -1.2, -1.35, -1.2, -0.95, -0.9], [1.5, 2.4, 3.1, 1.7, 0.6, 0.2]])
+def test_how_a_torque_breaks_a_joint_away_is_no_spike(shape):
+    """It rises in several samples of a slow logger and goes beyond where it stays, or falls in several."""
+    made = segment(step=0.01, seconds=20.0, noise=0.02)
+    tau = made.tau.copy()
+    for row in (300, 777, 1200):
+        tau[row : row + len(shape), 1] += 8.0 * np.array(shape)
+        tau[row + len(shape) :, 1] += 8.0 * shape[-1]
+    assert find(replace(made, tau=tau), JOINTS) == ()
+
+
+def test_a_coarse_torque_on_a_clock_that_was_made_even_has_no_spikes_of_a_grain():
+    """Linear interpolation puts others between the levels, which the grain is not."""
+    made, rng = segment(seed=3, noise=0.03, step=0.01, seconds=20.0), np.random.default_rng(3)
+    stamps = made.t + 5e-4 * rng.normal(size=len(made.t))
+    coarse = 0.1 * np.round((made.tau - 0.5 * made.tau) / 0.1)  # slow: the grain is three times the noise
+    even = np.stack([np.interp(made.t, stamps, own) for own in coarse.T], axis=1)
+    assert [quantum(own) for own in even.T] == pytest.approx([0.1] * 3, rel=1e-3)
+    assert find(replace(made, tau=even), JOINTS) == ()
 
 
 def test_slow_loggers_and_coarse_signals_repeat_by_their_nature():
