@@ -9,6 +9,7 @@ import numpy as np
 from . import blocks, comparison, pipeline
 from .addition import grown, spelled
 from .candidates import Candidate
+from .effect import SensorEffect
 from .estimate import Fit
 from .model_parameters import ROBOT
 from .unexplained import Refused, changed, explains
@@ -83,8 +84,11 @@ def in_doubt(before: Fit, after: Fit, told: Fit, candidate: Candidate) -> str | 
         falls = "nor the fall of the test error beside its own"
         falls = falls if still else f"and the test error falls by less than {100.0 * _WORTH:.2g} %"
         return f"its size is nothing beside its deviation, {falls}"
-    # what moves a joint may show in the torque of those that it carries, or that carry it
-    wide = len(candidate.touches(2)) > 1 and comparison.falls(before, after, _NOTHING)
+    # what moves a joint may show in the torque of those that it carries, or that carry it; and a
+    # torque that is read wrongly is made up for by bodies, which those that carry them bear
+    read = isinstance(candidate.effect, SensorEffect) and change.delta_rms < 0.0
+    wide = len(candidate.touches(2)) > 1 or (read and size_told(told, *candidate.key))
+    wide = wide and comparison.falls(before, after, _NOTHING)
     if change.delta_rms > -_NOTHING * unit and not wide:
         falls = "hardly falls" if change.delta_rms < 0.0 else "does not fall"
         return f"with it the error on the test logs {falls} ({rise})"

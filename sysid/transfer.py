@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from . import blocks
 from .estimate import Fit
+from .gaussian import HIGHEST, Gaussian
 from .prediction import Prediction
 from .thinning import MOST
 
 _CLEAR = 3.0  # standard errors: one in some hundred joints would be told by chance
+_MOST = 0.5  # of what is more
+_NEAR = 0.9  # of what a low-pass sees about a row that counts
 _WORTH = 0.1  # of the training error: what a noise floor may be in doubt by
 
 
@@ -19,22 +23,41 @@ _WORTH = 0.1  # of the training error: what a noise floor may be in doubt by
 class Transfer:
     """A joint's RMS on the test logs over that on the training logs, with its standard error (NaN where blocks are too few).
 
-    spans: (logs,) how long each training log is [s].
+    spans: (logs,) how long each training log is [s]. band: [Hz] below which arms move; louder: RMS [N m or N] of what the test logs
+    have more of beyond it, where that is most of what they have more of.
     """
 
     joint: str
     ratio: float
     se: float
     spans: tuple[float, ...]
+    band: float = np.inf
+    louder: float = 0.0
 
     @property
-    def fails(self) -> bool:
+    def more(self) -> bool:
         """Whether the error on the test logs is clearly and by a part worth having the greater."""
         return self.ratio - 1.0 > max(_CLEAR * self.se, _WORTH)
 
     @property
+    def noisier(self) -> bool:
+        """Whether it is so by noise that is faster than arms move: of a coarse encoder in slow motion, or of accelerations where the
+        arm has more inertia."""
+        return self.more and self.louder > 0.0
+
+    @property
+    def fails(self) -> bool:
+        """Whether it is so by what a model may tell."""
+        return self.more and not self.noisier
+
+    @property
     def says(self) -> str:
         """The sentence; empty where the model carries over, or nothing tells."""
+        if self.noisier:
+            return (
+                f"the error on the test logs is {self.ratio:.2f} +- {self.se:.2g} times that on the training logs by what is faster than "
+                f"{self.band:.2g} Hz for the most part, as the noise of angles and of accelerations is: the model carries over"
+            )
         if not self.fails:
             return ""
         shortest, longest = (f"{end(self.spans):.2g}" for end in (min, max))
@@ -47,23 +70,60 @@ class Transfer:
         )  # fmt: skip
 
 
-def transfers(fit: Fit) -> list[Transfer]:
+def quieter(errors: Mapping[str, float], found: Sequence[Transfer]) -> dict[str, float]:
+    """Errors [N m or N] of the test logs without what these have more of than the training logs as noise."""
+    louder = {one.joint: one.louder for one in found if one.noisier}
+    return {joint: max(e**2 - louder.get(joint, 0.0) ** 2, 0.0) ** 0.5 for joint, e in errors.items()}
+
+
+def transfers(fit: Fit, band: float | None = None) -> list[Transfer]:
     """Test error against training error, joint by joint.
 
         ratio = sqrt(mean r_test^2 / mean r_train^2)
 
     Residuals of a log are alike over time: both means are judged over blocks of it, several times as long as their memory,
     by leaving one out (jackknife).
+
+    Args:
+        band: [Hz] below which arms move.
     """
     train, test = (fit.predictions[part].thinned(MOST) for part in ("train", "test"))
     spans = tuple(float(np.ptp(train.t[train.log == number])) for number in np.unique(train.log))
     parts = [(part, part.residual) for part in (train, test)]
+    slow = [(below := _slow(part, left, band), below.residual) for part, left in parts] if band else []
     out = []
     for j, joint in enumerate(fit.joints):
         (first, one), (second, two) = (_level(part, left[:, j], j) for part, left in parts)
-        ratio = float(np.exp(second - first)) if np.isfinite(first) and np.isfinite(second) else float("nan")
-        out.append(Transfer(joint, ratio, ratio * float(np.hypot(one, two)), spans))
+        told = np.isfinite(first) and np.isfinite(second)
+        ratio = float(np.exp(second - first)) if told else float("nan")
+        louder = 0.0
+        if band and told:
+            whole, below = (_excess(own, j) for own in (parts, slow))
+            louder = float(np.sqrt(whole - below)) if 0.0 < whole and below < _MOST * whole else 0.0
+        out.append(Transfer(joint, ratio, ratio * float(np.hypot(one, two)), spans, band or np.inf, louder))
     return out
+
+
+def _excess(parts, j: int) -> float:
+    """By how much the mean square of what is left of joint j on the test logs exceeds that on the training logs."""
+    squares = []
+    for part, left in parts:
+        use = slice(None) if part.use is None else part.use[:, j]
+        squares.append(float(np.mean(left[use, j] ** 2)) if len(left[use, j]) else 0.0)
+    return squares[1] - squares[0]
+
+
+def _slow(part: Prediction, left, band: float) -> Prediction:
+    """What is left (n, dof) without what is faster than a band [Hz], on rows about which nearly all count."""
+    step = float(np.median(np.diff(part.t)))
+    low = Gaussian(min(band, HIGHEST / step), step)
+    use = np.ones(left.shape) if part.use is None else part.use.astype(float)
+    out, near = np.zeros(left.shape), np.zeros(left.shape)
+    for number in np.unique(part.log):
+        rows = part.log == number
+        near[rows], out[rows] = low(use[rows], axis=0), low(left[rows], axis=0)
+    known = (near > _NEAR) & (use > 0.0)
+    return Prediction(part.log, part.t, np.where(known, out / np.maximum(near, _NEAR), 0.0), np.zeros(left.shape), known)
 
 
 def _level(part: Prediction, left, j: int) -> tuple[float, float]:

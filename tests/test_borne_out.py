@@ -68,6 +68,17 @@ def test_an_effect_is_refused_where_its_joints_error_rises_as_add_fits_it(monkey
     assert ("as `sysid add` fits it" in judged(monkeypatch, (-0.05, -0.05), own)) is refused
 
 
+@pytest.mark.parametrize(("told", "together", "refused"), [(True, -0.02, False), (False, -0.02, True), (True, -0.004, True)])
+def test_what_a_joints_bodies_made_up_for_may_show_in_the_torque_of_those_that_carry_it(monkeypatch, told, together, refused):
+    """A gain of the elbow's torque whose own error falls by 0.3 % only, and that of all joints together by more: where its size is told."""
+    before, after = Told(error=1.0), Told(error=0.99)
+    monkeypatch.setattr(borne_out, "size_told", lambda *_: told)
+    monkeypatch.setattr(comparison, "compare", lambda *_: (Difference("a", "b", "elbow", -0.003, 0.0005),))
+    monkeypatch.setattr(comparison, "together", lambda *_, **__: Difference("a", "b", "*", together, 0.002))
+    said = in_doubt(before, after, after, Candidate(vocabulary.find("torque_gain"), 1, ()))
+    assert bool(said) is refused
+
+
 @pytest.mark.parametrize(("se", "refused"), [(0.02, False), (0.06, True)])
 def test_a_quiet_joints_own_error_may_rise_where_that_on_the_test_logs_clearly_falls(monkeypatch, se, refused):
     """A fit that weighs all joints alike trades what a quiet one loses on the training logs for what a loud one gains."""

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
+from sysid import blocks
 from sysid.view import greatest
 from sysid.view.singles import _Asker, _beyond, _draws, _share
 from tests.evidences import grouped, posed, roughened, viewed
@@ -39,6 +40,27 @@ def test_single_columns_are_told_as_groups_are():
         assert told.own[k] == pytest.approx(group.freedom[1] - 1.0, rel=1e-9)
 
 
+def test_what_a_column_takes_is_counted_on_its_joints_own_rows():
+    """With it the bodies are others, by which other joints win or lose as well: of a bending of joint 0 alone joint 1 gains nothing."""
+    p, columns = problem(3)
+    column = p.a[1] @ np.ones(p.a.shape[2]) + 0.2 * columns[:, 0]
+    p.tau[:, 1] += 0.3 * column
+    view = viewed(p)
+    score, squares, *own = _Asker(view, 1, np.random.default_rng(0), 200).apart(view.weights[1] * column[:, None], 0.0 * column[:, None])
+    # fold by fold: the coefficient of the other blocks, and what it takes of the joint's rows in these
+    unit, turn = squares.sum(), view.design.columns[1]
+    off = view.weights[1] * column - turn @ (turn.T @ (view.weights[1] * column))
+    expected, fold = 0.0, blocks.folds(BLOCKS)
+    for f in np.unique(fold):
+        inside = np.flatnonzero(fold == f)
+        size = (score.sum() - score[inside].sum()) / (unit - squares[inside].sum())
+        rows = np.isin(p.number, inside)
+        r = view.design.residual[rows, 1]
+        expected += np.sum(r**2) - np.sum((r - size * off[rows]) ** 2)
+    assert _share([(score, squares, *own)]) == pytest.approx(expected, rel=1e-6) and expected > 1.0
+    assert _share([(score, squares, score, squares)]) > expected + 1e-3 * abs(expected)
+
+
 def test_the_noise_of_the_angles_is_taken_off_as_of_groups():
     p, columns = problem()
     columns = columns[:, :3] + 0.3 * p.a[1][:, :3]
@@ -53,8 +75,8 @@ def test_the_noise_of_the_angles_is_taken_off_as_of_groups():
     for k, group in enumerate(groups):
         assert told.c[0, k] ** 2 == pytest.approx(group.c @ group.c, rel=1e-9)
         assert told.seen[0, k] == pytest.approx(np.sum(group.moves**2), rel=1e-9)
-        score, squares = asker.apart(view.weights[1] * columns[:, [k]], view.weights[1] * more[:, [k]])
-        assert _share([(score, squares)]) == pytest.approx(max(group.taken, 0.0), rel=1e-9)
+        score, squares, *_ = asker.apart(view.weights[1] * columns[:, [k]], view.weights[1] * more[:, [k]])
+        assert _share([(score, squares, score, squares)]) == pytest.approx(max(group.taken, 0.0), rel=1e-9)
     assert groups[1].taken > 5.0
     # with more of it they are not asked at all, neither as groups
     loud = asker.told_by(view.weights[1] * columns, view.weights[1] * 4.0 * more)

@@ -231,8 +231,11 @@ def test_each_joint_is_said_in_a_paragraph():
     (_, lines), *_ = text.verdict(of(document(verdict=[{"joint": "j3", "status": "complete"}])), 80)
     assert " ".join(map(str.strip, lines)) == (
         "j3: complete: no further effect is supported by these logs; its error is 4.00 times the "
-        "noise floor, and that is not known to better"
+        "noise floor; a floor is known to a tenth and two standard errors"
     )
+    louder = document(verdict=[{"joint": "j3", "status": "complete", "says": "the noise of the test logs is louder"}])
+    (_, lines), *_ = text.verdict(of(louder), 80)
+    assert " ".join(map(str.strip, lines)).endswith("its error is 4.00 times the noise floor the noise of the test logs is louder")
     close = document(verdict=[{"joint": "j3", "status": "complete"}])
     close["joints"]["j3"]["noise_floor"] = 0.39
     (_, lines), *_ = text.verdict(of(close), 80)

@@ -1,5 +1,6 @@
 """Whether a model carries over to the test logs: residuals of known size and memory, and what is said of them."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -7,7 +8,7 @@ import pytest
 from scipy.signal import lfilter
 
 from sysid.prediction import Prediction
-from sysid.transfer import Transfer, transfers
+from sysid.transfer import Transfer, _slow, quieter, transfers
 
 STEP = 0.01
 
@@ -57,3 +58,31 @@ def test_where_nothing_tells_nothing_is_said():
     use[:10] = True
     (found,) = of(few, part(rng, [9.0], use=use))
     assert np.isnan(found.ratio) and not found.fails and found.says == ""
+
+
+@pytest.mark.parametrize(("cutoff", "fails"), [(None, False), (4.0, True)])
+def test_noise_that_is_louder_is_no_model_that_does_not_carry_over(cutoff, fails):
+    """White noise beyond the band is the test logs' own; an error that is as slow as arms move is the model's."""
+    rng = np.random.default_rng(4)
+    train, test = part(rng, [1.0], spans=(30.0,)), part(rng, [1.0], spans=(30.0,))
+    more = rng.normal(size=test.measured.shape)
+    if cutoff is not None:
+        pole = np.exp(-2.0 * np.pi * cutoff * STEP)
+        more = lfilter([np.sqrt(1.0 - pole**2)], [1.0, -pole], more, axis=0)
+    test = replace(test, measured=test.measured + more)
+    (found,) = transfers(SimpleNamespace(joints=("j0",), predictions={"train": train, "test": test}), 12.0)
+    assert found.more and found.fails is fails and found.noisier is not fails
+    assert ("carries over" in found.says) is not fails
+    left = quieter({"j0": 1.41}, [found])["j0"]
+    assert left == (1.41 if fails else pytest.approx(1.0, abs=0.15))
+
+
+def test_rows_that_do_not_count_are_in_no_band():
+    """Beside a gap a low-pass sees too little to say what is slow."""
+    rng, use = np.random.default_rng(5), np.ones((3000, 1), dtype=bool)
+    use[:, 0] = np.arange(3000) % 300 > 100
+    spoilt = part(rng, [1.0], spans=(30.0,), use=use)
+    spoilt = replace(spoilt, measured=np.where(use, spoilt.measured, 50.0))
+    slow = _slow(spoilt, spoilt.residual, 5.0)
+    assert 0 < slow.use.sum() < use.sum() and not (slow.use & ~use).any()
+    assert np.abs(slow.residual).max() < 1.5

@@ -506,6 +506,20 @@ def test_what_training_logs_show_in_too_few_places_is_asked_of_the_test_logs():
     assert asked == []  # at the floor, and where blocks say what it may be
 
 
+@pytest.mark.parametrize(("before", "after", "status"), [(1.15, 1.02, "explained"), (1.15, 1.14, "complete"), (1.09, 1.0, "complete")])
+def test_a_joint_near_its_floor_whose_error_another_claim_lowers_is_explained(before, after, status):
+    """Above a tenth, within two standard errors; worth having is what lowers an error by 1.5 %."""
+    other, level = claim("stribeck", "shoulder", [0.9, 0.3], fitted(after, 1.0)), replace(floor(), std=0.05)
+    assert verdicts(fitted(before, 3.0), [other], [NOISE] * 2, [floor(), level])[1].status == status
+
+
+@pytest.mark.parametrize(("louder", "status"), [(2.8, "complete"), (1.0, "unresolved")])
+def test_noise_that_is_louder_in_the_test_logs_is_no_misfit(louder, status):
+    loud = Transfer("elbow", 3.0, 0.1, (20.0,), 15.0, louder)
+    found = verdicts(fitted(3.0, train=1.0), (), [NOISE] * 2, [floor()] * 2, carried=[loud])[1]
+    assert found.status == status and "what is faster than 15 Hz" in found.carries
+
+
 def test_another_mean_in_each_log_is_no_law():
     """What functions of the motion predict by saying which log it is."""
     found, _ = asked_of_elbow(3.0, means={"elbow": "another mean in each log"})

@@ -25,12 +25,21 @@ def taking_part(moves) -> np.ndarray:
     return whole**2 / np.maximum(np.sum(spread**2, axis=(-2, -1)), 1e-300)
 
 
-def gains(c, scores, squares) -> np.ndarray:
+def gains(c, scores, squares, own=None) -> np.ndarray:
     """(..., folds) of coefficients c (..., k) with scores (..., blocks, k); the last block, the
-    prior, is in no fold."""
+    prior, is in no fold.
+
+    Args:
+        own: scores and squares of those rows whose gain is asked; None: of all.
+    """
     first = np.flatnonzero(np.diff(folds(scores.shape[-2] - 1), prepend=-1))
-    s = np.add.reduceat(scores[..., :-1, :], first, axis=-2)
-    g = np.add.reduceat(squares[..., :-1, :, :], first, axis=-3)
+
+    def by_fold(scores, squares):
+        s = np.add.reduceat(scores[..., :-1, :], first, axis=-2)
+        return s, np.add.reduceat(squares[..., :-1, :, :], first, axis=-3)
+
+    s, g = by_fold(scores, squares)
     system = (1.0 + 1e-9) * np.eye(s.shape[-1]) - g
     rest = np.linalg.solve(system, (c[..., None, :] - s)[..., None])[..., 0]
+    s, g = (s, g) if own is None else by_fold(*own)
     return 2.0 * np.sum(rest * s, axis=-1) - np.einsum("...fi,...fij,...fj->...f", rest, g, rest)

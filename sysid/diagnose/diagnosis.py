@@ -106,8 +106,8 @@ def diagnose(
             own = then_asked.by_joint.get(j, [()])[0]
             return of_few_blocks(own, partial(refitted, after), after, test, j, least, fitted)
 
-        more = refused, transfers(last), weighed, lambda j: law(after, j, again()), then_asked.near
-        rest = few, beyond, fallen(first, then), by_log(last, found)
+        more = refused, transfers(last, view.cutoff), weighed, lambda j: law(after, j, again())
+        rest = then_asked.near, few, beyond, fallen(first, then), by_log(last, found)
         said = verdicts(fit, claims, after.unknown, found, *more, *rest)
         levels = np.array([f.rms or e for f, e in zip(found, last.rms("test").values())])
         where = failures(first, fit.predictions["test"].thinned(thinning.MOST), levels)

@@ -10,7 +10,8 @@ import numpy as np
 from ..candidates import Candidate
 from ..estimate import Fit
 from ..flexible import Law, Unknown
-from ..transfer import Transfer
+from ..noise.floor import DOUBT
+from ..transfer import Transfer, quieter
 from ..unexplained import by_weights, cause, explains, in_vain, loudest, noisy, not_all, smeared
 from .ask import HALF
 from .claims import Claim
@@ -70,7 +71,7 @@ def verdicts(
             square on the test logs, low-passed. means: {joint: why} where most is a mean by log.
     """
     last = claims[-1].after if claims else fit
-    errors = last.rms("train"), last.rms("test")
+    errors = last.rms("train"), quieter(last.rms("test"), carried)
     weighed, most = weighed or {}, {j: max(e[j] for e in errors) for j in fit.joints}
     by_joint = list(zip(fit.joints, floors))
     reaches = [floor.reached(most[joint]) for joint, floor in by_joint]
@@ -109,6 +110,8 @@ def verdicts(
         further = beyond(j, looks[0]) if looks and remains and beyond and not own else None
         further = further if further and further.predicts(among, WORTH) else None
         done = others and not own and remains and whole and little
+        above = first > (1.0 + DOUBT) * (floors[j].rms or 0.0)
+        fell = others and above and then**2 < (1.0 - WORTH) * first**2
         if own and (whole or evens[j]) and little:
             told = ("missing", own, explained, remains)
         elif not done and (own or (remains and (further or not looks) and joint not in means)):
@@ -123,7 +126,7 @@ def verdicts(
             why = why if looks else dict(means).get(joint, why)
             why += "".join({r.effect: f"; {r.told}" for r in refused if r.joint == joint}.values())
             told = ("unresolved", others, explained, remains, why, may, evens[j])
-        elif not claims or (floors[j].reached(first) and not done):
+        elif not claims or (floors[j].reached(first) and not (done or fell)):
             told = ("complete",)
         else:
             who = others or (max(claims, key=lambda c, j=j: c.step.shares[j]),)

@@ -168,4 +168,5 @@ def near(v: dict, document: dict) -> str:
     if not floor or (error or 0.0) < 1.05 * floor:
         return ""
     times = f"{error / floor:#.3g} times the noise floor"
-    return f"; its error is {times}, and that is not known to better"
+    known = "; a floor is known to a tenth and two standard errors" if not v.get("says") else ""
+    return f"; its error is {times}{known}"

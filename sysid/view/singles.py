@@ -99,14 +99,18 @@ def _parted(values, ends) -> Iterator[tuple[np.ndarray, np.ndarray]]:
 
 
 def _share(told) -> float:
-    """What a column takes of the squared residual of blocks that it was not fitted on, by the
-    scores and squares (blocks + 1,) of each view, its prior's last."""
-    score, squares = (
+    """What a column takes of the squared residual of its joint's own rows, in blocks that it was
+    not fitted on: to the bodies that it lets go, other joints may owe as much. By the scores and
+    squares (blocks + 1,) of each view, and the same of the joint's own rows; the prior's last."""
+    score, squares, *own = (
         np.concatenate([*(v[:-1] for v in s), [sum(v[-1] for v in s)]]) for s in zip(*told)
     )
     unit = squares.sum()
-    c, scores = score.sum() / np.sqrt(unit), score[:, None] / np.sqrt(unit)
-    return max(float(blocks.gains(np.array([c]), scores, squares[:, None, None] / unit).sum()), 0.0)
+    parts = [
+        (a[:, None] / np.sqrt(unit), b[:, None, None] / unit) for a, b in ((score, squares), own)
+    ]
+    c = np.array([score.sum() / np.sqrt(unit)])
+    return max(float(blocks.gains(c, *parts[0], own=parts[1]).sum()), 0.0)
 
 
 def _outlying(size):
@@ -210,10 +214,16 @@ class _Asker:
         rough = np.sum(more**2, axis=0) - np.sum(absorbed * noise, axis=0)
         return own, squares, score, absorbed, mixed, rough
 
-    def apart(self, column: np.ndarray, more: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Scores and squares (blocks + 1,) of one weighted column (n, 1), off the model."""
-        _, squares, score, *_ = self._summed(column, more)
-        return score[:, 0], squares[:, 0]
+    def apart(self, column: np.ndarray, more: np.ndarray) -> tuple[np.ndarray, ...]:
+        """Scores and squares (blocks + 1,) of one weighted column (n, 1), off the model, and the
+        same on the joint's own rows."""
+        _, squares, score, absorbed, *_ = self._summed(column, more)
+        off = (column - self.columns @ absorbed)[:, 0]
+        noisy = (more - self.rough_columns @ absorbed)[:, 0]
+        starts = [rows.start for rows in self.spans]
+        own = (self.residual * off - self.noise * noisy, off**2)
+        own = (np.append(np.add.reduceat(values, starts), 0.0) for values in own)
+        return score[:, 0], squares[:, 0], *own
 
     def told_by(self, values: np.ndarray, more: np.ndarray) -> _Told:
         """Of weighted columns (n, k), with what the angles' noise, once more, adds to them."""
