@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 import numpy as np
 
 from . import blocks, comparison, pipeline
 from .addition import grown, spelled
 from .candidates import Candidate
-from .effect import SensorEffect
+from .effect import NotFinite, SensorEffect
 from .estimate import Fit
 from .model_parameters import ROBOT
 from .unexplained import Refused, changed, explains
@@ -33,12 +33,16 @@ def tried(how: Callable, candidate: Candidate, last: Fit, **known):
 
 
 def misfit_taken(last: Fit, j: int, floor, known: dict, candidate: Candidate) -> float:
-    """The share of joint j's misfit on the test logs that goes where a candidate is in a fit.
+    """The share of joint j's misfit on the test logs that goes where a candidate is in a fit; none
+    where it is no finite number there.
 
     Args:
         floor: its NoiseFloor. known: as of `pipeline.fit_grown`.
     """
-    both = last, tried(pipeline.fit_grown, candidate, last, **known)
+    try:
+        both = last, tried(pipeline.fit_grown, candidate, last, **known)
+    except NotFinite:
+        return 0.0
     return explains(*(one.rms("test")[last.joints[j]] for one in both), floor.rms or 0.0)
 
 
@@ -135,10 +139,10 @@ def size_told(fit: Fit, effect: str, joint: int) -> bool:
     return blocks.clear(away, known, count)
 
 
-def undecided(members: Sequence[tuple[Candidate, float]], fit: Fit) -> Refused:
-    """What is there and cannot be told from effects on other joints, first the first: candidates
-    with their probabilities."""
-    likely = [(*one.named(fit.joints), chance) for one, chance in members]
+def undecided(choice, fit: Fit) -> Refused:
+    """What is there and cannot be told from effects on other joints, first the first: of a choice
+    the members with their probabilities."""
+    likely = [(*one.candidate.named(fit.joints), chance) for one, chance in choice.members]
     names = [
         f"{one} on {at} ({100 * chance:.0f} %)" for one, at, chance in likely if chance >= _LIKELY
     ]

@@ -123,7 +123,8 @@ def candidates(model: Model, extra=(), logs: Sequence[str] = ()) -> list[Candida
 
 def together(groups, robot: Robot) -> list[Candidate]:
     """Of what was asked in single logs only, in those that have most of it together: of its first
-    coefficient as each log alone tells it, for two logs up to all but one.
+    coefficient, which is a mass and none of a load is negative, as each log alone tells it, for two
+    logs up to all but one.
 
     Args:
         groups: candidates that were asked, with their `coefficients`.

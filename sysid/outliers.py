@@ -22,7 +22,8 @@ SPIKE = 3  # samples: "one or a few"
 FEWEST = 7  # samples that a parabola and its rest need
 SHORT = 8 * FEWEST  # samples: a log with fewer has no usual
 RESTING = 0.05  # of the usual speed: what is slower rests
-_AGAIN = 0.1  # of the values: by chance next to none of a billion are the same
+_LEVELS = 5  # at least that come again, of a torque that is told in steps
+_AGAIN = 0.02  # of the values: by chance next to none of a billion are the same
 _ABOUT = 4  # steps to either side of a spike that it is compared with
 _EDGE = 0.2  # of what stays behind it: what is found is six usual steps, and more than that
 _BLOCK = 64  # samples of which a median is the level thereabouts
@@ -52,8 +53,14 @@ def quantum(values) -> float:
     rounding = 1e-9 * np.abs(values).max(initial=0.0)
     if not rounding > 0.0:
         return 0.0
-    own, counts = np.unique(np.round(values / rounding), return_counts=True)
-    told = [own, own[counts > 1]] if counts[counts > 1].sum() > _AGAIN * len(values) else [own]
+    grains = np.round(values / rounding)
+    told = [np.unique(grains)]
+    # a value that is held comes once: a brake's and a frozen one are two levels of any torque
+    fresh = grains[np.append(True, np.diff(grains) != 0.0)]
+    own, counts = np.unique(fresh, return_counts=True)
+    again = counts > 1
+    if again.sum() >= _LEVELS and counts[again].sum() > _AGAIN * len(fresh):
+        told.append(own[again])
     gaps = [np.diff(one) for one in told if len(one) > 1]
     return float(max((np.quantile(one, 0.01) for one in gaps), default=0.0) * rounding)
 

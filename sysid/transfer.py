@@ -15,6 +15,7 @@ from .thinning import MOST
 
 _CLEAR = 3.0  # standard errors: one in some hundred joints would be told by chance
 _MOST = 0.5  # of what is more
+_FEWEST, _GAP = 50, 1.5  # rows that tell a mean square; steps
 _NEAR = 0.9  # of what a low-pass sees about a row that counts
 _WORTH = 0.1  # of the training error: what a noise floor may be in doubt by
 
@@ -23,7 +24,7 @@ _WORTH = 0.1  # of the training error: what a noise floor may be in doubt by
 class Transfer:
     """A joint's RMS on the test logs over that on the training logs, with its standard error (NaN where blocks are too few).
 
-    spans: (logs,) how long each training log is [s]. band: [Hz] below which arms move; louder: RMS [N m or N] of what the test logs
+    spans: (logs,) how long each training log is [s]. band: [Hz] of the diagnosis' low-pass, above which is little but noise; louder: RMS [N m or N] of what the test logs
     have more of beyond it, where that is most of what they have more of.
     """
 
@@ -52,7 +53,7 @@ class Transfer:
 
     @property
     def says(self) -> str:
-        """The sentence; empty where the model carries over, or nothing tells."""
+        """The sentence; empty where the errors are alike, or nothing tells."""
         if self.noisier:
             return (
                 f"the error on the test logs is {self.ratio:.2f} +- {self.se:.2g} times that on the training logs by what is faster than "
@@ -85,7 +86,7 @@ def transfers(fit: Fit, band: float | None = None) -> list[Transfer]:
     by leaving one out (jackknife).
 
     Args:
-        band: [Hz] below which arms move.
+        band: [Hz] of a low-pass above which is little but noise; None: it is not asked what is noise.
     """
     train, test = (fit.predictions[part].thinned(MOST) for part in ("train", "test"))
     spans = tuple(float(np.ptp(train.t[train.log == number])) for number in np.unique(train.log))
@@ -98,30 +99,36 @@ def transfers(fit: Fit, band: float | None = None) -> list[Transfer]:
         ratio = float(np.exp(second - first)) if told else float("nan")
         louder = 0.0
         if band and told:
-            whole, below = (_excess(own, j) for own in (parts, slow))
+            # beside a gap nobody knows what is slow: both of the same rows
+            whole, below = (_excess(own, j) for own in ([(one, left) for (_, left), (one, _) in zip(parts, slow)], slow))
             louder = float(np.sqrt(whole - below)) if 0.0 < whole and below < _MOST * whole else 0.0
         out.append(Transfer(joint, ratio, ratio * float(np.hypot(one, two)), spans, band or np.inf, louder))
     return out
 
 
 def _excess(parts, j: int) -> float:
-    """By how much the mean square of what is left of joint j on the test logs exceeds that on the training logs."""
+    """By how much the mean square of what is left of joint j on the test logs exceeds that on the training logs; NaN of too few rows."""
     squares = []
     for part, left in parts:
-        use = slice(None) if part.use is None else part.use[:, j]
-        squares.append(float(np.mean(left[use, j] ** 2)) if len(left[use, j]) else 0.0)
+        rows = part.use[:, j]
+        squares.append(float(np.mean(left[rows, j] ** 2)) if rows.sum() >= _FEWEST else np.nan)
     return squares[1] - squares[0]
 
 
 def _slow(part: Prediction, left, band: float) -> Prediction:
     """What is left (n, dof) without what is faster than a band [Hz], on rows about which nearly all count."""
-    step = float(np.median(np.diff(part.t)))
-    low = Gaussian(min(band, HIGHEST / step), step)
     use = np.ones(left.shape) if part.use is None else part.use.astype(float)
     out, near = np.zeros(left.shape), np.zeros(left.shape)
+    steps = np.diff(part.t)
     for number in np.unique(part.log):
-        rows = part.log == number
-        near[rows], out[rows] = low(use[rows], axis=0), low(left[rows], axis=0)
+        rows = np.flatnonzero(part.log == number)
+        step = float(np.median(np.diff(part.t[rows]))) if len(rows) > 1 else 0.0
+        if not step > 0.0:
+            continue
+        low = Gaussian(min(band, HIGHEST / step), step)
+        # a log that was split goes on elsewhere
+        for own in np.split(rows, np.flatnonzero(steps[rows[:-1]] > _GAP * step) + 1):
+            near[own], out[own] = low(use[own], axis=0), low(left[own], axis=0)
     known = (near > _NEAR) & (use > 0.0)
     return Prediction(part.log, part.t, np.where(known, out / np.maximum(near, _NEAR), 0.0), np.zeros(left.shape), known)
 

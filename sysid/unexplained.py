@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .candidates import Candidate
+from .effect import NotFinite
 from .estimate import Fit
 from .failures import taken
 from .model_parameters import ROBOT
@@ -85,8 +86,13 @@ def of_few_blocks(
             about reversals too, where a low-pass shows none: half of it is enough.
     """
     few = sorted((g for g in groups if g.signed and not g.testable), key=lambda g: g.taken)
-    members = [m for g in {g.candidate.kind: g for g in few}.values() if (m := refitted(g))]
-    shares = {m.candidate: taken(view.settled, m.view.settled, test)[j] for m in members}
+    shares = {}
+    for group in {g.candidate.kind: g for g in few}.values():
+        try:
+            if member := refitted(group):
+                shares[member.candidate] = taken(view.settled, member.view.settled, test)[j]
+        except NotFinite:  # on the test motion
+            continue
     best = max(shares, key=shares.get, default=None)
     if best and (shares[best] >= least or (shares[best] > _FITTED and fitted(best) >= _MOST)):
         return best, 1.0
@@ -161,18 +167,21 @@ def cause(
     )
 
 
-def by_log(fit: Fit, floors) -> dict[str, str]:
-    """{joint: why} of joints of whose error above the NoiseFloor, or above none where it is not
-    known, most is another mean in each log."""
+def by_log(fit: Fit, floors, still: Sequence[str] = ()) -> dict[str, str]:
+    """{joint: why} of joints of whose error above the NoiseFloor, or above what is noise in any
+    case where it is not known, most is another mean in each log.
+
+    Args:
+        still: joints that stand in the test logs, whose friction may be any there.
+    """
     out = {}
-    for joint, (share, square, said) in other_means(fit, fit.logs).items():
+    for joint, (share, square, said) in other_means(fit, fit.logs, still).items():
         floor = floors[fit.joints.index(joint)]
-        noise = (floor.rms or floor.low or 0.0) ** 2
-        if square > _MOST * (square / share - noise):
+        misfit = square / share - (floor.rms or floor.low or 0.0) ** 2
+        if misfit > 0.0 and square > _MOST * misfit:
             out[joint] = (
                 f"most of what is left is another mean in each log ({said}): a torque's zero that "
-                "was set anew, a load, or what hangs on the place; what else is left these logs do "
-                "not say before that is known"
+                "was set anew, a load, or what hangs on the place"
             )
     return out
 

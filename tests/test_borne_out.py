@@ -10,6 +10,7 @@ from sysid.blocks import parameters
 from sysid.borne_out import doubted, in_doubt, size_told
 from sysid.candidates import Candidate
 from sysid.comparison import Difference
+from sysid.effect import NotFinite
 
 
 class Told(SimpleNamespace):
@@ -194,3 +195,23 @@ def test_of_an_untold_size_a_fall_that_is_not_worth_having_says_nothing(monkeypa
     monkeypatch.setattr(comparison, "together", lambda *_, weighed=False: Difference("a", "b", "*", fall, 0.002))
     why = in_doubt(before, after, after, Candidate(vocabulary.find("cogging"), 1, ())) or ""
     assert ("falls by less than 1.5 %" in why) is refused and (refused or not why)
+
+
+def test_the_share_of_a_misfit_that_a_fit_takes(monkeypatch):
+    """Of an error of 2 above a floor of 1, to 1.5; nothing where the effect is no finite number."""
+    made, known = [], {"filters": None}
+
+    def how(spec, last, **given):
+        made.append((spec, given))
+        if len(made) > 1:
+            raise NotFinite("no number", where="here")
+        return Told(error=1.5)
+
+    monkeypatch.setattr(borne_out.pipeline, "fit_grown", how)
+    monkeypatch.setattr(borne_out, "grown", lambda experiment, name, joints, options, every: (name, joints, options))
+    last = Told(error=2.0, experiment=None)
+    candidate = Candidate(vocabulary.find("cogging"), 1, (("k", 3.0),))
+    taken = lambda: borne_out.misfit_taken(last, 1, SimpleNamespace(rms=1.0), known, candidate)  # noqa: E731
+    assert taken() == pytest.approx((4.0 - 2.25) / 3.0)
+    assert made == [(("cogging", ["elbow"], {"k": 3.0}), known)]
+    assert taken() == 0.0

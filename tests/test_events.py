@@ -249,6 +249,19 @@ def test_a_coarse_torque_on_a_clock_that_was_made_even_has_no_spikes_of_a_grain(
     assert find(replace(made, tau=even), JOINTS) == ()
 
 
+def test_values_that_are_held_are_no_grain():
+    """A log that is braked at its start and parked at its end holds two values, and is told as finely as ever."""
+    made = segment(step=0.01, seconds=60.0, noise=0.02)
+    tau = made.tau.copy()
+    tau[:400] = 0.0
+    tau[-400:] = tau[-401] + 3.0
+    assert max(quantum(own) for own in tau.T) < 1e-3
+    rows = (1500, 2200, 3100, 4000)
+    tau[list(rows), 2] += 5.0
+    found = [event for event in find(replace(made, tau=tau), JOINTS) if event.kind == "spike"]
+    assert [round(event.start / 0.01) for event in found if event.joints == ("c",)] == list(rows)
+
+
 def test_slow_loggers_and_coarse_signals_repeat_by_their_nature():
     made = segment(noise=0.0, grain=0.5)
     assert held_torque(made.tau[:, 0], STEP) == []

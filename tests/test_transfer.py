@@ -77,6 +77,37 @@ def test_noise_that_is_louder_is_no_model_that_does_not_carry_over(cutoff, fails
     assert left == (1.41 if fails else pytest.approx(1.0, abs=0.15))
 
 
+@pytest.mark.parametrize("band", [15.0, 6.0, 2.0])
+def test_what_stands_beside_gaps_is_not_taken_for_noise(band):
+    """A constant misfit about reversals, beside rows that are left out; and rows so few that no band sees any of them."""
+    rng, number = np.random.default_rng(6), np.arange(3000) % 150
+    use = (number >= 15)[:, None]
+    train, test = part(rng, [1.0], spans=(30.0,), use=use), part(rng, [1.0], spans=(30.0,), use=use)
+    beside = ((number >= 15) & (number < 25)) | (number >= 145)
+    test = replace(test, measured=test.measured + 3.0 * beside[:, None])
+    own = lambda **parts: transfers(SimpleNamespace(joints=("j0",), predictions=parts), band)[0]  # noqa: E731
+    assert own(train=train, test=test).louder == 0.0
+    few = (np.arange(3000) % 30 >= 15)[:, None]
+    drift = 3.0 * np.sin(2.0 * np.pi * 0.3 * STEP * np.arange(3000))[:, None]
+    train, test = replace(train, use=few), replace(test, use=few, measured=drift)
+    assert own(train=train, test=test).fails
+
+
+def test_each_log_has_a_rate_of_its_own():
+    """A misfit of 4 Hz in a log at 100 Hz beside one at 1 kHz."""
+    rng = np.random.default_rng(7)
+
+    def both(size: float) -> Prediction:
+        counts, steps = (20_000, 12_000), (1e-3, 1e-2)
+        t = np.concatenate([step * np.arange(n) for n, step in zip(counts, steps)])
+        log = np.repeat([0, 1], counts)
+        values = rng.normal(size=(len(t), 1)) + size * (np.sin(2.0 * np.pi * 4.0 * t) * (log == 1))[:, None]
+        return Prediction(log, t, values, 0.0 * values, None)
+
+    (found,) = transfers(SimpleNamespace(joints=("j0",), predictions={"train": both(0.0), "test": both(2.5)}), 15.0)
+    assert found.fails and not found.noisier
+
+
 def test_rows_that_do_not_count_are_in_no_band():
     """Beside a gap a low-pass sees too little to say what is slow."""
     rng, use = np.random.default_rng(5), np.ones((3000, 1), dtype=bool)

@@ -518,6 +518,10 @@ def test_noise_that_is_louder_in_the_test_logs_is_no_misfit(louder, status):
     loud = Transfer("elbow", 3.0, 0.1, (20.0,), 15.0, louder)
     found = verdicts(fitted(3.0, train=1.0), (), [NOISE] * 2, [floor()] * 2, carried=[loud])[1]
     assert found.status == status and "what is faster than 15 Hz" in found.carries
+    # nor does a claim of another joint, which takes nothing of it, explain it
+    other = claim("stribeck", "shoulder", [0.9, 0.0], fitted(3.0, 1.0, train=1.0))
+    found = verdicts(fitted(3.0, 3.0, train=1.0), [other], [NOISE] * 2, [floor()] * 2, carried=[loud])[1]
+    assert found.status == status
 
 
 def test_another_mean_in_each_log_is_no_law():
@@ -526,13 +530,15 @@ def test_another_mean_in_each_log_is_no_law():
     assert found.status == "unresolved" and found.says.startswith("another mean in each log") and found.left is not None
     found, _ = asked_of_elbow(3.0, means={"shoulder": "another mean in each log"})
     assert found.status == "unknown"
+    quiet, _ = asked_of_elbow(3.0, chance=0.5, means={"elbow": "another mean"})
+    assert "another mean" not in quiet.says  # nothing is predicted that it would be
     found, _ = asked_of_elbow(3.0, near=(Candidate(find("stribeck"), 1, ()), 0.02), means={"elbow": "another mean"})
     assert found.status == "unresolved" and found.says.startswith("what is left may be stribeck")
 
 
-@pytest.mark.parametrize(("square", "floor", "said"), [(0.5, 0.9, True), (0.5, 0.5, True), (0.2, 0.5, False), (0.2, None, False), (0.6, None, True)])
+@pytest.mark.parametrize(("square", "floor", "said"), [(0.5, 0.9, True), (0.5, 0.5, True), (0.2, 0.5, False), (0.2, None, False), (0.6, None, True), (0.2, 1.1, False)])
 def test_a_mean_by_log_is_told_where_it_is_most_of_what_is_no_noise(monkeypatch, square, floor, said):
-    monkeypatch.setattr(unexplained, "other_means", lambda fit, logs: {"elbow": (square / 1.0, square, "+1 in a.csv")})
+    monkeypatch.setattr(unexplained, "other_means", lambda fit, logs, still: {"elbow": (square / 1.0, square, "+1 in a.csv")})
     fit = SimpleNamespace(joints=("shoulder", "elbow"), logs=())
     level = SimpleNamespace(rms=None if floor is None else floor**0.5, low=None)
     found = unexplained.by_log(fit, [None, level])

@@ -88,8 +88,7 @@ def diagnose(
             raise too_short()
         known = {"filters": fit.filters, "progress": tell, "measured": whole}
         claims, refused = claiming.claimed(steps, fit, test, **known)
-        likely = (((m.candidate, p) for m, p in choice.members) for choice in undecided[-1:])
-        refused += [borne_out.undecided(list(members), fit) for members in likely]
+        refused += [borne_out.undecided(choice, fit) for choice in undecided[-1:]]
         after, last = (claims[-1].step.after, claims[-1].after) if claims else (view, fit)
         first, then = (HeldOut(one.settled, test) for one in (view, after))
         parts = measured.train, measured.test
@@ -107,7 +106,7 @@ def diagnose(
             return of_few_blocks(own, partial(refitted, after), after, test, j, least, fitted)
 
         more = refused, transfers(last, view.cutoff), weighed, lambda j: law(after, j, again())
-        rest = then_asked.near, few, beyond, fallen(first, then), by_log(last, found)
+        rest = then_asked.near, few, beyond, fallen(first, then), by_log(last, found, test.still)
         said = verdicts(fit, claims, after.unknown, found, *more, *rest)
         levels = np.array([f.rms or e for f, e in zip(found, last.rms("test").values())])
         where = failures(first, fit.predictions["test"].thinned(thinning.MOST), levels)

@@ -31,7 +31,7 @@ class Verdict:
     share of the joint's misfit on the test logs that all claims take, NaN where there is none.
     left: what functions of the motion predict of the rest, or None. says: why something is left.
     may: the effect that may be it. even: whether most of the rest is how the fit weighs its joints.
-    carries: that the model does not carry over to the test logs, where it does not.
+    carries: why the error on the test logs is the greater one, where it is.
     """
 
     joint: str
@@ -71,7 +71,7 @@ def verdicts(
             square on the test logs, low-passed. means: {joint: why} where most is a mean by log.
     """
     last = claims[-1].after if claims else fit
-    errors = last.rms("train"), quieter(last.rms("test"), carried)
+    firsts, errors = ((f.rms("train"), quieter(f.rms("test"), carried)) for f in (fit, last))
     weighed, most = weighed or {}, {j: max(e[j] for e in errors) for j in fit.joints}
     by_joint = list(zip(fit.joints, floors))
     reaches = [floor.reached(most[joint]) for joint, floor in by_joint]
@@ -82,7 +82,7 @@ def verdicts(
     out = []
     for j, joint in enumerate(fit.joints):
         taking = [c for c in claims if c.head.joint == joint or c.step.shares[j] >= WORTH]
-        pairs = [(fit.rms(part)[joint], last.rms(part)[joint]) for part in ("train", "test")]
+        pairs = [tuple(one[joint] for one in part) for part in zip(firsts, errors)]
         (first, then), both = pairs[1], [after for _, after in pairs]
         # what does not lower the joint's error on the test logs is no name for it
         own = tuple(c for c in taking if c.head.joint in (joint, "*") and then < first)
@@ -103,7 +103,7 @@ def verdicts(
         part = remains.share if remains else 1.0
         looks = near(j, part * seen.total, bool(remains))
         looks = looks or in_vain(refused, fit.joints, j, HALF * part)
-        looks = looks or (asked[j] and few(j, HALF * part)) or None
+        looks = looks or (asked[j] and not own and few(j, HALF * part)) or None
         # of whichever logs they explain less of: where these do not carry over, another law may
         taken = max(min(sum(c.step.shares[j] for c in own or others), explained), 0.0)
         little = remains is None or remains.share * max(1.0 - taken, 0.0) <= _PREDICTED * taken
@@ -123,7 +123,8 @@ def verdicts(
             effect, p = looks or (None, 1.0)
             may = effect if p > LEVEL else None  # what stands above the level was fitted, in vain
             why = cause(both, floors[j], effect, may, without, louder)
-            why = why if looks else dict(means).get(joint, why)
+            if remains and not looks and then > 0.0 and not evens[j]:
+                why = dict(means).get(joint, why)
             why += "".join({r.effect: f"; {r.told}" for r in refused if r.joint == joint}.values())
             told = ("unresolved", others, explained, remains, why, may, evens[j])
         elif not claims or (floors[j].reached(first) and not (done or fell)):

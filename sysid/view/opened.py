@@ -41,8 +41,8 @@ def first_view(experiment: Experiment, fit: Fit, logs=None) -> View:
     if fit.strength.auto:
         # with weights of a geometric mean of one, every joint's residual has this variance
         rms = np.array(list(fit.rms("train").values()))
-        on_same_rows = (rms * inverse(rms))[rms > 0.0]
-        variance = float(np.median(on_same_rows)) ** 2 if len(on_same_rows) else np.inf
+        alike = (rms * inverse(rms))[rms > 0.0]
+        variance = float(np.median(alike)) ** 2 if len(alike) else np.inf
         experiment = with_weight(experiment, min(USUAL, weakest(variance)))
     if logs is None:
         logs = experiment_logs.read(experiment, fit.model.robot, experiment.data.train)
