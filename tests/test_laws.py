@@ -8,7 +8,8 @@ import pytest
 
 from sysid import experiment_logs, flexible, pipeline
 from sysid.effect import NotFinite
-from sysid.view import elsewhere, first_view, law
+from sysid.lowpass import widest
+from sysid.view import elsewhere, first_view, law, opened
 
 
 def settling_contact(size: float):
@@ -62,6 +63,22 @@ def test_rows_count_where_both_draws_know_the_sign_of_a_speed(quiet):
         for plain, rough in zip(view.motion.pieces, view.rough.pieces):
             np.testing.assert_array_equal(plain.use, rough.use)
             assert (np.sign(plain.qd) == np.sign(rough.qd))[plain.use].all() and plain.use.any()
+
+
+def test_a_band_is_not_narrowed_where_short_logs_would_be_lost(simulated, monkeypatch):
+    """Nor where the test logs would be too short for it."""
+    experiment = pipeline.load(simulated("laws-control", seed=4))
+    fit = pipeline.fit(experiment)
+    train, test = (experiment_logs.read(experiment, fit.model.robot, part) for part in (experiment.data.train, experiment.data.test))
+    monkeypatch.setattr(opened, "narrowed", lambda cutoff, share: 0.5 * cutoff)
+    monkeypatch.setattr(opened, "_MOTION", 0.0)
+    wide, once = widest(train), 0.5 * widest(train)
+    assert first_view(experiment, fit, train, test).cutoff == pytest.approx(wide / 8.0)
+    short = [replace(log, segments=tuple(cut(log, slice(0, 500)).segments)) for log in test]
+    held = first_view(experiment, fit, train, short).cutoff
+    assert held in (pytest.approx(wide), pytest.approx(once), pytest.approx(0.5 * once)) and held > wide / 8.0
+    pieces = [cut(log, *(slice(k, k + 500) for k in range(0, len(log.segments[0].t) - 500, 500))) for log in train]
+    assert first_view(experiment, fit, pieces).cutoff > wide / 8.0
 
 
 def cut(log, *slices, **changes):

@@ -82,7 +82,7 @@ def diagnose(
     (measured, whole), extra = thinning.read(experiment), own_effects(experiment)
     fit = fit or pipeline.fit(experiment, progress=progress, measured=whole)
     with noticed():
-        view = first_view(fit.experiment, fit, measured.train)
+        view = first_view(fit.experiment, fit, measured.train, measured.test)
         steps, asked, then_asked, undecided = select.search(view, extra, level=level, tell=tell)
         if (test := lowpassed(measured.test, fit.joints, view.cutoff)) is None:
             raise too_short()

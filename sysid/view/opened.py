@@ -21,13 +21,14 @@ from ..specs import Experiment
 from .view import View, looked_at
 
 _NARROWER = 3  # times
+_KEPT = 0.8  # of the time: less is whole logs, and not their ends
 _MOTION = 2.0  # times the motion's own band: with less of it bodies are told badly
 _FEWEST = 50  # samples under the low-pass, or rows of other logs
 # of a step between two rows: what was a second ago is then taken for what was 0.98 s ago
 _APART = 0.02
 
 
-def first_view(experiment: Experiment, fit: Fit, logs=None) -> View:
+def first_view(experiment: Experiment, fit: Fit, logs=None, others=()) -> View:
     """The fitted model on the training logs, and on the same with the noise of the angles drawn
     once more; in the widest band that this noise leaves.
 
@@ -36,7 +37,8 @@ def first_view(experiment: Experiment, fit: Fit, logs=None) -> View:
     or, where torques are small, under one that says no more than that bodies are plausible.
 
     Args:
-        logs: the training logs, where they are at hand.
+        logs: the training logs, where they are at hand. others: logs that will be looked at in the
+            same band, which must not be too short for it.
     """
     if fit.strength.auto:
         # with weights of a geometric mean of one, every joint's residual has this variance
@@ -56,10 +58,18 @@ def first_view(experiment: Experiment, fit: Fit, logs=None) -> View:
         share = _middle(rough, view.rows.use) / np.maximum(_middle(residual, view.rows.use), 1e-300)
         lower = max(narrowed(view.cutoff, float(np.median(share))), _MOTION * own_band)
         narrow = lower <= 0.9 * view.cutoff and _under(experiment, fit, logs, lower, own_band)
-        if not narrow:  # of short logs a narrow low-pass leaves nothing
+        # of short logs a narrow low-pass leaves nothing
+        if not narrow or _seconds(narrow) < _KEPT * _seconds(view):
+            break
+        if others and lowpassed(others, fit.joints, lower, known=own_band) is None:
             break
         view = narrow
     return view
+
+
+def _seconds(view: View) -> float:
+    """How long the motion is that counts."""
+    return sum((piece.core.stop - piece.core.start) * piece.step for piece in view.motion.pieces)
 
 
 def _middle(values, use) -> np.ndarray:
