@@ -54,11 +54,10 @@ def quantum(values) -> float:
     if not rounding > 0.0:
         return 0.0
     grains = np.round(values / rounding)
-    told = [np.unique(grains)]
     # a value that is held comes once: a brake's and a frozen one are two levels of any torque
     fresh = grains[np.append(True, np.diff(grains) != 0.0)]
     own, counts = np.unique(fresh, return_counts=True)
-    again = counts > 1
+    told, again = [own], counts > 1
     if again.sum() >= _LEVELS and counts[again].sum() > _AGAIN * len(fresh):
         told.append(own[again])
     gaps = [np.diff(one) for one in told if len(one) > 1]

@@ -91,7 +91,7 @@ def transfers(fit: Fit, band: float | None = None) -> list[Transfer]:
     train, test = (fit.predictions[part].thinned(MOST) for part in ("train", "test"))
     spans = tuple(float(np.ptp(train.t[train.log == number])) for number in np.unique(train.log))
     parts = [(part, part.residual) for part in (train, test)]
-    slow = [(below := _slow(part, left, band), below.residual) for part, left in parts] if band else []
+    slow = [_slow(part, left, band) for part, left in parts] if band else []
     out = []
     for j, joint in enumerate(fit.joints):
         (first, one), (second, two) = (_level(part, left[:, j], j) for part, left in parts)
@@ -100,19 +100,17 @@ def transfers(fit: Fit, band: float | None = None) -> list[Transfer]:
         louder = 0.0
         if band and told:
             # beside a gap nobody knows what is slow: both of the same rows
-            whole, below = (_excess(own, j) for own in ([(one, left) for (_, left), (one, _) in zip(parts, slow)], slow))
+            rows = [one.use[:, j] for one in slow]
+            whole, below = (_excess(left, rows) for left in ([left[:, j] for _, left in parts], [one.residual[:, j] for one in slow]))
             louder = float(np.sqrt(whole - below)) if 0.0 < whole and below < _MOST * whole else 0.0
         out.append(Transfer(joint, ratio, ratio * float(np.hypot(one, two)), spans, band or np.inf, louder))
     return out
 
 
-def _excess(parts, j: int) -> float:
-    """By how much the mean square of what is left of joint j on the test logs exceeds that on the training logs; NaN of too few rows."""
-    squares = []
-    for part, left in parts:
-        rows = part.use[:, j]
-        squares.append(float(np.mean(left[rows, j] ** 2)) if rows.sum() >= _FEWEST else np.nan)
-    return squares[1] - squares[0]
+def _excess(left, rows) -> float:
+    """By how much the mean square of what is left (n,) on some rows of the test logs exceeds that on the training logs; NaN of too few."""
+    first, second = (float(np.mean(own[use] ** 2)) if use.sum() >= _FEWEST else np.nan for own, use in zip(left, rows))
+    return second - first
 
 
 def _slow(part: Prediction, left, band: float) -> Prediction:

@@ -11,7 +11,7 @@ import numpy as np
 from .candidates import Candidate
 from .effect import NotFinite
 from .estimate import Fit
-from .failures import taken
+from .failures import HeldOut, fallen
 from .model_parameters import ROBOT
 from .plausible import other_means
 
@@ -70,8 +70,7 @@ def in_vain(refused: Sequence[Refused], joints, j: int, least: float):
 def of_few_blocks(
     groups,
     refitted: Callable,
-    view,
-    test,
+    without: HeldOut,
     j: int,
     least: float,
     fitted: Callable[[Candidate], float] = lambda _: 0.0,
@@ -81,16 +80,17 @@ def of_few_blocks(
     them; with a p-value of one, as test logs may not choose. None where there is none.
 
     Args:
-        groups: of the joint. refitted: makes a Member, or None, of one. view: the model without
-            them. test: Motion. fitted: the share of the joint's misfit that goes as a fit has it,
-            about reversals too, where a low-pass shows none: half of it is enough.
+        groups: of the joint. refitted: makes a Member, or None, of one. without: the model without
+            them. fitted: the share of the joint's misfit that goes as a fit has it, about reversals
+            too, where a low-pass shows none: half of it is enough.
     """
     few = sorted((g for g in groups if g.signed and not g.testable), key=lambda g: g.taken)
     shares = {}
     for group in {g.candidate.kind: g for g in few}.values():
         try:
             if member := refitted(group):
-                shares[member.candidate] = taken(view.settled, member.view.settled, test)[j]
+                then = HeldOut(member.view.settled, without.test)
+                shares[member.candidate] = fallen(without, then)[j]
         except NotFinite:  # on the test motion
             continue
     best = max(shares, key=shares.get, default=None)

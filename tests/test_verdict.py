@@ -550,7 +550,8 @@ def test_of_those_that_test_logs_alone_can_ask_the_one_that_takes_most(monkeypat
         ("a", True, False, 1.0), ("a", True, False, 2.0), ("b", True, False, -3.0), ("c", True, True, 9.0), ("d", False, False, 9.0), ("e", True, False, 0.0)
     )]  # fmt: skip
     shares = {"a": 0.2, "b": 0.6}
-    monkeypatch.setattr(unexplained, "taken", lambda before, after, test: [0.0, shares[after]])
+    monkeypatch.setattr(unexplained, "HeldOut", lambda settled, test: settled)
+    monkeypatch.setattr(unexplained, "fallen", lambda before, after: [0.0, shares[after]])
     seen = []
 
     def refitted(group):
@@ -558,18 +559,18 @@ def test_of_those_that_test_logs_alone_can_ask_the_one_that_takes_most(monkeypat
         kind = group.candidate.kind
         return SimpleNamespace(candidate=kind, view=SimpleNamespace(settled=kind)) if kind in shares else None
 
-    view = SimpleNamespace(settled="before")
-    assert unexplained.of_few_blocks(groups, refitted, view, "test", 1, 0.5) == ("b", 1.0)
+    without = SimpleNamespace(test="test")
+    assert unexplained.of_few_blocks(groups, refitted, without, 1, 0.5) == ("b", 1.0)
     assert sorted(seen) == [("a", 2.0), ("b", -3.0), ("e", 0.0)]
-    assert unexplained.of_few_blocks(groups, refitted, view, "test", 1, 0.7) is None
-    assert unexplained.of_few_blocks([], refitted, view, "test", 1, 0.0) is None
+    assert unexplained.of_few_blocks(groups, refitted, without, 1, 0.7) is None
+    assert unexplained.of_few_blocks([], refitted, without, 1, 0.0) is None
     # about reversals, which a low-pass shows none of, a fit may say more
-    assert unexplained.of_few_blocks(groups, refitted, view, "test", 1, 0.7, {"b": 0.8}.get) == ("b", 1.0)
-    assert unexplained.of_few_blocks(groups, refitted, view, "test", 1, 0.7, {"b": 0.4}.get) is None
+    assert unexplained.of_few_blocks(groups, refitted, without, 1, 0.7, {"b": 0.8}.get) == ("b", 1.0)
+    assert unexplained.of_few_blocks(groups, refitted, without, 1, 0.7, {"b": 0.4}.get) is None
     shares["b"] = 0.05
-    assert unexplained.of_few_blocks(groups, refitted, view, "test", 1, 0.7, {"a": 0.9}.get) == ("a", 1.0)
+    assert unexplained.of_few_blocks(groups, refitted, without, 1, 0.7, {"a": 0.9}.get) == ("a", 1.0)
     shares["a"] = 0.05
-    assert unexplained.of_few_blocks(groups, refitted, view, "test", 1, 0.7, {"a": 0.9}.get) is None
+    assert unexplained.of_few_blocks(groups, refitted, without, 1, 0.7, {"a": 0.9}.get) is None
 
 
 def test_a_law_stands_beside_what_is_claimed():

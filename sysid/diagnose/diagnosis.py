@@ -103,7 +103,7 @@ def diagnose(
         def few(j: int, least: float):
             fitted = partial(borne_out.misfit_taken, last, j, found[j], known)
             own = then_asked.by_joint.get(j, [()])[0]
-            return of_few_blocks(own, partial(refitted, after), after, test, j, least, fitted)
+            return of_few_blocks(own, partial(refitted, after), then, j, least, fitted)
 
         more = refused, transfers(last, view.cutoff), weighed, lambda j: law(after, j, again())
         rest = then_asked.near, few, beyond, fallen(first, then), by_log(last, found, test.still)
