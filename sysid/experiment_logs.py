@@ -137,6 +137,11 @@ class Read:
     test: list[logs.Log]
     notices: tuple[str, ...]
 
+    @property
+    def parts(self) -> tuple[list[logs.Log], list[logs.Log]]:
+        """Of training, and of the test."""
+        return self.train, self.test
+
 
 def read_all(experiment: Experiment, *, structure: Model | None = None) -> Read:
     """The training and the test logs of an experiment.

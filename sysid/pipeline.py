@@ -200,7 +200,7 @@ def _under(strength: PriorWeight, found: Fit, measured: Read | None) -> Fit:
     preprocess = filtering.settled(experiment.preprocess, found.filters)
     with noticed():  # of the logs the fit said it
         logs_ = measured or read_all(experiment, structure=found.model)
-        train, test = (prepare(part, preprocess, found.joints) for part in (logs_.train, logs_.test))
+        train, test = (prepare(part, preprocess, found.joints) for part in logs_.parts)
         own = identify(experiment, found.model, train, found.compressed, found.prior)
         told = {part: predicted(own.model, own.x, motion) for part, motion in (("train", train), ("test", test))}
     same = ("samples", "left_out", "seconds", "filters", "logs", "notices", "events", "searched")

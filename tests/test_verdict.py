@@ -16,11 +16,12 @@ from sysid.diagnose.ask import Asked, ask
 from sysid.diagnose.detectable import detectable
 from sysid.diagnose.diagnosis import diagnose
 from sysid.diagnose.select import WORTH, search
-from sysid.diagnose.verdict import verdicts
+from sysid.diagnose.verdict import Verdict, verdicts
 from sysid.effect import TorqueEffect
 from sysid.effect_parameters import Linear
 from sysid.flexible import Law, Unknown
 from sysid.flexible.unknown import LEVEL
+from sysid.left_open import left_open
 from sysid.noise import NoiseFloor
 from sysid.simulate import simulate, write
 from sysid.statement.document import _verdict, dependences
@@ -571,6 +572,19 @@ def test_of_those_that_test_logs_alone_can_ask_the_one_that_takes_most(monkeypat
     assert unexplained.of_few_blocks(groups, refitted, without, 1, 0.7, {"a": 0.9}.get) == ("a", 1.0)
     shares["a"] = 0.05
     assert unexplained.of_few_blocks(groups, refitted, without, 1, 0.7, {"a": 0.9}.get) is None
+
+
+def test_what_may_come_of_another_joints_effect_is_left_open():
+    """Bodies bent by what one joint lacks leave error on others, which is no law that the catalogue lacks."""
+    stribeck = Candidate(find("stribeck"), 1, ())
+    joint = lambda name, status, may=None, claims=(): Verdict(name, status, claims, says="was", may=may)  # noqa: E731
+    said = [joint("a", "unknown"), joint("b", "unresolved", stribeck), joint("c", "unknown"), joint("d", "unknown", claims=(1,)), joint("e", "unknown")]
+    laws = {0: Law(1.0, "", 0.0), 2: Law(1e-9, "q_c", 0.3), 3: Law(1.0, "", 0.0), 4: None}
+    found = left_open(said, lambda j, candidate: laws[j], WORTH)
+    assert [one.status for one in found] == ["unresolved", "unresolved", "unknown", "unknown", "unknown"]
+    assert "may come of stribeck on b" in found[0].says and found[0].may is None
+    assert found[1:] == said[1:]
+    assert left_open(said[2:], lambda j, candidate: laws[0], WORTH) == said[2:]  # nothing may be there
 
 
 def test_a_law_stands_beside_what_is_claimed():

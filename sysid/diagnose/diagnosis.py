@@ -21,7 +21,7 @@ from .. import borne_out, pipeline, thinning
 from ..candidates import Candidate, candidates, own_effects
 from ..estimate import Fit
 from ..failures import Failure, HeldOut, failures, fallen
-from ..flexible import Law
+from ..left_open import left_open
 from ..lowpass import lowpassed
 from ..noise import NoiseFloor, floors_of_fit
 from ..shown import ShownDiagnosis
@@ -82,7 +82,7 @@ def diagnose(
     (measured, whole), extra = thinning.read(experiment), own_effects(experiment)
     fit = fit or pipeline.fit(experiment, progress=progress, measured=whole)
     with noticed():
-        view = first_view(fit.experiment, fit, measured.train, measured.test)
+        view = first_view(fit.experiment, fit, *measured.parts)
         steps, asked, then_asked, undecided = select.search(view, extra, level=level, tell=tell)
         if (test := lowpassed(measured.test, fit.joints, view.cutoff)) is None:
             raise too_short()
@@ -91,11 +91,10 @@ def diagnose(
         refused += [borne_out.undecided(choice, fit) for choice in undecided[-1:]]
         after, last = (claims[-1].step.after, claims[-1].after) if claims else (view, fit)
         first, then = (HeldOut(one.settled, test) for one in (view, after))
-        parts = measured.train, measured.test
-        found, weighed = floors_of_fit(experiment, last, after.model, after.x, parts)
+        found, weighed = floors_of_fit(experiment, last, after.model, after.x, measured.parts)
         again = cache(lambda: elsewhere(after, measured.test, measured.train))
 
-        def beyond(j: int, candidate: Candidate) -> Law | None:
+        def beyond(j: int, candidate: Candidate):
             group = then_asked.of(candidate) or asked.of(candidate)
             with_it = group and again() and refitted(after, group)
             return with_it and law(with_it.view, j, elsewhere(with_it.view, measured.test))
@@ -107,7 +106,8 @@ def diagnose(
 
         more = refused, transfers(last, view.cutoff), weighed, lambda j: law(after, j, again())
         rest = then_asked.near, few, beyond, fallen(first, then), by_log(last, found, test.still)
-        said = verdicts(fit, claims, after.unknown, found, *more, *rest)
+        named = verdicts(fit, claims, after.unknown, found, *more, *rest)
+        said = left_open(named, beyond, select.WORTH)
         levels = np.array([f.rms or e for f, e in zip(found, last.rms("test").values())])
         where = failures(first, fit.predictions["test"].thinned(thinning.MOST), levels)
         could = detectable(view, asked, candidates(view.model, extra))

@@ -92,7 +92,7 @@ def _fitted(experiment: Experiment, filters: dict | None) -> tuple[Fit, Motion, 
     read = experiment_logs.read_all(experiment, structure=structure)
     fit = pipeline.fit(experiment, filters=filters, measured=read)
     preprocess = settled(fit.experiment.preprocess, fit.filters)
-    return fit, *(prepare(logs, preprocess, fit.joints) for logs in (read.train, read.test))
+    return fit, *(prepare(logs, preprocess, fit.joints) for logs in read.parts)
 
 
 def _parameters(fit: Fit) -> tuple[str, ...]:
