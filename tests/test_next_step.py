@@ -31,7 +31,7 @@ def test_a_joint_that_moves_and_whose_limits_are_nothing_has_none(tmp_path, limi
 def design(probability):
     return {
         "duration": 20.0, "criterion": {"log_det": 3.0, "random_best": None}, "margins": {"collision": None}, "expected_std": {},
-        "separates": [{"a": "torque_bias:elbow", "b": "asymmetric_coulomb:elbow", "probability": probability}], "notices": [], "run": "next",
+        "separates": [{"a": "torque_bias:elbow", "b": "asymmetric_coulomb:elbow", "probability": probability, "if_a": probability, "if_b": probability}], "notices": [], "run": "next",
     }  # fmt: skip
 
 
@@ -182,3 +182,14 @@ def test_alternatives_do_not_run_into_what_holds_with_them():
     assert found == "torque_bias or asymmetric_coulomb on hip"
     assert all_of([found]) == found
     assert all_of(["load_friction on knee", found]) == "load_friction on knee and (torque_bias or asymmetric_coulomb on hip)"
+
+
+def test_of_two_of_which_one_can_do_all_that_the_other_does_only_one_is_told(capsys):
+    """A turn of a leg's base about its first axis is that joint's offset: no motion tells where it is that."""
+    document = design(0.5)
+    document["separates"][0] |= {"a": "encoder_offset:hip", "b": "gravity_tilt:*", "if_a": 0.0, "if_b": 0.98}
+    show_design(document, SimpleNamespace(path=Path("leg/config.yaml")))
+    said = capsys.readouterr().out
+    assert "told apart with probability 0.50: 0.98 if it is gravity_tilt:*, hardly ever if it is encoder_offset:hip" in said
+    show_design(design(0.9), SimpleNamespace(path=Path("leg/config.yaml")))
+    assert "0.90\n" in capsys.readouterr().out

@@ -6,7 +6,7 @@ import pytest
 from scipy.signal import butter, lfilter, sosfiltfilt
 
 from sysid import experiment_logs, pipeline
-from sysid.noise import NoiseFloor, floor, floors
+from sysid.noise import NoiseFloor, floor, floors, repeats
 from sysid.noise.of_fit import floors_of_fit
 
 
@@ -458,3 +458,23 @@ def test_a_floor_that_one_log_s_error_denies_is_not_given(simulated):
     for one, known in zip(shrunk[0.5], shrunk[1.0]):
         assert one.rms is None and "the error on the test logs" in one.detail
         assert one.about == pytest.approx(0.5 * known.rms, rel=0.15)
+
+
+@pytest.mark.parametrize("comes_again", [True, False])
+def test_noise_of_angles_that_the_motion_repeats_is_noise_all_the_same(comes_again):
+    """A periodic motion meets an encoder's grain at the same places: between repeats it is not seen, and a fit is left with it."""
+    rng, period, count = np.random.default_rng(5), 500, 4
+    motion = np.sin(2 * np.pi * np.arange(period * count) / period)
+    grain = np.tile(rng.standard_normal(period), count) if comes_again else rng.standard_normal(period * count)
+    torque, left = 3.0 * motion + rng.standard_normal(len(motion)), None
+    left = torque - (3.0 * motion + 2.0 * grain)
+    ask = lambda angles: repeats.scatter([[left]], [torque], [np.ones(len(torque), dtype=bool)], [float(period)], angles)  # noqa: E731
+    rms, std = ask(4.0)
+    assert rms == pytest.approx(np.sqrt(5.0), abs=3.0 * std + 0.03)
+    alone, _ = ask(0.0)  # nothing known of the angles: the torque's
+    assert alone == pytest.approx(1.0, abs=0.06)
+
+
+def test_what_is_drawn_counts_where_rows_do():
+    drawn, kept = [np.array([[1.0, 3.0], [1.0, 5.0]])], [np.array([True, False])]
+    assert repeats.mean_square(drawn, kept) == 1.0 and repeats.mean_square(None, kept) == 0.0

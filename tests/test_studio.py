@@ -629,7 +629,7 @@ def test_a_motion_is_designed_with_its_files_to_take_along(opened, monkeypatch):
 
     def write(found, folder):
         folder.mkdir(parents=True)
-        said = {"duration": 20.0, "separates": [{"a": "cogging:elbow", "b": "cable:elbow", "probability": 0.97}], "expected_std": {}}
+        said = {"duration": 20.0, "separates": [{"a": "cogging:elbow", "b": "cable:elbow", "probability": 0.97, "if_a": 0.97, "if_b": 0.97}], "expected_std": {}}
         (folder / "design.json").write_text(json.dumps(said))
         (folder / "trajectory.csv").write_text("t,q\n")
 

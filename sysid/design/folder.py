@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -22,7 +23,7 @@ def document(found: Design, run: str | Path = "") -> dict:
         "criterion": {"log_det": found.log_det, "random_best": number(found.random_best)},
         "margins": found.margins,
         "expected_std": found.deviations,
-        "separates": [{"a": p.a, "b": p.b, "probability": p.probability} for p in found.pairs],
+        "separates": [asdict(pair) for pair in found.pairs],
         "coefficients": {
             "rounds": found.family.rounds,
             "harmonics": found.family.harmonics,

@@ -50,11 +50,14 @@ _ACCUSED = 0.01  # family-wise: how often a diagnosis accuses anything where not
 
 @dataclass(frozen=True)
 class Pair:
-    """Two suspects, `effect:joint`, and the probability that the logs will tell them apart."""
+    """Two suspects, `effect:joint`, and the probability that the logs will tell them apart: in the mean
+    over which of them is true, where it is a and where it is b."""
 
     a: str
     b: str
     probability: float
+    if_a: float
+    if_b: float
 
 
 def pairs(
@@ -87,11 +90,13 @@ def pairs(
     for i, a in enumerate(words):
         for j, b in enumerate(words[:i]):
             one, other = (chances[a], chances[b]) if {a, b} <= chances.keys() else (0.5, 0.5)
-            told, ways = 0.0, ((i, j, one / other), (j, i, other / one))
-            for k, m, odds in ways:  # whichever of them is true
+            told, each = 0.0, []
+            # whichever of them is true
+            for k, m, odds in ((j, i, other / one), (i, j, one / other)):
                 left = _left(base, prior, own[k] @ suspects[k].size, own[m])
-                told += odds / (1.0 + odds) * min(_apart(left, odds), named[k])
-            out.append(Pair(b, a, float(told)))
+                each.append(float(min(_apart(left, odds), named[k])))
+                told += odds / (1.0 + odds) * each[-1]
+            out.append(Pair(b, a, float(told), *each))
     return out
 
 

@@ -156,8 +156,9 @@ def estimate(
     if math.sqrt(max(np.mean(v**2) for v in rest)) <= 1e-12 * max(size, own):
         return _certain(0.0, "the residual is a constant, or a function of the motion", own)
     if any(period is not None for period in shared.periods):
-        signals = [whole(runs, v, lengths) for v in (rest, raw, torque)]
-        found = repeats.scatter(signals, whole(runs, kept, lengths), shared.periods)
+        logged, *left = (whole(runs, v, lengths) for v in (torque, rest, raw))
+        made = repeats.mean_square(drawn, kept)
+        found = repeats.scatter(left, logged, whole(runs, kept, lengths), shared.periods, made)
         if found is not None:
             k = next(k for k, period in enumerate(shared.periods) if period is not None)
             count = int(lengths[k] / shared.periods[k] + 0.01)

@@ -20,35 +20,59 @@ _INDEPENDENT = 1.94  # second differences of repeats per independent one
 _TINY = 1e-300
 
 
-def scatter(signals, kept, periods) -> tuple[float, float] | None:
+def scatter(signals, torque, kept, periods, angles: float = 0.0) -> tuple[float, float] | None:
     """RMS of the noise and its standard error, None where nothing repeats.
 
+    Of the noise of the angles, what the motion repeats too is not seen between repeats (the grain
+    of an encoder that a periodic motion meets at the same places), and torque as measured shows
+    none of it: what is not seen is added.
+
     Args:
-        signals: several versions of the torque, (n,) of each stretch [N m or N]; each scatters by
-            the noise or more.
+        signals: versions of the residual, (n,) of each stretch [N m or N]; the last is as the model
+            leaves it. Each scatters by the noise or more.
+        torque: as measured, the same.
         kept: (n,) bool of each stretch, rows that count.
         periods: [samples] of each stretch, or None.
+        angles: mean square of what the noise of the angles adds to the torque that is predicted.
     """
+    predicted = [told - left for told, left in zip(torque, signals[-1])]
+    squares = [_squares(values, kept, periods) for values in (torque, predicted, *signals)]
+    if len(squares[0]) < _BLOCKS:
+        return None
+    seen = min(float(np.mean(squares[1])), angles)
+    unseen = [angles] + [angles - seen] * len(signals)
     found = []
-    for values_of in signals:
-        squares = []
-        for values, counts, period in zip(values_of, kept, periods):
-            if period is None:
-                continue
-            n, one, two = len(values), round(period), round(2 * period)
-            if n >= 3 * period:
-                a, b, c = (slice(k, k + n - two) for k in (0, one, two))
-                square = (values[a] - 2.0 * values[b] + values[c]) ** 2 / 6.0
-                both = counts[a] & counts[b] & counts[c]
-            else:
-                square = (values[one:] - values[:-one]) ** 2 / 2.0
-                both = counts[one:] & counts[:-one]
-            squares.append(square[both])
-        squares = np.concatenate(squares) if squares else np.zeros(0)
-        if len(squares) < _BLOCKS:
-            return None
-        found.append(block_rms(squares))
+    for own, more in zip([squares[0], *squares[2:]], unseen):
+        rms, error = block_rms(own)
+        whole = math.sqrt(rms**2 + more)
+        found.append((whole, error * rms / (whole + _TINY)))
     return min(found)
+
+
+def mean_square(drawn, kept) -> float:
+    """Of what is drawn (draws, n) of each run, over the rows (n,) that are kept; 0 of nothing."""
+    if drawn is None:
+        return 0.0
+    squares = [values[:, rows].ravel() ** 2 for values, rows in zip(drawn, kept)]
+    return float(np.mean(np.concatenate(squares)))
+
+
+def _squares(values_of, kept, periods) -> np.ndarray:
+    """The squares of what differs between repeats, as those of the noise."""
+    squares = []
+    for values, counts, period in zip(values_of, kept, periods):
+        if period is None:
+            continue
+        n, one, two = len(values), round(period), round(2 * period)
+        if n >= 3 * period:
+            a, b, c = (slice(k, k + n - two) for k in (0, one, two))
+            square = (values[a] - 2.0 * values[b] + values[c]) ** 2 / 6.0
+            both = counts[a] & counts[b] & counts[c]
+        else:
+            square = (values[one:] - values[:-one]) ** 2 / 2.0
+            both = counts[one:] & counts[:-one]
+        squares.append(square[both])
+    return np.concatenate(squares) if squares else np.zeros(0)
 
 
 def block_rms(squares: np.ndarray) -> tuple[float, float]:

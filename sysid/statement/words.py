@@ -12,6 +12,7 @@ from ..units import behind
 Members = Sequence[tuple[str, str, float]]  # (effect, joint, probability) of a set
 _HARDLY = 0.01  # of an error
 SURE = 0.9  # the set holds the truth so often
+NEVER = 0.05  # probability below which a motion is no answer
 
 
 def followed(entry: dict, word: Callable[[str], str]) -> str:
@@ -170,3 +171,15 @@ def near(v: dict, document: dict) -> str:
     times = f"{error / floor:#.3g} times the noise floor"
     known = "; a floor is known to a tenth and two standard errors" if not v.get("says") else ""
     return f"; its error is {times}{known}"
+
+
+def apart(pair: dict) -> str:
+    """How likely a designed motion tells two suspects from each other, as `design.json` has it."""
+    both, chance = f"{pair['a']} and {pair['b']}", pair["probability"]
+    if chance < NEVER:
+        return f"{both}: no motion within these limits is likely to tell them apart"
+    said = f"{both} will be told apart with probability {chance:.2f}"
+    (less, never), (more, told) = sorted((pair[f"if_{k}"], pair[k]) for k in "ab")
+    if less >= NEVER:
+        return said
+    return f"{said}: {more:.2f} if it is {told}, hardly ever if it is {never}"

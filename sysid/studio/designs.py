@@ -13,13 +13,14 @@ from .. import design as designing
 from ..errors import SysidError
 from ..specs import Experiment
 from ..statement import kept
+from ..statement.words import apart
 
 FILES = {
     "trajectory.csv": "text/csv",
     "trajectory.yaml": "application/yaml",
     "design.json": "application/json",
 }
-_MOST, _NEVER = 20, 0.005  # designs that are listed; a probability that is none
+_MOST = 20  # designs that are listed
 
 
 def suspects(asked) -> list[tuple[str, str]]:
@@ -71,12 +72,7 @@ def file(run: Path, name: str, which: str) -> str:
 @lru_cache(maxsize=64)
 def _said(path: Path, _stamp: int) -> str:
     said = json.loads(bounded.read_text(path))
-    told = [
-        f"{p['a']} and {p['b']} will be told apart with probability {p['probability']:.2f}"
-        if p["probability"] >= _NEVER
-        else f"no motion within these limits is likely to tell {p['a']} from {p['b']}"
-        for p in said["separates"]
-    ]
+    told = [apart(pair) for pair in said["separates"]]
     fall = [s["after"] / s["now"] for s in said["expected_std"].values() if s["now"] and s["after"]]
     if not told and fall:
         fall.sort()

@@ -3,12 +3,10 @@
 from pathlib import Path
 
 from ..addition import typed
+from ..statement.words import NEVER, apart
 from ..units import behind
 from .next_steps import next_step
 from .tables import show_notices
-
-_NEVER = 0.05  # probability below which a motion is no answer
-
 
 _SHOWN_STD, _FALLS = 20, 0.95  # parameters whose deviation falls most; by less than this it stays what it is
 
@@ -27,12 +25,9 @@ def show_design(document: dict, experiment) -> None:
     left = [f"{name} {100 * share:.1f} %" for name, share in document["margins"].items() if name != "collision"]
     near = document["margins"].get("collision")
     print(f"unused of each limit: {', '.join(left)}" + ("" if near is None else f"; links keep {near:.3g} m apart"))
-    never = [pair for pair in document["separates"] if pair["probability"] < _NEVER]
+    never = [pair for pair in document["separates"] if pair["probability"] < NEVER]
     for pair in document["separates"]:
-        if pair in never:
-            print(f"{pair['a']} and {pair['b']}: no motion within these limits is likely to tell them apart")
-            continue
-        print(f"{pair['a']} and {pair['b']} will be told apart with probability {pair['probability']:.2f}")
+        print(apart(pair))
     told = [(name, s) for name, s in document["expected_std"].items() if s["now"] and s["after"] < _FALLS * s["now"]]
     told.sort(key=lambda one: one[1]["after"] / one[1]["now"])
     if told:
