@@ -28,7 +28,8 @@ def held_out(experiment: Experiment, spec: PreprocessSpec, model: Model, logs: S
         logs: of one segment each. prior: bodies (bodies, 10). edge: [s] that are left out at both ends of each.
 
     Returns:
-        {"relative_error": geometric mean over the joints, "rms": {joint: N m or N}, "folds": logarithms of squared relative errors}.
+        {"relative_error": geometric mean over the joints, "rms": {joint: N m or N}, "folds": logarithms of squared relative errors,
+        "untold": how many coefficients of joints that move the rows that it leaves cannot tell}.
 
     Raises:
         SysidError: the filter cannot be, or the logs are too short to hold a part of them out.
@@ -68,7 +69,8 @@ def held_out(experiment: Experiment, spec: PreprocessSpec, model: Model, logs: S
         errors.append(_logarithm(own, size, held.rows))
     rms = np.sqrt(squares / np.maximum(rows, 1))
     relative = float(np.exp(0.5 * _logarithm(squares, size, rows)))
-    return {"relative_error": relative, "rms": dict(zip(model.robot.joints, rms.tolist())), "folds": errors}
+    untold = int(np.sum(pose(experiment, model, data, moving, prior).coordinates.held & moving))
+    return {"relative_error": relative, "rms": dict(zip(model.robot.joints, rms.tolist())), "folds": errors, "untold": untold}
 
 
 def _logarithm(squares: np.ndarray, size: np.ndarray, rows: np.ndarray) -> float:

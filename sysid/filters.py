@@ -179,13 +179,14 @@ def _widest_edge(spec: PreprocessSpec, candidates: Sequence[dict], logs) -> floa
 
 
 def _best(tried: list[dict], key: str, usual: float) -> dict:
-    """The candidate of least held-out error; among those within one standard error of it, the one nearest the usual."""
+    """The candidate of least held-out error; among those within one standard error of it, of those that leave rows which tell
+    most coefficients, the one nearest the usual."""
     least = min(tried, key=lambda entry: entry["relative_error"])
     # a candidate that is missing folds cannot be compared
     alike = [entry for entry in tried if len(entry["folds"]) == len(least["folds"])]
     kept = within_one_error([entry["folds"] for entry in alike], alike.index(least))
     tied = [entry for entry, within in zip(alike, kept) if within]
-    return min(tied, key=lambda entry: abs(np.log(entry[key] / usual)))
+    return min(tied, key=lambda entry: (entry["untold"], abs(np.log(entry[key] / usual))))
 
 
 def settled(spec: PreprocessSpec, chosen: dict) -> PreprocessSpec:
