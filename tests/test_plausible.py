@@ -2,10 +2,14 @@
 
 import shutil
 
+from types import SimpleNamespace
+
+import numpy as np
 import polars as pl
 import pytest
 
 from sysid import pipeline
+from sysid.plausible import implausible
 
 
 @pytest.fixture
@@ -41,3 +45,12 @@ def test_a_joint_that_stands_in_the_test_log_is_not_called_wrong(folder):
     texts = said(folder)
     assert any(text.startswith("the test logs do not show elbow in motion") for text in texts)
     assert not any("worse than none" in text and "elbow" in text for text in texts)
+
+
+@pytest.mark.parametrize(("train", "r2", "test", "said"), [(0.17, 0.9, 0.175, False), (0.17, 0.9, 0.3, True), (0.17, -0.1, 0.17, True)])
+def test_torque_that_hardly_varies_in_the_test_logs_is_no_fault_of_the_model(train, r2, test, said):
+    """Noise alone is left there, as in the training logs, and it is more than the torque varies by."""
+    part = lambda rms, r2: SimpleNamespace(errors=lambda: {"rms": np.array([rms]), "r2": np.array([r2])}, greatest=lambda fewest: np.zeros((fewest, 1)))  # noqa: E731
+    source = SimpleNamespace(joints={"yaw": SimpleNamespace(effort=np.inf)})
+    fit = SimpleNamespace(joints=("yaw",), predictions={"train": part(train, r2), "test": part(test, -0.26)}, model=SimpleNamespace(robot=SimpleNamespace(source=source), coefficients=()), held=())
+    assert any("worse than none" in text for text in implausible(fit)) == said
