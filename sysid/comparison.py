@@ -16,7 +16,7 @@ from .estimate import Fit
 from .fit_document import number
 from .prediction import Prediction
 
-_ROUNDING = 1e-9  # of an error: two fits of one model differ by 1e-16 of it, with a standard error as small
+_ROUNDING = 1e-6  # of an error: two fits of one model, or of one that shows nothing of an effect, are settled to that
 
 @dataclass(frozen=True)
 class Difference:

@@ -76,7 +76,7 @@ def of_few_blocks(
     fitted: Callable[[Candidate], float] = lambda _: 0.0,
 ):
     """The Candidate that takes most of joint j's squared residual on the test logs, under the
-    low-pass, and at least such a share, of those that training logs show in too few places to ask
+    low-pass, and at least such a share and a tenth, of those that training logs show in too few places to ask
     them; with a p-value of one, as test logs may not choose. None where there is none.
 
     Args:
@@ -94,7 +94,8 @@ def of_few_blocks(
         except NotFinite:  # on the test motion
             continue
     best = max(shares, key=shares.get, default=None)
-    if best and (shares[best] >= least or (shares[best] > _FITTED and fitted(best) >= _MOST)):
+    # less than a tenth may fall by chance, where one of several is picked
+    if best and shares[best] > _FITTED and (shares[best] >= least or fitted(best) >= _MOST):
         return best, 1.0
     return None
 

@@ -34,12 +34,13 @@ def show_added(document: dict, experiment, run, before=()) -> None:
         print("\n".join(text.wrapped(f"held at zero or at the prior: {', '.join(held)}", terminal_width(), "  ")))
     if document["says"]:
         Console().print(escape(document["says"]), soft_wrap=True, highlight=False)
+    nothing = all(abs(d["delta_rms"] or 0.0) <= _NOTHING * (first[d["joint"]] or 0.0) for d in document["differences"])
     if not document["refused"]:
         print(f"written into {document['experiment']}")
-        if all(abs(d["delta_rms"] or 0.0) <= _NOTHING * (first[d["joint"]] or 0.0) for d in document["differences"]):
+        if nothing:
             words = f"nothing changes with it, as these logs show none of it: it may be taken out of {document['experiment']} again"
             print("\n".join(text.wrapped(words, terminal_width(), "  ")))
-    if document["untold"]:
+    if document["untold"] and not nothing:
         print("\n".join(text.wrapped(document["untold"], terminal_width(), "  ")))
     show_notices(document, before)
     next_step("diagnose", typed(Path(document["experiment"])), out=out_of(experiment, run))
