@@ -478,3 +478,18 @@ def test_noise_of_angles_that_the_motion_repeats_is_noise_all_the_same(comes_aga
 def test_what_is_drawn_counts_where_rows_do():
     drawn, kept = [np.array([[1.0, 3.0], [1.0, 5.0]])], [np.array([True, False])]
     assert repeats.mean_square(drawn, kept) == 1.0 and repeats.mean_square(None, kept) == 0.0
+
+
+def test_a_floor_under_a_low_pass_is_what_comes_through(simulated):
+    """Angles that are hardly smoothed make torque's noise many times what a low-pass lets through of it, and none of that is white."""
+    folder = simulated("noise under a low-pass", seed=8, duration=16.0, rate=1000.0, encoder=14)
+    text = (folder / "config.yaml").read_text()
+    (folder / "low.yaml").write_text(text.replace("  torque: raw\n", "  torque: low-pass\n"))
+    experiment = pipeline.load(folder / "low.yaml")
+    fit = pipeline.fit(experiment)
+    read = experiment_logs.read_all(experiment)
+    found, _ = floors_of_fit(experiment, fit, fit.model, fit.x, read.parts)
+    for floor_, joint in zip(found, fit.joints):
+        error = max(fit.rms("train")[joint], fit.rms("test")[joint])
+        assert floor_.method == "spectral" and "carried through" in floor_.detail
+        assert floor_.rms == pytest.approx(error, rel=0.25), joint

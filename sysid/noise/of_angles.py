@@ -20,10 +20,17 @@ _MOST = 1_000_000  # draws times rows, for memory
 class OfAngles:
     """torque (draws, n, dof) [N m or N] over the core of each piece: what the angles' noise, drawn
     again, adds to the torque that a fit predicts, beside the measured one. band: [Hz] below which
-    the logs' motion stays."""
+    the logs' motion stays. known (n, dof) of each: rows that count in the log and in all draws, so
+    that none turns a joint's speed round."""
 
     torque: list[np.ndarray]
     band: float
+    known: Sequence[np.ndarray] = ()
+
+    def squares(self) -> np.ndarray:
+        """(dof,) its mean square over the rows that are known."""
+        sums = sum((v**2 * use).mean(0).sum(0) for v, use in zip(self.torque, self.known))
+        return sums / np.maximum(sum(use.sum(0) for use in self.known), 1)
 
 
 def of_angles(
@@ -53,18 +60,29 @@ def of_angles(
             segments = tuple(again(s, angle_noise(s, cutoff), cutoff, rng) for s in log.segments)
             jitter |= any(s.clock is not None for s in segments)
             noisy.append(replace(log, segments=segments))
-        found = predict(*of, prepare(noisy, spec, plain.joints))
+        motion = prepare(noisy, spec, plain.joints)
+        found, use = predict(*of, motion), _counted(motion)
+        known[number] = known[number] & use if len(use) == len(known[number]) else known[number]
         # a clock that is late shifts the measured torque as well
         before, after = (one.predicted - one.measured for one in (told[number], found))
         return after - before
 
+    known = [_counted(motion) for motion in motions]
     draws = [[made(number)] for number in range(len(logs))]
     rows = sum(len(first) for (first,) in draws)
     for _ in range(min(_DRAWS, _MOST // max(rows, 1)) - 1 if jitter else 0):
         for number, own in enumerate(draws):
             own.append(made(number))
-    out = []
-    for own, plain in zip(draws, motions):
+    out, use = [], []
+    for own, rows, plain in zip(draws, known, motions):
         ends = np.cumsum([piece.samples for piece in plain.pieces])[:-1]
         out += np.split(np.stack(own), ends, axis=1)
-    return OfAngles(out, max(bands))
+        use += np.split(rows, ends)
+    return OfAngles(out, max(bands), use)
+
+
+def _counted(motion: Motion) -> np.ndarray:
+    """(n, dof) whether rows count, of all pieces one after the other."""
+    every = np.ones((1, len(motion.joints)), dtype=bool)
+    uses = (every.repeat(len(p.t), 0) if p.use is None else p.use for p in motion.pieces)
+    return np.concatenate([use[piece.core] for use, piece in zip(uses, motion.pieces)])

@@ -11,6 +11,7 @@ from ..estimate import Fit
 from ..filters import settled
 from ..log import Log
 from ..model import Model
+from ..motion import Motion
 from ..prediction import Prediction, predict
 from ..preprocess import on_both_sides, prepare
 from ..specs import Experiment, PreprocessSpec
@@ -20,6 +21,7 @@ from .of_pieces import filtered, floors_of
 from .repeats import block_rms
 
 _MOST = 200_000  # rows that tell an error
+_AS_FAR = 1.56  # a polynomial of order 4 over a window is -3 dB at this share of one over it
 
 
 def floors_of_fit(
@@ -28,38 +30,56 @@ def floors_of_fit(
     """Each joint's noise floor, and {joint: RMS of what the model leaves}, as the fit sees torque.
 
     A low-pass on both sides leaves nothing of the frequencies at which noise is told from motion:
-    what it carries through is told of the torque as logged.
+    what it carries through is told of the torque as logged, beside angles that are smoothed as far.
 
     Args:
         model, x (size,): whose residual is looked at; in its parameters loud joints should not
             drown quiet ones. logs: of each part.
     """
     spec = settled(experiment.preprocess, fit.filters)
-    plain = spec.model_copy(update={"torque": "raw"}) if spec.torque == "low-pass" else spec
-    motions = [prepare(part, plain, fit.joints) for part in logs]
+    plain, motions = _as_logged(spec, logs, fit.joints)
     pieces = [piece for motion in motions for piece in motion.pieces]
+    made = []  # by the angles' noise
 
     def floors(model: Model, x) -> tuple[list[NoiseFloor], list[Prediction]]:
         told = [predict(model, x, motion) for motion in motions]
         predicted = np.concatenate([one.predicted for one in told])
         angles = of_angles(logs, motions, told, plain, (model, x))
+        made[:] = [angles.squares()]
         return floors_of(pieces, predicted, angles=angles), told
 
     found, told = floors(model, x)
-    if plain is not spec:
-        told = [predict(model, x, prepare(part, spec, fit.joints)) for part in logs]
+    sides = on_both_sides(spec, pieces[0].step)
+    if sides is not None:
+        seen = motions if plain is spec else [prepare(part, spec, fit.joints) for part in logs]
+        told = [predict(model, x, motion) for motion in seen]
+        angles = of_angles(logs, seen, told, spec, (model, x))
     left = np.max([one.errors()["rms"] for one in told], axis=0)
     # noise is in what every model leaves: whichever leaves less of a joint tells it
     most = np.max([list(fit.rms(part).values()) for part in ("train", "test")], axis=0)
     if np.any(more := left > (1.0 + DOUBT) * most):
         other, _ = floors(fit.model, fit.x)
         found = [b if worse else a for a, b, worse in zip(found, other, more)]
-    if not all(one.reached(error) for one, error in zip(found, most)):
+    if sides is not None:
+        found = filtered(found, sides, made[0], angles.squares())
+    elif not all(one.reached(error) for one, error in zip(found, most)):
         found = _halved(found, spec, fit, logs)
-    sides, given = on_both_sides(spec, pieces[0].step), dict(zip(fit.joints, left))
-    if sides is not None:  # what comes through is foreseen of white noise, and no more than about
-        return filtered(found, sides), given
-    return [_in_both(one, fit, j) for j, one in enumerate(found)], given
+    return [_in_both(one, fit, j) for j, one in enumerate(found)], dict(zip(fit.joints, left))
+
+
+def _as_logged(spec: PreprocessSpec, logs, joints) -> tuple[PreprocessSpec, list[Motion]]:
+    """The preprocessing that leaves torque as logged, and logs prepared with it: angles smoothed as
+    far as a low-pass on both sides would smooth what they make, or less where logs are short."""
+    if spec.torque == "raw":
+        return spec, [prepare(part, spec, joints) for part in logs]
+    plain = spec.model_copy(update={"torque": "raw"})
+    if spec.torque == "low-pass" and spec.filter == "savitzky-golay":
+        wide = plain.model_copy(update={"window": max(_AS_FAR / spec.cutoff, spec.window)})
+        try:
+            return wide, [prepare(part, wide, joints) for part in logs]
+        except SysidError:  # shorter than that
+            pass
+    return plain, [prepare(part, plain, joints) for part in logs]
 
 
 def _in_both(found: NoiseFloor, fit: Fit, joint: int) -> NoiseFloor:

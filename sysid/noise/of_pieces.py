@@ -1,14 +1,16 @@
 """The noise floors of a motion's pieces under what a model predicts of them."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from .floor import NoiseFloor, floors
+from .floor import UNSURE, NoiseFloor, floors
 from .of_angles import OfAngles
 
-_SIZES = ("rms", "std", "low", "high", "about")
+_SIZES = ("rms", "low", "high", "about")
+_MADE = 0.2  # of the power that the angles' noise makes: as its RMS is known to a tenth
 
 
 def floors_of(
@@ -28,17 +30,30 @@ def floors_of(
     return floors(residuals, measured, q, steps, use=use, angles=angles)
 
 
-def filtered(found: Sequence[NoiseFloor], smoother) -> list[NoiseFloor]:
-    """Floors as a fit sees them that filters torque: of white noise, what comes through."""
-    if smoother is None:
-        return list(found)
+def filtered(
+    found: Sequence[NoiseFloor], smoother, was: np.ndarray, now: np.ndarray
+) -> list[NoiseFloor]:
+    """Floors as a fit sees them whose torque goes through a filter: of white noise what comes
+    through, and what the noise of the angles makes there, which is no white one.
+
+    Args:
+        was, now: (dof,) mean squares of what the angles' noise makes of the floors found, and of
+            the torque that the fit sees.
+    """
     impulse = np.zeros(20 * smoother.reach + 1)
     impulse[len(impulse) // 2] = 1.0
-    gain = float(np.sqrt(np.sum(smoother(impulse) ** 2)))
+    gain = float(np.sum(smoother(impulse) ** 2))
 
-    def through(floor: NoiseFloor) -> NoiseFloor:
-        values = {name: getattr(floor, name) for name in _SIZES}
-        scaled = {name: None if v is None else v * gain for name, v in values.items()}
-        return replace(floor, **scaled, detail=f"{floor.detail}; carried through the fit's filter")
+    def through(floor: NoiseFloor, before: float, after: float) -> NoiseFloor:
+        size = lambda v: v and math.sqrt(gain * max(v**2 - before, 0.0) + after)  # noqa: E731
+        sizes = {name: size(getattr(floor, name)) for name in _SIZES}
+        told = replace(floor, **sizes, detail=f"{floor.detail}; carried through the fit's filter")
+        if not told.rms:
+            return told
+        std = math.hypot(gain * 2.0 * floor.rms * floor.std, _MADE * after) / (2.0 * told.rms)
+        if std <= UNSURE * told.rms:
+            return replace(told, std=std)
+        why = f"not determined: the noise of the angles hides that of the torque ({told.detail})"
+        return NoiseFloor(None, None, "none", why, told.low, told.high, told.rms)
 
-    return [through(floor) for floor in found]
+    return [through(*own) for own in zip(found, was.tolist(), now.tolist())]
