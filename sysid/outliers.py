@@ -22,6 +22,7 @@ SPIKE = 3  # samples: "one or a few"
 FEWEST = 7  # samples that a parabola and its rest need
 SHORT = 8 * FEWEST  # samples: a log with fewer has no usual
 RESTING = 0.05  # of the usual speed: what is slower rests
+_TWICE = 2  # an angle that turns round meets each level of a fine grid on its way there and back
 _LEVELS = 5  # at least that come again, of a torque that is told in steps
 _AGAIN = 0.02  # of the values: by chance next to none of a billion are the same
 _ABOUT = 4  # steps to either side of a spike that it is compared with
@@ -57,7 +58,7 @@ def quantum(values) -> float:
     # a value that is held comes once: a brake's and a frozen one are two levels of any torque
     fresh = grains[np.append(True, np.diff(grains) != 0.0)]
     own, counts = np.unique(fresh, return_counts=True)
-    told, again = [own], counts > 1
+    told, again = [own], counts > _TWICE
     if again.sum() >= _LEVELS and counts[again].sum() > _AGAIN * len(fresh):
         told.append(own[again])
     gaps = [np.diff(one) for one in told if len(one) > 1]
