@@ -80,6 +80,8 @@ def in_doubt(before: Fit, after: Fit, told: Fit, candidate: Candidate) -> str | 
         unit = before.rms("test")[own[0]]
         rise = changed(change.delta_rms / max(unit, 1e-300))
         still = any(-d.delta_rms < CLEAR * d.se for d in (change, shown))
+        # what reads a torque late makes torque of the angles' noise, in the fit's own error too
+        fell |= candidate.late is not None and all(-d.delta_rms > d.se for d in (change, shown))
     # a fit that weighs all joints alike may trade a quiet one's own error for what a loud one gains
     if not fell and still:
         return "the fit's own error does not fall with it"

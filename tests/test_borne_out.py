@@ -90,6 +90,16 @@ def test_a_quiet_joints_own_error_may_rise_where_that_on_the_test_logs_clearly_f
     assert (said == "the fit's own error does not fall with it") is refused and (said is None) is not refused
 
 
+@pytest.mark.parametrize(("effect", "se", "refused"), [("current_lag", 0.06, False), ("delay", 0.06, False), ("current_lag", 0.2, True), ("torque_gain", 0.06, True)])
+def test_what_reads_torque_late_makes_torque_of_the_angles_noise(monkeypatch, effect, se, refused):
+    """In the fit's own error, which rises with it, as well: one standard error of the test error bears it out."""
+    before, after = Told(error=1.0), Told(error=1.1)
+    monkeypatch.setattr(borne_out, "size_told", lambda *_: True)
+    monkeypatch.setattr(comparison, "compare", lambda *_: (Difference("a", "b", "elbow", -0.1, se),))
+    monkeypatch.setattr(comparison, "together", lambda *_, **__: Difference("a", "b", "*", -0.01, 0.002))
+    assert (in_doubt(before, after, after, Candidate(vocabulary.find(effect), 1, ())) is not None) is refused
+
+
 @pytest.mark.parametrize(
     ("before", "own", "shown", "refused"),
     [
