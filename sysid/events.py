@@ -246,7 +246,7 @@ def again(struck: Sequence[str], joints: int) -> str:
     """What may strike where few joints are knocked time and again: `struck` has all joints of every
     knock; empty where none is, or where most of the robot's are, as by somebody who pushes it."""
     most = max(map(struck.count, struck), default=0)
-    who = [joint for joint in dict.fromkeys(struck) if struck.count(joint) == most]
+    who = [joint for joint in dict.fromkeys(struck) if 4 * struck.count(joint) > 3 * most]
     if most < _AGAIN or 2 * len(who) > max(joints, 2):
         return ""
     where = " and ".join([", ".join(who[:-1]), who[-1]] if len(who) > 1 else who)

@@ -12,6 +12,7 @@ from sysid import urdf
 from sysid.statement import text
 from sysid.statement.words import all_of, either, named
 from sysid.terminal.designed import show_design
+from sysid.terminal.diagnosis import _after_diagnosis
 from sysid.terminal.next_steps import mended_first
 
 from .conftest import JOINTS, RATE, URDF
@@ -193,3 +194,13 @@ def test_of_two_of_which_one_can_do_all_that_the_other_does_only_one_is_told(cap
     assert "told apart with probability 0.50: 0.98 if it is gravity_tilt:*, hardly ever if it is encoder_offset:hip" in said
     show_design(design(0.9), SimpleNamespace(path=Path("leg/config.yaml")))
     assert "0.90\n" in capsys.readouterr().out
+
+
+def test_where_another_log_is_needed_its_design_is_typed_next(capsys):
+    """And no page to look at."""
+    found = SimpleNamespace(fit=SimpleNamespace(masses={}, joints=("a",)))
+    document = {"verdict": [{"joint": "a", "status": "unresolved", "says": ""}], "findings": [], "notices": [], "run": "runs/arm", "next_log": "sysid design arm --out next"}
+    _after_diagnosis(found, document, SimpleNamespace(path=Path("arm/config.yaml"), name="arm"))
+    assert capsys.readouterr().out.splitlines()[-1] == "next: sysid design arm --out next"
+    _after_diagnosis(found, {**document, "next_log": None}, SimpleNamespace(path=Path("arm/config.yaml"), name="arm"))
+    assert capsys.readouterr().out.splitlines()[-1] == "next: sysid report arm --open"

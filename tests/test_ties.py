@@ -311,7 +311,7 @@ def test_in_the_band_that_the_noise_of_coarse_angles_leaves_a_lag_is_told(laggin
 def test_torques_that_are_read_late_are_told_apart_by_what_is_as_slow_as_the_motion(lagging, monkeypatch):
     """A lag makes the torque's rate, and of coarse angles that is loud: least squares make it too short, and a delay, which only turns
     the noise's phase, leaves less. What is slow, with parameters that this noise does not bend, says that it is a lag, or neither."""
-    monkeypatch.setattr(opened, "_NARROWER", 1)  # in a band that holds much of it
+    monkeypatch.setattr(opened, "_NARROWER", 2)  # in a band that holds much of it
     view = first_view(*lagging)
     groups = {g.candidate.name: g for g in ask(view).groups if g.candidate.joint == 1}
     lag, delay = (refitted(view, groups[name]) for name in ("current_lag", "delay"))
@@ -329,7 +329,7 @@ def test_what_is_mostly_noise_is_asked_by_what_is_as_slow_as_the_motion(lagging,
     as the motion tells that the torque is late, and not whether it is a lag or a delay."""
     how = {"encoder": 12, "duration": 12.0}
     with monkeypatch.context() as wide:
-        wide.setattr(opened, "_NARROWER", 1)
+        wide.setattr(opened, "_NARROWER", 2)
         groups = {g.candidate.name: g for g in ask(first_view(*lagging)).groups if g.candidate.joint == 1}
     assert groups["delay"].slow and groups["current_lag"].slow and not groups["torque_bias"].slow
     assert groups["current_lag"].coefficients[0] == pytest.approx(0.01, rel=0.4)

@@ -10,9 +10,11 @@ from ..gaussian import HIGHEST, Gaussian
 from ..running import running
 
 _WINDOW = 0.1  # s
+MOTION = 2.0  # times the motion's own band: with less of it bodies are told badly
 _BAND = 4.0  # the angles' own low-pass, as a multiple of the cutoff
 _HELD = 1e-9  # of an angle's range: less than any encoder's noise
-_FEWEST = 50  # steps; and counts of a grain beyond which any number is near a whole one
+_FEWEST = 50  # steps that tell a grain
+_COUNTS, _NEAR = (1, 5, 15, 50), 0.05  # grains in a step, from few on; and how near to a whole one
 
 
 def noise_of(q, smooth, taken: float, step: float) -> np.ndarray:
@@ -87,7 +89,8 @@ def rougher(segment, noise, cutoff: float, rng: np.random.Generator) -> np.ndarr
     shifted by a random part of its grain: in slow motion that is no white noise.
 
     Args:
-        cutoff: [Hz] above which the angle holds no motion.
+        cutoff: [Hz] above which the angle holds hardly any motion, `MOTION` times its band: at a
+            steady speed what rounding makes is a tone, which must not pass for motion.
     """
     q = segment.q
     if len(q) < _FEWEST:
@@ -115,9 +118,12 @@ def grains(q) -> np.ndarray:
         steps = steps[steps > 1e-9 * np.ptp(q[:, j])]
         if len(steps) <= _FEWEST:
             continue
-        counts = steps / steps.min()
-        # files round what is rounded; of any other numbers one in fifty comes that near to a count
-        near = np.abs(counts - np.round(counts)) < 0.01 * np.maximum(counts, 1.0)
-        if np.mean(near) > 0.99 and np.mean(counts < _FEWEST) > 0.5:
-            out[j] = np.median(steps / np.round(counts))
+        grain = steps.min()
+        for most in _COUNTS:  # the smallest step is one, rounded again by its file; many tell it
+            few = steps[steps < (most + 0.5) * grain]
+            grain = few.sum() / np.round(few / grain).sum()
+        # of any other numbers one in ten comes that near to a count
+        near = np.abs(few / grain - np.round(few / grain)) < _NEAR
+        if len(few) > _FEWEST and np.mean(near) > 0.99:
+            out[j] = grain
     return out

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..log import Log
-from ..lowpass import again, angle_noise, band, widest
+from ..lowpass import MOTION, again, angle_noise, band, widest
 from ..motion import Motion
 from ..prediction import Prediction, predict
 from ..preprocess import prepare
@@ -55,9 +55,10 @@ def of_angles(
     def made(number: int) -> np.ndarray:
         nonlocal jitter
         part, plain, cutoff = logs[number], motions[number], cutoffs[number]
+        slow = min(cutoff, MOTION * bands[number])
         noisy = []
         for log in part:
-            segments = tuple(again(s, angle_noise(s, cutoff), cutoff, rng) for s in log.segments)
+            segments = tuple(again(s, angle_noise(s, cutoff), slow, rng) for s in log.segments)
             jitter |= any(s.clock is not None for s in segments)
             noisy.append(replace(log, segments=segments))
         motion = prepare(noisy, spec, plain.joints)

@@ -45,8 +45,8 @@ def _show_warnings(document: dict) -> None:
 
 
 def _after_diagnosis(found, document: dict, experiment) -> None:
-    """What is typed next: the first addition, what mends numbers that cannot be meant, what may be it, how joints are weighed, or the
-    page with all of it."""
+    """What is typed next: the first addition, what mends numbers that cannot be meant, what may be it, how joints are weighed, the
+    motion to log, or the page with all of it."""
     commands = [c for v in document["verdict"] for c in v.get("commands", ())]
     first = min((f for f in document["findings"] if f["command"] in commands and f["joins_as_step"]), key=lambda f: f["joins_as_step"], default=None)
     may = [v["may_be"]["command"] for v in document["verdict"] if "may_be" in v]
@@ -59,6 +59,8 @@ def _after_diagnosis(found, document: dict, experiment) -> None:
         next_line(first["command"] if first else may[0], out=out)
     elif even:
         next_step("diagnose", target, first=f"write {WEIGHED} for {text.listed(even, 'and')}", out=out)
+    elif document.get("next_log"):
+        next_line(document["next_log"])
     else:
         next_step("report", target, "--open", out=out)
 

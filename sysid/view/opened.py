@@ -12,7 +12,7 @@ from .. import experiment_logs
 from ..effect import NotFinite
 from ..errors import LogError
 from ..estimate import Fit
-from ..lowpass import again, band, lowpassed, narrowed, on_same_rows, stride_of, widest
+from ..lowpass import MOTION, again, band, lowpassed, narrowed, on_same_rows, stride_of, widest
 from ..notices import samples_of
 from ..posed_problem import inverse
 from ..prior_weight import USUAL, weakest, with_weight
@@ -22,7 +22,6 @@ from .view import View, looked_at
 
 _NARROWER = 3  # times
 _KEPT = 0.8  # of the time: less is whole logs, and not their ends
-_MOTION = 2.0  # times the motion's own band: with less of it bodies are told badly
 _FEWEST = 50  # samples under the low-pass, or rows of other logs
 # of a step between two rows: what was a second ago is then taken for what was 0.98 s ago
 _APART = 0.02
@@ -56,7 +55,7 @@ def first_view(experiment: Experiment, fit: Fit, logs=None, others=()) -> View:
         rough, residual = view.design.rough_residual, view.design.residual
         # in the middle of the rows: about reversals, and where something is missing, there is more
         share = _middle(rough, view.rows.use) / np.maximum(_middle(residual, view.rows.use), 1e-300)
-        lower = max(narrowed(view.cutoff, float(np.median(share))), _MOTION * own_band)
+        lower = max(narrowed(view.cutoff, float(np.median(share))), MOTION * own_band)
         narrow = lower <= 0.9 * view.cutoff and _under(experiment, fit, logs, lower, own_band)
         # of short logs a narrow low-pass leaves nothing
         if not narrow or _seconds(narrow) < _KEPT * _seconds(view):
@@ -91,7 +90,7 @@ def _motions(logs, joints, cutoff: float, own: float, seed: int = 0):
         return None
     rng = np.random.default_rng(seed)
     noise = np.max([piece.noise for piece in motion.pieces], axis=0)
-    drawn = lambda s: again(s, noise, cutoff, rng)  # noqa: E731
+    drawn = lambda s: again(s, noise, min(cutoff, MOTION * own), rng)  # noqa: E731
     noisy = [replace(log, segments=tuple(map(drawn, log.segments))) for log in logs]
     return on_same_rows(motion, lowpassed(noisy, joints, cutoff, known=own))
 
