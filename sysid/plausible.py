@@ -57,9 +57,20 @@ def _apart(fit: Fit, logs: Sequence[dict], still: Sequence[str]) -> Iterator[str
     for joint, (share, _, said) in other_means(fit, logs, still).items():
         if share > _SHARE:
             yield (
-                f"what is left of {joint} is another in some logs, in the mean {said}: a torque's zero that was set anew, a load, or what hangs "
+                f"{_left(joint)}, in the mean {said}: a torque's zero that was set anew, a load, or what hangs "
                 "on the place; `data.groups`, and an effect that is `per:` a group, give each its own"
             )
+
+
+def _left(joint: str) -> str:
+    return f"what is left of {joint} is another in some logs"
+
+
+def outdated(fit: Fit, last: Fit) -> list[str]:
+    """Notices of a fit on means by log that another one, with what is claimed, has none of."""
+    before, after = ({joint: found[0] for joint, found in other_means(one, one.logs).items()} for one in (fit, last))
+    gone = tuple(_left(joint) for joint in before if after.get(joint, 0.0) <= _SHARE)
+    return [notice for notice in fit.notices if notice.startswith(gone)]
 
 
 def other_means(fit: Fit, logs: Sequence[dict], still: Sequence[str] = ()) -> dict[str, tuple[float, float, str]]:

@@ -1,15 +1,14 @@
 """What a fit says of its own numbers: a joint that stands in the test logs, an error that is another in each log."""
 
 import shutil
-
 from types import SimpleNamespace
 
 import numpy as np
 import polars as pl
 import pytest
 
-from sysid import pipeline
-from sysid.plausible import implausible
+from sysid import pipeline, plausible
+from sysid.plausible import implausible, outdated
 
 
 @pytest.fixture
@@ -54,3 +53,12 @@ def test_torque_that_hardly_varies_in_the_test_logs_is_no_fault_of_the_model(tra
     source = SimpleNamespace(joints={"yaw": SimpleNamespace(effort=np.inf)})
     fit = SimpleNamespace(joints=("yaw",), predictions={"train": part(train, r2), "test": part(test, -0.26)}, model=SimpleNamespace(robot=SimpleNamespace(source=source), coefficients=()), held=())
     assert any("worse than none" in text for text in implausible(fit)) == said
+
+
+def test_a_mean_by_log_that_a_claim_takes_is_no_longer_told(monkeypatch):
+    """A load in some logs is another mean there, until it is in the model."""
+    means = {"fit": {"a": (0.5,), "b": (0.4,)}, "last": {"a": (0.02,), "b": (0.4,)}}
+    monkeypatch.setattr(plausible, "other_means", lambda one, logs: means[one.name])
+    said = [f"what is left of {joint} is another in some logs, in the mean +1 N m in a.csv" for joint in "ab"]
+    fit, last = (SimpleNamespace(name=name, logs=(), notices=["rows are left out", *said]) for name in means)
+    assert outdated(fit, last) == said[:1] and outdated(fit, fit) == []

@@ -47,7 +47,7 @@ def test_what_was_typed_wrongly_is_said_without_a_line_of_a_file(experiment, cli
 
 def test_a_number_without_unit_has_none():
     assert text.valued("mu", {"value": 0.09757, "std": 0.0019, "unit": "1"}) == "mu = 0.09757 +- 0.0019"
-    assert text.valued("b", {"value": 2.0, "std": None, "unit": "N m"}) == "b = 2 N m"
+    assert text.valued("b", {"value": 2.0, "std": None, "unit": "N m"}) == "b = 2 N m (held)"
 
 
 def test_effects_speak_of_any_joint():

@@ -13,6 +13,7 @@ from ..filters import settled, torque_band
 from ..fit_document import number, versions
 from ..flexible import Unknown
 from ..model_parameters import ROBOT
+from ..plausible import outdated
 from ..units import of_joint
 from . import text
 from .claims import chances, claims, confidence_set, finding, ties
@@ -32,6 +33,7 @@ def document(found: Diagnosis, run="") -> dict:
 def _document(found: Diagnosis, run) -> dict:
     fit, joints = found.fit, found.fit.joints
     rms = {part: dict(zip(joints, fit.predictions[part].told())) for part in ("train", "test")}
+    gone = outdated(fit, found.claims[-1].after) if found.claims else ()
     return {
         "band": torque_band(settled(fit.experiment.preprocess, fit.filters)),
         "joints": {
@@ -110,7 +112,7 @@ def _document(found: Diagnosis, run) -> dict:
         "not_claimed": [
             {"effect": r.effect, "joint": r.joint, "why": r.why} for r in found.refused
         ],
-        "notices": [*fit.notices, *found.notices],
+        "notices": [*(n for n in fit.notices if n not in gone), *found.notices],
         "logs": list(fit.logs),
         "versions": versions(),
         "run": str(run),

@@ -77,9 +77,10 @@ def option(value) -> str:
 
 
 def valued(name: str, p: dict) -> str:
-    """A parameter {value, std, unit} with its deviation and its unit, where it has these."""
-    std = "" if p["std"] is None else f" +- {p['std']:.2g}"
-    return f"{name} = {p['value']:.4g}{std}{behind(p['unit'])}"
+    """A parameter {value, std, unit} with its deviation and its unit, where it has these; without
+    a deviation the logs do not tell it from the rest of the model, or it is given."""
+    std, held = ("", " (held)") if p["std"] is None else (f" +- {p['std']:.2g}", "")
+    return f"{name} = {p['value']:.4g}{std}{behind(p['unit'])}{held}"
 
 
 def untold(parameters: dict[str, dict]) -> str:
