@@ -246,9 +246,11 @@ def again(struck: Sequence[str], joints: int) -> str:
     """What may strike where few joints are knocked time and again: `struck` has all joints of every
     knock; empty where none is, or where most of the robot's are, as by somebody who pushes it."""
     most = max(map(struck.count, struck), default=0)
-    who = [joint for joint in dict.fromkeys(struck) if 4 * struck.count(joint) > 3 * most]
-    if most < _AGAIN or 2 * len(who) > max(joints, 2):
+    each = {joint: struck.count(joint) for joint in struck}
+    near = [joint for joint, count in each.items() if 4 * count > 3 * most]
+    if most < _AGAIN or 2 * len(near) > max(joints, 2):
         return ""
+    who = [joint for joint, count in each.items() if count == most]
     where = " and ".join([", ".join(who[:-1]), who[-1]] if len(who) > 1 else who)
     why = "where nobody pushed, its own play or an end stop strikes, and a diagnosis with"
     return f"{most} knocks are on {where}: {why} `events: keep` under `preprocess:` can name it"

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
+from .model_parameters import ROBOT
+
 
 def left_open(verdicts: Sequence, beyond: Callable, worth: float) -> list:
     """Verdicts, of which one that says `unknown` is `unresolved` where the rest is nothing that the
@@ -22,11 +24,12 @@ def left_open(verdicts: Sequence, beyond: Callable, worth: float) -> list:
         for may, joint in mays.items():
             law = beyond(j, may)
             if law is not None and not law.predicts(asked, worth):
+                where = "of the whole robot" if may.joint == ROBOT else f"on {joint}"
                 why = (
-                    f"what is left may come of {may.name} on {joint}, which these logs do not tell "
-                    "there: with it in the model, the motion predicts nothing of the rest"
+                    f"what is left may come of {may.name} {where}, which these logs do not tell "
+                    "for sure: with it in the model, the motion predicts nothing of the rest"
                 )
-                return replace(one, status="unresolved", says=why)
+                return replace(one, status="unresolved", says=why, left=None, may=may)
         return one
 
     unknown = [one.status == "unknown" and not one.claims for one in verdicts]

@@ -22,7 +22,7 @@ SPIKE = 3  # samples: "one or a few"
 FEWEST = 7  # samples that a parabola and its rest need
 SHORT = 8 * FEWEST  # samples: a log with fewer has no usual
 RESTING = 0.05  # of the usual speed: what is slower rests
-_TWICE = 2  # an angle that turns round meets each level of a fine grid on its way there and back
+_FINER = 10  # times: less is a fine grid of which an angle that turns round meets some levels twice
 _LEVELS = 5  # at least that come again, of a torque that is told in steps
 _AGAIN = 0.02  # of the values: by chance next to none of a billion are the same
 _ABOUT = 4  # steps to either side of a spike that it is compared with
@@ -58,11 +58,12 @@ def quantum(values) -> float:
     # a value that is held comes once: a brake's and a frozen one are two levels of any torque
     fresh = grains[np.append(True, np.diff(grains) != 0.0)]
     own, counts = np.unique(fresh, return_counts=True)
-    told, again = [own], counts > _TWICE
+    told, again = [own], counts > 1
     if again.sum() >= _LEVELS and counts[again].sum() > _AGAIN * len(fresh):
         told.append(own[again])
     gaps = [np.diff(one) for one in told if len(one) > 1]
-    return float(max((np.quantile(one, 0.01) for one in gaps), default=0.0) * rounding)
+    least, *levels = [np.quantile(one, 0.01) for one in gaps] or [0.0]
+    return float(max([least, *(g for g in levels if g > _FINER * least)]) * rounding)
 
 
 def runs(flags) -> list[tuple[int, int]]:

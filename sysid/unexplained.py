@@ -76,8 +76,8 @@ def of_few_blocks(
     fitted: Callable[[Candidate], float] = lambda _: 0.0,
 ):
     """The Candidate that takes most of joint j's squared residual on the test logs, under the
-    low-pass, and at least such a share and a tenth, of those that training logs show in too few places to ask
-    them; with a p-value of one, as test logs may not choose. None where there is none.
+    low-pass, a tenth at least and at least such a share, of those that training logs show in too few
+    places to ask them; with a p-value of one, as test logs may not choose. None where there is none.
 
     Args:
         groups: of the joint. refitted: makes a Member, or None, of one. without: the model without

@@ -312,6 +312,38 @@ def test_rounding_is_drawn_again_as_rounding(grain):
         assert np.sqrt(np.mean(np.square(drawn))) == pytest.approx(band(made, low, high), rel=0.4)
 
 
+@pytest.mark.parametrize(("seed", "digits"), [(0, 6), (1, 7)])
+def test_a_grain_is_told_at_any_speed_though_files_round_it_again(seed, digits):
+    """Of 17 bits at 250 Hz and many grains a sample, to six digits of a radian."""
+    from sysid.lowpass.angles import grains
+
+    grain, t = 2.0 * np.pi / 2**17, np.arange(0.0, 20.0, 0.004)
+    truly = 0.8 * np.sin(1.1 * t + seed)[:, None] + 0.3 * np.sin(2.7 * t)[:, None]
+    q = np.round(grain * np.round(truly / grain), digits)
+    assert grains(q) == pytest.approx([grain], rel=1e-4)
+
+
+def test_a_steady_turn_is_not_taken_for_an_encoder():
+    """All of its steps are nearly alike, whatever rounds them."""
+    from sysid.lowpass.angles import grains
+
+    q = np.cumsum(1e-3 * (1.0 + 0.02 * np.random.default_rng(0).normal(size=8000)))[:, None]
+    assert grains(q) == [0.0]
+
+
+@pytest.mark.parametrize("band", [0.0, 0.001])
+def test_noise_is_drawn_again_of_a_joint_that_hardly_moves(band):
+    from types import SimpleNamespace
+
+    from sysid.lowpass import hardly_moving
+    from sysid.lowpass.angles import rougher
+
+    rng = np.random.default_rng(0)
+    q = 2e-4 * np.round(0.6 * rng.normal(size=(2000, 1)))
+    drawn = rougher(SimpleNamespace(q=q, step=1e-3), np.array([1e-4]), hardly_moving(15.0, band), rng)
+    assert np.isfinite(drawn).all() and hardly_moving(15.0, 4.0) == 8.0 and hardly_moving(15.0, 9.0) == 15.0
+
+
 def test_windows_that_overlap_are_summed_as_each_alone():
     """Every window by hand, whatever its size, stride and the number of values."""
     from sysid.gaussian import _weighed

@@ -11,6 +11,7 @@ from ..running import running
 
 _WINDOW = 0.1  # s
 MOTION = 2.0  # times the motion's own band: with less of it bodies are told badly
+_DRIFT = 1.0  # Hz: what is slower is drift, and no tone
 _BAND = 4.0  # the angles' own low-pass, as a multiple of the cutoff
 _HELD = 1e-9  # of an angle's range: less than any encoder's noise
 _FEWEST = 50  # steps that tell a grain
@@ -89,8 +90,8 @@ def rougher(segment, noise, cutoff: float, rng: np.random.Generator) -> np.ndarr
     shifted by a random part of its grain: in slow motion that is no white noise.
 
     Args:
-        cutoff: [Hz] above which the angle holds hardly any motion, `MOTION` times its band: at a
-            steady speed what rounding makes is a tone, which must not pass for motion.
+        cutoff: [Hz], `hardly_moving`: at a steady speed what rounding makes is a tone, which must
+            not pass for motion.
     """
     q = segment.q
     if len(q) < _FEWEST:
@@ -102,20 +103,26 @@ def rougher(segment, noise, cutoff: float, rng: np.random.Generator) -> np.ndarr
     size = local * np.minimum(noise / np.maximum(middle, 1e-300), 1.0)
     size = np.stack([np.interp(np.arange(len(q)), at, one) for one in size.T], axis=1)
     out = q + size * rng.normal(size=q.shape)
-    smooth = Gaussian(min(cutoff, HIGHEST / segment.step), segment.step)(q, axis=0)
+    low = Gaussian(min(cutoff, HIGHEST / segment.step), segment.step)
     for j, grain in enumerate(grains(q)):
         if grain:
             before = np.sqrt(max(noise[j] ** 2 - grain**2 / 12.0, 0.0)) * rng.normal(size=len(q))
-            truly = smooth[:, j] + grain * rng.uniform()
+            truly = low(q[:, j]) + grain * rng.uniform()
             out[:, j] = q[:, j] + grain * np.round((truly + before) / grain) - truly
     return out
+
+
+def hardly_moving(cutoff: float, band: float) -> float:
+    """The frequency [Hz] above which angles whose motion has such a band hold hardly any of it, at
+    most a cutoff."""
+    return min(cutoff, max(MOTION * band, _DRIFT))
 
 
 def grains(q) -> np.ndarray:
     """(dof,) what angles q (n, dof) are rounded to, zero where they are not."""
     out = np.zeros(q.shape[1])
-    for j, steps in enumerate(np.abs(np.diff(q, axis=0)).T):
-        steps = steps[steps > 1e-9 * np.ptp(q[:, j])]
+    for j, every in enumerate(np.abs(np.diff(q, axis=0)).T):
+        steps = every[every > 1e-9 * np.ptp(q[:, j])]
         if len(steps) <= _FEWEST:
             continue
         grain = steps.min()
@@ -124,6 +131,8 @@ def grains(q) -> np.ndarray:
             grain = few.sum() / np.round(few / grain).sum()
         # of any other numbers one in ten comes that near to a count
         near = np.abs(few / grain - np.round(few / grain)) < _NEAR
-        if len(few) > _FEWEST and np.mean(near) > 0.99:
+        # steps that are all alike are a steady speed
+        usual = np.unique(np.round(every / grain), return_counts=True)[1].max() / len(every)
+        if len(few) > _FEWEST and np.mean(near) > 0.99 > usual:
             out[j] = grain
     return out

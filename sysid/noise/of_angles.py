@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..log import Log
-from ..lowpass import MOTION, again, angle_noise, band, widest
+from ..lowpass import again, angle_noise, band, hardly_moving, widest
 from ..motion import Motion
 from ..prediction import Prediction, predict
 from ..preprocess import prepare
@@ -55,20 +55,20 @@ def of_angles(
     def made(number: int) -> np.ndarray:
         nonlocal jitter
         part, plain, cutoff = logs[number], motions[number], cutoffs[number]
-        slow = min(cutoff, MOTION * bands[number])
+        slow = hardly_moving(cutoff, bands[number])
         noisy = []
         for log in part:
             segments = tuple(again(s, angle_noise(s, cutoff), slow, rng) for s in log.segments)
             jitter |= any(s.clock is not None for s in segments)
             noisy.append(replace(log, segments=segments))
         motion = prepare(noisy, spec, plain.joints)
-        found, use = predict(*of, motion), _counted(motion)
-        known[number] = known[number] & use if len(use) == len(known[number]) else known[number]
+        found, use = predict(*of, motion), counted(motion)
+        known[number] &= use
         # a clock that is late shifts the measured torque as well
         before, after = (one.predicted - one.measured for one in (told[number], found))
         return after - before
 
-    known = [_counted(motion) for motion in motions]
+    known = [counted(motion) for motion in motions]
     draws = [[made(number)] for number in range(len(logs))]
     rows = sum(len(first) for (first,) in draws)
     for _ in range(min(_DRAWS, _MOST // max(rows, 1)) - 1 if jitter else 0):
@@ -82,7 +82,7 @@ def of_angles(
     return OfAngles(out, max(bands), use)
 
 
-def _counted(motion: Motion) -> np.ndarray:
+def counted(motion: Motion) -> np.ndarray:
     """(n, dof) whether rows count, of all pieces one after the other."""
     every = np.ones((1, len(motion.joints)), dtype=bool)
     uses = (every.repeat(len(p.t), 0) if p.use is None else p.use for p in motion.pieces)

@@ -16,12 +16,14 @@ from ..prediction import Prediction, predict
 from ..preprocess import on_both_sides, prepare
 from ..specs import Experiment, PreprocessSpec
 from .floor import DOUBT, NoiseFloor
-from .of_angles import of_angles
+from .of_angles import counted, of_angles
 from .of_pieces import filtered, floors_of
 from .repeats import block_rms
 
 _MOST = 200_000  # rows that tell an error
-_AS_FAR = 1.56  # a polynomial of order 4 over a window is -3 dB at this share of one over it
+# a polynomial of order n over a window is -3 dB at n + 1 times this of one over it (Schafer 2011)
+_AS_FAR = 1 / 3.2
+_KEPT = 0.5  # of a joint's rows: a window that takes more, about its reversals, is too wide
 
 
 def floors_of_fit(
@@ -39,16 +41,14 @@ def floors_of_fit(
     spec = settled(experiment.preprocess, fit.filters)
     plain, motions = _as_logged(spec, logs, fit.joints)
     pieces = [piece for motion in motions for piece in motion.pieces]
-    made = []  # by the angles' noise
 
-    def floors(model: Model, x) -> tuple[list[NoiseFloor], list[Prediction]]:
+    def floors(model: Model, x) -> tuple[list[NoiseFloor], list[Prediction], np.ndarray]:
         told = [predict(model, x, motion) for motion in motions]
         predicted = np.concatenate([one.predicted for one in told])
         angles = of_angles(logs, motions, told, plain, (model, x))
-        made[:] = [angles.squares()]
-        return floors_of(pieces, predicted, angles=angles), told
+        return list(floors_of(pieces, predicted, angles=angles)), told, angles.squares()
 
-    found, told = floors(model, x)
+    found, told, made = floors(model, x)
     sides = on_both_sides(spec, pieces[0].step)
     if sides is not None:
         seen = motions if plain is spec else [prepare(part, spec, fit.joints) for part in logs]
@@ -58,10 +58,11 @@ def floors_of_fit(
     # noise is in what every model leaves: whichever leaves less of a joint tells it
     most = np.max([list(fit.rms(part).values()) for part in ("train", "test")], axis=0)
     if np.any(more := left > (1.0 + DOUBT) * most):
-        other, _ = floors(fit.model, fit.x)
+        other, _, its = floors(fit.model, fit.x)
         found = [b if worse else a for a, b, worse in zip(found, other, more)]
+        made = np.where(more, its, made)
     if sides is not None:
-        found = filtered(found, sides, made[0], angles.squares())
+        found = filtered(found, sides, made, angles.squares())
     elif not all(one.reached(error) for one, error in zip(found, most)):
         found = _halved(found, spec, fit, logs)
     return [_in_both(one, fit, j) for j, one in enumerate(found)], dict(zip(fit.joints, left))
@@ -73,13 +74,17 @@ def _as_logged(spec: PreprocessSpec, logs, joints) -> tuple[PreprocessSpec, list
     if spec.torque == "raw":
         return spec, [prepare(part, spec, joints) for part in logs]
     plain = spec.model_copy(update={"torque": "raw"})
-    if spec.torque == "low-pass" and spec.filter == "savitzky-golay":
-        wide = plain.model_copy(update={"window": max(_AS_FAR / spec.cutoff, spec.window)})
-        try:
-            return wide, [prepare(part, wide, joints) for part in logs]
-        except SysidError:  # shorter than that
-            pass
-    return plain, [prepare(part, plain, joints) for part in logs]
+    motions = [prepare(part, plain, joints) for part in logs]
+    if spec.torque != "low-pass" or spec.filter != "savitzky-golay":
+        return plain, motions
+    window = (spec.order + 1) * _AS_FAR / spec.cutoff
+    wide = plain.model_copy(update={"window": max(window, spec.window)})
+    try:
+        others = [prepare(part, wide, joints) for part in logs]
+    except SysidError:  # shorter than that
+        return plain, motions
+    few = [counted(a).sum(0) < _KEPT * counted(b).sum(0) for a, b in zip(others, motions)]
+    return (plain, motions) if np.any(few) else (wide, others)
 
 
 def _in_both(found: NoiseFloor, fit: Fit, joint: int) -> NoiseFloor:

@@ -8,9 +8,9 @@ import numpy as np
 
 from .floor import UNSURE, NoiseFloor, floors
 from .of_angles import OfAngles
+from .repeats import MADE
 
 _SIZES = ("rms", "low", "high", "about")
-_MADE = 0.2  # of the power that the angles' noise makes: as its RMS is known to a tenth
 
 
 def floors_of(
@@ -45,15 +45,19 @@ def filtered(
     gain = float(np.sum(smoother(impulse) ** 2))
 
     def through(floor: NoiseFloor, before: float, after: float) -> NoiseFloor:
-        size = lambda v: v and math.sqrt(gain * max(v**2 - before, 0.0) + after)  # noqa: E731
-        sizes = {name: size(getattr(floor, name)) for name in _SIZES}
+        size = lambda v: math.sqrt(gain * max(v**2 - before, 0.0) + after)  # noqa: E731
+        known = {name: v for name in _SIZES if (v := getattr(floor, name)) is not None}
+        sizes = {name: size(v) for name, v in known.items()}
         told = replace(floor, **sizes, detail=f"{floor.detail}; carried through the fit's filter")
         if not told.rms:
             return told
-        std = math.hypot(gain * 2.0 * floor.rms * floor.std, _MADE * after) / (2.0 * told.rms)
+        # how large the angles' noise is stands in both
+        made = MADE * (after - gain * before)
+        std = math.hypot(gain * 2.0 * floor.rms * floor.std, made) / (2.0 * told.rms)
+        low, high = max(told.rms - 2.0 * std, 0.0), told.rms + 2.0 * std
         if std <= UNSURE * told.rms:
-            return replace(told, std=std)
+            return replace(told, std=std, low=low, high=high)
         why = f"not determined: the noise of the angles hides that of the torque ({told.detail})"
-        return NoiseFloor(None, None, "none", why, told.low, told.high, told.rms)
+        return NoiseFloor(None, None, "none", why, low, high, told.rms)
 
     return [through(*own) for own in zip(found, was.tolist(), now.tolist())]

@@ -17,6 +17,7 @@ from .stretches import moving
 _TOLERANCE, _AWAY = 0.003, 0.05
 _BLOCKS = 30
 _INDEPENDENT = 1.94  # second differences of repeats per independent one
+MADE = 0.2  # of the power that the angles' noise makes: as its RMS is known to a tenth
 _TINY = 1e-300
 
 
@@ -39,13 +40,14 @@ def scatter(signals, torque, kept, periods, angles: float = 0.0) -> tuple[float,
     squares = [_squares(values, kept, periods) for values in (torque, predicted, *signals)]
     if len(squares[0]) < _BLOCKS:
         return None
-    seen = min(float(np.mean(squares[1])), angles)
+    # that the motion is not quite the same stands in what is predicted, and not in the residual
+    seen = min(float(np.mean(squares[1])), float(np.mean(squares[-1])), angles)
     unseen = [angles] + [angles - seen] * len(signals)
     found = []
     for own, more in zip([squares[0], *squares[2:]], unseen):
         rms, error = block_rms(own)
         whole = math.sqrt(rms**2 + more)
-        found.append((whole, error * rms / (whole + _TINY)))
+        found.append((whole, math.hypot(error * rms, 0.5 * MADE * more) / (whole + _TINY)))
     return min(found)
 
 

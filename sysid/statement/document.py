@@ -46,7 +46,7 @@ def _document(found: Diagnosis, run) -> dict:
         },
         "findings": [finding(f, claim, found) for claim in found.claims for f in claim.findings],
         "claims": list(claims(found)),
-        "verdict": [_verdict(v, fit.experiment.path) for v in found.verdict],
+        "verdict": [_verdict(v, fit.experiment.path, joints) for v in found.verdict],
         "detectable": [
             {
                 "effect": d.candidate.name,
@@ -136,7 +136,7 @@ def _floor(floor) -> dict:
     }
 
 
-def _verdict(v: Verdict, path="config.yaml") -> dict:
+def _verdict(v: Verdict, path="config.yaml", joints=()) -> dict:
     out: dict = {"joint": v.joint, "status": v.status}
     # where all error may be noise, what falls is all that is more
     share = number(min(v.explained, 1.0)) if np.isfinite(v.explained) else None
@@ -162,9 +162,10 @@ def _verdict(v: Verdict, path="config.yaml") -> dict:
     if v.says or v.carries:
         out["says"] = "; ".join(words for words in (v.says, v.carries) if words)
     if v.may is not None:
-        name, joints, options = spelled(v.may, v.joint)
-        adds = command(Path(path), name, joints, options)
-        told = {"effect": name, "joint": v.joint, "options": options}
+        where = v.may.where(joints) if joints else v.joint
+        name, own, options = spelled(v.may, where)
+        adds = command(Path(path), name, own, options)
+        told = {"effect": name, "joint": where, "options": options}
         out["may_be"] = {**told, "command": adds}
     if v.even:
         out["weighting"] = "noise"

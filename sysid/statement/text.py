@@ -106,7 +106,7 @@ def _joint(v: dict, of: Told, width: int, said: dict[str, str]) -> list[str]:
     lines += rest if status != "unknown" else []
     if status != "unresolved" and v.get("says"):
         lines += wrapped(f"  {v['says']}", width, "    ")
-    if "may_be" in v:
+    if "may_be" in v and said.setdefault(v["may_be"]["command"], joint) == joint:
         lines += [f"  {TRIED}", v["may_be"]["command"]]
     if status == "unknown":
         lines += wrapped(f"  {OWN}", width, "    ")

@@ -180,7 +180,7 @@ def apart(pair: dict) -> str:
     if chance < NEVER:
         return f"{both}: no motion within these limits is likely to tell them apart"
     said = f"{both} will be told apart with probability {chance:.2f}"
-    (less, never), (more, told) = sorted((pair[f"if_{k}"], pair[k]) for k in "ab")
+    (less, never), (more, told) = sorted((pair.get(f"if_{k}", chance), pair[k]) for k in "ab")
     if less >= NEVER:
         return said
     return f"{said}: {more:.2f} if it is {told}, hardly ever if it is {never}"

@@ -34,7 +34,8 @@ def show_added(document: dict, experiment, run, before=()) -> None:
         print("\n".join(text.wrapped(f"held at zero or at the prior: {', '.join(held)}", terminal_width(), "  ")))
     if document["says"]:
         Console().print(escape(document["says"]), soft_wrap=True, highlight=False)
-    nothing = all(abs(d["delta_rms"] or 0.0) <= _NOTHING * (first[d["joint"]] or 0.0) for d in document["differences"])
+    changes = [(d["delta_rms"], first[d["joint"]]) for d in document["differences"]]
+    nothing = not document["refused"] and all(abs(change or 0.0) <= _NOTHING * (was or 0.0) for change, was in changes)
     if not document["refused"]:
         print(f"written into {document['experiment']}")
         if nothing:

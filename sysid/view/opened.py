@@ -12,7 +12,17 @@ from .. import experiment_logs
 from ..effect import NotFinite
 from ..errors import LogError
 from ..estimate import Fit
-from ..lowpass import MOTION, again, band, lowpassed, narrowed, on_same_rows, stride_of, widest
+from ..lowpass import (
+    MOTION,
+    again,
+    band,
+    hardly_moving,
+    lowpassed,
+    narrowed,
+    on_same_rows,
+    stride_of,
+    widest,
+)
 from ..notices import samples_of
 from ..posed_problem import inverse
 from ..prior_weight import USUAL, weakest, with_weight
@@ -89,8 +99,9 @@ def _motions(logs, joints, cutoff: float, own: float, seed: int = 0):
     if motion is None or motion.samples < _FEWEST:
         return None
     rng = np.random.default_rng(seed)
+    slow = hardly_moving(cutoff, own)
     noise = np.max([piece.noise for piece in motion.pieces], axis=0)
-    drawn = lambda s: again(s, noise, min(cutoff, MOTION * own), rng)  # noqa: E731
+    drawn = lambda s: again(s, noise, slow, rng)  # noqa: E731
     noisy = [replace(log, segments=tuple(map(drawn, log.segments))) for log in logs]
     return on_same_rows(motion, lowpassed(noisy, joints, cutoff, known=own))
 
