@@ -71,7 +71,7 @@ def test_a_band_is_not_narrowed_where_short_logs_would_be_lost(simulated, monkey
     fit = pipeline.fit(experiment)
     train, test = (experiment_logs.read(experiment, fit.model.robot, part) for part in (experiment.data.train, experiment.data.test))
     monkeypatch.setattr(opened, "narrowed", lambda cutoff, share: 0.5 * cutoff)
-    monkeypatch.setattr(opened, "_MOTION", 0.0)
+    monkeypatch.setattr(opened, "MOTION", 0.0)
     wide, once = widest(train), 0.5 * widest(train)
     assert first_view(experiment, fit, train, test).cutoff == pytest.approx(wide / 8.0)
     short = [replace(log, segments=tuple(cut(log, slice(0, 500)).segments)) for log in test]
