@@ -55,8 +55,8 @@ def mean_square(drawn, kept) -> float:
     """Of what is drawn (draws, n) of each run, over the rows (n,) that are kept; 0 of nothing."""
     if drawn is None:
         return 0.0
-    squares = [values[:, rows].ravel() ** 2 for values, rows in zip(drawn, kept)]
-    return float(np.mean(np.concatenate(squares)))
+    every = np.concatenate([values[:, rows].ravel() for values, rows in zip(drawn, kept)])
+    return float(every @ every) / max(len(every), 1)
 
 
 def _squares(values_of, kept, periods) -> np.ndarray:
