@@ -14,15 +14,17 @@ from ..model import Model
 from ..motion import Motion
 from ..prediction import Prediction, predict
 from ..preprocess import on_both_sides, prepare
+from ..projection import NOISE
 from ..specs import Experiment, PreprocessSpec
 from .floor import DOUBT, NoiseFloor
 from .of_angles import counted, of_angles
 from .of_pieces import filtered, floors_of
-from .repeats import block_rms
+from .repeats import MADE, block_rms
 
 _MOST = 200_000  # rows that tell an error
 # a polynomial of order n over a window is -3 dB at n + 1 times this of one over it (Schafer 2011)
 _AS_FAR = 1 / 3.2
+_ALL = "what the noise of the angles, drawn again, makes: all that is left"
 _KEPT = 0.5  # of a joint's rows: a window that takes more, about its reversals, is too wide
 
 
@@ -32,26 +34,32 @@ def floors_of_fit(
     """Each joint's noise floor, and {joint: RMS of what the model leaves}, as the fit sees torque.
 
     A low-pass on both sides leaves nothing of the frequencies at which noise is told from motion:
-    what it carries through is told of the torque as logged, beside angles that are smoothed as far.
+    what it carries through is told of the torque as logged; beside angles that are smoothed as far,
+    where their noise would hide that of the torque.
 
     Args:
         model, x (size,): whose residual is looked at; in its parameters loud joints should not
             drown quiet ones. logs: of each part.
     """
     spec = settled(experiment.preprocess, fit.filters)
-    plain, motions = _as_logged(spec, logs, fit.joints)
-    pieces = [piece for motion in motions for piece in motion.pieces]
+    plain = spec.model_copy(update={"torque": "raw"})
+    motions = [prepare(part, plain, fit.joints) for part in logs]
 
     def floors(model: Model, x) -> tuple[list[NoiseFloor], list[Prediction], np.ndarray]:
+        pieces = [piece for motion in motions for piece in motion.pieces]
         told = [predict(model, x, motion) for motion in motions]
         predicted = np.concatenate([one.predicted for one in told])
         angles = of_angles(logs, motions, told, plain, (model, x))
         return list(floors_of(pieces, predicted, angles=angles)), told, angles.squares()
 
     found, told, made = floors(model, x)
-    sides = on_both_sides(spec, pieces[0].step)
+    sides = on_both_sides(spec, motions[0].pieces[0].step)
     if sides is not None:
-        seen = motions if plain is spec else [prepare(part, spec, fit.joints) for part in logs]
+        loud = [m > NOISE * (f.rms or f.about or 0.0) ** 2 for f, m in zip(found, made)]
+        if any(loud) and (wide := _as_far(spec, logs, motions)):
+            plain, motions = wide
+            found, told, made = floors(model, x)
+        seen = [prepare(part, spec, fit.joints) for part in logs]
         told = [predict(model, x, motion) for motion in seen]
         angles = of_angles(logs, seen, told, spec, (model, x))
     left = np.max([one.errors()["rms"] for one in told], axis=0)
@@ -62,29 +70,34 @@ def floors_of_fit(
         found = [b if worse else a for a, b, worse in zip(found, other, more)]
         made = np.where(more, its, made)
     if sides is not None:
-        found = filtered(found, sides, made, angles.squares())
+        found = filtered(found, sides, made, now := angles.squares())
+        found = [_alone(*own) for own in zip(found, np.sqrt(now).tolist(), most.tolist())]
     elif not all(one.reached(error) for one, error in zip(found, most)):
         found = _halved(found, spec, fit, logs)
     return [_in_both(one, fit, j) for j, one in enumerate(found)], dict(zip(fit.joints, left))
 
 
-def _as_logged(spec: PreprocessSpec, logs, joints) -> tuple[PreprocessSpec, list[Motion]]:
-    """The preprocessing that leaves torque as logged, and logs prepared with it: angles smoothed as
-    far as a low-pass on both sides would smooth what they make, or less where logs are short."""
-    if spec.torque == "raw":
-        return spec, [prepare(part, spec, joints) for part in logs]
-    plain = spec.model_copy(update={"torque": "raw"})
-    motions = [prepare(part, plain, joints) for part in logs]
+def _alone(found: NoiseFloor, made: float, error: float) -> NoiseFloor:
+    """A floor; where it is not known and all that is left is what the angles' noise makes, that."""
+    std = 0.5 * MADE * made
+    own = NoiseFloor(made, std, "spectral", _ALL, made - 2.0 * std, made + 2.0 * std)
+    return own if found.rms is None and own.reached(error) else found
+
+
+def _as_far(spec: PreprocessSpec, logs, motions) -> tuple[PreprocessSpec, list[Motion]] | None:
+    """The preprocessing that leaves torque as logged and smooths angles as far as a low-pass on
+    both sides smooths what they make, and logs prepared with it; None where that takes the rows that
+    motions prepared otherwise have."""
     if spec.torque != "low-pass" or spec.filter != "savitzky-golay":
-        return plain, motions
-    window = (spec.order + 1) * _AS_FAR / spec.cutoff
-    wide = plain.model_copy(update={"window": max(window, spec.window)})
+        return None
+    window = max((spec.order + 1) * _AS_FAR / spec.cutoff, spec.window)
+    wide = spec.model_copy(update={"torque": "raw", "window": window})
     try:
-        others = [prepare(part, wide, joints) for part in logs]
-    except SysidError:  # shorter than that
-        return plain, motions
+        others = [prepare(part, wide, motions[0].joints) for part in logs]
+    except SysidError:  # logs shorter than that
+        return None
     few = [counted(a).sum(0) < _KEPT * counted(b).sum(0) for a, b in zip(others, motions)]
-    return (plain, motions) if np.any(few) else (wide, others)
+    return None if np.any(few) else (wide, others)
 
 
 def _in_both(found: NoiseFloor, fit: Fit, joint: int) -> NoiseFloor:
