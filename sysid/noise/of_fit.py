@@ -86,8 +86,8 @@ def _alone(found: NoiseFloor, made: float, error: float) -> NoiseFloor:
 
 def _as_far(spec: PreprocessSpec, logs, motions) -> tuple[PreprocessSpec, list[Motion]] | None:
     """The preprocessing that leaves torque as logged and smooths angles as far as a low-pass on
-    both sides smooths what they make, and logs prepared with it; None where that takes the rows that
-    motions prepared otherwise have."""
+    both sides smooths what they make, and logs prepared with it; None where that takes the rows
+    that motions prepared otherwise have."""
     if spec.torque != "low-pass" or spec.filter != "savitzky-golay":
         return None
     window = max((spec.order + 1) * _AS_FAR / spec.cutoff, spec.window)
