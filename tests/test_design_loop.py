@@ -35,7 +35,7 @@ def test_a_tie_is_designed_away(tmp_path, monkeypatch):
     simulated, first, designed, _, second, added = said
     assert "cannot tell it" in first and "cannot tell" not in second
     pairs = json.loads((Path("next") / "design.json").read_text())["separates"]
-    assert {"stribeck:knee", "position_friction:knee"} in [{pair["a"], pair["b"]} for pair in pairs]
+    assert {"stribeck:knee", "encoder_eccentricity:knee"} in [{pair["a"], pair["b"]} for pair in pairs]
     assert all(pair["probability"] > 0.9 for pair in pairs)
     true = float(re.search(r"dF=(\S+),", simulated)[1])
     size, deviation = map(float, re.search(r"stribeck.knee.dF = (\S+) \+- (\S+)", added).groups())
