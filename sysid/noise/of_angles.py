@@ -61,14 +61,13 @@ def of_angles(
             segments = tuple(again(s, angle_noise(s, cutoff), slow, rng) for s in log.segments)
             jitter |= any(s.clock is not None for s in segments)
             noisy.append(replace(log, segments=segments))
-        motion = prepare(noisy, spec, plain.joints)
-        found, use = predict(*of, motion), counted(motion)
-        known[number] &= use
+        found = predict(*of, prepare(noisy, spec, plain.joints))
+        known[number] = known[number] & _use(found)
         # a clock that is late shifts the measured torque as well
         before, after = (one.predicted - one.measured for one in (told[number], found))
         return after - before
 
-    known = [counted(motion) for motion in motions]
+    known = [_use(one) for one in told]
     draws = [[made(number)] for number in range(len(logs))]
     rows = sum(len(first) for (first,) in draws)
     for _ in range(min(_DRAWS, _MOST // max(rows, 1)) - 1 if jitter else 0):
@@ -82,8 +81,6 @@ def of_angles(
     return OfAngles(out, max(bands), use)
 
 
-def counted(motion: Motion) -> np.ndarray:
-    """(n, dof) whether rows count, of all pieces one after the other."""
-    every = np.ones((1, len(motion.joints)), dtype=bool)
-    uses = (every.repeat(len(p.t), 0) if p.use is None else p.use for p in motion.pieces)
-    return np.concatenate([use[piece.core] for use, piece in zip(uses, motion.pieces)])
+def _use(told: Prediction) -> np.ndarray:
+    """(n, dof) whether rows count."""
+    return np.ones(told.predicted.shape, dtype=bool) if told.use is None else told.use

@@ -17,7 +17,7 @@ from ..preprocess import on_both_sides, prepare
 from ..projection import NOISE
 from ..specs import Experiment, PreprocessSpec
 from .floor import DOUBT, NoiseFloor
-from .of_angles import counted, of_angles
+from .of_angles import of_angles
 from .of_pieces import filtered, floors_of
 from .repeats import MADE, block_rms
 
@@ -96,7 +96,8 @@ def _as_far(spec: PreprocessSpec, logs, motions) -> tuple[PreprocessSpec, list[M
         others = [prepare(part, wide, motions[0].joints) for part in logs]
     except SysidError:  # logs shorter than that
         return None
-    few = [counted(a).sum(0) < _KEPT * counted(b).sum(0) for a, b in zip(others, motions)]
+    rows = lambda motion: motion.samples - motion.left_out  # noqa: E731 - of each joint
+    few = [rows(other) < _KEPT * rows(motion) for other, motion in zip(others, motions)]
     return None if np.any(few) else (wide, others)
 
 

@@ -37,18 +37,20 @@ def scatter(signals, torque, kept, periods, angles: float = 0.0) -> tuple[float,
         angles: mean square of what the noise of the angles adds to the torque that is predicted.
     """
     predicted = [told - left for told, left in zip(torque, signals[-1])]
-    squares = [_squares(values, kept, periods) for values in (torque, predicted, *signals)]
-    if len(squares[0]) < _BLOCKS:
+    parts = (torque, predicted, *signals)
+    measured, moved, *left = (_squares(values, kept, periods) for values in parts)
+    if len(measured) < _BLOCKS:
         return None
     # that the motion is not quite the same stands in what is predicted, and not in the residual
-    seen = min(float(np.mean(squares[1])), float(np.mean(squares[-1])), angles)
-    unseen = [angles] + [angles - seen] * len(signals)
-    found = []
-    for own, more in zip([squares[0], *squares[2:]], unseen):
-        rms, error = block_rms(own)
-        whole = math.sqrt(rms**2 + more)
-        found.append((whole, math.hypot(error * rms, 0.5 * MADE * more) / (whole + _TINY)))
-    return min(found)
+    unseen = angles - min(float(np.mean(moved)), float(np.mean(left[-1])), angles)
+    return min(_with(measured, angles), *(_with(own, unseen) for own in left))
+
+
+def _with(squares: np.ndarray, unseen: float) -> tuple[float, float]:
+    """RMS and its standard error, with a mean square of the angles' noise that is not seen."""
+    rms, error = block_rms(squares)
+    whole = math.sqrt(rms**2 + unseen)
+    return whole, math.hypot(error * rms, 0.5 * MADE * unseen) / (whole + _TINY)
 
 
 def mean_square(drawn, kept) -> float:
