@@ -133,6 +133,20 @@ def test_no_candidate_makes_everything_rise(view):
     assert np.all(found >= -1e-4 * view.settled.objective)
 
 
+def test_who_cannot_fall_as_far_is_not_settled(bound, monkeypatch):
+    """The tangent of a convex prior stands below it: nobody who falls so far is left out, not all others are settled."""
+    asked = [SimpleNamespace(candidate=c, shapes={}) for c in candidates(bound.model) if not c.effect.shapes()]
+    every = falls(bound, asked)
+    share = 0.1 * every.max() / np.sum(bound.design.residual**2, axis=0).min()
+    least = 0.1 * every.max()
+    posed = []
+    nearby = type(bound.settled.problem).from_nearby
+    monkeypatch.setattr(type(bound.settled.problem), "from_nearby", lambda problem, *how: posed.append(problem) or nearby(problem, *how))
+    found = falls(bound, asked, share)
+    assert np.array_equal(found[every >= least], every[every >= least])
+    assert np.sum(every >= least) <= len(posed) < len(asked)
+
+
 @pytest.mark.long
 def test_most_falls_with_what_is_missing(simulated):
     """In moves with stops bodies imitate a coupling: by its slopes it stands in no clear place, where all has settled anew it is first."""

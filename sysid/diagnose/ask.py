@@ -13,8 +13,10 @@ from ..view import View, falls
 from . import null
 from .evidence import Group
 from .projected import groups
+from .ties import NEAR
 
 _MAY_BE = 0.05  # family-wise: an effect that may be there, though it is not claimed
+HIDES = 0.25  # of a joint's squared residual: without less, statistics grow by less than a seventh
 HALF = 0.5  # of what functions of the motion predict: that much may be the effect
 
 
@@ -45,12 +47,12 @@ class Asked:
     @cached_property
     def falls(self) -> np.ndarray:
         """(groups,) how far everything falls where a candidate comes in and all else settles anew;
-        minus infinity but at the values that take most, of those of the sign it may have."""
+        minus infinity but at the values of right sign that take most, and where that is little."""
         best, out = dict[tuple, int](), np.full(len(self.groups), -np.inf)
         for k in sorted(range(len(out)), key=lambda k: (self.groups[k].signed, self.gains[k])):
             best[self.groups[k].candidate.kind] = k
         some = [k for k in best.values() if not self.groups[k].candidate.begins]
-        out[some] = falls(self.view, [self.groups[k] for k in some])
+        out[some] = falls(self.view, [self.groups[k] for k in some], NEAR * HIDES)
         return out
 
     @cached_property

@@ -13,7 +13,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ..view import View, alike
-from .ask import Asked, ask
+from .ask import HIDES, Asked, ask
 from .refits import settled
 from .steps import Step, rejoined, revised, step_of
 from .ties import NEAR, Choice, chosen, price_of
@@ -22,7 +22,6 @@ LEVEL = 0.01  # family-wise: how often anything is accused where nothing is ther
 WORTH = 0.03  # of a joint's squared residual under the low-pass: 1.5 % of its root mean square
 _ALONE = 1.645  # standard errors: five per cent, were it the only question
 _MOST_STEPS, _SHORTLIST, _TRIALS = 8, 8, 2
-_HIDES = 0.25  # of a joint's squared residual: without less, statistics grow by less than a seventh
 
 
 def search(
@@ -76,8 +75,7 @@ def _next(view: View, asked: Asked, level: float, worth: float, open_: list[Choi
         told = found and asked.told(k, found)
         if told and told.statistics[k] > threshold:
             own = {j: j for j in np.argsort(-told.gains).tolist()}
-            kind = asked.groups[k].candidate.kind
-            if step := _standing(view, told, own, [k], worth, open_, kind):
+            if step := _standing(view, told, own, [k], worth, open_, told.groups[k].candidate.kind):
                 return step
     return None
 
@@ -88,7 +86,7 @@ def _trials(view: View, asked: Asked) -> list[int]:
     dof, loss = view.model.robot.dof, np.sum(view.design.residual**2, axis=0)
     left, out = [np.mean(loss[g.candidate.touches(dof)]) for g in asked.groups], dict[tuple, int]()
     for k in np.argsort(-asked.falls, kind="stable").tolist():
-        if asked.falls[k] > _HIDES * left[k]:
+        if asked.falls[k] > HIDES * left[k]:
             out.setdefault(asked.groups[k].candidate.key, k)
     return list(out.values())[:_TRIALS]
 

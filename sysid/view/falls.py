@@ -26,28 +26,34 @@ from .view import View
 _NOTHING = 1e-9  # of the greatest: what rounding leaves of a direction that no row tells
 
 
-def falls(view: View, asked: Sequence) -> np.ndarray:
-    """How far a view's objective falls (asked,) with the columns of each candidate at its shapes.
+def falls(view: View, asked: Sequence, least: float | None = None) -> np.ndarray:
+    """How far a view's objective falls (asked,) with the columns of each candidate at its shapes;
+    minus infinity where it cannot fall by `least`.
 
     Args:
-        asked: a candidate each, and its shapes.
+        asked: a candidate each, and its shapes. least: share of a joint's least squared residual.
     """
+    loss = np.sum(view.design.residual**2, axis=0)
+    enough = -np.inf if least is None else least * loss.min()
     target = view.rows.tau.T[:, :, None]
     full = np.concatenate([view.rows.columns, target], axis=2) * view.weights[:, None, None]
     own = condensed(view.model, view.rows).total(view.weights)
     norms = np.linalg.norm(own, axis=0)
     norms = np.where(norms > 0.0, norms, 1.0)
-    known = full, own, np.linalg.pinv((own / norms).T, rcond=_NOTHING) / norms
-    left = [_least(view, *known, one.candidate, one.shapes) for one in asked]
+    inverse = np.linalg.pinv((own / norms).T, rcond=_NOTHING) / norms
+    basis, sizes, _ = np.linalg.svd((own / norms)[:, :-1])
+    known = full, own, inverse, basis[:, : np.sum(sizes > _NOTHING * sizes[0])]
+    left = [_least(view, *known, one.candidate, one.shapes, enough) for one in asked]
     return view.settled.objective - np.array(left)
 
 
-def _least(view: View, full, own, inverse, candidate: Candidate, shapes: dict[str, float]) -> float:
-    """The least objective with one candidate.
+def _least(view: View, full, own, inverse, basis, candidate: Candidate, shapes, least) -> float:
+    """The least objective with one candidate; infinity where it cannot fall by `least`: the prior
+    is convex and stands above its tangent, with which all is least squares.
 
     Args:
-        full: (dof, n, size + 1) weighted columns and torque. own, inverse: (size + 1, size + 1)
-            their triangle, and the inverse of its transpose on its range.
+        full: (dof, n, size + 1) weighted columns and torque. own, inverse, basis: their triangle,
+            the inverse of its transpose on its range, and a basis of its columns' range.
     """
     joints = candidate.touches(view.model.robot.dof)
     columns, signs = columns_of(view.source, candidate, [shapes])[0], []
@@ -61,6 +67,9 @@ def _least(view: View, full, own, inverse, candidate: Candidate, shapes: dict[st
     size, more = len(own) - 1, len(square)
     # the same squares as the rows: all that an objective looks at
     told = inverse @ cross
+    held, score = basis.T @ told, cross.T @ np.append(-view.settled.x, 1.0)
+    if score @ np.linalg.pinv(square - held.T @ held, hermitian=True) @ score < least:
+        return np.inf
     both = np.block([[own, told], [np.zeros((more, size + 1)), root(square - told.T @ told).T]])
     triangle = both[:, [*range(size), *range(size + 1, size + 1 + more), size]]
     model = view.model if candidate.nonlinear else grown(view.source, candidate, shapes)
