@@ -16,6 +16,7 @@ from .clock import Clock, corrected
 from .drive_spec import ActuatorSpec
 from .errors import LogError
 from .events import Event
+from .full_turns import going_on
 from .groups import levels_of
 from .log_spec import DataSpec, LogSpec
 from .recording import Recording, recorded
@@ -73,11 +74,13 @@ def read(log: LogSpec, data: DataSpec, joints: tuple[str, ...], prismatic, folde
     Raises:
         LogError: the file, a column, a unit or a value is not what a log can hold.
     """
-    return assembled(measured(log, data, joints, prismatic, folder, actuators), log, data)
+    return assembled(measured(log, data, joints, prismatic, folder, actuators), log, data, joints, prismatic)
 
 
-def assembled(samples: Recording, log: LogSpec, data: DataSpec) -> Log:
-    """The log of what was `measured` of an entry of an experiment: resampled where its clock is irregular, split at gaps and where a recording ends."""
+def assembled(samples: Recording, log: LogSpec, data: DataSpec, joints: tuple[str, ...], prismatic) -> Log:
+    """The log of what was `measured` of an entry of an experiment: angles that jump by a turn go on, it is resampled where its clock is
+    irregular, split at gaps and where a recording ends."""
+    samples = going_on(samples, joints, prismatic)
     hashes = {name: sha256(path) for name, path in samples.files.items()}
     each = list(hashes.values())
     whole = each[0] if len(each) == 1 else hashlib.sha256("".join(each).encode()).hexdigest()

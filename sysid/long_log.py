@@ -18,6 +18,7 @@ import numpy as np
 from . import log as logs
 from . import recorded_columns, recording, spans, units
 from .even_clock import EvenClock, Stretch
+from .full_turns import going_on
 from .groups import levels_of
 from .log import Log
 from .log_spec import DataSpec, LogSpec
@@ -129,6 +130,7 @@ class _Source:
         with noticed() as told:
             how = (spec, self._data, self._joints, self._prismatic, self._folder)
             samples = logs.measured(*how, table=part, first=row)
+            samples = going_on(samples, self._joints, self._prismatic)
         for said in told:
             key = found[0] if (found := _DEGREES.findall(said)) else said
             if key not in self._told:

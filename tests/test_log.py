@@ -9,6 +9,7 @@ import pytest
 
 from sysid import experiment_logs, log, log_spec, pipeline, regressor
 from sysid.errors import LogError, SysidWarning
+from sysid.full_turns import unwrapped
 from sysid.readers import open_table
 from tests.conftest import JOINTS, csv, matrices, motion, write_mat5, write_mat73, write_table
 
@@ -238,6 +239,32 @@ def test_signals_go_with_their_samples(tmp_path, arm_logs):
         np.testing.assert_allclose(segment.signals["clock"], segment.t, atol=1e-12)
 
 
+@pytest.mark.parametrize("unit, turn", [("rad", 2 * np.pi), ("deg", 360.0)])
+def test_angles_that_were_logged_within_a_turn_go_on(tmp_path, arm_logs, unit, turn):
+    """As they were, but for whole turns, and it is said; the first sample of a piece that another recording begins with is no jump."""
+    q = {name: turn / (2 * np.pi) * (arm_logs[0][name] + 2.9) for name in ("q_shoulder", "q_elbow")}
+    plain = read(write_table(tmp_path / "plain.csv", arm_logs[0] | q), units={"position": unit})
+    within = q | {"q_elbow": (q["q_elbow"] + turn / 2) % turn - turn / 2}
+    with pytest.warns(SysidWarning, match="'elbow' jumps by a turn") as told:
+        wrapped = read(write_table(tmp_path / "within.csv", arm_logs[0] | within), units={"position": unit})
+    assert len(told) == 1
+    assert np.abs(np.diff(within["q_elbow"])).max() > 0.9 * turn
+    turns = (only(plain).q - only(wrapped).q) / (2 * np.pi)
+    np.testing.assert_allclose(turns, np.tile(np.round(turns[0]), (len(turns), 1)), atol=1e-9)
+
+
+def test_what_slides_and_what_was_recorded_anew_jumps_by_no_turn():
+    """A slide of 6.3 m from sample to sample stays, and so does another recording's first angle; a glitch of one sample goes."""
+    q = np.zeros((9, 2))
+    q[4:, 0] = q[6:, 1] = 2 * np.pi
+    q[2, 1] = -2 * np.pi
+    found, joints = unwrapped(q, np.array([False, True]), [(0, 6), (6, 9)])
+    np.testing.assert_array_equal(found[:, 0], q[:, 0])
+    np.testing.assert_allclose(found[:, 1], [0.0] * 6 + [2 * np.pi] * 3, atol=1e-12)
+    assert joints == [1]
+    assert unwrapped(q, np.array([False, False]), [(0, 9)])[0] is q
+
+
 def test_several_logs(experiment, arm_logs):
     """Two logs and a piece in train, two in test: every sample counts once, and no filter sees across a border."""
     config_ = {
@@ -280,11 +307,7 @@ def test_mat_v5_big_endian(tmp_path):
 
     element = lambda kind, data: pack.pack(">II", kind, len(data)) + data + bytes(-len(data) % 8)  # noqa: E731
     matrix = (
-        element(6, pack.pack(">II", 6, 0))
-        + element(5, pack.pack(">ii", 2, 1))
-        + pack.pack(">HH", 1, 1)
-        + b"q\0\0\0"
-        + element(9, pack.pack(">dd", 1.5, -2.0))
+        element(6, pack.pack(">II", 6, 0)) + element(5, pack.pack(">ii", 2, 1)) + pack.pack(">HH", 1, 1) + b"q\0\0\0" + element(9, pack.pack(">dd", 1.5, -2.0))
     )
     (tmp_path / "log.mat").write_bytes(b"MATLAB 5.0 MAT-file".ljust(124) + pack.pack(">H", 0x0100) + b"MI" + element(14, matrix))
     np.testing.assert_array_equal(open_table(tmp_path / "log.mat").load(["q"])["q"], [1.5, -2.0])

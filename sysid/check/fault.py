@@ -11,7 +11,8 @@ ERROR, WARNING = "error", "warning"
 class Fault:
     """A fault of one log, or of all where `log` is empty; of one joint, or of all where `joint` is.
 
-    severity: "error" where a fit of it would be wrong, "warning" where it is worth knowing. times:
+    severity: "error" where a fit of what was logged would be wrong, "warning" where it is worth
+    knowing. times:
     [s] on the log's own clock; rows: how many samples. says: what, with its figure; do: the cure.
     """
 

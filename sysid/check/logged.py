@@ -82,7 +82,7 @@ def _taken(spec: LogSpec, how: tuple) -> tuple[logs.Log, Recording | None]:
     if (log := long_log.in_spans(spec, *how)) is not None:
         return log, None
     told = logs.measured(spec, *how)
-    log = logs.assembled(told, spec, how[0])
+    log = logs.assembled(told, spec, *how[:3])
     # segments go to what was recorded in one go; of spans these are not told
     return (log if len(told.parts) > 1 else long_log.spanned(log)), told
 

@@ -11,15 +11,14 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
+from ..full_turns import jumps
 from ..log import DEGREES, GAP_STEPS
 from ..robot import Robot
 from .samples import Samples, Told, behind, told
 
-TURN = 2.0 * np.pi
 BEYOND = 0.02  # rad or m beyond a limit, and share of the range
 FASTER = 1.5  # times a limit of speed, as many a URDF states the rated one
 JITTER = 0.05  # of a step, RMS: what is less, resampling mends
-_NEAR = 0.1  # of a turn: so near to a whole one is a jump of the count, and no motion
 SPAN = 0.05  # s over which a speed is taken
 _MOST = 4096  # rows of the part before that are looked at again: a speed's, at any rate of a logger
 
@@ -137,7 +136,7 @@ def _of_part(part: Samples, seen: int, step: float, robot: Robot) -> Tally:
 def _of_joint(part: Samples, seen: int, moved, j: int, step: float, robot: Robot) -> OfJoint:
     t, q, since = part.t[seen:], part.q[seen:, j], max(seen - 1, 0)
     slides, (low, high) = bool(robot.prismatic[j]), robot.limits[j]
-    jumps, size = np.abs(np.abs(moved) - TURN) < _NEAR * TURN, np.abs(q)
+    jumped, size = jumps(moved), np.abs(q)
     room = BEYOND * max(1.0, high - low) if np.isfinite(high - low) else np.inf
     beyond = (q < low - room) | (q > high + room)
     lag = min(lag_of(step), len(part.t))
@@ -145,7 +144,7 @@ def _of_joint(part: Samples, seen: int, moved, j: int, step: float, robot: Robot
     top = speeds(part.t[again], part.q[again, j], step)
     allowed = robot.source.joints[robot.joints[j]].velocity
     return OfJoint(
-        Told() if slides else told(jumps, np.abs(moved), part.t[since:][1:]),
+        Told() if slides else told(jumped, np.abs(moved), part.t[since:][1:]),
         Told() if slides else told(size > DEGREES, size, t),
         told(beyond & (high > low), np.maximum(low - q, q - high), t, q),
         told(top > FASTER * allowed, top, part.t[again]),

@@ -10,6 +10,7 @@ import numpy as np
 
 from .. import datasets
 from .. import robot as machines
+from ..full_turns import ADVICE
 from ..robot_spec import RobotSpec
 from ..warned import noticed
 from . import joints, physics, robots, units
@@ -137,6 +138,6 @@ def _wraps(data: list[Logged], used: list[str], robot, unit: str) -> tuple[str, 
         ).items():
             notes.append(
                 f"the angle of {joint} jumps by a turn {count} times in {Path(one.name).name}: "
-                "unwrap it (numpy.unwrap) before it is logged"
+                f"{ADVICE}"
             )
     return tuple(notes)

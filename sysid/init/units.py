@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import LogError
+from ..full_turns import TURN, jumps
 from ..log import DEGREES
-from ..units import DEGREE
+from ..units import DEGREE, POSITION
 from .guess import Guess
 from .logged import Logged, Signals
 from .words import UNITS, words
@@ -17,7 +18,6 @@ _STEPS = (2e-4, 2e-1)  # s
 _SLOWEST = 10.0  # s from sample to sample, of a clock whose start tells its unit
 _PER_SECOND = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
 _EPOCH = (0.9e9, 4.2e9)  # s since 1970: the years 1998 to 2103
-_TURN = 2.0 * np.pi
 _DIGITS = 3  # of a rate that speeds tell
 _ALOHA, _ALOHA_RATE = "observations/qpos", 50.0  # Hz: DT = 0.02 s in ALOHA's constants
 _COUNTS = (
@@ -94,7 +94,7 @@ def position_unit(q: dict[str, np.ndarray], slides: dict[str, bool], named: str)
     largest = {joint: float(np.abs(values).max()) for joint, values in turning.items()}
     joint = max(largest, key=largest.get)
     if largest[joint] > DEGREES:
-        turns = largest[joint] / _TURN
+        turns = largest[joint] / TURN
         why = f"{joint} reaches {largest[joint]:.4g}, which in rad would be {turns:.2g} turns"
         far = [own for own, size in largest.items() if size > DEGREES]
         moving = [own for own, values in turning.items() if np.ptp(values) > 0.0]
@@ -129,11 +129,8 @@ def _counts(values) -> bool:
 
 def wraps(q: dict[str, np.ndarray], slides: dict[str, bool], unit: str) -> dict[str, int]:
     """How often each turning joint's angle jumps by a turn, of those that do."""
-    turn = 360.0 if unit == "deg" else _TURN
-    jumps = {
-        j: np.abs(np.abs(np.diff(v)) - turn) < 0.1 * turn for j, v in q.items() if not slides[j]
-    }
-    return {joint: int(found.sum()) for joint, found in jumps.items() if found.any()}
+    found = {j: jumps(POSITION[unit] * np.diff(v)) for j, v in q.items() if not slides[j]}
+    return {joint: int(jumped.sum()) for joint, jumped in found.items() if jumped.any()}
 
 
 def within_a_turn(data: list[Logged], used: list[str], slides: dict[str, bool]) -> bool:
@@ -143,7 +140,7 @@ def within_a_turn(data: list[Logged], used: list[str], slides: dict[str, bool]) 
     jumping = {joint for q in logged for joint in wraps(q, slides, "rad")}
     each = [q[joint] for q in logged for joint in jumping if joint in q]
     return bool(each) and all(
-        np.abs(q).max() < 1.1 * _TURN and np.quantile(np.abs(np.diff(q)), 0.9) < 0.1 * _TURN
+        np.abs(q).max() < 1.1 * TURN and np.quantile(np.abs(np.diff(q)), 0.9) < 0.1 * TURN
         for q in each
     )
 

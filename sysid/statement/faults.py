@@ -22,7 +22,7 @@ def lines(document: dict, width: int) -> list[str]:
             out += wrapped(f"  {line}", width, "    ")
         for do in dict.fromkeys(f["do"] for f in own):
             out += wrapped(f"  -> {do}", width, "     ")
-    return [*out, *wrapped(_sum([severity for severity, _ in groups], document["ok"]), width, "  ")]
+    return [*out, *wrapped(_sum(list(groups), document["ok"]), width, "  ")]
 
 
 def _told(own: list[dict]) -> list[str]:
@@ -42,12 +42,14 @@ def _told(own: list[dict]) -> list[str]:
     return [worst["says"], f"{len(says)} such in all: {', '.join(counted)}"]
 
 
-def _sum(kinds: list[str], ok: bool) -> str:
+def _sum(kinds: list[tuple[str, str]], ok: bool) -> str:
     if not kinds:
         return "no fault was found"
-    errors, warnings = kinds.count("error"), kinds.count("warning")
+    wrong = {fault for severity, fault in kinds if severity == "error"}
+    errors, warnings = len(wrong), len(kinds) - len(wrong)
     said = f"{warnings} kind{'s' * (warnings != 1)} of warning"
     if ok:
         return f"{said}, no error: these logs can be fitted"
     more = f" and {said}" if warnings else ""
-    return f"{errors} kind{'s' * (errors > 1)} of error{more}: a fit of these logs would be wrong"
+    then = "mends it" if wrong == {"angle_wrap"} else "of these logs would be wrong"
+    return f"{errors} kind{'s' * (errors > 1)} of error{more}: a fit {then}"

@@ -6,11 +6,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ...full_turns import ADVICE, TURN
 from ...lowpass.angles import grains
 from ...units import DEGREE
 from ..fault import ERROR, WARNING, Fault
 from ..look import Logged, Look
-from ..tally import FASTER, TURN, lag_of
+from ..tally import FASTER, lag_of
 
 AFTER, SENSELESS = 1, ("wrong_unit",)
 _COARSE = TURN / 2**12  # rad: a velocity by differences then is mostly steps
@@ -41,7 +42,7 @@ def _of_log(look: Look, log: Logged, j: int, joint: str, slides: bool) -> Iterat
                 f"the angle of {joint} jumps by a turn {own.wraps.count} times in {name}, "
                 f"first at {times[0]:.4g} s"
             ),
-            "unwrap it (numpy.unwrap) before it is logged",
+            ADVICE,
             joint,
             name,
             times,

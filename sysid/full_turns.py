@@ -1,0 +1,47 @@
+"""Angles that were logged within one turn: they jump by a turn where the joint goes on."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from .recording import Recording
+from .warned import warn
+
+TURN = 2.0 * np.pi  # rad
+ADVICE = "a fit takes it to go on, and says so; better unwrap it (numpy.unwrap) before it is logged"
+_NEAR = 0.1  # of a turn: what a joint moves by beside the jump, and what moves by less in most steps
+
+
+def jumps(moved: np.ndarray) -> np.ndarray:
+    """Which steps (n,) or (n, dof) from sample to sample [rad] are jumps by a turn."""
+    return np.abs(np.abs(moved) - TURN) < _NEAR * TURN
+
+
+def going_on(samples: Recording, joints: tuple[str, ...], prismatic) -> Recording:
+    """Samples in SI units whose angles go on where they jumped by a turn, which is said."""
+    q, found = unwrapped(samples.signals["q"], ~np.asarray(prismatic), samples.parts)
+    for j in found:
+        warn(f"{samples.where}: the angle of joint {joints[j]!r} jumps by a turn, and is taken to go on (numpy.unwrap)", above=2)
+    return replace(samples, signals=samples.signals | {"q": q}) if found else samples
+
+
+def unwrapped(q: np.ndarray, turns, parts: Sequence[tuple[int, int]]) -> tuple[np.ndarray, list[int]]:
+    """Angles (n, dof) [rad] that go on where they jumped by a turn, and the joints that did; the angles themselves where none does.
+
+    Args:
+        turns: (dof,) bool, the joints whose positions are angles. parts: first row and the one behind the last of what was recorded in one go.
+    """
+    found, out = [], q
+    for j in np.flatnonzero(turns).tolist():
+        moved = np.diff(q[:, j])
+        moved[[first - 1 for first, _ in parts if first]] = 0.0  # another recording
+        jumped = jumps(moved)
+        if not jumped.any() or np.median(np.abs(moved)) > _NEAR * TURN:
+            continue
+        out = q.copy() if out is q else out
+        out[1:, j] -= np.cumsum(np.where(jumped, np.sign(moved) * TURN, 0.0))
+        found.append(j)
+    return out, found
