@@ -168,9 +168,7 @@ def check_finite(values, name: str, where: str, *, joints=(), t=None, first: int
 def _convert(signals, data: DataSpec, joints, prismatic, where: str, drives) -> None:
     prismatic = np.asarray(prismatic)
     unit = data.units.position
-    angular = unit in ("rad", "deg")
-    # one unit is named for all joints: an angle for the turning ones, a length for the sliding ones
-    scale = np.where(prismatic, 1.0 if angular else units.POSITION[unit], units.POSITION[unit] if angular else 1.0)
+    scale = units.scales(unit, prismatic)
     if np.any(scale != 1.0):
         for name in ("q", "qd", "qdd"):
             if name in signals:
@@ -178,10 +176,11 @@ def _convert(signals, data: DataSpec, joints, prismatic, where: str, drives) -> 
         for joint, own in drives.items():
             if own.servo:
                 signals[f"signals.{motor_side.command_name(joint)}"] *= scale[joints.index(joint)]
+    # a sum's factors make torque of its signals
+    logged = [j for j in joints if j not in (*data.torque, *data.unused, *drives)]
+    each = dict(zip(joints, units.scales(data.units.torque, prismatic)))
     if data.units.torque == "A":
-        # a sum's factors make torque of its signals
-        logged = [j for j in joints if j not in (*data.torque, *data.unused, *drives)]
-        constants = data.units.torque_constant or {}
+        each = constants = data.units.torque_constant or {}
         if missing := [j for j in logged if j not in constants]:
             raise LogError(
                 f"torque is in A and joint {missing[0]!r} has no torque constant",
@@ -189,7 +188,8 @@ def _convert(signals, data: DataSpec, joints, prismatic, where: str, drives) -> 
                 allowed="data.units.torque_constant: {joint: N m per A, …}",
                 do="add the constants",
             )
-        signals["tau"] *= np.array([constants[j] if j in logged else 1.0 for j in joints])
+    if any(each[j] != 1.0 for j in logged):
+        signals["tau"] *= np.array([each[j] if j in logged else 1.0 for j in joints])
     if unit == "rad":
         largest = np.abs(signals["q"]).max(axis=0)
         far = [f"{joint} {value:.4g}" for joint, value, slides in zip(joints, largest, prismatic) if not slides and value > DEGREES]

@@ -98,7 +98,7 @@ class UnitsSpec(Spec):
 
     time: Literal["s", "ms", "us", "ns"] = "s"
     position: Literal["rad", "deg", "m", "mm"] = "rad"
-    torque: Literal["N m", "N", "A"] = "N m"
+    torque: Literal["N m", "N", "A", "mN m", "N cm", "kN m", "mN", "kN"] = "N m"
     torque_constant: Annotated[dict[str, NonZero] | None, BeforeValidator(_constants)] = None
 
     def model_post_init(self, _context: Any) -> None:

@@ -3,10 +3,15 @@
 import math
 import re
 
+import numpy as np
+
 TIME = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 DEGREE = round(math.pi / 180.0, 8)  # rad, as an experiment file says it
 POSITION = {"rad": 1.0, "m": 1.0, "deg": math.pi / 180.0, "mm": 1e-3}
-TORQUE = {"N m": 1.0, "N": 1.0, "A": 1.0}  # A is multiplied by the joint's torque constant
+_FORCES = {"N": 1.0, "mN": 1e-3, "kN": 1e3}
+_TORQUES = {"N m": 1.0, "mN m": 1e-3, "N cm": 1e-2, "kN m": 1e3}
+_FAR, _SLACK = 10.0, 0.1  # of the way between a joint's limits
+TORQUE = _TORQUES | _FORCES | {"A": 1.0}  # A is multiplied by the joint's torque constant
 
 
 #: {quantity: {word: unit}}
@@ -22,7 +27,7 @@ WORDS = {
 _SYMBOLS = {
     "time": {"µs": "us", "min": "min"},
     "position": {"°": "deg", "cm": "cm", "rev": "rev", "turns": "turns", "mrad": "mrad"},
-    "torque": {"n": "N", "a": "A", "amp": "A", "amps": "A", "ma": "mA", "mnm": "mN m", "ncm": "N cm", "knm": "kN m", "kn": "kN"},
+    "torque": {"n": "N", "a": "A", "amp": "A", "amps": "A", "ma": "mA", "mnm": "mN m", "ncm": "N cm", "knm": "kN m", "kn": "kN", "mn": "mN"},
 }
 _BRACKETS = re.compile(r"[\[(]([^\[\]()]*)[\])]\s*$")
 
@@ -47,13 +52,30 @@ def is_unit(word: str) -> bool:
     return any(in_header(f"[{word.strip('[]()')}]", quantity) for quantity in WORDS)
 
 
+def scales(unit: str, prismatic) -> np.ndarray:
+    """What makes SI units of logged numbers (dof,) of joints, turning and sliding (dof,) ones, in a unit of position or of torque: one unit is
+    named for all, an angle (a torque) for those that turn, a length (a force) for those that slide; the others' numbers are SI."""
+    own = (POSITION | TORQUE)[unit]
+    slides, both = unit in ("m", "mm") or unit in _FORCES, unit == "A"
+    return np.where(np.asarray(prismatic) == slides, own, 1.0) if not both else np.ones(len(prismatic))
+
+
+def in_millimetres(values, low: float, high: float) -> bool:
+    """Whether a sliding joint's positions (n,) go far beyond its limits [m], and as mm not at all."""
+    values, span = np.asarray(values), high - low
+    if not (np.isfinite(span) and span > 0.0):
+        return False
+    far, near = (max(low - s * values.min(), s * values.max() - high) for s in (1.0, 1e-3))
+    return far > _FAR * span and near < _SLACK * span
+
+
 def agree(stated: str, taken: str) -> bool:
     """Whether numbers in one unit may be read in another: the same, or, as one unit is named for turning and for sliding
     joints, the other kind's own of which 1 is 1 (rad and m, N m and N)."""
-    scales = POSITION if taken in POSITION else TORQUE if taken in TORQUE else TIME
-    kind = (("rad", "deg"), ("m", "mm"), ("N m",), ("N",), ("A",), ("s", "ms", "us", "ns"))
+    known = POSITION if taken in POSITION else TORQUE if taken in TORQUE else TIME
+    kind = (("rad", "deg"), ("m", "mm"), tuple(_TORQUES), tuple(_FORCES), ("A",), tuple(TIME))
     alike = any(stated in units and taken in units for units in kind)
-    return stated == taken or (not alike and stated != "A" and taken != "A" and scales.get(stated) == 1.0)
+    return stated == taken or (not alike and stated != "A" and taken != "A" and known.get(stated) == 1.0)
 
 
 def of_joint(unit: str, *, prismatic: bool) -> str:

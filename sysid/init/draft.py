@@ -10,10 +10,9 @@ import numpy as np
 
 from .. import datasets
 from .. import robot as machines
-from ..full_turns import ADVICE
 from ..robot_spec import RobotSpec
 from ..warned import noticed
-from . import joints, physics, robots, units
+from . import joints, physics, robots, units, wrapped_angles
 from .files import logs_among, opened
 from .guess import Draft, Guess
 from .logged import Logged, Signals, read, signals
@@ -60,13 +59,18 @@ def draft(reference: str, names: list[str], folder: Path, wishes: Wishes) -> Dra
     angles = _angles(data, found, robot)
     used, chosen = joints.chosen(robot, found, data, arm, angles.value)
     clock = units.clock(data, found, wishes.rate)
-    wrapped = _wraps(data, used, robot, angles.value)
+    wrapped = wrapped_angles.told(data, used, _sliding(robot), angles.value)
     notes = (*machine.notes, *broken, *passed, *mended, *wrapped)
     out = Draft(urdf, {}, notes, found.rest)
     out = out.having(*machine.guesses, *chosen, *_parts(data, clock, folder, wishes))
     out = out.having(*clock, *_columns(found, used), angles, *_drive(found, used))
+    out = out.having(*_lengths(data, found, used, robot))
     # a joint in degrees may turn by so much between samples; one that stays within a turn is in rad
-    rad = wrapped if not angles.alone and units.within_a_turn(data, used, _sliding(robot)) else ()
+    rad = (
+        wrapped
+        if not angles.alone and wrapped_angles.within_a_turn(data, used, _sliding(robot))
+        else ()
+    )
     return physics.held_against(out, found, folder, wrapped, rad=bool(rad))
 
 
@@ -78,11 +82,24 @@ def _moved(reference: str, folder: Path) -> str:
 
 
 def _angles(data: list[Logged], found: Signals, robot) -> Guess:
-    q = {joint: np.concatenate([one.q[joint] for one in data]) for joint in found.joints}
-    slides = _sliding(robot)
-    guess = units.position_unit(q, slides, found.position.meaning.unit)
+    slides, limits = _sliding(robot), dict(zip(robot.joints, robot.limits))
+    q = _positions(data, found.joints)
+    guess = units.position_unit(q, slides, limits, found.position.meaning.unit)
     doubt = units.mixed(data, [joint for joint in found.joints if not slides[joint]])
     return replace(guess, doubt=doubt) if doubt else guess
+
+
+def _lengths(data: list[Logged], found: Signals, used: list[str], robot) -> list[Guess]:
+    """Where joints that slide beside others that turn are in mm."""
+    slides, limits = _sliding(robot), dict(zip(robot.joints, robot.limits))
+    if found.position.meaning.unit or all(slides[joint] for joint in found.joints):
+        return []
+    own = units.millimetres(_positions(data, used), slides, limits)
+    return units.in_mm(own, found.position.columns)
+
+
+def _positions(data: list[Logged], joints: list[str]) -> dict[str, np.ndarray]:
+    return {joint: np.concatenate([one.q[joint] for one in data]) for joint in joints}
 
 
 def _sliding(robot) -> dict[str, bool]:
@@ -128,16 +145,3 @@ def _drive(found: Signals, used: list[str]) -> list[Guess]:
     out.append(Guess("preprocess.window", "auto", window))
     each = "each joint's error counts by its own noise; none: all alike"
     return [*out, Guess("model.effects", _EFFECTS, why), Guess("solver.weighting", "noise", each)]
-
-
-def _wraps(data: list[Logged], used: list[str], robot, unit: str) -> tuple[str, ...]:
-    slides, notes = _sliding(robot), []
-    for one in data:
-        for joint, count in units.wraps(
-            {j: one.q[j] for j in used if j in one.q}, slides, unit
-        ).items():
-            notes.append(
-                f"the angle of {joint} jumps by a turn {count} times in {Path(one.name).name}: "
-                f"{ADVICE}"
-            )
-    return tuple(notes)

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from .. import check, config
-from ..check.equations import Equations, Reading
+from ..check.equations import LIKELY, Equations, Reading
 from ..check.look import Look, looked
 from ..errors import LogError
 from ..units import DEGREE
@@ -46,12 +46,52 @@ def in_degrees(look: Look, *, currents: bool, alone: str = "") -> list[str]:
     least = min(as_deg.loss, as_rad.loss - _BETTER)
     if alone and scored(_turned(plain, joints == alone)).loss < least:
         return [alone]
+    if _only_as_rad_within_limits(look)[turning].any():
+        return []
     known = as_rad.known & as_deg.known & turning
     gain = np.log(as_rad.left / as_deg.left)[known]
     impossible = (as_rad.left > as_rad.whole)[known]
     if not known.any() or not (currents or np.mean(impossible) > 0.5):
         return []
     return joints[turning].tolist() if gain.sum() > _BETTER * known.sum() else []
+
+
+def _only_as_rad_within_limits(look: Look) -> np.ndarray:
+    """(dof,) whether all of a joint's angles are within its limits as rad, and none as degrees."""
+    low, high = look.robot.limits.T
+    least = np.min([log.tally.low[0] for log in look.logs], axis=0)
+    most = np.max([log.tally.high[0] for log in look.logs], axis=0)
+    within = (least >= low) & (most <= high)
+    return within & ((DEGREE * most < low) | (DEGREE * least > high))
+
+
+def torque_unit(look: Look) -> list[Guess]:
+    """The unit of torques that are a thousand times what the URDF's masses need, or a thousandth:
+    of all joints that tell a factor."""
+    if look.equations is None:
+        return []
+    plain = Reading.plain(look.robot.dof)
+    bounded, free = look.equations.scored(plain), look.equations.scored(plain, free=True)
+    tells = bounded.known & free.known & (free.factor > 0.0) & (free.taken > _TAKES)
+    gain, factor = np.log(bounded.left / free.left)[tells], free.factor[tells]
+    large = factor > 1.0
+    off = np.abs(np.abs(np.log10(factor)) - 3.0)
+    if not tells.any() or gain.sum() < _BETTER * len(gain) or off.max() > np.log10(LIKELY[1]):
+        return []
+    if large.any() and not large.all():
+        return []
+    times = "a thousand times what" if large.all() else "a thousandth of what"
+    why = f"they are {times} the URDF's masses need"
+    doubt = "masses and friction follow it"
+    slides = np.asarray(look.robot.prismatic)
+    if slides.any() and not slides.all():
+        scale = 1e-3 if large.all() else 1e3
+        columns = {joint: look.column("torque", joint) for joint in look.robot.joints}
+        if None in columns.values():
+            return []
+        return [Guess("data.torque", {j: {c: scale} for j, c in columns.items()}, why, doubt)]
+    unit = ("m" if large.all() else "k") + ("N" if slides.all() else "N m")
+    return [Guess("data.units.torque", unit, why, doubt)]
 
 
 def _turned(plain: Reading, own: np.ndarray) -> Reading:
@@ -101,11 +141,17 @@ def held_against(
         out = replace(out, guesses={k: g for k, g in out.guesses.items() if g is not amperes})
     with noticed():
         look = looked(config.experiment(out.tree, path))
+        if not (amperes or servos or found.torque.meaning.unit) and (unit := torque_unit(look)):
+            out = out.having(*unit)
+            look = looked(config.experiment(out.tree, path))
         angles = out.guesses["data.units.position"]
         small = angles.value == "rad" and not found.position.meaning.unit and not rad
         how = {"currents": amperes is not None or servos, "alone": angles.alone}
         if small and (turned := in_degrees(look, **how)):
-            out = out.having(replace(angles, doubt=""), _degrees(look, angles, turned))
+            told = _degrees(look, angles, turned)
+            if (beside := out.guesses.get(told.key)) and told.key == "data.position":
+                told = replace(told, value=beside.value | told.value)
+            out = out.having(replace(angles, doubt=""), told)
             look = looked(config.experiment(out.tree, path))
         scales = None if servos else factors(look, certain=amperes is not None)
         if scales:

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import LogError
-from ..full_turns import TURN, jumps
+from ..full_turns import TURN
 from ..log import DEGREES
-from ..units import DEGREE, POSITION
+from ..units import DEGREE, in_millimetres
 from .guess import Guess
 from .logged import Logged, Signals
 from .words import UNITS, words
@@ -24,6 +24,7 @@ _COUNTS = (
     "0, 1, 2 ... may be the samples' numbers: then state their rate, `sysid init --rate HZ`, or "
     "write data.rate in place of data.columns.time"
 )
+_AS_MM = "as mm they are within the URDF's limits, and far beyond as m"
 _OFTEN = 15.0  # times the angles of another log, as degrees are 57 times rad
 _WHOLE = 50.0  # counts: angles in degrees that are whole numbers by chance reach no more values
 
@@ -65,12 +66,14 @@ def seconds(t, samples: int, clock: str | None, said: dict) -> float:
     return float(np.sum(steps[steps > 0])) / _PER_SECOND[said.get("data.units.time") or clock]
 
 
-def position_unit(q: dict[str, np.ndarray], slides: dict[str, bool], named: str) -> Guess:
-    """The unit of angles, from the largest of them.
+def position_unit(
+    q: dict[str, np.ndarray], slides: dict[str, bool], limits: dict[str, tuple], named: str
+) -> Guess:
+    """The unit of angles, from the largest of them; of a robot that only slides that of lengths.
 
     Args:
-        q: {joint: (n,) as logged}. slides: {joint: whether it is prismatic}. named: as the columns'
-        names say.
+        q: {joint: (n,) as logged}. slides: {joint: whether it is prismatic}. limits: {joint: (low,
+        high) [rad or m], infinite where it has none}. named: as the columns' names say.
 
     Raises:
         LogError: they are counts of an encoder, of which nobody knows how many make a turn.
@@ -78,9 +81,9 @@ def position_unit(q: dict[str, np.ndarray], slides: dict[str, bool], named: str)
     key = "data.units.position"
     turning = {joint: values for joint, values in q.items() if not slides[joint]}
     if not turning:
-        return Guess(
-            key, named or "m", "the joints slide" + ("" if named else " and no name says another")
-        )
+        short = not named and millimetres(q, slides, limits)
+        why = "" if named else f", and {_AS_MM}" if short else " and no name says another"
+        return Guess(key, named or ("mm" if short else "m"), "the joints slide" + why)
     if named == "counts" or all(_counts(values) for values in turning.values()):
         joint, values = next(iter(turning.items()))
         shown = f"{values.min():.0f} to {values.max():.0f}"
@@ -97,6 +100,9 @@ def position_unit(q: dict[str, np.ndarray], slides: dict[str, bool], named: str)
         turns = largest[joint] / TURN
         why = f"{joint} reaches {largest[joint]:.4g}, which in rad would be {turns:.2g} turns"
         far = [own for own, size in largest.items() if size > DEGREES]
+        if not any(np.isfinite(limits[own]).all() for own in far):
+            doubt = "write deg if these are degrees"
+            return Guess(key, "rad", f"{why}, and it may turn without end", doubt)
         moving = [own for own, values in turning.items() if np.ptp(values) > 0.0]
         if len(moving) > 1 and len(far) == 1:  # of an arm in degrees more go so far
             doubt = "it alone: if its angle is in degrees, and the others' are in rad, write "
@@ -104,6 +110,17 @@ def position_unit(q: dict[str, np.ndarray], slides: dict[str, bool], named: str)
             return Guess(key, "rad", why, doubt, joint)
         return Guess(key, "deg", why, "write rad if a joint really makes many turns")
     return Guess(key, "rad", f"the largest angle is {largest[joint]:.3g}")
+
+
+def millimetres(q: dict[str, np.ndarray], slides: dict[str, bool], limits: dict) -> list[str]:
+    """The sliding joints whose positions are within their limits as mm, and far beyond as m."""
+    return [j for j, values in q.items() if slides[j] and in_millimetres(values, *limits[j])]
+
+
+def in_mm(joints: list[str], columns: dict[str, str]) -> list[Guess]:
+    """That positions of sliding joints are in mm, beside angles in a unit of their own."""
+    said = {joint: {columns[joint]: 1e-3} for joint in joints}
+    return [Guess("data.position", said, _AS_MM)] if said else []
 
 
 def mixed(data: list[Logged], turning: list[str]) -> str:
@@ -125,24 +142,6 @@ def mixed(data: list[Logged], turning: list[str]) -> str:
 
 def _counts(values) -> bool:
     return bool(np.ptp(values) > _WHOLE and np.all(values == np.round(values)))
-
-
-def wraps(q: dict[str, np.ndarray], slides: dict[str, bool], unit: str) -> dict[str, int]:
-    """How often each turning joint's angle jumps by a turn, of those that do."""
-    found = {j: jumps(POSITION[unit] * np.diff(v)) for j, v in q.items() if not slides[j]}
-    return {joint: int(jumped.sum()) for joint, jumped in found.items() if jumped.any()}
-
-
-def within_a_turn(data: list[Logged], used: list[str], slides: dict[str, bool]) -> bool:
-    """Whether the angles of all joints that jump by 2 pi stay within a turn of zero, as what was
-    wrapped does, and go by little from sample to sample otherwise."""
-    logged = [{joint: one.q[joint] for joint in used if joint in one.q} for one in data]
-    jumping = {joint for q in logged for joint in wraps(q, slides, "rad")}
-    each = [q[joint] for q in logged for joint in jumping if joint in q]
-    return bool(each) and all(
-        np.abs(q).max() < 1.1 * TURN and np.quantile(np.abs(np.diff(q)), 0.9) < 0.1 * TURN
-        for q in each
-    )
 
 
 def rate_of(q: dict[str, np.ndarray], qd: dict[str, np.ndarray]) -> float | None:

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...full_turns import ADVICE, TURN
 from ...lowpass.angles import grains
-from ...units import DEGREE
+from ...units import DEGREE, in_millimetres
 from ..fault import ERROR, WARNING, Fault
 from ..look import Logged, Look
 from ..tally import FASTER, lag_of
@@ -49,7 +49,12 @@ def _of_log(look: Look, log: Logged, j: int, joint: str, slides: bool) -> Iterat
             own.wraps.count,
         )
         return
-    if own.far.count and look.experiment.data.units.position == "rad":
+    low, high = look.robot.limits[j]
+    allowed = look.robot.source.joints[joint].velocity
+    fast = own.fast.count and np.quantile(log.speeds(j), 0.999) > FASTER * allowed
+    # a joint without limits may make many turns, and no faster than its drive
+    endless = not np.isfinite(high - low) and np.isfinite(allowed) and not fast
+    if own.far.count and look.experiment.data.units.position == "rad" and not endless:
         yield Fault(
             "wrong_unit",
             ERROR,
@@ -61,8 +66,19 @@ def _of_log(look: Look, log: Logged, j: int, joint: str, slides: bool) -> Iterat
             own.far.count,
         )
         return
+    if slides and own.beyond.count and in_millimetres(log.column("q", j), low, high):
+        yield Fault(
+            "wrong_unit",
+            ERROR,
+            f"{joint} is at {own.beyond.value:.4g} m in {name}: as mm that is within its limits",
+            _millimetres(look, joint),
+            joint,
+            name,
+            (own.beyond.at,),
+            own.beyond.count,
+        )
+        return
     if own.beyond.count:
-        low, high = look.robot.limits[j]
         yield Fault(
             "limit_exceeded",
             WARNING,
@@ -76,8 +92,7 @@ def _of_log(look: Look, log: Logged, j: int, joint: str, slides: bool) -> Iterat
             (own.beyond.at,),
             own.beyond.count,
         )
-    allowed = look.robot.source.joints[joint].velocity
-    if own.fast.count and np.quantile(log.speeds(j), 0.999) > FASTER * allowed:
+    if fast:
         yield Fault(
             "limit_exceeded",
             WARNING,
@@ -102,6 +117,14 @@ def _of_log(look: Look, log: Logged, j: int, joint: str, slides: bool) -> Iterat
             name,
             rows=log.samples,
         )
+
+
+def _millimetres(look: Look, joint: str) -> str:
+    """What to write where a joint's position is in mm."""
+    column, unit = look.column("position", joint), look.experiment.data.units.position
+    if column is None or unit == "rad":
+        return "set data.units.position: mm"
+    return f"write data.position: {{{joint}: {{{column}: 0.001}}}}, as it alone names its unit"
 
 
 def _degrees(look: Look, log: Logged, joint: str) -> str:

@@ -142,7 +142,8 @@ def _factors(look: Look, equations: Equations, reading: Reading, scored: Scored)
                 yield Fault("wrong_unit", WARNING, says, do, name)
             continue
         if thousand:
-            yield Fault("wrong_unit", ERROR, says, "is it in mN m, or kN m? give it in N m", name)
+            do = _thousandth(look, name, own, bool(np.all((off == tells)[tells])))
+            yield Fault("wrong_unit", ERROR, says, do, name)
         elif own < 1.0:
             yield Fault(
                 "torque_in_amperes",
@@ -158,6 +159,19 @@ def _factors(look: Look, equations: Equations, reading: Reading, scored: Scored)
             yield Fault(
                 "wrong_unit", ERROR, says, "give it in N m, on the joint's side of the gear", name
             )
+
+
+def _thousandth(look: Look, joint: str, factor: float, every: bool) -> str:
+    """What to write where torque is a thousand times off: as that of all joints is, or of one."""
+    slides = look.robot.prismatic[look.robot.joints.index(joint)]
+    unit = ("m" if factor > 1.0 else "k") + ("N" if slides else "N m")
+    column = look.column("torque", joint)
+    if every and not look.robot.prismatic.any():
+        return f"if it is in {unit} set data.units.torque: {unit}"
+    if column is None:
+        return f"if it is in {unit} give it in N{' m' * (not slides)}"
+    scale = 0.001 if factor > 1.0 else 1000
+    return f"if it is in {unit} write data.torque: {{{joint}: {{{column}: {scale}}}}}"
 
 
 def _times(factor: float) -> str:

@@ -1,0 +1,89 @@
+"""Units that the URDF's robot tells: its limits, and the torques that its masses need."""
+
+import numpy as np
+import pytest
+
+from sysid import check, pipeline, regressor, robot, units
+from sysid.robot_spec import RobotSpec
+from tests.conftest import JOINTS, URDF, csv, motion
+
+SLIDES = URDF.replace('name="shoulder" type="revolute"', 'name="shoulder" type="prismatic"').replace(
+    'lower="-3" upper="3" effort="50"', 'lower="-0.9" upper="0.9" effort="50"', 1
+)
+ENDLESS = URDF.replace('type="revolute"', 'type="continuous"').replace('lower="-3" upper="3" ', "")
+
+
+def logged(folder, urdf, *, turn=0.0, shown=None, torque=1.0, seed=0):
+    """Logs of a robot with friction and another mass: its motion grows by `turn` rad in each joint, and is shown in other units."""
+    machine = robot.load(RobotSpec(urdf=str(folder / "robot.urdf")))
+    t = np.arange(1600) / 200
+    q, qd, qdd = (0.6 * part for part in motion(t))
+    q, qd = q + turn * t[:, None] / t[-1], qd + turn / t[-1]
+    tau = regressor.torque(machine, 1.2 * machine.prior, q, qd, qdd) + 0.3 * qd + 0.1 * np.sign(qd)
+    tau += np.random.default_rng(seed).normal(0.0, 0.01, tau.shape)
+    angles = {f"q_{j}": (shown or {}).get(j, 1.0) * q[:, k] for k, j in enumerate(JOINTS)}
+    return csv({"t": t} | angles | {f"tau_{j}": torque * tau[:, k] for k, j in enumerate(JOINTS)})
+
+
+def begun(cli, folder):
+    said = cli("init", folder / "robot.urdf", folder / "a.csv", out=folder / "mine")
+    assert said.status == 0, said.err
+    return said.out, pipeline.load(folder / "mine")
+
+
+def folder_of(tmp_path, urdf, **how):
+    (tmp_path / "robot.urdf").write_text(urdf)
+    (tmp_path / "a.csv").write_text(logged(tmp_path, urdf, **how))
+    return tmp_path
+
+
+@pytest.mark.parametrize(("factor", "unit"), [(1.0, "N m"), (1e3, "mN m"), (1e-3, "kN m")])
+def test_torques_a_thousand_times_off_are_in_another_unit(cli, tmp_path, factor, unit):
+    """Of a robot whose masses are a fifth off; not its angles in degrees, nor its torques currents."""
+    said, made = begun(cli, folder_of(tmp_path, URDF, torque=factor))
+    assert (made.data.units.torque, made.data.units.position) == (unit, "rad")
+    assert ("LOOK data.units.torque" in said) == (factor != 1.0)
+    assert not [f for f in check.check(made) if f.severity == "error"]
+
+
+def test_a_slide_in_millimetres_beside_a_hinge(cli, tmp_path):
+    """Its limits tell it; the hinge keeps its own unit, degrees too."""
+    for name, hinge, unit in (("rad", 1.0, "rad"), ("deg", 180.0 / np.pi, "deg")):
+        folder = tmp_path / name
+        folder.mkdir()
+        said, made = begun(cli, folder_of(folder, SLIDES, shown={"shoulder": 1e3, "elbow": hinge}))
+        assert made.data.units.position == unit and made.data.position == {"shoulder": {"q_shoulder": 1e-3}}
+        assert "as mm" in said and not [f for f in check.check(made) if f.severity == "error"]
+    metres = tmp_path / "m"
+    metres.mkdir()
+    assert not begun(cli, folder_of(metres, SLIDES))[1].data.position
+
+
+def test_check_says_what_to_write_of_a_slide_in_millimetres(cli, tmp_path):
+    _, made = begun(cli, folder_of(tmp_path, SLIDES, shown={"shoulder": 1e3}))
+    config = tmp_path / "mine" / "config.yaml"
+    text = config.read_text()
+    start = text.index("  position:\n    shoulder:") if "  position:\n    shoulder:" in text else text.index("  position: {shoulder")
+    end = text.index("\n", text.index("0.001", start)) + 1
+    config.write_text(text[:start] + text[end:])
+    (fault, *_) = [f for f in check.check(pipeline.load(tmp_path / "mine")) if f.fault == "wrong_unit"]
+    assert fault.severity == "error" and fault.joint == "shoulder" and "mm" in fault.do
+    config.write_text((text[:start] + text[end:]).replace("position: rad", "position: mm"))
+    assert not [f for f in check.check(pipeline.load(tmp_path / "mine")) if f.fault == "wrong_unit"]
+
+
+@pytest.mark.parametrize(("shown", "unit"), [(1.0, "rad"), (180.0 / np.pi, "deg")])
+def test_a_joint_without_limits_may_turn_many_times(cli, tmp_path, shown, unit):
+    """Fifteen rad of a continuous joint are no degrees by their size; torques tell, either way."""
+    _, made = begun(cli, folder_of(tmp_path, ENDLESS, turn=15.0, shown=dict.fromkeys(JOINTS, shown)))
+    assert made.data.units.position == unit
+    assert not [f for f in check.check(made) if f.severity == "error"]
+
+
+@pytest.mark.parametrize("unit", ["N m", "mN m", "N cm", "kN m", "N", "mN", "kN"])
+def test_a_unit_of_torque_is_that_of_the_joints_that_it_can_be_of(unit):
+    own = {"mN m": 1e-3, "N cm": 1e-2, "kN m": 1e3, "mN": 1e-3, "kN": 1e3}.get(unit, 1.0)
+    turns = unit.endswith(" m") or unit == "N cm"
+    expected = [own, 1.0] if turns else [1.0, own]
+    np.testing.assert_array_equal(units.scales(unit, [False, True]), expected)
+    assert units.agree(unit, unit) and not units.agree("A", unit)
