@@ -8,7 +8,9 @@ import pytest
 from scripts.blind_parts.robots import PLANAR
 from sysid import pipeline, regressor, results
 from sysid.changes import changed, many
+from sysid.changes.fitted import possible
 from sysid.errors import ConfigError, LogError, SysidError
+from sysid.inertia.pseudo import box, displaced
 from sysid.statement.changes import document as changes_document
 from tests.conftest import csv
 from tests.test_lowpass import smooth
@@ -17,14 +19,15 @@ CHANGED_CONFIG = "robot: {urdf: robot.urdf}\ndata: {train: [train.csv], test: [t
 LOAD = np.array([0.8, 0.8 * 0.32, 0.0, 0.8 * 0.02, 0.002, 0.8 * 0.32**2 + 0.003, 0.8 * 0.32**2 + 0.003, 0.0, 0.0, 0.0])  # of the fore link's frame
 
 
-def written(arm, path, seed: int, *, load=None, coulomb=(0.5, 0.3), bias=0.0, seconds: float = 12.0):
-    """A log of the planar arm, with a body on its last link or other friction."""
+def written(arm, path, seed: int, *, load=None, coulomb=(0.5, 0.3), bias=0.0, seconds: float = 12.0, pitch: float = 0.0):
+    """A log of the planar arm, with a body on its last link, other friction, or a base that is turned about y."""
     t = np.arange(int(seconds * 250)) / 250.0
     q, qd, qdd = smooth(t, seed, 1.2)
     pi = np.array(arm.prior) * 1.1
     if load is not None:
         pi[-1] += load
-    tau = regressor.torque(arm, pi, q, qd, qdd) + 0.3 * qd + np.array(coulomb) * np.sign(qd) + [0.0, bias]
+    gravity = 9.81 * np.array([np.sin(pitch), 0.0, -np.cos(pitch)])
+    tau = regressor.torque(arm, pi, q, qd, qdd, gravity=gravity) + 0.3 * qd + np.array(coulomb) * np.sign(qd) + [0.0, bias]
     tau += np.random.default_rng(seed).normal(0.0, 0.1, q.shape)
     columns = {"t": t} | {f"q_{joint}": q[:, j] for j, joint in enumerate(arm.joints)} | {f"tau_{joint}": tau[:, j] for j, joint in enumerate(arm.joints)}
     path.write_text(csv(columns))
@@ -57,6 +60,31 @@ def what_changed(folder, log: str) -> dict:
 def verdict(said: dict, joint: str) -> dict:
     (own,) = [v for v in said["verdict"] if v["joint"] == joint]
     return own
+
+
+@pytest.mark.parametrize("pitch", [0.02, 0.2, -0.3])
+def test_a_base_that_tilts_far_is_a_tilt_and_nothing_else(fitted, planar, pitch):
+    """Its cosine is no bias of the torques; how far it is rolled, which no torque of an arm in a plane shows, is not told."""
+    written(planar, fitted / "tilted.csv", 7, pitch=pitch)
+    (found,) = what_changed(fitted, "tilted.csv")["findings"]
+    assert (found["effect"], found["joint"]) == ("gravity_tilt", "*")
+    values = found["parameters"]
+    assert values["gravity_tilt.*.pitch"]["value"] == pytest.approx(pitch, abs=3.0 * values["gravity_tilt.*.pitch"]["std"] + 1e-3)
+    assert values["gravity_tilt.*.pitch"]["std"] < 5e-3 and values["gravity_tilt.*.roll"]["std"] is None
+
+
+def test_a_bucket_s_load_is_as_possible_as_a_finger_s():
+    """What is believed of a load is as weak for a heavy one as for a light one: the same one in kilograms and tonnes comes out alike."""
+    rng = np.random.default_rng(0)
+    columns = rng.normal(size=(400, 10)) * [1.0, 0.3, 0.3, 0.3, 0.1, 0.1, 0.1, 0.1, 0.1, 0.1]
+    body = displaced(box(1.0, np.zeros(3), (0.4, 0.5, 0.3)), np.eye(3), np.array([0.5, 0.1, -0.2]))
+    noise, found = rng.normal(0.0, 0.05, 400), []
+    for mass in (0.005, 1.0, 300.0):
+        torque = columns @ (mass * body) + mass * noise
+        rows = np.column_stack([columns, torque]) / (0.05 * mass)  # as loud as its noise
+        found.append(possible(rows.T @ rows, list(range(10)), slice(0, 10))[0] / mass)
+    np.testing.assert_allclose(found[0], found[1], atol=2e-3)
+    np.testing.assert_allclose(found[2], found[1], atol=2e-3)
 
 
 def test_no_change_no_finding(fitted):
@@ -133,7 +161,9 @@ def test_many_logs_are_asked_at_once(fitted, cli, tmp_path):
 @pytest.mark.long
 def test_processes_change_nothing(fitted):
     logs = [str(fitted / log) for log in ("same.csv", "loaded.csv", "rough.csv", "test.csv", "train.csv")]
-    logs += [f"{folder}/../{folder.split('/')[-1]}/{log}" for folder in [str(fitted)] for log in ("same.csv", "loaded.csv", "rough.csv", "test.csv", "train.csv")]
+    logs += [
+        f"{folder}/../{folder.split('/')[-1]}/{log}" for folder in [str(fitted)] for log in ("same.csv", "loaded.csv", "rough.csv", "test.csv", "train.csv")
+    ]
     alone, together = (many(fitted / "run", logs, jobs=jobs)[0] for jobs in (1, 2))
     assert list(alone) == list(together) == logs
     for one, other in zip(alone.values(), together.values()):

@@ -258,3 +258,13 @@ def test_divided_differences_at_and_near_coincidence():
                 np.testing.assert_allclose(first_divided_difference(a, b), exact(a, b), rtol=1e-13)
                 got = second_divided_difference(np.array(a), np.array(b), np.array(c))
                 np.testing.assert_allclose(got, exact(a, b, c), rtol=3e-13)
+
+
+def test_a_body_at_the_edge_of_the_possible_ones_has_slopes():
+    """Rounding leaves a thin body of a robot in kN m without an inverse: its slopes are those of one that stands just inside."""
+    prior = pseudo.from_pseudo(np.diag([0.2, 0.3, 0.5, 2.0]))
+    divergence = DIVERGENCES["log-det"](prior[None])
+    edge = pseudo.from_pseudo(np.diag([0.0, 0.3, 0.5, 2.0]))[None]
+    assert np.isfinite(divergence.gradient(edge)).all() and np.isfinite(divergence.hessian(edge)).all()
+    inside = pseudo.from_pseudo(np.diag([2.0 * np.finfo(float).eps, 0.3, 0.5, 2.0]))[None]
+    np.testing.assert_allclose(divergence.gradient(edge), divergence.gradient(inside), rtol=0.1)  # to rounding's part of eps

@@ -10,6 +10,7 @@ import numpy as np
 from ..blocks import jackknife
 from ..carried import BALL, WEAK
 from ..inertia import DIVERGENCES, PARAMETERIZATIONS
+from ..inertia.pseudo import from_pseudo, to_pseudo
 from ..model import Model
 from ..model_parameters import ROBOT, place
 from ..objective import Objective
@@ -17,6 +18,8 @@ from ..projection import inverted, of_data, root
 from ..solve import Coordinates, solve
 from ..vocabulary import find
 from .halves import Key, Question, least_squares
+
+_ROUNDS = 3  # of what is believed of a body's size
 
 
 @dataclass(frozen=True)
@@ -69,16 +72,25 @@ def possible(products, places, own: slice | None) -> tuple[np.ndarray, np.ndarra
     order = [*body, *(k for k in range(size) if k not in body)]
     at = [places[k] for k in order]
     triangle = np.linalg.qr(root(products[np.ix_([*at, -1], [*at, -1])]).T, mode="r")
-    objective = Objective(triangle, DIVERGENCES["log-det"](BALL[None]), WEAK)
     flat = np.zeros(size - 10, dtype=bool)
     coordinates = Coordinates(PARAMETERIZATIONS["log-cholesky"](), 1, flat, flat)
-    start = np.concatenate([BALL, least_squares(products, at)[10:]])
-    theta = coordinates.theta(start)
-    found = solve(objective, coordinates, theta, tolerance=1e-10, max_iterations=200, handover=0.5)
+    start, ball = np.concatenate([BALL, least_squares(products, at)[10:]]), BALL
+    for _ in range(_ROUNDS):
+        objective = Objective(triangle, DIVERGENCES["log-det"](ball[None]), WEAK)
+        theta, how = coordinates.theta(start), {"tolerance": 1e-10, "max_iterations": 200}
+        found = solve(objective, coordinates, theta, handover=0.5, **how)
+        # an excavator's bucket holds more than a finger, and a long link's frame is far from it
+        ball, start = _like(found.x[:10]), found.x
     out, around = np.empty(size), np.zeros((size, size))
     out[order] = found.x
     around[own, own] = 0.5 * objective.prior_hessian(found.x)[0]
     return out, around
+
+
+def _like(body) -> np.ndarray:
+    """A ball (10,) at the link's own frame as heavy and as large as a body (10,)."""
+    second = to_pseudo(body)
+    return from_pseudo(np.diag([*(np.trace(second[:3, :3]) / 3.0,) * 3, second[3, 3]]))
 
 
 def _nearby(products, places, c, around, pull) -> np.ndarray:
@@ -103,6 +115,7 @@ def _parameters(model: Model, key: Key, c, without, told_by_data, spread):
 
     def told(value: float, each, slope, unit: str) -> tuple[float, float, str]:
         (known,) = of_data(told_by_data, spread, slope[None])
+        known &= bool(np.any(told_by_data @ slope))  # a column of nothing has no spread
         return float(value), float(jackknife(each)) if known else np.nan, unit
 
     slopes = np.eye(len(c))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,12 +16,15 @@ from ..lowpass import LEAST, lowpassed, stride_of
 from ..model import Model
 from ..noise import floors_of
 from ..specs import Experiment
+from ..vocabulary import find
 from ..warned import noticed
 from .fitted import Change, together
 from .halves import BLOCKS, support
 from .halves import question as asked_of
 from .held import Held, held
-from .signatures import signatures
+from .signatures import TILT, about
+
+_ROUNDS, _NEAR = 5, 1e-4  # about a tilt; rad: what rounds may still change of it
 
 
 @dataclass(frozen=True)
@@ -79,23 +82,36 @@ def asked(
     structure = model.model.scaled_by(motion)
     stride = stride_of(motion, LEAST)
     data = rows.measured(motion, stride)
-    residual = (data.tau - rows.predicted(structure, motion, x, stride)) * data.use
     counted = np.maximum(data.use.sum(axis=0), 1)
     by_size = lambda squares: 1.0 / np.maximum(np.sqrt(squares / counted), 1e-12)  # noqa: E731
     blocks = numbered(data.t, data.piece, shortest=np.inf, fewest=BLOCKS)
-    tried = signatures(structure, x, motion, stride, data.use)
-    tried = {key: columns for key, columns in tried.items() if np.any(columns)}
-    squares = (residual**2).sum(axis=0)
-    question = asked_of(tried, residual, by_size(squares), blocks)
-    least = {} if rate is None else {"least": support(rate, among * len(tried))}
-    chosen = question.supported(**least)
-    changes, after = together(structure, question, chosen)
-    if changes:  # a joint counts by what is left of it, not by what the changes made of it
-        question = question.weighed(by_size(after))
-        changes, after = together(structure, question, question.supported(**least) or chosen)
+    squares = after = (about(structure, x, motion, stride, data)[0] ** 2).sum(axis=0)
+    changes, tilt = (), None
+    for _ in range(_ROUNDS):  # what a tilt does bends with it
+        residual, tried = about(structure, x, motion, stride, data, tilt)
+        question = asked_of(tried, residual, by_size(after), blocks)
+        least = {} if rate is None else {"least": support(rate, among * len(tried))}
+        chosen = question.supported(**least)
+        changes, after = together(structure, question, chosen)
+        if changes:  # a joint counts by what is left of it, not by what the changes made of it
+            question = question.weighed(by_size(after))
+            changes, after = together(structure, question, question.supported(**least) or chosen)
+        before, tilt = tilt, _tilt(changes)
+        if tilt is None or (before is not None and np.abs(tilt - before).max() < _NEAR):
+            break
     rms = [np.sqrt(own / counted) for own in (squares, after)]
     found = _floors(structure, x, motion) if floors else ()
     return Changed(robot.joints, *rms, found, changes, _notes(experiment, changes))
+
+
+def _tilt(changes: Sequence[Change]) -> np.ndarray | None:
+    """The tilt (roll, pitch) [rad] among changes, within an effect's bounds; None without one."""
+    for change in changes:
+        if (change.effect, change.joint) == (TILT[0], "*"):
+            shapes = find(TILT[0]).shapes()
+            values = (change.parameters[f"{TILT[0]}.*.{one.name}"][0] for one in shapes)
+            return np.array([np.clip(v, one.low, one.high) for v, one in zip(values, shapes)])
+    return None
 
 
 def _floors(structure: Model, x, motion) -> tuple:

@@ -1,4 +1,8 @@
-"""What each change that could be would add to the torque of a held model."""
+"""What each change that could be would add to the torque of a held model.
+
+How far a base is tilted is no coefficient: its columns are slopes, about a tilt that is known to be
+near, and the residual is taken so that the slopes' coefficients are the whole of it.
+"""
 
 from __future__ import annotations
 
@@ -14,15 +18,42 @@ from ..vocabulary import find
 _PER_JOINT = ("coulomb", "viscous", "torque_bias")
 
 
-def signatures(structure: Model, x, motion, stride: int, use) -> dict[tuple[str, int], np.ndarray]:
-    """Columns (dof, n, k) of every change, by (effect, joint)."""
-    robot, pieces = structure.robot, rows.seen(structure, motion)
+TILT = "gravity_tilt", ROBOT
+
+
+def about(structure: Model, x, motion, stride: int, data, tilt=None):
+    """The residual (n, dof) of a held model, and `signatures`, about a tilt (roll, pitch) [rad].
+
+    Args:
+        data: the measured rows. tilt: of the base, None: it stands as the model says.
+    """
+    here = structure
+    if tilt is not None:
+        here = structure.with_effect(find(TILT[0]).bound(structure.robot, ROBOT), (ROBOT,))
+        here = here.with_shapes([*structure.shapes, *tilt])
+    residual = (data.tau - rows.predicted(here, motion, x, stride)) * data.use
+    columns = signatures(structure, x, motion, stride, data.use, here)
+    if tilt is not None:
+        residual += np.einsum("jnk,k->nj", columns[TILT], tilt)
+    return residual, {key: own for key, own in columns.items() if np.any(own)}
+
+
+def signatures(
+    structure: Model, x, motion, stride: int, use, tilted: Model | None = None
+) -> dict[tuple[str, int], np.ndarray]:
+    """Columns (dof, n, k) of every change, by (effect, joint).
+
+    Args:
+        tilted: the model with a tilt about which its slopes are; None: about none.
+    """
+    tilted = structure if tilted is None else tilted
+    robot, pieces = structure.robot, rows.seen(tilted, motion)
     out = {}
     for joint in range(robot.dof):
         for name in _PER_JOINT:
             columns = np.zeros((robot.dof, len(use), 1))
             columns[joint] = rows.signature(
-                structure, motion, pieces, find(name), joint, {}, stride, use
+                tilted, motion, pieces, find(name), joint, {}, stride, use
             )
             out[name, joint] = columns
     for name in ("payload", "gravity_tilt"):
@@ -30,10 +61,10 @@ def signatures(structure: Model, x, motion, stride: int, use) -> dict[tuple[str,
         if isinstance(effect, MotionEffect):
             if any(term.name == name for term, _ in structure.terms):
                 continue
-            grown = structure.with_effect(effect, (ROBOT,))
+            grown = tilted if tilted is not structure else structure.with_effect(effect, (ROBOT,))
             out[name, ROBOT] = tangents(grown, motion, x, stride, use)[:, :, grown.last_shapes]
         else:
             out[name, ROBOT] = rows.signature(
-                structure, motion, pieces, effect, ROBOT, {}, stride, use
+                tilted, motion, pieces, effect, ROBOT, {}, stride, use
             )
     return out

@@ -27,6 +27,16 @@ def affine_metric(inverse) -> np.ndarray:
     return turned.reshape(flat) @ np.swapaxes(np.swapaxes(turned, -1, -2).reshape(flat), -1, -2)
 
 
+def _inverse(pseudo) -> np.ndarray:
+    """Inverses of pseudo-inertias (..., 4, 4); of one that rounding has left at the edge of the possible ones that of its nearest inside."""
+    try:
+        return np.linalg.inv(pseudo)
+    except np.linalg.LinAlgError:
+        values, vectors = np.linalg.eigh(pseudo)
+        inside = np.maximum(values, np.finfo(float).eps * values[..., -1:])
+        return (vectors / inside[..., None, :]) @ np.swapaxes(vectors, -1, -2)
+
+
 class Divergence(ABC):
     """d(pi || prior) for bodies pi (..., 10); prior (..., 10) must be physically possible."""
 
@@ -78,10 +88,10 @@ class LogDet(Divergence):
         return self._log_determinant - log_determinant + np.sum(self.linear * pi, -1) - 4.0
 
     def gradient(self, pi):
-        return self.linear - pseudo_gradient(np.linalg.inv(to_pseudo(pi)))
+        return self.linear - pseudo_gradient(_inverse(to_pseudo(pi)))
 
     def hessian(self, pi):
-        return affine_metric(np.linalg.inv(to_pseudo(pi)))
+        return affine_metric(_inverse(to_pseudo(pi)))
 
 
 class _Quadratic(Divergence):
