@@ -25,6 +25,7 @@ from .effect_options import one_of
 from .effect_parameters import Asked, Linear, Shape
 from .errors import ConfigError
 from .motion import Piece
+from .units import of_joint
 
 
 class NotFinite(ConfigError):
@@ -118,6 +119,10 @@ class Effect(ABC):
             ConfigError: an option names what this robot lacks, or the effect cannot stand on this joint.
         """
         return self
+
+    def unit_on(self, unit: str, robot, joint: int) -> str:
+        """A unit of its values, written for a revolute joint, as it reads on a joint of a robot."""
+        return of_joint(unit, prismatic=bool(robot.prismatic[joint]))
 
     def present(self, motion: Piece) -> bool:
         """Whether it is there in a motion's log."""

@@ -9,7 +9,7 @@ from typing import Self
 
 import numpy as np
 
-from . import regressor, units
+from . import regressor
 from .deflection import Deflection
 from .effect import Effect, SensorEffect, TorqueEffect, WrenchEffect
 from .effect_parameters import Shape
@@ -50,7 +50,7 @@ class Terms:
         """The effects' coefficients, after the bodies: by effect, then joint, then coefficient."""
         return tuple(
             Coefficient(
-                effect.name, joint, self._name(effect, joint, linear.name), self._unit(linear.unit, joint), linear.lower == 0,
+                effect.name, joint, self._name(effect, joint, linear.name), self._unit(effect, linear.unit, joint), linear.lower == 0,
                 effect.given_coefficients.get(linear.name), term, None if effect.group is None else (effect.group, effect.level),
                 linear.of_body,
             )
@@ -67,7 +67,7 @@ class Terms:
         for term, (effect, joints) in enumerate(self.terms):
             for joint in joints:
                 for shape, low, high, _ in self.ranges(effect, joint):
-                    name, unit = self._name(effect, joint, shape.name), self._unit(shape.unit, joint)
+                    name, unit = self._name(effect, joint, shape.name), self._unit(effect, shape.unit, joint)
                     begin = effect.asked[shape.name].start if shape.name in effect.asked else None
                     out.append(ShapeValue(term, joint, shape, name, unit, low, high, (term, joint, shape.name) in given, begin))
         return tuple(out)
@@ -99,8 +99,8 @@ class Terms:
         level = "" if effect.level is None else f"[{effect.level}]"
         return f"{effect.name}.{place(joint, self.robot.joints)}.{word}{level}"
 
-    def _unit(self, unit: str, joint: int) -> str:
-        return units.of_joint(unit, prismatic=joint != ROBOT and bool(self.robot.prismatic[joint]))
+    def _unit(self, effect: Effect, unit: str, joint: int) -> str:
+        return unit if joint == ROBOT else effect.unit_on(unit, self.robot, joint)
 
     @property
     def last_shapes(self) -> slice:

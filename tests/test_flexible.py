@@ -60,7 +60,7 @@ LAWS = {
     "another joint's speed": (lambda v: np.abs(v["qd_shoulder"]), "qd_shoulder"),
     "the past speed": (lagged(0.3), None),
     "friction that follows an angle": (lambda v: np.sign(v["qd_elbow"]) * (1.0 + np.sin(3.0 * v["q_elbow"])), None),
-    "friction that follows another angle": (lambda v: np.sign(v["qd_elbow"]) * np.sin(3.0 * v["q_shoulder"]), None),
+    "friction that follows another angle": (lambda v: np.sign(v["qd_elbow"]) * np.sin(3.0 * v["q_shoulder"]), "q_shoulder and direction"),
     "a product of two angles": (lambda v: v["q_elbow"] * v["q_shoulder"], None),
 }
 
@@ -83,6 +83,7 @@ def test_a_steady_tone_is_told(hertz):
     """What comes in time and not with the motion."""
     found = asked(lambda v: np.sin(2.0 * np.pi * hertz * v["time"]))
     assert found.tone > 0.8 and found.shares["a steady tone"] == found.tone and found.predictable(2, WORTH)
+    assert found.hertz == pytest.approx(hertz, abs=1.0 / 15.0)
     assert found.gain.sum() < 0.1 * found.total  # functions of the motion do not predict it
     assert asked(LAWS["an angle"][0]).tone == 0.0
 
@@ -188,7 +189,7 @@ def test_products_are_functions_of_unit_size_on_rows_that_count():
     words, values = all_products(KNOWN, use)
     assert len(words) == values.shape[1] > 500 and not values[~use].any()
     np.testing.assert_allclose(np.mean(values**2, axis=0), 1.0, rtol=1e-9)
-    variables = {"time", "its past", *(f"{kind}_{joint}" for kind in ("q", "qd", "qdd", "load") for joint in ("shoulder", "elbow"))}
+    variables = {"time", "its past", "direction", *(f"{kind}_{joint}" for kind in ("q", "qd", "qdd", "load") for joint in ("shoulder", "elbow"))}
     assert {one for word in words for one in word.split(" and ")} == variables - {"load_shoulder"}
 
 
@@ -317,6 +318,15 @@ def test_a_function_alone_is_said_with_its_variables():
     (entry,) = dependences(seen)
     assert entry == {"variable": "q_elbow", "with": "q_shoulder", "share": pytest.approx(0.4)}
     assert followed(entry, quantity) == "the position of elbow with the position of shoulder"
+
+
+def test_a_function_times_the_direction_says_so_and_a_tone_its_frequency():
+    """Friction that goes with an angle is no function of the angle: who writes the formula needs to know."""
+    entry = {"variable": "q_y", "with": "direction", "share": 0.9}
+    assert followed(entry, quantity) == "the position of y with the direction of motion"
+    entry = {"variable": "load_y", "with": "its past and direction", "share": 0.9}
+    assert followed(entry, quantity) == "the load of y with its past and the direction of motion"
+    assert followed({"variable": "a steady tone", "hertz": 7.31, "share": 0.4}, quantity) == "a steady tone of 7.31 Hz alone"
 
 
 @pytest.mark.parametrize("law", ["an angle", "the past speed", "noise"])

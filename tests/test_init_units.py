@@ -1,10 +1,13 @@
 """Units that the URDF's robot tells: its limits, and the torques that its masses need."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from sysid import check, pipeline, regressor, robot, units
 from sysid.robot_spec import RobotSpec
+from sysid.vocabulary import find
 from tests.conftest import JOINTS, URDF, csv, motion
 
 SLIDES = URDF.replace('name="shoulder" type="revolute"', 'name="shoulder" type="prismatic"').replace(
@@ -87,3 +90,19 @@ def test_a_unit_of_torque_is_that_of_the_joints_that_it_can_be_of(unit):
     expected = [own, 1.0] if turns else [1.0, own]
     np.testing.assert_array_equal(units.scales(unit, [False, True]), expected)
     assert units.agree(unit, unit) and not units.agree("A", unit)
+
+
+@pytest.mark.parametrize(
+    ("slides", "units_of"),
+    [
+        ((False, False), ("kg m^2", "N m s/rad", "N m", "N m")),
+        ((True, True), ("kg", "N s/m", "N", "N")),
+        ((False, True), ("kg m", "N m s/m", "N m", "N m")),
+        ((True, False), ("kg m", "N s/rad", "N", "N")),
+    ],
+)
+def test_units_of_a_coupling_are_those_of_both_joints(slides, units_of):
+    """The first joint's torque or force, by the acceleration and speed of the second, which turns or slides."""
+    robot_ = SimpleNamespace(joints=("own", "other"), prismatic=np.array(slides))
+    effect = find("joint_coupling").bound(robot_, 0)
+    assert tuple(effect.unit_on(one.unit, robot_, 0) for one in effect.coefficients()) == units_of

@@ -382,11 +382,11 @@ def test_a_share_that_is_told_is_one(low):
 
 
 def test_a_tone_alone_is_unknown_and_its_share_is_said():
-    hum = replace(NOISE, tone=0.4, shares={"a steady tone": 0.4})
+    hum = replace(NOISE, tone=0.4, hertz=7.3, shares={"a steady tone": 0.4})
     found = elbow(2.0, rest=hum)
     assert found.status == "unknown"
     said = _verdict(found)
-    assert said["depends_on"] == [{"variable": "a steady tone", "share": 0.4}] and said["share_left"] == pytest.approx(0.4)
+    assert said["depends_on"] == [{"variable": "a steady tone", "share": 0.4, "hertz": 7.3}] and said["share_left"] == pytest.approx(0.4)
     # and it is weighed against what effects took
     assert elbow(3.0, [claim("cogging", "elbow", [0.0, 0.1], fitted(1.6))], rest=hum).status == "unknown"
     assert elbow(3.0, [claim("cogging", "elbow", [0.0, 0.78], fitted(1.6))], rest=hum).status == "unknown"  # 0.088 beside 0.78

@@ -40,6 +40,13 @@ class JointCoupling(TorqueEffect):
     def variants(self, robot, joint):
         return [{"other": name} for k, name in enumerate(robot.joints) if k != joint]
 
+    def unit_on(self, unit, robot, joint):
+        slides, turned = robot.prismatic[joint], not robot.prismatic[self._beside(joint)]
+        effort, way = "N" if slides else "N m", "rad" if turned else "m"
+        if unit == "kg m^2":
+            return unit if turned and not slides else "kg m" if turned or not slides else "kg"
+        return unit.replace("N m", effort).replace("rad", way)
+
     def _beside(self, joint):
         return self.joints.index(self.other) if self.other is not None else joint - 1 if joint else 1
 

@@ -11,7 +11,8 @@ every effect is (`products`), and what is said of it (`unknown`).
 Source: Rahimi & Recht 2007 (random features); Hoerl & Kennard 1970 (ridge).
 """
 
+from .functions import DIRECTION
 from .products import products
-from .unknown import TONE, Law, Unknown, unknown
+from .unknown import HUM, TONE, Law, Unknown, unknown
 
-__all__ = ["TONE", "Law", "Unknown", "products", "unknown"]
+__all__ = ["DIRECTION", "HUM", "TONE", "Law", "Unknown", "products", "unknown"]

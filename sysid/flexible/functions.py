@@ -9,6 +9,7 @@ _KNOTS, _PAIRS, _WAVES = (
     6,
     12,
 )  # of a spline; of variables drawn with; random cosines of each pair
+DIRECTION = "direction"  # of the joint's motion, among the variables that a function is of
 _MEMORIES = (0.05, 0.2, 0.5, 1.0)  # s
 
 

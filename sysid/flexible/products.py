@@ -7,7 +7,7 @@ from itertools import islice
 
 import numpy as np
 
-from .functions import of_unit_size
+from .functions import DIRECTION, of_unit_size
 from .pasts import pasts
 
 _OWN, _OTHER = 6, 2  # half waves over an angle's travel: of the joint's own, and of another's
@@ -35,9 +35,10 @@ def products(
     while part := list(islice(found, _PART)):
         words, values = zip(*part)
         own = np.stack(values, axis=1)
-        for some in (own, direction * own):
+        both = [w if f"qd_{joint}" in w.split(" and ") else f"{w} and {DIRECTION}" for w in words]
+        for some, told in ((own, words), (direction * own, both)):
             kept, which = of_unit_size(some, use)
-            yield [words[k] for k in which], kept
+            yield [told[k] for k in which], kept
 
 
 def _all(known, joint: str, piece, step: float) -> Iterator[Factor]:

@@ -8,10 +8,13 @@ import numpy as np
 
 from .. import blocks
 from ..running import running
-from .functions import groups
+from .functions import DIRECTION, groups
 from .ridge import predicted, stretches
 
 TONE = 1e-4  # probability of a line that strong by chance
+HUM = "a steady tone"
+_TOLD = 0.02  # of a squared residual: less is not told of one variable
+_ALONE = 0.5  # of what functions of a variable and of the direction predict: else both are told
 # Of a squared residual: two that differ by less correlate by 0.99; and by how much their difference
 # may follow what was predicted, so that its share changes by a hundredth
 _SAME, _FOLLOWS = 0.02, 0.005
@@ -41,7 +44,8 @@ class Unknown:
     {variable: share of the squared residual that functions of it alone, and of the direction of
     motion, predict}; residual (n,): what was asked; chance: the probability of predictions as good
     as these, were nothing there; tone: the share of a steady tone, zero where there is none;
-    single: the share that one function alone predicts, where these were asked one by one."""
+    single: the share that one function alone predicts, where these were asked one by one; hertz: of
+    the tone."""
 
     gain: np.ndarray
     told: np.ndarray
@@ -50,6 +54,7 @@ class Unknown:
     chance: float = 1.0
     tone: float = 0.0
     single: float = 0.0
+    hertz: float = 0.0
 
     @property
     def total(self) -> float:
@@ -130,16 +135,22 @@ def unknown(
     )
     total = max(float(np.sum(residual**2)), 1e-300)
     shares = {name: float(one[1].sum() / total) for name, one in tried.items() if name != "*"}
-    share, by_chance = _tone(residual, noise, step)
-    if by_chance < TONE:
-        shares["a steady tone"] = share
-    return Unknown(gain, told, shares, residual, chance, tone=share if by_chance < TONE else 0.0)
+    for name in [n for n, own in shares.items() if own > _TOLD and n != f"qd_{joint}"]:
+        alone = told_by[name][:, : told_by[name].shape[1] // 2]  # the rest is times the direction
+        if predicted(alone, residual, use, spans)[1].sum() < _ALONE * shares[name] * total:
+            shares[f"{name} and {DIRECTION}"] = shares.pop(name)
+    share, by_chance, hertz = _tone(residual, noise, step)
+    if by_chance >= TONE:
+        return Unknown(gain, told, shares, residual, chance)
+    shares[HUM] = share
+    return Unknown(gain, told, shares, residual, chance, tone=share, hertz=hertz)
 
 
-def _tone(residual, noise, step: float) -> tuple[float, float]:
-    """The share of a residual's square that its strongest line holds, and the probability of such a
-    line above the spectrum about it, were it noise of any smooth colour (Fisher 1929, against a
-    local median), with lines that `noise` has as well: a coarse encoder at a steady speed."""
+def _tone(residual, noise, step: float) -> tuple[float, float, float]:
+    """The share of a residual's square that its strongest line holds, the probability of such a line
+    above the spectrum about it, were it noise of any smooth colour (Fisher 1929, against a local
+    median), with lines that `noise` has as well: a coarse encoder at a steady speed; and its
+    frequency [Hz]."""
     n = len(residual)
     power, lines = (np.abs(np.fft.rfft(r * np.hanning(n))) ** 2 for r in (residual, noise))
     width = max(9, int(2.0 * n * step) | 1)  # two hertz
@@ -151,6 +162,6 @@ def _tone(residual, noise, step: float) -> tuple[float, float]:
     )  # slower than 1 Hz is drift
     at = int(np.argmax(ratio))
     near = slice(max(0, at - 2), at + 3)
-    return float(power[near].sum() / max(power.sum(), 1e-300)), float(
-        min(1.0, len(power) * np.exp(-min(ratio[at], 700.0)))
-    )
+    share = float(power[near].sum() / max(power.sum(), 1e-300))
+    by_chance = min(1.0, len(power) * np.exp(-min(ratio[at], 700.0)))
+    return share, float(by_chance), at / (n * step)

@@ -6,19 +6,25 @@ import re
 import textwrap
 from collections.abc import Callable, Sequence
 
+from ..flexible import DIRECTION
 from ..unexplained import not_claimed
 from ..units import behind
 
 Members = Sequence[tuple[str, str, float]]  # (effect, joint, probability) of a set
+_DIRECTION = "the direction of motion"
 _HARDLY = 0.01  # of an error
 SURE = 0.9  # the set holds the truth so often
 NEVER = 0.05  # probability below which a motion is no answer
 
 
 def followed(entry: dict, word: Callable[[str], str]) -> str:
-    """What a residual follows, alone or with a second variable, in words."""
+    """What a residual follows, alone or with other variables, in words."""
     first, other = word(entry["variable"]), entry.get("with")
-    return f"{first} with {word(other)}" if other else f"{first} alone"
+    first += f" of {entry['hertz']:.3g} Hz" if "hertz" in entry else ""
+    if not other:
+        return f"{first} alone"
+    told = [_DIRECTION if one == DIRECTION else word(one) for one in other.split(" and ")]
+    return f"{first} with {listed(told, 'and')}"
 
 
 def named(head: tuple[str, str], members: Members) -> list[tuple[str, str]]:
