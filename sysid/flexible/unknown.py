@@ -147,7 +147,7 @@ def unknown(
 
 
 def _tone(residual, noise, step: float) -> tuple[float, float, float]:
-    """The share of a residual's square that its strongest line holds, the probability of such a line
+    """The share of a residual's square that its strongest line holds, the chance of such a line
     above the spectrum about it, were it noise of any smooth colour (Fisher 1929, against a local
     median), with lines that `noise` has as well: a coarse encoder at a steady speed; and its
     frequency [Hz]."""
