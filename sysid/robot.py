@@ -192,17 +192,22 @@ def _chosen(spec: RobotSpec, source: urdf.Urdf, moving: list[str]):
             raise RobotError(f"joint {both[0]!r} is in robot.joints and in robot.lock", where=where, do="keep it in one of them")
         if not spec.joints:
             raise RobotError("robot.joints is empty", where=where, allowed=", ".join(moving), do="name at least one joint")
-        return spec.joints
-    followers = _mimics(source)
-    if mimics := [name for name in moving if name in followers and name not in spec.lock]:
-        warn(f"joints {', '.join(mimics)} mimic others in the URDF and are locked; name them in robot.joints to move them", above=3)
-    chosen = [name for name in moving if name not in spec.lock and name not in mimics]
+    leaders = followers(source)
+    mimics = {name: leaders[name] for name in moving if name in leaders and name not in (*spec.lock, *(spec.joints or ()))}
+    chosen = [name for name in moving if name not in spec.lock and name not in mimics] if spec.joints is None else spec.joints
     if not chosen:
         raise RobotError("no joint is left to move", where=where, allowed="at least one revolute, continuous or prismatic joint")
+    for name, leader in mimics.items():
+        if leader in chosen:  # the other finger of a hand that stands still matters to nobody
+            warn(
+                f"{name} moves with {leader} in the URDF (<mimic>), and is held still here: masses and torques are wrong as far as what it moves weighs; "
+                "where it has angles and torques of its own, name it in robot.joints", above=3,
+            )  # fmt: skip
     return chosen
 
 
-def _mimics(source: urdf.Urdf) -> set[str | None]:
-    """Names of the joints that mimic others."""
+def followers(source: urdf.Urdf) -> dict[str | None, str | None]:
+    """{joint that mimics another: the one that it follows}."""
     root = ElementTree.fromstring(source.text.encode())
-    return {element.get("name") for element in root.findall("joint") if element.find("mimic") is not None}
+    joints = ((element.get("name"), element.find("mimic")) for element in root.findall("joint"))
+    return {name: mimic.get("joint") for name, mimic in joints if mimic is not None}

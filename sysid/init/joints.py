@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import ConfigError, LogError
-from ..robot import Robot
+from ..robot import Robot, followers
 from .guess import Guess
 from .logged import Logged, Signals
 from .robots import grips
@@ -72,7 +72,14 @@ def chosen(
         out.append(Guess("data.unused", own, why, doubt))
     if robot.locked:
         whys.append(f"{', '.join(robot.locked)}, by <mimic>: locked at 0")
-    return order, [*out, Guess("robot.lock", lock, "; ".join(whys))] if whys else out
+    moved = {name: leader for name, leader in followers(robot.source).items() if leader in order}
+    doubt = "; ".join(
+        f"{name} moves with {leader}, and the model holds it still: masses and torques are wrong "
+        "as far as what it moves weighs"
+        for name, leader in moved.items()
+        if name in robot.locked
+    )
+    return order, [*out, Guess("robot.lock", lock, "; ".join(whys), doubt)] if whys else out
 
 
 def _logged(data: list[Logged], joint: str, scale: float) -> np.ndarray | None:
