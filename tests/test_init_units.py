@@ -106,3 +106,21 @@ def test_units_of_a_coupling_are_those_of_both_joints(slides, units_of):
     robot_ = SimpleNamespace(joints=("own", "other"), prismatic=np.array(slides))
     effect = find("joint_coupling").bound(robot_, 0)
     assert tuple(effect.unit_on(one.unit, robot_, 0) for one in effect.coefficients()) == units_of
+
+
+def test_columns_whose_units_stand_in_their_names(cli, tmp_path):
+    """A slide in mm and a hinge in degrees are both read, each in its own; what nothing was made of is said where its joint is locked."""
+    (tmp_path / "robot.urdf").write_text(SLIDES)
+    named = {"q_shoulder": "shoulder_pos [mm]", "q_elbow": "elbow_pos [deg]", "tau_shoulder": "shoulder_force [N]", "tau_elbow": "elbow_torque [Nm]"}
+    text = logged(tmp_path, SLIDES, shown={"shoulder": 1e3, "elbow": 180.0 / np.pi})
+    for plain, name in named.items():
+        text = text.replace(plain, name, 1)
+    (tmp_path / "a.csv").write_text(text)
+    _, made = begun(cli, tmp_path)
+    assert set(made.robot.joints) == set(JOINTS) and made.data.units.position == "deg"
+    assert made.data.position == {"shoulder": {"shoulder_pos [mm]": 1e-3}}
+    assert not [f for f in check.check(made) if f.severity == "error"]
+    (tmp_path / "a.csv").write_text(text.replace("elbow_torque [Nm]", "elbow_strain", 1))
+    (tmp_path / "mine" / "config.yaml").unlink()
+    said = cli("init", tmp_path / "robot.urdf", tmp_path / "a.csv", out=tmp_path / "other")
+    assert said.status == 0 and "elbow_strain" in said.out

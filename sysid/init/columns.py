@@ -7,41 +7,10 @@ places in a matrix, which count the joints in the order of the URDF.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
 
 from ..readers.table import Table
+from .named_columns import Found, merged, pattern
 from .words import Meaning, meaning, words
-
-
-@dataclass(frozen=True)
-class Found:
-    """Columns of one signal. columns: {joint: column}; pattern: with {joint}, where one says it
-    all; counted: they were given to joints by their number, not by a name; more: numbered columns
-    beyond the joints; meaning: what their names say."""
-
-    columns: dict[str, str]
-    pattern: str | None
-    counted: bool
-    more: tuple[str, ...]
-    meaning: Meaning
-
-    @property
-    def said(self):
-        """What an experiment file says of them."""
-        return self.pattern or list(self.columns.values())
-
-    @property
-    def why(self) -> str:
-        """How their joints were found."""
-        if not self.counted:
-            return "the columns carry the joints' names"
-        own = [*self.columns.values(), *self.more]
-        named = own[0] if len(own) == 1 else f"{own[0]} to {own[-1]}"
-        return f"{named}, taken in the order of the URDF's joints"
-
-    def of(self, joints: Iterable[str]) -> Found:
-        """The columns of some of the joints."""
-        return replace(self, columns={joint: self.columns[joint] for joint in joints})
 
 
 def found(table: Table, joints: list[str]) -> dict[str, list[Found]]:
@@ -53,6 +22,8 @@ def found(table: Table, joints: list[str]) -> dict[str, list[Found]]:
     groups: dict[str, list[Found]] = {}
     for entry in [*_usual(table, joints), *_named(table, joints), *_counted(table, joints)]:
         groups.setdefault(entry.meaning.signal, []).append(entry)
+    for entries in groups.values():
+        entries += merged([f for f in entries if not f.counted], joints)
     # stable: what covers more joints, what is measured, what is found by name comes first
     for entries in groups.values():
         entries.sort(key=lambda f: (-len(f.columns), f.meaning.away))
@@ -61,17 +32,17 @@ def found(table: Table, joints: list[str]) -> dict[str, list[Found]]:
 
 def _usual(table: Table, joints: list[str]) -> Iterable[Found]:
     """What the format itself says; of names that are not the joints' nothing."""
-    for signal, pattern in table.usual.items():
-        if signal == "time" or "{joint}" not in pattern:
+    for signal, said in table.usual.items():
+        if signal == "time" or "{joint}" not in said:
             continue
-        columns = {j: c for j in joints if (c := pattern.replace("{joint}", j)) in table.names}
+        columns = {j: c for j in joints if (c := said.replace("{joint}", j)) in table.names}
         if columns:
-            yield Found(columns, pattern, False, (), Meaning(signal, -1, ""))
+            yield Found(columns, said, False, (), Meaning(signal, -1, ""))
 
 
 def _bases(table: Table) -> dict[str, str]:
     """{matrix or what the names of its elements begin with: signal}, as the format says."""
-    return {pattern.removesuffix(".{joint}"): signal for signal, pattern in table.usual.items()}
+    return {said.removesuffix(".{joint}"): signal for signal, said in table.usual.items()}
 
 
 def _named(table: Table, joints: list[str]) -> Iterable[Found]:
@@ -96,7 +67,7 @@ def _named(table: Table, joints: list[str]) -> Iterable[Found]:
             means = Meaning(_bases(table)[bases.pop()], -1, "")
         if means.signal:
             ordered = {joint: columns[joint] for joint in joints if joint in columns}
-            yield Found(ordered, _pattern(ordered), False, (), means)
+            yield Found(ordered, pattern(ordered), False, (), means)
 
 
 def _counted(table: Table, joints: list[str]) -> Iterable[Found]:
@@ -186,13 +157,3 @@ def _shared(all_words: list[tuple]) -> int:
             break
         count += 1
     return min(count, min(map(len, all_words)) - 1)
-
-
-def _pattern(columns: dict[str, str]) -> str | None:
-    """The pattern of columns that hold their joints' names as they are."""
-    patterns = {c.replace(j, "{joint}") for j, c in columns.items() if c.count(j) == 1}
-    if len(patterns) != 1:
-        return None
-    (pattern,) = patterns
-    same = all(pattern.replace("{joint}", j) == c for j, c in columns.items())
-    return pattern if same and pattern.count("{joint}") == 1 else None

@@ -84,7 +84,9 @@ def _moved(reference: str, folder: Path) -> str:
 def _angles(data: list[Logged], found: Signals, robot) -> Guess:
     slides, limits = _sliding(robot), dict(zip(robot.joints, robot.limits))
     q = _positions(data, found.joints)
-    guess = units.position_unit(q, slides, limits, found.position.meaning.unit)
+    said = {unit for j, unit in found.position.units.items() if unit and not slides[j]}
+    named = said.pop() if len(said) == 1 else found.position.meaning.unit
+    guess = units.position_unit(q, slides, limits, named)
     doubt = units.mixed(data, [joint for joint in found.joints if not slides[joint]])
     return replace(guess, doubt=doubt) if doubt else guess
 
@@ -95,6 +97,7 @@ def _lengths(data: list[Logged], found: Signals, used: list[str], robot) -> list
     if found.position.meaning.unit or all(slides[joint] for joint in found.joints):
         return []
     own = units.millimetres(_positions(data, used), slides, limits)
+    own += [j for j in used if found.position.units.get(j) == "mm" and j not in own]
     return units.in_mm(own, found.position.columns)
 
 

@@ -10,6 +10,7 @@ from ..robot import Robot, followers
 from .guess import Guess
 from .logged import Logged, Signals
 from .robots import grips
+from .words import words
 
 _STILL = 1e-3  # rad or m: a joint that travels less was held
 
@@ -44,7 +45,7 @@ def chosen(
     Raises:
         LogError: none is left.
     """
-    used, unused, lock, whys = [], [], {}, []
+    used, unused, lock, whys, passed = [], [], {}, [], []
     for joint, slides in zip(robot.joints, robot.prismatic):
         values = _logged(data, joint, _si(unit, slides))
         travel = 0.0 if values is None else float(np.ptp(values))
@@ -54,6 +55,8 @@ def chosen(
                 unused.append(joint)
             continue
         lock[joint], why = _locked(robot, joint, values)
+        if values is None and (own := _passed_over(signals, joint)) and joint in arm:
+            passed.append(f"nothing was made of {', '.join(own)}, which carry the name of {joint}")
         reason = "stands still" if values is not None else "has no columns"
         whys.append(f"{joint} {reason if joint in arm else 'moves a gripper'}: {why}")
     if len(used) == len(unused):
@@ -68,18 +71,28 @@ def chosen(
     if unused:
         own = [joint for joint in order if joint in unused]
         why = "they move, and no column holds their torque, or one that never changes"
-        doubt = f"is the torque of {', '.join(own)} logged under another name?"
+        known = [column for joint in own for column in _passed_over(signals, joint)]
+        shown = f", {', '.join(known)}" if known else ""
+        doubt = f"is the torque of {', '.join(own)} logged under another name{shown}?"
         out.append(Guess("data.unused", own, why, doubt))
     if robot.locked:
         whys.append(f"{', '.join(robot.locked)}, by <mimic>: locked at 0")
     moved = {name: leader for name, leader in followers(robot.source).items() if leader in order}
-    doubt = "; ".join(
+    passed += [
         f"{name} moves with {leader}, and the model holds it still: masses and torques are wrong "
         "as far as what it moves weighs"
         for name, leader in moved.items()
         if name in robot.locked
-    )
+    ]
+    doubt = "; ".join(passed)
     return order, [*out, Guess("robot.lock", lock, "; ".join(whys), doubt)] if whys else out
+
+
+def _passed_over(signals: Signals, joint: str) -> list[str]:
+    """Columns that carry a joint's name, and of which nothing was made."""
+    own = words(joint)
+    runs = lambda said: (said[k : k + len(own)] for k in range(len(said)))  # noqa: E731
+    return [column for column in signals.rest if own in runs(words(column))]
 
 
 def _logged(data: list[Logged], joint: str, scale: float) -> np.ndarray | None:
