@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from . import config, drives, gains, groups, late, listed_effects, locked_joints, masses, robot, rollout
+from . import config, drives, gains, groups, late, listed_effects, load_doubt, locked_joints, masses, robot, rollout
 from . import filters as filtering
 from . import log as logs
 from .compress import compress
@@ -142,7 +142,7 @@ def _fit(experiment: Experiment, filters: dict | None, strength: PriorWeight | N
             weight = weight or prior_strength(experiment, structure, motion, compressed, prior)
         with _timed(seconds, "solve", tell):
             found = identify(with_weight(experiment, weight.value), structure, motion, compressed, prior, told=shaped.told)
-            found = scattered(replace(found, strength=strength or weight), motion)
+            found = load_doubt.with_doubt(scattered(replace(found, strength=strength or weight), motion), motion)
         if not found.physically_consistent:
             names = [body.name for body, possible in zip(machine.bodies, is_consistent(found.pi)) if not possible]
             warn(f"impossible bodies: {', '.join(names or ['what an effect carries'])}; identified.urdf will not serve a simulator. model.inertia: log-cholesky keeps them possible")

@@ -12,6 +12,7 @@ from ..units import behind
 
 Members = Sequence[tuple[str, str, float]]  # (effect, joint, probability) of a set
 _DIRECTION = "the direction of motion"
+_ROUNDING = 1e-20  # in any unit: what is left of a number that is held at nought
 _HARDLY = 0.01  # of an error
 SURE = 0.9  # the set holds the truth so often
 NEVER = 0.05  # probability below which a motion is no answer
@@ -86,7 +87,8 @@ def valued(name: str, p: dict) -> str:
     """A parameter {value, std, unit} with its deviation and its unit, where it has these; without
     a deviation the logs do not tell it from the rest of the model, or it is given."""
     std, held = ("", " (held)") if p["std"] is None else (f" +- {p['std']:.2g}", "")
-    return f"{name} = {p['value']:.4g}{std}{behind(p['unit'])}{held}"
+    value = p["value"] if abs(p["value"]) > _ROUNDING else 0.0
+    return f"{name} = {value:.4g}{std}{behind(p['unit'])}{held}"
 
 
 def untold(parameters: dict[str, dict]) -> str:

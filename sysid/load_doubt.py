@@ -1,0 +1,102 @@
+"""What is not known of the load that an effect looks at.
+
+A gear that gives and friction that grows with the load look at the torque that the bodies found need. A fit takes that load for
+known. Where its logs tell a rotor's and a link's inertia together and not each, the load is as doubtful as the link, and so is
+whatever answers to it: of a soft gear they tell the compliance times the square of the link's inertia.
+
+    d theta = -H^-1 2 A' W^2 dE,      dE what another load changes of the predicted torque, A the slopes of everything fitted,
+
+along the few directions of the bodies' covariance by which loads change most: to first order, as everything said of a fit's
+deviations is.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from . import rows
+from .effect import NotFinite
+from .estimate import Fit
+from .model import Model, moving_coefficients
+from .motion import Motion
+from .objective import add_blocks
+from .posed_problem import pose
+from .prior_weight import with_weight
+from .projection import inverted, root
+from .source import Source
+
+_ROWS, _MOST, _WHOLE = 3000, 4, 0.99  # rows; directions, and how much of the loads' doubt they hold
+_STEP = 0.1  # of a deviation: of slopes
+
+
+def with_doubt(fit: Fit, motion: Motion) -> Fit:
+    """A fit whose deviations of what answers to the load hold what is not known of the load; itself where nothing does.
+
+    Args:
+        motion: the training logs'.
+    """
+    model = fit.model
+    linear = [k for k, c in enumerate(model.coefficients) if model.terms[c.term][0].uses_load and np.isfinite(fit.uncertainty.std[10 * model.bodies + k])]
+    bent = [k for k, v in enumerate(model.shape_values) if model.terms[v.term][0].uses_load and np.isfinite(fit.shape_std[k])]
+    if not (linear or bent):
+        return fit
+    try:
+        moved = _answers(fit, motion, {*(model.coefficients[k].joint for k in linear), *(model.shape_values[k].joint for k in bent)})
+    except NotFinite:  # of a formula, beside where it stands
+        return fit
+    at = [10 * model.bodies + k for k in linear]
+    free = [k for k, value in enumerate(model.shape_values) if not value.held]
+    covariance = _with(fit.uncertainty.covariance, at, moved[at])
+    shaped = _with(fit.shape_covariance, bent, moved[[model.size + free.index(k) for k in bent]])
+    sure = replace(fit.uncertainty, covariance=covariance, std=_std(covariance, fit.uncertainty.std))
+    return replace(fit, uncertainty=sure, shape_covariance=shaped, shape_std=_std(shaped, fit.shape_std))
+
+
+def _answers(fit: Fit, motion: Motion, joints: set[int]) -> np.ndarray:
+    """How far each parameter goes (size + free shape values, directions), the load a deviation off in each of some directions."""
+    model, x = fit.model, fit.x
+    weights = np.ones(model.robot.dof) if fit.weights is None else fit.weights
+    stride = rows.stride_for(motion, _ROWS)
+    found = rows.stack(model, motion, stride)
+    slopes = Source(model, x, motion, stride, found.use).full(found.columns) * weights[:, None, None]
+    torque = lambda pi: rows.predicted(model.referring_to(np.append(pi, x[len(pi) :])), motion, x, stride) * found.use  # noqa: E731
+    bodies = x[: 10 * model.bodies]
+    base = torque(bodies)
+    moved = [(torque(bodies + _STEP * d) - base) * weights / _STEP for d in _directions(fit, found.columns, joints)]
+    pull = [2.0 * stride * np.einsum("jnk,nj->k", slopes, own) for own in moved]
+    free = np.append(np.isfinite(fit.uncertainty.std), np.ones(slopes.shape[2] - model.size, dtype=bool))
+    hessian = 2.0 * stride * np.einsum("jnk,jnl->kl", slopes, slopes) + _prior(fit, motion, slopes.shape[2])
+    out = np.zeros((len(free), len(pull)))
+    out[free] = -inverted(hessian[np.ix_(free, free)]) @ np.array(pull).T[free]
+    return out
+
+
+def _directions(fit: Fit, columns: np.ndarray, joints: set[int]) -> np.ndarray:
+    """Deviations (directions, 10 bodies) of the bodies' parameters by which the loads of some joints change most."""
+    robot, count = fit.model.robot, 10 * fit.model.bodies
+    spread = root(np.nan_to_num(fit.uncertainty.covariance[:count, :count]))
+    loads = [columns[j][:, :count] * np.repeat(robot.carried(j) & ~robot.turned(j), 10) for j in sorted(joints)]
+    _, sizes, turn = np.linalg.svd(np.concatenate(loads) @ spread, full_matrices=False)
+    held = np.cumsum(sizes**2) / max(float(np.sum(sizes**2)), 1e-300)
+    return (spread @ turn[: min(_MOST, 1 + int(np.searchsorted(held, _WHOLE)))].T).T
+
+
+def _prior(fit: Fit, motion: Motion, size: int) -> np.ndarray:
+    """The Hessian (size, size) of the prior where a fit stands."""
+    model: Model = fit.model
+    experiment = with_weight(fit.experiment, fit.strength.value)
+    data = fit.compressed if fit.compressed.size == model.size else fit.compressed.first(model.size)
+    problem = pose(experiment, model, data, moving_coefficients(model, motion), fit.prior, fit.weights)
+    return add_blocks(np.zeros((size, size)), problem.objective.beside_data(fit.x)) if problem.objective.says else np.zeros((size, size))
+
+
+def _with(covariance: np.ndarray, at: list[int], moved: np.ndarray) -> np.ndarray:
+    out = covariance.copy()
+    out[np.ix_(at, at)] += moved @ moved.T
+    return out
+
+
+def _std(covariance: np.ndarray, before: np.ndarray) -> np.ndarray:
+    return np.where(np.isfinite(before), np.sqrt(np.clip(np.nan_to_num(np.diagonal(covariance)), 0.0, None)), before)
