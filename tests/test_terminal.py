@@ -33,6 +33,7 @@ def finding(effect, joint, command, step, **more):
         "joins_as_step": step,
         "options": {},
         "options_say": {},
+        "or_options": [],
         "size_told": True,
         "misfit_known": True,
     } | more

@@ -1,5 +1,6 @@
 """Which explanations logs cannot tell apart: losses are those of refits without each fold, and the set holds the truth."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -131,6 +132,21 @@ def test_the_set_holds_the_truth_and_its_twin_and_not_the_rest(biased):
     assert [p for _, p in found.members] == pytest.approx([0.5, 0.5], abs=0.01)  # one column: nobody can tell
     base = losses(weighed(view, found.head.view.weights), view.blocks)
     assert found.gain.sum() == pytest.approx((base - found.head.losses).sum())
+
+
+def test_other_options_that_do_as_well_are_told_of_the_head(biased):
+    """One that is the same but for its options, and none that leaves more; of another head nobody has said it."""
+    view, groups = biased
+    bias, twin, drag = (of(groups, *key) for key in (("torque_bias", 1), ("asymmetric_coulomb", 1), ("quadratic_drag", 1)))
+    disguised = replace(bias, candidate=replace(bias.candidate, options=(("other", "wrist"),)))
+    lame = replace(drag, candidate=replace(bias.candidate, effect=drag.candidate.effect.given(), options=(("other", "thumb"),)))
+    lame.candidate.effect.__dict__["name"] = "torque_bias"
+    found = chosen(view, [bias, disguised, lame, twin], np.random.default_rng(0))
+    assert found.head.candidate.name == "torque_bias"
+    said = {bias.candidate.options, disguised.candidate.options} - {found.head.candidate.options}
+    assert {one.options for one in found.forms} == said
+    (other,) = [m for m, _ in found.members if m is not found.head]
+    assert found.headed(other).forms == () and found.headed(found.head).forms == found.forms
 
 
 @pytest.mark.parametrize(("likelier", "kept"), [(0.98, [2, 2]), (0.995, [1, 2])])

@@ -39,7 +39,7 @@ from .numbering import (
     summed,
 )
 from .parameters import clear, covariance, widening
-from .redrawn import left_out, normal_scores, ratio_at, redrawn
+from .redrawn import chance_among, left_out, normal_scores, ratio_at, redrawn
 from .rivals import SAME, chances, confidence_set, price, within_one_error
 
 __all__ = [
@@ -55,6 +55,7 @@ __all__ = [
     "averaged",
     "believed",
     "clear",
+    "chance_among",
     "chances",
     "confidence_set",
     "covariance",

@@ -48,3 +48,9 @@ def ratio_at(score: float, directions: float, rest: float) -> float:
         return np.inf
     left = max(half**2 - lead * ((1.0 - one) ** 2 - one * score**2), 0.0)
     return float(((half + np.sqrt(left)) / lead) ** 3)
+
+
+def chance_among(statistic: float, greatest: np.ndarray) -> float:
+    """Family-wise p-value of a statistic beside the greatest (draws,) of all of nothing there; one
+    of what cannot be tested."""
+    return float((1 + np.sum(~(greatest < statistic))) / (1 + len(greatest)))

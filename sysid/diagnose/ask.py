@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..blocks import Belief
+from ..blocks import Belief, chance_among
 from ..candidates import Candidate, candidates, together
 from ..view import View, falls
 from . import null
@@ -62,7 +62,7 @@ class Asked:
 
     def p(self, k: int) -> float:
         """Family-wise p-value of a group."""
-        return null.chance(self.statistics[k], self.maxima)
+        return chance_among(self.statistics[k], self.maxima)
 
     def threshold(self, level: float) -> float:
         """The statistic beyond chance at a family-wise level; infinity where none is testable."""
@@ -85,7 +85,7 @@ class Asked:
         if not takes:
             return None
         best = max(takes, key=lambda k: np.nan_to_num(statistics[k], nan=-np.inf))
-        p, alone = (null.chance(statistics[best], most) for most in (self.maxima, own))
+        p, alone = (chance_among(statistics[best], most) for most in (self.maxima, own))
         if (alone if there else p) <= _MAY_BE:
             return found[best].candidate, p
         untold = [k for k in takes if np.isnan(statistics[k])]  # nobody can say that it is not

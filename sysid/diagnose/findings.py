@@ -23,7 +23,7 @@ class Finding:
     its set. rms_before, rms_after: on the test logs, on its joint (over all joints for `*`), of the
     fits without it and with it. parameters: {name: (value, std or NaN, unit)} of the fit with it,
     of a claim with all that is claimed; size_told: whether they say how large it is. step: which
-    step of the search it heads, or None. command: what adds it.
+    step of the search it heads, or None. command: what adds it. forms: as of `Choice`, of a head.
     """
 
     member: Member
@@ -37,6 +37,7 @@ class Finding:
     size_told: bool
     step: int | None
     command: str
+    forms: tuple = ()
 
     @property
     def candidate(self):
@@ -66,4 +67,5 @@ def finding(
     heads = number if member is step.choice.head else None
     added = command(before.experiment.path, *spelled(candidate, joint))
     numbers = after.parameters_of(*candidate.key), size_told(after, *candidate.key)
-    return Finding(member, joint, step.p, chance, *errors, se, *numbers, heads, added)
+    forms = step.choice.forms if heads is not None else ()
+    return Finding(member, joint, step.p, chance, *errors, se, *numbers, heads, added, forms)

@@ -41,11 +41,6 @@ def statistics(groups: Sequence[Group], belief: blocks.Belief = blocks.UNTOLD) -
     return np.where([g.testable for g in groups], found, np.nan)
 
 
-def chance(statistic: float, greatest: np.ndarray) -> float:
-    """Family-wise p-value of a statistic beside `maxima`; one of what cannot be tested."""
-    return float((1 + np.sum(~(greatest < statistic))) / (1 + len(greatest)))
-
-
 def maxima(
     groups: Sequence[Group],
     rng: np.random.Generator,

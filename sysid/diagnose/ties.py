@@ -13,14 +13,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .. import blocks
-from ..posed_problem import inverse
-from ..view import COMPARED, View, holds, losses, slow_losses, taken, weighed
+from ..candidates import Candidate
+from ..view import COMPARED, View, even, holds, losses, slow_losses, taken, weighed
 from .evidence import Group
 from .projected import groups_at
 from .refits import Member, refitted
 
 _OUTSIDE, _HARDLY = 0.10, 0.01  # outside the set of 90 %: p-value; chance of all such together
-_UNEVEN = 0.35  # logarithm: two joints count half as much against each other, in power
 NEAR = 0.4  # of what the best takes, as all are asked at once: by less no refit makes it the best
 _CLOSE = 0.1  # of what the head takes: by less another may have lost to what still acted then
 
@@ -30,13 +29,15 @@ class Choice:
     """The head and, by falling probability, all that these logs cannot tell from it: members with
     their probabilities. gain (blocks,): what the head takes of the model's weighted loss in each
     block; shares (dof,): of each joint's loss. beaten: all others that were refitted; where one of
-    them is there, it is the head that is."""
+    them is there, it is the head that is. forms: the head's effect with other options, which these
+    logs cannot tell from it either."""
 
     head: Member
     members: tuple[tuple[Member, float], ...]
     gain: np.ndarray
     beaten: tuple[Member, ...] = ()
     shares: np.ndarray | None = None
+    forms: tuple[Candidate, ...] = ()
 
     @property
     def decided(self) -> bool:
@@ -62,7 +63,8 @@ class Choice:
     def headed(self, head: Member) -> Choice:
         """The choice with another of its members at the head."""
         members = sorted(self.members, key=lambda one: one[0] is not head)
-        return replace(self, head=head, members=tuple(members))
+        forms = self.forms if head is self.head else ()
+        return replace(self, head=head, members=tuple(members), forms=forms)
 
     def without(self, there: set) -> Choice:
         """The choice without what is in the model anyway, as another step brings it."""
@@ -77,7 +79,10 @@ def chosen(view: View, groups: list[Group], rng, known: Mapping = {}) -> Choice 
     members = [m for g in groups if (m := refitted(view, g, known.get(id(g.candidate))))]
     if not members:
         return None
-    first, (view, members) = view, _even(view, members)
+    first = view
+    if (view := even(first, min(members, key=lambda m: m.losses.sum()).view)) is not first:
+        grown = ((m.group, weighed(m.view, view.weights)) for m in members)
+        members = [Member(group, found, losses(found, view.blocks)) for group, found in grown]
     base = losses(view, view.blocks)
     # who loses more than nobody explains nothing, however far its losses scatter
     members = [m for m in members if m.losses.sum() <= base.sum()] or members[:1]
@@ -93,7 +98,7 @@ def chosen(view: View, groups: list[Group], rng, known: Mapping = {}) -> Choice 
         group = (groups_at(view, [(group.candidate, group.shapes)]) or [group])[0]
     price = price_of(view, group)
     priced = table + np.array([price(member.group) for member in members]) / len(table)
-    kept = _least(members, priced.sum(0))
+    kept, every = _least(members, priced.sum(0)), list(zip(members, table.T))
     members, table, priced = [members[k] for k in kept], table[:, kept], priced[:, kept]
     free = table + np.array([price(m.group, signs=0.0) for m in members]) / len(table)
     p = blocks.confidence_set(table, rng)
@@ -121,29 +126,18 @@ def chosen(view: View, groups: list[Group], rng, known: Mapping = {}) -> Choice 
         order += [] if told > 1.0 - _OUTSIDE and wide(k) else [k]
         told += chance[k]
     order = [k for n, k in enumerate(order) if not n or sum(map(chance.get, order[n:])) > _HARDLY]
-    whole = sum(map(chance.get, order))
+    own, whole = members[head].candidate, sum(map(chance.get, order))
+    apart = ((m.candidate, np.stack([table[:, head], lost], axis=1)) for m, lost in every)
+    apart = ((c, both) for c, both in apart if c.key == own.key and c.kind != own.kind)
+    forms = tuple(c for c, both in apart if blocks.confidence_set(both, rng)[1] >= _OUTSIDE)
     return Choice(
         members[head],
         tuple((members[k], float(chance[k] / whole)) for k in order),
         base.sum(1) - table[:, head],
         tuple(replace(m, view=replace(m.view)) for k, m in enumerate(members) if k not in order),
         taken(view, base, members[head].losses),
+        forms,
     )
-
-
-def _even(view: View, members: list[Member]) -> tuple[View, list[Member]]:
-    """Everything with the weights that the best of the members asks for.
-
-    A joint that lacks something is loud, counts little, and the prior much: what the prior is in
-    the way of would speak for whoever has the most freedom.
-    """
-    best = min(members, key=lambda m: m.losses.sum()).view
-    weights = inverse(best.rms())
-    if np.ptp(np.log(weights / view.weights)) < _UNEVEN:
-        return view, members
-    view = weighed(view, weights)
-    even = [(m.group, weighed(m.view, weights)) for m in members]
-    return view, [Member(group, found, losses(found, view.blocks)) for group, found in even]
 
 
 def price_of(view: View, group: Group) -> Callable[..., float]:

@@ -73,6 +73,8 @@ def finding(f: Finding, claim: Claim, found: Diagnosis) -> dict:
             name: f.candidate.effect.options.get(name, "").partition(" (default")[0]
             for name, _ in f.candidate.options
         },
+        # other options under which it does as well, for all that these logs tell
+        "or_options": [dict(form.options) for form in f.forms],
         # as an experiment file spells it
         "adds": dict(zip(("effect", "joints", "options"), spelled(f.candidate, f.joint))),
         "summary": describe(f.candidate.effect)["summary"],

@@ -14,6 +14,7 @@ from .words import (
     listed,
     near,
     option,
+    other_options,
     otherwise,
     percent,
     placed,
@@ -164,6 +165,9 @@ def _head(f: dict, of: Told, joint: str, width: int, said: dict[str, str]) -> li
     out = wrapped(words, width, "    ") if takes or values else []
     for name, value in f["options"].items():
         out += wrapped(f"  {name} {option(value)}: {f['options_say'][name]}", width, "    ")
+    if others := [other_options(form, f["options"]) for form in f["or_options"]]:
+        words = f"  with {listed(others, 'or')} it does as well, for all that these logs tell"
+        out += wrapped(words, width, "    ")
     if not f["size_told"]:
         out += wrapped(f"  {untold(f['parameters'])}", width, "    ")
     others = [m for m in of.sets[f["command"]] if m[:2] != (f["effect"], f["joint"])]

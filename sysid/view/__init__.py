@@ -2,7 +2,7 @@
 
 from .design import Design, Sums, by_block, designed, instrumented, summed
 from .falls import falls
-from .joining import COMPARED, allowed, around, joined, shapes_in, shapes_of, weighed
+from .joining import COMPARED, allowed, around, even, joined, shapes_in, shapes_of, weighed
 from .laws import law
 from .losses import losses, slow_losses, taken, took
 from .opened import elsewhere, first_view, too_short
@@ -21,6 +21,7 @@ __all__ = [
     "by_block",
     "designed",
     "elsewhere",
+    "even",
     "falls",
     "first_view",
     "greatest",

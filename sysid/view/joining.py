@@ -18,6 +18,7 @@ from ..settled import placed
 from .design import designed
 from .view import View, looked_at
 
+_UNEVEN = 0.35  # logarithm: two joints count half as much against each other, in power
 COMPARED = 1e-4  # share of the objective: finer than rivals are ever told apart by
 _CHANCE = 1.645  # standard deviations: five per cent to one side
 
@@ -85,6 +86,18 @@ def weighed(view: View, weights=None) -> View:
     """
     how = {} if weights is None else {"tolerance": COMPARED, "like": view}
     return _again(view, view.model, inverse(view.rms()) if weights is None else weights, **how)
+
+
+def even(view: View, best: View) -> View:
+    """The view with the weights that the best of those that grew from it asks for; itself where
+    these are its own.
+
+    A joint that lacks something is loud, counts little, and the prior much: what the prior is in
+    the way of would speak for whoever has the most freedom.
+    """
+    weights = inverse(best.rms())
+    uneven = np.ptp(np.log(weights / view.weights)) >= _UNEVEN
+    return weighed(view, weights) if uneven else view
 
 
 def around(view: View, after: View, candidate: Candidate) -> View:
