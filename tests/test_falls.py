@@ -11,6 +11,7 @@ from sysid.candidates import candidates, own_effects
 from sysid.diagnose.ask import Asked, ask
 from sysid.trusted import trust
 from sysid.view import falls, first_view, joined
+from sysid.view.falls import _most as most
 
 
 @pytest.fixture(scope="module")
@@ -145,6 +146,19 @@ def test_who_cannot_fall_as_far_is_not_settled(bound, monkeypatch):
     found = falls(bound, asked, share)
     assert np.array_equal(found[every >= least], every[every >= least])
     assert np.sum(every >= least) <= len(posed) < len(asked)
+
+
+def test_columns_that_the_models_own_hold_may_fall_as_far_as_the_prior_lets_them():
+    """Rounding leaves of them a square of either sign: no bound is made of it."""
+    rng = np.random.default_rng(0)
+    for _ in range(50):
+        own = np.linalg.qr(rng.normal(size=(30, 4)))[0]
+        column = own @ rng.normal(size=(4, 1))
+        assert np.isinf(most(column.T @ column, own.T @ column, rng.normal(size=1)))
+    free = rng.normal(size=(30, 2))
+    rest = free - own @ (own.T @ free)
+    score = rng.normal(size=2)
+    assert most(free.T @ free, own.T @ free, score) == pytest.approx(score @ np.linalg.solve(rest.T @ rest, score))
 
 
 @pytest.mark.long

@@ -156,7 +156,7 @@ def of(said):
         COMMAND: (("cogging", FIRST, 0.6), ("spring", FIRST, 0.3), ("payload", "*", 0.1)),
         "sysid add x payload": (("payload", "*", 1.0),),
     }
-    return text.Told(said, units, dict.fromkeys(JOINTS, 0.11), sets)
+    return text.Told(said, units, dict.fromkeys(JOINTS, 0.11), sets, {command: {("spring", FIRST)} for command in sets})
 
 
 def printed(monkeypatch, capsys, columns):

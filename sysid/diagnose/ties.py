@@ -21,6 +21,7 @@ from .refits import Member, refitted
 
 _OUTSIDE, _HARDLY = 0.10, 0.01  # outside the set of 90 %: p-value; chance of all such together
 NEAR = 0.4  # of what the best takes, as all are asked at once: by less no refit makes it the best
+_SAME = 0.01  # of what the head takes: by less nobody sees the difference
 _CLOSE = 0.1  # of what the head takes: by less another may have lost to what still acted then
 
 
@@ -53,6 +54,13 @@ class Choice:
         """All members, and of the beaten those that took nearly as much as the head."""
         most = self.head.losses.sum() + _CLOSE * self.gain.sum()
         return [*(m for m, _ in self.members), *(m for m in self.beaten if m.losses.sum() <= most)]
+
+    @property
+    def as_little(self) -> list[Member]:
+        """The others that leave as little as the head, to a hundredth of what it takes: less likely
+        for the numbers that they need alone."""
+        most = self.head.losses.sum() + _SAME * self.gain.sum()
+        return [m for m, _ in self.members if m is not self.head and m.losses.sum() <= most]
 
     def worth_having(self, least: float) -> bool:
         """Whether it takes that share of some joint, and more of all than its standard error."""

@@ -12,6 +12,7 @@ from ..diagnose.diagnosis import Diagnosis
 from ..diagnose.findings import Finding
 from ..fit_document import number
 from ..vocabulary import describe
+from .rivals import or_options
 from .words import SURE, Members, named
 
 
@@ -74,7 +75,7 @@ def finding(f: Finding, claim: Claim, found: Diagnosis) -> dict:
             for name, _ in f.candidate.options
         },
         # other options under which it does as well, for all that these logs tell
-        "or_options": [dict(form.options) for form in f.forms],
+        "or_options": or_options(f.candidate, f.forms),
         # as an experiment file spells it
         "adds": dict(zip(("effect", "joints", "options"), spelled(f.candidate, f.joint))),
         "summary": describe(f.candidate.effect)["summary"],

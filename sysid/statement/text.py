@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from ..addition import LIKELY, designs, likely
+from .rivals import as_little, other_options, rivals
 from .words import (
     all_of,
     either,
@@ -14,7 +15,6 @@ from .words import (
     listed,
     near,
     option,
-    other_options,
     otherwise,
     percent,
     placed,
@@ -42,24 +42,23 @@ class Told:
 
     units: {joint: N m or N}. after: {joint: held-out RMS with all that is named}. sets: of each
     command that adds what is named, the set that this stands in: (effect, joint, probability).
+    little: the (effect, joint) in these sets that leave as little as their heads.
     """
 
     document: dict
     units: dict[str, str]
     after: dict[str, float]
     sets: dict[str, tuple[tuple[str, str, float], ...]]
+    little: dict[str, set[tuple[str, str]]]
 
 
 def told(found: Diagnosis, document: dict) -> Told:
     """A diagnosis and its document."""
     fit = found.fit
     last = found.claims[-1].after if found.claims else fit
-    units = {
-        joint: "N" if slides else "N m"
-        for joint, slides in zip(fit.joints, fit.model.robot.prismatic)
-    }
+    units = {j: "N" if s else "N m" for j, s in zip(fit.joints, fit.model.robot.prismatic)}
     sets = {claim.head.command: claim.set for claim in found.claims}
-    return Told(document, units, last.rms("test"), sets)
+    return Told(document, units, last.rms("test"), sets, as_little(found))
 
 
 def verdict(of: Told, width: int) -> list[tuple[str, list[str]]]:
@@ -165,14 +164,14 @@ def _head(f: dict, of: Told, joint: str, width: int, said: dict[str, str]) -> li
     out = wrapped(words, width, "    ") if takes or values else []
     for name, value in f["options"].items():
         out += wrapped(f"  {name} {option(value)}: {f['options_say'][name]}", width, "    ")
-    if others := [other_options(form, f["options"]) for form in f["or_options"]]:
+    if others := other_options(f["or_options"]):
         words = f"  with {listed(others, 'or')} it does as well, for all that these logs tell"
         out += wrapped(words, width, "    ")
     if not f["size_told"]:
         out += wrapped(f"  {untold(f['parameters'])}", width, "    ")
     others = [m for m in of.sets[f["command"]] if m[:2] != (f["effect"], f["joint"])]
     if told := likely(others):
-        rest = listed([f"{placed(e, j, f['joint'])} ({percent(p)})" for e, j, p in told], "or")
+        rest = listed(rivals(told, f, of.little[f["command"]]), "or")
         words = f"  {untold_from(f['probability'])} {rest}"
         out += wrapped(words, width, "    ")
         words = f"  to separate them: {f['separate_by']}; or, if a motion can, by"

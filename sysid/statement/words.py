@@ -83,11 +83,6 @@ def option(value) -> str:
     return ", ".join(map(str, value)) if isinstance(value, (list, tuple)) else str(value)
 
 
-def other_options(form: dict, own: dict) -> str:
-    """The options of another form of an effect that are not its own, as they are typed."""
-    return " and ".join(f"{k}={option(v)}" for k, v in form.items() if own.get(k) != v)
-
-
 def valued(name: str, p: dict) -> str:
     """A parameter {value, std, unit} with its deviation and its unit, where it has these; without
     a deviation the logs do not tell it from the rest of the model, or it is given."""

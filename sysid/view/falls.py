@@ -12,6 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from .. import eigen
 from ..candidate_columns import bounds_of, columns_of, grown
 from ..candidates import Candidate
 from ..effect import SensorEffect
@@ -67,8 +68,7 @@ def _least(view: View, full, own, inverse, basis, candidate: Candidate, shapes, 
     size, more = len(own) - 1, len(square)
     # the same squares as the rows: all that an objective looks at
     told = inverse @ cross
-    held, score = basis.T @ told, cross.T @ np.append(-view.settled.x, 1.0)
-    if score @ np.linalg.pinv(square - held.T @ held, hermitian=True) @ score < least:
+    if _most(square, basis.T @ told, cross.T @ np.append(-view.settled.x, 1.0)) < least:
         return np.inf
     both = np.block([[own, told], [np.zeros((more, size + 1)), root(square - told.T @ told).T]])
     triangle = both[:, [*range(size), *range(size + 1, size + 1 + more), size]]
@@ -82,6 +82,17 @@ def _least(view: View, full, own, inverse, basis, candidate: Candidate, shapes, 
         problem = replace(problem, carried=heard)
     x = problem.from_nearby(np.append(view.settled.x, np.zeros(more)), COMPARED)
     return problem.objective.value(problem.minimum(COMPARED) if x is None else x)
+
+
+def _most(square, held, score) -> float:
+    """How far the objective may fall at most: by what of its slopes (k,) in a candidate's columns the
+    model's own do not hold, of squares (k, k); infinity where they hold a column, as then the prior
+    alone says how far."""
+    scale = np.sqrt(np.maximum(np.diagonal(square), 1e-300))
+    values, vectors = eigen.symmetric((square - held.T @ held) / np.outer(scale, scale))
+    if np.any(values <= _NOTHING):
+        return np.inf
+    return float(np.sum((vectors.T @ (score / scale)) ** 2 / values))
 
 
 def _bounds(view: View, candidate: Candidate, more: int) -> tuple[np.ndarray, list[bool]]:
