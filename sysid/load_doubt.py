@@ -6,7 +6,7 @@ whatever answers to it: of a soft gear they tell the compliance times the square
 
     d theta = -H^-1 2 A' W^2 dE,      dE what another load changes of the predicted torque, A the slopes of everything fitted,
 
-along the few directions of the bodies' covariance by which loads change most: to first order, as everything said of a fit's
+along the few directions of the bodies' covariance by which each joint's load changes most: to first order, as everything said of a fit's
 deviations is.
 """
 
@@ -25,9 +25,9 @@ from .objective import add_blocks
 from .posed_problem import pose
 from .prior_weight import with_weight
 from .projection import inverted, root
-from .source import Source
+from .tangents import tangents
 
-_ROWS, _MOST, _WHOLE = 3000, 4, 0.99  # rows; directions, and how much of the loads' doubt they hold
+_ROWS, _WHOLE = 3000, 0.99  # rows; how much of what is not known of each load its directions hold
 _STEP = 0.1  # of a deviation: of slopes
 
 
@@ -60,11 +60,13 @@ def _answers(fit: Fit, motion: Motion, joints: set[int]) -> np.ndarray:
     weights = np.ones(model.robot.dof) if fit.weights is None else fit.weights
     stride = rows.stride_for(motion, _ROWS)
     found = rows.stack(model, motion, stride)
-    slopes = Source(model, x, motion, stride, found.use).full(found.columns) * weights[:, None, None]
-    torque = lambda pi: rows.predicted(model.referring_to(np.append(pi, x[len(pi) :])), motion, x, stride) * found.use  # noqa: E731
+    torque = lambda pi: rows.predicted(model.referring_to(np.append(pi, x[len(pi) :])), motion, x, stride)  # noqa: E731
     bodies = x[: 10 * model.bodies]
     base = torque(bodies)
-    moved = [(torque(bodies + _STEP * d) - base) * weights / _STEP for d in _directions(fit, found.columns, joints)]
+    free = [k for k, value in enumerate(model.shape_values) if not value.held]
+    bent = tangents(model, motion, x, stride, found.use)[:, :, free] if free else np.zeros((*found.columns.shape[:2], 0))
+    slopes = np.concatenate([found.columns, bent], axis=2) * weights[:, None, None]
+    moved = [(torque(bodies + _STEP * d) - base) * found.use * weights / _STEP for d in _directions(fit, found.columns, joints)]
     pull = [2.0 * stride * np.einsum("jnk,nj->k", slopes, own) for own in moved]
     free = np.append(np.isfinite(fit.uncertainty.std), np.ones(slopes.shape[2] - model.size, dtype=bool))
     hessian = 2.0 * stride * np.einsum("jnk,jnl->kl", slopes, slopes) + _prior(fit, motion, slopes.shape[2])
@@ -74,13 +76,20 @@ def _answers(fit: Fit, motion: Motion, joints: set[int]) -> np.ndarray:
 
 
 def _directions(fit: Fit, columns: np.ndarray, joints: set[int]) -> np.ndarray:
-    """Deviations (directions, 10 bodies) of the bodies' parameters by which the loads of some joints change most."""
-    robot, count = fit.model.robot, 10 * fit.model.bodies
+    """Deviations (directions, 10 bodies) of the bodies' parameters by which the loads of some joints change most: of one after the
+    other, each what those before it leave."""
+    robot, count, out = fit.model.robot, 10 * fit.model.bodies, []
     spread = root(np.nan_to_num(fit.uncertainty.covariance[:count, :count]))
-    loads = [columns[j][:, :count] * np.repeat(robot.carried(j) & ~robot.turned(j), 10) for j in sorted(joints)]
-    _, sizes, turn = np.linalg.svd(np.concatenate(loads) @ spread, full_matrices=False)
-    held = np.cumsum(sizes**2) / max(float(np.sum(sizes**2)), 1e-300)
-    return (spread @ turn[: min(_MOST, 1 + int(np.searchsorted(held, _WHOLE)))].T).T
+    left = np.eye(spread.shape[1])
+    for j in sorted(joints):
+        load = columns[j][:, :count] * np.repeat(robot.carried(j) & ~robot.turned(j), 10) @ spread
+        whole = float(np.sum(load**2))
+        _, sizes, turn = np.linalg.svd(load @ left, full_matrices=False)
+        known = whole - float(np.sum((load @ left) ** 2))
+        many = 0 if known >= _WHOLE * whole else 1 + int(np.searchsorted(known + np.cumsum(sizes**2), _WHOLE * whole))
+        out.append(turn[:many] @ spread.T)
+        left = left - turn[:many].T @ (turn[:many] @ left)
+    return np.concatenate(out)
 
 
 def _prior(fit: Fit, motion: Motion, size: int) -> np.ndarray:

@@ -177,6 +177,9 @@ def _pinocchio_model(source: urdf.Urdf) -> pin.Model:
         raise RobotError(f"Pinocchio cannot build it ({error})", where=str(source.path)) from None
 
 
+HELD = "{} moves with {} (<mimic> in the URDF), and the model holds it still: masses and torques are off by what its motion needs"
+
+
 def _chosen(spec: RobotSpec, source: urdf.Urdf, moving: list[str]):
 
     where = str(source.path)
@@ -199,10 +202,7 @@ def _chosen(spec: RobotSpec, source: urdf.Urdf, moving: list[str]):
         raise RobotError("no joint is left to move", where=where, allowed="at least one revolute, continuous or prismatic joint")
     for name, leader in mimics.items():
         if leader in chosen:  # the other finger of a hand that stands still matters to nobody
-            warn(
-                f"{name} moves with {leader} in the URDF (<mimic>), and is held still here: masses and torques are wrong as far as what it moves weighs; "
-                "where it has angles and torques of its own, name it in robot.joints", above=3,
-            )  # fmt: skip
+            warn(f"{HELD.format(name, leader)}; where it has angles and torques of its own, name it in robot.joints", above=3)
     return chosen
 
 

@@ -41,6 +41,8 @@ def in_header(name: str, quantity: str) -> str:
     found = _BRACKETS.search(name)
     if found is None:
         return ""
+    if re.match(r"\s*M[Nn]", found[1]):
+        return found[1].strip()  # mega is no milli
     said = re.sub(r"[\s.*·⋅]", "", found[1].lower())
     if quantity == "position":
         said = re.sub(r"(/s|/s\^?2|/s²)$", "", said)

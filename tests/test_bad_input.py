@@ -625,7 +625,7 @@ def test_mimic_joint_is_locked(experiment, cli):
         '<limit lower="-1" upper="1" effort="1" velocity="1"/><mimic joint="elbow" multiplier="2"/></joint></robot>'
     )
     document = fitted(cli("fit", experiment(urdf=replaced(("</robot>", finger))), "--json"))
-    assert any("grip moves with elbow" in notice and "held still" in notice for notice in document["notices"])
+    assert any("grip moves with elbow" in notice and "holds it still" in notice for notice in document["notices"])
     assert set(document["rms"]["test"]) == set(JOINTS)
 
 

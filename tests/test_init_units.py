@@ -13,6 +13,7 @@ from tests.conftest import JOINTS, URDF, csv, motion
 SLIDES = URDF.replace('name="shoulder" type="revolute"', 'name="shoulder" type="prismatic"').replace(
     'lower="-3" upper="3" effort="50"', 'lower="-0.9" upper="0.9" effort="50"', 1
 )
+BOTH_SLIDE = SLIDES.replace('name="elbow" type="revolute"', 'name="elbow" type="prismatic"').replace('lower="-3" upper="3"', 'lower="-0.9" upper="0.9"')
 ENDLESS = URDF.replace('type="revolute"', 'type="continuous"').replace('lower="-3" upper="3" ', "")
 
 
@@ -124,3 +125,65 @@ def test_columns_whose_units_stand_in_their_names(cli, tmp_path):
     (tmp_path / "mine" / "config.yaml").unlink()
     said = cli("init", tmp_path / "robot.urdf", tmp_path / "a.csv", out=tmp_path / "other")
     assert said.status == 0 and "elbow_strain" in said.out
+
+
+@pytest.mark.parametrize(
+    ("urdf", "names", "unit", "factors"),
+    [
+        (URDF, ("tau_shoulder [mNm]", "tau_elbow [mNm]"), "mN m", {}),
+        (SLIDES, ("shoulder_force [kN]", "elbow_torque [Nm]"), "kN", {}),
+        (URDF, ("tau_shoulder [kNm]", "tau_elbow [Nm]"), "N m", {"shoulder": {"tau_shoulder [kNm]": 1000.0}}),
+    ],
+)
+def test_units_of_torque_that_headers_state(cli, tmp_path, urdf, names, unit, factors):
+    """Of all joints of a kind, or of one joint alone."""
+    (tmp_path / "robot.urdf").write_text(urdf)
+    text = logged(tmp_path, urdf)
+    header, *rows = text.split("\n")
+    plain = header.split(",")
+    scale = [{"mNm": 1e3, "kN": 1e-3, "kNm": 1e-3}.get(name.split("[")[1].rstrip("]"), 1.0) for name in names]
+    columns = [plain.index(f"tau_{joint}") for joint in JOINTS]
+    for k, row in enumerate(rows):
+        cells = row.split(",")
+        for at, own in zip(columns, scale) if row else ():
+            cells[at] = repr(float(cells[at]) * own)
+        rows[k] = ",".join(cells)
+    for at, name in zip(columns, names):
+        plain[at] = name
+    (tmp_path / "a.csv").write_text("\n".join([",".join(plain), *rows]))
+    _, made = begun(cli, tmp_path)
+    assert made.data.units.torque == unit and made.data.torque == factors
+    assert not [f for f in check.check(made) if f.severity == "error"]
+
+
+@pytest.mark.parametrize("velocity", ['velocity="10"', ""])
+def test_a_shaft_that_turns_many_times_is_no_error(tmp_path, velocity):
+    """With a drive's greatest speed it is nothing to speak of; without one it is worth a word."""
+    made = folder_of(tmp_path, ENDLESS.replace('velocity="10"', velocity), turn=15.0)
+    (made / "config.yaml").write_text("robot: {urdf: robot.urdf}\ndata: {train: [a.csv], test: [a.csv]}\n")
+    found = {f.severity for f in check.check(pipeline.load(made)) if f.fault == "wrong_unit"}
+    assert found == (set() if velocity else {"warning"})
+
+
+@pytest.mark.parametrize(("factor", "unit"), [(1e3, "mN m"), (1e-3, "kN m")])
+def test_check_says_the_unit_of_torques_a_thousand_times_off(tmp_path, factor, unit):
+    """Of an arm whose torque is mostly friction, too; where another unit is stated it does not know better."""
+    made = folder_of(tmp_path, URDF, torque=factor)
+    told = f"data.units.torque: {unit}"
+    for stated in ("N m", "N cm"):
+        (made / "config.yaml").write_text(f"robot: {{urdf: robot.urdf}}\ndata: {{train: [a.csv], test: [a.csv], units: {{torque: {stated}}}}}\n")
+        errors = [f for f in check.check(pipeline.load(made)) if f.severity == "error" and f.fault in ("wrong_unit", "torque_in_amperes")]
+        assert errors
+        if stated == "N m":
+            assert all(told in f.do for f in errors)
+        else:
+            assert not any("data.units.torque: mN" in f.do or "data.units.torque: kN" in f.do for f in errors)
+
+
+def test_one_slide_of_two_in_millimetres(cli, tmp_path):
+    _, made = begun(cli, folder_of(tmp_path, BOTH_SLIDE, shown={"shoulder": 1e3}))
+    assert made.data.units.position == "m" and made.data.position == {"shoulder": {"q_shoulder": 1e-3}}
+
+
+def test_mega_is_no_milli():
+    assert units.in_header("F [MN]", "torque") not in units.TORQUE and units.in_header("F [mN]", "torque") == "mN"

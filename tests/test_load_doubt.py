@@ -74,3 +74,26 @@ def test_what_does_not_look_at_the_load_is_as_sure_as_before(simulated):
     path = simulated("load-doubt-plain", "spring:elbow:size=2") / "config.yaml"
     fit = pipeline.fit(pipeline.load(path))
     assert load_doubt.with_doubt(fit, None) is fit
+
+
+def test_friction_that_goes_with_two_loads_is_as_doubtful_as_each(simulated):
+    """Of a linear coefficient: with the load's covariance given, the answer is the regression of its change on the slopes."""
+    path = simulated("load-doubt-two", "load_friction:shoulder:mu=0.1", duration=6.0) / "config.yaml"
+    text = path.read_text().replace("effects: [", "effects: [load_friction, ")
+    with pytest.MonkeyPatch.context() as patch:
+        motions = []
+        patch.setattr(load_doubt, "with_doubt", lambda fit, motion: motions.append(motion) or fit)
+        fit = pipeline.fit(config.loads(text, path))
+    own = [k for k, c in enumerate(fit.model.coefficients) if c.effect == "load_friction"]
+    at = [10 * fit.model.bodies + k for k in own]
+    # a load that is a tenth larger wherever it comes from makes the coefficient a tenth smaller
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(load_doubt, "_directions", lambda *_: 0.1 * fit.x[None, : 10 * fit.model.bodies])
+        moved = load_doubt._answers(fit, motions[0], {0, 1})
+    told = [k for k in at if np.isfinite(fit.uncertainty.std[k])]  # one of them is held at zero
+    assert told
+    np.testing.assert_allclose(moved[told, 0], -0.1 * fit.x[told], rtol=0.02, atol=2e-4)
+    after = load_doubt.with_doubt(fit, motions[0])
+    assert np.all(after.uncertainty.std[told] >= fit.uncertainty.std[told]) and np.isfinite(after.uncertainty.std[told]).all()
+    rest = np.setdiff1d(np.arange(fit.model.size), told)
+    np.testing.assert_array_equal(after.uncertainty.std[rest], fit.uncertainty.std[rest])

@@ -85,10 +85,10 @@ def asked(
     counted = np.maximum(data.use.sum(axis=0), 1)
     by_size = lambda squares: 1.0 / np.maximum(np.sqrt(squares / counted), 1e-12)  # noqa: E731
     blocks = numbered(data.t, data.piece, shortest=np.inf, fewest=BLOCKS)
-    squares = after = (about(structure, x, motion, stride, data)[0] ** 2).sum(axis=0)
+    residual, tried = about(structure, x, motion, stride, data)
+    squares = after = (residual**2).sum(axis=0)
     changes, tilt = (), None
     for _ in range(_ROUNDS):  # what a tilt does bends with it
-        residual, tried = about(structure, x, motion, stride, data, tilt)
         question = asked_of(tried, residual, by_size(after), blocks)
         least = {} if rate is None else {"least": support(rate, among * len(tried))}
         chosen = question.supported(**least)
@@ -97,8 +97,10 @@ def asked(
             question = question.weighed(by_size(after))
             changes, after = together(structure, question, question.supported(**least) or chosen)
         before, tilt = tilt, _tilt(changes)
-        if tilt is None or (before is not None and np.abs(tilt - before).max() < _NEAR):
+        told = tilt is not None and before is not None
+        if np.abs(tilt - before).max() < _NEAR if told else tilt is before:
             break
+        residual, tried = about(structure, x, motion, stride, data, tilt)
     rms = [np.sqrt(own / counted) for own in (squares, after)]
     found = _floors(structure, x, motion) if floors else ()
     return Changed(robot.joints, *rms, found, changes, _notes(experiment, changes))

@@ -12,7 +12,7 @@ from .. import datasets
 from .. import robot as machines
 from ..robot_spec import RobotSpec
 from ..warned import noticed
-from . import joints, physics, robots, units, wrapped_angles
+from . import joints, physics, robots, torques, units, wrapped_angles
 from .files import logs_among, opened
 from .guess import Draft, Guess
 from .logged import Logged, Signals, read, signals
@@ -65,6 +65,9 @@ def draft(reference: str, names: list[str], folder: Path, wishes: Wishes) -> Dra
     out = out.having(*machine.guesses, *chosen, *_parts(data, clock, folder, wishes))
     out = out.having(*clock, *_columns(found, used), angles, *_drive(found, used))
     out = out.having(*_lengths(data, found, used, robot))
+    if found.torque.meaning.signal == "torque":
+        columns = {joint: c for joint, c in found.torque.columns.items() if joint in used}
+        out = out.having(*torques.named(columns, _sliding(robot)))
     # a joint in degrees may turn by so much between samples; one that stays within a turn is in rad
     rad = (
         wrapped
@@ -94,7 +97,7 @@ def _angles(data: list[Logged], found: Signals, robot) -> Guess:
 def _lengths(data: list[Logged], found: Signals, used: list[str], robot) -> list[Guess]:
     """Where joints that slide beside others that turn are in mm."""
     slides, limits = _sliding(robot), dict(zip(robot.joints, robot.limits))
-    if found.position.meaning.unit or all(slides[joint] for joint in found.joints):
+    if found.position.meaning.unit:
         return []
     own = units.millimetres(_positions(data, used), slides, limits)
     own += [j for j in used if found.position.units.get(j) == "mm" and j not in own]

@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import ConfigError, LogError
-from ..robot import Robot, followers
+from ..robot import HELD, Robot, followers
 from .guess import Guess
 from .logged import Logged, Signals
 from .robots import grips
@@ -78,12 +78,8 @@ def chosen(
     if robot.locked:
         whys.append(f"{', '.join(robot.locked)}, by <mimic>: locked at 0")
     moved = {name: leader for name, leader in followers(robot.source).items() if leader in order}
-    passed += [
-        f"{name} moves with {leader}, and the model holds it still: masses and torques are wrong "
-        "as far as what it moves weighs"
-        for name, leader in moved.items()
-        if name in robot.locked
-    ]
+    moving = {name: leader for name, leader in moved.items() if name in robot.locked}
+    passed += [HELD.format(name, leader) for name, leader in moving.items()]
     doubt = "; ".join(passed)
     return order, [*out, Guess("robot.lock", lock, "; ".join(whys), doubt)] if whys else out
 

@@ -135,13 +135,14 @@ def held_against(
         wrapped: what is told of angles that jump by a turn; a check that says it too says where.
         rad: that these jumps say that all are in rad.
     """
-    path, amperes = folder / "config.yaml", out.guesses.get("data.units.torque")
+    path, named = folder / "config.yaml", out.guesses.get("data.units.torque")
+    amperes = named if named and named.value == "A" else None
     servos = found.torque.meaning.signal == "command"
     if amperes:  # in N m, until the factors are found
         out = replace(out, guesses={k: g for k, g in out.guesses.items() if g is not amperes})
     with noticed():
         look = looked(config.experiment(out.tree, path))
-        if not (amperes or servos or found.torque.meaning.unit) and (unit := torque_unit(look)):
+        if not (named or servos or found.torque.meaning.unit) and (unit := torque_unit(look)):
             out = out.having(*unit)
             look = looked(config.experiment(out.tree, path))
         angles = out.guesses["data.units.position"]

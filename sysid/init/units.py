@@ -81,9 +81,8 @@ def position_unit(
     key = "data.units.position"
     turning = {joint: values for joint, values in q.items() if not slides[joint]}
     if not turning:
-        short = not named and millimetres(q, slides, limits)
-        why = "" if named else f", and {_AS_MM}" if short else " and no name says another"
-        return Guess(key, named or ("mm" if short else "m"), "the joints slide" + why)
+        why = "the joints slide" + ("" if named else " and no name says another")
+        return Guess(key, named or "m", why)
     if named == "counts" or all(_counts(values) for values in turning.values()):
         joint, values = next(iter(turning.items()))
         shown = f"{values.min():.0f} to {values.max():.0f}"

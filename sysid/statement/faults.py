@@ -51,5 +51,6 @@ def _sum(kinds: list[tuple[str, str]], ok: bool) -> str:
     if ok:
         return f"{said}, no error: these logs can be fitted"
     more = f" and {said}" if warnings else ""
-    then = "mends it" if wrong == {"angle_wrap"} else "of these logs would be wrong"
+    mended = "takes the angles to go on, and can be made"
+    then = mended if wrong == {"angle_wrap"} else "of these logs would be wrong"
     return f"{errors} kind{'s' * (errors > 1)} of error{more}: a fit {then}"

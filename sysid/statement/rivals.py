@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 def as_little(found: Diagnosis) -> dict[str, set[tuple[str, str]]]:
-    """Of the command of each claim the (effect, joint) of its set that leave as little as its head."""
+    """Of each claim's command the (effect, joint) of its set that leave as little as its head."""
     return {
         claim.head.command: {
             (m.candidate.named(found.fit.joints)) for m in claim.step.choice.as_little

@@ -52,12 +52,14 @@ def _of_log(look: Look, log: Logged, j: int, joint: str, slides: bool) -> Iterat
     low, high = look.robot.limits[j]
     allowed = look.robot.source.joints[joint].velocity
     fast = own.fast.count and np.quantile(log.speeds(j), 0.999) > FASTER * allowed
-    # a joint without limits may make many turns, and no faster than its drive
-    endless = not np.isfinite(high - low) and np.isfinite(allowed) and not fast
-    if own.far.count and look.experiment.data.units.position == "rad" and not endless:
+    # a joint without limits may make many turns, and no faster than its drive; of a drive without
+    # one nobody knows
+    endless = not np.isfinite(high - low) and not fast
+    told = not (endless and np.isfinite(allowed))
+    if own.far.count and look.experiment.data.units.position == "rad" and told:
         yield Fault(
             "wrong_unit",
-            ERROR,
+            WARNING if endless else ERROR,
             (f"{joint} reaches {own.far.most:.4g} rad in {name}, {own.far.most / TURN:.2g} turns"),
             _degrees(look, log, joint),
             joint,
@@ -121,10 +123,12 @@ def _of_log(look: Look, log: Logged, j: int, joint: str, slides: bool) -> Iterat
 
 def _millimetres(look: Look, joint: str) -> str:
     """What to write where a joint's position is in mm."""
-    column, unit = look.column("position", joint), look.experiment.data.units.position
-    if column is None or unit == "rad":
+    data, column = look.experiment.data, look.column("position", joint)
+    if column is None or joint in data.position or data.columns.velocity is not None:
+        return "give it in m"
+    if data.units.position == "rad" and np.sum(look.robot.prismatic) == 1:
         return "set data.units.position: mm"
-    return f"write data.position: {{{joint}: {{{column}: 0.001}}}}, as it alone names its unit"
+    return f"write data.position: {{{joint}: {{{column}: 0.001}}}}"
 
 
 def _degrees(look: Look, log: Logged, joint: str) -> str:

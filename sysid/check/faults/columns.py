@@ -18,6 +18,8 @@ AFTER, SENSELESS = 2, ("wrong_unit", "angle_wrap")
 _BETTER = 1.0
 _ROUNDS = 4
 _EXPLAINS = 0.2  # of a joint's torque squared: less of the URDF's torque tells no factor
+# and of so much that a factor, were it free, explains much more
+_TAKES, _CLEAR = 0.01, 3.0  # the same; logarithm of the squares that are left
 _THOUSAND = (500.0, 2000.0)
 _KEYS = {"angle": "position", "torque": "torque"}
 _OUT_OF = "or take it as it is, where the URDF is what is wrong"
@@ -121,7 +123,8 @@ def _factors(look: Look, equations: Equations, reading: Reading, scored: Scored)
     """How much larger or smaller the torque is than the URDF's masses ask for."""
     free = equations.scored(reading, free=True)
     logged = np.any([log.tally.swing > 0.0 for log in look.logs], axis=0)  # else none was
-    tells = logged & free.known & (free.taken > _EXPLAINS) & (free.factor > 0.0)
+    clear = (free.taken > _TAKES) & (np.log(scored.left / free.left) > _CLEAR)
+    tells = logged & free.known & ((free.taken > _EXPLAINS) | clear) & (free.factor > 0.0)
     off = (
         tells
         & ((free.factor < LIKELY[0]) | (free.factor > LIKELY[1]))
@@ -163,7 +166,10 @@ def _factors(look: Look, equations: Equations, reading: Reading, scored: Scored)
 
 def _thousandth(look: Look, joint: str, factor: float, every: bool) -> str:
     """What to write where torque is a thousand times off: as that of all joints is, or of one."""
-    slides = look.robot.prismatic[look.robot.joints.index(joint)]
+    data, slides = look.experiment.data, look.robot.prismatic[look.robot.joints.index(joint)]
+    own = joint in data.torque or joint in look.experiment.actuator
+    if data.units.torque not in ("N m", "N") or own:
+        return f"is it in mN m, or kN m? give it in N{' m' * (not slides)}"
     unit = ("m" if factor > 1.0 else "k") + ("N" if slides else "N m")
     column = look.column("torque", joint)
     if every and not look.robot.prismatic.any():
