@@ -28,6 +28,16 @@ def going_on(samples: Recording, joints: tuple[str, ...], prismatic) -> Recordin
     return replace(samples, signals=samples.signals | {"q": q}) if found else samples
 
 
+def followed(q: np.ndarray, command: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """An angle and its command (n,) [rad] of one recording that go on where the angle jumped by a turn, the command within half a turn of it; both
+    as they are where none does."""
+    own, found = unwrapped(q[:, None], [True], [(0, len(q))])
+    if not found:
+        return q, command
+    ahead = command - q
+    return own[:, 0], own[:, 0] + ahead - TURN * np.round(ahead / TURN)
+
+
 def unwrapped(q: np.ndarray, turns, parts: Sequence[tuple[int, int]]) -> tuple[np.ndarray, list[int]]:
     """Angles (n, dof) [rad] that go on where they jumped by a turn, and the joints that did; the angles themselves where none does.
 

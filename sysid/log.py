@@ -16,7 +16,8 @@ from .clock import Clock, corrected
 from .drive_spec import ActuatorSpec
 from .errors import LogError
 from .events import Event
-from .full_turns import going_on
+from .finite import check_finite
+from .full_turns import followed, going_on
 from .groups import levels_of
 from .log_spec import DataSpec, LogSpec
 from .recording import Recording, recorded
@@ -33,7 +34,6 @@ _TOLD, _EVEN = 1e-3, 1e-2
 # Of what stamps are rounded to: as much beside a line is a steady clock's own rounding. Twice that is most likely a steady one's
 # too, which ran late now and then, unless the angles tell otherwise.
 _ROUNDED = 0.505
-_LARGEST = 1e20  # no unit makes a measured signal larger (a clock in ns, logged as a signal, reads 2e18)
 NO_ACTUATORS: dict[str, ActuatorSpec] = {}
 DEGREES = 4.0 * np.pi  # rad: no robot joint turns so far from zero, but its angle in degrees does
 
@@ -78,8 +78,8 @@ def read(log: LogSpec, data: DataSpec, joints: tuple[str, ...], prismatic, folde
 
 
 def assembled(samples: Recording, log: LogSpec, data: DataSpec, joints: tuple[str, ...], prismatic) -> Log:
-    """The log of what was `measured` of an entry of an experiment: angles that jump by a turn go on, it is resampled where its clock is
-    irregular, split at gaps and where a recording ends."""
+    """The log of what was `measured` of an entry of an experiment: angles go on, an irregular clock is
+    resampled, gaps and ends of recordings split it."""
     samples = going_on(samples, joints, prismatic)
     hashes = {name: sha256(path) for name, path in samples.files.items()}
     each = list(hashes.values())
@@ -115,11 +115,13 @@ def measured(
 
 def _driven(samples: Recording, j: int, joint: str, own: motor_side.Drive) -> None:
     """Put what a drive's command makes in the place of its joint's torque."""
-    signals = samples.signals
-    command, rate = signals[f"signals.{motor_side.command_name(joint)}"], np.zeros(len(samples.t))
+    signals, rate = samples.signals, np.zeros(len(samples.t))
+    command = signals[f"signals.{motor_side.command_name(joint)}"]
     for first, last in samples.parts:
         part = slice(first, last)
-        signals["tau"][part, j], rate[part] = motor_side.driven(own, samples.t[part], command[part], signals["q"][part, j])
+        q = signals["q"][part, j]
+        q, command[part] = followed(q, command[part]) if own.servo else (q, command[part])
+        signals["tau"][part, j], rate[part] = motor_side.driven(own, samples.t[part], command[part], q)
     if own.free_delay:
         signals[f"signals.{motor_side.rate_name(joint)}"] = rate
 
@@ -141,28 +143,6 @@ def _piece(samples: Recording, log: LogSpec) -> tuple[int, Recording]:
             allowed=f"start < stop within 0 to {since[-1]:.6g} s, counted from the log's first sample", do="correct start and stop",
         )  # fmt: skip
     return int(first), samples.rows(int(first), int(last))
-
-
-def check_finite(values, name: str, where: str, *, joints=(), t=None, first: int = 0) -> None:
-    """Whether values (n,), or (n, dof) of joints, from row `first` of a log on, can be a measurement.
-
-    Args:
-        t: (n,) [s], where it is known by now.
-
-    Raises:
-        LogError: one is no number, or larger than any unit makes it.
-    """
-    # only a bad log pays for the search; a NaN fails both comparisons
-    if values.max() <= _LARGEST and values.min() >= -_LARGEST:
-        return
-    row, *column = (int(k) for k in np.argwhere(~(np.abs(values) <= _LARGEST))[0])
-    joint = f" of joint {joints[column[0]]!r}" if column else ""
-    bad = int(np.sum(~(np.abs(values.reshape(len(values), -1)) <= _LARGEST).all(axis=1)))
-    left = "the row" if bad == 1 else f"the row, and {bad - 1} more like it,"
-    raise LogError(
-        f"{name.removeprefix('signals.')}{joint} is {values[row, *column]:g}", where=f"{where} row {first + row} counted from 0" + ("" if t is None else f", t = {t[row]:.6g} s"),
-        allowed=f"finite numbers, at most {_LARGEST:g} in size", do=f"leave {left} out; a gap is split there",
-    )  # fmt: skip
 
 
 def _convert(signals, data: DataSpec, joints, prismatic, where: str, drives) -> None:
@@ -236,8 +216,9 @@ def _segments(t, signals, where: str, breaks: Iterable[int] = ()):
             clock, part = clock[rows], {name: values[rows] for name, values in part.items()}
         resampled += 1
         yield replace(segment(clock, own, part), clock=left)
-    if resampled and np.delete(steps, cuts - 1).min() < 0.999 * np.delete(steps, cuts - 1).max():
-        warn(f"{where}: steps of {np.delete(steps, cuts - 1).min():.4g} to {np.delete(steps, cuts - 1).max():.4g} s were resampled to a uniform {own:.4g} s", above=2)
+    inside = np.delete(steps, cuts - 1)
+    if resampled and inside.min() < 0.999 * inside.max():
+        warn(f"{where}: steps of {inside.min():.4g} to {inside.max():.4g} s were resampled to a uniform {own:.4g} s", above=2)
     if off > 0.0:
         said = f"{where}: the time stamps are off by {1e3 * off:.2g} ms (RMS), as the joints' angles show, and were corrected"
         ends = f"; at the ends, where these do not show it, up to {lost:.2g} s is left out" if lost > 0.0 else ""

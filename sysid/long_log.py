@@ -93,6 +93,10 @@ class _Rows:
     def __call__(self, first: int, last: int) -> Segment:
         return self.source.rows(self.stretch, first, last)
 
+    def measured(self, first: int, last: int) -> Segment:
+        """The same with angles that jump by a turn."""
+        return self.source.rows(self.stretch, first, last, wrapped=True)
+
 
 class _Source:
     """One Parquet file and how it is read."""
@@ -122,15 +126,16 @@ class _Source:
             unused=tuple(self._data.unused), levels=groups,
         )  # fmt: skip
 
-    def rows(self, stretch: Stretch, first: int, last: int) -> Segment:
-        """Rows of a stretch."""
+    def rows(self, stretch: Stretch, first: int, last: int, wrapped: bool = False) -> Segment:
+        """Rows of a stretch, whose angles go on where they jump by a turn, or are `wrapped`."""
         row = stretch.row + first
         part = self._table.between(row, stretch.row + last)
         spec = self._spec.model_copy(update={"start": None, "stop": None})
         with noticed() as told:
             how = (spec, self._data, self._joints, self._prismatic, self._folder)
             samples = logs.measured(*how, table=part, first=row)
-            samples = going_on(samples, self._joints, self._prismatic)
+            if not wrapped:
+                samples = going_on(samples, self._joints, self._prismatic)
         for said in told:
             key = found[0] if (found := _DEGREES.findall(said)) else said
             if key not in self._told:

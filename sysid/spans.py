@@ -90,6 +90,11 @@ class Spans(Sequence):
             return (self.around(number, margin),), 0
         return self, number
 
+    def measured(self, number: int) -> Segment:
+        """A span as it was measured, where what reads it makes more of it."""
+        rows, first, last, _ = self._spans[number]
+        return getattr(rows, "measured", rows)(first, last)
+
     def around(self, number: int, margin: int) -> Segment:
         """A span with up to `margin` rows of what stands before and after it, outside its core."""
         rows, first, last, n = self._spans[number]

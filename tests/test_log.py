@@ -9,7 +9,7 @@ import pytest
 
 from sysid import experiment_logs, log, log_spec, pipeline, regressor
 from sysid.errors import LogError, SysidWarning
-from sysid.full_turns import unwrapped
+from sysid.full_turns import followed, unwrapped
 from sysid.readers import open_table
 from tests.conftest import JOINTS, csv, matrices, motion, write_mat5, write_mat73, write_table
 
@@ -263,6 +263,18 @@ def test_what_slides_and_what_was_recorded_anew_jumps_by_no_turn():
     np.testing.assert_allclose(found[:, 1], [0.0] * 6 + [2 * np.pi] * 3, atol=1e-12)
     assert joints == [1]
     assert unwrapped(q, np.array([False, False]), [(0, 9)])[0] is q
+
+
+def test_a_servos_command_goes_on_with_its_angle():
+    """Late by some samples, so that the two jump in different rows: what the servo is behind by is what it was."""
+    angle = np.linspace(0.0, 20.0, 2000)
+    command = angle + 0.3
+    wrap = lambda x: (x + np.pi) % (2 * np.pi) - np.pi
+    q, asked = followed(wrap(angle), wrap(command))
+    np.testing.assert_allclose(asked - q, 0.3, atol=1e-9)
+    assert np.abs(np.diff(q)).max() < 0.02 and np.abs(np.diff(asked)).max() < 0.02
+    plain = followed(angle, command)
+    assert plain[0] is angle and plain[1] is command
 
 
 def test_several_logs(experiment, arm_logs):

@@ -118,6 +118,6 @@ def _in_parts(whole: Samples) -> Iterator[Samples]:
 
 
 def _of_spans(segments: Spans) -> Iterator[Samples]:
-    for span in segments:
+    for span in map(segments.measured, range(len(segments))):
         released()
         yield Samples(span.t, span.q, span.tau)

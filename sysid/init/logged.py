@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import LogError
-from ..log import check_finite
+from ..finite import check_finite
 from ..readers.table import Table
 from .columns import Found, found
 from .words import is_time, words

@@ -1,0 +1,29 @@
+"""What can be a measurement: numbers that are finite, and no larger than any unit makes them."""
+
+import numpy as np
+
+from .errors import LogError
+
+_LARGEST = 1e20  # no unit makes a measured signal larger (a clock in ns, logged as a signal, reads 2e18)
+
+
+def check_finite(values, name: str, where: str, *, joints=(), t=None, first: int = 0) -> None:
+    """Whether values (n,), or (n, dof) of joints, from row `first` of a log on, can be a measurement.
+
+    Args:
+        t: (n,) [s], where it is known by now.
+
+    Raises:
+        LogError: one is no number, or larger than any unit makes it.
+    """
+    if values.max() <= _LARGEST and values.min() >= -_LARGEST:
+        return  # only a bad log pays for the search; a NaN fails both comparisons
+    row, *column = (int(k) for k in np.argwhere(~(np.abs(values) <= _LARGEST))[0])
+    joint = f" of joint {joints[column[0]]!r}" if column else ""
+    bad = int(np.sum(~(np.abs(values.reshape(len(values), -1)) <= _LARGEST).all(axis=1)))
+    left = "the row" if bad == 1 else f"the row, and {bad - 1} more like it,"
+    at = "" if t is None else f", t = {t[row]:.6g} s"
+    raise LogError(
+        f"{name.removeprefix('signals.')}{joint} is {values[row, *column]:g}", where=f"{where} row {first + row} counted from 0{at}",
+        allowed=f"finite numbers, at most {_LARGEST:g} in size", do=f"leave {left} out; a gap is split there",
+    )  # fmt: skip
