@@ -167,4 +167,8 @@ def test_most_falls_with_what_is_missing(simulated):
     experiment = pipeline.load(simulated("falls-coupled", "joint_coupling:elbow:size=1", seed=4, duration=8.0, motion="moves"))
     asked = ask(first_view(experiment, pipeline.fit(experiment)))
     assert asked.groups[int(np.argmax(asked.falls))].candidate.key == ("joint_coupling", 1)
-    assert np.isfinite(asked.falls).sum() == len({group.candidate.kind for group in asked.groups})
+    told = [group.candidate.kind for group, fall in zip(asked.groups, asked.falls) if np.isfinite(fall)]
+    assert len(told) == len(set(told)) > 10  # each at its best values; of the others none takes what anybody on trial must
+    few = [g for g, fall in zip(asked.groups, asked.falls) if not np.isfinite(fall) and g.candidate.kind not in told]
+    left = np.sum(asked.view.design.residual**2, axis=0).min()
+    assert few and falls(asked.view, few[:5]).max() < 0.1 * left
