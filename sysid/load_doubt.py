@@ -20,6 +20,7 @@ from . import rows
 from .effect import NotFinite
 from .estimate import Fit
 from .model import Model, moving_coefficients
+from .model_parameters import ROBOT
 from .motion import Motion
 from .objective import add_blocks
 from .posed_problem import pose
@@ -81,7 +82,7 @@ def _directions(fit: Fit, columns: np.ndarray, joints: set[int]) -> np.ndarray:
     robot, count, out = fit.model.robot, 10 * fit.model.bodies, []
     spread = root(np.nan_to_num(fit.uncertainty.covariance[:count, :count]))
     left = np.eye(spread.shape[1])
-    for j in sorted(joints):
+    for j in range(robot.dof) if ROBOT in joints else sorted(joints):
         load = columns[j][:, :count] * np.repeat(robot.carried(j) & ~robot.turned(j), 10) @ spread
         whole = float(np.sum(load**2))
         _, sizes, turn = np.linalg.svd(load @ left, full_matrices=False)
