@@ -61,13 +61,12 @@ def _answers(fit: Fit, motion: Motion, joints: set[int]) -> np.ndarray:
     weights = np.ones(model.robot.dof) if fit.weights is None else fit.weights
     stride = rows.stride_for(motion, _ROWS)
     found = rows.stack(model, motion, stride)
-    torque = lambda pi: rows.predicted(model.referring_to(np.append(pi, x[len(pi) :])), motion, x, stride)  # noqa: E731
-    bodies = x[: 10 * model.bodies]
-    base = torque(bodies)
+    torque = lambda d: rows.predicted(model.referring_to(x + np.pad(d, (0, len(x) - len(d)))), motion, x, stride)  # noqa: E731
+    base = torque(np.zeros(len(x)))
     free = [k for k, value in enumerate(model.shape_values) if not value.held]
     bent = tangents(model, motion, x, stride, found.use)[:, :, free] if free else np.zeros((*found.columns.shape[:2], 0))
     slopes = np.concatenate([found.columns, bent], axis=2) * weights[:, None, None]
-    moved = [(torque(bodies + _STEP * d) - base) * found.use * weights / _STEP for d in _directions(fit, found.columns, joints)]
+    moved = [(torque(_STEP * d) - base) * found.use * weights / _STEP for d in _directions(fit, found.columns, joints)]
     pull = [2.0 * stride * np.einsum("jnk,nj->k", slopes, own) for own in moved]
     free = np.append(np.isfinite(fit.uncertainty.std), np.ones(slopes.shape[2] - model.size, dtype=bool))
     hessian = 2.0 * stride * np.einsum("jnk,jnl->kl", slopes, slopes) + _prior(fit, motion, slopes.shape[2])
@@ -77,13 +76,13 @@ def _answers(fit: Fit, motion: Motion, joints: set[int]) -> np.ndarray:
 
 
 def _directions(fit: Fit, columns: np.ndarray, joints: set[int]) -> np.ndarray:
-    """Deviations (directions, 10 bodies) of the bodies' parameters by which the loads of some joints change most: of one after the
-    other, each what those before it leave."""
+    """Deviations (directions, size) of the parameters by which the loads of some joints change most: of one after the other, each what
+    those before it leave. What is not known of a link's inertia is not known of its rotor's, the other way."""
     robot, count, out = fit.model.robot, 10 * fit.model.bodies, []
-    spread = root(np.nan_to_num(fit.uncertainty.covariance[:count, :count]))
+    spread = root(np.nan_to_num(fit.uncertainty.covariance))
     left = np.eye(spread.shape[1])
     for j in range(robot.dof) if ROBOT in joints else sorted(joints):
-        load = columns[j][:, :count] * np.repeat(robot.carried(j) & ~robot.turned(j), 10) @ spread
+        load = columns[j][:, :count] * np.repeat(robot.carried(j) & ~robot.turned(j), 10) @ spread[:count]
         whole = float(np.sum(load**2))
         _, sizes, turn = np.linalg.svd(load @ left, full_matrices=False)
         known = whole - float(np.sum((load @ left) ** 2))
