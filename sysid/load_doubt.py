@@ -19,13 +19,12 @@ import numpy as np
 from . import rows
 from .effect import NotFinite
 from .estimate import Fit
-from .model import Model, moving_coefficients
+from .linearised import Linearised
 from .model_parameters import ROBOT
 from .motion import Motion
-from .objective import add_blocks
-from .posed_problem import pose
 from .prior_weight import with_weight
-from .projection import inverted, root
+from .projection import inverted, prior_hessian, root
+from .settled import placed
 from .tangents import tangents
 
 _ROWS, _WHOLE = 3000, 0.99  # rows; how much of what is not known of each load its directions hold
@@ -48,7 +47,7 @@ def with_doubt(fit: Fit, motion: Motion) -> Fit:
     except NotFinite:  # of a formula, beside where it stands
         return fit
     at = [10 * model.bodies + k for k in linear]
-    free = [k for k, value in enumerate(model.shape_values) if not value.held]
+    free = Linearised(model, fit.x).free
     covariance = _with(fit.uncertainty.covariance, at, moved[at])
     shaped = _with(fit.shape_covariance, bent, moved[[model.size + free.index(k) for k in bent]])
     sure = replace(fit.uncertainty, covariance=covariance, std=_std(covariance, fit.uncertainty.std))
@@ -60,16 +59,15 @@ def _answers(fit: Fit, motion: Motion, joints: set[int]) -> np.ndarray:
     model, x = fit.model, fit.x
     weights = np.ones(model.robot.dof) if fit.weights is None else fit.weights
     stride = rows.stride_for(motion, _ROWS)
-    found = rows.stack(model, motion, stride)
+    known = placed(with_weight(fit.experiment, fit.strength.value), model, motion, fit.prior, x, weights=fit.weights, stride=stride)
     torque = lambda d: rows.predicted(model.referring_to(x + np.pad(d, (0, len(x) - len(d)))), motion, x, stride)  # noqa: E731
-    base = torque(np.zeros(len(x)))
-    free = [k for k, value in enumerate(model.shape_values) if not value.held]
-    bent = tangents(model, motion, x, stride, found.use)[:, :, free] if free else np.zeros((*found.columns.shape[:2], 0))
-    slopes = np.concatenate([found.columns, bent], axis=2) * weights[:, None, None]
-    moved = [(torque(_STEP * d) - base) * found.use * weights / _STEP for d in _directions(fit, found.columns, joints)]
-    pull = [2.0 * stride * np.einsum("jnk,nj->k", slopes, own) for own in moved]
-    free = np.append(np.isfinite(fit.uncertainty.std), np.ones(slopes.shape[2] - model.size, dtype=bool))
-    hessian = 2.0 * stride * np.einsum("jnk,jnl->kl", slopes, slopes) + _prior(fit, motion, slopes.shape[2])
+    base, columns, use = torque(np.zeros(len(x))), known.rows.columns, known.rows.use
+    bent = tangents(model, motion, x, stride, use)[:, :, Linearised(model, x).free]
+    slopes, more = np.concatenate([columns, bent], axis=2) * weights[:, None, None], bent.shape[2]
+    moved = [(torque(_STEP * d) - base) * use * weights / _STEP for d in _directions(fit, columns, joints)]
+    pull = [2.0 * np.einsum("jnk,nj->k", slopes, own) for own in moved]
+    free = np.append(np.isfinite(fit.uncertainty.std), np.ones(more, dtype=bool))
+    hessian = 2.0 * np.einsum("jnk,jnl->kl", slopes, slopes) + np.pad(prior_hessian(known), (0, more))
     out = np.zeros((len(free), len(pull)))
     out[free] = -inverted(hessian[np.ix_(free, free)]) @ np.array(pull).T[free]
     return out
@@ -90,15 +88,6 @@ def _directions(fit: Fit, columns: np.ndarray, joints: set[int]) -> np.ndarray:
         out.append(turn[:many] @ spread.T)
         left = left - turn[:many].T @ (turn[:many] @ left)
     return np.concatenate(out)
-
-
-def _prior(fit: Fit, motion: Motion, size: int) -> np.ndarray:
-    """The Hessian (size, size) of the prior where a fit stands."""
-    model: Model = fit.model
-    experiment = with_weight(fit.experiment, fit.strength.value)
-    data = fit.compressed if fit.compressed.size == model.size else fit.compressed.first(model.size)
-    problem = pose(experiment, model, data, moving_coefficients(model, motion), fit.prior, fit.weights)
-    return add_blocks(np.zeros((size, size)), problem.objective.beside_data(fit.x)) if problem.objective.says else np.zeros((size, size))
 
 
 def _with(covariance: np.ndarray, at: list[int], moved: np.ndarray) -> np.ndarray:

@@ -13,6 +13,6 @@ Source: Rahimi & Recht 2007 (random features); Hoerl & Kennard 1970 (ridge).
 
 from .functions import DIRECTION
 from .products import products
-from .unknown import HUM, TONE, Law, Unknown, unknown
+from .unknown import HUM, TOLD, TONE, Law, Unknown, unknown
 
-__all__ = ["DIRECTION", "HUM", "TONE", "Law", "Unknown", "products", "unknown"]
+__all__ = ["DIRECTION", "HUM", "TOLD", "TONE", "Law", "Unknown", "products", "unknown"]

@@ -13,7 +13,7 @@ from .ridge import predicted, stretches
 
 TONE = 1e-4  # probability of a line that strong by chance
 HUM = "a steady tone"
-_TOLD = 0.02  # of a squared residual: less is not told of one variable
+TOLD = 0.02  # of a squared residual: less is not told of one variable
 _ALONE = 0.5  # of what functions of a variable and of the direction predict: else both are told
 # Of a squared residual: two that differ by less correlate by 0.99; and by how much their difference
 # may follow what was predicted, so that its share changes by a hundredth
@@ -135,7 +135,7 @@ def unknown(
     )
     total = max(float(np.sum(residual**2)), 1e-300)
     shares = {name: float(one[1].sum() / total) for name, one in tried.items() if name != "*"}
-    for name in [n for n, own in shares.items() if own > _TOLD and n != f"qd_{joint}"]:
+    for name in [n for n, own in shares.items() if own > TOLD and n != f"qd_{joint}"]:
         alone = told_by[name][:, : told_by[name].shape[1] // 2]  # the rest is times the direction
         if predicted(alone, residual, use, spans)[1].sum() < _ALONE * shares[name] * total:
             shares[f"{name} and {DIRECTION}"] = shares.pop(name)

@@ -16,7 +16,7 @@ from .. import check, config
 from ..check.equations import LIKELY, Equations, Reading
 from ..check.look import Look, looked
 from ..errors import LogError
-from ..units import DEGREE
+from ..units import DEGREE, of_joint
 from ..warned import noticed
 from .guess import Draft, Guess
 from .logged import Signals
@@ -90,7 +90,7 @@ def torque_unit(look: Look) -> list[Guess]:
         if None in columns.values():
             return []
         return [Guess("data.torque", {j: {c: scale} for j, c in columns.items()}, why, doubt)]
-    unit = ("m" if large.all() else "k") + ("N" if slides.all() else "N m")
+    unit = ("m" if large.all() else "k") + of_joint("N m", prismatic=bool(slides.all()))
     return [Guess("data.units.torque", unit, why, doubt)]
 
 

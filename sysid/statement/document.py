@@ -11,7 +11,7 @@ from ..diagnose.diagnosis import Diagnosis
 from ..diagnose.verdict import Verdict
 from ..filters import settled, torque_band
 from ..fit_document import number, versions
-from ..flexible import HUM, Unknown
+from ..flexible import HUM, TOLD, Unknown
 from ..model_parameters import ROBOT
 from ..plausible import outdated
 from ..units import of_joint
@@ -179,7 +179,7 @@ def _verdict(v: Verdict, path="config.yaml", joints=()) -> dict:
 def dependences(found: Unknown) -> list[dict]:
     """What a residual follows: variables with the share of its square that functions of each alone
     predict, largest first; where none does, all of them together."""
-    alone = sorted((share, name) for name, share in found.shares.items() if share > 0.02)[::-1]
+    alone = sorted((share, name) for name, share in found.shares.items() if share > TOLD)[::-1]
     out = [
         {"variable": name, **({"with": other} if other else {}), "share": float(share)}
         | ({"hertz": found.hertz} if name == HUM else {})

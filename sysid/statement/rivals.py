@@ -15,7 +15,7 @@ def as_little(found: Diagnosis) -> dict[str, set[tuple[str, str]]]:
     """Of each claim's command the (effect, joint) of its set that leave as little as its head."""
     return {
         claim.head.command: {
-            (m.candidate.named(found.fit.joints)) for m in claim.step.choice.as_little
+            m.candidate.named(found.fit.joints) for m in claim.step.choice.as_little
         }
         for claim in found.claims
     }
@@ -25,8 +25,8 @@ def rivals(members: Members, own: dict, little: set[tuple[str, str]]) -> list[st
     """What a finding is not told from, with probabilities; and of what is much less likely, though
     it leaves as little, why."""
     out = []
+    why = ", which leaves as little and needs more numbers"
     for e, j, p in members:
-        why = ", which leaves as little and needs more numbers"
         least = (e, j) in little and p < 0.5 * own["probability"]
         out.append(f"{placed(e, j, own['joint'])} ({percent(p)}{why * least})")
     return out

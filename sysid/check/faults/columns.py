@@ -8,6 +8,7 @@ from itertools import combinations
 
 import numpy as np
 
+from ...units import of_joint
 from ..equations import LIKELY, Equations, Reading, Scored
 from ..fault import ERROR, WARNING, Fault
 from ..look import Look
@@ -167,15 +168,16 @@ def _factors(look: Look, equations: Equations, reading: Reading, scored: Scored)
 def _thousandth(look: Look, joint: str, factor: float, every: bool) -> str:
     """What to write where torque is a thousand times off: as that of all joints is, or of one."""
     data, slides = look.experiment.data, look.robot.prismatic[look.robot.joints.index(joint)]
+    plain = of_joint("N m", prismatic=bool(slides))
     own = joint in data.torque or joint in look.experiment.actuator
     if data.units.torque not in ("N m", "N") or own:
-        return f"is it in mN m, or kN m? give it in N{' m' * (not slides)}"
-    unit = ("m" if factor > 1.0 else "k") + ("N" if slides else "N m")
+        return f"is it in mN m, or kN m? give it in {plain}"
+    unit = ("m" if factor > 1.0 else "k") + plain
     column = look.column("torque", joint)
     if every and not look.robot.prismatic.any():
         return f"if it is in {unit} set data.units.torque: {unit}"
     if column is None:
-        return f"if it is in {unit} give it in N{' m' * (not slides)}"
+        return f"if it is in {unit} give it in {plain}"
     scale = 0.001 if factor > 1.0 else 1000
     return f"if it is in {unit} write data.torque: {{{joint}: {{{column}: {scale}}}}}"
 
