@@ -219,7 +219,28 @@ def test_a_load_or_an_offset_that_turns_a_torque_is_no_wrong_sign(what, made, tm
         table = pl.read_csv(logs / file)
         more = 40.0 * np.sin(table["q_shoulder"] + table["q_elbow"]) if what == "load" else pl.lit(16.0)
         table.with_columns((pl.col("tau_elbow") + sign * more).alias("tau_elbow")).write_csv(logs / file)
-    assert not [f for f in check.check(pipeline.load(logs)) if f.fault == "sign_flipped" and f.log]
+    assert not [f for f in check.check(pipeline.load(logs)) if f.fault in ("sign_flipped", "joint_order") and f.log]
+
+
+@pytest.mark.parametrize("file", ["train_2.csv", "test.csv"])
+@pytest.mark.parametrize("keys, word", [(["tau"], "the torque columns"), (["q"], "the angle columns"), (["q", "tau"], "the columns")])
+def test_columns_that_one_log_has_in_another_order_are_named_with_it(keys, word, file, made, tmp_path):
+    logs = shutil.copytree(made(logs=3, duration=6.0), tmp_path / "logs")
+    names = {f"{key}_{a}": f"{key}_{b}" for key in keys for a, b in (("shoulder", "elbow"), ("elbow", "shoulder"))}
+    pl.read_csv(logs / file).rename(names).write_csv(logs / file)
+    found = [f for f in check.check(pipeline.load(logs)) if f.severity == "error"]
+    assert {(f.fault, f.joint, f.log) for f in found} == {("joint_order", joint, file) for joint in ("shoulder", "elbow")}
+    assert all(f.says.startswith(f"{word} of shoulder and elbow look exchanged in {file} alone") for f in found)
+
+
+def test_an_angle_and_its_torque_that_one_log_has_with_the_other_sign_are_named_with_it(made, tmp_path):
+    """Friction brakes as before: gravity alone tells it."""
+    logs = shutil.copytree(made(logs=3, duration=6.0), tmp_path / "logs")
+    for column in ("q_elbow", "tau_elbow"):
+        turned(logs, "train_1.csv", column)
+    found = [f for f in check.check(pipeline.load(logs)) if f.severity == "error"]
+    assert [(f.fault, f.joint, f.log) for f in found] == [("sign_flipped", "elbow", "train_1.csv")]
+    assert "the angle and torque of elbow has in train_1.csv alone" in found[0].says
 
 
 @pytest.mark.parametrize("wrong", ["train_1.csv", "train_2.csv"])

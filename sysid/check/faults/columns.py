@@ -36,7 +36,9 @@ def find(look: Look) -> Iterator[Fault]:
     for _ in range(_ROUNDS):
         # of joints that hardly move any reading of the columns tells as little
         others = [
-            own for own in _others(reading, look) if any(look.excited[j].enough for j in own[1][1])
+            own
+            for own in readings(reading, look.robot.dof)
+            if any(look.excited[j].enough for j in own[1][1])
         ]
         tried = [(made, told, equations.scored(made)) for made, told in others]
         tried = [(s.loss, made, told, s) for made, told, s in tried if _clear(scored, s, *told[1:])]
@@ -48,9 +50,8 @@ def find(look: Look) -> Iterator[Fault]:
     yield from _factors(look, equations, reading, scored)
 
 
-def _others(reading: Reading, look: Look) -> Iterator[tuple[Reading, tuple]]:
-    """Readings that differ in one thing, with (fault, joints, what)."""
-    dof = look.robot.dof
+def readings(reading: Reading, dof: int) -> Iterator[tuple[Reading, tuple]]:
+    """Readings that differ from one in one thing, with (fault, joints, what)."""
     for i, j in combinations(range(dof), 2):
         angle, torque = _swapped(reading.angle, i, j), _swapped(reading.torque, i, j)
         yield replace(reading, torque=torque), ("joint_order", (i, j), "torque")
