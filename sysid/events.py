@@ -6,7 +6,7 @@ knock       several joints pulsed or rang at once, for tens of milliseconds: a h
 spike       a sample or a few of one joint's torque stand alone
 brake       one joint's torque repeats exactly while it rests: not the torque that holds it
 frozen      one joint's torque or angle repeats exactly while it moves: the reading stood still
-missing     one joint's torque never changes though it moves: none was logged, or another signal
+missing     one joint's torque never changes though it moves, or is 0 for a while: none was logged
 saturation  as frozen, at the highest or lowest torque of the log: told, but not left out
 slip        an angle steps between two samples as no motion does: told, and taken out of the angle
 mask        no event: a stretch that the user leaves out (`masks`)
@@ -84,6 +84,8 @@ def find(
             extreme = tau[first] != 0.0 and tau[first] in (tau.min(), tau.max())  # no limit is 0
             kind = "brake" if rests(q, first, last, usual) else "frozen"
             kind = "saturation" if extreme else kind
+            if kind == "frozen" and tau[first] == 0.0:
+                kind = "missing"
             tell(kind, first, last, [j])
         if not tau.any() and segment.tau.any() and rests(q, 0, len(q) - 1, usual):
             tell("brake", 0, len(q) - 1, [j])

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from . import motor_side, units
+from .anew import angle_starts
 from .clock import Clock, corrected
 from .drive_spec import ActuatorSpec
 from .errors import LogError
@@ -108,9 +109,20 @@ def measured(
     for name, values in samples.signals.items():
         check_finite(values, name, samples.where, joints=joints, t=samples.t, first=first)
     _convert(samples.signals, data, joints, prismatic, samples.where, drives)
+    samples = _apart(samples, prismatic)
     for joint, own in drives.items():
         _driven(samples, joints.index(joint), joint, own)
     return samples
+
+
+def _apart(samples: Recording, prismatic) -> Recording:
+    """Samples with a break where all angles jump, which is said."""
+    found = angle_starts(samples.t, samples.signals["q"], samples.breaks, ~np.asarray(prismatic))
+    if not len(found):
+        return samples
+    at = ", ".join(f"{samples.t[row]:.4g}" for row in found[:4]) + ", ..." * (len(found) > 4)
+    warn(f"{samples.where}: the angles of most joints jump at once at {at} s: what comes from there on is taken as a recording of its own", above=2)
+    return replace(samples, breaks=np.union1d(samples.breaks, found))
 
 
 def _driven(samples: Recording, j: int, joint: str, own: motor_side.Drive) -> None:

@@ -16,6 +16,7 @@ import numpy as np
 from . import datasets, motor_side, units
 from .errors import LogError
 from .log_spec import DataSpec, LogSpec
+from .outliers import SHORT
 from .readers import open_table
 from .readers.table import Table
 from .recorded_columns import KEYS, check_headers, meant, names_of, refuse_shared, single, time_of
@@ -92,6 +93,15 @@ def recorded(
                 above=2,
             )
         breaks = np.union1d(breaks, anew)
+        own = _starts(t, breaks)
+        if len(own) and not anew:
+            warn(
+                f"{where}: the clock starts anew at row {', '.join(map(str, own[:4]))}"
+                f"{', ...' * (len(own) > 4)} counted from 0: what comes from there on is a recording "
+                "of its own, whose times are taken to go on",
+                above=2,
+            )
+        breaks = np.union1d(breaks, own)
     files = {
         name if path == table.path else f"{name}/{path.relative_to(table.path).as_posix()}": path
         for name, table in tables.items()
@@ -240,6 +250,14 @@ def _whole(t) -> np.ndarray:
     return t.astype(np.int64, copy=False) if t.dtype.kind in "iu" else t
 
 
+def _starts(t, breaks) -> np.ndarray:
+    """Rows at which a clock (n,) runs back, not at a break that is known, and on from there, as of
+    another recording; none where what stands between is as short as of rows in a wrong order."""
+    back = np.setdiff1d(np.flatnonzero(np.diff(t) < 0.0) + 1, breaks)
+    bounds = np.union1d(np.concatenate([[0], back, [len(t)]]), breaks).astype(int)
+    return back if np.diff(bounds).min() >= SHORT else back[:0]
+
+
 def _increasing(t, breaks, where: str) -> np.ndarray:
     """The clock with every recording put a step behind the one before, where it does not stand
     behind it anyway."""
@@ -263,7 +281,7 @@ def _increasing(t, breaks, where: str) -> np.ndarray:
             f"time {verb}: {t[row - 1]:.9g} s, then {t[row]:.9g} s",
             where=f"{where} row {row} counted from 0",
             allowed="increasing time",
-            do="sort the rows or leave doubles out",
+            do="leave doubles out, and sort rows that stand in a wrong order",
         )
     anew = [row for row in breaks if steps[row - 1] <= 0.0]
     if anew:

@@ -54,11 +54,13 @@ def rests(q, first: int, last: int, usual: float) -> bool:
     Args:
         usual: the speed [a sample] of the joint that moves most; a small share of it is rest.
     """
-    # white noise of deviation s leaves second differences of median 0.6745 sqrt(6) s, and two
-    # angles sqrt(2) s apart
+    # white noise of deviation s leaves second differences of median 0.6745 sqrt(6) s, and the
+    # largest and the least of n values at most 2 sqrt(2 ln n) s apart, in the mean
+    own = q[first : last + 1]
     noise = np.median(np.abs(np.diff(q, 2))) / (0.6745 * np.sqrt(6.0))
-    reach = max(RESTING * usual * (last - first), 3.0 * np.sqrt(2.0) * noise, _GRAINS * quantum(q))
-    return bool(abs(q[last] - q[first]) <= reach)
+    apart = 2.0 * np.sqrt(2.0 * np.log(max(len(own), _FEWEST))) + 1.0
+    reach = max(RESTING * usual * (last - first), apart * noise, _GRAINS * quantum(q))
+    return bool(np.ptp(own) <= reach)
 
 
 def held_angle(q) -> list[tuple[int, int]]:

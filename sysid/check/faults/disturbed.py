@@ -31,6 +31,11 @@ _KINDS = {
         "the reading of {joint} stood still while it moved",
         "a fit leaves these rows out; mend the logger, which writes a value twice",
     ),
+    "missing": (
+        "effort_missing",
+        "the torque of {joint} is 0 for a while in which it moves",
+        "a fit leaves these rows out; the drive was off, or its telemetry was lost",
+    ),
     "slip": (
         "clock_jitter",
         "the angle of {joint} steps between two samples, as where one is taken early or late",
@@ -47,11 +52,12 @@ _AGAIN = 0.2  # of the rows: that many which only repeat the row before
 
 
 def find(look: Look) -> Iterator[Fault]:
-    """spikes, knock, brake_closed, values_held, clock_jitter, saturation."""
+    """spikes, knock, brake_closed, values_held, clock_jitter, saturation, effort_missing."""
     for log in look.logs:
         groups: dict[tuple[str, str], list] = {}
-        # torque that is missing is `effort_missing`
         for event in (one for one in log.log.events if one.kind in _KINDS):
+            if event.kind == "missing" and _throughout(event, log.log):
+                continue  # what moves without any torque is told as a whole
             for joint in event.joints if event.kind != "knock" else ("",):
                 groups.setdefault((event.kind, joint), []).append(event)
         for (kind, joint), own in groups.items():
@@ -88,3 +94,8 @@ def find(look: Look) -> Iterator[Fault]:
                 again.times[:1],
                 again.count,
             )
+
+
+def _throughout(event, log) -> bool:
+    """Whether an event is as long as its log."""
+    return event.start <= log.segments[0].t[0] and event.stop >= log.segments[-1].t[-1]
