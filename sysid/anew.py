@@ -2,20 +2,37 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from .full_turns import jumps
 from .outliers import SHORT, quantum
+from .recording import Recording
+from .segment import GAP_STEPS
+from .warned import warn
 
 _FARTHER = 3.0  # times as far as in any other step: no motion does that on several joints at once
 _MOST = 0.001  # of the steps: what comes oftener is the logger's way
 _GRAINS = 2.5  # quanta: what a resting joint's noise jumps by
-_REGULAR = 10.0  # steps: a longer one is a gap, about which the file is split anyway
+
+
+def apart(samples: Recording, prismatic) -> Recording:
+    """Samples with a break where all angles jump, which is said."""
+    found = angle_starts(samples.t, samples.signals["q"], samples.breaks, ~np.asarray(prismatic))
+    if not len(found):
+        return samples
+    at = ", ".join(f"{samples.t[row]:.4g}" for row in found[:4]) + ", ..." * (len(found) > 4)
+    warn(
+        f"{samples.where}: the angles of most joints jump at once at {at} s: what comes from there on is taken as a recording of its own",
+        above=2,
+    )
+    return replace(samples, breaks=np.union1d(samples.breaks, found))
 
 
 def angle_starts(t, q, breaks, turns) -> np.ndarray:
     """Rows before which most of the joints that move, two at least, jump farther than they move
-    anywhere else between two samples, and not where a reading that stood still goes on.
+    anywhere else between two samples.
 
     Args:
         t (n,), q (n, dof). breaks: rows at which another recording begins, as is known. turns:
@@ -25,10 +42,10 @@ def angle_starts(t, q, breaks, turns) -> np.ndarray:
     if len(steps) < SHORT:
         return np.zeros(0, dtype=int)
     clock = np.diff(t)
-    asked = clock < _REGULAR * np.median(clock)
+    asked = clock <= GAP_STEPS * np.median(clock)  # about a gap the file is split anyway
     asked[np.asarray(breaks, dtype=int) - 1] = False
     far = np.stack([_far(own, asked, bool(turn)) for own, turn in zip(steps.T, turns)], axis=1)
-    far[1:] &= steps[:-1] != 0.0
+    far[1:] &= np.any(steps[:-1] != 0.0, axis=1)[:, None]  # else a reading that stood still goes on
     far &= np.abs(steps) > _GRAINS * np.array([quantum(own) for own in q.T])
     moving = int(np.sum(np.ptp(q, axis=0) > 0.0))
     count = far.sum(axis=1)

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .log import GAP_STEPS
 from .rounded_stamps import UNIFORM
+from .segment import GAP_STEPS
 
 
 @dataclass(frozen=True)

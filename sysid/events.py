@@ -6,8 +6,10 @@ knock       several joints pulsed or rang at once, for tens of milliseconds: a h
 spike       a sample or a few of one joint's torque stand alone
 brake       one joint's torque repeats exactly while it rests: not the torque that holds it
 frozen      one joint's torque or angle repeats exactly while it moves: the reading stood still
-missing     one joint's torque never changes though it moves, or is 0 for a while: none was logged
+missing     one joint's torque never changes though it moves, is 0 for a while, or was not written
+empty       a sample or a few of a joint's torque were not written
 saturation  as frozen, at the highest or lowest torque of the log: told, but not left out
+glitch      a sample or a few of an angle stand alone: told, and what is about them in their place
 slip        an angle steps between two samples as no motion does: told, and taken out of the angle
 mask        no event: a stretch that the user leaves out (`masks`)
 """
@@ -26,12 +28,17 @@ from .segment import Segment
 
 WORDS = {
     "knock": "knock", "spike": "torque spike", "brake": "closed brake", "frozen": "frozen value",
-    "missing": "missing torque",
-    "saturation": "flat top", "slip": "step of an angle", "mask": "masked stretch",
+    "missing": "missing torque", "empty": "empty sample of torque",
+    "saturation": "flat top", "glitch": "angle spike", "slip": "step of an angle", "mask": "masked stretch",
 }  # fmt: skip
 KINDS = tuple(WORDS)
 #: told alone: no row is left out for them
-TOLD = {"saturation": "not left out", "slip": "taken out of the angle"}
+TOLD = {
+    "saturation": "not left out", "slip": "taken out of the angle",
+    "glitch": "taken out of the angle",
+}  # fmt: skip
+#: a sample or a few, in whose place a straight line stands
+MENDED = ("spike", "empty")
 _PASSES = 3  # over the spikes: without the largest, those beside them stand out
 _SHOWN = 4  # times of each kind and log that a notice gives
 _AGAIN = 4  # knocks of a joint in one part of an experiment: more than accidents
@@ -197,7 +204,7 @@ def usable(
     """Rows (n, dof) bool at times t (n,) that no event reaches, for each joint's equation.
 
     A knock is in the equations of all joints that bear it, whichever show it, and a wrong angle in
-    every joint's. Spikes are mended before any filter, and reach nothing beside them.
+    every joint's. What is MENDED before any filter reaches nothing beside it.
 
     Args:
         angles, torque: how far [s] the filters of the angles and of the torque see to either side.
@@ -208,7 +215,7 @@ def usable(
         if event.kind in TOLD:
             continue
         of_signal = {"torque": torque, "position": angles, "both": max(angles, torque)}
-        reach = 0.0 if event.kind == "spike" else of_signal[event.signal]
+        reach = 0.0 if event.kind in MENDED else of_signal[event.signal]
         rounding = 1e-9 * max(abs(event.start), abs(event.stop), 1.0)
         first = np.searchsorted(t, event.start - reach - rounding)
         last = np.searchsorted(t, event.stop + reach + rounding, side="right")
@@ -230,12 +237,14 @@ def told(events: Sequence[Event], left_out: float, part: str, joints: int) -> li
         own = [e.kind == "mask" for e in masked]
         why = "masked" if all(own) else "disturbed or masked" if any(own) else "disturbed"
         share = f"{100 * left_out:.1f} % of the {part} rows left out as {why}"
-        keeps = "" if any(own) else "; preprocess.events: keep keeps them"
+        kept = any(e.kind not in ("mask", "empty") for e in masked) and not any(own)
+        keeps = "; preprocess.events: keep keeps them" if kept else ""
         out.append(f"{share}: {_summary(masked)}{keeps}")
         if said := again([j for e in masked if e.kind == "knock" for j in e.joints], joints):
             out.append(f"{said} ({part} logs)")
     said = {
         "saturation": "flat tops of the torque",
+        "glitch": "samples of an angle that stand alone, as of a bad encoder or wire",
         "slip": "samples that were taken early or late, or of an encoder that slipped",
     }
     for kind, words in said.items():

@@ -11,6 +11,7 @@ from . import events, long_log, masks, robot
 from . import log as logs
 from .bumps import bumps
 from .free_memory import released
+from .glitches import without_glitches
 from .log_spec import LogSpec
 from .model import Model
 from .robot import Robot
@@ -69,7 +70,7 @@ def _silent(read: list[logs.Log], extents: list[np.ndarray], machine: Robot, dri
     """What of the logs' torques was not logged, by the extents of their segments."""
     ends = [(log.name, float(log.segments[0].t[0]), float(log.segments[-1].t[-1])) for log in read]
     found = events.unlogged([(*own, extent) for own, extent in zip(ends, extents)], machine.joints)
-    return [tuple(e for e in own if not {*e.joints} & {*driven, *log.unused}) for log, own in zip(read, found)]
+    return [tuple(e for e in (*log.events, *own) if not {*e.joints} & {*driven, *log.unused}) for log, own in zip(read, found)]
 
 
 def _disturbed(machine: Robot, read: list[logs.Log], *, among: int = 1) -> list[logs.Log]:
@@ -88,27 +89,29 @@ def _disturbed(machine: Robot, read: list[logs.Log], *, among: int = 1) -> list[
 
 
 def _shown(machine: Robot, log: logs.Log, among: int) -> logs.Log:
-    """A log with what its signals show of disturbances, and without its angles' slips."""
+    """A log with what its signals show of disturbances, and without its angles' glitches and slips."""
     found, segments = list(log.events), []
     for segment in log.segments:
-        angles, steps = segment.q, []
-        # stamps that were wrong have been corrected; a span of a long log is read anew, as it is
-        if among == 1 and segment.clock is None:
-            angles, steps = without_slips(segment.q, segment.step)
+        angles, alone, steps = segment.q, [], []
+        if among == 1:  # a span of a long log is read anew, as it is
+            angles, alone = without_glitches(segment.q)
+        if among == 1 and segment.clock is None:  # stamps that were wrong have been corrected
+            angles, steps = without_slips(angles, segment.step)
         own = events.find(segment, machine.joints, log=log.name, among=among, angles=angles)
-        own = [*own, *_slips(segment.t, steps, machine.joints, log.name)]
+        for kind, places in (("glitch", alone), ("slip", steps)):
+            own = [*own, *_of_angles(kind, segment.t, places, machine.joints, log.name)]
         found += [e for e in own if not (e.signal == "torque" and set(e.joints) <= set(log.unused))]
         segments.append(segment if angles is segment.q else replace(segment, q=angles))
     return replace(log, events=tuple(found), segments=tuple(segments))
 
 
-def _slips(t, found: list[list[tuple[int, int]]], joints: tuple[str, ...], log: str) -> list[events.Event]:
-    """One event of all joints whose angles step at the same sample."""
+def _of_angles(kind: str, t, found: list[list[tuple[int, int]]], joints: tuple[str, ...], log: str) -> list[events.Event]:
+    """One event of all joints whose angles step, or stand alone, at the same sample."""
     members: dict[tuple[int, int], list[str]] = {}
     for joint, places in zip(joints, found):
         for place in places:
             members.setdefault(place, []).append(joint)
-    return [events.Event("slip", log, float(t[a]), float(t[b]), tuple(own), "position") for (a, b), own in members.items()]
+    return [events.Event(kind, log, float(t[a]), float(t[b]), tuple(own), "position") for (a, b), own in members.items()]
 
 
 def _disturbed_in_spans(machine: Robot, log: logs.Log, driven: Collection[str]) -> logs.Log:

@@ -11,8 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from . import motor_side, units
-from .anew import angle_starts
+from . import anew, motor_side, units, unwritten
 from .clock import Clock, corrected
 from .drive_spec import ActuatorSpec
 from .errors import LogError
@@ -23,13 +22,11 @@ from .groups import levels_of
 from .log_spec import DataSpec, LogSpec
 from .recording import Recording, recorded
 from .rounded_stamps import off_steady
-from .segment import Segment
+from .segment import GAP_STEPS, Segment
 from .slips import SLOWEST
 from .spans import Spans
 from .warned import warn
 
-# A step longer than this many median steps is a hole that interpolation would invent motion for.
-GAP_STEPS = 10.0
 # Of a step: stamps that are off by less are right; and even ones, which say nothing of it, by less than the other.
 _TOLD, _EVEN = 1e-3, 1e-2
 # Of what stamps are rounded to: as much beside a line is a steady clock's own rounding. Twice that is most likely a steady one's
@@ -87,7 +84,8 @@ def assembled(samples: Recording, log: LogSpec, data: DataSpec, joints: tuple[st
     whole = each[0] if len(each) == 1 else hashlib.sha256("".join(each).encode()).hexdigest()
     segments = tuple(_segments(samples.t, samples.signals, samples.where, samples.breaks))
     return Log(
-        samples.name, next(iter(samples.files.values())), whole, segments, hashes=hashes, unused=tuple(data.unused), levels=levels_of(data.groups, log),
+        samples.name, next(iter(samples.files.values())), whole, segments, unwritten.told(samples, joints), hashes=hashes, unused=tuple(data.unused),
+        levels=levels_of(data.groups, log),
     )  # fmt: skip
 
 
@@ -106,23 +104,14 @@ def measured(
     samples = recorded(log, data, joints, folder, drives, table=table)
     if log.start is not None or log.stop is not None:
         first, samples = _piece(samples, log)
+    samples = unwritten.filled(samples, joints)
     for name, values in samples.signals.items():
         check_finite(values, name, samples.where, joints=joints, t=samples.t, first=first)
     _convert(samples.signals, data, joints, prismatic, samples.where, drives)
-    samples = _apart(samples, prismatic)
+    samples = anew.apart(samples, prismatic)
     for joint, own in drives.items():
         _driven(samples, joints.index(joint), joint, own)
     return samples
-
-
-def _apart(samples: Recording, prismatic) -> Recording:
-    """Samples with a break where all angles jump, which is said."""
-    found = angle_starts(samples.t, samples.signals["q"], samples.breaks, ~np.asarray(prismatic))
-    if not len(found):
-        return samples
-    at = ", ".join(f"{samples.t[row]:.4g}" for row in found[:4]) + ", ..." * (len(found) > 4)
-    warn(f"{samples.where}: the angles of most joints jump at once at {at} s: what comes from there on is taken as a recording of its own", above=2)
-    return replace(samples, breaks=np.union1d(samples.breaks, found))
 
 
 def _driven(samples: Recording, j: int, joint: str, own: motor_side.Drive) -> None:

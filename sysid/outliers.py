@@ -78,7 +78,7 @@ def bursts(s, level: float) -> list[tuple[int, int]]:
     return [(a, b) for a, b in runs(s > 0.5 * level) if s[a : b + 1].max() > level]
 
 
-def spikes(tau, *, among: int = 1) -> list[list[tuple[int, int]]]:
+def spikes(tau, *, among: int = 1, grain=None) -> list[list[tuple[int, int]]]:
     """First and last samples of the spikes of each joint's torque (n, dof).
 
     Of up to `SPIKE` samples that are entered and left by steps of opposite sign, min(|in|, |out|)
@@ -91,18 +91,19 @@ def spikes(tau, *, among: int = 1) -> list[list[tuple[int, int]]]:
 
     Args:
         among: how many parts its log has that are looked at by themselves, of all of which `CHANCE`
-            is.
+            is. grain: (dof,) steps that are usual at least; by default the torque's own quantum.
 
     Source: Benjamini & Hochberg 1995.
     """
     n, dof = tau.shape
     if n < SHORT:
         return [[] for _ in range(dof)]
-    found = [pulses for j in range(dof) for pulses in _pulses(tau[:, j])]
+    grain = [quantum(own) for own in tau.T] if grain is None else grain
+    found = [pulses for own, least in zip(tau.T, grain) for pulses in _pulses(own, least)]
     hit = [np.zeros(len(z), dtype=bool) for _, z, _ in found]
     while True:
         pairs = zip((z for _, z, _ in found), hit)
-        s = [surprise(z, _WHITE, z[~own], _TAIL) if len(z) else z for z, own in pairs]
+        s = [surprise(z, _WHITE, _usual(z[~own]), _TAIL) if len(z) else z for z, own in pairs]
         # ranks of those alone that are high enough at any rank: the others have none
         count, asked = max(sum(map(len, s)), 1), SPIKE * n * dof * among
         lowest = np.log(asked / (CHANCE * count))
@@ -127,11 +128,16 @@ def spikes(tau, *, among: int = 1) -> list[list[tuple[int, int]]]:
     return out
 
 
-def _pulses(tau):
+def _usual(z):
+    """Sizes of pulses, of few of which those that are not there, of no size, are the usual ones."""
+    return z if len(z) >= SHORT else np.append(z, np.zeros(SHORT - len(z)))
+
+
+def _pulses(tau, grain: float):
     """Pulses of tau (n,) of each width: first sample, size over the usual step, is it alone."""
     step = np.diff(tau)
     size = np.abs(step)
-    least = max(np.median(size), quantum(tau), NOTHING * np.std(tau))
+    least = max(np.median(size), grain, NOTHING * np.std(tau))
     usual = np.maximum(least, _thereabouts(size))
     away = np.abs(tau - running(tau, 4 * SPIKE + 1, "median", "edge"))
     for width in range(1, SPIKE + 1):

@@ -20,6 +20,7 @@ from .outliers import SHORT
 from .readers import open_table
 from .readers.table import Table
 from .recorded_columns import KEYS, check_headers, meant, names_of, refuse_shared, single, time_of
+from .segment import GAP_STEPS
 from .warned import warn
 
 _EPOCH = 1e6  # s: a clock that reads more counts from 1970, not from the log's start
@@ -30,7 +31,8 @@ EPISODE = "episode_index"  # the column in which LeRobot numbers episodes
 class Recording:
     """Samples as they were logged. t (n,) [s], increasing; signals {name: (n, ...)}; breaks: rows
     at which another recording begins; name, and where to find it in a message; files: path of each
-    file, by its name."""
+    file, by its name; empty: (joint, first, last) of rows in which a joint's torque was not
+    written, and is a straight line."""
 
     name: str
     where: str
@@ -38,6 +40,7 @@ class Recording:
     t: np.ndarray
     signals: dict[str, np.ndarray]
     breaks: np.ndarray
+    empty: tuple[tuple[int, int, int], ...] = ()
 
     def rows(self, first: int, last: int) -> Recording:
         """The samples from row `first` up to, not including, `last`."""
@@ -145,7 +148,7 @@ def _load(table: Table, data: DataSpec, joints, episodes, drives):
             do="remove episode, or give start and stop",
         )  # fmt: skip
     asked = [*filter(None, (time, counted)), *(c for names in wanted.values() for c in names if c)]
-    columns = table.load(list(dict.fromkeys(asked)))
+    columns = table.load(list(dict.fromkeys(asked)), [c for c in wanted.get("tau", ()) if c])
     lengths = {name: len(values) for name, values in columns.items()}
     if len(set(lengths.values())) > 1:
         shown = ", ".join(f"{name!r} {length}" for name, length in lengths.items())
@@ -252,8 +255,12 @@ def _whole(t) -> np.ndarray:
 
 def _starts(t, breaks) -> np.ndarray:
     """Rows at which a clock (n,) runs back, not at a break that is known, and on from there, as of
-    another recording; none where what stands between is as short as of rows in a wrong order."""
-    back = np.setdiff1d(np.flatnonzero(np.diff(t) < 0.0) + 1, breaks)
+    another recording; none where it is by as little, or for as short, as of rows in a wrong order.
+    """
+    steps = np.diff(t)
+    back = np.setdiff1d(np.flatnonzero(steps < 0.0) + 1, breaks)
+    if len(back) and np.any(-steps[back - 1] <= GAP_STEPS * np.median(np.abs(steps))):
+        return back[:0]
     bounds = np.union1d(np.concatenate([[0], back, [len(t)]]), breaks).astype(int)
     return back if np.diff(bounds).min() >= SHORT else back[:0]
 

@@ -8,6 +8,9 @@ import numpy as np
 
 from .clock import Left
 
+# A step longer than this many median steps is a hole that interpolation would invent motion for.
+GAP_STEPS = 10.0
+
 
 @dataclass(frozen=True)
 class Segment:

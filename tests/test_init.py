@@ -311,7 +311,7 @@ def test_logs_in_different_units_are_to_be_looked_at(experiment, cli):
     assert "if these are in rad, bring all logs to one unit" in json.dumps(said)
 
 
-@pytest.mark.parametrize("column", [f"q_{JOINTS[0]}", f"tau_{JOINTS[1]}", "t"])
+@pytest.mark.parametrize("column", [f"q_{JOINTS[0]}", "t"])
 def test_what_is_no_number_is_said_with_its_row(column, experiment, cli):
     def gap(columns):
         return {n: np.where((np.arange(len(v)) == 7) & (n == column), np.nan, v) for n, v in columns.items()}

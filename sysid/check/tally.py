@@ -12,8 +12,9 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from ..full_turns import jumps
-from ..log import DEGREES, GAP_STEPS
+from ..log import DEGREES
 from ..robot import Robot
+from ..segment import GAP_STEPS
 from .samples import Samples, Told, behind, told
 
 BEYOND = 0.02  # rad or m beyond a limit, and share of the range
@@ -123,6 +124,7 @@ def _of_part(part: Samples, seen: int, step: float, robot: Robot) -> Tally:
     off = steps[~gap] - step * np.maximum(np.round(steps[~gap] / step), 1.0)
     moved, changed = (np.diff(values[since], axis=0) for values in (part.q, part.tau))
     again = np.all(moved == 0.0, axis=1) & np.all(changed == 0.0, axis=1)
+    moved[gap] = 0.0  # nobody knows how far it turned meanwhile
     joints = tuple(_of_joint(part, seen, moved[:, j], j, step, robot) for j in range(q.shape[1]))
     return Tally(
         len(t), float(t[0]), float(t[-1]), np.array([q.min(0), tau.min(0)]),

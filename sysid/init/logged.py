@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import LogError
-from ..finite import check_finite
+from ..finite import check_finite, filled
 from ..readers.table import Table
 from .columns import Found, found
 from .words import is_time, words
@@ -139,7 +139,10 @@ def _one(name: str, table: Table, signals: Signals) -> Logged:
     counted = [_EPISODE] if _EPISODE in table.names else []
     time = [signals.time] if signals.time else []
     names = [*time, *counted, *(c for columns in chosen.values() for c in columns.values())]
-    values = table.load(list(dict.fromkeys(names)))
+    torques = tuple(chosen["tau"].values())
+    values = table.load(list(dict.fromkeys(names)), torques)
+    for column in (c for c in torques if values[c].ndim == 1):
+        values[column], _ = filled(values[column], column, str(table.path))
     for column in (*time, *chosen["q"].values(), *chosen["tau"].values()):
         check_finite(values[column], column, str(table.path))  # as a fit would, before a guess
     of = {kind: {j: values[c] for j, c in columns.items()} for kind, columns in chosen.items()}

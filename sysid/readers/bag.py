@@ -119,7 +119,7 @@ class BagTable(Table):
             self._columns[name] = index[order], np.concatenate([v for _, v in entries])[order]
         self.names = [*self._stamps, *sorted(self._columns, key=_by_signal)]
 
-    def load(self, names):
+    def load(self, names, empty=()):
         asked = [name for name in names if name not in self._stamps]
         counts = np.zeros(len(self._stamps["t"]), dtype=int)
         for name in asked:

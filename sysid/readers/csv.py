@@ -65,7 +65,7 @@ class CsvTable(Table):
     def _point(self, cell: str) -> str:
         return cell if self._separator == "," else cell.replace(",", ".")
 
-    def load(self, names):
+    def load(self, names, empty=()):
         places = {name: k for k, name in enumerate(self.names)}
         positions = [places[name] for name in names]
         # polars wants ascending positions and each once; the header is skipped because we name the columns
@@ -91,12 +91,12 @@ class CsvTable(Table):
             name, cells = self.names[position], columns[k]
             columns[k] = None
             values = cells if cells.dtype == pl.Float64 else self._parsed(cells)
-            bad = values.is_null()
+            bad = values.is_null() & cells.is_not_null() if name in empty else values.is_null()
             if bad.any():
                 row = int(bad.arg_max())
                 said = "the cell is empty" if cells[row] is None else f"{cells[row][:60]!r} is no number"
                 raise LogError(said, where=f"{self.path} line {row + 1 + self._above} column {name!r}", do="correct the row or leave it out")
-            out[name] = values.to_numpy()
+            out[name] = values.to_numpy()  # what is empty is NaN
         return {name: out[name] for name in names}
 
     def _frame(self, wanted, schema) -> pl.DataFrame:

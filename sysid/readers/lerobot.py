@@ -106,6 +106,6 @@ class LeRobotTable(Table):
     def width(self, name):
         return self._parts[0].width(name)
 
-    def load(self, names):
-        loaded = [part.load(names) for part in self._parts]
+    def load(self, names, empty=()):
+        loaded = [part.load(names, empty) for part in self._parts]
         return {name: np.concatenate([part[name] for part in loaded]) for name in names}

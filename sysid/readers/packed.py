@@ -59,5 +59,5 @@ class PackedTable(Table):
     def resolve(self, column):
         return self._told(lambda: self._table.resolve(column))
 
-    def load(self, names):
-        return self._told(lambda: self._table.load(names))
+    def load(self, names, empty=()):
+        return self._told(lambda: self._table.load(names, empty))

@@ -73,16 +73,16 @@ class ParquetTable(Table):
         part._part, part.rows = (first, last - first), last - first
         return part
 
-    def load(self, names):
+    def load(self, names, empty=()):
         out, held = {}, {}
         for name in names:
             column, k = self._elements.get(name, (name, None))
             if column not in held:
-                held[column] = self._column(column)
+                held[column] = self._column(column, column in empty)
             out[name] = held[column] if k is None else held[column][:, k]
         return out
 
-    def _column(self, name) -> np.ndarray:
+    def _column(self, name, empty: bool = False) -> np.ndarray:
         kind, width = self._schema[name], self._widths.get(name)
         if not (kind.is_numeric() or width):
             raise LogError(f"column {name!r} holds {kind}", where=str(self.path), allowed="numbers, or lists of numbers of one length")
@@ -90,7 +90,8 @@ class ParquetTable(Table):
             # column by column, so that the file never stands in memory beside the arrays
             with silenced():
                 values = self._values(name)
-                self._check_null(name, values, 1)
+                if width or not empty:
+                    self._check_null(name, values, 1)
                 if isinstance(kind, pl.List) and (other := values.list.len() != width).any():
                     row = int(other.arg_max()) + (self._part or (0,))[0]
                     raise LogError(
@@ -101,7 +102,8 @@ class ParquetTable(Table):
                 values = values if values.dtype in _WHOLE else values.cast(pl.Float64)
         except _CORRUPT as error:
             raise self._unreadable(error, name) from None
-        self._check_null(name, values, width or 1)
+        if width or not empty:
+            self._check_null(name, values, width or 1)
         out = values.to_numpy()
         return out.reshape(-1, width) if width and width > 1 else out
 

@@ -1,7 +1,7 @@
 """What a reader gives: named columns, loaded when asked for."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
@@ -47,8 +47,12 @@ class Table(ABC):
         return f"{name} [{self.stated[name]}]" if self.stated.get(name) else name
 
     @abstractmethod
-    def load(self, names: list[str]) -> dict[str, np.ndarray]:
-        """The named columns as arrays of floats or whole numbers: (n,), or (n, k) for the name of a matrix."""
+    def load(self, names: list[str], empty: Collection[str] = ()) -> dict[str, np.ndarray]:
+        """The named columns as arrays of floats or whole numbers: (n,), or (n, k) for the name of a matrix.
+
+        Args:
+            empty: columns of which a cell may be empty, which is NaN; of any other that is refused.
+        """
 
     def width(self, name: str) -> int:
         """How many columns stand behind a name: more than one for a matrix."""
@@ -119,7 +123,7 @@ class ArrayTable(Table):
             return array.ravel()
         return array.T if array.ndim == 2 and array.shape[0] < array.shape[1] else array
 
-    def load(self, names):
+    def load(self, names, empty=()):
         out, held = {}, {}
         for name in names:
             variable, _, index = name.partition("[") if name not in self._widths else (name, "", "")

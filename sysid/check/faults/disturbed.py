@@ -33,8 +33,18 @@ _KINDS = {
     ),
     "missing": (
         "effort_missing",
-        "the torque of {joint} is 0 for a while in which it moves",
+        "the torque of {joint} is 0, or was not written, for a while in which it moves",
         "a fit leaves these rows out; the drive was off, or its telemetry was lost",
+    ),
+    "empty": (
+        "effort_missing",
+        "the torque of {joint} was not written in single samples",
+        "a fit leaves these samples out; log it with every sample",
+    ),
+    "glitch": (
+        "spikes",
+        "the angle of {joint} has spikes of a sample or a few",
+        "a fit takes these samples out but with `events: keep`; look after the encoder's wire",
     ),
     "slip": (
         "clock_jitter",

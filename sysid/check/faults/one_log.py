@@ -1,5 +1,5 @@
 """Whether the columns of one log are read otherwise than those of the others: what these tell of the
-robot foretells its torque, so that no mass of the URDF needs to be right.
+robot predicts its torque, so that no mass of the URDF needs to be right.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ def find(look: Look) -> Iterator[Fault]:
     if len(look.logs) < 2 or look.every is None:
         return
     found = [own for k in range(len(look.logs)) if (own := _read_otherwise(look, look.every, k))]
-    # an odd log bends what the others foretell: where two are, the clearest is told
+    # an odd log bends what the others tell: where two are, the clearest is told
     if found:
         _, k, kind, joints, word, left = min(found, key=lambda own: own[0])
         name, names = look.logs[k].path.name, [look.robot.joints[j] for j in joints]
@@ -39,10 +39,12 @@ def find(look: Look) -> Iterator[Fault]:
             says = f"{what} of {' and '.join(names)} look exchanged in {name} alone"
         else:
             says = f"the {word} of {names[0]} has in {name} alone the sign against the other logs'"
-        foretold = f"read so, what the other logs tell of the robot leaves {100 * left:.0f} % of it"
+        predicted = (
+            f"read so, what the other logs tell of the robot leaves {100 * left:.0f} % of it"
+        )
         do = "correct that file's columns, or leave the file out"
         for joint in names:
-            yield Fault(kind, ERROR, f"{says}: {foretold}", do, joint, name)
+            yield Fault(kind, ERROR, f"{says}: {predicted}", do, joint, name)
 
 
 def _read_otherwise(look: Look, seen: Seen, k: int) -> tuple | None:
@@ -58,7 +60,7 @@ def _read_otherwise(look: Look, seen: Seen, k: int) -> tuple | None:
     asked = [j for j in asked if here[:, j].sum() > FEWEST]
     if len(asked) < look.robot.dof or not asked:
         return None
-    x, usual = _foretold(seen, rest)
+    x, usual = _told_by(seen, rest)
     plain = _squares(rows.tau[own], rows.columns[:, own], rows.use[own], x)
     if not np.any(np.sqrt(plain) > _ODD * usual):
         return None
@@ -73,7 +75,7 @@ def _read_otherwise(look: Look, seen: Seen, k: int) -> tuple | None:
     return best
 
 
-def _foretold(seen: Seen, use) -> tuple[np.ndarray, np.ndarray]:
+def _told_by(seen: Seen, use) -> tuple[np.ndarray, np.ndarray]:
     """Parameters (size,) by least squares about the URDF's, of rows (n, dof) that are used, each
     joint in units of what is left of it, and this (dof,)."""
     rows, model = seen.rows, seen.model

@@ -1,0 +1,42 @@
+"""Samples of an angle that stand alone, as an encoder or its wire makes them: a filter makes of one a
+knock that the arm never had, so that what was about it is put in its place.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .outliers import NORMAL, SHORT, SPIKE, quantum, spikes
+from .running import running
+
+_BESIDE, _ORDER = 6, 3  # samples to either side, between which the motion is a polynomial
+
+
+def without_glitches(q: np.ndarray) -> tuple[np.ndarray, list[list[tuple[int, int]]]]:
+    """Angles (n, dof) without samples that stand alone, and of each joint the first and the last of
+    such; the angles themselves where there is none.
+
+    As of a torque's `spikes`, of what an angle has beside the running median: of one that goes on
+    either way this is nothing, so that neither fast motion nor a sample that was taken late is any.
+    """
+    if len(q) < SHORT:
+        return q, [[] for _ in q.T]
+    middle = np.stack([running(own, 4 * SPIKE + 1, "median", "edge") for own in q.T], axis=1)
+    # where an angle turns round it stands beside its median by its noise and its steps
+    noise = np.median(np.abs(np.diff(q, 2, axis=0)), axis=0) / (NORMAL * np.sqrt(6.0))
+    grain = np.maximum(np.sqrt(2.0) * noise, [quantum(own) for own in q.T])
+    found = spikes(q - middle, grain=grain)
+    if not any(found):
+        return q, found
+    out, rows = q.copy(), np.arange(len(q))
+    for j, own in enumerate(found):
+        good = np.ones(len(q), dtype=bool)
+        for first, last in own:
+            good[first : last + 1] = False
+        for first, last in own:
+            before, after = rows[:first][good[:first]], rows[last + 1 :][good[last + 1 :]]
+            about = np.concatenate([before[-_BESIDE:], after[:_BESIDE]])
+            alone, order = np.arange(first, last + 1), min(_ORDER, len(about) - 1)
+            curve = np.polynomial.Polynomial.fit(about, q[about, j], order)
+            out[alone, j] = curve(alone)
+    return out, found
