@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from . import anew, motor_side, units, unwritten
+from . import anew, arrivals, motor_side, units, unwritten
 from .clock import Clock, corrected
 from .drive_spec import ActuatorSpec
 from .errors import LogError
@@ -78,7 +78,7 @@ def read(log: LogSpec, data: DataSpec, joints: tuple[str, ...], prismatic, folde
 def assembled(samples: Recording, log: LogSpec, data: DataSpec, joints: tuple[str, ...], prismatic) -> Log:
     """The log of what was `measured` of an entry of an experiment: angles go on, an irregular clock is
     resampled, gaps and ends of recordings split it."""
-    samples = going_on(samples, joints, prismatic)
+    samples = arrivals.evened(going_on(samples, joints, prismatic))
     hashes = {name: sha256(path) for name, path in samples.files.items()}
     each = list(hashes.values())
     whole = each[0] if len(each) == 1 else hashlib.sha256("".join(each).encode()).hexdigest()

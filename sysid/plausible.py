@@ -10,6 +10,8 @@ from .blocks import averaged
 from .estimate import Fit
 
 _EFFORT, _FEWEST = 1.5, 3  # times what the URDF allows the drive, and in how many samples
+BEGINS = "implausible"  # a notice that makes all the rest doubtful
+WRONG = "a check of these logs finds their columns wrong"
 ASK = "are its columns, signs and units right? `sysid check` says"
 _ALIKE = 1.1  # times an error: two that differ by less are alike
 _BLOCKS = 10  # of a log, whose means say how far its own may be off
@@ -31,7 +33,7 @@ def implausible(fit: Fit, still: Sequence[str] = (), logs: Sequence[dict] = ()) 
     carries = (test["rms"] <= _ALIKE * train["rms"]) & (train["r2"] > 0.0)
     worse = [f"{joint} (R2 {r2:.2g})" for joint, r2, well in zip(fit.joints, test["r2"], carries) if r2 < 0.0 and not well and joint not in stands]
     if worse:
-        yield f"implausible: the model is worse than none on the test logs of {', '.join(worse)}; {ASK}"
+        yield f"{BEGINS}: the model is worse than none on the test logs of {', '.join(worse)}; {ASK}"
     if moved := [joint for joint in stands if np.isfinite(test["r2"][fit.joints.index(joint)]) and joint not in _held(fit)]:
         yield (
             f"the test logs do not show {', '.join(moved)} in motion: the error there is friction at rest, which no model tells, and "
@@ -43,7 +45,7 @@ def implausible(fit: Fit, still: Sequence[str] = (), logs: Sequence[dict] = ()) 
         allowed = robot.source.joints[joint].effort
         torque = greatest[:, j]
         if np.sum(torque > _EFFORT * allowed) >= _FEWEST:
-            yield f"implausible: the torque of {joint} reaches {torque.max():.4g}, the URDF allows its drive {allowed:.4g}; {ASK}"
+            yield f"{BEGINS}: the torque of {joint} reaches {torque.max():.4g}, the URDF allows its drive {allowed:.4g}; {ASK}"
 
 
 def _held(fit: Fit) -> set[str]:

@@ -20,14 +20,14 @@ ROOT = Path(__file__).resolve().parent.parent
 # The order of the method: a module imports only from modules above it.
 ORDER = [
     "errors", "warned", "mistyped", "bounded", "nonnegative", "eigen", "unfinished", "whole_files", "yaml_text", "state", "trusted", "progress", "units", "picture", "threads", "free_memory", "silence", "callable_module", "workers", "inertia", "urdf_checks", "urdf_files", "urdf", "readers", "datasets", "spec_values", "robot_spec", "drive_spec", "log_spec", "specs", "groups", "prior", "link_priors", "rotors", "robot", "regressor", "running", "outliers", "glitches", "knocks", "repeats",
-    "frequencies", "clock", "segment", "spans", "events", "motor_side", "recorded_columns", "recording", "finite", "full_turns", "anew", "unwritten", "rounded_stamps", "gaussian", "smoother", "slips", "log", "even_clock", "long_log", "masks", "same_samples",
+    "frequencies", "clock", "segment", "spans", "events", "motor_side", "recorded_columns", "recording", "finite", "full_turns", "anew", "unwritten", "arrivals", "rounded_stamps", "gaussian", "smoother", "slips", "log", "even_clock", "long_log", "masks", "same_samples",
     "motion", "both_sides", "clock_jumps", "jumps", "extent", "standstill", "preprocess", "long_motion", "blocks", "two_masses", "lowpass", "flexible", "effect_parameters", "effect_options", "effect", "deflection",
     "vocabulary", "formula", "effects", "own_effects",
     "per_level", "config_errors", "config", "addition", "model_parameters", "slides", "scales", "terms", "needed", "kept_columns", "model", "listed_effects", "drives", "instants", "inverse_dynamics", "with_torque", "stretches", "rows", "tangents", "objective", "projection", "landscape", "multistart", "source",
     "reduction", "triangles", "linearised", "compress", "symmetric_matrices", "central_path", "interior", "nearby", "certificate", "trust_region", "solve", "prior_weight", "uncertainty", "differences", "prediction", "carried", "posed_problem", "given_shapes", "estimate",
     "long_prediction", "base_parameters", "held_apart", "masses", "plausible", "blows", "settled", "deflection_starts", "shape_search", "shape", "bumps", "filter_errors", "filters", "fit_document", "results", "earlier_fit", "shape_refinement", "notices", "experiment_logs", "locked_joints", "thinning",
     "experiment_file", "yaml_edit", "effect_entry", "urdf_export", "gains", "late", "load_doubt", "simulate", "rollout", "pipeline", "run", "export", "check", "init", "comparison",
-    "transfer", "noise", "candidates", "carriers", "candidate_columns", "design", "view", "failures", "unexplained", "left_open", "borne_out", "shown", "diagnose", "changes", "online", "fleet", "statement", "loop", "report",
+    "transfer", "noise", "candidates", "carriers", "candidate_columns", "design", "view", "failures", "unexplained", "left_open", "misread", "borne_out", "shown", "diagnose", "changes", "online", "fleet", "statement", "loop", "report",
     "studies", "studio", "terminal", "cli", "__main__",
 ]  # fmt: skip
 # Late imports that close a loop on purpose: a path that names a data set, a prior that is a previous run, the effects

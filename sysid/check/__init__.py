@@ -11,7 +11,7 @@ fault.py      what is told
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from importlib import import_module
 from pkgutil import iter_modules
 
@@ -32,6 +32,7 @@ FAULTS = (
 _OF_ANGLES = (
     "angle_wrap", "wrong_unit", "coarse_values", "standstill", "not_excited", "limit_exceeded",
 )  # fmt: skip
+_READINGS = ("among", "columns", "one_log")  # the modules that ask how columns are read
 
 
 def check(experiment: Experiment) -> list[Fault]:
@@ -50,10 +51,17 @@ def faults_of(look: Look) -> list[Fault]:
     return sorted(found, key=lambda fault: (fault.severity != ERROR, FAULTS.index(fault.fault)))
 
 
-def _found(look) -> Iterator[Fault]:
+def misread(experiment: Experiment) -> list[Fault]:
+    """The errors of how an experiment's columns are read: their order, signs and units."""
+    with noticed():
+        return [f for f in _found(looked(experiment), _READINGS) if f.severity == ERROR]
+
+
+def _found(look, asked: Collection[str] = ()) -> Iterator[Fault]:
     from . import faults
 
     names = sorted(module.name for module in iter_modules(faults.__path__))
+    names = [name for name in names if name in asked] if asked else names
     modules = [import_module(f"{faults.__name__}.{name}") for name in names]
     grave: set[str] = set()
     signs: dict[str, int] = {}
@@ -90,4 +98,4 @@ def document(found: list[Fault]) -> dict:
 
 callable_module(__name__, "", "check")  # `sysid.check(experiment)`
 
-__all__ = ["ERROR", "FAULTS", "WARNING", "Fault", "check", "document", "faults_of"]
+__all__ = ["ERROR", "FAULTS", "WARNING", "Fault", "check", "document", "faults_of", "misread"]

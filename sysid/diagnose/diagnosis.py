@@ -23,6 +23,7 @@ from ..estimate import Fit
 from ..failures import Failure, HeldOut, failures, fallen
 from ..left_open import left_open
 from ..lowpass import lowpassed
+from ..misread import misread, unasked
 from ..noise import NoiseFloor, floors_of_fit
 from ..shown import ShownDiagnosis
 from ..specs import Experiment
@@ -30,9 +31,8 @@ from ..transfer import transfers
 from ..unexplained import by_log, notices, of_few_blocks
 from ..view import View, elsewhere, first_view, law, too_short
 from ..warned import noticed
-from . import claims as claiming
 from . import select
-from .claims import Claim, Refused
+from .claims import Claim, Refused, claimed
 from .detectable import Detectable, detectable
 from .findings import Finding
 from .refits import refitted
@@ -83,11 +83,12 @@ def diagnose(
     fit = fit or pipeline.fit(experiment, progress=progress, measured=whole)
     with noticed():
         view = first_view(fit.experiment, fit, *measured.parts)
-        steps, asked, then_asked, undecided = select.search(view, extra, level=level, tell=tell)
+        how = {"level": level, "tell": tell, "most": 0 if (wrong := misread(fit)) else select.STEPS}
+        steps, asked, then_asked, undecided = select.search(view, extra, **how)
         if (test := lowpassed(measured.test, fit.joints, view.cutoff)) is None:
             raise too_short()
         known = {"filters": fit.filters, "progress": tell, "measured": whole}
-        claims, refused = claiming.claimed(steps, fit, test, **known)
+        claims, refused = claimed(steps, fit, test, **known)
         refused += [borne_out.undecided(choice, fit) for choice in undecided[-1:]]
         after, last = (claims[-1].step.after, claims[-1].after) if claims else (view, fit)
         first, then = (HeldOut(one.settled, test) for one in (view, after))
@@ -107,11 +108,11 @@ def diagnose(
         more = refused, transfers(last, view.cutoff), weighed, lambda j: law(after, j, again())
         rest = then_asked.near, few, beyond, fallen(first, then), by_log(last, found, test.still)
         named = verdicts(fit, claims, after.unknown, found, *more, *rest)
-        said = left_open(named, beyond, select.WORTH)
+        said = unasked(named) if wrong else left_open(named, beyond, select.WORTH)
         levels = np.array([f.rms or e for f, e in zip(found, last.rms("test").values())])
         where = failures(first, fit.predictions["test"].thinned(thinning.MOST), levels)
         could = detectable(view, asked, candidates(view.model, extra))
         events, part = (*view.motion.events, *test.events), () if whole else measured.notices
         told = tuple(claims), tuple(said), tuple(could), tuple(where), events, view, first, then
-        say = tuple(refused), (*part, *notices(claims, refused))
+        say = tuple(refused), (*wrong, *part, *notices(claims, refused))
         return Diagnosis(fit, dict(zip(fit.joints, found)), *told, *say)

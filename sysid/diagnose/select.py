@@ -21,11 +21,11 @@ from .ties import NEAR, Choice, chosen, price_of
 LEVEL = 0.01  # family-wise: how often anything is accused where nothing is there
 WORTH = 0.03  # of a joint's squared residual under the low-pass: 1.5 % of its root mean square
 _ALONE = 1.645  # standard errors: five per cent, were it the only question
-_MOST_STEPS, _SHORTLIST, _TRIALS = 8, 8, 2
+STEPS, _SHORTLIST, _TRIALS = 8, 8, 2
 
 
 def search(
-    view: View, extra=(), *, level: float = LEVEL, worth: float = WORTH, most: int = _MOST_STEPS,
+    view: View, extra=(), *, level: float = LEVEL, worth: float = WORTH, most: int = STEPS,
     tell: Callable[[str, float], None] = lambda stage, share: None,
 ):  # fmt: skip
     """The effects that join, in order, and the answers under the first model and the last.

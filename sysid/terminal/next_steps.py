@@ -6,7 +6,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from ..addition import typed
-from ..plausible import ASK
+from ..plausible import ASK, BEGINS, WRONG
 from ..statement import text
 from .tables import terminal_width
 
@@ -34,7 +34,7 @@ def out_of(experiment, run) -> list[str]:
 
 def implausible(document: dict) -> list[str]:
     """The notices that make all the rest doubtful."""
-    return [notice for notice in document["notices"] if notice.startswith("implausible")]
+    return [notice for notice in document["notices"] if notice.startswith(BEGINS)]
 
 
 def mended_first(document: dict, experiment, masses: dict) -> bool:
@@ -47,6 +47,9 @@ def mended_first(document: dict, experiment, masses: dict) -> bool:
     if not implausible(document):
         return False
     out, target = out_of(experiment, document["run"]), typed(experiment.path)
+    if any(WRONG in notice for notice in implausible(document)):
+        next_step("check", target, first="correct the columns, or what the experiment file says of them", out=out)
+        return True
     unchecked = not _checked(document, experiment)
     if unchecked and any(ASK in notice for notice in implausible(document)):  # wrong columns make masses, and effects that mend them
         next_step("check", target, first="how joints are explained cannot be meant: see what the logs say", out=out)

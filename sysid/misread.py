@@ -1,0 +1,37 @@
+"""Logs whose columns are not read as they were written: nothing that a model lacks mends them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from . import check
+from .estimate import Fit
+from .plausible import BEGINS, WRONG
+
+_LEFT = 0.1  # of a torque's square about its mean: a fit that leaves more may read another column
+
+
+def misread(fit: Fit) -> list[str]:
+    """What a check says of the columns of logs that a fit explains badly: a notice for each joint
+    that it names, none where the columns are read rightly."""
+    errors = [prediction.errors()["r2"] for prediction in fit.predictions.values()]
+    badly = any(np.any(r2[np.isfinite(r2)] < 1.0 - _LEFT) for r2 in errors)
+    if not (badly or any(notice.startswith(BEGINS) for notice in fit.notices)):
+        return []
+    found = {fault.says: fault for fault in check.misread(fit.experiment)}
+    return [f"{BEGINS}: {WRONG}: {fault.says}; {fault.do}" for fault in found.values()]
+
+
+def unasked(verdicts: Sequence) -> list:
+    """Verdicts on logs that are not read as they were written: where something is left, nobody knows
+    what."""
+    why = "the columns of these logs look wrong, and what is left may be no more than that"
+    return [
+        replace(one, status="unresolved", says=why, left=None, may=None, even=False)
+        if one.status in ("unknown", "unresolved")
+        else one
+        for one in verdicts
+    ]
