@@ -4,8 +4,11 @@ one packet, and none of them missing. Angles tell it: on an even clock they are 
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
+from .errors import LogError
 from .recording import Recording
 from .running import running
 from .warned import warn
@@ -26,6 +29,13 @@ def evened(samples: Recording) -> Recording:
         if (even := _even(t[own], samples.signals["q"][own])) is not None:
             late = max(late, float(np.max(t[own] - even)))
             t[own] = even
+        elif wrong := [row for row in samples.together if first <= row < last]:
+            raise LogError(
+                f"time stands still: two samples at {t[wrong[0]]:.9g} s",
+                where=f"{samples.where} row {wrong[0]} counted from 0",
+                allowed="increasing time",
+                do="leave doubles out",
+            )
     if not late:
         return samples
     warn(
@@ -33,15 +43,7 @@ def evened(samples: Recording) -> Recording:
         "say that samples were taken evenly: they are read so",
         above=2,
     )
-    return Recording(
-        samples.name,
-        samples.where,
-        samples.files,
-        t,
-        samples.signals,
-        samples.breaks,
-        samples.empty,
-    )
+    return replace(samples, t=t)
 
 
 def _even(t: np.ndarray, q: np.ndarray) -> np.ndarray | None:

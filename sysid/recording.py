@@ -8,19 +8,17 @@ across.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from . import datasets, motor_side, units
+from . import datasets, motor_side, stamps, units
 from .errors import LogError
 from .log_spec import DataSpec, LogSpec
-from .outliers import SHORT
 from .readers import open_table
 from .readers.table import Table
 from .recorded_columns import KEYS, check_headers, meant, names_of, refuse_shared, single, time_of
-from .segment import GAP_STEPS
 from .warned import warn
 
 _EPOCH = 1e6  # s: a clock that reads more counts from 1970, not from the log's start
@@ -32,7 +30,8 @@ class Recording:
     """Samples as they were logged. t (n,) [s], increasing; signals {name: (n, ...)}; breaks: rows
     at which another recording begins; name, and where to find it in a message; files: path of each
     file, by its name; empty: (joint, first, last) of rows in which a joint's torque was not
-    written, and is a straight line."""
+    written, and is a straight line; together: rows with the stamp of the one before and other
+    values, which stand a little behind it."""
 
     name: str
     where: str
@@ -41,13 +40,16 @@ class Recording:
     signals: dict[str, np.ndarray]
     breaks: np.ndarray
     empty: tuple[tuple[int, int, int], ...] = ()
+    together: tuple[int, ...] = ()
 
     def rows(self, first: int, last: int) -> Recording:
         """The samples from row `first` up to, not including, `last`."""
         part = slice(first, last)
         inside = self.breaks[(self.breaks > first) & (self.breaks < last)] - first
         signals = {name: values[part] for name, values in self.signals.items()}
-        return Recording(self.name, self.where, self.files, self.t[part], signals, inside)
+        own = tuple(row - first for row in self.together if first < row < last)
+        t = self.t[part]
+        return replace(self, t=t, signals=signals, breaks=inside, together=own)
 
     @property
     def parts(self) -> list[tuple[int, int]]:
@@ -96,7 +98,7 @@ def recorded(
                 above=2,
             )
         breaks = np.union1d(breaks, anew)
-        own = _starts(t, breaks)
+        own = stamps.starts(t, breaks)
         if len(own) and not anew:
             warn(
                 f"{where}: the clock starts anew at row {', '.join(map(str, own[:4]))}"
@@ -111,7 +113,9 @@ def recorded(
         for path in table.files
     }
     breaks = breaks.astype(int)
-    return Recording(log.name, where, files, _increasing(t, breaks, where), signals, breaks)
+    t, together = stamps.in_packets(t, signals)
+    t = stamps.increasing(t, breaks, where)
+    return Recording(log.name, where, files, t, signals, breaks, together=together)
 
 
 def _joined(parts: list[np.ndarray]) -> np.ndarray:
@@ -251,49 +255,3 @@ def from_origin(t, start, scale: float) -> np.ndarray:
 
 def _whole(t) -> np.ndarray:
     return t.astype(np.int64, copy=False) if t.dtype.kind in "iu" else t
-
-
-def _starts(t, breaks) -> np.ndarray:
-    """Rows at which a clock (n,) runs back, not at a break that is known, and on from there, as of
-    another recording; none where it is by as little, or for as short, as of rows in a wrong order.
-    """
-    steps = np.diff(t)
-    back = np.setdiff1d(np.flatnonzero(steps < 0.0) + 1, breaks)
-    if len(back) and np.any(-steps[back - 1] <= GAP_STEPS * np.median(np.abs(steps))):
-        return back[:0]
-    bounds = np.union1d(np.concatenate([[0], back, [len(t)]]), breaks).astype(int)
-    return back if np.diff(bounds).min() >= SHORT else back[:0]
-
-
-def _increasing(t, breaks, where: str) -> np.ndarray:
-    """The clock with every recording put a step behind the one before, where it does not stand
-    behind it anyway."""
-    if not np.isfinite(t).all():
-        raise LogError(
-            "time is not a finite number",
-            where=f"{where} row {int(np.argmin(np.isfinite(t)))} counted from 0",
-            do="leave the row out",
-        )
-    if len(t) < 2:
-        raise LogError(
-            "the log has one sample", where=where, allowed="two or more", do="give a longer log"
-        )
-    steps = np.diff(t)
-    within = np.ones(len(steps), dtype=bool)
-    within[breaks - 1] = False
-    if (backwards := within & (steps <= 0.0)).any():
-        row = int(np.argmax(backwards)) + 1
-        verb = "stands still" if t[row] == t[row - 1] else "runs backwards"
-        raise LogError(
-            f"time {verb}: {t[row - 1]:.9g} s, then {t[row]:.9g} s",
-            where=f"{where} row {row} counted from 0",
-            allowed="increasing time",
-            do="leave doubles out, and sort rows that stand in a wrong order",
-        )
-    anew = [row for row in breaks if steps[row - 1] <= 0.0]
-    if anew:
-        step = float(np.median(steps[within])) if within.any() else 1.0
-        t = t.astype(float, copy=True)
-        for row in anew:
-            t[row:] += t[row - 1] + step - t[row]
-    return t

@@ -136,3 +136,75 @@ def test_who_goes_and_comes_back_does_not_rest():
     assert abs(q[1300] - q[700]) < 1e-3 and not rests(q, 700, 1300, usual)
     still = np.full(1000, 0.3) + 1e-4 * np.random.default_rng(0).normal(size=1000)
     assert rests(np.concatenate([q[:4000], still]), 4000, 4999, usual)
+
+
+def arrivals(rng, n, step, size=0.4, stalls=10):
+    """Stamps of even samples that arrive late, and in packets after a stall."""
+    t = step * np.arange(n)
+    late = t + step * size * np.abs(rng.normal(size=n))
+    for k in rng.integers(100, n - 100, stalls):
+        late[k : k + 5] = np.maximum(late[k : k + 5], t[k] + 5.0 * step)
+    return np.round(np.maximum.accumulate(late), 6)
+
+
+@pytest.mark.parametrize("step, size", [(1e-3, 0.4), (2e-3, 0.3), (0.01, 0.3)])
+def test_samples_that_arrive_late_were_taken_evenly(step, size, tmp_path):
+    """Also those that come in one packet, with one stamp."""
+    made, file = columns(20.0, step), tmp_path / "a.csv"
+    made["t"] = arrivals(np.random.default_rng(1), len(made["t"]), step, size)
+    assert np.any(np.diff(made["t"]) == 0.0)
+    file.write_text(csv(made))
+    with pytest.warns(SysidWarning, match="samples were taken evenly"):
+        (found,) = read(file).segments
+    assert found.step == pytest.approx(step, rel=1e-4) and np.array_equal(found.q[:, 0], made["q_shoulder"])
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_what_was_taken_unevenly_or_is_missing_keeps_its_stamps(tmp_path):
+    """Samples at the times that their stamps say, and even ones of which some are missing."""
+    rng, step, file = np.random.default_rng(2), 0.01, tmp_path / "a.csv"
+    t = np.cumsum(step * (1.0 + 0.3 * rng.uniform(-1.0, 1.0, size=3000)))
+    q = np.stack([np.sin(2.0 * t), np.cos(1.7 * t)], axis=1)
+    for kept in (np.ones(3000, dtype=bool), rng.uniform(size=3000) > 0.03):
+        clock = t if kept.all() else step * np.arange(3000)
+        angle = q if kept.all() else np.stack([np.sin(2.0 * clock), np.cos(1.7 * clock)], axis=1)
+        names = [f"{kind}_{joint}" for kind in ("q", "tau") for joint in JOINTS]
+        made = dict(zip(names, np.hstack([angle, angle])[kept].T))
+        file.write_text(csv({"t": clock[kept]} | made))
+        for found in read(file).segments:
+            at = np.sin(2.0 * found.t)
+            assert np.abs(found.q[5:-5, 0] - at[5:-5]).max() < 1e-3
+
+
+def test_doubled_rows_and_packets_that_are_not_even_are_refused(tmp_path):
+    file, t = tmp_path / "a.csv", np.cumsum(0.01 * (1.0 + 0.3 * np.random.default_rng(2).uniform(-1.0, 1.0, size=ROWS)))
+    q = np.stack([np.sin(2.0 * t), np.cos(1.7 * t)], axis=1)
+    names = [f"{kind}_{joint}" for kind in ("q", "tau") for joint in JOINTS]
+    uneven = {"t": t} | dict(zip(names, np.hstack([q, q]).T))
+    uneven["t"][7] = uneven["t"][6]
+    file.write_text(csv(uneven))
+    with pytest.raises(LogError, match="time stands still"):
+        read(file)
+    made = columns()
+    for name in made:
+        made[name][7] = made[name][6]
+    file.write_text(csv(made))
+    with pytest.raises(LogError, match="time stands still"):
+        read(file)
+
+
+@pytest.mark.parametrize("wrapped", [True, False])
+def test_an_angle_is_not_unwrapped_across_a_gap(wrapped, tmp_path):
+    """Within a stretch it is."""
+    t = 0.01 * np.arange(2000)
+    q = 1.2 * t
+    kept = (t < 6.0) | (t > 11.2)
+    angle = (q + np.pi) % (2.0 * np.pi) - np.pi if wrapped else q
+    file = tmp_path / "a.csv"
+    file.write_text(csv({"t": t[kept], "q_shoulder": angle[kept], "q_elbow": np.sin(t[kept]), "tau_shoulder": t[kept], "tau_elbow": np.sin(t[kept])}))
+    with pytest.warns(SysidWarning):
+        first, last = read(file).segments
+    for own in (first, last):
+        turns = (own.q[:, 0] - 1.2 * own.t) / (2.0 * np.pi)
+        assert np.ptp(turns) < 1e-6 and abs(turns[0] - round(turns[0])) < 1e-6
+    assert wrapped or np.allclose(last.q[:, 0], 1.2 * last.t)

@@ -1,0 +1,76 @@
+"""The clock that a log has: where it starts anew, which samples came together, and that it increases."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .errors import LogError
+from .outliers import SHORT
+from .segment import GAP_STEPS
+
+_LITTLE = 1e-3  # of a step
+
+
+def starts(t, breaks) -> np.ndarray:
+    """Rows at which a clock (n,) runs back, not at a break that is known, and on from there, as of
+    another recording; none where it is by as little, or for as short, as of rows in a wrong order.
+    """
+    steps = np.diff(t)
+    back = np.setdiff1d(np.flatnonzero(steps < 0.0) + 1, breaks)
+    if len(back) and np.any(-steps[back - 1] <= GAP_STEPS * np.median(np.abs(steps))):
+        return back[:0]
+    bounds = np.union1d(np.concatenate([[0], back, [len(t)]]), breaks).astype(int)
+    return back if np.diff(bounds).min() >= SHORT else back[:0]
+
+
+def in_packets(t, signals) -> tuple[np.ndarray, tuple[int, ...]]:
+    """The clock with what has the stamp of the row before it and other values a little behind it, as
+    of samples that arrived in one packet, and these rows."""
+    steps = np.diff(t)
+    other = np.any([_differ(np.diff(signals[name], axis=0)) for name in ("q", "tau")], axis=0)
+    rows = np.flatnonzero((steps == 0.0) & other) + 1
+    if not len(rows) or np.any(steps < 0.0):
+        return t, ()
+    t = t.astype(float, copy=True)
+    little = _LITTLE * float(np.median(steps))
+    for row in rows:
+        t[row] = t[row - 1] + little
+    return t, tuple(rows.tolist())
+
+
+def increasing(t, breaks, where: str) -> np.ndarray:
+    """The clock with every recording put a step behind the one before, where it does not stand
+    behind it anyway."""
+    if not np.isfinite(t).all():
+        raise LogError(
+            "time is not a finite number",
+            where=f"{where} row {int(np.argmin(np.isfinite(t)))} counted from 0",
+            do="leave the row out",
+        )
+    if len(t) < 2:
+        raise LogError(
+            "the log has one sample", where=where, allowed="two or more", do="give a longer log"
+        )
+    steps = np.diff(t)
+    within = np.ones(len(steps), dtype=bool)
+    within[breaks - 1] = False
+    if (backwards := within & (steps <= 0.0)).any():
+        row = int(np.argmax(backwards)) + 1
+        verb = "stands still" if t[row] == t[row - 1] else "runs backwards"
+        raise LogError(
+            f"time {verb}: {t[row - 1]:.9g} s, then {t[row]:.9g} s",
+            where=f"{where} row {row} counted from 0",
+            allowed="increasing time",
+            do="leave doubles out, and sort rows that stand in a wrong order",
+        )
+    anew = [row for row in breaks if steps[row - 1] <= 0.0]
+    if anew:
+        step = float(np.median(steps[within])) if within.any() else 1.0
+        t = t.astype(float, copy=True)
+        for row in anew:
+            t[row:] += t[row - 1] + step - t[row]
+    return t
+
+
+def _differ(steps) -> np.ndarray:
+    return np.any(steps != 0.0, axis=1)
