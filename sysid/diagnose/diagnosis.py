@@ -110,7 +110,7 @@ def diagnose(
         named = verdicts(fit, claims, after.unknown, found, *more, *rest)
         said = unasked(named) if wrong else left_open(named, beyond, select.WORTH)
         levels = np.array([f.rms or e for f, e in zip(found, last.rms("test").values())])
-        where = failures(first, fit.predictions["test"].thinned(thinning.MOST), levels)
+        where = failures(first, fit.predictions["test"].thinned(thinning.MOST), levels, view)
         could = detectable(view, asked, candidates(view.model, extra))
         events, part = (*view.motion.events, *test.events), () if whole else measured.notices
         told = tuple(claims), tuple(said), tuple(could), tuple(where), events, view, first, then

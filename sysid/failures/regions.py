@@ -8,7 +8,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..prediction import Prediction
+from ..view import View
 from .held_out import HeldOut
+from .stretches import Stretches, stretches
 
 _CUTS, _HALF = 10, 0.5  # quantiles a region may begin or end at; of the squared error
 _MAP, _WINDOW = 12, 0.5  # cells of a map along a side; s
@@ -38,7 +40,7 @@ class Region:
 @dataclass(frozen=True)
 class Failure:
     """Where one joint's residual is: its share of all joints' error in units of their noise, the
-    regions most crowded with error, a map of the mean residual over (q, qd), the error over time,
+    stretches of time and the regions most crowded with error, a map of the mean residual over (q, qd), the error over time,
     and over frequency.
 
     map: {"q": edges (m + 1,), "qd": edges (m + 1,), "mean": (m, m) [N m], NaN where no row is,
@@ -49,6 +51,7 @@ class Failure:
 
     joint: str
     share: float
+    stretches: Stretches | None
     regions: tuple[Region, ...]
     map: dict = field(repr=False)
     time: dict = field(repr=False)
@@ -56,22 +59,29 @@ class Failure:
 
     def words(self) -> list[str]:
         """Sentences, the most telling first."""
-        return [region.words() for region in self.regions]
+        first = [self.stretches.words()] if self.stretches else []
+        return first + [region.words() for region in self.regions]
+
+    @property
+    def parts(self) -> tuple:
+        """The stretches of time that hold most of the error; none where it is spread out."""
+        return self.stretches.parts if self.stretches else ()
 
 
-def failures(held_out: HeldOut, raw: Prediction, levels) -> list[Failure]:
+def failures(held_out: HeldOut, raw: Prediction, levels, view: View) -> list[Failure]:
     """Where each joint's test residual is.
 
     Args:
         raw: measured and predicted torque of the test logs as the fit sees them, for the
             frequencies.
-        levels: (dof,) noise floors, in which the joints' errors are compared.
+        levels: (dof,) noise floors, in which the joints' errors are compared. view: what the model
+            was settled on.
     """
     robot, rows, known = held_out.model.robot, held_out.rows, held_out.variables
     least = max(1e-9 * np.max(levels), 1e-100)  # of joints that were braked all the time
     weighted = (held_out.rms() / np.maximum(levels, least)) ** 2
-    stretches = _stretches(raw)
-    out = []
+    runs = _runs(raw)
+    out, crowded = [], stretches(held_out, view.motion, view.weights)
     for j, joint in enumerate(robot.joints):
         use = rows.use[:, j]
         left = held_out.residual[use, j]
@@ -88,13 +98,14 @@ def failures(held_out: HeldOut, raw: Prediction, levels) -> list[Failure]:
         )
         q, qd = (known[f"{name}_{joint}"][1][use] for name in ("q", "qd"))
         residuals, steps = (
-            [raw.residual[s, j] for s in stretches],
-            [raw.t[s.start + 1] - raw.t[s.start] for s in stretches],
+            [raw.residual[s, j] for s in runs],
+            [raw.t[s.start + 1] - raw.t[s.start] for s in runs],
         )
         out.append(
             Failure(
                 joint,
                 float(weighted[j] / max(weighted.sum(), 1e-300)),
+                crowded[j],
                 tuple(regions),
                 _map(q, qd, left),
                 _windows(rows.t[use], rows.log[use], square),
@@ -104,7 +115,7 @@ def failures(held_out: HeldOut, raw: Prediction, levels) -> list[Failure]:
     return out
 
 
-def _stretches(raw: Prediction) -> list[slice]:
+def _runs(raw: Prediction) -> list[slice]:
     """Contiguous rows, longer than a few samples."""
     step = np.diff(raw.t)
     usual = np.median(step) if len(step) else 1.0

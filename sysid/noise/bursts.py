@@ -11,7 +11,7 @@ from ..outliers import BURST, CHANCE, bursts, surprise
 _FEWEST = 40  # windows that have a usual
 # Mean squares of a Gaussian over a window: z75 - z50 of one independent value, the widest there is,
 # over the median, and how much flatter its tail is from there on than from z50 to z75.
-_WHITE, _TAIL = 0.19, 0.6
+WHITE, TAIL = 0.19, 0.6
 
 
 def calm(values: list[np.ndarray], kept: list[np.ndarray], steps: list[float], usual=None):
@@ -39,7 +39,7 @@ def calm(values: list[np.ndarray], kept: list[np.ndarray], steps: list[float], u
     middle = float(np.median(squares)) if len(squares) else 0.0
     if len(squares) < _FEWEST or middle <= 0.0:
         return kept
-    s, level = surprise(squares / middle, _WHITE, tail=_TAIL), np.log(len(squares) / CHANCE)
+    s, level = surprise(squares / middle, WHITE, tail=TAIL), np.log(len(squares) / CHANCE)
     out = [k.copy() for k in kept]
     for a, b in bursts(s, level):
         for k, first, last in places[a : b + 1]:

@@ -121,7 +121,10 @@ def failures(fit: Fit, document: dict) -> Section:
             "name": joint,
             "where": where,
             "share": percentage(entry["share_of_error"]),
-            "regions": [_region(region, where) for region in entry["regions"]],
+            "regions": [
+                *(entry["words"][:1] if entry["stretches"] else []),
+                *(_region(region, where) for region in entry["regions"]),
+            ],
             "charts": own,
         })  # fmt: skip
     values = {"joints": joints, "cutoff": number(document["low_pass"]["cutoff_hz"], 3)}

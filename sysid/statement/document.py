@@ -15,7 +15,7 @@ from ..flexible import HUM, TOLD, Unknown
 from ..model_parameters import ROBOT
 from ..plausible import outdated
 from ..units import of_joint
-from . import text
+from . import text, where
 from .claims import chances, claims, confidence_set, finding, ties
 
 
@@ -80,28 +80,7 @@ def _document(found: Diagnosis, run) -> dict:
             }
             for e in found.events
         ],
-        "fails_where": [
-            {
-                "joint": f.joint,
-                "share_of_error": f.share,
-                "words": f.words(),
-                "regions": [
-                    {
-                        "variable": r.variable,
-                        "unit": r.unit,
-                        "low": r.low,
-                        "high": r.high,
-                        "share_of_error": r.error,
-                        "share_of_rows": r.rows,
-                    }
-                    for r in f.regions
-                ],
-                "map": {key: plain(values) for key, values in f.map.items()},
-                "time": {key: plain(values) for key, values in f.time.items()},
-                "frequency": {key: plain(values) for key, values in f.frequency.items()},
-            }
-            for f in found.failures
-        ],
+        "fails_where": [where.entry(f) for f in found.failures],
         "low_pass": {
             "cutoff_hz": found.view.cutoff,
             "rms_test_before": dict(zip(joints, found.first.rms().tolist())),
@@ -187,13 +166,3 @@ def dependences(found: Unknown) -> list[dict]:
         for name, _, other in [words.partition(" and ")]
     ]
     return out or [{"variable": "several variables together", "share": found.share}]
-
-
-def plain(values):
-    """Arrays as lists, NaN as None."""
-    array = np.asarray(values)
-    return (
-        [[number(v) for v in row] for row in array.tolist()]
-        if array.ndim == 2
-        else [number(v) for v in array.tolist()]
-    )

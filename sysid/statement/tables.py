@@ -115,17 +115,6 @@ def _many(kind: str, log: str, some: list[dict]) -> str:
     return f"{words}; each in diagnosis.json"
 
 
-def fails(document: dict, width: int) -> list[str]:
-    """Where the joints that are not done with hold most of their error."""
-    status = {v["joint"]: v["status"] for v in document["verdict"]}
-    out = []
-    for entry in document["fails_where"]:
-        # what is named elsewhere, or named, is better told by its effect; the first is the sharpest
-        if entry["words"] and status[entry["joint"]] in ("unresolved", "unknown"):
-            out += wrapped(f"where {entry['joint']} fails: {entry['words'][0]}", width, "  ")
-    return out
-
-
 def level(value: float | None) -> str:
     """An error to four digits, a dash where there is none."""
     return "-" if value is None else f"{value:.4g}"

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from ..addition import LIKELY, designs, likely
+from . import where
 from .rivals import as_little, other_options, rivals
 from .words import (
     all_of,
@@ -117,7 +118,12 @@ def blind(document: dict) -> list[str]:
     """The joints whose error another log may explain, and nothing that is known now."""
     own = (v for v in document["verdict"] if v["joint"] not in document.get("unused", ()))
     open_ = (v for v in own if v["status"] == "unresolved")
-    return [v["joint"] for v in open_ if not {"may_be", "weighting"} & v.keys()]
+    known = where.touched(document)
+    return [
+        v["joint"]
+        for v in open_
+        if not {"may_be", "weighting"} & v.keys() and v["joint"] not in known
+    ]
 
 
 def needing(document: dict) -> str:

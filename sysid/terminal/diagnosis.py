@@ -4,7 +4,7 @@ from rich.console import Console
 from rich.text import Text
 
 from ..addition import typed
-from ..statement import sizes, tables, text
+from ..statement import sizes, tables, text, where
 from ..unexplained import WEIGHED
 from .next_steps import implausible, mended_first, next_line, next_step, out_of
 from .tables import number, show_notices, table, terminal_width
@@ -19,7 +19,7 @@ def show_diagnosis(found, document: dict, experiment=None, before=()) -> None:
     of, width = text.told(found, document), terminal_width()
     _show_warnings(document)
     show_verdict(of, width)
-    parts = [tables.errors(of, width), tables.suspects(document, width), tables.events(document, width), tables.fails(document, width)]
+    parts = [tables.errors(of, width), tables.suspects(document, width), tables.events(document, width), where.fails(document, width)]
     for lines in [*parts, sizes.fitting(document, found.fit.joints, width)]:
         if lines:
             print("\n" + "\n".join(lines))
@@ -57,6 +57,8 @@ def _after_diagnosis(found, document: dict, experiment) -> None:
         return
     if first is not None or may:
         next_line(first["command"] if first else may[0], out=out)
+    elif where.touched(document):
+        next_step("diagnose", target, first="leave out what is no motion of the robot, if it is none", out=out)
     elif even:
         next_step("diagnose", target, first=f"write {WEIGHED} for {text.listed(even, 'and')}", out=out)
     elif document.get("next_log"):

@@ -1,0 +1,161 @@
+"""The stretches of time that hold most of what a model leaves of all its logs: what acted there acts
+nowhere else, and is no law of the robot.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..motion import Motion
+from ..noise.bursts import TAIL, WHITE
+from ..outliers import CHANCE, bursts, surprise
+from ..projection import inverted, prior_hessian
+from ..settled import Settled
+from .held_out import HeldOut
+
+_WINDOW = 0.2  # s: a push, a snag, a contact last longer
+_APART = 0.6  # s: what is nearer is one
+_MOST, _LESS = 0.5, 0.25  # of the squared error that they hold, in less of the time
+_FEWEST = 40  # windows that have a usual
+_PASSES, _DOUBT = 6, 4.0  # over the weights; times the usual square, of which a window counts half
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """A stretch of a log, from `start` to `stop` [s] on the log's own clock."""
+
+    log: str
+    start: float
+    stop: float
+
+
+@dataclass(frozen=True)
+class Stretches:
+    """Where most of a joint's squared error is, on training and test logs: `error` of it, in `time`
+    [s] of `whole`."""
+
+    parts: tuple[Stretch, ...]
+    error: float
+    time: float
+    whole: float
+
+    def words(self) -> str:
+        """As a sentence says it."""
+        each: dict[str, list[str]] = {}
+        for part in self.parts:
+            each.setdefault(part.log, []).append(f"{part.start:.2f} to {part.stop:.2f} s")
+        where = "; ".join(f"{log}, {', '.join(times)}" for log, times in each.items())
+        return (
+            f"{100 * self.error:.0f} % of the squared error of all logs lies in {self.time:.1f} s of "
+            f"{self.whole:.0f} s: {where}"
+        )
+
+
+def stretches(held_out: HeldOut, train: Motion, weights) -> list[Stretches | None]:
+    """Of each joint the stretches that hold most of its error, None where it is spread out.
+
+    Squares over windows of time against that of most windows, as knocks' are of a residual; where
+    any stands out, once more of what a fit leaves that doubts such windows, as they bend a fit.
+
+    Args:
+        train: the motion that the model was settled on. weights: (dof,) by which joints count.
+    """
+    settled, test = held_out.settled, held_out.rows
+    parts = ((settled.rows, train), (test, held_out.test))
+    found = _found(parts, settled.x)
+    if any(found):
+        found = _found(parts, _doubting(settled, train, np.asarray(weights)))
+    return found
+
+
+def _found(parts, x) -> list[Stretches | None]:
+    known = [(rows, rows.residual(x), motion) for rows, motion in parts]
+    return [_of_joint(known, j) for j in range(known[0][0].tau.shape[1])]
+
+
+def _doubting(settled: Settled, motion: Motion, weights: np.ndarray) -> np.ndarray:
+    """Parameters (size,) of least squares with the prior in which windows count the less the more is
+    left there (Cauchy's weights)."""
+    rows, x = settled.rows, settled.x
+    residual, prior = rows.residual(x), prior_hessian(settled)
+    scale = 2.0 * weights**2
+    pull = np.einsum("j,jnk,nj->k", scale, rows.columns, residual, optimize=True)
+    window = np.unique(
+        np.stack([rows.log, np.floor(rows.t / _WINDOW).astype(np.int64)], axis=1),
+        axis=0, return_inverse=True,
+    )[1].ravel()  # fmt: skip
+    change = np.zeros_like(x)
+    for _ in range(_PASSES):
+        left = residual - np.einsum("jnk,k->nj", rows.columns, change, optimize=True)
+        system, right = prior.copy(), -pull
+        for j, columns in enumerate(rows.columns):
+            count = np.maximum(np.bincount(window, rows.use[:, j]), 1.0)
+            square = np.bincount(window, left[:, j] ** 2) / count
+            there = square[np.bincount(window, rows.use[:, j]) > 0]
+            usual = float(np.median(there)) if len(there) else 0.0
+            counts = scale[j] / (1.0 + (square / max(_DOUBT * usual, 1e-300))[window])
+            system += columns.T @ (columns * counts[:, None])
+            right = right + columns.T @ (counts * residual[:, j])
+        change = inverted(system) @ right
+    return x + change
+
+
+def _of_joint(parts: Sequence[tuple], j: int) -> Stretches | None:
+    found = [_windows(rows, residual, motion, j) for rows, residual, motion in parts]
+    logs = [log for own in found for log in own]
+    squares = np.concatenate([square for *_, square in logs] or [np.zeros(0)])
+    middle = float(np.median(squares)) if len(squares) else 0.0
+    if len(squares) < _FEWEST or middle <= 0.0:
+        return None
+    s = surprise(squares / middle, WHITE, tail=TAIL)
+    level, first, out, held = np.log(len(squares) / CHANCE), 0, [], 0.0
+    for name, starts, own in logs:
+        mine = s[first : first + len(own)]
+        first += len(own)
+        apart = np.flatnonzero(np.diff(starts) > _APART) + 1
+        for index in np.split(np.arange(len(own)), apart):
+            for a, b in bursts(mine[index], level):
+                held += float(own[index[a : b + 1]].sum())
+                out.append(
+                    Stretch(name, float(starts[index[a]]), float(starts[index[b]] + _WINDOW))
+                )
+    out = _joined(out)
+    time, whole = sum(one.stop - one.start for one in out), _WINDOW * len(squares)
+    error = held / float(squares.sum())
+    return (
+        Stretches(tuple(out), error, time, whole)
+        if error > _MOST and time < _LESS * whole
+        else None
+    )
+
+
+def _windows(rows, residual, motion: Motion, j: int) -> list[tuple[str, np.ndarray, np.ndarray]]:
+    """Of each log: its name, the starts (k,) [s] of its windows that have enough rows of a joint, and
+    the mean squares (k,) there."""
+    names = {piece.log: piece.source for piece in motion.pieces}
+    use, out = rows.use[:, j], []
+    for log in np.unique(rows.log):
+        own = use & (rows.log == log)
+        if not own.any():
+            continue
+        number = np.floor(rows.t[own] / _WINDOW).astype(np.int64)
+        unique, index, count = np.unique(number, return_inverse=True, return_counts=True)
+        square = np.bincount(index, residual[own, j] ** 2) / count
+        enough = 2 * count >= np.median(count)
+        out.append((names[int(log)], unique[enough] * _WINDOW, square[enough]))
+    return out
+
+
+def _joined(found: Sequence[Stretch]) -> list[Stretch]:
+    """Stretches of which those that are near each other are one."""
+    out: list[Stretch] = []
+    for one in found:
+        last = out[-1] if out else None
+        if last and last.log == one.log and one.start - last.stop <= _APART:
+            out[-1] = Stretch(one.log, last.start, one.stop)
+        else:
+            out.append(one)
+    return out

@@ -1,0 +1,97 @@
+"""Where a model fails, as documents and a terminal have it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..failures import Failure
+from ..fit_document import number
+from .words import wrapped
+
+
+def entry(found: Failure) -> dict:
+    """What a document has of one joint."""
+    return {
+        "joint": found.joint,
+        "share_of_error": found.share,
+        "words": found.words(),
+        "stretches": [
+            {"log": one.log, "start": one.start, "stop": one.stop} for one in found.parts
+        ],
+        "regions": [
+            {
+                "variable": r.variable,
+                "unit": r.unit,
+                "low": r.low,
+                "high": r.high,
+                "share_of_error": r.error,
+                "share_of_rows": r.rows,
+            }
+            for r in found.regions
+        ],
+        "map": {key: plain(values) for key, values in found.map.items()},
+        "time": {key: plain(values) for key, values in found.time.items()},
+        "frequency": {key: plain(values) for key, values in found.frequency.items()},
+    }
+
+
+def touched(document: dict) -> list[str]:
+    """The joints that are not done with whose error lies in a few stretches of time."""
+    status = {v["joint"]: v["status"] for v in document["verdict"]}
+    return [
+        own["joint"]
+        for own in document.get("fails_where", ())
+        if own.get("stretches") and status[own["joint"]] in ("unresolved", "unknown")
+    ]
+
+
+def fails(document: dict, width: int) -> list[str]:
+    """Where the joints that are not done with hold most of their error."""
+    status = {v["joint"]: v["status"] for v in document["verdict"]}
+    out = []
+    for own in document["fails_where"]:
+        # what is named elsewhere, or named, is better told by its effect; the first is the sharpest
+        if own["words"] and status[own["joint"]] in ("unresolved", "unknown"):
+            out += wrapped(f"where {own['joint']} fails: {own['words'][0]}", width, "  ")
+    if joints := touched(document):
+        said = (
+            "what acts for a while alone, a push, a snag, a contact, is no law of the robot: if you "
+            "know of one there, leave it out, under `preprocess:` in the experiment file, and "
+            "diagnose again"
+        )
+        out += [*wrapped(said, width, "  "), *masks(document, joints)]
+    return out
+
+
+def masks(document: dict, joints: list[str]) -> list[str]:
+    """What an experiment file says to leave those stretches out: of all joints, as what touches an
+    arm is borne by many of them."""
+    spans: dict[str, list[tuple[float, float]]] = {}
+    for own in document["fails_where"]:
+        for one in own["stretches"] if own["joint"] in joints else ():
+            spans.setdefault(one["log"], []).append((one["start"], one["stop"]))
+    out = ["mask:"]
+    for log, each in spans.items():
+        for start, stop in _united(each):
+            out.append(f"  - {{log: {log}, start: {start:.2f}, stop: {stop:.2f}}}")
+    return out
+
+
+def _united(spans: list[tuple[float, float]]) -> list[tuple[float, float]]:
+    out: list[tuple[float, float]] = []
+    for start, stop in sorted(spans):
+        if out and start <= out[-1][1]:
+            out[-1] = (out[-1][0], max(stop, out[-1][1]))
+        else:
+            out.append((start, stop))
+    return out
+
+
+def plain(values):
+    """Arrays as lists, NaN as None."""
+    array = np.asarray(values)
+    return (
+        [[number(v) for v in row] for row in array.tolist()]
+        if array.ndim == 2
+        else [number(v) for v in array.tolist()]
+    )
