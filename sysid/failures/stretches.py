@@ -119,9 +119,9 @@ def _of_joint(parts: Sequence[tuple], j: int) -> Stretches | None:
         for index in np.split(np.arange(len(own)), apart):
             for a, b in bursts(mine[index], level):
                 held += float(own[index[a : b + 1]].sum())
-                out.append(
-                    Stretch(name, float(starts[index[a]]), float(starts[index[b]] + _WINDOW))
-                )
+                # what begins and ends softly is there a little longer than it stands out
+                start, stop = float(starts[index[a]]), float(starts[index[b]]) + _WINDOW
+                out.append(Stretch(name, max(start - _WINDOW, 0.0), stop + _WINDOW))
     out = _joined(out)
     time, whole = sum(one.stop - one.start for one in out), _WINDOW * len(squares)
     error = held / float(squares.sum())
