@@ -19,17 +19,20 @@ from .held_out import HeldOut
 _WINDOW = 0.2  # s: a push, a snag, a contact last longer
 _APART = 0.6  # s: what is nearer is one
 _MOST, _LESS = 0.5, 0.25  # of the squared error that they hold, in less of the time
+_LITTLE = 0.02  # of the squared error: what holds less is no matter
 _FEWEST = 40  # windows that have a usual
 _PASSES, _DOUBT = 6, 4.0  # over the weights; times the usual square, of which a window counts half
 
 
 @dataclass(frozen=True)
 class Stretch:
-    """A stretch of a log, from `start` to `stop` [s] on the log's own clock."""
+    """A stretch of a log, from `start` to `stop` [s] on the log's own clock; error: the share that it
+    holds of a joint's squares on all logs."""
 
     log: str
     start: float
     stop: float
+    error: float
 
 
 @dataclass(frozen=True)
@@ -111,25 +114,23 @@ def _of_joint(parts: Sequence[tuple], j: int) -> Stretches | None:
     if len(squares) < _FEWEST or middle <= 0.0:
         return None
     s = surprise(squares / middle, WHITE, tail=TAIL)
-    level, first, out, held = np.log(len(squares) / CHANCE), 0, [], 0.0
+    level, first, out, whole = np.log(len(squares) / CHANCE), 0, [], float(squares.sum())
     for name, starts, own in logs:
         mine = s[first : first + len(own)]
         first += len(own)
         apart = np.flatnonzero(np.diff(starts) > _APART) + 1
         for index in np.split(np.arange(len(own)), apart):
             for a, b in bursts(mine[index], level):
-                held += float(own[index[a : b + 1]].sum())
+                error = float(own[index[a : b + 1]].sum()) / whole
                 # what begins and ends softly is there a little longer than it stands out
                 start, stop = float(starts[index[a]]), float(starts[index[b]]) + _WINDOW
-                out.append(Stretch(name, max(start - _WINDOW, 0.0), stop + _WINDOW))
-    out = _joined(out)
-    time, whole = sum(one.stop - one.start for one in out), _WINDOW * len(squares)
-    error = held / float(squares.sum())
-    return (
-        Stretches(tuple(out), error, time, whole)
-        if error > _MOST and time < _LESS * whole
-        else None
-    )
+                out.append(Stretch(name, max(start - _WINDOW, 0.0), stop + _WINDOW, error))
+    # a window of noise that stands out holds next to nothing of the whole
+    out = [one for one in _joined(out) if one.error > _LITTLE]
+    time, length = sum(one.stop - one.start for one in out), _WINDOW * len(squares)
+    error = sum(one.error for one in out)
+    few = error > _MOST and time < _LESS * length
+    return Stretches(tuple(out), error, time, length) if few else None
 
 
 def _windows(rows, residual, motion: Motion, j: int) -> list[tuple[str, np.ndarray, np.ndarray]]:
@@ -155,7 +156,7 @@ def _joined(found: Sequence[Stretch]) -> list[Stretch]:
     for one in found:
         last = out[-1] if out else None
         if last and last.log == one.log and one.start - last.stop <= _APART:
-            out[-1] = Stretch(one.log, last.start, one.stop)
+            out[-1] = Stretch(one.log, last.start, one.stop, last.error + one.error)
         else:
             out.append(one)
     return out
