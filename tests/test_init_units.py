@@ -50,6 +50,15 @@ def test_torques_a_thousand_times_off_are_in_another_unit(cli, tmp_path, factor,
     assert not [f for f in check.check(made) if f.severity == "error"]
 
 
+@pytest.mark.parametrize(("joint", "shown", "factor"), [("elbow", 100.0, 100.0), ("elbow", 180.0 / np.pi, 180.0 / np.pi), ("shoulder", 100.0, 100.0)])
+def test_one_angle_of_a_motor_s_shaft_is_behind_a_gear(cli, tmp_path, joint, shown, factor):
+    """Its ratio is what goes with the torques, to a tenth; degrees stay degrees."""
+    said, made = begun(cli, folder_of(tmp_path, URDF, shown={joint: shown}))
+    (column,) = made.data.position[joint].items()
+    assert column[0] == f"q_{joint}" and 1.0 / column[1] == pytest.approx(factor, rel=0.1 if factor == 100.0 else 1e-3)
+    assert ("a motor's shaft, behind a gear of about" in " ".join(said.split())) == (factor == 100.0)
+
+
 def test_a_slide_in_millimetres_beside_a_hinge(cli, tmp_path):
     """Its limits tell it; the hinge keeps its own unit, degrees too."""
     for name, hinge, unit in (("rad", 1.0, "rad"), ("deg", 180.0 / np.pi, "deg")):

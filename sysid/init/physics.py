@@ -18,6 +18,7 @@ from ..check.look import Look, looked
 from ..errors import LogError
 from ..units import DEGREE, of_joint
 from ..warned import noticed
+from . import shafts
 from .guess import Draft, Guess
 from .logged import Signals
 
@@ -148,8 +149,9 @@ def held_against(
         angles = out.guesses["data.units.position"]
         small = angles.value == "rad" and not found.position.meaning.unit and not rad
         how = {"currents": amperes is not None or servos, "alone": angles.alone}
-        if small and (turned := in_degrees(look, **how)):
-            told = _degrees(look, angles, turned)
+        gear = shafts.ratio(look, angles.alone) if small and angles.alone else None
+        if small and (turned := [angles.alone] if gear else in_degrees(look, **how)):
+            told = shafts.told(look, angles, gear) if gear else _degrees(look, angles, turned)
             if (beside := out.guesses.get(told.key)) and told.key == "data.position":
                 told = replace(told, value=beside.value | told.value)
             out = out.having(replace(angles, doubt=""), told)
@@ -175,7 +177,7 @@ def _degrees(look: Look, angles: Guess, joints: list[str]) -> Guess:
     why = "only as degrees do such angles go with the torques of the URDF's robot"
     if len(joints) > 1 or (column := look.column("position", joints[0])) is None:
         return Guess(angles.key, "deg", f"{angles.why}, and {why}")
-    doubt = f"{angles.why}; the others' stay as they are"
+    doubt = f"{angles.why}; the others' stay as they are; of a motor's shaft write 1 / (gear ratio)"
     return Guess("data.position", {joints[0]: {column: DEGREE}}, why, doubt)
 
 
