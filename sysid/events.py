@@ -33,10 +33,8 @@ WORDS = {
 }  # fmt: skip
 KINDS = tuple(WORDS)
 #: told alone: no row is left out for them
-TOLD = {
-    "saturation": "not left out", "slip": "taken out of the angle",
-    "glitch": "taken out of the angle",
-}  # fmt: skip
+_OUT = "taken out of the angle"
+TOLD = {"saturation": "not left out", "slip": _OUT, "glitch": _OUT}
 #: a sample or a few, in whose place a straight line stands
 MENDED = ("spike", "empty")
 _PASSES = 3  # over the spikes: without the largest, those beside them stand out

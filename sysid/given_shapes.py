@@ -24,10 +24,17 @@ def said_of_shapes(fit) -> list[str]:
         out.append(f"{', '.join(one.name for one in group)}: {begun}; {checked if counts[-1] else 'no profile was checked'}")
     if held := [v.name for v in fit.model.shape_values if v.held]:
         out.append(f"{', '.join(held)}: held as the experiment says")
-    for value, at in zip(fit.model.shape_values, fit.model.shapes):
-        if at_edge(value, at):
-            out.append(f"{value.name} = {at:.4g}{behind(value.unit)} is at the edge of its range, {value.low:.4g} to {value.high:.4g}")
-    return out
+    return out + at_edges(fit)
+
+
+def at_edges(fit) -> list[str]:
+    """The shape values that ended at an end of their range, in sentences."""
+    shapes = zip(fit.model.shape_values, fit.model.shapes)
+    return [
+        f"{value.name} = {at:.4g}{behind(value.unit)} is at the edge of its range, {value.low:.4g} to {value.high:.4g}: what it is may lie beyond, or it is another effect"
+        for value, at in shapes
+        if at_edge(value, at)
+    ]
 
 
 def at_edge(value, at: float) -> bool:

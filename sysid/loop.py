@@ -19,6 +19,7 @@ from .diagnose.diagnosis import Diagnosis, diagnose
 from .effect_entry import asked, with_effect
 from .errors import SysidError
 from .estimate import Fit
+from .given_shapes import at_edges
 from .specs import Experiment
 from .statement import kept
 from .warned import noticed
@@ -221,7 +222,7 @@ def document(added: Added) -> dict:
         "added": name, "experiment": str(added.experiment.path), "rms_test_before": added.before.rms("test"), "rms_test_after": added.after.rms("test"),
         "refused": added.refused, "says": added.says,
         "differences": [{"joint": d.joint, "delta_rms": d.delta_rms, "se": fit_document.number(d.se)} for d in added.differences],
-        "parameters": own, "untold": _untold(added, name), "converged": found["converged"], "notices": found["notices"],
+        "parameters": own, "untold": _untold(added, name), "converged": found["converged"], "notices": [*found["notices"], *at_edges(added.after)],
     }  # fmt: skip
 
 

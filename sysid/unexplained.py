@@ -12,6 +12,7 @@ from .candidates import Candidate
 from .effect import NotFinite
 from .estimate import Fit
 from .failures import HeldOut, fallen
+from .given_shapes import at_edges
 from .model_parameters import ROBOT
 from .plausible import other_means
 
@@ -268,6 +269,7 @@ def notices(claims, refused: Sequence[Refused]) -> list[str]:
     """What to know beside claims, and of what is not claimed."""
     heads = [c.head for c in claims if c.after.weights is None and not c.head.size_told]
     told = [f"{r.effect} on {r.joint} is not claimed: {r.why}" for r in refused]
+    told += at_edges(claims[-1].after) if claims else []
     return told + [hidden_by_weights(head.effect, head.joint) for head in heads]
 
 

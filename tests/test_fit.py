@@ -332,6 +332,6 @@ def test_a_certificate_says_what_it_takes_as_given(leg):
     assert said_of_shapes(fit) == [
         "a.hip.x, a.hip.y: started from 30 places; the profile over each was checked at 9 to 12 values, and none lay lower",
         "b.hip.z: started where the effect does nothing; its profile was checked at 8 values, which led to a lower place, and the search went on there",
-        "c.hip.w: held as the experiment says", "a.hip.y = 2 is at the edge of its range, 0.1 to 2",
+        "c.hip.w: held as the experiment says", "a.hip.y = 2 is at the edge of its range, 0.1 to 2: what it is may lie beyond, or it is another effect",
     ]  # fmt: skip
     assert not at_edge(value("x", start=0.1), 0.1) and at_edge(value("x"), 0.1) and not at_edge(value("x"), 0.11)

@@ -40,7 +40,8 @@ class Region:
 @dataclass(frozen=True)
 class Failure:
     """Where one joint's residual is: its share of all joints' error in units of their noise, the
-    stretches of time and the regions most crowded with error, a map of the mean residual over (q, qd), the error over time,
+    stretches of time and the regions most crowded with error, a map of the mean residual over
+    (q, qd), the error over time,
     and over frequency.
 
     map: {"q": edges (m + 1,), "qd": edges (m + 1,), "mean": (m, m) [N m], NaN where no row is,

@@ -1,5 +1,5 @@
-"""The stretches of time that hold most of what a model leaves of all its logs: what acted there acts
-nowhere else, and is no law of the robot.
+"""The stretches of time that hold most of what a model leaves of all its logs: what acted there
+acts nowhere else, and is no law of the robot.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ _PASSES, _DOUBT = 6, 4.0  # over the weights; times the usual square, of which a
 
 @dataclass(frozen=True)
 class Stretch:
-    """A stretch of a log, from `start` to `stop` [s] on the log's own clock; error: the share that it
-    holds of a joint's squares on all logs."""
+    """A stretch of a log, from `start` to `stop` [s] on the log's own clock; error: the share that
+    it holds of a joint's squares on all logs."""
 
     log: str
     start: float
@@ -52,8 +52,8 @@ class Stretches:
             each.setdefault(part.log, []).append(f"{part.start:.2f} to {part.stop:.2f} s")
         where = "; ".join(f"{log}, {', '.join(times)}" for log, times in each.items())
         return (
-            f"{100 * self.error:.0f} % of the squared error of all logs lies in {self.time:.1f} s of "
-            f"{self.whole:.0f} s: {where}"
+            f"{100 * self.error:.0f} % of the squared error of all logs lies in {self.time:.1f} s "
+            f"of {self.whole:.0f} s: {where}"
         )
 
 
@@ -80,8 +80,8 @@ def _found(parts, x) -> list[Stretches | None]:
 
 
 def _doubting(settled: Settled, motion: Motion, weights: np.ndarray) -> np.ndarray:
-    """Parameters (size,) of least squares with the prior in which windows count the less the more is
-    left there (Cauchy's weights)."""
+    """Parameters (size,) of least squares with the prior in which windows count the less the more
+    is left there (Cauchy's weights)."""
     rows, x = settled.rows, settled.x
     residual, prior = rows.residual(x), prior_hessian(settled)
     scale = 2.0 * weights**2
@@ -134,8 +134,8 @@ def _of_joint(parts: Sequence[tuple], j: int) -> Stretches | None:
 
 
 def _windows(rows, residual, motion: Motion, j: int) -> list[tuple[str, np.ndarray, np.ndarray]]:
-    """Of each log: its name, the starts (k,) [s] of its windows that have enough rows of a joint, and
-    the mean squares (k,) there."""
+    """Of each log: its name, the starts (k,) [s] of its windows that have enough rows of a joint,
+    and the mean squares (k,) there."""
     names = {piece.log: piece.source for piece in motion.pieces}
     use, out = rows.use[:, j], []
     for log in np.unique(rows.log):

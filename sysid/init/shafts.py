@@ -1,4 +1,5 @@
-"""A joint's angle that is its motor's shaft's: many turns, and torques that go with them behind a gear."""
+"""A joint's angle that is its motor's shaft's: many turns, and torques that go with them behind a
+gear."""
 
 from __future__ import annotations
 

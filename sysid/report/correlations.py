@@ -27,10 +27,15 @@ def correlation_map(name: str, names: list[str], found: np.ndarray) -> dict:
     }]  # fmt: skip
     layout = {
         "xaxis": {
-            "type": "category", "tickangle": -60, "tickfont": {"size": 10}, "automargin": True,
+            "type": "category",
+            "tickangle": -60,
+            "tickfont": {"size": 10},
+            "automargin": True,
         },
         "yaxis": {
-            "type": "category", "tickfont": {"size": 10}, "automargin": True,
+            "type": "category",
+            "tickfont": {"size": 10},
+            "automargin": True,
             "autorange": "reversed",
         },
         "margin": {"l": 10, "r": 10, "t": 10, "b": 10},

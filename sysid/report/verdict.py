@@ -5,7 +5,7 @@ from __future__ import annotations
 from ..addition import LIKELY, apart, designs, likely
 from ..estimate import Fit
 from ..given_shapes import given_shapes, said_of_shapes
-from ..statement import text
+from ..statement import text, where
 from ..statement.words import either, followed, near, option, otherwise, percent, refused, untold
 from .section import Section
 from .words import (
@@ -54,7 +54,7 @@ def verdict(fit: Fit, document: dict) -> Section:
         "notices": document["notices"],
         "made": document.get("made", ""),
         "next_log": document.get("next_log"),
-        "needing": text.needing(document) if document.get("next_log") else "",
+        "needing": where.needing(document) if document.get("next_log") else "",
         "another": text.ANOTHER,
         "own_law": _first(text.OWN).replace("`", ""),
         "trying": text.TRIED,
@@ -112,7 +112,7 @@ def _card(found: dict, fit: Fit, document: dict) -> dict:
         "left": left_words(found, fit),
         "near": near(found, document) + refused(joint, document) if status == "complete" else "",
         "tried": found.get("may_be"),
-        "blind": joint in text.blind(document),
+        "blind": joint in where.blind(document),
         "says": _first(says),
         "commands": commands,
         "error": f"{level(error)}{SPACE}{force}",

@@ -15,7 +15,7 @@ from ..flexible import HUM, TOLD, Unknown
 from ..model_parameters import ROBOT
 from ..plausible import outdated
 from ..units import of_joint
-from . import text, where
+from . import where
 from .claims import chances, claims, confidence_set, finding, ties
 
 
@@ -26,7 +26,7 @@ def document(found: Diagnosis, run="") -> dict:
     stands, and neither an effect that may be it nor how the fit weighs its joints does.
     """
     out = _document(found, run)
-    blind = text.blind(out)
+    blind = where.blind(out)
     return {**out, "next_log": another_log(found.fit.experiment.path) if blind else None}
 
 

@@ -69,7 +69,7 @@ def verdict(of: Told, width: int) -> list[tuple[str, list[str]]]:
         (f"{v['joint']}: {v['status']}", _joint(v, of, width, said)) for v in of.document["verdict"]
     ]
     if of.document.get("next_log"):
-        words = f"{needing(of.document)}; {ANOTHER} is designed by"
+        words = f"{where.needing(of.document)}; {ANOTHER} is designed by"
         out.append(("", [*wrapped(words, width, "  "), of.document["next_log"]]))
     return out
 
@@ -112,24 +112,6 @@ def _joint(v: dict, of: Told, width: int, said: dict[str, str]) -> list[str]:
     if status == "unknown":
         lines += wrapped(f"  {OWN}", width, "    ")
     return lines
-
-
-def blind(document: dict) -> list[str]:
-    """The joints whose error another log may explain, and nothing that is known now."""
-    own = (v for v in document["verdict"] if v["joint"] not in document.get("unused", ()))
-    open_ = (v for v in own if v["status"] == "unresolved")
-    known = where.touched(document)
-    return [
-        v["joint"]
-        for v in open_
-        if not {"may_be", "weighting"} & v.keys() and v["joint"] not in known
-    ]
-
-
-def needing(document: dict) -> str:
-    """Which joints need another log, in words."""
-    joints = blind(document)
-    return f"{listed(joints, 'and')} need{'s' * (len(joints) == 1)} another log"
 
 
 def _fall(v: dict, of: Told) -> str:

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..failures import Failure
 from ..fit_document import number
-from .words import wrapped
+from .words import listed, wrapped
 
 
 def entry(found: Failure) -> dict:
@@ -45,6 +45,24 @@ def touched(document: dict) -> list[str]:
     ]
 
 
+def blind(document: dict) -> list[str]:
+    """The joints whose error another log may explain, and nothing that is known now."""
+    own = (v for v in document["verdict"] if v["joint"] not in document.get("unused", ()))
+    open_ = (v for v in own if v["status"] == "unresolved")
+    known = touched(document)
+    return [
+        v["joint"]
+        for v in open_
+        if not {"may_be", "weighting"} & v.keys() and v["joint"] not in known
+    ]
+
+
+def needing(document: dict) -> str:
+    """Which joints need another log, in words."""
+    joints = blind(document)
+    return f"{listed(joints, 'and')} need{'s' * (len(joints) == 1)} another log"
+
+
 def fails(document: dict, width: int) -> list[str]:
     """Where the joints that are not done with hold most of their error."""
     status = {v["joint"]: v["status"] for v in document["verdict"]}
@@ -55,8 +73,8 @@ def fails(document: dict, width: int) -> list[str]:
             out += wrapped(f"where {own['joint']} fails: {own['words'][0]}", width, "  ")
     if joints := touched(document):
         said = (
-            "what acts for a while alone, a push, a snag, a contact, is no law of the robot: if you "
-            "know of one there, leave it out, under `preprocess:` in the experiment file, and "
+            "what acts for a while alone, a push, a snag, a contact, is no law of the robot: if "
+            "you know of one there, leave it out, under `preprocess:` in the experiment file, and "
             "diagnose again"
         )
         out += [*wrapped(said, width, "  "), *masks(document, joints)]
