@@ -157,6 +157,10 @@ def _convert(signals, data: DataSpec, joints, prismatic, where: str, drives) -> 
         for joint, own in drives.items():
             if own.servo:
                 signals[f"signals.{motor_side.command_name(joint)}"] *= scale[joints.index(joint)]
+    for joint, zero in data.zero.items():
+        signals["q"][:, joints.index(joint)] += zero
+        if joint in drives and drives[joint].servo:
+            signals[f"signals.{motor_side.command_name(joint)}"] += zero
     # a sum's factors make torque of its signals
     logged = [j for j in joints if j not in (*data.torque, *data.unused, *drives)]
     each = dict(zip(joints, units.scales(data.units.torque, prismatic)))

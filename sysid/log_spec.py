@@ -120,6 +120,7 @@ class DataSpec(Spec):
     rate: Positive | None = None
     torque: dict[str, Sum] = {}
     position: dict[str, Annotated[dict[str, NonZero], Field(min_length=1)]] = {}
+    zero: dict[str, float] = {}
     unused: list[str] = []
     date: Day | None = None
 

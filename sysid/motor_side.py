@@ -89,13 +89,13 @@ def check(data: DataSpec, actuators: Mapping[str, ActuatorSpec], joints: tuple[s
     Raises:
         ConfigError: it is not, or has two.
     """
-    given = {"data.torque": data.torque, "data.position": data.position, "data.unused": data.unused, "actuator": actuators}
+    given = {"data.torque": data.torque, "data.position": data.position, "data.zero": data.zero, "data.unused": data.unused, "actuator": actuators}
     for key, named in given.items():
         for joint in named:
             if joint not in joints:
                 raise ConfigError(f"{key} names the joint {joint!r}", allowed=", ".join(joints), do="correct the joint")
     for joint in joints:
-        sources = [key for key, named in given.items() if key != "data.position" and joint in named]
+        sources = [key for key, named in given.items() if key not in ("data.position", "data.zero") and joint in named]
         if len(sources) > 1:
             raise ConfigError(f"the torque of joint {joint!r} is told by {' and by '.join(sources)}", allowed="one of them", do="leave one out")
     if data.position and (data.columns.velocity or data.columns.acceleration):

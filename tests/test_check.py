@@ -126,7 +126,7 @@ def test_another_reading_is_scored_as_the_log_that_it_makes(made, tmp_path):
     spoiled.tables = {file: table.rename(names).select(table.columns) for file, table in spoiled.tables.items()}
     spoiled.save()
     wrong = looked(pipeline.load(logs)).equations
-    exchanged = Reading((0, 1), (1, 0), (1.0, 1.0), (1.0, 1.0))
+    exchanged = Reading((0, 1), (1, 0), (1.0, 1.0), (1.0, 1.0), (0.0, 0.0))
     assert wrong.scored(exchanged).left == pytest.approx(right.scored(Reading.plain(2)).left, rel=1e-9)
     assert wrong.scored(exchanged).loss < wrong.scored(Reading.plain(2)).loss - 2.0
 
@@ -241,6 +241,23 @@ def test_an_angle_and_its_torque_that_one_log_has_with_the_other_sign_are_named_
     found = [f for f in check.check(pipeline.load(logs)) if f.severity == "error"]
     assert [(f.fault, f.joint, f.log) for f in found] == [("sign_flipped", "elbow", "train_1.csv")]
     assert "the angle and torque of elbow has in train_1.csv alone" in found[0].says
+
+
+@pytest.mark.parametrize(("joint", "zero", "turn"), [("shoulder", 0.5 * np.pi, "a quarter turn"), ("elbow", -0.5 * np.pi, "a quarter turn back"), ("shoulder", np.pi, "half a turn")])
+def test_a_zero_that_is_a_quarter_turn_off_is_said_and_mended(joint, zero, turn, made, tmp_path):
+    logs = shutil.copytree(made(), tmp_path / "logs")
+    for file in ("train.csv", "test.csv"):
+        table = pl.read_csv(logs / file)
+        table.with_columns(pl.col(f"q_{joint}") - zero).write_csv(logs / file)
+    (told,) = [f for f in check.check(pipeline.load(logs)) if "zero" in f.says]
+    assert (told.fault, told.joint) == ("limit_exceeded", joint) and f"looks {turn} from the URDF's" in told.says
+    wanted = told.do.partition("write data.zero: ")[2].partition(";")[0]
+    assert wanted == f"{{{joint}: {zero:.6g}}}"
+    text = (logs / "config.yaml").read_text()
+    assert "\ndata:\n" in text
+    (logs / "config.yaml").write_text(text.replace("\ndata:\n", f"\ndata:\n  zero: {wanted}\n"))
+    assert not [f for f in check.check(pipeline.load(logs)) if "zero" in f.says]
+    assert check.misread(pipeline.load(logs)) == []
 
 
 @pytest.mark.parametrize("wrong", ["train_1.csv", "train_2.csv"])

@@ -54,7 +54,8 @@ def faults_of(look: Look) -> list[Fault]:
 def misread(experiment: Experiment) -> list[Fault]:
     """The errors of how an experiment's columns are read: their order, signs and units."""
     with noticed():
-        return [f for f in _found(looked(experiment), _READINGS) if f.severity == ERROR]
+        found = _found(looked(experiment), _READINGS)
+        return [f for f in found if f.severity == ERROR or f.fault == "limit_exceeded"]
 
 
 def _found(look, asked: Collection[str] = ()) -> Iterator[Fault]:

@@ -28,18 +28,19 @@ FEWEST = 50  # rows by which a joint can be told anything
 @dataclass(frozen=True)
 class Reading:
     """How columns are read: the joint whose column each joint's angle and torque (dof,) really is,
-    and their factors (dof,)."""
+    their factors (dof,), and the angles [rad] of the URDF at which these read zero."""
 
     angle: tuple[int, ...]
     torque: tuple[int, ...]
     angle_factor: tuple[float, ...]
     torque_factor: tuple[float, ...]
+    zero: tuple[float, ...]
 
     @staticmethod
     def plain(dof: int) -> Reading:
         """As the experiment says."""
         own, one = tuple(range(dof)), (1.0,) * dof
-        return Reading(own, own, one, one)
+        return Reading(own, own, one, one, (0.0,) * dof)
 
 
 @dataclass(frozen=True)
@@ -89,6 +90,7 @@ class Equations:
         columns = []
         for q, qd, qdd, smoother, rows in self.pieces:
             q, qd, qdd = (a[:, own] * factor for a in (q, qd, qdd))
+            q = q + reading.zero
             p = regressor.torque(self.robot, self.robot.prior, q, qd, qdd)
             stacked = np.stack([p, qdd, qd, np.sign(qd), np.ones_like(q)])
             columns.append(smoother.at(np.moveaxis(stacked, 1, 2), rows))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from itertools import combinations
+from itertools import combinations, product
 
 import numpy as np
 
@@ -18,6 +18,7 @@ AFTER, SENSELESS = 2, ("wrong_unit", "angle_wrap")
 # otherwise: what is left falls to a third of its power.
 _BETTER = 1.0
 _ROUNDS = 4
+_QUARTERS = (1, 2, -1)  # turns by which a log's zero may be off the URDF's
 _EXPLAINS = 0.2  # of a joint's torque squared: less of the URDF's torque tells no factor
 # and of so much that a factor, were it free, explains much more
 _TAKES, _CLEAR = 0.01, 3.0  # the same; logarithm of the squares that are left
@@ -27,7 +28,7 @@ _OUT_OF = "or take it as it is, where the URDF is what is wrong"
 
 
 def find(look: Look) -> Iterator[Fault]:
-    """joint_order, sign_flipped, wrong_unit, torque_in_amperes."""
+    """joint_order, sign_flipped, limit_exceeded, wrong_unit, torque_in_amperes."""
     equations = look.equations
     if equations is None:
         return
@@ -57,6 +58,9 @@ def readings(reading: Reading, dof: int) -> Iterator[tuple[Reading, tuple]]:
         yield replace(reading, torque=torque), ("joint_order", (i, j), "torque")
         yield replace(reading, angle=angle), ("joint_order", (i, j), "angle")
         yield replace(reading, angle=angle, torque=torque), ("joint_order", (i, j), "")
+    for j, quarters in product(range(dof), _QUARTERS):
+        zero = tuple(quarters * np.pi / 2 if k == j else z for k, z in enumerate(reading.zero))
+        yield replace(reading, zero=zero), ("limit_exceeded", (j,), quarters)
     for j in range(dof):
         angle, torque = _turned(reading.angle_factor, j), _turned(reading.torque_factor, j)
         yield replace(reading, torque_factor=torque), ("sign_flipped", (j,), "torque")
@@ -86,6 +90,15 @@ def _clear(before: Scored, after: Scored, joints, word: str) -> bool:
 
 def _told(look: Look, kind: str, joints, word: str) -> Iterator[Fault]:
     names = [look.robot.joints[j] for j in joints]
+    if kind == "limit_exceeded":
+        turn = {1: "a quarter turn", 2: "half a turn", -1: "a quarter turn back"}[word]
+        says = (
+            f"the zero of {names[0]}'s angle looks {turn} from the URDF's: from there the URDF's "
+            "robot explains the torques"
+        )
+        do = f"write data.zero: {{{names[0]}: {word * np.pi / 2:.6g}}}; {_OUT_OF}"
+        yield Fault(kind, WARNING, says, do, names[0])
+        return
     kinds = ["position", "torque"] if word in ("", "angle and torque") else [_KEYS[word]]
     for name in names:
         if kind == "joint_order":
