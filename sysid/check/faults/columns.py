@@ -170,6 +170,9 @@ def _factors(look: Look, equations: Equations, reading: Reading, scored: Scored)
                 (
                     "if it is a current set data.units.torque: A and torque_constant, the "
                     "gear's ratio included"
+                    if every
+                    else "is it the motor's, before a gear, or a current? give it in N m, on the "
+                    "joint's side"
                 ),
                 name,
             )

@@ -49,8 +49,11 @@ def find(look: Look) -> Iterator[Fault]:
             yield Fault(
                 "delayed_signal",
                 WARNING,
-                (f"the torque of {joint} is {1e3 * abs(lag):.2g} ms {word} than its motion"),
-                "log both from the same cycle, or add the effect delay",
+                (
+                    f"the torque of {joint} looks {1e3 * abs(lag):.2g} ms {word} than its motion: "
+                    "a delay, or an effect that looks like one"
+                ),
+                "`sysid diagnose` says which; log both from the same cycle where it is a delay",
                 joint,
             )
 
