@@ -19,6 +19,7 @@ from .events import Event
 from .finite import check_finite
 from .full_turns import followed, going_on
 from .groups import levels_of
+from .held_rows import without_held
 from .log_spec import DataSpec, LogSpec
 from .recording import Recording, recorded
 from .rounded_stamps import off_steady
@@ -78,7 +79,7 @@ def read(log: LogSpec, data: DataSpec, joints: tuple[str, ...], prismatic, folde
 def assembled(samples: Recording, log: LogSpec, data: DataSpec, joints: tuple[str, ...], prismatic) -> Log:
     """The log of what was `measured` of an entry of an experiment: angles go on, an irregular clock is
     resampled, gaps and ends of recordings split it."""
-    samples = arrivals.evened(going_on(samples, joints, prismatic))
+    samples = without_held(arrivals.evened(going_on(samples, joints, prismatic)))
     hashes = {name: sha256(path) for name, path in samples.files.items()}
     each = list(hashes.values())
     whole = each[0] if len(each) == 1 else hashlib.sha256("".join(each).encode()).hexdigest()

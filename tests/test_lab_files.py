@@ -1,5 +1,7 @@
 """Files as loggers leave them: two recordings in one, torque that was not written, angles that stand alone."""
 
+import warnings
+
 import numpy as np
 import polars as pl
 import pytest
@@ -208,3 +210,27 @@ def test_an_angle_is_not_unwrapped_across_a_gap(wrapped, tmp_path):
         turns = (own.q[:, 0] - 1.2 * own.t) / (2.0 * np.pi)
         assert np.ptp(turns) < 1e-6 and abs(turns[0] - round(turns[0])) < 1e-6
     assert wrapped or np.allclose(last.q[:, 0], 1.2 * last.t)
+
+
+def test_rows_in_which_nothing_came_are_left_out(tmp_path):
+    """What a robot at rest repeats, and a logger that writes each value twice, stays."""
+    made, file = columns(20.0, 0.005), tmp_path / "a.csv"
+    n = len(made["t"])
+    held = {name: values.copy() for name, values in made.items()}
+    for name in list(made)[1:]:
+        for first, count in ((400, 30), (1500, 8)):
+            held[name][first : first + count] = held[name][first - 1]
+    file.write_text(csv(held))
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        found = read(file)
+    assert "38 rows, 2 times, only repeat the row before while the robot moves, the first at 2 s" in str(told[0].message)
+    assert [len(s.t) for s in found.segments] == [400, n - 430]  # a short one is interpolated
+    assert np.abs(found.segments[1].q[:, 0] - made["q_shoulder"][430:]).max() < 1e-3
+    resting = {name: values.copy() for name, values in made.items()}
+    for name in list(made)[1:]:
+        resting[name][400:] = resting[name][400]
+    twice = {name: values if name == "t" else np.repeat(values[::6], 6)[:n] for name, values in made.items()}
+    for other in (resting, twice, made):
+        file.write_text(csv(other))
+        assert sum(len(s.t) for s in read(file).segments) == n
