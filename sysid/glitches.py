@@ -9,6 +9,7 @@ import numpy as np
 from .outliers import NORMAL, SHORT, SPIKE, quantum, spikes
 from .running import running
 
+_NOISES = 4.0  # deviations of the angle's noise, of which a step is usual
 _BESIDE, _ORDER = 6, 3  # samples to either side, between which the motion is a polynomial
 
 
@@ -22,9 +23,10 @@ def without_glitches(q: np.ndarray) -> tuple[np.ndarray, list[list[tuple[int, in
     if len(q) < SHORT:
         return q, [[] for _ in q.T]
     middle = np.stack([running(own, 4 * SPIKE + 1, "median", "edge") for own in q.T], axis=1)
-    # where an angle turns round it stands beside its median by its noise and its steps
+    # where an angle turns round it stands beside its median by its noise and its steps; what is no
+    # more than the tails of a noisy encoder does no harm
     noise = np.median(np.abs(np.diff(q, 2, axis=0)), axis=0) / (NORMAL * np.sqrt(6.0))
-    grain = np.maximum(np.sqrt(2.0) * noise, [quantum(own) for own in q.T])
+    grain = np.maximum(_NOISES * noise, [quantum(own) for own in q.T])
     found = spikes(q - middle, grain=grain)
     if not any(found):
         return q, found
