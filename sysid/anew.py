@@ -9,11 +9,11 @@ import numpy as np
 from .full_turns import jumps
 from .outliers import SHORT, quantum
 from .recording import Recording
-from .segment import GAP_STEPS
 from .warned import warn
 
 _FARTHER = 3.0  # times as far as in any other step: no motion does that on several joints at once
 _MOST = 0.001  # of the steps: what comes oftener is the logger's way
+_LOST = 1.5  # steps: in longer ones samples are missing
 _GRAINS = 2.5  # quanta: what a resting joint's noise jumps by
 
 
@@ -42,14 +42,16 @@ def angle_starts(t, q, breaks, turns) -> np.ndarray:
     if len(steps) < SHORT:
         return np.zeros(0, dtype=int)
     clock = np.diff(t)
-    asked = clock <= GAP_STEPS * np.median(clock)  # about a gap the file is split anyway
+    asked = clock <= _LOST * np.median(clock)  # over what is missing any joint goes far
     asked[np.asarray(breaks, dtype=int) - 1] = False
     far = np.stack([_far(own, asked, bool(turn)) for own, turn in zip(steps.T, turns)], axis=1)
     far[1:] &= np.any(steps[:-1] != 0.0, axis=1)[:, None]  # else a reading that stood still goes on
     far &= np.abs(steps) > _GRAINS * np.array([quantum(own) for own in q.T])
     moving = int(np.sum(np.ptp(q, axis=0) > 0.0))
     count = far.sum(axis=1)
-    return np.flatnonzero((count >= 2) & (2 * count > moving)) + 1
+    found = np.flatnonzero((count >= 2) & (2 * count > moving)) + 1
+    bounds = np.union1d(np.concatenate([[0], found, [len(t)]]), breaks).astype(int)
+    return found if np.diff(bounds).min() >= SHORT else found[:0]  # a few rows are none
 
 
 def _far(steps, asked, turns: bool) -> np.ndarray:

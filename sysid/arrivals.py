@@ -5,12 +5,15 @@ one packet, and none of them missing. Angles tell it: on an even clock they are 
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
 from .errors import LogError
 from .recording import Recording
+from .rounded_stamps import ROUNDED, off_steady
 from .running import running
+from .segment import gaps
 from .warned import warn
 
 _PIECE, _ORDER = 21, 3  # samples in which a motion is a polynomial of that order
@@ -24,7 +27,8 @@ _IRREGULAR = 0.05  # of a step, RMS: what is less, resampling mends
 def evened(samples: Recording) -> Recording:
     """Samples with an even clock where their angles say that they were taken so, which is told."""
     t, late = samples.t.astype(float, copy=True), 0.0
-    for first, last in samples.parts:
+    bounds = np.union1d(samples.breaks, gaps(samples.t)).astype(int)
+    for first, last in pairwise([0, *bounds.tolist(), len(t)]):
         own = slice(first, last)
         if (even := _even(t[own], samples.signals["q"][own])) is not None:
             late = max(late, float(np.max(t[own] - even)))
@@ -51,6 +55,8 @@ def _even(t: np.ndarray, q: np.ndarray) -> np.ndarray | None:
     n, steps = len(t), np.diff(t)
     if n < _FEWEST * _PIECE or not np.std(steps) > _IRREGULAR * np.median(steps):
         return None
+    if off_steady(t, float(np.median(steps))) <= ROUNDED:
+        return None  # rounded, and not late
     index = np.arange(n)
     earliest = _earliest(t, index)
     if earliest is None:

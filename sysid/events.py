@@ -6,8 +6,8 @@ knock       several joints pulsed or rang at once, for tens of milliseconds: a h
 spike       a sample or a few of one joint's torque stand alone
 brake       one joint's torque repeats exactly while it rests: not the torque that holds it
 frozen      one joint's torque or angle repeats exactly while it moves: the reading stood still
-missing     one joint's torque never changes though it moves, is 0 for a while, or was not written
-empty       a sample or a few of a joint's torque were not written
+missing     one joint's torque never changes though it moves, or is 0 for a while
+unwritten   no torque of a joint was written for a while; empty: in a sample or a few
 saturation  as frozen, at the highest or lowest torque of the log: told, but not left out
 glitch      a sample or a few of an angle stand alone: told, and what is about them in their place
 slip        an angle steps between two samples as no motion does: told, and taken out of the angle
@@ -28,15 +28,18 @@ from .segment import Segment
 
 WORDS = {
     "knock": "knock", "spike": "torque spike", "brake": "closed brake", "frozen": "frozen value",
-    "missing": "missing torque", "empty": "empty sample of torque",
+    "missing": "missing torque", "unwritten": "stretch without torque",
+    "empty": "empty sample of torque",
     "saturation": "flat top", "glitch": "angle spike", "slip": "step of an angle", "mask": "masked stretch",
 }  # fmt: skip
 KINDS = tuple(WORDS)
-#: told alone: no row is left out for them
 _OUT = "taken out of the angle"
+#: told alone: no row is left out for them
 TOLD = {"saturation": "not left out", "slip": _OUT, "glitch": _OUT}
 #: a sample or a few, in whose place a straight line stands
 MENDED = ("spike", "empty")
+#: what no log can keep
+UNWRITTEN = ("unwritten", "empty")
 _PASSES = 3  # over the spikes: without the largest, those beside them stand out
 _SHOWN = 4  # times of each kind and log that a notice gives
 _AGAIN = 4  # knocks of a joint in one part of an experiment: more than accidents
@@ -235,7 +238,7 @@ def told(events: Sequence[Event], left_out: float, part: str, joints: int) -> li
         own = [e.kind == "mask" for e in masked]
         why = "masked" if all(own) else "disturbed or masked" if any(own) else "disturbed"
         share = f"{100 * left_out:.1f} % of the {part} rows left out as {why}"
-        kept = any(e.kind not in ("mask", "empty") for e in masked) and not any(own)
+        kept = any(e.kind not in ("mask", *UNWRITTEN) for e in masked) and not any(own)
         keeps = "; preprocess.events: keep keeps them" if kept else ""
         out.append(f"{share}: {_summary(masked)}{keeps}")
         if said := again([j for e in masked if e.kind == "knock" for j in e.joints], joints):

@@ -11,7 +11,7 @@ from . import events, long_log, masks, robot
 from . import log as logs
 from .bumps import bumps
 from .free_memory import released
-from .glitches import without_glitches
+from .glitches import without_glitches, without_their_slopes
 from .log_spec import LogSpec
 from .model import Model
 from .robot import Robot
@@ -101,7 +101,8 @@ def _shown(machine: Robot, log: logs.Log, among: int) -> logs.Log:
         for kind, places in (("glitch", alone), ("slip", steps)):
             own = [*own, *_of_angles(kind, segment.t, places, machine.joints, log.name)]
         found += [e for e in own if not (e.signal == "torque" and set(e.joints) <= set(log.unused))]
-        segments.append(segment if angles is segment.q else replace(segment, q=angles))
+        rates = {name: without_their_slopes(getattr(segment, name), alone) for name in ("qd", "qdd")}
+        segments.append(segment if angles is segment.q else replace(segment, q=angles, **rates))
     return replace(log, events=tuple(found), segments=tuple(segments))
 
 
@@ -128,7 +129,7 @@ def _of_span(machine: Robot, log: logs.Log, number: int) -> tuple[list[events.Ev
     """Events of a span of a log, its step [s] and its extent; nothing of it stays in memory."""
     released()
     span = log.segments.around(number, _BESIDE)
-    (own,) = _disturbed(machine, [replace(log, segments=(replace(span, core=None),))], among=len(log.segments))
+    (own,) = _disturbed(machine, [replace(log, segments=(replace(span, core=None),), events=())], among=len(log.segments))
     return events.clipped(own.events, *span.t[[span.core.start, span.core.stop - 1]]), span.step, events.extent(span)
 
 

@@ -3,8 +3,9 @@
 import numpy as np
 
 from .errors import LogError
-from .outliers import runs
+from .outliers import SPIKE, runs
 
+_OFTEN = 0.2  # of the rows: samples that are empty as often are of another rate
 _LARGEST = 1e20  # no unit makes a measured signal larger (a clock in ns, logged as a signal, reads 2e18)
 
 
@@ -12,18 +13,22 @@ def filled(values, name: str, where: str) -> tuple[np.ndarray, list[tuple[int, i
     """Values (n,) with straight lines where nothing was written, and the first and the last row of every such stretch.
 
     Raises:
-        LogError: nothing was written in most of the rows.
+        LogError: nothing was written at all, in most of the rows, or in every other row or so.
     """
     empty = np.isnan(values)
     if not empty.any():
         return values, []
-    if 2 * empty.sum() > len(values):
+    if empty.all():
+        raise LogError(f"{name} is empty", where=where, do="leave the file out, or name the joint in data.unused")
+    found = runs(empty)
+    alone = sum(b - a + 1 for a, b in found if b - a < SPIKE)
+    if 2 * empty.sum() > len(values) or alone > _OFTEN * len(values):
         raise LogError(
             f"{name} is written in {100 * (1 - empty.mean()):.2g} % of the rows", where=where, allowed="a value in most rows",
             do="leave the rows without it out: what is left is as fast as it was logged",
         )  # fmt: skip
     rows = np.arange(len(values))
-    return np.where(empty, np.interp(rows, rows[~empty], values[~empty]), values), runs(empty)
+    return np.where(empty, np.interp(rows, rows[~empty], values[~empty]), values), found
 
 
 def check_finite(values, name: str, where: str, *, joints=(), t=None, first: int = 0) -> None:

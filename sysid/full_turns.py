@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from .recording import Recording
-from .segment import GAP_STEPS
+from .segment import gaps
 from .warned import warn
 
 TURN = 2.0 * np.pi  # rad
@@ -23,9 +23,8 @@ def jumps(moved: np.ndarray) -> np.ndarray:
 
 def going_on(samples: Recording, joints: tuple[str, ...], prismatic) -> Recording:
     """Samples in SI units whose angles go on where they jumped by a turn, which is said."""
-    steps = np.diff(samples.t)
-    gaps = np.flatnonzero(steps > GAP_STEPS * np.median(steps)) + 1  # nobody knows how far it turned meanwhile
-    bounds = [0, *np.union1d(samples.breaks, gaps).astype(int).tolist(), len(samples.t)]
+    # nobody knows how far a joint turned in a gap
+    bounds = [0, *np.union1d(samples.breaks, gaps(samples.t)).astype(int).tolist(), len(samples.t)]
     q, found = unwrapped(samples.signals["q"], ~np.asarray(prismatic), list(zip(bounds, bounds[1:])))
     for j in found:
         warn(f"{samples.where}: the angle of joint {joints[j]!r} jumps by a turn, and is taken to go on (numpy.unwrap)", above=2)

@@ -11,6 +11,8 @@ from .running import running
 
 _NOISES = 4.0  # deviations of the angle's noise, of which a step is usual
 _BESIDE, _ORDER = 6, 3  # samples to either side, between which the motion is a polynomial
+_NEAR = 24  # samples to either side among which these are
+_FELT = 3  # samples to either side of which a logger's own derivative is made
 
 
 def without_glitches(q: np.ndarray) -> tuple[np.ndarray, list[list[tuple[int, int]]]]:
@@ -36,9 +38,27 @@ def without_glitches(q: np.ndarray) -> tuple[np.ndarray, list[list[tuple[int, in
         for first, last in own:
             good[first : last + 1] = False
         for first, last in own:
-            before, after = rows[:first][good[:first]], rows[last + 1 :][good[last + 1 :]]
-            about = np.concatenate([before[-_BESIDE:], after[:_BESIDE]])
+            near = rows[max(first - _NEAR, 0) : last + _NEAR + 1]
+            near = near[good[near]]
+            about = np.concatenate([near[near < first][-_BESIDE:], near[near > last][:_BESIDE]])
             alone, order = np.arange(first, last + 1), min(_ORDER, len(about) - 1)
             curve = np.polynomial.Polynomial.fit(about, q[about, j], order)
             out[alone, j] = curve(alone)
     return out, found
+
+
+def without_their_slopes(
+    values: np.ndarray | None, found: list[list[tuple[int, int]]]
+) -> np.ndarray | None:
+    """Logged speeds or accelerations (n, dof) with straight lines where they were made of samples
+    that stand alone; None where none were logged."""
+    if values is None or not any(found):
+        return values
+    out, rows = values.copy(), np.arange(len(values))
+    for j, own in enumerate(found):
+        good = np.ones(len(values), dtype=bool)
+        for first, last in own:
+            good[max(first - _FELT, 0) : last + _FELT + 1] = False
+        if good.any() and not good.all():
+            out[~good, j] = np.interp(rows[~good], rows[good], values[good, j])
+    return out

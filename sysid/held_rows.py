@@ -1,5 +1,5 @@
-"""Rows that only repeat the one before, in every column, while the robot moves: messages that did not
-arrive. They are no samples, and are left out."""
+"""Rows that only repeat the angles and torques of the one before while the robot moves: messages that
+did not arrive. They are no samples, and are left out."""
 
 from __future__ import annotations
 
@@ -7,12 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from .outliers import SHORT, quantum, runs
+from .outliers import SHORT, runs
 from .recording import Recording
+from .repeats import held_angle
+from .segment import gaps
 from .warned import warn
 
 _FEWEST = 4  # rows: fewer may be alike by chance
-_GRAINS = 2.5  # quanta by which an angle is elsewhere when it goes on: it moved meanwhile
 _OFTEN = 0.5  # of the rows: what comes more often is how the logger writes
 
 
@@ -22,12 +23,16 @@ def without_held(samples: Recording) -> Recording:
     if len(q) < SHORT:
         return samples
     again = np.all(np.diff(q, axis=0) == 0.0, axis=1) & np.all(np.diff(tau, axis=0) == 0.0, axis=1)
-    again[samples.breaks - 1] = False
-    found = [(a + 1, b + 1) for a, b in runs(again) if b - a + 1 >= _FEWEST]
+    apart = np.union1d(samples.breaks, gaps(samples.t)).astype(int)
+    again[apart - 1] = False
+    found = {
+        (a, b + 1) for a, b in runs(again) if b - a + 1 >= _FEWEST
+    }  # the sample and its repeats
     if not found or again.sum() > _OFTEN * len(q):
         return samples
-    grain = _GRAINS * np.array([quantum(own) for own in q.T])
-    moved = [(a, b) for a, b in found if np.any(np.abs(q[min(b + 1, len(q) - 1)] - q[a]) > grain)]
+    # a joint at least went on as it came, and made up for it at once
+    moved = sorted(found & {run for own in q.T for run in held_angle(own)})
+    moved = [(a + 1, b) for a, b in moved if not np.any((apart > a) & (apart <= b + 1))]
     if not moved:
         return samples
     kept = np.ones(len(q), dtype=bool)
@@ -41,11 +46,6 @@ def without_held(samples: Recording) -> Recording:
         above=2,
     )
     place = np.cumsum(kept) - kept  # how many of the rows before each are kept
-    empty = tuple(
-        (j, int(place[a]), max(int(place[b + 1 if b + 1 < len(q) else b]) - 1, int(place[a])))
-        for j, a, b in samples.empty
-    )
     signals = {name: values[kept] for name, values in samples.signals.items()}
-    return replace(
-        samples, t=samples.t[kept], signals=signals, breaks=place[samples.breaks], empty=empty
-    )
+    breaks = place[samples.breaks]
+    return replace(samples, t=samples.t[kept], signals=signals, breaks=breaks, empty=())

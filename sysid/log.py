@@ -22,7 +22,7 @@ from .groups import levels_of
 from .held_rows import without_held
 from .log_spec import DataSpec, LogSpec
 from .recording import Recording, recorded
-from .rounded_stamps import off_steady
+from .rounded_stamps import ROUNDED, off_steady
 from .segment import GAP_STEPS, Segment
 from .slips import SLOWEST
 from .spans import Spans
@@ -30,9 +30,6 @@ from .warned import warn
 
 # Of a step: stamps that are off by less are right; and even ones, which say nothing of it, by less than the other.
 _TOLD, _EVEN = 1e-3, 1e-2
-# Of what stamps are rounded to: as much beside a line is a steady clock's own rounding. Twice that is most likely a steady one's
-# too, which ran late now and then, unless the angles tell otherwise.
-_ROUNDED = 0.505
 NO_ACTUATORS: dict[str, ActuatorSpec] = {}
 DEGREES = 4.0 * np.pi  # rad: no robot joint turns so far from zero, but its angle in degrees does
 
@@ -79,13 +76,14 @@ def read(log: LogSpec, data: DataSpec, joints: tuple[str, ...], prismatic, folde
 def assembled(samples: Recording, log: LogSpec, data: DataSpec, joints: tuple[str, ...], prismatic) -> Log:
     """The log of what was `measured` of an entry of an experiment: angles go on, an irregular clock is
     resampled, gaps and ends of recordings split it."""
-    samples = without_held(arrivals.evened(going_on(samples, joints, prismatic)))
+    samples = arrivals.evened(going_on(samples, joints, prismatic))
+    lacking, samples = unwritten.told(samples, joints), without_held(samples)
     hashes = {name: sha256(path) for name, path in samples.files.items()}
     each = list(hashes.values())
     whole = each[0] if len(each) == 1 else hashlib.sha256("".join(each).encode()).hexdigest()
     segments = tuple(_segments(samples.t, samples.signals, samples.where, samples.breaks))
     return Log(
-        samples.name, next(iter(samples.files.values())), whole, segments, unwritten.told(samples, joints), hashes=hashes, unused=tuple(data.unused),
+        samples.name, next(iter(samples.files.values())), whole, segments, lacking, hashes=hashes, unused=tuple(data.unused),
         levels=levels_of(data.groups, log),
     )  # fmt: skip
 
@@ -105,11 +103,13 @@ def measured(
     samples = recorded(log, data, joints, folder, drives, table=table)
     if log.start is not None or log.stop is not None:
         first, samples = _piece(samples, log)
-    samples = unwritten.filled(samples, joints)
+    if table is None:  # of what is read in parts nobody would say it of the whole
+        samples = unwritten.filled(samples, joints)
     for name, values in samples.signals.items():
         check_finite(values, name, samples.where, joints=joints, t=samples.t, first=first)
     _convert(samples.signals, data, joints, prismatic, samples.where, drives)
-    samples = anew.apart(samples, prismatic)
+    if table is None:
+        samples = anew.apart(samples, prismatic)
     for joint, own in drives.items():
         _driven(samples, joints.index(joint), joint, own)
     return samples
@@ -203,10 +203,10 @@ def _segments(t, signals, where: str, breaks: Iterable[int] = ()):
         if b - a < 2:
             continue
         rounding = off_steady(clock, step)
-        written = rounding > _ROUNDED
+        written = rounding > ROUNDED
         true = corrected(clock, part["q"], written=written) if written or step > 0.99 * SLOWEST else Clock(clock)
         told, left = true.off > (_TOLD if written else _EVEN) * step, None
-        if not told and rounding <= 2.0 * _ROUNDED:
+        if not told and rounding <= 2.0 * ROUNDED:
             mean = (clock[-1] - clock[0]) / (len(clock) - 1)
             yield segment(clock[0] + mean * np.arange(len(clock)), mean, part)
             continue

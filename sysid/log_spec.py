@@ -120,7 +120,7 @@ class DataSpec(Spec):
     rate: Positive | None = None
     torque: dict[str, Sum] = {}
     position: dict[str, Annotated[dict[str, NonZero], Field(min_length=1)]] = {}
-    zero: dict[str, float] = {}
+    zero: dict[str, Annotated[float, AfterValidator(_finite)]] = {}
     unused: list[str] = []
     date: Day | None = None
 

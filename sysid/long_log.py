@@ -17,7 +17,6 @@ import numpy as np
 
 from . import log as logs
 from . import recorded_columns, recording, spans, units
-from .errors import LogError
 from .even_clock import EvenClock, Stretch
 from .full_turns import going_on
 from .groups import levels_of
@@ -135,13 +134,6 @@ class _Source:
         with noticed() as told:
             how = (spec, self._data, self._joints, self._prismatic, self._folder)
             samples = logs.measured(*how, table=part, first=row)
-            if samples.empty:
-                j, own, _ = samples.empty[0]
-                raise LogError(
-                    f"the torque of joint {self._joints[j]!r} is empty",
-                    where=f"{self._table.path} row {row + own} counted from 0",
-                    do="leave the row out",
-                )
             if not wrapped:
                 samples = going_on(samples, self._joints, self._prismatic)
         for said in told:

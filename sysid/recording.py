@@ -99,7 +99,7 @@ def recorded(
             )
         breaks = np.union1d(breaks, anew)
         own = stamps.starts(t, breaks)
-        if len(own) and not anew:
+        if len(own):
             warn(
                 f"{where}: the clock starts anew at row {', '.join(map(str, own[:4]))}"
                 f"{', ...' * (len(own) > 4)} counted from 0: what comes from there on is a recording "
@@ -113,7 +113,7 @@ def recorded(
         for path in table.files
     }
     breaks = breaks.astype(int)
-    t, together = stamps.in_packets(t, signals)
+    t, together = stamps.in_packets(t, signals, breaks)
     t = stamps.increasing(t, breaks, where)
     return Recording(log.name, where, files, t, signals, breaks, together=together)
 
@@ -152,7 +152,7 @@ def _load(table: Table, data: DataSpec, joints, episodes, drives):
             do="remove episode, or give start and stop",
         )  # fmt: skip
     asked = [*filter(None, (time, counted)), *(c for names in wanted.values() for c in names if c)]
-    columns = table.load(list(dict.fromkeys(asked)), [c for c in wanted.get("tau", ()) if c])
+    columns = table.load(list(dict.fromkeys(asked)), _may_lack(wanted, data))
     lengths = {name: len(values) for name, values in columns.items()}
     if len(set(lengths.values())) > 1:
         shown = ", ".join(f"{name!r} {length}" for name, length in lengths.items())
@@ -187,6 +187,12 @@ def _load(table: Table, data: DataSpec, joints, episodes, drives):
                     signals[name][:, k] = columns[c][rows]
     _sum(signals, data, joints)
     return (columns[time][rows] if time else None), unit, signals, breaks
+
+
+def _may_lack(wanted: dict, data: DataSpec) -> set[str]:
+    """The columns that may be empty in some rows: those of torque, and what alone torque's sums need."""
+    sums = [f"sums.{name}" for entry in data.torque.values() for name in entry]
+    return {column for key in ("tau", *sums) for column in wanted.get(key, ()) if column}
 
 
 def _signals(table: Table, data: DataSpec, joints, drives) -> dict[str, list[str]]:

@@ -6,6 +6,9 @@ import numpy as np
 
 # Steps that all stay this close to the median are uniform sampling with rounded time stamps.
 UNIFORM = 0.02
+# Of what stamps are rounded to: as much beside a line is a steady clock's own rounding. Twice that is most likely a steady one's
+# too, which ran late now and then, unless the angles tell otherwise.
+ROUNDED = 0.505
 
 
 def off_steady(t, step: float) -> float:

@@ -12,6 +12,12 @@ from .clock import Left
 GAP_STEPS = 10.0
 
 
+def gaps(t) -> np.ndarray:
+    """Rows before which a clock (n,) has a gap: of samples that come in packets most steps are next to nothing, and the mean is usual."""
+    steps = np.diff(t)
+    return np.flatnonzero(steps > GAP_STEPS * max(np.median(steps), np.mean(steps))) + 1 if len(steps) else np.zeros(0, dtype=int)
+
+
 @dataclass(frozen=True)
 class Segment:
     """Uniformly sampled signals without a gap. t (n,) [s]; q, tau (n, dof); qd, qdd (n, dof) or None where not logged.

@@ -19,23 +19,33 @@ def starts(t, breaks) -> np.ndarray:
     back = np.setdiff1d(np.flatnonzero(steps < 0.0) + 1, breaks)
     if len(back) and np.any(-steps[back - 1] <= GAP_STEPS * np.median(np.abs(steps))):
         return back[:0]
+    if not len(back):
+        return back
     bounds = np.union1d(np.concatenate([[0], back, [len(t)]]), breaks).astype(int)
     return back if np.diff(bounds).min() >= SHORT else back[:0]
 
 
-def in_packets(t, signals) -> tuple[np.ndarray, tuple[int, ...]]:
+def in_packets(t, signals, breaks) -> tuple[np.ndarray, tuple[int, ...]]:
     """The clock with what has the stamp of the row before it and other values a little behind it, as
-    of samples that arrived in one packet, and these rows."""
+    of samples that arrived in one packet, and these rows.
+
+    Args:
+        breaks: rows at which another recording begins.
+    """
     steps = np.diff(t)
+    steps[np.asarray(breaks, dtype=int) - 1] = 0
     other = np.any([_differ(np.diff(signals[name], axis=0)) for name in ("q", "tau")], axis=0)
-    rows = np.flatnonzero((steps == 0.0) & other) + 1
-    if not len(rows) or np.any(steps < 0.0):
+    together = (steps == 0) & other
+    together[np.asarray(breaks, dtype=int) - 1] = False
+    rows = np.flatnonzero(together) + 1
+    if not len(rows) or np.any(steps < 0):
         return t, ()
     t = t.astype(float, copy=True)
-    little = _LITTLE * float(np.median(steps))
-    for row in rows:
-        t[row] = t[row - 1] + little
-    return t, tuple(rows.tolist())
+    little = _LITTLE * float(np.median(steps[steps > 0])) if np.any(steps > 0) else 0.0
+    # of a packet the first has its stamp, and each of the others stands a little behind the one before
+    number = np.arange(len(t))
+    first = np.maximum.accumulate(np.where(np.append(False, together), 0, number))
+    return t + little * (number - first), tuple(rows.tolist())
 
 
 def increasing(t, breaks, where: str) -> np.ndarray:

@@ -31,7 +31,7 @@ def filled(samples: Recording, joints: tuple[str, ...]) -> Recording:
 
 def told(samples: Recording, joints: tuple[str, ...]) -> tuple[Event, ...]:
     """Where a joint's torque was not written."""
-    t, kinds = samples.t, ("missing", "empty")
+    t, kinds = samples.t, ("unwritten", "empty")
     return ordered(
         [
             Event(kinds[b - a < SPIKE], samples.name, float(t[a]), float(t[b]), (joints[j],))

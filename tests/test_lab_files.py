@@ -93,7 +93,7 @@ def test_torque_that_was_not_written_counts_for_nothing(kind, experiment, cli):
     machine, structure, _ = pipeline.build(loaded)
     (found,) = experiment_logs.read(loaded, machine, loaded.data.train)
     told = [(e.kind, e.joints) for e in found.events]
-    assert told == [("missing", ("elbow",)), ("empty", ("shoulder",))]
+    assert told == [("unwritten", ("elbow",)), ("empty", ("shoulder",))]
     use = usable(found.segments[0].t, JOINTS, found.events, torque=0.05)
     assert not use[200:300, 1].any() and np.flatnonzero(~use[:, 0]).tolist() == [450]
     said = cli("fit", folder, "--json")

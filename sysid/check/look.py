@@ -11,6 +11,7 @@ import numpy as np
 from .. import experiment_logs, pipeline
 from ..errors import SysidError
 from ..estimate import Fit
+from ..events import UNWRITTEN
 from ..listed_effects import build, found
 from ..lowpass import band, lowpassed, stride_of, widest
 from ..model import Model
@@ -139,7 +140,8 @@ class Look:
         """The experiment fitted as it is; None where it cannot be."""
         parts = ([log.log for log in self.part(name)] for name in ("train", "test"))
         if self.experiment.preprocess.events == "keep":
-            parts = ([replace(log, events=()) for log in part] for part in parts)
+            own = lambda log: tuple(e for e in log.events if e.kind in UNWRITTEN)  # noqa: E731
+            parts = ([replace(log, events=own(log)) for log in part] for part in parts)
         try:
             return pipeline.fit(self.experiment, measured=experiment_logs.Read(*parts, ()))
         except Untrusted:

@@ -13,14 +13,17 @@ from ..motion import Motion
 from ..noise.bursts import TAIL, WHITE
 from ..outliers import CHANCE, bursts, surprise
 from ..projection import inverted, prior_hessian
+from ..running import running
 from ..settled import Settled
 from .held_out import HeldOut
 
 _WINDOW = 0.2  # s: a push, a snag, a contact last longer
 _APART = 0.6  # s: what is nearer is one
 _MOST, _LESS = 0.5, 0.25  # of the squared error that they hold, in less of the time
-_LITTLE = 0.02  # of the squared error: what holds less is no matter
+_LITTLE = 0.005  # of the squared error: what holds less is no matter
 _FEWEST = 40  # windows that have a usual
+_LIKE = 31  # windows of the nearest pace, by which one is judged
+_SHOWN = 8  # stretches: more are how the robot moves
 _PASSES, _DOUBT = 6, 4.0  # over the weights; times the usual square, of which a window counts half
 
 
@@ -67,15 +70,26 @@ def stretches(held_out: HeldOut, train: Motion, weights) -> list[Stretches | Non
         train: the motion that the model was settled on. weights: (dof,) by which joints count.
     """
     settled, test = held_out.settled, held_out.rows
-    parts = ((settled.rows, train), (test, held_out.test))
+    parts = _with_pace(((settled.rows, train), (test, held_out.test)))
     found = _found(parts, settled.x)
     if any(found):
         found = _found(parts, _doubting(settled, train, np.asarray(weights)))
     return found
 
 
+def _with_pace(parts) -> list[tuple]:
+    """Rows and motion of parts, with how fast the robot moves there (n,): the squares of all speeds
+    and accelerations over the usual ones."""
+    paces = []
+    for name in ("qd", "qdd"):
+        squares = [rows.of(motion, name) ** 2 for rows, motion in parts]
+        usual = np.mean(np.concatenate(squares), axis=0)
+        paces.append([np.sum(own / np.where(usual > 0.0, usual, 1.0), axis=1) for own in squares])
+    return [(*part, qd + qdd) for part, qd, qdd in zip(parts, *paces)]
+
+
 def _found(parts, x) -> list[Stretches | None]:
-    known = [(rows, rows.residual(x), motion) for rows, motion in parts]
+    known = [(rows, rows.residual(x), motion, pace) for rows, motion, pace in parts]
     return [_of_joint(known, j) for j in range(known[0][0].tau.shape[1])]
 
 
@@ -107,15 +121,14 @@ def _doubting(settled: Settled, motion: Motion, weights: np.ndarray) -> np.ndarr
 
 
 def _of_joint(parts: Sequence[tuple], j: int) -> Stretches | None:
-    found = [_windows(rows, residual, motion, j) for rows, residual, motion in parts]
-    logs = [log for own in found for log in own]
-    squares = np.concatenate([square for *_, square in logs] or [np.zeros(0)])
+    logs = [log for part in parts for log in _windows(*part, j)]
+    squares, pace = (np.concatenate([log[k] for log in logs] or [np.zeros(0)]) for k in (2, 3))
     middle = float(np.median(squares)) if len(squares) else 0.0
     if len(squares) < _FEWEST or middle <= 0.0:
         return None
-    s = surprise(squares / middle, WHITE, tail=TAIL)
-    level, first, out, whole = np.log(len(squares) / CHANCE), 0, [], float(squares.sum())
-    for name, starts, own in logs:
+    s = _surprise(squares, pace, middle)
+    level, first, out, whole = _level(squares), 0, [], float(squares.sum())
+    for name, starts, own, _ in logs:
         mine = s[first : first + len(own)]
         first += len(own)
         apart = np.flatnonzero(np.diff(starts) > _APART) + 1
@@ -129,13 +142,33 @@ def _of_joint(parts: Sequence[tuple], j: int) -> Stretches | None:
     out = [one for one in _joined(out) if one.error > _LITTLE]
     time, length = sum(one.stop - one.start for one in out), _WINDOW * len(squares)
     error = sum(one.error for one in out)
-    few = error > _MOST and time < _LESS * length
+    few = error > _MOST and time < _LESS * length and len(out) <= _SHOWN
     return Stretches(tuple(out), error, time, length) if few else None
 
 
-def _windows(rows, residual, motion: Motion, j: int) -> list[tuple[str, np.ndarray, np.ndarray]]:
+def _level(squares) -> float:
+    return float(np.log(len(squares) / CHANCE))
+
+
+def _surprise(squares, pace, middle: float) -> np.ndarray:
+    """How surprising (k,) windows are beside those in which the robot moves as fast: where all is
+    fast there is more of any error. What stands out is none of these the next time."""
+    order, calm = np.argsort(pace, kind="stable"), np.ones(len(squares), dtype=bool)
+    for _ in range(_PASSES):
+        usual = order[calm[order]]
+        near = running(squares[usual], _LIKE, "median", "edge")
+        like = np.interp(pace, pace[usual], near)
+        s = surprise(squares / np.maximum(like, middle), WHITE, tail=TAIL)
+        now = s <= 0.5 * _level(squares)
+        if np.array_equal(calm, now) or now.sum() < _LIKE:
+            break
+        calm = now
+    return s
+
+
+def _windows(rows, residual, motion: Motion, pace, j: int) -> list[tuple]:
     """Of each log: its name, the starts (k,) [s] of its windows that have enough rows of a joint,
-    and the mean squares (k,) there."""
+    the mean squares (k,) there and the mean pace (k,)."""
     names = {piece.log: piece.source for piece in motion.pieces}
     use, out = rows.use[:, j], []
     for log in np.unique(rows.log):
@@ -146,7 +179,8 @@ def _windows(rows, residual, motion: Motion, j: int) -> list[tuple[str, np.ndarr
         unique, index, count = np.unique(number, return_inverse=True, return_counts=True)
         square = np.bincount(index, residual[own, j] ** 2) / count
         enough = 2 * count >= np.median(count)
-        out.append((names[int(log)], unique[enough] * _WINDOW, square[enough]))
+        fast = np.bincount(index, pace[own]) / count
+        out.append((names[int(log)], unique[enough] * _WINDOW, square[enough], fast[enough]))
     return out
 
 

@@ -141,8 +141,10 @@ def _one(name: str, table: Table, signals: Signals) -> Logged:
     names = [*time, *counted, *(c for columns in chosen.values() for c in columns.values())]
     torques = tuple(chosen["tau"].values())
     values = table.load(list(dict.fromkeys(names)), torques)
-    for column in (c for c in torques if values[c].ndim == 1):
-        values[column], _ = filled(values[column], column, str(table.path))
+    for column in torques:
+        own = values[column] if values[column].ndim > 1 else values[column][:, None]
+        whole = [filled(one, column, str(table.path))[0] for one in np.asarray(own, dtype=float).T]
+        values[column] = np.stack(whole, axis=1).reshape(values[column].shape)
     for column in (*time, *chosen["q"].values(), *chosen["tau"].values()):
         check_finite(values[column], column, str(table.path))  # as a fit would, before a guess
     of = {kind: {j: values[c] for j, c in columns.items()} for kind, columns in chosen.items()}

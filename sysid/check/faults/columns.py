@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import combinations, product
 
@@ -34,11 +34,12 @@ def find(look: Look) -> Iterator[Fault]:
         return
     reading = Reading.plain(look.robot.dof)
     scored = equations.scored(reading)
+    turning = np.flatnonzero(~np.asarray(look.robot.prismatic)).tolist()
     for _ in range(_ROUNDS):
         # of joints that hardly move any reading of the columns tells as little
         others = [
             own
-            for own in readings(reading, look.robot.dof)
+            for own in readings(reading, look.robot.dof, turning)
             if any(look.excited[j].enough for j in own[1][1])
         ]
         tried = [(made, told, equations.scored(made)) for made, told in others]
@@ -51,14 +52,20 @@ def find(look: Look) -> Iterator[Fault]:
     yield from _factors(look, equations, reading, scored)
 
 
-def readings(reading: Reading, dof: int) -> Iterator[tuple[Reading, tuple]]:
-    """Readings that differ from one in one thing, with (fault, joints, what)."""
+def readings(
+    reading: Reading, dof: int, turning: Sequence[int] = ()
+) -> Iterator[tuple[Reading, tuple]]:
+    """Readings that differ from one in one thing, with (fault, joints, what).
+
+    Args:
+        turning: the joints of which another zero of the angle is asked.
+    """
     for i, j in combinations(range(dof), 2):
         angle, torque = _swapped(reading.angle, i, j), _swapped(reading.torque, i, j)
         yield replace(reading, torque=torque), ("joint_order", (i, j), "torque")
         yield replace(reading, angle=angle), ("joint_order", (i, j), "angle")
         yield replace(reading, angle=angle, torque=torque), ("joint_order", (i, j), "")
-    for j, quarters in product(range(dof), _QUARTERS):
+    for j, quarters in product(turning, _QUARTERS):
         zero = tuple(quarters * np.pi / 2 if k == j else z for k, z in enumerate(reading.zero))
         yield replace(reading, zero=zero), ("limit_exceeded", (j,), quarters)
     for j in range(dof):
@@ -96,7 +103,10 @@ def _told(look: Look, kind: str, joints, word: str) -> Iterator[Fault]:
             f"the zero of {names[0]}'s angle looks {turn} from the URDF's: from there the URDF's "
             "robot explains the torques"
         )
-        do = f"write data.zero: {{{names[0]}: {word * np.pi / 2:.6g}}}; {_OUT_OF}"
+        known = dict(look.experiment.data.zero)
+        known[names[0]] = known.get(names[0], 0.0) + word * np.pi / 2
+        told = ", ".join(f"{joint}: {at:.6g}" for joint, at in known.items())
+        do = f"write data.zero: {{{told}}}; {_OUT_OF}"
         yield Fault(kind, WARNING, says, do, names[0])
         return
     kinds = ["position", "torque"] if word in ("", "angle and torque") else [_KEYS[word]]

@@ -33,8 +33,13 @@ _KINDS = {
     ),
     "missing": (
         "effort_missing",
-        "the torque of {joint} is 0, or was not written, for a while in which it moves",
+        "the torque of {joint} is 0 for a while in which it moves",
         "a fit leaves these rows out; the drive was off, or its telemetry was lost",
+    ),
+    "unwritten": (
+        "effort_missing",
+        "no torque of {joint} was written for a while",
+        "a fit leaves these rows out; log it with every sample",
     ),
     "empty": (
         "effort_missing",

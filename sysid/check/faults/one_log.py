@@ -40,7 +40,7 @@ def find(look: Look) -> Iterator[Fault]:
         else:
             says = f"the {word} of {names[0]} has in {name} alone the sign against the other logs'"
         predicted = (
-            f"read so, what the other logs tell of the robot leaves {100 * left:.0f} % of it"
+            f"read so, what the other logs tell of the robot leaves {100 * left:.0f} % of its error"
         )
         do = "correct that file's columns, or leave the file out"
         for joint in names:
@@ -58,18 +58,20 @@ def _read_otherwise(look: Look, seen: Seen, k: int) -> tuple | None:
         j for j in range(look.robot.dof) if look.excited[j].enough and rest[:, j].sum() > FEWEST
     ]
     asked = [j for j in asked if here[:, j].sum() > FEWEST]
-    if len(asked) < look.robot.dof or not asked:
+    if not asked:
         return None
     x, usual = _told_by(seen, rest)
     plain = _squares(rows.tau[own], rows.columns[:, own], rows.use[own], x)
-    if not np.any(np.sqrt(plain) > _ODD * usual):
+    if not np.any(np.sqrt(plain[asked]) > _ODD * usual[asked]):
         return None
     best = None
     for reading, (kind, joints, word) in readings(Reading.plain(look.robot.dof), look.robot.dof):
+        if not set(joints) <= set(asked):
+            continue
         tau, columns, use = _as_read(seen, k, reading)
         left = _squares(tau, columns, use, x)
         fallen = left / np.maximum(plain, 1e-300)
-        loss = float(np.sum(np.log(fallen)))
+        loss = float(np.sum(np.log(fallen[asked])))
         if np.all(fallen[list(joints)] < _LEAVES) and (best is None or loss < best[0]):
             best = loss, k, kind, joints, word, float(np.sqrt(fallen[list(joints)].max()))
     return best
@@ -84,14 +86,15 @@ def _told_by(seen: Seen, use) -> tuple[np.ndarray, np.ndarray]:
     tau = rows.residual(start)
     scale = np.sqrt(np.einsum("jnk,jnk->k", rows.columns, rows.columns))
     scale = np.where(scale > 0.0, 1.0 / np.maximum(scale, 1e-300), 0.0)
-    usual = np.sqrt(np.sum(tau**2 * use, axis=0) / use.sum(axis=0))
+    count = np.maximum(use.sum(axis=0), 1)
+    usual = np.sqrt(np.sum(tau**2 * use, axis=0) / count)
     for _ in range(_PASSES):
-        weights = 1.0 / np.maximum(usual, 1e-300)
+        weights = np.divide(1.0, usual, out=np.zeros_like(usual), where=usual > 0.0)
         counted = rows.columns * (use.T * weights[:, None])[:, :, None] * scale
         a = counted.reshape(-1, counted.shape[2])
         y = ((tau * use) * weights).T.ravel()
         step = scale * (np.linalg.pinv(a.T @ a, rcond=1e-10, hermitian=True) @ (a.T @ y))
-        usual = np.sqrt(np.sum(rows.residual(start + step) ** 2 * use, axis=0) / use.sum(axis=0))
+        usual = np.sqrt(np.sum(rows.residual(start + step) ** 2 * use, axis=0) / count)
     return start + step, usual
 
 
