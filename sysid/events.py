@@ -23,7 +23,7 @@ import numpy as np
 
 from .knocks import knocks
 from .outliers import spikes
-from .repeats import TRAVELS, held_angle, held_torque, rests
+from .repeats import held_angle, held_torque, rests
 from .segment import Segment
 
 WORDS = {
@@ -104,37 +104,6 @@ def find(
     for first, last, members in struck:
         tell("knock", first, last, members, "both")
     return ordered(found)
-
-
-def extent(segment: Segment) -> np.ndarray:
-    """(4, dof): the least and the greatest torque and angle of each joint."""
-    tau, q = segment.tau, segment.q
-    return np.stack([tau.min(axis=0), tau.max(axis=0), q.min(axis=0), q.max(axis=0)])
-
-
-def unlogged(
-    logs: Sequence[tuple[str, float, float, np.ndarray]], joints: Sequence[str]
-) -> list[list[Event]]:
-    """Of each log the joints whose torque never changes in it: though they move there, or where it
-    is the same in another log in which they do.
-
-    Args:
-        logs: name, first and last time [s], and the `extent` (segments, 4, dof) of its segments.
-    """
-    found = []
-    for *_, extents in logs:
-        low, high = extents[:, 0].min(axis=0), extents[:, 1].max(axis=0)
-        travel = extents[:, 3].max(axis=0) - extents[:, 2].min(axis=0)
-        found.append((np.where(low == high, low, np.nan), travel > TRAVELS))
-    known = [{own[j] for own, moves in found if moves[j]} for j in range(len(joints))]
-    return [
-        [
-            Event("missing", name, start, stop, (joint,))
-            for j, joint in enumerate(joints)
-            if own[j] in known[j]  # NaN is in none
-        ]
-        for (name, start, stop, _), (own, _) in zip(logs, found)
-    ]
 
 
 def clipped(events: Sequence[Event], start: float, stop: float) -> list[Event]:

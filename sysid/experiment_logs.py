@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from . import events, long_log, masks, robot
+from . import events, long_log, masks, robot, unwritten
 from . import log as logs
 from .bumps import bumps
 from .free_memory import released
@@ -61,7 +61,7 @@ def with_events(machine: Robot, read: list[logs.Log], *, driven: Collection[str]
         driven: joints whose torque is that of an actuator, which may be the same throughout.
     """
     short = [log for log in read if not isinstance(log.segments, Spans)]
-    silent = _silent(short, [np.stack([events.extent(s) for s in log.segments]) for log in short], machine, driven)
+    silent = _silent(short, [np.stack([unwritten.extent(s) for s in log.segments]) for log in short], machine, driven)
     done = iter(_disturbed(machine, [replace(log, events=own) for log, own in zip(short, silent)]) if short else ())
     return [_disturbed_in_spans(machine, log, driven) if isinstance(log.segments, Spans) else next(done) for log in read]
 
@@ -69,7 +69,7 @@ def with_events(machine: Robot, read: list[logs.Log], *, driven: Collection[str]
 def _silent(read: list[logs.Log], extents: list[np.ndarray], machine: Robot, driven: Collection[str]) -> list[tuple[events.Event, ...]]:
     """What of the logs' torques was not logged, by the extents of their segments."""
     ends = [(log.name, float(log.segments[0].t[0]), float(log.segments[-1].t[-1])) for log in read]
-    found = events.unlogged([(*own, extent) for own, extent in zip(ends, extents)], machine.joints)
+    found = unwritten.unlogged([(*own, extent) for own, extent in zip(ends, extents)], machine.joints)
     return [tuple(e for e in (*log.events, *own) if not {*e.joints} & {*driven, *log.unused}) for log, own in zip(read, found)]
 
 
@@ -130,7 +130,7 @@ def _of_span(machine: Robot, log: logs.Log, number: int) -> tuple[list[events.Ev
     released()
     span = log.segments.around(number, _BESIDE)
     (own,) = _disturbed(machine, [replace(log, segments=(replace(span, core=None),), events=())], among=len(log.segments))
-    return events.clipped(own.events, *span.t[[span.core.start, span.core.stop - 1]]), span.step, events.extent(span)
+    return events.clipped(own.events, *span.t[[span.core.start, span.core.stop - 1]]), span.step, unwritten.extent(span)
 
 
 @dataclass(frozen=True)

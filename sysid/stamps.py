@@ -17,7 +17,9 @@ def starts(t, breaks) -> np.ndarray:
     """
     steps = np.diff(t)
     back = np.setdiff1d(np.flatnonzero(steps < 0.0) + 1, breaks)
-    if len(back) and np.any(-steps[back - 1] <= GAP_STEPS * np.median(np.abs(steps))):
+    usual = GAP_STEPS * np.median(np.abs(steps)) if len(steps) else 0.0
+    on = [steps[row : row + SHORT].max(initial=0.0) for row in back]  # a wrong stamp leaps on again
+    if np.any(-steps[back - 1] <= usual) or np.any(np.array(on) > usual):
         return back[:0]
     if not len(back):
         return back

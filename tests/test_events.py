@@ -12,13 +12,14 @@ from scipy.signal import lfilter
 
 from sysid import config, experiment_logs, pipeline
 from sysid.clock import Left
-from sysid.events import Event, again, extent, find, mended, told, unlogged, usable, with_clock
+from sysid.events import Event, again, find, mended, told, usable, with_clock
 from sysid.log import Log, Segment
 from sysid.lowpass import lowpassed
 from sysid.outliers import quantum
 from sysid.preprocess import prepare
 from sysid.repeats import held_angle, held_torque
 from sysid.specs import PreprocessSpec
+from sysid.unwritten import extent, unlogged
 
 STEP = 1e-3
 JOINTS = ("a", "b", "c")

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from sysid import urdf
-from sysid.statement import text
+from sysid.statement import where
 from sysid.statement.words import all_of, either, named
 from sysid.terminal.designed import show_design
 from sysid.terminal.diagnosis import _after_diagnosis
@@ -64,8 +64,8 @@ def test_logs_are_checked_before_an_effect_mends_what_wrong_columns_bent(capsys,
 
 def test_a_joint_that_is_not_used_needs_no_other_log():
     verdict = [{"joint": joint, "status": "unresolved"} for joint in ("hip", "knee")]
-    assert text.blind({"verdict": verdict}) == ["hip", "knee"]
-    assert text.blind({"verdict": verdict, "unused": ["knee"]}) == ["hip"]
+    assert where.blind({"verdict": verdict}) == ["hip", "knee"]
+    assert where.blind({"verdict": verdict, "unused": ["knee"]}) == ["hip"]
 
 
 def test_a_check_refuses_what_a_fit_would(experiment, cli):
@@ -117,8 +117,8 @@ def test_a_torque_that_was_not_logged_bends_no_other_joint(experiment, cli):
     assert first["elbow"] is None and second["elbow"] is None
     said = cli("diagnose", bare, "--json", out=bare / "run")
     found = json.loads(said.out)
-    assert found["unused"] == ["elbow"] and text.blind(found) == [joint for joint in text.blind(found) if joint != "elbow"]
-    assert (found["next_log"] is not None) is bool(text.blind(found))
+    assert found["unused"] == ["elbow"] and where.blind(found) == [joint for joint in where.blind(found) if joint != "elbow"]
+    assert (found["next_log"] is not None) is bool(where.blind(found))
 
 
 def test_logs_of_which_no_row_counts_are_refused(experiment, cli):
