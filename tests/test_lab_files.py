@@ -234,3 +234,88 @@ def test_rows_in_which_nothing_came_are_left_out(tmp_path):
     for other in (resting, twice, made):
         file.write_text(csv(other))
         assert sum(len(s.t) for s in read(file).segments) == n
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("size", [2, 3])
+def test_packets_whose_samples_all_have_one_stamp_are_even(size, tmp_path):
+    """Also where the clock starts anew in another file of the recording."""
+    made = columns(20.0, 0.005)
+    n = len(made["t"])
+    made["t"] = (
+        np.repeat(made["t"][size - 1 :: size], size)[:n]
+        if n % size == 0
+        else np.append(np.repeat(made["t"][size - 1 :: size], size), [made["t"][-1]] * (n % size))
+    )
+    for name in ("a.csv", "b.csv"):
+        (tmp_path / name).write_text(csv(made))
+    (segment,) = read(tmp_path / "a.csv").segments
+    assert segment.step == pytest.approx(0.005, rel=2e-3) and len(segment.t) == n
+    spec = log_spec.LogSpec(files=[str(tmp_path / "a.csv"), str(tmp_path / "b.csv")])
+    both = log.read(spec, log_spec.DataSpec(), JOINTS, (False, False)).segments
+    assert [len(one.t) for one in both] == [n, n]
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("bits, rate", [(14, 50.0), (12, 30.0), (12, 100.0)])
+def test_a_robot_that_rests_between_moves_lost_no_message(bits, rate, tmp_path):
+    """However coarse its angles and torques are, and at the end of a recording."""
+    t = np.arange(round(60.0 * rate)) / rate
+    at = np.interp(t % 4.0, [0.0, 1.0, 2.0, 3.0, 4.0], [0.0, 0.8, 0.8, 0.0, 0.0])
+    grain = 2.0 * np.pi / 2**bits
+    q = grain * np.round(np.stack([at, -0.5 * at], axis=1) / grain)
+    tau = 0.1 * np.round(np.stack([3.0 * np.sin(at), np.cos(at)], axis=1) / 0.1)
+    names = [f"{kind}_{joint}" for kind in ("q", "tau") for joint in JOINTS]
+    for name, offset in (("a.csv", 0.0), ("b.csv", 1.0)):
+        (tmp_path / name).write_text(csv({"t": t} | dict(zip(names, np.hstack([q + offset, tau]).T))))
+    assert sum(len(s.t) for s in read(tmp_path / "a.csv").segments) == len(t)
+    spec = log_spec.LogSpec(files=[str(tmp_path / "a.csv"), str(tmp_path / "b.csv")])
+    assert sum(len(s.t) for s in log.read(spec, log_spec.DataSpec(), JOINTS, (False, False)).segments) == 2 * len(t)
+
+
+def test_a_few_rows_are_no_recording(tmp_path):
+    """A first message of nothing but zeros; samples that are missing while all joints move."""
+    t, q, *_ = motion(20.0, 0.002)
+    turns = np.ones(3, dtype=bool)
+    for row in (0, 3000):
+        wrong = q.copy()
+        wrong[row] = q[row] + 3.0
+        assert not len(angle_starts(t, wrong, [], turns))
+    kept = np.ones(len(t), dtype=bool)
+    kept[2000:2007] = False
+    assert not len(angle_starts(t[kept], q[kept], [], turns))
+
+
+def test_logged_speeds_of_a_sample_that_stands_alone_are_not_used(experiment):
+    """What a logger differentiates of it stands to its sides."""
+
+    def spoiled(made):
+        t = made["t"]
+        made["q_elbow"][300] += 0.3
+        return made | {
+            f"{kind}_{joint}": value
+            for joint in JOINTS
+            for kind, value in (("qd", np.gradient(made[f"q_{joint}"], t)), ("qdd", np.gradient(np.gradient(made[f"q_{joint}"], t), t)))
+        }
+
+    config = {"preprocess.filter": "none", "data.columns.velocity": "qd_{joint}", "data.columns.acceleration": "qdd_{joint}"}
+    folder = experiment(train=spoiled, test=spoiled, config=config)
+    loaded = pipeline.load(folder)
+    machine, *_ = pipeline.build(loaded)
+    (found,) = experiment_logs.read(loaded, machine, loaded.data.train)
+    (own,) = found.segments
+    assert [e.kind for e in found.events if e.joints == ("elbow",)] == ["glitch"]
+    for values in (own.q, own.qd, own.qdd):
+        around = np.abs(np.diff(values[250:350, 1]))
+        assert around[45:56].max() < 3.0 * np.delete(around, slice(40, 60)).max()
+
+
+def test_a_zero_stands_in_radians_whatever_the_unit_is(tmp_path):
+    made, file = columns(), tmp_path / "a.csv"
+    shown = made | {f"q_{joint}": np.degrees(made[f"q_{joint}"]) for joint in JOINTS}
+    file.write_text(csv(shown))
+    (own,) = read(file, units={"position": "deg"}, zero={"elbow": -0.5}).segments
+    np.testing.assert_allclose(own.q[:, 1], made["q_elbow"] - 0.5, atol=1e-9)
+    np.testing.assert_allclose(own.q[:, 0], made["q_shoulder"], atol=1e-9)
+    with pytest.raises(ValueError, match="finite"):
+        log_spec.DataSpec.model_validate({"zero": {"elbow": float("nan")}})
