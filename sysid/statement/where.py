@@ -9,6 +9,8 @@ from ..fit_document import number
 from ..plausible import WRONG
 from .words import listed, wrapped
 
+_END = 0.1  # of the rows, at one end of a joint's motion
+
 
 def entry(found: Failure) -> dict:
     """What a document has of one joint."""
@@ -66,6 +68,28 @@ def needing(document: dict) -> str:
     return f"{listed(joints, 'and')} need{'s' * (len(joints) == 1)} another log"
 
 
+def at_end(own: dict) -> str:
+    """What may be there where half of a joint's error lies at one end of its motion; empty where it
+    does not."""
+    edges = own["map"]["q"]
+    for r in own["regions"]:
+        if r["variable"] != "q" or r["share_of_rows"] > _END:
+            continue
+        for end, at, bound, law in (
+            ("upper", r["high"], edges[-1], "max"),
+            ("lower", r["low"], edges[0], "min"),
+        ):
+            if at == bound:
+                return (
+                    f"{100 * r['share_of_error']:.0f} % of the squared error of {own['joint']} lies "
+                    f"at the {end} end of its motion, {r['low']:.4g} to {r['high']:.4g} {r['unit']}: "
+                    "an end stop, or something that it meets there, looks like a function of the "
+                    "angle too; `sysid add EXPERIMENT formula --joint "
+                    f"{own['joint']} --option 'formula=k*{law}(q - q0, 0)'` fits one"
+                )
+    return ""
+
+
 def fails(document: dict, width: int) -> list[str]:
     """Where the joints that are not done with hold most of their error."""
     status = {v["joint"]: v["status"] for v in document["verdict"]}
@@ -74,6 +98,8 @@ def fails(document: dict, width: int) -> list[str]:
         # what is named elsewhere, or named, is better told by its effect; the first is the sharpest
         if own["words"] and status[own["joint"]] in ("unresolved", "unknown"):
             out += wrapped(f"where {own['joint']} fails: {own['words'][0]}", width, "  ")
+        if status[own["joint"]] not in ("complete", "explained") and (said := at_end(own)):
+            out += wrapped(said, width, "  ")
     if joints := touched(document):
         said = (
             "what acts for a while alone, a push, a snag, a contact, is no law of the robot: if "
