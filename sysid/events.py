@@ -233,11 +233,8 @@ def again(struck: Sequence[str], joints: int) -> str:
         return ""
     who = [joint for joint, count in each.items() if count == most]
     where = " and ".join([", ".join(who[:-1]), who[-1]] if len(who) > 1 else who)
-    return (
-        f"{most} knocks are on {where}: where nobody pushed, its own play or an end stop strikes; with "
-        "`events: keep` under `preprocess:` a diagnosis can name play, and `sysid add EXPERIMENT "
-        "formula --joint JOINT --option 'formula=k*max(q - q0, 0)'` fits a stop (min: a lower one)"
-    )
+    why = "where nobody pushed, its own play or an end stop strikes, and a diagnosis with"
+    return f"{most} knocks are on {where}: {why} `events: keep` under `preprocess:` can name it"
 
 
 def _summary(events: Sequence[Event]) -> str:

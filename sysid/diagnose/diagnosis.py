@@ -18,7 +18,8 @@ from functools import cache, partial
 import numpy as np
 
 from .. import borne_out, pipeline, thinning
-from ..candidates import Candidate, candidates, own_effects
+from ..candidates import Candidate, candidates
+from ..end_stops import asked_too
 from ..estimate import Fit
 from ..failures import Failure, HeldOut, failures, fallen
 from ..left_open import left_open
@@ -79,10 +80,11 @@ def diagnose(
     """
     tell = progress or (lambda stage, share: None)
     experiment = fit.experiment if fit else pipeline.started(experiment)
-    (measured, whole), extra = thinning.read(experiment), own_effects(experiment)
+    measured, whole = thinning.read(experiment)
     fit = fit or pipeline.fit(experiment, progress=progress, measured=whole)
     with noticed():
         view = first_view(fit.experiment, fit, *measured.parts)
+        extra = asked_too(fit.experiment, view)
         how = {"level": level, "tell": tell, "most": 0 if (wrong := misread(fit)) else select.STEPS}
         steps, asked, then_asked, undecided = select.search(view, extra, **how)
         if (test := lowpassed(measured.test, fit.joints, view.cutoff)) is None:

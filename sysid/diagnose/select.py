@@ -31,8 +31,7 @@ def search(
     """The effects that join, in order, and the answers under the first model and the last.
 
     Args:
-        level: family-wise. most: steps. worth: least share of a joint's squared residual that an
-            effect must take.
+        level: family-wise. most: steps. worth: least share of a joint's square that one must take.
 
     Returns:
         (steps, asked first, asked last, what is there and cannot be told from effects elsewhere)

@@ -89,8 +89,7 @@ def verdicts(
         others = tuple(c for c in taking if c.head.joint not in (joint, "*"))
         low, noise = (floors[j].rms or v or 0.0 for v in (floors[j].low, floors[j].about))
         explained = explains(first, then, low) if claims else float("nan")
-        # who leaves more that is no noise is no name for what is missing; in no log is there more
-        # noise than an error of another, so that what does not carry over is no noise
+        # who leaves more than noise, which no log has more of than another's error, is no name
         whole = (1.0 + _LEFT) * explains(first, then, min(*both, noise)) >= 1.0
         whole |= noisy(*pairs[1], floors[j]) or floors[j].reached(both[0])
         whole |= smeared(both, floors[j])

@@ -98,7 +98,7 @@ def fails(document: dict, width: int) -> list[str]:
         # what is named elsewhere, or named, is better told by its effect; the first is the sharpest
         if own["words"] and status[own["joint"]] in ("unresolved", "unknown"):
             out += wrapped(f"where {own['joint']} fails: {own['words'][0]}", width, "  ")
-        if status[own["joint"]] not in ("complete", "explained") and (said := at_end(own)):
+        if status[own["joint"]] in ("unresolved", "unknown") and (said := at_end(own)):
             out += wrapped(said, width, "  ")
     if joints := touched(document):
         said = (
