@@ -80,12 +80,13 @@ def at_end(own: dict) -> str:
             ("lower", r["low"], edges[0], "min"),
         ):
             if at == bound:
+                share, joint = f"{100 * r['share_of_error']:.0f} %", own["joint"]
+                span = f"{r['low']:.4g} to {r['high']:.4g} {r['unit']}"
                 return (
-                    f"{100 * r['share_of_error']:.0f} % of the squared error of {own['joint']} lies "
-                    f"at the {end} end of its motion, {r['low']:.4g} to {r['high']:.4g} {r['unit']}: "
-                    "an end stop, or something that it meets there, looks like a function of the "
-                    "angle too; `sysid add EXPERIMENT formula --joint "
-                    f"{own['joint']} --option 'formula=k*{law}(q - q0, 0)'` fits one"
+                    f"{share} of the squared error of {joint} lies at the {end} end of its motion, "
+                    f"{span}: an end stop, or something that it meets there, looks like a "
+                    f"function of the angle too; `sysid add EXPERIMENT formula --joint {joint} "
+                    f"--option 'formula=k*{law}(q - q0, 0)'` fits one"
                 )
     return ""
 
