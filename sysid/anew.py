@@ -51,7 +51,8 @@ def angle_starts(t, q, breaks, turns) -> np.ndarray:
     count = far.sum(axis=1)
     found = np.flatnonzero((count >= 2) & (2 * count > moving)) + 1
     bounds = np.union1d(np.concatenate([[0], found, [len(t)]]), breaks).astype(int)
-    return found if np.diff(bounds).min() >= SHORT else found[:0]  # a few rows are none
+    at = np.searchsorted(bounds, found)  # a few rows are no recording
+    return found[np.minimum(bounds[at] - bounds[at - 1], bounds[at + 1] - bounds[at]) >= SHORT]
 
 
 def _far(steps, asked, turns: bool) -> np.ndarray:

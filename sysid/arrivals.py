@@ -27,7 +27,7 @@ _IRREGULAR = 0.05  # of a step, RMS: what is less, resampling mends
 def evened(samples: Recording) -> Recording:
     """Samples with an even clock where their angles say that they were taken so, which is told."""
     t, late = samples.t.astype(float, copy=True), 0.0
-    bounds = np.union1d(samples.breaks, gaps(samples.t)).astype(int)
+    bounds = np.union1d(samples.breaks, _lost(samples.t)).astype(int)
     for first, last in pairwise([0, *bounds.tolist(), len(t)]):
         own = slice(first, last)
         if (even := _even(t[own], samples.signals["q"][own])) is not None:
@@ -48,6 +48,16 @@ def evened(samples: Recording) -> Recording:
         above=2,
     )
     return replace(samples, t=t)
+
+
+def _lost(t: np.ndarray) -> np.ndarray:
+    """Rows before which samples of a clock (n,) are missing: after a stall those that were late come
+    at once, and the clock is where it would have been."""
+    rows = gaps(t)
+    step = (t[-1] - t[0]) / max(len(t) - 1, 1)
+    gap = t[rows] - t[rows - 1]
+    caught = np.minimum(rows + np.round(2.0 * gap / step).astype(int), len(t) - 1)
+    return rows[t[caught] - t[rows - 1] > (caught - rows + 1) * step + 0.5 * gap]
 
 
 def _even(t: np.ndarray, q: np.ndarray) -> np.ndarray | None:

@@ -14,7 +14,6 @@ from .segment import gaps
 from .warned import warn
 
 _FEWEST = 4  # rows: fewer may be alike by chance
-_OFTEN = 0.5  # of the rows: what comes more often is how the logger writes
 
 
 def without_held(samples: Recording) -> Recording:
@@ -28,7 +27,7 @@ def without_held(samples: Recording) -> Recording:
     found = {
         (a, b + 1) for a, b in runs(again) if b - a + 1 >= _FEWEST
     }  # the sample and its repeats
-    if not found or again.sum() > _OFTEN * len(q):
+    if not found:
         return samples
     # a joint at least went on as it came, and made up for it at once
     moved = sorted(found & {run for own in q.T for run in held_angle(own)})

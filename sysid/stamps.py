@@ -13,18 +13,27 @@ _LITTLE = 1e-3  # of a step
 
 def starts(t, breaks) -> np.ndarray:
     """Rows at which a clock (n,) runs back, not at a break that is known, and on from there, as of
-    another recording; none where it is by as little, or for as short, as of rows in a wrong order.
+    another recording; not where it is by as little, or for as short, as of rows in a wrong order.
     """
     steps = np.diff(t)
     back = np.setdiff1d(np.flatnonzero(steps < 0.0) + 1, breaks)
-    usual = GAP_STEPS * np.median(np.abs(steps)) if len(steps) else 0.0
-    on = [steps[row : row + SHORT].max(initial=0.0) for row in back]  # a wrong stamp leaps on again
-    if np.any(-steps[back - 1] <= usual) or np.any(np.array(on) > usual):
-        return back[:0]
     if not len(back):
         return back
-    bounds = np.union1d(np.concatenate([[0], back, [len(t)]]), breaks).astype(int)
-    return back if np.diff(bounds).min() >= SHORT else back[:0]
+    on = steps[steps > 0.0]
+    usual = GAP_STEPS * max(np.median(on), np.mean(np.minimum(on, GAP_STEPS * np.median(on))))
+    size = -steps[back - 1]
+    leap = np.array([steps[row : row + SHORT].max(initial=0.0) for row in back])
+    # a stamp that is wrong leaps on again by as much
+    if np.any(size <= usual) or np.any(leap > 0.5 * size):
+        return back[:0]
+    bounds = np.union1d(np.concatenate([[0], back, [len(t)]]), breaks)
+    return back if np.all(_pieces(back, bounds) >= SHORT) else back[:0]
+
+
+def _pieces(rows, bounds) -> np.ndarray:
+    """How many rows (k,) the shorter of the two pieces has between which each of some rows stands."""
+    at = np.searchsorted(bounds, rows)
+    return np.minimum(bounds[at] - bounds[at - 1], bounds[at + 1] - bounds[at])
 
 
 def in_packets(t, signals, breaks) -> tuple[np.ndarray, tuple[int, ...]]:
@@ -43,11 +52,12 @@ def in_packets(t, signals, breaks) -> tuple[np.ndarray, tuple[int, ...]]:
     if not len(rows) or np.any(steps < 0):
         return t, ()
     t = t.astype(float, copy=True)
-    little = _LITTLE * float(np.median(steps[steps > 0])) if np.any(steps > 0) else 0.0
     # of a packet the first has its stamp, and each of the others stands a little behind the one before
     number = np.arange(len(t))
-    first = np.maximum.accumulate(np.where(np.append(False, together), 0, number))
-    return t + little * (number - first), tuple(rows.tolist())
+    behind = number - np.maximum.accumulate(np.where(np.append(False, together), 0, number))
+    later = steps[steps > 0]
+    little = min(_LITTLE, 0.5 / behind.max()) * float(later.min()) if len(later) else 0.0
+    return t + little * behind, tuple(rows.tolist())
 
 
 def increasing(t, breaks, where: str) -> np.ndarray:

@@ -17,7 +17,7 @@ from tests.conftest import JOINTS
 
 def seen(q, left):
     rows = SimpleNamespace(of=lambda *_: q, residual=lambda _: left, use=np.ones(q.shape, dtype=bool))
-    return SimpleNamespace(rows=rows, motion=None, settled=SimpleNamespace(x=None))
+    return SimpleNamespace(rows=rows, motion=None, settled=SimpleNamespace(x=None), model=SimpleNamespace(terms=[]))
 
 
 def test_a_stop_is_asked_only_where_half_of_what_is_left_lies_at_an_end(experiment):
@@ -26,12 +26,15 @@ def test_a_stop_is_asked_only_where_half_of_what_is_left_lies_at_an_end(experime
     q = np.sin(np.linspace(0.0, 40.0, 4000))[:, None] * [1.0, 0.5]
     noise = 0.1 * rng.normal(size=q.shape)
     names = lambda left: [effect.name for effect in asked_too(loaded, seen(q, left))]  # noqa: E731
+    at = lambda left: {effect.name: effect.at for effect in asked_too(loaded, seen(q, left))}  # noqa: E731
     assert names(noise) == [] and names(np.zeros_like(q)) == []
     assert names(noise + q**3) == []  # at both ends
     assert names(noise + [2.0, 0.0] * np.maximum(q - 0.97, 0.0) * 20.0) == ["upper_stop"]
     assert names(noise + [0.0, 2.0] * np.minimum(q + 0.485, 0.0) * 40.0) == ["lower_stop"]
     both = noise + [2.0, 0.0] * np.maximum(q - 0.97, 0.0) * 20.0 + [0.0, 2.0] * np.minimum(q + 0.485, 0.0) * 40.0
-    assert names(both) == ["lower_stop", "upper_stop"]
+    assert at(both) == {"upper_stop": (0,), "lower_stop": (1,)}
+    parked = np.concatenate([np.linspace(0.0, 1.0, 1000), np.ones(3000)])[:, None]
+    assert asked_too(loaded, seen(parked, 0.1 * rng.normal(size=parked.shape))) == []
 
 
 @pytest.mark.parametrize("side", ["upper_stop", pytest.param("lower_stop", marks=pytest.mark.long)])

@@ -59,6 +59,11 @@ def test_half_of_an_error_at_one_end_of_a_motion_may_be_a_stop():
         region = {"variable": variable, "low": low, "high": high, "unit": "rad", "share_of_error": 0.55, "share_of_rows": rows}
         return {"joint": "elbow", "regions": [region], "map": {"q": [-1.0, 0.0, 1.0]}}
 
-    assert "at the upper end of its motion, 0.9 to 1 rad" in (said := where.at_end(own("q", 0.9, 1.0, 0.05))) and "k*max(q - q0, 0)" in said
+    assert (
+        "at the upper end of its motion, 0.9 to 1 rad" in (said := where.at_end(own("q", 0.9, 1.0, 0.05)))
+        and "k*max(q - q0, 0)" in said
+        and "name=upper_stop" in said
+    )
+    assert where.at_end(own("q", 0.9, 1.0, 0.05), {("upper_stop", "elbow")}) == ""
     assert "k*min(q - q0, 0)" in where.at_end(own("q", -1.0, -0.9, 0.05))
     assert [where.at_end(own(*one)) for one in (("q", 0.2, 0.4, 0.05), ("q", 0.5, 1.0, 0.3), ("qd", 0.9, 1.0, 0.05))] == ["", "", ""]

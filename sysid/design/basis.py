@@ -10,6 +10,7 @@ import numpy as np
 
 from .. import experiment_logs, pipeline
 from ..candidates import Candidate, candidates, own_effects
+from ..end_stops import LAWS, stops
 from ..errors import ConfigError, LogError
 from ..estimate import Fit
 from ..filters import settled
@@ -151,7 +152,9 @@ def _has_logs(experiment: Experiment) -> bool:
 
 def _suspects(experiment: Experiment, model: Model, separate) -> list[Candidate]:
     joints = model.robot.joints
-    every = candidates(model, own_effects(experiment))
+    of_stops = {n: [joints.index(j) for e, j in separate if e == n and j in joints] for n in LAWS}
+    extra = [*own_effects(experiment), *stops(experiment, model, of_stops)]
+    every = candidates(model, extra)
     out = []
     for effect, joint in separate:
         if joint != "*" and joint not in joints:

@@ -23,6 +23,7 @@ _MOST, _LESS = 0.5, 0.25  # of the squared error that they hold, in less of the 
 _LITTLE = 0.005  # of the squared error: what holds less is no matter
 _FEWEST = 40  # windows that have a usual
 _LIKE = 31  # windows of the nearest pace, by which one is judged
+_FAST = 25.0  # times the usual square: no pace makes more of an error
 _SHOWN = 8  # stretches: more are how the robot moves
 _PASSES, _DOUBT = 6, 4.0  # over the weights; times the usual square, of which a window counts half
 
@@ -156,9 +157,10 @@ def _surprise(squares, pace, middle: float) -> np.ndarray:
     order, calm = np.argsort(pace, kind="stable"), np.ones(len(squares), dtype=bool)
     for _ in range(_PASSES):
         usual = order[calm[order]]
-        near = running(squares[usual], _LIKE, "median", "edge")
-        like = np.interp(pace, pace[usual], near)
-        s = surprise(squares / np.maximum(like, middle), WHITE, tail=TAIL)
+        size = min(_LIKE, 2 * (len(usual) // 20) + 1)
+        near = running(squares[usual], size, "median", "edge")
+        like = np.clip(np.interp(pace, pace[usual], near), middle, _FAST * middle)
+        s = surprise(squares / like, WHITE, tail=TAIL)
         now = s <= 0.5 * _level(squares)
         if np.array_equal(calm, now) or now.sum() < _LIKE:
             break

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..end_stops import END, LAWS
 from ..failures import Failure
 from ..fit_document import number
 from ..plausible import WRONG
 from .words import listed, wrapped
-
-_END = 0.1  # of the rows, at one end of a joint's motion
 
 
 def entry(found: Failure) -> dict:
@@ -68,38 +67,40 @@ def needing(document: dict) -> str:
     return f"{listed(joints, 'and')} need{'s' * (len(joints) == 1)} another log"
 
 
-def at_end(own: dict) -> str:
+def at_end(own: dict, asked: set[tuple[str, str]] = frozenset()) -> str:
     """What may be there where half of a joint's error lies at one end of its motion; empty where it
-    does not."""
-    edges = own["map"]["q"]
+    does not.
+
+    Args:
+        asked: what was asked of these logs, or is known of them: effects and joints.
+    """
+    edges, joint = own["map"]["q"], own["joint"]
     for r in own["regions"]:
-        if r["variable"] != "q" or r["share_of_rows"] > _END:
+        ends = {"upper_stop": r["high"] == edges[-1], "lower_stop": r["low"] == edges[0]}
+        names = [name for name, there in ends.items() if there and (name, joint) not in asked]
+        if r["variable"] != "q" or r["share_of_rows"] > END or not names:
             continue
-        for end, at, bound, law in (
-            ("upper", r["high"], edges[-1], "max"),
-            ("lower", r["low"], edges[0], "min"),
-        ):
-            if at == bound:
-                share, joint = f"{100 * r['share_of_error']:.0f} %", own["joint"]
-                span = f"{r['low']:.4g} to {r['high']:.4g} {r['unit']}"
-                return (
-                    f"{share} of the squared error of {joint} lies at the {end} end of its motion, "
-                    f"{span}: an end stop, or something that it meets there, looks like a "
-                    f"function of the angle too; `sysid add EXPERIMENT formula --joint {joint} "
-                    f"--option 'formula=k*{law}(q - q0, 0)'` fits one"
-                )
+        name, share = names[0], f"{100 * r['share_of_error']:.0f} %"
+        span = f"{r['low']:.4g} to {r['high']:.4g} {r['unit']}"
+        return (
+            f"{share} of the squared error of {joint} lies at the {name.partition('_')[0]} end of "
+            f"its motion, {span}: an end stop, or something that it meets there, looks like that; "
+            f"`sysid add EXPERIMENT formula --joint {joint} --option 'formula={LAWS[name]}' "
+            f"--option name={name}` fits one"
+        )
     return ""
 
 
 def fails(document: dict, width: int) -> list[str]:
     """Where the joints that are not done with hold most of their error."""
     status = {v["joint"]: v["status"] for v in document["verdict"]}
+    asked = {(d["effect"], d["joint"]) for d in document["detectable"]}
     out = []
     for own in document["fails_where"]:
         # what is named elsewhere, or named, is better told by its effect; the first is the sharpest
         if own["words"] and status[own["joint"]] in ("unresolved", "unknown"):
             out += wrapped(f"where {own['joint']} fails: {own['words'][0]}", width, "  ")
-        if status[own["joint"]] in ("unresolved", "unknown") and (said := at_end(own)):
+        if status[own["joint"]] in ("unresolved", "unknown") and (said := at_end(own, asked)):
             out += wrapped(said, width, "  ")
     if joints := touched(document):
         said = (

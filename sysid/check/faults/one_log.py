@@ -72,7 +72,9 @@ def _read_otherwise(look: Look, seen: Seen, k: int) -> tuple | None:
         left = _squares(tau, columns, use, x)
         fallen = left / np.maximum(plain, 1e-300)
         loss = float(np.sum(np.log(fallen[asked])))
-        if np.all(fallen[list(joints)] < _LEAVES) and (best is None or loss < best[0]):
+        rises = np.any(fallen[here.any(axis=0)] > 1.0 / _LEAVES)  # of others, whatever is asked
+        clear = np.all(fallen[list(joints)] < _LEAVES) and not rises
+        if clear and (best is None or loss < best[0]):
             best = loss, k, kind, joints, word, float(np.sqrt(fallen[list(joints)].max()))
     return best
 
