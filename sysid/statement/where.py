@@ -74,8 +74,9 @@ def at_end(own: dict, asked: set[tuple[str, str]] = frozenset()) -> str:
     Args:
         asked: what was asked of these logs, or is known of them: effects and joints.
     """
-    edges, joint = own["map"]["q"], own["joint"]
-    for r in own["regions"]:
+    joint = own["joint"]
+    for r in own.get("regions", ()):
+        edges = own["map"]["q"]
         ends = {"upper_stop": r["high"] == edges[-1], "lower_stop": r["low"] == edges[0]}
         names = [name for name, there in ends.items() if there and (name, joint) not in asked]
         if r["variable"] != "q" or r["share_of_rows"] > END or not names:
