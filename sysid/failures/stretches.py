@@ -19,7 +19,7 @@ from .held_out import HeldOut
 
 _WINDOW = 0.2  # s: a push, a snag, a contact last longer
 _APART = 0.6  # s: what is nearer is one
-_MOST, _LESS = 0.5, 0.25  # of the squared error that they hold, in less of the time
+_MOST, _LESS = 0.8, 0.25  # of the squared error that they hold, in less of the time
 _LITTLE = 0.005  # of the squared error: what holds less is no matter
 _FEWEST = 40  # windows that have a usual
 _LIKE = 31  # windows of the nearest pace, by which one is judged
