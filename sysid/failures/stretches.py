@@ -19,7 +19,11 @@ from .held_out import HeldOut
 
 _WINDOW = 0.2  # s: a push, a snag, a contact last longer
 _APART = 0.6  # s: what is nearer is one
-_MOST, _LESS = 0.8, 0.25  # of the squared error that they hold, in less of the time
+_MOST, _BENT, _LESS = (
+    0.8,
+    0.2,
+    0.33,
+)  # of the squared error that they hold, of what bends a fit; of the time
 _LITTLE = 0.005  # of the squared error: what holds less is no matter
 _FEWEST = 40  # windows that have a usual
 _LIKE = 31  # windows of the nearest pace, by which one is judged
@@ -72,10 +76,10 @@ def stretches(held_out: HeldOut, train: Motion, weights) -> list[Stretches | Non
     """
     settled, test = held_out.settled, held_out.rows
     parts = _with_pace(((settled.rows, train), (test, held_out.test)))
-    found = _found(parts, settled.x)
-    if any(found):
-        found = _found(parts, _doubting(settled, train, np.asarray(weights)))
-    return found
+    # what bends a fit hides in it: any window that stands out is a reason to doubt it
+    if not any(_found(parts, settled.x, most=_BENT)):
+        return _found(parts, settled.x)
+    return _found(parts, _doubting(settled, train, np.asarray(weights)))
 
 
 def _with_pace(parts) -> list[tuple]:
@@ -89,9 +93,9 @@ def _with_pace(parts) -> list[tuple]:
     return [(*part, qd + qdd) for part, qd, qdd in zip(parts, *paces)]
 
 
-def _found(parts, x) -> list[Stretches | None]:
+def _found(parts, x, most: float = _MOST) -> list[Stretches | None]:
     known = [(rows, rows.residual(x), motion, pace) for rows, motion, pace in parts]
-    return [_of_joint(known, j) for j in range(known[0][0].tau.shape[1])]
+    return [_of_joint(known, j, most) for j in range(known[0][0].tau.shape[1])]
 
 
 def _doubting(settled: Settled, motion: Motion, weights: np.ndarray) -> np.ndarray:
@@ -121,14 +125,14 @@ def _doubting(settled: Settled, motion: Motion, weights: np.ndarray) -> np.ndarr
     return x + change
 
 
-def _of_joint(parts: Sequence[tuple], j: int) -> Stretches | None:
+def _of_joint(parts: Sequence[tuple], j: int, most: float) -> Stretches | None:
     logs = [log for part in parts for log in _windows(*part, j)]
     squares, pace = (np.concatenate([log[k] for log in logs] or [np.zeros(0)]) for k in (2, 3))
     middle = float(np.median(squares)) if len(squares) else 0.0
     if len(squares) < _FEWEST or middle <= 0.0:
         return None
     s = _surprise(squares, pace, middle)
-    level, first, out, whole = _level(squares), 0, [], float(squares.sum())
+    level, first, out, whole = np.log(len(squares) / CHANCE), 0, [], float(squares.sum())
     for name, starts, own, _ in logs:
         mine = s[first : first + len(own)]
         first += len(own)
@@ -143,12 +147,8 @@ def _of_joint(parts: Sequence[tuple], j: int) -> Stretches | None:
     out = [one for one in _joined(out) if one.error > _LITTLE]
     time, length = sum(one.stop - one.start for one in out), _WINDOW * len(squares)
     error = sum(one.error for one in out)
-    few = error > _MOST and time < _LESS * length and len(out) <= _SHOWN
+    few = error > most and time < _LESS * length and len(out) <= _SHOWN
     return Stretches(tuple(out), error, time, length) if few else None
-
-
-def _level(squares) -> float:
-    return float(np.log(len(squares) / CHANCE))
 
 
 def _surprise(squares, pace, middle: float) -> np.ndarray:
@@ -161,7 +161,7 @@ def _surprise(squares, pace, middle: float) -> np.ndarray:
         near = running(squares[usual], size, "median", "edge")
         like = np.clip(np.interp(pace, pace[usual], near), middle, _FAST * middle)
         s = surprise(squares / like, WHITE, tail=TAIL)
-        now = s <= 0.5 * _level(squares)
+        now = s <= 0.5 * np.log(len(squares) / CHANCE)
         if np.array_equal(calm, now) or now.sum() < _LIKE:
             break
         calm = now
