@@ -9,6 +9,7 @@ import numpy as np
 from .full_turns import jumps
 from .outliers import SHORT, quantum
 from .recording import Recording
+from .stamps import long_enough
 from .warned import warn
 
 _FARTHER = 3.0  # times as far as in any other step: no motion does that on several joints at once
@@ -50,9 +51,7 @@ def angle_starts(t, q, breaks, turns) -> np.ndarray:
     moving = int(np.sum(np.ptp(q, axis=0) > 0.0))
     count = far.sum(axis=1)
     found = np.flatnonzero((count >= 2) & (2 * count > moving)) + 1
-    bounds = np.union1d(np.concatenate([[0], found, [len(t)]]), breaks).astype(int)
-    at = np.searchsorted(bounds, found)  # a few rows are no recording
-    return found[np.minimum(bounds[at] - bounds[at - 1], bounds[at + 1] - bounds[at]) >= SHORT]
+    return found[long_enough(found, breaks, len(t))]  # a few rows are no recording
 
 
 def _far(steps, asked, turns: bool) -> np.ndarray:

@@ -4,7 +4,7 @@ joint, which is asked of the joint where much of what is left lies there.
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -62,15 +62,15 @@ def asked_too(experiment: Experiment, view) -> list[Effect]:
     q, left = view.rows.of(view.motion, "q"), view.rows.residual(view.settled.x)
     ends = {j: _ends(q, left, view.rows.use, j) for j in range(q.shape[1])}
     at = {name: [j for j, own in ends.items() if name in own] for name in LAWS}
-    return [*own_effects(experiment), *stops(experiment, view.model, at)]
+    return with_stops(own_effects(experiment), view.model, at)
 
 
-def stops(experiment: Experiment, model: Model, at: dict[str, Collection[int]]) -> list[Stop]:
-    """The stops that may be asked of joints, {name: their numbers}: not one of whose name there is a
-    law of the user's own."""
-    taken = {effect.name for effect in own_effects(experiment)}
-    taken |= {effect.name for effect, _ in model.terms}
-    return [Stop(name, joints) for name, joints in at.items() if joints and name not in taken]
+def with_stops(own: Sequence[Effect], model: Model, at: dict[str, Collection[int]]) -> list[Effect]:
+    """The user's own effects and the stops that may be asked of joints, {name: their numbers}: not
+    one of whose name there is an own law."""
+    taken = {effect.name for effect in [*own, *(effect for effect, _ in model.terms)]}
+    asked = {name: joints for name, joints in at.items() if joints and name not in taken}
+    return [*own, *(Stop(name, joints) for name, joints in asked.items())]
 
 
 def _ends(q, left, use, j: int) -> list[str]:

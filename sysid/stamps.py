@@ -26,14 +26,15 @@ def starts(t, breaks) -> np.ndarray:
     # a stamp that is wrong leaps on again by as much
     if np.any(size <= usual) or np.any(leap > 0.5 * size):
         return back[:0]
-    bounds = np.union1d(np.concatenate([[0], back, [len(t)]]), breaks)
-    return back if np.all(_pieces(back, bounds) >= SHORT) else back[:0]
+    return back if np.all(long_enough(back, breaks, len(t))) else back[:0]
 
 
-def _pieces(rows, bounds) -> np.ndarray:
-    """How many rows (k,) the shorter of the two pieces has between which each of some rows stands."""
+def long_enough(rows, breaks, n: int) -> np.ndarray:
+    """Which of some rows (k,) of n, at which another recording may begin, stand between two pieces
+    that are long enough to be recordings; `breaks` begin others."""
+    bounds = np.union1d(np.concatenate([[0], rows, [n]]), breaks).astype(int)
     at = np.searchsorted(bounds, rows)
-    return np.minimum(bounds[at] - bounds[at - 1], bounds[at + 1] - bounds[at])
+    return np.minimum(bounds[at] - bounds[at - 1], bounds[at + 1] - bounds[at]) >= SHORT
 
 
 def in_packets(t, signals, breaks) -> tuple[np.ndarray, tuple[int, ...]]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from .. import experiment_logs, pipeline
 from ..candidates import Candidate, candidates, own_effects
-from ..end_stops import LAWS, stops
+from ..end_stops import LAWS, with_stops
 from ..errors import ConfigError, LogError
 from ..estimate import Fit
 from ..filters import settled
@@ -153,8 +153,7 @@ def _has_logs(experiment: Experiment) -> bool:
 def _suspects(experiment: Experiment, model: Model, separate) -> list[Candidate]:
     joints = model.robot.joints
     of_stops = {n: [joints.index(j) for e, j in separate if e == n and j in joints] for n in LAWS}
-    extra = [*own_effects(experiment), *stops(experiment, model, of_stops)]
-    every = candidates(model, extra)
+    every = candidates(model, with_stops(own_effects(experiment), model, of_stops))
     out = []
     for effect, joint in separate:
         if joint != "*" and joint not in joints:

@@ -19,11 +19,8 @@ from .held_out import HeldOut
 
 _WINDOW = 0.2  # s: a push, a snag, a contact last longer
 _APART = 0.6  # s: what is nearer is one
-_MOST, _BENT, _LESS = (
-    0.8,
-    0.2,
-    0.33,
-)  # of the squared error that they hold, of what bends a fit; of the time
+_MOST, _LESS = 0.8, 0.33  # of the squared error that they hold, in less of the time
+_BENT = 0.2  # of the squared error: so much in a few windows bends a fit
 _LITTLE = 0.005  # of the squared error: what holds less is no matter
 _FEWEST = 40  # windows that have a usual
 _LIKE = 31  # windows of the nearest pace, by which one is judged
@@ -77,9 +74,10 @@ def stretches(held_out: HeldOut, train: Motion, weights) -> list[Stretches | Non
     settled, test = held_out.settled, held_out.rows
     parts = _with_pace(((settled.rows, train), (test, held_out.test)))
     # what bends a fit hides in it: any window that stands out is a reason to doubt it
-    if not any(_found(parts, settled.x, most=_BENT)):
-        return _found(parts, settled.x)
-    return _found(parts, _doubting(settled, train, np.asarray(weights)))
+    plain = _found(parts, settled.x, most=_BENT)
+    if not any(plain):
+        return plain
+    return _found(parts, _doubting(settled, train, np.asarray(weights)), most=_MOST)
 
 
 def _with_pace(parts) -> list[tuple]:
@@ -93,7 +91,7 @@ def _with_pace(parts) -> list[tuple]:
     return [(*part, qd + qdd) for part, qd, qdd in zip(parts, *paces)]
 
 
-def _found(parts, x, most: float = _MOST) -> list[Stretches | None]:
+def _found(parts, x, *, most: float) -> list[Stretches | None]:
     known = [(rows, rows.residual(x), motion, pace) for rows, motion, pace in parts]
     return [_of_joint(known, j, most) for j in range(known[0][0].tau.shape[1])]
 
@@ -114,9 +112,9 @@ def _doubting(settled: Settled, motion: Motion, weights: np.ndarray) -> np.ndarr
         left = residual - np.einsum("jnk,k->nj", rows.columns, change, optimize=True)
         system, right = prior.copy(), -pull
         for j, columns in enumerate(rows.columns):
-            count = np.maximum(np.bincount(window, rows.use[:, j]), 1.0)
-            square = np.bincount(window, left[:, j] ** 2) / count
-            there = square[np.bincount(window, rows.use[:, j]) > 0]
+            count = np.bincount(window, rows.use[:, j])
+            square = np.bincount(window, left[:, j] ** 2) / np.maximum(count, 1.0)
+            there = square[count > 0]
             usual = float(np.median(there)) if len(there) else 0.0
             counts = scale[j] / (1.0 + (square / max(_DOUBT * usual, 1e-300))[window])
             system += columns.T @ (columns * counts[:, None])
