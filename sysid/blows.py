@@ -129,7 +129,7 @@ def _link(found, motion, place: tuple[int, int], own: list[int]) -> tuple:
     model = found.model
     starts = {k: start for k in own if (start := model.shape_values[k].shape.start) is not None}
     idle = model.with_some_shapes(starts)
-    return idle, row.bent(idle, motion, found.x, place[1])
+    return idle, row.bent(idle, motion, found.x, [place[1]])[place[1]]
 
 
 def _tried(found, motion, weights, place: tuple[int, int], own: list[int], sets: np.ndarray, link: tuple) -> np.ndarray:

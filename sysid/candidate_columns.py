@@ -130,14 +130,17 @@ def _changes(source, candidate: Candidate, shapes: list[dict[str, float]], among
     effect = candidate.effect
     leading = next(s.name for s in effect.shapes() if s.start is not None)
     begun = [_begun(source, candidate, leading, own) for own in shapes]
-    known, apart = source.bent(candidate.joint), None
-    if effect.blows and not candidate.begins and shapes == tried(source, candidate):
+    among = {candidate.joint, *(j for j in among if j >= 0)}
+    known, apart = source.bent(candidate.joint, among), None
+    everywhere = tried(source, candidate) if effect.blows and not candidate.begins else []
+    if everywhere and all(own in everywhere for own in shapes):
         tries = {}
-        for joint in {candidate.joint, *(j for j in among if j >= 0)}:
+        for joint in among:
             one = replace(candidate, joint=joint)
             tries[joint] = [_begun(source, one, leading, own) for own in tried(source, one)]
-        key = candidate.name, candidate.options
-        apart = source.flights(key, effect, tries)[candidate.joint]
+        key, places = (candidate.name, candidate.options), [everywhere.index(own) for own in shapes]
+        flown = source.flights(key, effect, tries)[candidate.joint]
+        apart = [[piece[k] for k in places] for piece in flown]
     found = row.secants(
         source.model, source.motion, known, effect, begun, source.stride, source.use, apart
     )

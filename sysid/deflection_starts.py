@@ -41,7 +41,7 @@ def from_tries(found: Settled, motion: Motion, term: int, joint: int, weights) -
     scale = np.ones(model.robot.dof) if weights is None else np.asarray(weights)
     projection = Projection(rows.columns, rows.residual(found.x), prior_hessian(found), scale)
     gains = []
-    for change in row.secants(model, motion, row.bent(model, motion, found.x, joint), effect, tried, found.stride, rows.use):
+    for change in row.secants(model, motion, row.bent(model, motion, found.x, [joint])[joint], effect, tried, found.stride, rows.use):
         c, _, _, gain, _ = projection.step(change[:, :, None], joint)
         gains.append(gain if c[0] > 0 else 0.0)
     if not max(gains) > 0:

@@ -20,8 +20,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from .robot import Robot
+from .tree import cross, frames, skew, to_base
 
-_CHUNK = 4096  # samples: the arrays of one body stay in cache
+CHUNK = 4096  # samples: the arrays of one body stay in cache
 
 
 @dataclass(frozen=True)
@@ -49,7 +50,7 @@ def body_motions(robot: Robot, q, qd, qdd, *, gravity=None, deflection=None) -> 
         linear, angular = robot.subspaces[i, :3, None], robot.subspaces[i, 3:, None]
         turn, p = frame.turn, frame.origin
         carried = {
-            j: (turn(jl + _cross(ja, p)), turn(ja)) for j, (jl, ja) in (jacobians[parent] if parent >= 0 else {}).items()
+            j: (turn(jl + cross(ja, p)), turn(ja)) for j, (jl, ja) in (jacobians[parent] if parent >= 0 else {}).items()
         }
         for j in np.flatnonzero(robot.transmission[i]):
             gain = robot.transmission[i, j]
@@ -62,116 +63,13 @@ def body_motions(robot: Robot, q, qd, qdd, *, gravity=None, deflection=None) -> 
     ]
 
 
-@dataclass(frozen=True)
-class Frame:
-    """Motion of a frame of the tree, (3, n) in its own axes; `turn` takes vectors from its parent's axes to its own, `origin`
-    (3, 1 or n) is where it stands in these."""
-
-    angular: np.ndarray
-    angular_acceleration: np.ndarray
-    acceleration: np.ndarray
-    turn: "_Turn"
-    origin: np.ndarray
-
-
-def frames(robot: Robot, q, qd, qdd, *, gravity=None, deflection=None, bearing=None) -> list[Frame]:
-    """Motion of every frame of the tree, parents first. Arguments: see `body_motions`.
-
-    Args:
-        bearing: rows of those that are asked for, with all that they hang on; the others are None. All where it is None.
-    """
-    q, qd, qdd = (np.ascontiguousarray(np.asarray(x, dtype=float).T) for x in (q, qd, qdd))
-    n = q.shape[1]
-    full_q, full_qd, full_qdd = (robot.transmission @ x for x in (q, qd, qdd))
-    if deflection is not None:
-        links = [body.row for body in robot.bodies if body.kind == "link"]
-        for full, behind in zip((full_q, full_qd, full_qdd), deflection):
-            full[links] -= behind.T
-    zero = np.zeros((3, n))
-    # the base accelerates upward at -g: gravity enters every body at no cost
-    base = (zero, zero, np.repeat(-np.asarray(robot.gravity if gravity is None else gravity)[:, None], n, 1))
-    out: list[Frame] = []
-    for i, parent in enumerate(robot.parents):
-        if bearing is not None and i not in bearing:
-            out.append(None)
-            continue
-        w, alpha, a = (out[parent].angular, out[parent].angular_acceleration, out[parent].acceleration) if parent >= 0 else base
-        linear, angular = robot.subspaces[i, :3, None], robot.subspaces[i, 3:, None]
-        speed, push = full_qd[i], full_qdd[i]
-        revolute = bool(np.any(angular))
-        to_child = _rotation_to_child(robot.rotations[i], robot.subspaces[i], full_q[i]) if revolute else robot.rotations[i].T
-        # origin of the child's frame in the parent's axes; a prismatic joint moves it along its axis
-        p = robot.translations[i][:, None] + (0.0 if revolute else robot.rotations[i] @ (linear * full_q[i]))
-        turn = _Turn(to_child)
-        new_w, new_alpha = turn(w), turn(alpha)
-        # classical acceleration of the child's origin
-        new_a = turn(a + _cross(alpha, p) + _cross(w, _cross(w, p)))
-        if revolute:
-            new_alpha = new_alpha + angular * push + _cross(new_w, angular) * speed
-            new_w = new_w + angular * speed
-        else:
-            new_a = new_a + linear * push + 2.0 * _cross(new_w, linear) * speed
-        out.append(Frame(new_w, new_alpha, new_a, turn, p))
-    return out
-
-
-class _Turn:
-    """Turn vectors (3, n) by one matrix (3, 3) or by a matrix for each sample (3, 3, n); `back` by its inverse."""
-
-    def __init__(self, matrix):
-        self.matrix = matrix
-
-    def __call__(self, vector):
-        m = self.matrix
-        if m.ndim == 2:
-            return m @ vector
-        out = np.empty((3, m.shape[2]))
-        for r in range(3):
-            np.multiply(m[r, 0], vector[0], out=out[r])
-            out[r] += m[r, 1] * vector[1]
-            out[r] += m[r, 2] * vector[2]
-        return out
-
-    def back(self, vector):
-        """From the child's axes to the parent's."""
-        return _Turn(np.swapaxes(self.matrix, 0, 1))(vector)
-
-
-def _rotation_to_child(placement, subspace, angle) -> np.ndarray:
-    """(R_placement exp(S(axis) angle))' for every sample: (3, 3, n), by Rodrigues' formula."""
-    skew = _skew(subspace[3:])
-    parts = [placement, placement @ skew, placement @ skew @ skew]
-    shares = np.stack([part.T.ravel() for part in parts], axis=1)
-    half = np.tan(0.5 * angle)  # sine and cosine of the whole in the time of one of them
-    sine = 2.0 * half / (1.0 + half**2)
-    return (shares @ np.stack([np.ones_like(half), sine, half * sine])).reshape(3, 3, half.size)
-
-
-def _skew(vector) -> np.ndarray:
-    x, y, z = vector
-    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-
-
-def _cross(a, b) -> np.ndarray:
-    """a x b (3, n); of a vector that is the same for every sample one product with a matrix."""
-    if np.shape(b)[1] == 1:
-        return _skew(-b[:, 0]) @ a
-    if np.shape(a)[1] == 1:
-        return _skew(a[:, 0]) @ b
-    out = np.empty(np.shape(a))
-    for k, (i, j) in enumerate(((1, 2), (2, 0), (0, 1))):
-        np.multiply(a[i], b[j], out=out[k])
-        out[k] -= a[j] * b[i]
-    return out
-
-
 def wrench_columns(motion: BodyMotion, linear, angular, out) -> None:
     """Write the ten columns of one body in one joint's torque into out (10, n)."""
     w, alpha, a = motion.angular, motion.angular_acceleration, motion.acceleration
     out[0] = np.einsum("in,in->n", linear, a)
     along, square = np.einsum("in,in->n", linear, w), np.einsum("in,in->n", w, w)
-    out[1:4] = _cross(linear, alpha) + w * along - linear * square + _cross(a, angular)
-    u = _cross(angular, w)  # angular . (w x I w) = (angular x w) . I w
+    out[1:4] = cross(linear, alpha) + w * along - linear * square + cross(a, angular)
+    u = cross(angular, w)  # angular . (w x I w) = (angular x w) . I w
     out[4:7] = angular * alpha + u * w
     for k, (i, j) in zip((7, 8, 9), ((0, 1), (1, 2), (0, 2))):
         out[k] = angular[i] * alpha[j] + angular[j] * alpha[i] + u[i] * w[j] + u[j] * w[i]
@@ -214,7 +112,7 @@ def regressor(robot: Robot, q, qd, qdd) -> np.ndarray:
     return np.moveaxis(columns(robot, q, qd, qdd), -1, 0)
 
 
-def regressor_chunks(robot: Robot, q, qd, qdd, *, chunk: int = _CHUNK) -> Iterator[np.ndarray]:
+def regressor_chunks(robot: Robot, q, qd, qdd, *, chunk: int = CHUNK) -> Iterator[np.ndarray]:
     """`regressor` in pieces of at most `chunk` samples, so that memory does not grow with the log."""
     for start in range(0, len(q), chunk):
         part = slice(start, start + chunk)
@@ -224,35 +122,50 @@ def regressor_chunks(robot: Robot, q, qd, qdd, *, chunk: int = _CHUNK) -> Iterat
 def torque(robot: Robot, pi, q, qd, qdd, *, gravity=None, deflection=None) -> np.ndarray:
     """Inverse dynamics (n, dof) [N m] of bodies pi (bodies, 10), rotors included, friction not. Bodies without mass cost nothing."""
     q, qd, qdd = (np.asarray(x, dtype=float) for x in (q, qd, qdd))
-    heavy = [(parameters, body.row) for parameters, body in zip(np.asarray(pi), robot.bodies) if parameters.any()]
-    bearing = set()
-    for _, row in heavy:
-        while row >= 0 and row not in bearing:
-            bearing.add(row)
-            row = robot.parents[row]
-    out = np.zeros((len(q), robot.dof))
-    for start in range(0, len(q), _CHUNK):
-        part = slice(start, start + _CHUNK)
+    heavy, bearing = heavy_of(robot, pi)
+    rows, out = range(len(robot.parents))[::-1], np.zeros((len(q), robot.dof))
+    for start in range(0, len(q), CHUNK):
+        part = slice(start, start + CHUNK)
         behind = None if deflection is None else deflection[:, part]
         found = frames(robot, q[part], qd[part], qdd[part], gravity=gravity, deflection=behind, bearing=bearing)
-        wrenches: dict[int, list] = {}  # force and moment about the origin of each frame, all that hangs on it included
-        for parameters, row in heavy:
-            force, moment = _wrench(parameters, found[row])
-            held = wrenches.setdefault(row, [0.0, 0.0])
-            held[0], held[1] = held[0] + force, held[1] + moment
-        for i in reversed(range(len(found))):  # children before their parents
-            if i not in wrenches:
-                continue
-            force, moment = wrenches[i]
-            linear, angular = robot.subspaces[i, :3], robot.subspaces[i, 3:]
-            along = linear @ force + angular @ moment
-            for j in np.flatnonzero(robot.transmission[i]):
-                out[part, j] += robot.transmission[i, j] * along
-            if robot.parents[i] >= 0:
-                held = wrenches.setdefault(robot.parents[i], [0.0, 0.0])
-                force = found[i].turn.back(force)
-                held[0], held[1] = held[0] + force, held[1] + found[i].turn.back(moment) + _cross(found[i].origin, force)
+        handed_down(robot, found, rows, wrenches(heavy, found), out[part].T)
     return out
+
+
+def heavy_of(robot: Robot, pi) -> tuple[list[tuple[np.ndarray, int]], set[int]]:
+    """The parameters of bodies that have some, each with its row; and these rows with all that bear them."""
+    heavy = [(parameters, body.row) for parameters, body in zip(np.asarray(pi), robot.bodies) if parameters.any()]
+    return heavy, {i for _, row in heavy for i in to_base(robot, row)}
+
+
+def wrenches(heavy, found) -> dict[int, list]:
+    """{row: force and moment (3, n) of the bodies of a frame about its origin}."""
+    out: dict[int, list] = {}
+    for parameters, row in heavy:
+        force, moment = _wrench(parameters, found[row])
+        held = out.setdefault(row, [0.0, 0.0])
+        held[0], held[1] = held[0] + force, held[1] + moment
+    return out
+
+
+def handed_down(robot: Robot, found, rows, held_by: dict[int, list], out: np.ndarray) -> None:
+    """Add to torque (dof, n) what holds the wrenches of frames, each handed on to the frame that bears it.
+
+    Args:
+        rows: of the tree, children before their parents. held_by: as of `wrenches`; changed.
+    """
+    for i in rows:
+        if i not in held_by:
+            continue
+        force, moment = held_by[i]
+        linear, angular = robot.subspaces[i, :3], robot.subspaces[i, 3:]
+        along = linear @ force + angular @ moment
+        for j in np.flatnonzero(robot.transmission[i]):
+            out[j] += robot.transmission[i, j] * along
+        if robot.parents[i] >= 0:
+            held = held_by.setdefault(robot.parents[i], [0.0, 0.0])
+            force = found[i].turn.back(force)
+            held[0], held[1] = held[0] + force, held[1] + found[i].turn.back(moment) + cross(found[i].origin, force)
 
 
 def _wrench(parameters, motion):
@@ -262,5 +175,5 @@ def _wrench(parameters, motion):
     inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     w, alpha, a = motion.angular, motion.angular_acceleration, motion.acceleration
     force = mass * a + w * (h @ w) - h[:, None] * np.einsum("in,in->n", w, w)  # w x (w x h)
-    force -= _skew(h) @ alpha
-    return force, _skew(h) @ a + inertia @ alpha + _cross(w, inertia @ w)
+    force -= skew(h) @ alpha
+    return force, skew(h) @ a + inertia @ alpha + cross(w, inertia @ w)

@@ -6,18 +6,18 @@ what a diagnosis asks its questions of: few enough to keep, spread over the whol
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
 
 import numpy as np
 
-from . import regressor
 from .both_sides import settled
 from .effect import NotFinite
 from .model import Model
 from .motion import Motion, Piece
 from .slides import counted
+from .standing_apart import standing_apart
 from .stretches import stretches
 from .two_masses import link_load
 
@@ -132,29 +132,23 @@ class Bent:
     seen: Piece
 
 
-def bent(model: Model, motion: Motion, x, joint: int, pieces: list | None = None) -> list[Bent]:
-    """Of each piece, at parameters x (size,): what changes is the torque of what the link carries.
+def bent(model: Model, motion: Motion, x, joints: Sequence[int], pieces: list | None = None) -> dict[int, list[Bent]]:
+    """{joint: of each piece}, at parameters x (size,): what changes is the torque of what the link carries.
 
     Args:
         pieces: `seen(model, motion)`, where it is at hand.
     """
-    pi, out = np.asarray(x)[: 10 * model.bodies].reshape(-1, 10), []
-    carried = model.robot.carried(joint)
-    own, alone = np.where(carried[:, None], pi, 0.0), not (carried & model.robot.turned(joint)).any()
+    pi, out = np.asarray(x)[: 10 * model.bodies].reshape(-1, 10), {joint: [] for joint in joints}
     for parts in _alike(seen(model, motion) if pieces is None else pieces):
         part = _joined(parts)
-        needed = lambda behind: regressor.torque(model.robot, own, part.q, part.qd, part.qdd, gravity=part.gravity, deflection=behind)  # noqa: B023, E731
-        base, slopes = needed(part.deflection), []
-        for order, nudge in enumerate(NUDGES):
-            behind = np.zeros((3, *part.q.shape)) if part.deflection is None else part.deflection.copy()
-            behind[order, :, joint] += nudge
-            slopes.append((needed(behind) - base).T / nudge)
-        inertia = -slopes[-1][joint]  # of the link alone: its rotor stays with the motor
-        plain = alone and part.deflection is None and part.gravity is None
-        load = base[:, joint] if plain else link_load(model.robot, pi, part, joint)
-        ends = np.cumsum([len(one.q) for one in parts])[:-1]
-        each = (np.split(values, ends, axis=-1) for values in (np.stack(slopes), load, inertia))
-        out += [Bent(*known, one) for *known, one in zip(*each, parts)]
+        moves, how = (part.q, part.qd, part.qdd), {"gravity": part.gravity, "deflection": part.deflection}
+        plain, ends = part.deflection is None and part.gravity is None, np.cumsum([len(one.q) for one in parts])[:-1]
+        for joint, (base, slopes) in standing_apart(model.robot, pi, *moves, joints, NUDGES, **how).items():
+            inertia = -slopes[-1][joint]  # of the link alone: its rotor stays with the motor
+            alone = not (model.robot.carried(joint) & model.robot.turned(joint)).any()
+            load = base[joint] if plain and alone else link_load(model.robot, pi, part, joint)
+            each = (np.split(values, ends, axis=-1) for values in (slopes, load, inertia))
+            out[joint] += [Bent(*known, one) for *known, one in zip(*each, parts)]
     return out
 
 

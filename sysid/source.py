@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -49,11 +50,12 @@ class Source:
     def _bent(self) -> dict:
         return {}
 
-    def bent(self, joint: int) -> list:
+    def bent(self, joint: int, among: Iterable[int] = ()) -> list:
         """What a joint's link would change if it stood apart from its motor: the same for whatever
-        parts them."""
+        parts them. among: joints that will be asked alike."""
         if joint not in self._bent:
-            self._bent[joint] = row.bent(self.model, self.motion, self.x, joint, self._seen)
+            new = [j for j in {joint, *among} if j not in self._bent]
+            self._bent.update(row.bent(self.model, self.motion, self.x, new, self._seen))
         return self._bent[joint]
 
     @cached_property
@@ -92,7 +94,7 @@ class Source:
         known = self._flights.setdefault(key, {})
         if more := {joint: own for joint, own in tries.items() if joint not in known}:
             both = [self] if self.beside is None else [self, self.beside]
-            bent = [{joint: source.bent(joint) for joint in more} for source in both]
+            bent = [{joint: source.bent(joint, more) for joint in more} for source in both]
             found = [{joint: [] for joint in more} for _ in both]
             for k in range(len(self.motion.pieces)):
                 parts = [(b[joint][k], own) for b in bent for joint, own in more.items()]

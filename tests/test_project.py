@@ -19,7 +19,7 @@ ROOT = Path(__file__).resolve().parent.parent
 
 # The order of the method: a module imports only from modules above it.
 ORDER = [
-    "errors", "warned", "mistyped", "bounded", "nonnegative", "eigen", "unfinished", "whole_files", "yaml_text", "state", "trusted", "progress", "units", "picture", "threads", "free_memory", "silence", "callable_module", "workers", "inertia", "urdf_checks", "urdf_files", "urdf", "readers", "datasets", "spec_values", "robot_spec", "drive_spec", "log_spec", "specs", "groups", "prior", "link_priors", "rotors", "robot", "regressor", "running", "outliers", "glitches", "knocks", "repeats",
+    "errors", "warned", "mistyped", "bounded", "nonnegative", "eigen", "unfinished", "whole_files", "yaml_text", "state", "trusted", "progress", "units", "picture", "threads", "free_memory", "silence", "callable_module", "workers", "inertia", "urdf_checks", "urdf_files", "urdf", "readers", "datasets", "spec_values", "robot_spec", "drive_spec", "log_spec", "specs", "groups", "prior", "link_priors", "rotors", "robot", "tree", "regressor", "standing_apart", "running", "outliers", "glitches", "knocks", "repeats",
     "frequencies", "clock", "segment", "spans", "events", "motor_side", "recorded_columns", "stamps", "recording", "finite", "full_turns", "anew", "unwritten", "rounded_stamps", "arrivals", "held_rows", "gaussian", "smoother", "slips", "log", "even_clock", "long_log", "masks", "same_samples",
     "motion", "both_sides", "clock_jumps", "jumps", "extent", "standstill", "preprocess", "long_motion", "blocks", "two_masses", "lowpass", "flexible", "effect_parameters", "effect_options", "effect", "deflection",
     "vocabulary", "formula", "effects", "own_effects",

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .. import regressor
+from .. import tree
 from ..robot import Robot
 
 
@@ -25,7 +25,7 @@ def summed(robot: Robot, weights, q, qd, qdd) -> tuple[np.ndarray, np.ndarray]:
     Args:
         weights (dof, 10 bodies, n): of columns.
     """
-    frames = regressor.frames(robot, q, qd, qdd)
+    frames = tree.frames(robot, q, qd, qdd)
     jacobians = _jacobians(robot, frames)
     s, out = np.zeros((robot.dof, len(q))), np.zeros((3, len(frames), len(q)))
     gains = [_Gains(len(q), len(joints)) for joints, *_ in jacobians]
