@@ -1,10 +1,12 @@
 """What stopped a reader on the way from a log to an added effect stays mended."""
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 
 import sysid
 from sysid import check, config, pipeline
@@ -120,6 +122,19 @@ def test_the_cure_of_a_sign_can_be_typed(experiment):
     mended = {"data.torque": {"elbow": {"tau_elbow": -1}}}
     found = check.check(pipeline.load(experiment(config=mended, train=turned, test=turned, name="mended")))
     assert not [f for f in found if f.severity == "error"]
+
+
+def test_the_cure_of_two_signs_holds_both(experiment):
+    """An entry in a file replaces the one before it: whichever line is typed says all."""
+    turned = lambda c: c | {name: -c[name] for name in ("tau_shoulder", "tau_elbow")}
+    found = check.check(pipeline.load(experiment(train=turned, test=turned)))
+    both = {"shoulder": {"tau_shoulder": -1}, "elbow": {"tau_elbow": -1}}
+    for fault in (own := [f for f in found if f.fault == "sign_flipped"]):
+        written = re.fullmatch(r"write data\.torque: (\{.*\}); or take it as it is.*", fault.do)[1]
+        assert yaml.safe_load(written) == both
+    assert {f.joint for f in own} == set(BOTH)
+    mended = experiment(config={"data.torque": both}, train=turned, test=turned, name="mended")
+    assert not [f for f in check.check(pipeline.load(mended)) if f.severity == "error"]
 
 
 def test_exchanged_columns_are_told_once_with_the_list_to_write(experiment):

@@ -34,7 +34,7 @@ def find(look: Look) -> Iterator[Fault]:
         return
     reading = Reading.plain(look.robot.dof)
     scored = equations.scored(reading)
-    turning = np.flatnonzero(~np.asarray(look.robot.prismatic)).tolist()
+    turning, found = np.flatnonzero(~np.asarray(look.robot.prismatic)).tolist(), []
     for _ in range(_ROUNDS):
         # of joints that hardly move any reading of the columns tells as little
         others = [
@@ -47,8 +47,10 @@ def find(look: Look) -> Iterator[Fault]:
         # as it is, and in another unit, it may leave the least
         if not tried or equations.scored(reading, free=True).loss < min(loss for loss, *_ in tried):
             break
-        _, reading, (kind, joints, word), scored = min(tried, key=lambda one: one[0])
-        yield from _told(look, kind, joints, word)
+        _, reading, told, scored = min(tried, key=lambda one: one[0])
+        found.append(told)
+    for told in found:  # each says all of what is to be written, as one entry replaces another
+        yield from _told(look, reading, *told)
     yield from _factors(look, equations, reading, scored)
 
 
@@ -95,7 +97,8 @@ def _clear(before: Scored, after: Scored, joints, word: str) -> bool:
     return bool(gain.sum() > _BETTER * len(joints) and np.all(gain[list(joints)] > 0.0))
 
 
-def _told(look: Look, kind: str, joints, word: str) -> Iterator[Fault]:
+def _told(look: Look, reading: Reading, kind: str, joints, word) -> Iterator[Fault]:
+    """What is said of one thing in which a reading differs from the experiment's."""
     names = [look.robot.joints[j] for j in joints]
     if kind == "limit_exceeded":
         turn = {1: "a quarter turn", 2: "half a turn", -1: "a quarter turn back"}[word]
@@ -104,7 +107,8 @@ def _told(look: Look, kind: str, joints, word: str) -> Iterator[Fault]:
             "robot explains the torques"
         )
         known = dict(look.experiment.data.zero)
-        known[names[0]] = known.get(names[0], 0.0) + word * np.pi / 2
+        for joint, more in zip(look.robot.joints, reading.zero):
+            known |= {joint: known.get(joint, 0.0) + more} if more else {}
         told = ", ".join(f"{joint}: {at:.6g}" for joint, at in known.items())
         do = f"write data.zero: {{{told}}}; {_OUT_OF}"
         yield Fault(kind, WARNING, says, do, names[0])
@@ -117,31 +121,39 @@ def _told(look: Look, kind: str, joints, word: str) -> Iterator[Fault]:
                 f"{what} of {names[0]} and {names[1]} look exchanged: the URDF's robot "
                 "explains them in the other order"
             )
-            do = "; ".join(_exchanged(look, key, names) for key in kinds)
+            do = "; ".join(_exchanged(look, key, reading) for key in kinds)
         else:
             says = (
                 f"the {word} of {name} has the sign against the URDF's: as it is, "
                 "friction would drive the joint or gravity lift it"
             )
-            do = "; ".join(_negated(look, key, name) for key in kinds)
+            do = "; ".join(_negated(look, key, name, reading) for key in kinds)
         yield Fault(kind, ERROR, says, f"{do}; {_OUT_OF}", name)
 
 
-def _exchanged(look: Look, key: str, names: list[str]) -> str:
-    found = [look.column(key, joint) for joint in names]
-    every = [look.column(key, joint) for joint in look.robot.joints]
+def _in_order(look: Look, key: str, reading: Reading) -> list[str | None]:
+    """The column of each joint in the order of a reading; None where it is no single one."""
+    order = reading.angle if key == "position" else reading.torque
+    return [look.column(key, look.robot.joints[k]) for k in order]
+
+
+def _exchanged(look: Look, key: str, reading: Reading) -> str:
+    every = _in_order(look, key, reading)
     if None in every:
         return f"exchange the two in data.columns.{key}"
-    other = dict(zip(found, reversed(found)))
-    return f"write data.columns.{key}: [{', '.join(other.get(c, c) for c in every)}]"
+    return f"write data.columns.{key}: [{', '.join(every)}]"
 
 
-def _negated(look: Look, key: str, joint: str) -> str:
+def _negated(look: Look, key: str, joint: str, reading: Reading) -> str:
     """How an experiment says that a column has the other sign."""
-    column = look.column(key, joint)
-    if column is None or joint in getattr(look.experiment.data, key):
+    factors = reading.angle_factor if key == "position" else reading.torque_factor
+    own = zip(look.robot.joints, factors, _in_order(look, key, reading))
+    turned = {name: column for name, factor, column in own if factor < 0.0}
+    sums = getattr(look.experiment.data, key)
+    if turned[joint] is None or joint in sums:
         return f"log the {key} with the other sign"
-    return f"write data.{key}: {{{joint}: {{{column}: -1}}}}"
+    written = [f"{n}: {{{c}: -1}}" for n, c in turned.items() if c is not None and n not in sums]
+    return f"write data.{key}: {{{', '.join(written)}}}"
 
 
 def _factors(look: Look, equations: Equations, reading: Reading, scored: Scored) -> Iterator[Fault]:
