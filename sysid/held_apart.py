@@ -161,14 +161,14 @@ def strongest(apart: HeldApart, begin: float | None = None) -> PriorWeight:
                 break
             if way.step < 0 and begin is not None and own.mean() > before.mean():
                 break
-    for step in (_below, _above):
+    for step in (_below, above):
         _try(apart, found, step(_least(found, rows)))
-    _try(apart, found, _above(_within(found, rows)))
+    _try(apart, found, above(_within(found, rows)))
     value, least = _within(found, rows), _weakest(apart, found)
     if bounded := bool(value < least):
         value = float(f"1e{int(np.floor(np.log10(least)))}")
         while value < least:
-            value = _above(value)
+            value = above(value)
         _try(apart, found, value)
     tried = tuple(sorted(found))
     errors, _ = judged(np.array([found[w] for w in tried]), rows)
@@ -215,7 +215,7 @@ def _within(found: dict[float, np.ndarray], rows) -> float:
     return max(w for w, kept in zip(found, within_one_error(errors, best)) if kept)
 
 
-def _above(weight: float) -> float:
+def above(weight: float) -> float:
     """The next of 1, 3, 10, 30, ..."""
     digit, power = f"{weight:.0e}".split("e")
     return float(f"3e{power}" if digit == "1" else f"1e{int(power) + 1}")

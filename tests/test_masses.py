@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -140,3 +141,15 @@ def test_a_fit_and_a_check_name_armature_and_adding_it_cures(experiment, cli):
     values = {p["name"]: p["value"] for p in after["parameters"]}
     assert values["armature.shoulder.Ia"] == pytest.approx(3.0, abs=0.3)
     assert values["armature.elbow.Ia"] == pytest.approx(2.0, abs=0.2)
+
+
+@pytest.mark.parametrize(("least", "expected"), [(30.0, 1000.0), (3000.0, None)])
+def test_a_stronger_prior_is_told_where_it_hardly_costs_anything(least, expected):
+    """Squares held apart that grow by 1e-5 of themselves with the weight: 2010 makes one per cent of the error."""
+    rows = np.full((5, 2), 100)
+    apart = SimpleNamespace(squares=lambda weight: rows * (1.0 + 1e-5 * weight), rows=rows)
+    found = SimpleNamespace(strength=SimpleNamespace(value=1.0))
+    told = masses._stronger(SimpleNamespace(apart=apart, found=found, plausible=lambda weight: weight >= least))
+    assert told.stronger == expected
+    said = replace(told, far=(("link", "joint", 9.0, 2.0),)).says
+    assert ("prior.weight: 1000" in said and "0.5 %" in said) if expected else "columns or units may be wrong" in said

@@ -54,7 +54,7 @@ def find(look: Look) -> Iterator[Fault]:
             continue
         held.add(body.name)
         word = (
-            "a payload that the URDF lacks, or its mass"
+            "a payload that the URDF lacks, its mass, or a spring that it hangs on"
             if own > 1.0
             else "its mass, or its centre of mass"
         )
