@@ -56,6 +56,9 @@ def held_out(experiment: Experiment, spec: PreprocessSpec, model: Model, logs: S
     # a part that the joints stood still in, or were braked, has no error
     folds = [fold for fold in data.stretches(_FOLDS) if _only(target, fold).rows.any()]
     size = np.array([max(float(np.sum(f.triangle[:, -1] ** 2)), 1e-300) for f in target.by_joint]) / np.maximum(target.rows, 1)
+    # a wider filter leaves fewer rows of a joint whose effects jump: it counts no less for that
+    whole = sum(np.sum(np.ones(p.q.shape, dtype=bool)[p.core] if p.use is None else p.use[p.core], axis=0) for p in raw.pieces)
+    counts = whole / np.maximum(target.rows, 1)
     squares, rows, errors = np.zeros(model.robot.dof), np.zeros(model.robot.dof), []
     if len(folds) < 2:
         raise SysidError("the log is too short to hold a part of it out", where="preprocess")
@@ -66,18 +69,19 @@ def held_out(experiment: Experiment, spec: PreprocessSpec, model: Model, logs: S
         own = held.squares(problem.minimum(experiment.solver.tolerance))
         squares += own
         rows += held.rows
-        errors.append(_logarithm(own, size, held.rows))
+        errors.append(_logarithm(own, size, held.rows, counts))
     rms = np.sqrt(squares / np.maximum(rows, 1))
-    relative = float(np.exp(0.5 * _logarithm(squares, size, rows)))
+    relative = float(np.exp(0.5 * _logarithm(squares, size, rows, counts)))
     untold = int(np.sum(pose(experiment, model, data, moving, prior).coordinates.held & moving))
     return {"relative_error": relative, "rms": dict(zip(model.robot.joints, rms.tolist())), "folds": errors, "untold": untold}
 
 
-def _logarithm(squares: np.ndarray, size: np.ndarray, rows: np.ndarray) -> float:
-    """The mean over the joints, as many rows as each has, of the logarithm of their squared error over that of their torque."""
+def _logarithm(squares: np.ndarray, size: np.ndarray, rows: np.ndarray, counts: np.ndarray) -> float:
+    """The mean over the joints, each by its rows times what one of them `counts`, of the logarithm of their squared error over that
+    of their torque."""
     count = rows > 0
     error = squares[count] / rows[count] / size[count]
-    return float(np.average(np.log(np.maximum(error, _EXACT)), weights=rows[count]))
+    return float(np.average(np.log(np.maximum(error, _EXACT)), weights=(rows * counts)[count]))
 
 
 def _trimmed(piece, segment, edge: float):

@@ -213,7 +213,9 @@ def discover(experiment: Experiment, run: Path, *, most: int = 10, progress=None
 
 def document(added: Added) -> dict:
     """The document of `sysid add`."""
-    name = added.experiment.model.effects[-1].name
+    there = added.before.experiment.model.effects
+    # a joint may have joined an entry that the file has already
+    name = next((spec.name for spec in added.experiment.model.effects if spec not in there), added.experiment.model.effects[-1].name)
     model = added.before.model
     before = {*model.names, *(value.name for value in model.shape_values)}
     found = fit_document.document(added.after)

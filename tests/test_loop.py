@@ -219,6 +219,14 @@ def test_add_writes_refits_and_tells(experiment, cli):
     assert [s["added"] for s in loop.read_history(said.run)] == [None, "torque_bias"]
 
 
+def test_what_joins_an_entry_of_the_file_is_told_by_its_name(experiment, cli):
+    """The entry is not the last one."""
+    there = ["viscous", "coulomb", {"torque_bias": {"joints": ["elbow"]}}, {"asymmetric_coulomb": {"joints": ["elbow"]}}]
+    folder = experiment(config={"model.effects": there})
+    said = json.loads(cli("add", folder, "torque_bias", "--joint", "shoulder", "--force", "--json").out)
+    assert said["added"] == "torque_bias" and [p["name"] for p in said["parameters"]] == ["torque_bias.shoulder.b"]
+
+
 CHEETAH = Path(__file__).resolve().parent.parent / "configs" / "cheetah3.yaml"
 
 

@@ -204,3 +204,18 @@ def test_where_another_log_is_needed_its_design_is_typed_next(capsys):
     assert capsys.readouterr().out.splitlines()[-1] == "next: sysid design arm --out next"
     _after_diagnosis(found, {**document, "next_log": None}, SimpleNamespace(path=Path("arm/config.yaml"), name="arm"))
     assert capsys.readouterr().out.splitlines()[-1] == "next: sysid report arm --open"
+
+
+@pytest.mark.parametrize("steps", [(1, 2), (2, 1)])
+def test_what_is_promised_one_after_another_is_printed_in_that_order(steps, capsys):
+    """A verdict stands by joint; the order is printed where the second joint's effect came first."""
+    found, experiment = SimpleNamespace(fit=SimpleNamespace(masses={}, joints=("a", "b"))), SimpleNamespace(path=Path("arm/config.yaml"), name="arm")
+    on = {"a": "sysid add arm spring --joint a", "b": "sysid add arm spring --joint b"}
+    verdict = [{"joint": joint, "status": "missing", "commands": [command]} for joint, command in on.items()]
+    findings = [{"command": command, "joins_as_step": step} for command, step in zip(on.values(), steps)]
+    _after_diagnosis(found, {"verdict": verdict, "findings": findings, "notices": [], "run": "runs/arm"}, experiment)
+    *said, last = capsys.readouterr().out.splitlines()
+    if steps == (1, 2):
+        assert not said and last == f"next: {on['a']}"
+    else:
+        assert "in this order" in " ".join(said) and said[-2:] == [on["b"], on["a"]] and last == f"next: {on['b']}"

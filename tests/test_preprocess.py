@@ -1,6 +1,7 @@
 """Filters against closed forms."""
 
 import warnings
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -8,10 +9,12 @@ import pytest
 
 from sysid import filters
 from sysid.errors import ConfigError, LogError, SysidWarning
+from sysid.filter_errors import held_out
+from sysid.listed_effects import build
 from sysid.log import Log, Segment
 from sysid.preprocess import prepare
 from sysid.smoother import Smoother, _convolved, rate, savitzky_golay
-from sysid.specs import PreprocessSpec
+from sysid.specs import EffectSpec, PreprocessSpec
 from tests.problems import arm, arm_log
 
 STEP = 1e-3
@@ -218,8 +221,6 @@ def test_what_cannot_be_filtered_is_said():
 @pytest.mark.long
 def test_auto_window_follows_the_noise_and_the_motion():
     """More encoder noise wants a wider window, and the choice is made on held-out stretches of the training log."""
-    from dataclasses import replace
-
     experiment, structure, _, _, prior = arm()
     rng = np.random.default_rng(2)
     chosen = {}
@@ -242,8 +243,6 @@ def test_auto_window_follows_the_noise_and_the_motion():
 def test_a_low_pass_follows_the_noise_too():
     """What an angle's noise becomes as acceleration asks for a lower cutoff; torque is held against what was logged, so that none wins
     by what it smooths away. Where one is given, nothing is chosen."""
-    from dataclasses import replace
-
     experiment, structure, _, _, prior = arm()
     rng = np.random.default_rng(8)
     low = PreprocessSpec(torque="low-pass")
@@ -307,3 +306,18 @@ def test_a_standing_joint_has_no_direction():
         assert np.abs(piece.direction(0)[piece.t > 2.3]).mean() > 0.99
         np.testing.assert_array_equal(piece.direction(1), np.sign(piece.qd[:, 1]))
         assert motion.standing[0] > 0.25 and motion.standing[1] < 0.1
+
+
+def test_a_joint_counts_no_less_for_the_rows_that_a_wide_window_leaves_out():
+    """Two wrist joints rub on each other, and one of them lacks a torque: the wider the window, the fewer rows tell of it. Errors relative
+    to each torque are in a geometric mean over the joints as ever."""
+    experiment, structure, *_, prior = arm()
+    turning = EffectSpec(name="joint_coupling", joints=["wrist_2_joint"], options={"other": "wrist_3_joint"})
+    model = build(structure.robot, [*experiment.model.effects, turning])
+    made = arm_log(structure.robot, np.random.default_rng(8), seconds=30.0, noise=0.02)
+    (segment,) = made.segments
+    tau = segment.tau + np.outer(segment.q[:, 5], [0.0, 0.0, 0.0, 0.0, 2.0, 0.0])
+    logs = [replace(made, segments=(replace(segment, tau=tau),))]
+    found = [held_out(experiment, PreprocessSpec(window=window), model, logs, prior, 0.2) for window in (0.05, 0.15)]
+    mean = [np.mean(np.log([*one["rms"].values()])) for one in found]
+    assert np.log(found[1]["relative_error"] / found[0]["relative_error"]) == pytest.approx(mean[1] - mean[0], abs=0.02)

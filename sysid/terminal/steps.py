@@ -13,6 +13,7 @@ from .next_steps import next_line, next_step, out_of
 from .tables import number, show_notices, table, terminal_width
 
 _NOTHING = 1e-6  # of an error: rounding
+_OTHER = 0.01  # of an error: by so much a change is of other rows than the errors beside it
 
 
 def show_added(document: dict, experiment, run, before=()) -> None:
@@ -27,6 +28,10 @@ def show_added(document: dict, experiment, run, before=()) -> None:
         for d in document["differences"]
     ]  # fmt: skip
     table(f"held-out RMS without and with {document['added']}", ["joint", "before", "after", "change", "standard error"], rows)
+    changed = [(d["joint"], d["delta_rms"], first[d["joint"]], after[d["joint"]]) for d in document["differences"]]
+    if other := [j for j, *known in changed if None not in known and abs(known[0] - (known[2] - known[1])) > _OTHER * known[1]]:
+        words = f"before and after hold all rows that each fit counts, the change of {text.listed(other, 'and')} those that both count"
+        print("\n".join(text.wrapped(words, terminal_width(), "  ")))
     for parameter in document["parameters"]:
         if parameter["std"] is not None:
             print(text.valued(parameter["name"], parameter))
