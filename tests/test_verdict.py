@@ -393,6 +393,15 @@ def test_a_tone_alone_is_unknown_and_its_share_is_said():
     assert elbow(3.0, [claim("cogging", "elbow", [0.0, 0.82], fitted(1.6))], rest=hum).status == "missing"
 
 
+def test_a_joint_at_its_floor_that_drifts_with_time_alone_is_complete():
+    """Noise that is slower than the blocks looks like a law of time; friction that changes with time goes with the direction, too."""
+    drift = replace(left(0.3), shares={"time": 0.3})
+    assert elbow(1.08, rest=drift).status == "complete"
+    assert elbow(2.0, rest=drift).status == "unknown"  # no drift that a floor holds
+    assert elbow(1.08, rest=replace(drift, shares={"time and direction": 0.3, "time": 0.1})).status == "unknown"
+    assert elbow(1.08, rest=replace(drift, tone=0.1)).status == "unknown"
+
+
 # ---- what a log could have shown
 
 

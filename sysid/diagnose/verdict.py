@@ -30,8 +30,7 @@ class Verdict:
     (error stands above the floor, or the floor is not known, and nothing says why). explained:
     share of the joint's misfit on the test logs that all claims take, NaN where there is none.
     left: what functions of the motion predict of the rest, or None. says: why something is left.
-    may: the effect that may be it. even: whether most of the rest is how the fit weighs its joints.
-    carries: why the error on the test logs is the greater one, where it is.
+    may: the effect that may be it. even: how joints weigh makes it. carries: why tests show more.
     """
 
     joint: str
@@ -77,8 +76,9 @@ def verdicts(
     reaches = [floor.reached(most[joint]) for joint, floor in by_joint]
     evens = [by_weights(last, joint, floor.rms, weighed) for joint, floor in by_joint]
     louder = loudest(errors[1], floors, [not (at or even) for at, even in zip(reaches, evens)])
-    # an error that is no more than noise, however joints are weighed, lacks nothing
+    # an error that is no more than noise, however joints are weighed, or than its drift, lacks none
     asked = [not f.within(min(most[j], weighed.get(j, np.inf))) for j, f in by_joint]
+    asked = [own and not (at and one.drifts) for own, at, one in zip(asked, reaches, left)]
     out = []
     for j, joint in enumerate(fit.joints):
         taking = [c for c in claims if c.head.joint == joint or c.step.shares[j] >= WORTH]

@@ -83,6 +83,12 @@ class Unknown:
         is more."""
         return max(self.predicted, self.tone)
 
+    @property
+    def drifts(self) -> bool:
+        """Whether most of what is predicted goes with time alone, whatever the robot does: noise as
+        slow as that is a drift, which blocks of time cannot tell from a law."""
+        return self.tone < TOLD and self.shares.get("time", 0.0) > _ALONE * self.predicted > 0.0
+
     def predictable(self, joints: int, worth: float) -> bool:
         """Whether functions of the motion predict a part worth having, or a tone holds it. Two
         questions may be asked of each of `joints`, those above their floors: each has half of the
