@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 
 import numpy as np
 
@@ -47,26 +47,35 @@ def misfit_taken(last: Fit, j: int, floor, known: dict, candidate: Candidate) ->
 
 
 def doubted(
-    before: Fit, after: Fit, without: Callable[[], Fit], told: Fit, candidate: Candidate
-) -> str | None:
+    before: Fit, after: Fit, without: Callable[[], Fit], told: Fit, candidate: Candidate,
+    there: Collection[tuple[str, int]] = (),
+) -> str | None:  # fmt: skip
     """Why fits do not bear out a candidate under either prior, None where they do: one that was
     chosen without it may have bodies make up for it, so that they hold it back as it joins.
 
     Args:
         without: fits the model of the fit before under the prior of told, that of `sysid add`; as
-            before and after are under that of the fit before.
+            before and after are under that of the fit before. there: what is claimed already.
     """
-    why = in_doubt(before, after, told, candidate)
-    if why is None or told is after or in_doubt(without(), told, told, candidate):
+    beside = candidate.joint in {joint for _, joint in there}
+    why = in_doubt(before, after, told, candidate, beside)
+    if why is None or told is after or in_doubt(without(), told, told, candidate, beside):
         return why
     own = None if candidate.joint == ROBOT else list(candidate.judged_by(before.joints))
     risen = comparison.rises(before, told, own) or comparison.spoiled(before, (after, told), own)
     return why if risen else None
 
 
-def in_doubt(before: Fit, after: Fit, told: Fit, candidate: Candidate) -> str | None:
+def in_doubt(
+    before: Fit, after: Fit, told: Fit, candidate: Candidate, beside: bool = False
+) -> str | None:
     """Why fits do not bear out a candidate, None where they do. Both are fits with it: after under
-    the prior of the one before, told as `sysid add` gives it."""
+    the prior of the one before, told as `sysid add` gives it.
+
+    Args:
+        beside: something is claimed on its joint already. A law that is not quite the catalogue's
+            leaves a rest, and what the training logs have of it the test logs must have as well.
+    """
     own, whole = candidate.judged_by(before.joints), candidate.joint == ROBOT
     if whole:  # what held bodies against its lack may hold them against it
         after = min((after, told), key=lambda one: comparison.together(before, one).delta_rms)
@@ -95,7 +104,8 @@ def in_doubt(before: Fit, after: Fit, told: Fit, candidate: Candidate) -> str | 
     read = isinstance(candidate.effect, SensorEffect) and change.delta_rms < 0.0
     wide = len(candidate.touches(2)) > 1 or (read and size_told(told, *candidate.key))
     wide = wide and comparison.falls(before, after, _NOTHING)
-    if change.delta_rms > -_NOTHING * unit and not wide:
+    unsure = beside and little and change.delta_rms > -change.se
+    if (change.delta_rms > -_NOTHING * unit or unsure) and not wide:
         falls = "hardly falls" if change.delta_rms < 0.0 else "does not fall"
         return f"with it the error on the test logs {falls} ({rise})"
     if not whole and (other := comparison.spoiled(before, (after, told), own)):

@@ -225,3 +225,20 @@ def test_the_share_of_a_misfit_that_a_fit_takes(monkeypatch):
     assert taken() == pytest.approx((4.0 - 2.25) / 3.0)
     assert made == [(("cogging", ["elbow"], {"k": 3.0}), known)]
     assert taken() == 0.0
+
+
+@pytest.mark.parametrize(
+    ("fall", "se", "beside", "refused"),
+    [(-0.008, 0.01, False, False), (-0.008, 0.01, True, True), (-0.008, 0.004, True, False), (-0.03, 0.04, True, False)],
+)
+def test_beside_a_claim_the_test_error_falls_by_its_standard_error(monkeypatch, fall, se, beside, refused):
+    """Of an effect that is alone less does: what the training logs say of it is no rest that another one's law left. Where the fall is
+    worth having, it need not be beyond doubt."""
+    before, after = Told(error=1.0), Told(error=0.9)
+    monkeypatch.setattr(borne_out, "size_told", lambda *_: True)
+    monkeypatch.setattr(comparison, "compare", lambda *_: (Difference("a", "b", "elbow", fall, se),))
+    monkeypatch.setattr(comparison, "together", lambda *_, **__: Difference("a", "b", "*", -0.01, 0.002))
+    cogging = Candidate(vocabulary.find("cogging"), 1, ())
+    assert bool(in_doubt(before, after, after, cogging, beside)) is refused
+    there = {("stribeck", 1 if beside else 0)}
+    assert bool(doubted(before, after, lambda: before, after, cogging, there)) is refused

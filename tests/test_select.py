@@ -303,7 +303,7 @@ def test_another_variant_of_what_joined_later_may_stand_for_a_head_that_is_refus
     found = [steps.Step(made, 1e-3, SimpleNamespace(settled=None), SimpleNamespace(settled=None), np.zeros(2)) for made in (choice(one, two), choice(three))]
     fit, asked = SimpleNamespace(joints=("shoulder", "elbow")), []
 
-    def borne_out(near, last, with_):
+    def borne_out(near, last, with_, there):
         asked.append([m.candidate for m in near])
         good = [m for m in near if borne and m is two]
         return (good[0], {id(two): SimpleNamespace()}, "no") if good else (None, {}, "no")

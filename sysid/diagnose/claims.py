@@ -1,9 +1,9 @@
 """What the search found, as `sysid add` gives it: each effect written into the experiment and
 fitted as the user's fit is.
 
-So what a diagnosis states is what comes of it; of several effects, what comes of all: one that is
-still missing bends the parameters of another, which no deviation knows. The test logs may only
-refuse: then the next likeliest of what the training logs cannot tell apart is fitted.
+So what a diagnosis states is what comes of it; of several effects, what comes of all: one missing
+bends the parameters of another, which no deviation knows. The test logs only refuse: then the next
+likeliest that is tied is fitted, but not beside a claim, where some rest speaks for somebody.
 """
 
 from __future__ import annotations
@@ -68,11 +68,11 @@ def claimed(
         if number in stands or step.candidate.key in there or last is refused.get(number, [0])[0]:
             continue
         step = replace(step, choice=with_tests(step.choice, last, test))
-        # with the head refused the least likely member may be it
-        first, *other = step.choice.members[:_FITTED]
+        most = 1 if step.candidate.joint in {joint for _, joint in there} else _FITTED
+        first, *other = step.choice.members[:most]
         free = lambda one: one.key not in there and one.kind not in heads  # noqa: B023, E731
         near = [first, *(m for m in other if free(m[0].candidate))]
-        head, fits, why = _borne_out([m for m, _ in near], last, with_)
+        head, fits, why = _borne_out([m for m, _ in near], last, with_, there)
         own = *step.candidate.named(fit.joints), why
         refused.pop(number, None)
         if head is None:
@@ -97,14 +97,14 @@ def claimed(
     return claims, [own for _, own in refused.values() if (own.effect, own.joint) not in there]
 
 
-def _borne_out(near: list[Member], last: Fit, with_: Callable):
+def _borne_out(near: list[Member], last: Fit, with_: Callable, there: set):
     """The first that fits bear out, of those that logs cannot tell apart, and the fits by the id of
     who is in them; and why they do not bear out the head, None where they do."""
     fits, whys = {}, []
     for member in near:
         after, *others = with_(pipeline.refit, member)  # and under one prior, the last one's or its
         fits[id(member)] = after
-        whys.append(doubted(last, *others, after, member.candidate))
+        whys.append(doubted(last, *others, after, member.candidate, there))
         if whys[-1] is None:
             return member, fits, whys[0]
     return None, fits, whys[0]

@@ -57,6 +57,7 @@ def verdict(fit: Fit, document: dict) -> Section:
         "needing": where.needing(document) if document.get("next_log") else "",
         "another": text.ANOTHER,
         "own_law": _first(text.OWN).replace("`", ""),
+        "begin": text.BEGIN,
         "trying": text.TRIED,
         "band": band(fit),
     }
@@ -112,6 +113,7 @@ def _card(found: dict, fit: Fit, document: dict) -> dict:
         "left": left_words(found, fit),
         "near": near(found, document) + refused(joint, document) if status == "complete" else "",
         "tried": found.get("may_be"),
+        "law": found.get("law"),
         "blind": joint in where.blind(document),
         "says": _first(says),
         "commands": commands,

@@ -17,6 +17,7 @@ from ..plausible import outdated
 from ..units import of_joint
 from . import where
 from .claims import chances, claims, confidence_set, finding, ties
+from .laws import to_begin_with
 
 
 def document(found: Diagnosis, run="") -> dict:
@@ -46,7 +47,9 @@ def _document(found: Diagnosis, run) -> dict:
         },
         "findings": [finding(f, claim, found) for claim in found.claims for f in claim.findings],
         "claims": list(claims(found)),
-        "verdict": [_verdict(v, fit.experiment.path, joints) for v in found.verdict],
+        "verdict": [
+            _with_law(_verdict(v, fit.experiment.path, joints), fit) for v in found.verdict
+        ],
         "detectable": [
             {
                 "effect": d.candidate.name,
@@ -113,6 +116,13 @@ def _floor(floor) -> dict:
         "floor_detail": floor.detail,
         "noise_floor_within": [floor.low, floor.high],
     }
+
+
+def _with_law(entry: dict, fit) -> dict:
+    """What is `unknown` with a law of one's own to begin with, where one variable stands out."""
+    there = [effect.name for effect, _ in fit.model.terms]
+    known = entry["status"] == "unknown" and to_begin_with(entry, fit.experiment.path, there)
+    return entry | ({"law": known} if known else {})
 
 
 def _verdict(v: Verdict, path="config.yaml", joints=()) -> dict:

@@ -34,6 +34,7 @@ ANOTHER = "a motion that tells most of what these logs leave open"
 TRIED = "to try it, and see the held-out error before and after"
 NO_MORE = "no further effect is supported by these logs"
 OWN = "a law of your own can be tried: `sysid effects formula`"
+BEGIN = "to begin with, a polynomial in what it follows most"
 _TOGETHER = "several variables together"
 
 
@@ -110,7 +111,9 @@ def _joint(v: dict, of: Told, width: int, said: dict[str, str]) -> list[str]:
     if "may_be" in v and said.setdefault(v["may_be"]["command"], joint) == joint:
         lines += [f"  {TRIED}", v["may_be"]["command"]]
     if status == "unknown":
-        lines += wrapped(f"  {OWN}", width, "    ")
+        law = v.get("law")
+        lines += wrapped(f"  {OWN}{f'; {BEGIN}' if law else ''}", width, "    ")
+        lines += [law["command"]] if law else []
     return lines
 
 

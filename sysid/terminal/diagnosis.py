@@ -65,6 +65,8 @@ def _after_diagnosis(found, document: dict, experiment) -> None:
         next_step("diagnose", target, first="leave out what is no motion of the robot, if it is none", out=out)
     elif even:
         next_step("diagnose", target, first=f"write {WEIGHED} for {text.listed(even, 'and')}", out=out)
+    elif laws := [v["law"]["command"] for v in document["verdict"] if "law" in v]:
+        next_line(laws[0], out=out)
     elif document.get("next_log"):
         next_line(document["next_log"])
     else:

@@ -1,0 +1,57 @@
+"""A law of the user's own to begin with, of the variable that a residual follows most.
+
+No law is known from which variable it is of, but three powers of it, with the direction of motion
+where that takes part, show how much there is, and their plot what the law looks like.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from pathlib import Path
+
+from ..addition import command
+from ..flexible.functions import DIRECTION
+from ..formula.text import OTHER
+
+_MOST = 0.5  # of what functions of the motion predict: less, and another variable has more
+_NEARLY = 0.8  # of what most predict: one variable that does says it more simply than two
+_TERMS = {
+    "": "a*{0} + b*{0}**2 + c*{0}**3",
+    DIRECTION: "a*s + b*s*{0} + c*s*{0}**2 + d*{0} + e*{0}**2",
+    "other": "a*{0} + b*{1} + c*{0}*{1} + d*{0}**2*{1} + e*{0}*{1}**2",
+}
+
+
+def to_begin_with(entry: dict, path, there: Collection[str]) -> dict | None:
+    """{formula, command} for a joint that is `unknown`, as its document has it; None where
+    nothing that a formula may hold stands out, or such a law is in the model already.
+
+    Args:
+        path: of the experiment file. there: names of the model's effects.
+    """
+    joint, told = entry["joint"], entry.get("depends_on", ())
+    if not told or told[0]["share"] < _MOST * entry["share_left"]:
+        return None
+    near = [one for one in told if one["share"] >= _NEARLY * told[0]["share"]]
+    first = min(near, key=lambda one: "with" in one)
+    variable, other = _in_formula(first["variable"], joint), first.get("with", "")
+    if other and other != DIRECTION:
+        other = _in_formula(other, joint)
+    if variable is None or other is None:
+        return None
+    form = other if other in _TERMS else "other"
+    formula, name = _TERMS[form].format(variable, other), f"law_of_{variable}"
+    if name in there:
+        return None
+    options = {"formula": formula, "name": name}
+    return {"formula": formula, "command": command(Path(path), "formula", [joint], options)}
+
+
+def _in_formula(variable: str, joint: str) -> str | None:
+    """A variable of a view as a formula of a joint has it."""
+    if variable == "time":
+        return "t"
+    kind, _, of = variable.partition("_")
+    if of == joint and kind in ("q", "qd", "qdd", "load"):
+        return kind
+    return variable if OTHER.fullmatch(variable) else None
