@@ -72,16 +72,18 @@ def settle(
         best = solved(best.model.referring_to(best.x))
     search = Search(motion, weights, attempted, lambda found: _descended(found, motion, attempted, weights, tolerance), rough)
     tally = {}
+    # what was found before the model grew stands apart from its motor already: profiles say whether what joined leads elsewhere
+    apart = [place for place in deflections(best.model) if place not in found] if grid else []
     if grid:
         best, tally = search.started(best, found)
-        for place in deflections(best.model):
+        for place in apart:
             tried, count = from_tries(best, motion, *place, weights)
             tally[place] = 1 + count
             if tried is not None:
                 best = min(best, solved(tried), key=lambda s: s.objective)
     best = search.descended(best)
     # tried before all else was found, a link may have stayed on its motor; a diagnosis has a fit
-    for place in deflections(best.model) if grid and profile else ():
+    for place in apart if profile else ():
         without = idle(best.model, *place)
         tried, count = from_tries(solved(without), motion, *place, weights) if without else (None, 0)
         tally[place] += count
