@@ -518,3 +518,13 @@ def test_a_floor_under_a_low_pass_is_what_comes_through(simulated):
         error = max(fit.rms("train")[joint], fit.rms("test")[joint])
         assert floor_.method == "spectral" and "carried through" in floor_.detail
         assert floor_.rms == pytest.approx(error, rel=0.25), joint
+
+
+@pytest.mark.parametrize(("size", "said"), [(0.0, None), (1.0, "33 %"), (0.2, None)])
+def test_a_steady_tone_in_the_noise_is_told(size, said):
+    """What makes it may be switched off, or be filtered out."""
+    rng = np.random.default_rng(3)
+    q = wandering(30.0, 0.004, rng)
+    hum = size * np.sin(2.0 * np.pi * 17.3 * 0.004 * np.arange(len(q)))
+    own = found(q, 0.004, rng.normal(size=len(q)) + hum, nothing(q, 0.004) + 1e-9 * q[:, 1], size=0.0)
+    assert (f"white, {said} of the residual's power a steady tone of 17.3 Hz" in own.detail) if said else ("tone" not in own.detail)

@@ -6,13 +6,14 @@ together one group, held small by a ridge that blocks held apart choose.
 
 The functions (`functions`), what they predict of what they were not fitted on (`ridge`), the
 products of two and the functions of what the motion was (`pasts`) that are asked one by one, as
-every effect is (`products`), and what is said of it (`unknown`).
+every effect is (`products`), a steady tone (`tone`), and what is said of it all (`unknown`).
 
 Source: Rahimi & Recht 2007 (random features); Hoerl & Kennard 1970 (ridge).
 """
 
 from .functions import DIRECTION
 from .products import products
-from .unknown import HUM, TOLD, TONE, Law, Unknown, unknown
+from .tone import TONE, steady
+from .unknown import HUM, TOLD, Law, Unknown, unknown
 
-__all__ = ["DIRECTION", "HUM", "TOLD", "TONE", "Law", "Unknown", "products", "unknown"]
+__all__ = ["DIRECTION", "HUM", "TOLD", "TONE", "Law", "Unknown", "products", "steady", "unknown"]

@@ -7,11 +7,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .. import blocks
-from ..running import running
 from .functions import DIRECTION, groups
 from .ridge import predicted, stretches
+from .tone import TONE, steady
 
-TONE = 1e-4  # probability of a line that strong by chance
 HUM = "a steady tone"
 TOLD = 0.02  # of a squared residual: less is not told of one variable
 _ALONE = 0.5  # of what functions of a variable and of the direction predict: else both are told
@@ -145,29 +144,8 @@ def unknown(
         alone = told_by[name][:, : told_by[name].shape[1] // 2]  # the rest is times the direction
         if predicted(alone, residual, use, spans)[1].sum() < _ALONE * shares[name] * total:
             shares[f"{name} and {DIRECTION}"] = shares.pop(name)
-    share, by_chance, hertz = _tone(residual, noise, step)
+    share, by_chance, hertz = steady(residual, noise, step)
     if by_chance >= TONE:
         return Unknown(gain, told, shares, residual, chance)
     shares[HUM] = share
     return Unknown(gain, told, shares, residual, chance, tone=share, hertz=hertz)
-
-
-def _tone(residual, noise, step: float) -> tuple[float, float, float]:
-    """The share of a residual's square that its strongest line holds, the chance of such a line
-    above the spectrum about it, were it noise of any smooth colour (Fisher 1929, against a local
-    median), with lines that `noise` has as well: a coarse encoder at a steady speed; and its
-    frequency [Hz]."""
-    n = len(residual)
-    power, lines = (np.abs(np.fft.rfft(r * np.hanning(n))) ** 2 for r in (residual, noise))
-    width = max(9, int(2.0 * n * step) | 1)  # two hertz
-    level = running(power, width, "median") / np.log(2.0)
-    # in which phase its grain is met is chance, and moves a line by less than it is wide
-    level += running(lines, 5, "max")
-    ratio = np.where(
-        np.arange(len(power)) > n * step, power / np.maximum(level, 1e-300), 0.0
-    )  # slower than 1 Hz is drift
-    at = int(np.argmax(ratio))
-    near = slice(max(0, at - 2), at + 3)
-    share = float(power[near].sum() / max(power.sum(), 1e-300))
-    by_chance = min(1.0, len(power) * np.exp(-min(ratio[at], 700.0)))
-    return share, float(by_chance), at / (n * step)

@@ -12,14 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from . import outliers, repeats
+from .hum import hum
 from .of_angles import OfAngles
 from .rest import Shared, rest_of, shared_by
 from .spectrum import spectrum_of, weighed
-from .stretches import (
-    FEWEST_SAMPLES,
-    bridged,
-    whole,
-)
+from .stretches import FEWEST_SAMPLES, bridged, whole
 from .uneven import with_uneven
 
 #: standard error over RMS beyond which a floor is not given: two of them are the 25 % that one can
@@ -178,7 +175,7 @@ def estimate(
         counts = [run.counts for run in runs]
         times = min(1.0, outliers.of_drawn(rest, kept, drawn, steps, bandwidth))
         found = with_uneven(found, drawn, counts, times, float(made @ spectrum.width))
-    words = f"residual above {bandwidth:.2g} Hz, {found.colour}"
+    words = f"residual above {bandwidth:.2g} Hz, {found.colour}{hum(rest, steps)}"
     return _bounded(found.rms, found.std, "spectral", words, found.doubt, own, found.least)
 
 
