@@ -16,6 +16,7 @@ from ..model_parameters import ROBOT
 from ..plausible import outdated
 from ..units import of_joint
 from . import where
+from .alike import read_alike
 from .claims import chances, claims, confidence_set, finding, ties
 from .laws import to_begin_with
 
@@ -94,7 +95,11 @@ def _document(found: Diagnosis, run) -> dict:
         "not_claimed": [
             {"effect": r.effect, "joint": r.joint, "why": r.why} for r in found.refused
         ],
-        "notices": [*(n for n in fit.notices if n not in gone), *found.notices],
+        "notices": [
+            *(n for n in fit.notices if n not in gone),
+            *found.notices,
+            *read_alike([claim.head for claim in found.claims]),
+        ],
         "logs": list(fit.logs),
         "versions": versions(),
         "run": str(run),

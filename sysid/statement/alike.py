@@ -1,0 +1,39 @@
+"""Torques that are read late on many joints, by much the same: one cause, and not one on each."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from .words import listed
+
+_MANY = 3  # joints: two may be a cause each
+_SPREAD = (
+    0.5  # of the middle one: a lag and a delay of the same size tell times that differ by less
+)
+_LATE = {"delay": ("d", 1.0), "current_lag": ("T", -1.0)}  # a torque that leads is one that lags
+
+
+def read_alike(findings: Sequence) -> Iterator[str]:
+    """What is said of claims' heads of which many are a time by which torque is read late.
+
+    Args:
+        findings: of each claim the head: effect, joint, parameters {name: (value, ...)}.
+    """
+    late: dict[str, float] = {}
+    for one in findings:
+        word, sign = _LATE.get(one.effect, ("", 0.0))
+        for name, (value, *_) in one.parameters.items():
+            if word and name.rpartition(".")[2] == word:
+                late[one.joint] = sign * value
+    times = np.array([*late.values()])
+    if len(times) < _MANY or np.ptp(times) > _SPREAD * abs(np.median(times)):
+        return
+    low, high = np.sort(1e3 * np.abs(times))[[0, -1]]
+    how = "late" if np.median(times) > 0.0 else "early"
+    yield (
+        f"the torques of {listed([*late], 'and')} are all {how}, by {low:.2g} to {high:.2g} ms: "
+        "one cause is likelier than one on each joint, as torque and angles of different clocks "
+        "or cycles, or a command that was logged in the place of the torque"
+    )

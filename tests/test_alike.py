@@ -1,0 +1,33 @@
+"""Torques that are read late on many joints, by much the same."""
+
+from types import SimpleNamespace
+
+import pytest
+
+from sysid.statement.alike import read_alike
+
+
+def heads(**times) -> list:
+    """A claim's head on each joint: (effect, its time [s])."""
+    word = {"delay": "d", "current_lag": "T", "cogging": "a1"}
+    return [SimpleNamespace(effect=e, joint=j, parameters={f"{e}.{j}.{word[e]}": (at, 1e-4, "s")}) for j, (e, at) in times.items()]
+
+
+def test_one_cause_is_told_once():
+    (said,) = read_alike(heads(a=("delay", -0.0101), b=("current_lag", 0.0121), c=("delay", -0.0115), d=("cogging", 0.01)))
+    assert said.startswith("the torques of a, b and c are all early, by 10 to 12 ms")
+    (said,) = read_alike(heads(a=("delay", 0.006), b=("delay", 0.0055), c=("delay", 0.0062)))
+    assert "all late, by 5.5 to 6.2 ms" in said
+
+
+@pytest.mark.parametrize(
+    "times",
+    [
+        {"a": ("delay", 0.006), "b": ("delay", 0.006)},
+        {"a": ("delay", 0.006), "b": ("delay", 0.006), "c": ("delay", 0.012)},
+        {"a": ("delay", 0.006), "b": ("delay", 0.006), "c": ("current_lag", 0.006)},
+        {"a": ("cogging", 0.006), "b": ("cogging", 0.006), "c": ("cogging", 0.006)},
+    ],
+)
+def test_two_or_other_times_are_a_cause_each(times):
+    assert not [*read_alike(heads(**times))]
