@@ -2,9 +2,11 @@
 
 import json
 import re
+import shutil
 from pathlib import Path
 
 import numpy as np
+import polars as pl
 import pytest
 import yaml
 
@@ -343,3 +345,19 @@ def test_a_link_under_an_upright_axis_has_no_weight_to_be_wrong(experiment):
 def test_a_weight_that_a_joint_carries_is_told(experiment, arm):
     """The same arm eight times as heavy as its URDF says."""
     assert implausible(column(experiment, arm=arm)) == (["elbow"] if arm > 1.0 else [])
+
+
+@pytest.mark.parametrize("apart", [True, False])
+def test_two_clocks_that_run_apart_are_told(simulated, tmp_path, apart):
+    """And no delay, which would be another at each end of the log."""
+    folder = shutil.copytree(simulated("clocks", duration=24.0), tmp_path / "logs")
+    for file in (folder / "train.csv", folder / "test.csv"):
+        table = pl.read_csv(file)
+        t = table["t"].to_numpy()
+        late = 0.0015 * (t - t[0]) if apart else 0.018
+        table.with_columns(pl.Series(name, np.interp(t - late, t, table[name])) for name in table.columns if name.startswith("tau_")).write_csv(file)
+    found = [f for f in check.check(pipeline.load(folder)) if f.fault == "delayed_signal"]
+    if apart:
+        assert len(found) == 1 and "clocks that run apart" in found[0].says and not found[0].joint
+    else:
+        assert {f.joint for f in found} == set(BOTH) and all("18 ms later" in f.says for f in found)
