@@ -1,0 +1,49 @@
+"""A law of one's own to begin with, where no effect of the catalogue explains what is left."""
+
+import shlex
+
+import pytest
+
+from sysid.formula.text import parse
+from sysid.statement.laws import to_begin_with
+
+
+def entry(*follows, left: float = 0.6) -> dict:
+    """A joint that is `unknown`, as a diagnosis has it."""
+    return {"joint": "wrist", "share_left": left, "depends_on": [dict(zip(("variable", "share", "with"), one)) for one in follows]}
+
+
+@pytest.mark.parametrize(
+    ("follows", "linear", "has"),
+    [
+        (("q_elbow", 0.6), 3, "c*q_elbow**3"),
+        (("q_wrist", 0.6), 3, "a*q + b*q**2"),
+        (("time", 0.5), 3, "c*t**3"),
+        (("load_wrist", 0.6, "direction"), 5, "b*s*load"),
+        (("qd_wrist", 0.6, "time"), 5, "c*qd*t"),
+    ],
+)
+def test_a_formula_in_what_a_residual_follows(follows, linear, has):
+    found = to_begin_with(entry(follows), "arm/config.yaml", ())
+    assert has in found["formula"] and len(parse(found["formula"]).linear) == linear
+    words = shlex.split(found["command"])
+    assert words[:4] == ["sysid", "add", "arm", "formula"] and f"formula={found['formula']}" in words and words[4:6] == ["--joint", "wrist"]
+
+
+def test_one_variable_that_says_nearly_as_much_comes_before_two():
+    found = to_begin_with(entry(("qd_wrist", 0.6, "time"), ("time", 0.55)), "arm", ())
+    assert found["formula"] == "a*t + b*t**2 + c*t**3"
+    assert "qd" in to_begin_with(entry(("qd_wrist", 0.6, "time"), ("time", 0.3)), "arm", ())["formula"]
+
+
+@pytest.mark.parametrize(
+    "follows",
+    [("a steady tone", 0.6), ("several variables together", 0.6), ("load_elbow", 0.6), ("qd_wrist", 0.6, "its past"), ("q_wrist", 0.2), ("q_a b", 0.6)],
+)
+def test_none_where_no_formula_can_hold_it_or_it_says_little(follows):
+    assert to_begin_with(entry(follows), "arm", ()) is None
+
+
+def test_none_that_is_in_the_model_already():
+    assert to_begin_with(entry(("q_elbow", 0.6)), "arm", ("viscous", "law_of_q_elbow")) is None
+    assert to_begin_with({"joint": "wrist", "share_left": 0.5, "depends_on": []}, "arm", ()) is None
