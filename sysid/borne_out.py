@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from .unexplained import Refused, changed, explains
 CLEAR = 2.0  # standard deviations
 _LIKELY = 0.05  # less is not listed
 _WORTH = 1.5e-2  # of an error: what is worth having, three per cent of its square (`select`)
+_USUAL = ("viscous", "coulomb", "torque_bias", "armature")  # of every joint, as `sysid init` has it
 _NOTHING = 5e-3  # of an error: a hundredth of its square, the least that is told in per cent
 
 
@@ -47,35 +48,34 @@ def misfit_taken(last: Fit, j: int, floor, known: dict, candidate: Candidate) ->
 
 
 def doubted(
-    before: Fit, after: Fit, without: Callable[[], Fit], told: Fit, candidate: Candidate,
-    there: Collection[tuple[str, int]] = (),
-) -> str | None:  # fmt: skip
+    before: Fit, after: Fit, without: Callable[[], Fit], told: Fit, candidate: Candidate
+) -> str | None:
     """Why fits do not bear out a candidate under either prior, None where they do: one that was
     chosen without it may have bodies make up for it, so that they hold it back as it joins.
 
     Args:
         without: fits the model of the fit before under the prior of told, that of `sysid add`; as
-            before and after are under that of the fit before. there: what is claimed already.
+            before and after are under that of the fit before.
     """
-    beside = candidate.joint in {joint for _, joint in there}
-    why = in_doubt(before, after, told, candidate, beside)
-    if why is None or told is after or in_doubt(without(), told, told, candidate, beside):
+    why = in_doubt(before, after, told, candidate)
+    if why is None or told is after or in_doubt(without(), told, told, candidate):
         return why
     own = None if candidate.joint == ROBOT else list(candidate.judged_by(before.joints))
     risen = comparison.rises(before, told, own) or comparison.spoiled(before, (after, told), own)
     return why if risen else None
 
 
-def in_doubt(
-    before: Fit, after: Fit, told: Fit, candidate: Candidate, beside: bool = False
-) -> str | None:
-    """Why fits do not bear out a candidate, None where they do. Both are fits with it: after under
-    the prior of the one before, told as `sysid add` gives it.
+def beside(fit: Fit, candidate: Candidate) -> bool:
+    """Whether a fit has an effect on a candidate's joint beyond what every joint has: a law that is
+    not quite the catalogue's leaves a rest, and what the training logs have of it the test logs must
+    have as well."""
+    own = (effect.name for effect, joints in fit.model.terms if candidate.joint in joints)
+    return any(name not in (*_USUAL, candidate.name) for name in own)
 
-    Args:
-        beside: something is claimed on its joint already. A law that is not quite the catalogue's
-            leaves a rest, and what the training logs have of it the test logs must have as well.
-    """
+
+def in_doubt(before: Fit, after: Fit, told: Fit, candidate: Candidate) -> str | None:
+    """Why fits do not bear out a candidate, None where they do. Both are fits with it: after under
+    the prior of the one before, told as `sysid add` gives it."""
     own, whole = candidate.judged_by(before.joints), candidate.joint == ROBOT
     if whole:  # what held bodies against its lack may hold them against it
         after = min((after, told), key=lambda one: comparison.together(before, one).delta_rms)
@@ -104,9 +104,11 @@ def in_doubt(
     read = isinstance(candidate.effect, SensorEffect) and change.delta_rms < 0.0
     wide = len(candidate.touches(2)) > 1 or (read and size_told(told, *candidate.key))
     wide = wide and comparison.falls(before, after, _NOTHING)
-    unsure = beside and little and change.delta_rms > -change.se
+    unsure = little and change.delta_rms > -change.se and beside(before, candidate)
     if (change.delta_rms > -_NOTHING * unit or unsure) and not wide:
         falls = "hardly falls" if change.delta_rms < 0.0 else "does not fall"
+        if unsure and change.delta_rms <= -_NOTHING * unit:
+            falls = "falls by less than its standard error, beside what is on that joint already"
         return f"with it the error on the test logs {falls} ({rise})"
     if not whole and (other := comparison.spoiled(before, (after, told), own)):
         rise = changed(other[0].delta_rms / before.rms("test")[other[0].joint])

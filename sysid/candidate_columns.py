@@ -133,12 +133,14 @@ def _changes(source, candidate: Candidate, shapes: list[dict[str, float]], among
     among = {candidate.joint, *(j for j in among if j >= 0)}
     known, apart = source.bent(candidate.joint, among), None
     everywhere = tried(source, candidate) if effect.blows and not candidate.begins else []
-    if everywhere and all(own in everywhere for own in shapes):
+    key = candidate.name, candidate.options
+    flown_before = shapes == everywhere or source.flew(key, candidate.joint)
+    if everywhere and flown_before and all(own in everywhere for own in shapes):
         tries = {}
         for joint in among:
             one = replace(candidate, joint=joint)
             tries[joint] = [_begun(source, one, leading, own) for own in tried(source, one)]
-        key, places = (candidate.name, candidate.options), [everywhere.index(own) for own in shapes]
+        places = [everywhere.index(own) for own in shapes]
         flown = source.flights(key, effect, tries)[candidate.joint]
         apart = [[piece[k] for k in places] for piece in flown]
     found = row.secants(

@@ -27,6 +27,12 @@ def idle(model: Model, term: int, joint: int) -> Model | None:
     return out if others or out.shapes == model.shapes else None
 
 
+def stands_apart(model: Model, term: int, joint: int) -> bool:
+    """Whether a deflection does anything."""
+    own = (k for k, v in enumerate(model.shape_values) if (v.term, v.joint) == (term, joint) and v.shape.start is not None)
+    return any(model.shapes[k] != model.shape_values[k].shape.start for k in own)
+
+
 def from_tries(found: Settled, motion: Motion, term: int, joint: int, weights) -> tuple[Model | None, int]:
     """The model with the best of the values that a deflection says to try, where it does nothing yet and none is held: on the
     other side of a resonance no step from there arrives. And how many were tried."""

@@ -25,7 +25,7 @@ from .model import Model, moving_coefficients
 from .model_parameters import ROBOT, Coefficient
 from .motion import Motion
 from .posed_problem import pose
-from .prior_weight import PLAUSIBLE
+from .prior_weight import PLAUSIBLE, USUAL
 from .robot import Robot
 from .triangles import Compressed
 from .vocabulary import find, vocabulary
@@ -100,6 +100,7 @@ def document(found: Masses | None) -> dict:
         "joints": None if found.joints is None else list(found.joints),
         "prior_weight": found.weight,
         "stronger": found.stronger,
+        "costs": found.costs,
         "command": found.command or None,
         "says": found.says,
         "do": found.do,
@@ -209,8 +210,8 @@ def _cure(found: Fit, motion: Motion) -> Masses:
 
 def _stronger(now: _Asked) -> Masses:
     """The strongest prior that hardly costs anything, where it brings all masses back."""
-    weight, found = now.found.strength.value, Masses(())
-    before = now.apart.squares(weight)
+    given, found = now.found.strength.value, Masses(())
+    before, weight = now.apart.squares(given), given or USUAL
     for _ in range(_STRONGER):
         weight = above(weight)
         errors, _ = judged(np.array([before, now.apart.squares(weight)]), now.apart.rows)

@@ -18,7 +18,7 @@ import numpy as np
 
 from . import blows, eigen, multistart
 from . import rows as row
-from .deflection_starts import deflections, from_tries, idle
+from .deflection_starts import deflections, from_tries, idle, stands_apart
 from .effect import NotFinite
 from .estimate import Fit
 from .inertia import DIVERGENCES
@@ -72,18 +72,18 @@ def settle(
         best = solved(best.model.referring_to(best.x))
     search = Search(motion, weights, attempted, lambda found: _descended(found, motion, attempted, weights, tolerance), rough)
     tally = {}
-    # what was found before the model grew stands apart from its motor already: profiles say whether what joined leads elsewhere
-    apart = [place for place in deflections(best.model) if place not in found] if grid else []
     if grid:
         best, tally = search.started(best, found)
-        for place in apart:
+        for place in deflections(best.model):
             tried, count = from_tries(best, motion, *place, weights)
             tally[place] = 1 + count
             if tried is not None:
                 best = min(best, solved(tried), key=lambda s: s.objective)
     best = search.descended(best)
     # tried before all else was found, a link may have stayed on its motor; a diagnosis has a fit
-    for place in apart if profile else ():
+    for place in deflections(best.model) if grid and profile else ():
+        if place in found and stands_apart(best.model, *place):
+            continue  # found so before the model grew: profiles say whether what joined leads elsewhere
         without = idle(best.model, *place)
         tried, count = from_tries(solved(without), motion, *place, weights) if without else (None, 0)
         tally[place] += count

@@ -88,6 +88,10 @@ class Source:
     def _flights(self) -> dict:
         return {}
 
+    def flew(self, key, joint: int) -> bool:
+        """Whether `flights` has those of a joint."""
+        return joint in self._flights.get(key, {})
+
     def flights(self, key, effect, tries: dict[int, list[dict]]) -> dict[int, list]:
         """{joint: how far its link stands apart, of each piece (tried, 3, n)}, at sets of shape values that are tried on
         joints: all these links at once, once for all who ask with a `key`."""

@@ -22,7 +22,7 @@ def standing_apart(
     deflection=None,
 ) -> dict[int, tuple[np.ndarray, np.ndarray]]:
     """{joint: (torque (dof, n) of what its link carries, slopes (3, dof, n) of that in how far the link stands behind its motor in
-    position, speed and acceleration)}, by differences over `nudges`. Other arguments: see `torque`.
+    position, speed and acceleration)}, by differences over `nudges`. Other arguments: see `regressor.body_motions`.
 
     What hangs on other links stays as it is, and is looked at once for all joints.
     """
@@ -32,6 +32,18 @@ def standing_apart(
         joint: (np.zeros((robot.dof, len(q))), np.zeros((len(nudges), robot.dof, len(q))))
         for joint in joints
     }
+    links = {}
+    for joint in joints:
+        root = robot.bodies[joint].row
+        carried = {i for i in bearing if root in to_base(robot, i)}
+        own = [one for one in heavy if one[1] in carried]
+        # children before their parents, and then what bears the link
+        links[joint] = (
+            root,
+            carried,
+            own,
+            [*sorted(carried, reverse=True), *to_base(robot, root)[1:]],
+        )
     for start in range(0, len(q), CHUNK):
         part = slice(start, start + CHUNK)
         stand = of_rows(
@@ -40,11 +52,7 @@ def standing_apart(
         found = frames_of(robot, stand, gravity, bearing)
         each = wrenches(heavy, found)
         for joint, (base, slopes) in out.items():
-            root = robot.bodies[joint].row
-            carried = {i for i in bearing if root in to_base(robot, i)}
-            own = [one for one in heavy if one[1] in carried]
-            # children before their parents, and then what bears the link
-            rows = [*sorted(carried, reverse=True), *to_base(robot, root)[1:]]
+            root, carried, own, rows = links[joint]
             handed_down(
                 robot, found, rows, {i: list(each[i]) for i in carried if i in each}, base[:, part]
             )

@@ -15,9 +15,15 @@ def heads(**times) -> list:
 
 def test_one_cause_is_told_once():
     (said,) = read_alike(heads(a=("delay", -0.0101), b=("current_lag", 0.0121), c=("delay", -0.0115), d=("cogging", 0.01)))
-    assert said.startswith("the torques of a, b and c are all early, by 10 to 12 ms")
+    assert said.startswith("the torques of a, b and c are early by much the same, 10 to 12 ms")
     (said,) = read_alike(heads(a=("delay", 0.006), b=("delay", 0.0055), c=("delay", 0.0062)))
-    assert "all late, by 5.5 to 6.2 ms" in said
+    assert "late by much the same, 5.5 to 6.2 ms" in said
+
+
+def test_who_is_late_by_another_time_or_by_none_that_is_known_is_not_among_them():
+    own = {joint: ("delay", 0.006) for joint in "abcd"}
+    (said,) = read_alike(heads(**own, e=("delay", 0.02), f=("delay", float("nan"))))
+    assert said.startswith("the torques of a, b, c and d are late")
 
 
 @pytest.mark.parametrize(

@@ -17,6 +17,7 @@ class Told(SimpleNamespace):
     """A fit as far as `in_doubt` looks at it: the error of its joint."""
 
     joints = ("shoulder", "elbow")
+    model = SimpleNamespace(terms=())
 
     def rms(self, part):
         return {"shoulder": 1.0, "elbow": self.error}
@@ -234,11 +235,14 @@ def test_the_share_of_a_misfit_that_a_fit_takes(monkeypatch):
 def test_beside_a_claim_the_test_error_falls_by_its_standard_error(monkeypatch, fall, se, beside, refused):
     """Of an effect that is alone less does: what the training logs say of it is no rest that another one's law left. Where the fall is
     worth having, it need not be beyond doubt."""
-    before, after = Told(error=1.0), Told(error=0.9)
+    terms = [(vocabulary.find(name), (0, 1)) for name in ("viscous", "coulomb", "torque_bias", "armature", "cogging")]
+    terms.append((vocabulary.find("stribeck"), (1,) if beside else (0,)))
+    before, after = Told(error=1.0, model=SimpleNamespace(terms=terms)), Told(error=0.9)
     monkeypatch.setattr(borne_out, "size_told", lambda *_: True)
     monkeypatch.setattr(comparison, "compare", lambda *_: (Difference("a", "b", "elbow", fall, se),))
     monkeypatch.setattr(comparison, "together", lambda *_, **__: Difference("a", "b", "*", -0.01, 0.002))
     cogging = Candidate(vocabulary.find("cogging"), 1, ())
-    assert bool(in_doubt(before, after, after, cogging, beside)) is refused
-    there = {("stribeck", 1 if beside else 0)}
-    assert bool(doubted(before, after, lambda: before, after, cogging, there)) is refused
+    assert borne_out.beside(before, cogging) is beside
+    said = in_doubt(before, after, after, cogging) or ""
+    assert said == doubted(before, after, lambda: before, after, cogging) or not refused
+    assert ("less than its standard error, beside what is on that joint already" in said) is refused

@@ -4,6 +4,7 @@ import shlex
 
 import pytest
 
+from sysid.formula import Formula
 from sysid.formula.text import parse
 from sysid.statement.laws import to_begin_with
 
@@ -19,8 +20,10 @@ def entry(*follows, left: float = 0.6) -> dict:
         (("q_elbow", 0.6), 3, "c*q_elbow**3"),
         (("q_wrist", 0.6), 3, "a*q + b*q**2"),
         (("time", 0.5), 3, "c*t**3"),
-        (("load_wrist", 0.6, "direction"), 5, "b*s*load"),
-        (("qd_wrist", 0.6, "time"), 5, "c*qd*t"),
+        (("load_wrist", 0.6, "direction"), 4, "a*s*load"),
+        (("qd_wrist", 0.6), 2, "a*qd**2"),
+        (("qd_wrist", 0.6, "direction"), 3, "a*s*qd**2"),
+        (("qd_wrist", 0.6, "time"), 5, "a*qd*t"),
     ],
 )
 def test_a_formula_in_what_a_residual_follows(follows, linear, has):
@@ -44,6 +47,14 @@ def test_none_where_no_formula_can_hold_it_or_it_says_little(follows):
     assert to_begin_with(entry(follows), "arm", ()) is None
 
 
+def test_the_name_is_one_that_a_formula_may_have():
+    found = to_begin_with(entry(("q_J2", 0.6)), "arm", ())
+    name = shlex.split(found["command"])[-1].partition("=")[2]
+    assert Formula(found["formula"], name).name == name == "law_of_q_j2"
+
+
 def test_none_that_is_in_the_model_already():
-    assert to_begin_with(entry(("q_elbow", 0.6)), "arm", ("viscous", "law_of_q_elbow")) is None
+    there = {("viscous", "wrist"), ("law_of_q_elbow", "wrist"), ("law_of_q", "elbow"), ("law_of_qd", "wrist")}
+    assert to_begin_with(entry(("q_elbow", 0.6)), "arm", there) is None
+    assert to_begin_with(entry(("q_wrist", 0.6)), "arm", there) and to_begin_with(entry(("qd_wrist", 0.6, "time")), "arm", there)
     assert to_begin_with({"joint": "wrist", "share_left": 0.5, "depends_on": []}, "arm", ()) is None

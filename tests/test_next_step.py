@@ -218,4 +218,4 @@ def test_what_is_promised_one_after_another_is_printed_in_that_order(steps, caps
     if steps == (1, 2):
         assert not said and last == f"next: {on['a']}"
     else:
-        assert "in this order" in " ".join(said) and said[-2:] == [on["b"], on["a"]] and last == f"next: {on['b']}"
+        assert "add them in this order" in " ".join(" ".join(said).split()) and said[-2:] == [on["b"], on["a"]] and last == f"next: {on['b']}"

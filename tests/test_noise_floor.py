@@ -528,5 +528,5 @@ def test_a_steady_tone_in_the_noise_is_told(size, share):
     q = wandering(30.0, 0.004, rng)
     hum = size * np.sin(2.0 * np.pi * 17.3 * 0.004 * np.arange(len(q)))
     said = found(q, 0.004, rng.normal(size=len(q)) + hum, nothing(q, 0.004) + 1e-9 * q[:, 1], size=0.0).detail
-    told = re.search(r"(\d+) % of the residual's power a steady tone of 17.3 Hz", said)
+    told = re.search(r"(\d+) % of the noise's power a steady tone of 17.3 Hz", said)
     assert ("tone" not in said) if share is None else float(told[1]) / 100.0 == pytest.approx(share, abs=0.03)

@@ -256,7 +256,7 @@ def test_what_the_test_logs_refuse_is_not_claimed(simulated, tmp_path):
 def test_where_fits_refuse_the_head_the_next_of_its_set_is_claimed(simulated, monkeypatch):
     """Logs that cannot tell a bias from friction that differs with the direction cannot refuse both by refusing one."""
     real = claims.doubted
-    monkeypatch.setattr(claims, "doubted", lambda *given: "not it" if given[4].name == "torque_bias" else real(*given))
+    monkeypatch.setattr(claims, "doubted", lambda *given: "not it" if given[-1].name == "torque_bias" else real(*given))
     experiment = pipeline.load(simulated(*BIAS))
     found = diagnose(experiment)
     (claim,) = found.claims
@@ -265,7 +265,7 @@ def test_where_fits_refuse_the_head_the_next_of_its_set_is_claimed(simulated, mo
     assert [f.effect for f in claim.findings] == ["asymmetric_coulomb", "torque_bias"]
     assert claim.head.command.split()[3] == "asymmetric_coulomb" and claim.after.parameters_of("asymmetric_coulomb", 1)
     assert [name for name, *_ in claim.set] == ["asymmetric_coulomb", "torque_bias"]
-    monkeypatch.setattr(claims, "doubted", lambda *given: f"not {given[4].name}")
+    monkeypatch.setattr(claims, "doubted", lambda *given: f"not {given[-1].name}")
     (refused,) = diagnose(experiment).refused
     assert (refused.effect, refused.why) == ("torque_bias", "not torque_bias")
 
@@ -276,7 +276,7 @@ def test_what_is_refused_alone_is_asked_again_beside_what_stands(simulated, monk
     real, asked = claims.doubted, []
 
     def doubted(before, *others):
-        candidate = others[3]
+        candidate = others[-1]
         asked.append(candidate.name)
         alone = candidate.name == asked[0] and not before.model.terms[-1][0].name == "load_friction"
         return "too much else is missing" if alone else real(before, *others)
@@ -301,9 +301,9 @@ def test_another_variant_of_what_joined_later_may_stand_for_a_head_that_is_refus
     one, two, three = (Member(SimpleNamespace(candidate=c), None, None) for c in (soft, play, other))
     choice = lambda *members: Choice(members[0], tuple((m, 1.0 / len(members)) for m in members), None)  # noqa: E731
     found = [steps.Step(made, 1e-3, SimpleNamespace(settled=None), SimpleNamespace(settled=None), np.zeros(2)) for made in (choice(one, two), choice(three))]
-    fit, asked = SimpleNamespace(joints=("shoulder", "elbow")), []
+    fit, asked = SimpleNamespace(joints=("shoulder", "elbow"), model=SimpleNamespace(terms=())), []
 
-    def borne_out(near, last, with_, there):
+    def borne_out(near, last, with_):
         asked.append([m.candidate for m in near])
         good = [m for m in near if borne and m is two]
         return (good[0], {id(two): SimpleNamespace()}, "no") if good else (None, {}, "no")

@@ -46,7 +46,7 @@ def left(share: float) -> Unknown:
 def fitted(elbow: float, shoulder: float = 1.0, train: float | None = None):
     rms = {"test": {"shoulder": shoulder, "elbow": elbow}}
     rms["train"] = rms["test"] if train is None else {"shoulder": shoulder, "elbow": train}
-    return SimpleNamespace(joints=JOINTS, rms=rms.get, weights=None)
+    return SimpleNamespace(joints=JOINTS, rms=rms.get, weights=None, model=SimpleNamespace(terms=()))
 
 
 def claim(effect: str, joint: str, shares, after):

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from .. import pipeline
-from ..borne_out import doubted, size_told, tried
+from ..borne_out import beside, doubted, size_told, tried
 from ..carriers import with_tests
 from ..estimate import Fit
 from ..failures import taken
@@ -68,11 +68,11 @@ def claimed(
         if number in stands or step.candidate.key in there or last is refused.get(number, [0])[0]:
             continue
         step = replace(step, choice=with_tests(step.choice, last, test))
-        most = 1 if step.candidate.joint in {joint for _, joint in there} else _FITTED
-        first, *other = step.choice.members[:most]
+        first, *other = step.choice.members[:_FITTED]
         free = lambda one: one.key not in there and one.kind not in heads  # noqa: B023, E731
         near = [first, *(m for m in other if free(m[0].candidate))]
-        head, fits, why = _borne_out([m for m, _ in near], last, with_, there)
+        most = 1 if beside(last, step.candidate) else _FITTED
+        head, fits, why = _borne_out([m for m, _ in near[:most]], last, with_)
         own = *step.candidate.named(fit.joints), why
         refused.pop(number, None)
         if head is None:
@@ -97,14 +97,14 @@ def claimed(
     return claims, [own for _, own in refused.values() if (own.effect, own.joint) not in there]
 
 
-def _borne_out(near: list[Member], last: Fit, with_: Callable, there: set):
+def _borne_out(near: list[Member], last: Fit, with_: Callable):
     """The first that fits bear out, of those that logs cannot tell apart, and the fits by the id of
     who is in them; and why they do not bear out the head, None where they do."""
     fits, whys = {}, []
     for member in near:
         after, *others = with_(pipeline.refit, member)  # and under one prior, the last one's or its
         fits[id(member)] = after
-        whys.append(doubted(last, *others, after, member.candidate, there))
+        whys.append(doubted(last, *others, after, member.candidate))
         if whys[-1] is None:
             return member, fits, whys[0]
     return None, fits, whys[0]

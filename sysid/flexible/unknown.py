@@ -84,9 +84,11 @@ class Unknown:
 
     @property
     def drifts(self) -> bool:
-        """Whether most of what is predicted goes with time alone, whatever the robot does: noise as
-        slow as that is a drift, which blocks of time cannot tell from a law."""
-        return self.tone < TOLD and self.shares.get("time", 0.0) > _ALONE * self.predicted > 0.0
+        """Whether most of what is predicted goes with time alone, and next to nothing with anything
+        else: noise as slow as that is a drift, which blocks of time cannot tell from a law."""
+        time = self.shares.get("time", 0.0)
+        other = max((own for name, own in self.shares.items() if name != "time"), default=0.0)
+        return self.tone < TOLD and time > _ALONE * self.predicted > 0.0 and other < _ALONE * time
 
     def predictable(self, joints: int, worth: float) -> bool:
         """Whether functions of the motion predict a part worth having, or a tone holds it. Two

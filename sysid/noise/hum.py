@@ -23,4 +23,4 @@ def hum(values: list[np.ndarray], steps: list[float]) -> str:
     share, chance, hertz = steady(values[longest], np.zeros(len(values[longest])), steps[longest])
     if chance >= TONE or share < _MUCH:
         return ""
-    return f", {100 * share:.0f} % of the residual's power a steady tone of {hertz:.3g} Hz"
+    return f", {100 * share:.0f} % of the noise's power a steady tone of {hertz:.3g} Hz"

@@ -9,10 +9,9 @@ import numpy as np
 from .words import listed
 
 _MANY = 3  # joints: two may be a cause each
-_SPREAD = (
-    0.5  # of the middle one: a lag and a delay of the same size tell times that differ by less
-)
-_LATE = {"delay": ("d", 1.0), "current_lag": ("T", -1.0)}  # a torque that leads is one that lags
+# of the middle one: a lag and a delay of one size tell times that differ by less
+_NEAR = 0.3
+_LATE = {"delay": ("d", 1.0), "current_lag": ("T", -1.0)}  # what lags is behind what was logged
 
 
 def read_alike(findings: Sequence) -> Iterator[str]:
@@ -27,13 +26,15 @@ def read_alike(findings: Sequence) -> Iterator[str]:
         for name, (value, *_) in one.parameters.items():
             if word and name.rpartition(".")[2] == word:
                 late[one.joint] = sign * value
-    times = np.array([*late.values()])
-    if len(times) < _MANY or np.ptp(times) > _SPREAD * abs(np.median(times)):
+    late = {joint: time for joint, time in late.items() if np.isfinite(time)}
+    middle = float(np.median([*late.values()])) if late else 0.0
+    late = {j: time for j, time in late.items() if abs(time - middle) <= _NEAR * abs(middle)}
+    if len(late) < _MANY:
         return
-    low, high = np.sort(1e3 * np.abs(times))[[0, -1]]
-    how = "late" if np.median(times) > 0.0 else "early"
+    low, high = np.sort(1e3 * np.abs([*late.values()]))[[0, -1]]
+    how = "late" if middle > 0.0 else "early"
     yield (
-        f"the torques of {listed([*late], 'and')} are all {how}, by {low:.2g} to {high:.2g} ms: "
-        "one cause is likelier than one on each joint, as torque and angles of different clocks "
-        "or cycles, or a command that was logged in the place of the torque"
+        f"the torques of {listed([*late], 'and')} are {how} by much the same, {low:.2g} to "
+        f"{high:.2g} ms: one cause is likelier than one on each joint, as torque and angles of "
+        "different clocks or cycles, or a command that was logged in the place of the torque"
     )

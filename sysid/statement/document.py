@@ -125,7 +125,8 @@ def _floor(floor) -> dict:
 
 def _with_law(entry: dict, fit) -> dict:
     """What is `unknown` with a law of one's own to begin with, where one variable stands out."""
-    there = [effect.name for effect, _ in fit.model.terms]
+    joints = fit.model.robot.joints
+    there = {(e.name, joints[j]) for e, own in fit.model.terms for j in own if j != ROBOT}
     known = entry["status"] == "unknown" and to_begin_with(entry, fit.experiment.path, there)
     return entry | ({"law": known} if known else {})
 

@@ -6,6 +6,7 @@ where that takes part, show how much there is, and their plot what the law looks
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection
 from pathlib import Path
 
@@ -15,19 +16,21 @@ from ..formula.text import OTHER
 
 _MOST = 0.5  # of what functions of the motion predict: less, and another variable has more
 _NEARLY = 0.8  # of what most predict: one variable that does says it more simply than two
+# without what nearly every model has, a constant, Coulomb and viscous friction
 _TERMS = {
     "": "a*{0} + b*{0}**2 + c*{0}**3",
-    DIRECTION: "a*s + b*s*{0} + c*s*{0}**2 + d*{0} + e*{0}**2",
-    "other": "a*{0} + b*{1} + c*{0}*{1} + d*{0}**2*{1} + e*{0}*{1}**2",
+    DIRECTION: "a*s*{0} + b*s*{0}**2 + c*{0} + d*{0}**2",
+    "other": "a*{0}*{1} + b*{0}**2*{1} + c*{0}*{1}**2 + d*{0}**2 + e*{1}**2",
 }
+_OF_SPEED = {"": "a*qd**2 + b*qd**3", DIRECTION: "a*s*qd**2 + b*qd**2 + c*qd**3"}
 
 
-def to_begin_with(entry: dict, path, there: Collection[str]) -> dict | None:
+def to_begin_with(entry: dict, path, there: Collection[tuple[str, str]]) -> dict | None:
     """{formula, command} for a joint that is `unknown`, as its document has it; None where
     nothing that a formula may hold stands out, or such a law is in the model already.
 
     Args:
-        path: of the experiment file. there: names of the model's effects.
+        path: of the experiment file. there: (effect, joint) of the model's.
     """
     joint, told = entry["joint"], entry.get("depends_on", ())
     if not told or told[0]["share"] < _MOST * entry["share_left"]:
@@ -39,9 +42,14 @@ def to_begin_with(entry: dict, path, there: Collection[str]) -> dict | None:
         other = _in_formula(other, joint)
     if variable is None or other is None:
         return None
-    form = other if other in _TERMS else "other"
-    formula, name = _TERMS[form].format(variable, other), f"law_of_{variable}"
-    if name in there:
+    form, terms = other if other in _TERMS else "other", _TERMS
+    if variable == "qd" and form in _OF_SPEED:
+        terms = _OF_SPEED
+    formula = terms[form].format(variable, other)
+    name = re.sub(
+        "[^a-z0-9_]", "_", "_and_".join(("law_of_" + variable, other)[: 1 + bool(other)]).lower()
+    )
+    if (name, joint) in there:
         return None
     options = {"formula": formula, "name": name}
     return {"formula": formula, "command": command(Path(path), "formula", [joint], options)}

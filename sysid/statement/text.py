@@ -34,7 +34,7 @@ ANOTHER = "a motion that tells most of what these logs leave open"
 TRIED = "to try it, and see the held-out error before and after"
 NO_MORE = "no further effect is supported by these logs"
 OWN = "a law of your own can be tried: `sysid effects formula`"
-BEGIN = "to begin with, a polynomial in what it follows most"
+BEGIN = "to begin with, a polynomial in what it follows"
 _TOGETHER = "several variables together"
 
 

@@ -45,13 +45,13 @@ def _show_warnings(document: dict) -> None:
 
 
 def _after_diagnosis(found, document: dict, experiment) -> None:
-    """What is typed next: the first addition, what mends numbers that cannot be meant, what may be it, how joints are weighed, the
-    motion to log, or the page with all of it."""
+    """What is typed next: the first addition, what mends numbers that cannot be meant, what may be it, how joints are weighed, a law to
+    begin with, the motion to log, or the page with all of it."""
     commands = [c for v in document["verdict"] for c in v.get("commands", ())]
     steps = sorted((f for f in document["findings"] if f["command"] in commands and f["joins_as_step"]), key=lambda f: f["joins_as_step"])
     first, ordered = next(iter(steps), None), list(dict.fromkeys(f["command"] for f in steps))
     if ordered != [c for c in dict.fromkeys(commands) if c in ordered]:
-        words = "each of these was found with those before it in the model, and is promised so: add them in this order"
+        words = "each of these builds on those before it, and so do the errors above: add them in this order"
         print("\n".join([*text.wrapped(words, terminal_width(), "  "), *ordered]))
     may = [v["may_be"]["command"] for v in document["verdict"] if "may_be" in v]
     even = [v["joint"] for v in document["verdict"] if "weighting" in v]

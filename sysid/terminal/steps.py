@@ -30,7 +30,7 @@ def show_added(document: dict, experiment, run, before=()) -> None:
     table(f"held-out RMS without and with {document['added']}", ["joint", "before", "after", "change", "standard error"], rows)
     changed = [(d["joint"], d["delta_rms"], first[d["joint"]], after[d["joint"]]) for d in document["differences"]]
     if other := [j for j, *known in changed if None not in known and abs(known[0] - (known[2] - known[1])) > _OTHER * known[1]]:
-        words = f"before and after hold all rows that each fit counts, the change of {text.listed(other, 'and')} those that both count"
+        words = f"the change on {text.listed(other, 'and')} is over rows that both fits count, and so not after less before"
         print("\n".join(text.wrapped(words, terminal_width(), "  ")))
     for parameter in document["parameters"]:
         if parameter["std"] is not None:

@@ -34,7 +34,7 @@ def find(look: Look) -> Iterator[Fault]:
         return
     reading = Reading.plain(look.robot.dof)
     scored = equations.scored(reading)
-    turning, found = np.flatnonzero(~np.asarray(look.robot.prismatic)).tolist(), []
+    turning = np.flatnonzero(~np.asarray(look.robot.prismatic)).tolist()
     for _ in range(_ROUNDS):
         # of joints that hardly move any reading of the columns tells as little
         others = [
@@ -47,9 +47,10 @@ def find(look: Look) -> Iterator[Fault]:
         # as it is, and in another unit, it may leave the least
         if not tried or equations.scored(reading, free=True).loss < min(loss for loss, *_ in tried):
             break
-        _, reading, told, scored = min(tried, key=lambda one: one[0])
-        found.append(told)
-    for told in found:  # each says all of what is to be written, as one entry replaces another
+        _, reading, _, scored = min(tried, key=lambda one: one[0])
+    for told in _differences(
+        reading
+    ):  # each says all that is to be written: one entry replaces another
         yield from _told(look, reading, *told)
     yield from _factors(look, equations, reading, scored)
 
@@ -97,6 +98,27 @@ def _clear(before: Scored, after: Scored, joints, word: str) -> bool:
     return bool(gain.sum() > _BETTER * len(joints) and np.all(gain[list(joints)] > 0.0))
 
 
+def _differences(reading: Reading) -> Iterator[tuple[str, tuple[int, ...], str | int]]:
+    """In which a reading differs from the experiment's: (fault, joints, what)."""
+    orders = {"angle": reading.angle, "torque": reading.torque}
+    orders = {"": reading.angle} if reading.angle == reading.torque else orders
+    for word, order in orders.items():
+        left = {k for k, own in enumerate(order) if own != k}
+        while left:
+            ring = [min(left)]
+            while order[ring[-1]] != ring[0]:
+                ring.append(order[ring[-1]])
+            left -= {*ring}
+            yield "joint_order", tuple(ring), word
+    for j, factors in enumerate(zip(reading.angle_factor, reading.torque_factor)):
+        turned = [word for word, factor in zip(("angle", "torque"), factors) if factor < 0.0]
+        if turned:
+            yield "sign_flipped", (j,), " and ".join(turned)
+    for j, zero in enumerate(reading.zero):
+        if quarters := round(zero / (np.pi / 2)):
+            yield "limit_exceeded", (j,), quarters
+
+
 def _told(look: Look, reading: Reading, kind: str, joints, word) -> Iterator[Fault]:
     """What is said of one thing in which a reading differs from the experiment's."""
     names = [look.robot.joints[j] for j in joints]
@@ -106,11 +128,7 @@ def _told(look: Look, reading: Reading, kind: str, joints, word) -> Iterator[Fau
             f"the zero of {names[0]}'s angle looks {turn} from the URDF's: from there the URDF's "
             "robot explains the torques"
         )
-        known = dict(look.experiment.data.zero)
-        for joint, more in zip(look.robot.joints, reading.zero):
-            known |= {joint: known.get(joint, 0.0) + more} if more else {}
-        told = ", ".join(f"{joint}: {at:.6g}" for joint, at in known.items())
-        do = f"write data.zero: {{{told}}}; {_OUT_OF}"
+        do = f"write data.zero: {_zeros(look, reading)}; {_OUT_OF}"
         yield Fault(kind, WARNING, says, do, names[0])
         return
     kinds = ["position", "torque"] if word in ("", "angle and torque") else [_KEYS[word]]
@@ -118,7 +136,7 @@ def _told(look: Look, reading: Reading, kind: str, joints, word) -> Iterator[Fau
         if kind == "joint_order":
             what = f"the {word} columns" if word else "the columns"
             says = (
-                f"{what} of {names[0]} and {names[1]} look exchanged: the URDF's robot "
+                f"{what} of {', '.join(names[:-1])} and {names[-1]} look exchanged: the URDF's robot "
                 "explains them in the other order"
             )
             do = "; ".join(_exchanged(look, key, reading) for key in kinds)
@@ -128,7 +146,17 @@ def _told(look: Look, reading: Reading, kind: str, joints, word) -> Iterator[Fau
                 "friction would drive the joint or gravity lift it"
             )
             do = "; ".join(_negated(look, key, name, reading) for key in kinds)
+        if "position" in kinds and look.experiment.data.zero:  # which is of the angle as it is read
+            do += f"; write data.zero: {_zeros(look, reading)}"
         yield Fault(kind, ERROR, says, f"{do}; {_OUT_OF}", name)
+
+
+def _zeros(look: Look, reading: Reading) -> str:
+    """The zeros of all joints, those that the experiment has among them."""
+    known, joints = look.experiment.data.zero, look.robot.joints
+    own = zip(joints, reading.angle, reading.angle_factor, reading.zero)
+    zeros = {joint: turn * known.get(joints[k], 0.0) + more for joint, k, turn, more in own}
+    return f"{{{', '.join(f'{joint}: {at:.6g}' for joint, at in zeros.items() if at)}}}"
 
 
 def _in_order(look: Look, key: str, reading: Reading) -> list[str | None]:
@@ -140,7 +168,7 @@ def _in_order(look: Look, key: str, reading: Reading) -> list[str | None]:
 def _exchanged(look: Look, key: str, reading: Reading) -> str:
     every = _in_order(look, key, reading)
     if None in every:
-        return f"exchange the two in data.columns.{key}"
+        return f"exchange them in data.columns.{key}"
     return f"write data.columns.{key}: [{', '.join(every)}]"
 
 
@@ -148,12 +176,12 @@ def _negated(look: Look, key: str, joint: str, reading: Reading) -> str:
     """How an experiment says that a column has the other sign."""
     factors = reading.angle_factor if key == "position" else reading.torque_factor
     own = zip(look.robot.joints, factors, _in_order(look, key, reading))
-    turned = {name: column for name, factor, column in own if factor < 0.0}
     sums = getattr(look.experiment.data, key)
-    if turned[joint] is None or joint in sums:
+    turned = {n: c for n, factor, c in own if factor < 0.0 and c is not None and n not in sums}
+    if joint not in turned:
         return f"log the {key} with the other sign"
-    written = [f"{n}: {{{c}: -1}}" for n, c in turned.items() if c is not None and n not in sums]
-    return f"write data.{key}: {{{', '.join(written)}}}"
+    written = ", ".join(f"{name}: {{{column}: -1}}" for name, column in turned.items())
+    return f"{'add to' if sums else 'write'} data.{key}: {{{written}}}"
 
 
 def _factors(look: Look, equations: Equations, reading: Reading, scored: Scored) -> Iterator[Fault]:
@@ -182,7 +210,7 @@ def _factors(look: Look, equations: Equations, reading: Reading, scored: Scored)
                 yield Fault("wrong_unit", WARNING, says, do, name)
             continue
         if thousand:
-            do = _thousandth(look, name, own, bool(np.all((off == tells)[tells])))
+            do = _thousandth(look, reading, name, own, bool(np.all((off == tells)[tells])))
             yield Fault("wrong_unit", ERROR, says, do, name)
         elif own < 1.0:
             yield Fault(
@@ -204,7 +232,7 @@ def _factors(look: Look, equations: Equations, reading: Reading, scored: Scored)
             )
 
 
-def _thousandth(look: Look, joint: str, factor: float, every: bool) -> str:
+def _thousandth(look: Look, reading: Reading, joint: str, factor: float, every: bool) -> str:
     """What to write where torque is a thousand times off: as that of all joints is, or of one."""
     data, slides = look.experiment.data, look.robot.prismatic[look.robot.joints.index(joint)]
     plain = of_joint("N m", prismatic=bool(slides))
@@ -212,13 +240,15 @@ def _thousandth(look: Look, joint: str, factor: float, every: bool) -> str:
     if data.units.torque not in ("N m", "N") or own:
         return f"is it in mN m, or kN m? give it in {plain}"
     unit = ("m" if factor > 1.0 else "k") + plain
-    column = look.column("torque", joint)
+    at = look.robot.joints.index(joint)
+    column = _in_order(look, "torque", reading)[at]
     if every and not look.robot.prismatic.any():
         return f"if it is in {unit} set data.units.torque: {unit}"
     if column is None:
         return f"if it is in {unit} give it in {plain}"
-    scale = 0.001 if factor > 1.0 else 1000
-    return f"if it is in {unit} write data.torque: {{{joint}: {{{column}: {scale}}}}}"
+    sign = "-" if reading.torque_factor[at] < 0.0 else ""
+    scale, how = "0.001" if factor > 1.0 else "1000", "add to" if data.torque else "write"
+    return f"if it is in {unit} {how} data.torque: {{{joint}: {{{column}: {sign}{scale}}}}}"
 
 
 def _times(factor: float) -> str:

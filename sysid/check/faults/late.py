@@ -59,7 +59,9 @@ def find(look: Look) -> Iterator[Fault]:
             )
             do = "`sysid diagnose` says which; log both from the same cycle where it is a delay"
             found.append(Fault("delayed_signal", WARNING, says, do, joint))
-    yield from [*_clocks(apart, asked)] or found
+    clocks = [*_clocks(apart, asked)]
+    yield from clocks
+    yield from (fault for fault in found if not clocks or fault.joint not in apart)
 
 
 def _clocks(apart: dict[str, tuple[float, ...]], asked: int) -> Iterator[Fault]:
@@ -75,18 +77,22 @@ def _clocks(apart: dict[str, tuple[float, ...]], asked: int) -> Iterator[Fault]:
     alike = np.ptp(change) <= _ALIKE * abs(np.median(change))
     if not alike or sum(gain for *_, gain in apart.values()) <= _CLEAR:
         return
-    first, last = (1e3 * np.median([one[k] for one in apart.values()]) for k in (0, 1))
+    first, last = (_when(np.median([one[k] for one in apart.values()])) for k in (0, 1))
+    *names, name = apart
     says = (
-        f"the torques of {', '.join(apart)} are {_when(first)} in the first third of the logs and "
-        f"{_when(last)} in the last: they and the angles have clocks that run apart"
+        f"the torques of {', '.join(names)} and {name} are {first} in the first third of each log "
+        f"and {last} in the last: clocks that run apart look like that, or friction that changes on "
+        "all of them"
     )
-    do = "put both on one clock, as by a start and a stop that both show: no one delay mends it"
+    do = "put torque and angles on one clock, as by a start and a stop that both show"
     yield Fault("delayed_signal", WARNING, says, do)
 
 
 def _when(lag: float) -> str:
-    """A lag [ms] in words."""
-    return f"{abs(lag):.2g} ms {'late' if lag > 0 else 'early'}"
+    """A lag [s] in words."""
+    if abs(lag) < _LEAST[0]:
+        return "in time"
+    return f"{1e3 * abs(lag):.2g} ms {'late' if lag > 0 else 'early'}"
 
 
 def _at_ends(left, lags, log, t, count: int) -> tuple[float, float, float] | None:
