@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from types import SimpleNamespace
 
 import numpy as np
 import polars as pl
@@ -12,6 +13,7 @@ from scripts.check_parts import faults
 from sysid import check, pipeline
 from sysid.check import FAULTS
 from sysid.check.equations import Reading
+from sysid.check.faults import columns
 from sysid.check.look import looked
 from sysid.simulate import simulate, write
 
@@ -302,3 +304,20 @@ def test_one_joint_s_torque_before_its_gear_is_worth_a_word(made, tmp_path):
         table.with_columns(pl.col("tau_elbow") / 6.0).write_csv(logs / name)
     (found,) = [f for f in check.check(pipeline.load(logs)) if f.fault == "wrong_unit"]
     assert (found.joint, found.severity) == ("elbow", "warning") and "gear" in found.do
+
+
+def test_what_is_told_of_columns_is_the_reading_that_came_out():
+    """Not the steps to it: a sign that was turned back is none, and three columns in a ring are told once."""
+    reading = Reading((0, 1, 2), (1, 2, 0), (1, 1, 1), (1, 1, -1), zero=(0.0, np.pi, 0.0))
+    assert [*columns._differences(reading)] == [("joint_order", (0, 1, 2), "torque"), ("sign_flipped", (2,), "torque"), ("limit_exceeded", (1,), 2)]
+    both = Reading((1, 0, 2), (1, 0, 2), (-1, 1, 1), (-1, 1, 1), zero=(0.0, 0.0, 0.0))
+    assert [*columns._differences(both)] == [("joint_order", (0, 1), ""), ("sign_flipped", (0,), "angle and torque")]
+
+
+def test_a_zero_is_of_the_angle_as_it_is_read():
+    data = SimpleNamespace(zero={"a": 0.3}, torque={"b": {"x": -1}}, position={})
+    look = SimpleNamespace(robot=SimpleNamespace(joints=("a", "b")), experiment=SimpleNamespace(data=data), column=lambda key, joint: f"{key}_{joint}")
+    turned = Reading((0, 1), (0, 1), (-1, 1), (-1, 1), zero=(np.pi / 2, 0.0))
+    said = {fault.fault: fault.do for told in columns._differences(turned) for fault in columns._told(look, turned, *told)}
+    assert "write data.zero: {a: 1.2708}" in said["sign_flipped"] and "write data.zero: {a: 1.2708}" in said["limit_exceeded"]
+    assert "write data.position: {a: {position_a: -1}}; add to data.torque: {a: {torque_a: -1}}" in said["sign_flipped"]
