@@ -48,9 +48,8 @@ def find(look: Look) -> Iterator[Fault]:
         if not tried or equations.scored(reading, free=True).loss < min(loss for loss, *_ in tried):
             break
         _, reading, _, scored = min(tried, key=lambda one: one[0])
-    for told in _differences(
-        reading
-    ):  # each says all that is to be written: one entry replaces another
+    # each says all that is to be written, as one entry replaces another
+    for told in _differences(reading):
         yield from _told(look, reading, *told)
     yield from _factors(look, equations, reading, scored)
 
