@@ -10,7 +10,10 @@ from .outliers import NORMAL, SHORT, SPIKE, quantum, spikes
 from .running import running
 
 _NOISES = 4.0  # deviations of the angle's noise, of which a step is usual
+# Of how far a joint goes: what makes no torque to speak of; and of how far the farthest goes, who stands
+_HARMLESS, _STANDS = 1e-4, 1e-3
 _BESIDE, _ORDER = 6, 3  # samples to either side, between which the motion is a polynomial
+_FARTHER = 3.0  # times from the curve than any sample beside it
 _NEAR = 24  # samples to either side among which these are
 _FELT = 3  # samples to either side of which a logger's own derivative is made
 
@@ -28,11 +31,14 @@ def without_glitches(q: np.ndarray) -> tuple[np.ndarray, list[list[tuple[int, in
     # where an angle turns round it stands beside its median by its noise and its steps; what is no
     # more than the tails of a noisy encoder does no harm
     noise = np.median(np.abs(np.diff(q, 2, axis=0)), axis=0) / (NORMAL * np.sqrt(6.0))
-    grain = np.maximum(_NOISES * noise, [quantum(own) for own in q.T])
+    # of a joint that stands for most of a log these are nothing, and a resampled angle's ripple is more
+    least = _HARMLESS * np.ptp(middle, axis=0)
+    grain = np.maximum(np.maximum(_NOISES * noise, least), [quantum(own) for own in q.T])
+    grain[least <= _STANDS * least.max()] = np.inf
     found = spikes(q - middle, grain=grain)
     if not any(found):
         return q, found
-    out, rows = q.copy(), np.arange(len(q))
+    out, rows, told = q.copy(), np.arange(len(q)), [list[tuple[int, int]]() for _ in q.T]
     for j, own in enumerate(found):
         good = np.ones(len(q), dtype=bool)
         for first, last in own:
@@ -43,8 +49,12 @@ def without_glitches(q: np.ndarray) -> tuple[np.ndarray, list[list[tuple[int, in
             about = np.concatenate([near[near < first][-_BESIDE:], near[near > last][:_BESIDE]])
             alone, order = np.arange(first, last + 1), min(_ORDER, len(about) - 1)
             curve = np.polynomial.Polynomial.fit(about, q[about, j], order)
-            out[alone, j] = curve(alone)
-    return out, found
+            # where a motion sets off none of its samples is on the curve
+            beside, far = (np.abs(q[at, j] - curve(at)).max() for at in (about, alone))
+            if far > _FARTHER * beside:
+                out[alone, j] = curve(alone)
+                told[j].append((first, last))
+    return out, told
 
 
 def without_their_slopes(

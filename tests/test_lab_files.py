@@ -5,6 +5,7 @@ import warnings
 import numpy as np
 import polars as pl
 import pytest
+from scipy.interpolate import make_interp_spline
 
 from sysid import check, experiment_logs, log, log_spec, pipeline
 from sysid.anew import angle_starts
@@ -129,6 +130,20 @@ def test_an_angle_that_stands_alone_is_taken_out(step, bits, noise):
     mended, found = without_glitches(hit)
     assert [[(a, b) for jj, a, b, _ in places if jj == j] for j in range(3)] == found
     assert np.abs(mended - q).max() < 3.0 * noise + (2.0 * np.pi / 2**bits if bits else 0.0) + 50.0 * step**3
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_an_angle_that_sets_off_is_no_glitch(seed):
+    """Moves with stops, 100 samples a second whose stamps jitter: read evenly, a step of the encoder ripples where a joint stands."""
+    rng, t = np.random.default_rng(seed), 0.01 * np.arange(420)
+    stamps = np.sort(t + 1.7e-3 * rng.normal(size=420))
+    places = np.cumsum(rng.uniform(-0.5, 0.5, size=(7, 3)) * (rng.random((7, 3)) < 0.5), axis=0)
+    share = np.clip((stamps[:, None] - 0.6 * np.arange(7)) / 0.35, 0.0, 1.0)
+    moved = share**3 * (10.0 - 15.0 * share + 6.0 * share**2)
+    q = np.diff(np.concatenate([np.zeros((1, 3)), places]), axis=0)
+    angle = 2.0 * np.pi / 2**18 * np.round(moved @ q * 2**18 / (2.0 * np.pi))
+    evenly = make_interp_spline(stamps, angle, k=3)(np.linspace(stamps[0], stamps[-1], 420))
+    assert without_glitches(evenly)[1] == [[], [], []]
 
 
 def test_who_goes_and_comes_back_does_not_rest():

@@ -21,7 +21,9 @@ SENSELESS = ("wrong_unit", "angle_wrap", "joint_order", "sign_flipped")
 # What another reading leaves of the squares of every joint whose column it reads otherwise: a
 # factor of two in what is left, as of a torque's sign.
 _LEAVES = 0.25
-_ODD = 2.0  # times the error that a joint has in the other logs: no reading is asked for of less
+# Times the error that a joint has in the other logs: no reading is asked for of less, and what is
+# read rightly has no more
+_ODD = 2.0
 _PASSES = 2  # over the weights of the joints
 
 
@@ -73,7 +75,10 @@ def _read_otherwise(look: Look, seen: Seen, k: int) -> tuple | None:
         fallen = left / np.maximum(plain, 1e-300)
         loss = float(np.sum(np.log(fallen[asked])))
         rises = np.any(fallen[here.any(axis=0)] > 1.0 / _LEAVES)  # of others, whatever is asked
-        clear = np.all(fallen[list(joints)] < _LEAVES) and not rises
+        these = list(joints)
+        # read rightly, it is predicted as the other logs are: else they tell too little of this one
+        usually = np.all(np.sqrt(left[these]) <= _ODD * usual[these])
+        clear = np.all(fallen[these] < _LEAVES) and usually and not rises
         if clear and (best is None or loss < best[0]):
             best = loss, k, kind, joints, word, float(np.sqrt(fallen[list(joints)].max()))
     return best
