@@ -28,15 +28,15 @@ def entry(*follows, left: float = 0.6) -> dict:
 )
 def test_a_formula_in_what_a_residual_follows(follows, linear, has):
     found = to_begin_with(entry(follows), "arm/config.yaml", ())
-    assert has in found["formula"] and len(parse(found["formula"]).linear) == linear
+    assert has in found["options"]["formula"] and len(parse(found["options"]["formula"]).linear) == linear
     words = shlex.split(found["command"])
-    assert words[:4] == ["sysid", "add", "arm", "formula"] and f"formula={found['formula']}" in words and words[4:6] == ["--joint", "wrist"]
+    assert words[:4] == ["sysid", "add", "arm", "formula"] and f"formula={found['options']['formula']}" in words and words[4:6] == ["--joint", "wrist"]
 
 
 def test_one_variable_that_says_nearly_as_much_comes_before_two():
     found = to_begin_with(entry(("qd_wrist", 0.6, "time"), ("time", 0.55)), "arm", ())
-    assert found["formula"] == "a*t + b*t**2 + c*t**3"
-    assert "qd" in to_begin_with(entry(("qd_wrist", 0.6, "time"), ("time", 0.3)), "arm", ())["formula"]
+    assert found["options"]["formula"] == "a*t + b*t**2 + c*t**3"
+    assert "qd" in to_begin_with(entry(("qd_wrist", 0.6, "time"), ("time", 0.3)), "arm", ())["options"]["formula"]
 
 
 @pytest.mark.parametrize(
@@ -50,7 +50,7 @@ def test_none_where_no_formula_can_hold_it_or_it_says_little(follows):
 def test_the_name_is_one_that_a_formula_may_have():
     found = to_begin_with(entry(("q_J2", 0.6)), "arm", ())
     name = shlex.split(found["command"])[-1].partition("=")[2]
-    assert Formula(found["formula"], name).name == name == "law_of_q_j2"
+    assert Formula(found["options"]["formula"], name).name == name == "law_of_q_j2"
 
 
 def test_none_that_is_in_the_model_already():

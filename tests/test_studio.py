@@ -340,6 +340,14 @@ def test_bad_additions_say_so_in_one_line(opened, body, words):
     assert opened.file.read_bytes() == before and opened.get("/api/state").json()["undo"] is None
 
 
+def test_a_law_to_begin_with_goes_into_the_file_as_its_card_has_it(opened):
+    law = {"effect": "formula", "joint": "elbow", "options": {"formula": "a*q + b*q**2 + c*q**3", "name": "law_of_q"}}
+    answer = opened.post("/api/add", sha=opened.sha, **law)
+    assert answer.status_code == 200, answer.text
+    (entry,) = [e for e in opened.session.history.experiment(opened.file.read_text()).model.effects if e.name == "formula"]
+    assert entry.options == law["options"] and entry.joints == ["elbow"]
+
+
 def test_a_formula_goes_into_the_file(opened):
     opened.post("/api/add", sha=opened.sha, formula="a*sin(3*q)", joint="elbow")
     (entry,) = [e for e in opened.session.history.experiment(opened.file.read_text()).model.effects if e.name == "formula"]

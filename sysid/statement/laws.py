@@ -26,8 +26,9 @@ _OF_SPEED = {"": "a*qd**2 + b*qd**3", DIRECTION: "a*s*qd**2 + b*qd**2 + c*qd**3"
 
 
 def to_begin_with(entry: dict, path, there: Collection[tuple[str, str]]) -> dict | None:
-    """{formula, command} for a joint that is `unknown`, as its document has it; None where
-    nothing that a formula may hold stands out, or such a law is in the model already.
+    """{effect, joint, options, command} for a joint that is `unknown`, as its document has it.
+
+    None where nothing that a formula may hold stands out, or such a law is in the model already.
 
     Args:
         path: of the experiment file. there: (effect, joint) of the model's.
@@ -52,7 +53,8 @@ def to_begin_with(entry: dict, path, there: Collection[tuple[str, str]]) -> dict
     if (name, joint) in there:
         return None
     options = {"formula": formula, "name": name}
-    return {"formula": formula, "command": command(Path(path), "formula", [joint], options)}
+    adds = command(Path(path), "formula", [joint], options)
+    return {"effect": "formula", "joint": joint, "options": options, "command": adds}
 
 
 def _in_formula(variable: str, joint: str) -> str | None:

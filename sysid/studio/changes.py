@@ -137,6 +137,8 @@ def _own(body: dict) -> Part:
     effect = body.get("effect")
     if not isinstance(effect, str):
         raise SysidError("effect must be a text")
+    if effect == "formula":  # as a diagnosis spells a law: with its name
+        return effect, joints, _options(body.get("options", {}))
     if effect not in vocabulary():
         raise SysidError("there is no such effect", allowed=", ".join(vocabulary()))
     joints = None if find(effect).scope == "robot" else joints
