@@ -26,7 +26,6 @@ _MOST = 0.25  # of the rows; where more stand out, they are no exception
 _SLOW, _MOST_SLOW, _LARGER = 0.12, 0.25, 2.0
 _ALIKE = 10  # groups of values by the size of the noise about them
 _KNOWN = 4.0  # the most that its square is larger than drawn
-_LITTLE = 0.3  # of what is usual: no more, anywhere, makes it larger by less than a twentieth
 
 
 def without(
@@ -49,14 +48,12 @@ def without(
         if not len(sizes) or not (typical := float(np.median(sizes)) / NORMAL) > 0.0:
             continue
         usual = [np.full(len(d), typical) for d in steps_of]
-        more = (
-            []
-            if drawn is None
-            else [[_step(v, k, width) for v in once] for once, k in zip(drawn, kept)]
-        )
-        if any(np.any(np.abs(v) > _LITTLE * typical) for once in more for v in once):
+        if drawn is not None:
             spans = [0.5 / (bandwidth * step) for step in steps]
-            local = [_local(once, n) for once, n in zip(more, spans)]
+            local = [
+                _local([_step(v, k, width) for v in once], n)
+                for once, k, n in zip(drawn, kept, spans)
+            ]
             # so few independent values tell it: two standard errors of theirs are usual
             number = [max(n / (2 * width + 1), len(v)) for v, n in zip(drawn, spans)]
             unsure = [1.0 + 2.0 / math.sqrt(2.0 * n) for n in number]
