@@ -21,7 +21,7 @@ def entry(*follows, left: float = 0.6) -> dict:
         (("q_wrist", 0.6), 3, "a*q + b*q**2"),
         (("time", 0.5), 3, "c*t**3"),
         (("load_wrist", 0.6, "direction"), 4, "a*s*load"),
-        (("qd_wrist", 0.6), 2, "a*qd**2"),
+        (("qd_wrist", 0.6), 3, "a*qd*abs(qd)"),
         (("qd_wrist", 0.6, "direction"), 3, "a*s*qd**2"),
         (("qd_wrist", 0.6, "time"), 5, "a*qd*t"),
     ],

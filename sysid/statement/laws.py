@@ -22,7 +22,7 @@ _TERMS = {
     DIRECTION: "a*s*{0} + b*s*{0}**2 + c*{0} + d*{0}**2",
     "other": "a*{0}*{1} + b*{0}**2*{1} + c*{0}*{1}**2 + d*{0}**2 + e*{1}**2",
 }
-_OF_SPEED = {"": "a*qd**2 + b*qd**3", DIRECTION: "a*s*qd**2 + b*qd**2 + c*qd**3"}
+_OF_SPEED = {"": "a*qd*abs(qd) + b*qd**2 + c*qd**3", DIRECTION: "a*s*qd**2 + b*qd**2 + c*qd**3"}
 
 
 def to_begin_with(entry: dict, path, there: Collection[tuple[str, str]]) -> dict | None:
