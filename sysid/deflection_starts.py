@@ -41,7 +41,7 @@ def from_tries(found: Settled, motion: Motion, term: int, joint: int, weights) -
     own = {v.shape.name: k for k, v in enumerate(model.shape_values) if (v.term, v.joint) == (term, joint)}
     values = [model.shape_values[k] for k in own.values()]
     tried = effect.tries({v.shape.name: (v.low, v.high) for v in values})
-    busy = any(v.held or model.shapes[k] != v.shape.start for k, v in zip(own.values(), values) if v.held or v.shape.start is not None)
+    busy = any(v.held for v in values) or stands_apart(model, term, joint)
     if busy or not tried:
         return None, 0
     scale = np.ones(model.robot.dof) if weights is None else np.asarray(weights)

@@ -30,7 +30,7 @@ class Verdict:
     (error stands above the floor, or the floor is not known, and nothing says why). explained:
     share of the joint's misfit on the test logs that all claims take, NaN where there is none.
     left: what functions of the motion predict of the rest, or None. says: why something is left.
-    may: the effect that may be it. even: how joints weigh makes it. carries: why tests show more.
+    may: the effect that may be it. even: whether weights make it. carries: why test logs err more.
     """
 
     joint: str
