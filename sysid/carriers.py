@@ -12,6 +12,7 @@ from .estimate import Fit
 from .inertia.consistency import is_consistent
 from .inertia.pseudo import from_central
 from .motion import Motion
+from .picks import of_logs, stretches, told
 
 
 def with_tests(choice, fit: Fit, test: Motion):
@@ -29,11 +30,12 @@ def with_tests(choice, fit: Fit, test: Motion):
 
 
 def _with_tests(member, fit: Fit, test: Motion):
-    candidate = member.candidate
-    if "logs" not in dict(candidate.options) or not (more := _carriers(candidate, member.view, fit, test)):
-        return member
-    logs = (*dict(candidate.options)["logs"], *more)
-    return replace(member, group=replace(member.group, candidate=_in(candidate, logs, fit)))
+    options = dict(member.candidate.options)
+    for name, find in (("logs", _carriers), ("stretches", _stretches)):
+        if name in options and (more := find(member.candidate, member.view, fit, test)):
+            grown = _in(member.candidate, {name: [*options[name], *more]}, fit)
+            return replace(member, group=replace(member.group, candidate=grown))
+    return member
 
 
 def _carriers(candidate: Candidate, view, fit: Fit, test: Motion) -> list[str]:
@@ -42,18 +44,32 @@ def _carriers(candidate: Candidate, view, fit: Fit, test: Motion) -> list[str]:
     names = [name for name in dict.fromkeys(piece.source for piece in test.pieces) if name not in trained]
     if not names:
         return []
+    found, left, torque = _weighed(_in(candidate, {"logs": names}, fit), view, fit, test)
+    gain = np.sum(left**2 - (left - torque) ** 2, axis=1)
+    source = np.array([piece.source for piece in test.pieces])[found.piece]
+    return [name for name in names if gain[source == name].sum() > 0.0]
+
+
+def _stretches(candidate: Candidate, view, fit: Fit, test: Motion) -> list[str]:
+    """The stretches of the test logs that have a load that parts of training logs have."""
+    names = dict.fromkeys(piece.source for piece in test.pieces)
+    found, left, torque = _weighed(_in(candidate, {"logs": list(names)}, fit), view, fit, test)
+    return told(found, stretches(found.t, of_logs(found.log), left, torque), test.pieces)
+
+
+def _weighed(candidate: Candidate, view, fit: Fit, test: Motion) -> tuple:
+    """The rows of test logs, what is left of them (n, dof) without a candidate, and its torque (n, dof) at the size that a view of the
+    training logs gives it; each joint by its error in the fit."""
     found, first = row.measured(test, 1), 10 * view.model.bodies
     own = [first + k for k, c in enumerate(view.model.coefficients) if (c.effect, c.joint) == candidate.key]
     # with the bodies that stand beside it: those of a model without it have a part of it already
-    effect, model = _in(candidate, names, fit).effect, view.model
+    effect, model = candidate.effect, view.model
     columns = row.signature(model, test, row.seen(model, test), effect, candidate.joint, {}, 1, found.use)
     size = view.x[own] if not model.coefficients[own[0] - first].of_body else _possible(view.x[own])
     left = (found.tau - row.predicted(model, test, view.x, 1)) * found.use
     error = np.array(list(fit.rms("train").values()))
     weight = np.where(error > 0.0, 1.0 / np.maximum(error, 1e-300), 0.0)
-    gain = np.sum((left**2 - (left - (columns @ size).T) ** 2) * weight**2, axis=1)
-    source = np.array([piece.source for piece in test.pieces])[found.piece]
-    return [name for name in names if gain[source == name].sum() > 0.0]
+    return found, left * weight, (columns @ size).T * weight
 
 
 def _possible(pi: np.ndarray) -> np.ndarray:
@@ -62,6 +78,9 @@ def _possible(pi: np.ndarray) -> np.ndarray:
     return pi if pi[0] <= 0.0 or is_consistent(pi) else from_central(pi[0], pi[1:4] / pi[0], np.zeros((3, 3)))
 
 
-def _in(candidate: Candidate, logs, fit: Fit) -> Candidate:
-    """A candidate in some logs."""
-    return made(candidate.effect, candidate.joint, dict(candidate.options) | {"logs": list(logs)}, fit.model.robot)
+def _in(candidate: Candidate, where: dict, fit: Fit) -> Candidate:
+    """A candidate in other logs, or stretches of them."""
+    anywhere = {"logs": None, "stretches": None}
+    options = {name: value for name, value in candidate.options if name not in anywhere}
+    effect = candidate.effect.given(**{k: v for k, v in anywhere.items() if hasattr(candidate.effect, k)})
+    return made(effect, candidate.joint, options | where, fit.model.robot)

@@ -13,7 +13,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from . import bounded, datasets, groups
+from . import bounded, datasets, effect_options, groups
 from .config_errors import keys_of, named, own_keys, refused, unknown_key
 from .errors import ConfigError
 from .formula import parse
@@ -128,10 +128,13 @@ def _listed(experiment: Experiment, lines) -> Experiment:
         location, said = wrong
         raise refused(location, said, (), lines, experiment.path)
     names = [log.name for log in (*data.train, *data.test)]
-    for k, mask in enumerate(experiment.preprocess.mask):
-        if mask.log not in names:
-            near = difflib.get_close_matches(mask.log, names, 3, 0.3) or names[:3]
-            raise refused(("preprocess", "mask", k, "log"), f"no such log in data.train or data.test; near: {', '.join(near)}", mask.log, lines, experiment.path)
+    asked = [(("preprocess", "mask", k, "log"), mask.log) for k, mask in enumerate(experiment.preprocess.mask)]
+    for k, spec in enumerate(experiment.model.effects):
+        asked += [(("model", "effects", k), log) for log in effect_options.logs_of(spec.options)]
+    for location, log in asked:
+        if log not in names:
+            near = difflib.get_close_matches(log, names, 3, 0.3) or names[:3]
+            raise refused(location, f"no such log in data.train or data.test; near: {', '.join(near)}", log, lines, experiment.path)
     data = groups.resolved(data)
     return experiment.model_copy(update={"data": data})
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import inf, nan
+
 from .errors import ConfigError
 
 
@@ -24,3 +26,27 @@ def texts(effect, option: str) -> None:
     value = getattr(effect, option)
     if value is not None and not (isinstance(value, list) and value and all(isinstance(item, str) for item in value)):
         raise ConfigError(f"{effect.name}.{option} is {value!r}", where="model.effects", allowed="a list of names")
+
+
+def stretches(effect, option: str) -> list[tuple[str, float, float]]:
+    """Stretches of logs (log, start, stop) that an option gives as texts "LOG START STOP", none where it is left out. Raises ConfigError."""
+    texts(effect, option)
+    out = []
+    for text in getattr(effect, option) or ():
+        try:
+            log, start, stop = text.rsplit(None, 2)
+            out.append((log, float(start), float(stop)))
+        except ValueError:
+            out.append((text, nan, nan))
+        if not -inf < out[-1][1] < out[-1][2] < inf:
+            allowed = "LOG START STOP: a log's name under `data`, and two times [s] of its clock, the second one later"
+            raise ConfigError(f"{effect.name}.{option} has {text!r}", where="model.effects", allowed=allowed, do="correct it, as in 'pick.csv 3.2 7.9'")
+    return out
+
+
+def logs_of(options: dict) -> list[str]:
+    """The names of logs among the options of an effect that is in some logs, or in stretches of some; what is none of either is left
+    to the effect."""
+    lists = (options.get(name) if isinstance(options.get(name), list) else [] for name in ("logs", "stretches"))
+    own, parts = ([text for text in one if isinstance(text, str)] for one in lists)
+    return own + [text.rsplit(None, 2)[0] for text in parts if len(text.split()) > 2]

@@ -62,8 +62,8 @@ def _levels(effect: Effect, spec, groups: Mapping[str, Mapping]) -> list[Effect]
     """An effect at each level of the group that it is per, but for those that its entry excepts; itself where it is in all logs."""
     if spec.per is None:
         return [effect]
-    if getattr(effect, "logs", None) is not None:
-        raise ConfigError(f"model.effects: {effect.name} has both logs and per", allowed="one of them", do="leave logs out: data.groups says which logs")
+    if named := [name for name in ("logs", "stretches") if getattr(effect, name, None) is not None]:
+        raise ConfigError(f"model.effects: {effect.name} has both {named[0]} and per", allowed="one of them", do=f"leave {named[0]} out: data.groups says which logs")
     levels = tuple(groups[spec.per])
     own = [level for level in levels if level not in (spec.spared or ())]
     if effect.mimics_mass and isinstance(effect, LinkEffect) and len(own) == len(levels):

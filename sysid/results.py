@@ -124,6 +124,8 @@ def _entry(effect: dict, moved: Callable[[str], str]) -> dict | str:
         return own
     if isinstance(own.get("logs"), list):
         own["logs"] = [moved(name) if isinstance(name, str) else name for name in own["logs"]]
+    if isinstance(own.get("stretches"), list):
+        own["stretches"] = [" ".join([moved(name), *times]) for name, *times in (text.rsplit(None, 2) for text in own["stretches"])]
     name = effect["name"]
     if is_own(name):
         file, _, kind = name.rpartition(":")

@@ -19,7 +19,6 @@ import numpy as np
 
 from .. import borne_out, pipeline, thinning
 from ..candidates import Candidate, candidates
-from ..end_stops import asked_too
 from ..estimate import Fit
 from ..failures import Failure, HeldOut, failures, fallen
 from ..left_open import left_open
@@ -28,6 +27,7 @@ from ..misread import misread, unasked
 from ..noise import NoiseFloor, floors_of_fit
 from ..shown import ShownDiagnosis
 from ..specs import Experiment
+from ..suspected import suspected
 from ..transfer import transfers
 from ..unexplained import by_log, notices, of_few_blocks
 from ..view import View, elsewhere, first_view, law, too_short
@@ -84,7 +84,7 @@ def diagnose(
     fit = fit or pipeline.fit(experiment, progress=progress, measured=whole)
     with noticed():
         view = first_view(fit.experiment, fit, *measured.parts)
-        extra = asked_too(fit.experiment, view)
+        extra = suspected(fit.experiment, view)
         how = {"level": level, "tell": tell, "most": 0 if (wrong := misread(fit)) else select.STEPS}
         steps, asked, then_asked, undecided = select.search(view, extra, **how)
         if (test := lowpassed(measured.test, fit.joints, view.cutoff)) is None:

@@ -1,0 +1,213 @@
+"""What a robot picks up and puts down within a log: when, by the torque that a body on its last link needs.
+
+A model of the whole log has a part of such a load all the time and lacks the rest for a while, and no function of the motion
+predicts which. Two times and a body are looked for together: the body by least squares beside everything in the model, the times
+by how far the residual falls. Only stretches that take more than chance gives over all of them are asked.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from .candidate_columns import columns_of
+from .candidates import made
+from .effects.payload import Payload
+from .model_parameters import ROBOT
+from .motion import Piece
+from .vocabulary import find
+
+_CELLS = 240  # of time, in all logs: where a stretch may begin and end at first
+_SHORTEST = 1.0  # s: of a stretch
+_TIMES = 1.4  # how much longer the next length that is tried is
+_DRAWS = 99  # of chance: a residual that beats them all is there at one per cent
+_MASS = slice(0, 4)  # m and m c: what a load is seen by first
+_RIDGE = 1e-6  # of what the body takes, where a short stretch tells a part of it alone
+_ROUNDS = 10  # of body and times in turn
+_TAKES = 0.25  # of some joint's squared residual: less hides behind whatever else is missing
+_WHOLE = 0.95  # of a log's rows: that is all of it
+
+
+class Picked(Payload):
+    """A payload that is asked during stretches that were found."""
+
+    def __init__(self, found: Sequence[str] = ()):
+        self.found = list(found)
+
+    def variants(self, robot, joint):
+        return [{"stretches": self.found}]
+
+    def among(self, logs):
+        return []
+
+
+def picked(view) -> list[Payload]:
+    """The payload to be asked during stretches of a view's training logs; none where no stretch stands out.
+
+    Args:
+        view: of the model, a `view.View`.
+    """
+    name = find(Payload.name)
+    if any(effect.name == name.name for effect, _ in view.model.terms):
+        return []
+    (columns,) = columns_of(view.source, made(name, ROBOT, {}, view.model.robot), [{}])
+    parts = _Parts.of(view, columns[:, :, _MASS] * view.weights[:, None, None])
+    there = parts.first()
+    if there is None:
+        return []
+    there, shares = parts.settled(there)
+    held = [there[rows].mean() for rows in parts.logs]
+    if shares.max() < _TAKES or all(share < 1.0 - _WHOLE or share > _WHOLE for share in held):
+        return []  # whole logs are asked anyway
+    return [Picked(told(view.rows, there, view.motion.pieces))]
+
+
+@dataclass(frozen=True)
+class _Parts:
+    """What is looked at: weighted columns of the body (dof, n, 4), each of size one, of the model (dof, n, k) and the residual
+    (n, dof); the rows of each log; t (n,) [s]."""
+
+    body: np.ndarray
+    model: np.ndarray
+    residual: np.ndarray
+    logs: tuple[slice, ...]
+    t: np.ndarray
+
+    @classmethod
+    def of(cls, view, columns: np.ndarray) -> _Parts:
+        size = np.sqrt(np.einsum("jnk,jnk->k", columns, columns))
+        logs = tuple(of_logs(view.rows.log))
+        return cls(columns / np.maximum(size, 1e-300), view.design.columns, view.design.residual, logs, view.rows.t)
+
+    def first(self) -> np.ndarray | None:
+        """(n,) bool of the stretch that takes most; None where chance takes as much."""
+        cells = self._cells()
+        sums = lambda a, b: np.stack([sum(a[j][s].T @ b[j][s] for j in range(len(a))) for s in cells])  # noqa: E731
+        shifted = self._shifted(np.random.default_rng(1))
+        squares, cross = sums(self.body, self.body), sums(self.model, self.body)
+        scores = sums(self.body, shifted)  # (cells, 4, 1 + draws)
+        level = sum(a.T @ own for a, own in zip(self.model, shifted))  # what the model takes of each (k, 1 + draws)
+        best, most = None, np.zeros(shifted.shape[2])
+        for spans in self._spans(cells):
+            within = lambda a: _between(a, spans)  # noqa: E731, B023
+            own, shared = within(squares), within(cross)
+            ridge = _RIDGE * np.trace(own, axis1=1, axis2=2)[:, None, None] + 1e-12
+            left = own - np.swapaxes(shared, 1, 2) @ shared + ridge * np.eye(own.shape[1])
+            score = within(scores) - np.swapaxes(shared, 1, 2) @ level
+            size = np.linalg.solve(left, score)
+            gain = np.where(size[:, 0] > 0.0, np.sum(size * score, axis=1), 0.0)  # no load is lighter than none
+            if gain[:, 0].max() > most[0]:
+                best = spans[int(gain[:, 0].argmax())]
+            most = np.maximum(most, gain.max(axis=0))
+        if best is None or most[0] <= most[1:].max():
+            return None
+        there = np.zeros(len(self.t), dtype=bool)
+        there[cells[best[0]].start : cells[best[1] - 1].stop] = True
+        return there
+
+    def settled(self, there: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(n,) bool of all stretches that have the body of some, body and stretches found in turn; and what it takes of each joint's
+        squared residual (dof,)."""
+        square = np.maximum(np.sum(self.residual**2, axis=0), 1e-300)
+        for _ in range(_ROUNDS):
+            body = self.body * there[:, None]
+            shared = sum(a.T @ p for a, p in zip(self.model, body))
+            left = sum(p.T @ p for p in body) - shared.T @ shared
+            size = np.linalg.lstsq(left, sum(p.T @ self.residual[:, j] for j, p in enumerate(body)), rcond=1e-9)[0]
+            torque = (self.body @ size).T  # (n, dof)
+            bare = self.residual + (self.model @ (shared @ size)).T
+            shares = 1.0 - np.sum((bare - torque * there[:, None]) ** 2, axis=0) / square
+            again = stretches(self.t, self.logs, bare, torque)
+            if (again == there).all():
+                break
+            there = again
+        return there, shares
+
+    def _cells(self) -> list[slice]:
+        """Rows of short stretches of time, none in two logs."""
+        seconds = sum(self.t[rows][-1] - self.t[rows][0] for rows in self.logs)
+        size, out = max(0.5 * _SHORTEST, seconds / _CELLS), []
+        for rows in self.logs:
+            number = ((self.t[rows] - self.t[rows][0]) / size).astype(int)
+            cuts = np.concatenate([[0], np.flatnonzero(np.diff(number)) + 1, [len(number)]]) + rows.start
+            out += [slice(a, b) for a, b in zip(cuts, cuts[1:])]
+        return out
+
+    def _spans(self, cells: list[slice]) -> Iterator[np.ndarray]:
+        """Cells (spans, 2) from one to before another of the same log, those of one length together."""
+        log = np.array([next(k for k, rows in enumerate(self.logs) if rows.start <= cell.start < rows.stop) for cell in cells])
+        length, least = 2.0, 2
+        while least <= len(cells):
+            begin = np.arange(len(cells) - least + 1)
+            own = begin[log[begin] == log[begin + least - 1]]
+            if len(own):
+                yield np.stack([own, own + least], axis=1)
+            length *= _TIMES
+            least = max(least + 1, int(length))
+
+    def _shifted(self, rng) -> np.ndarray:
+        """The residual (dof, n, 1 + draws), first as it is, then each log's turned round in time: what it is, and not when."""
+        out = [self.residual]
+        for _ in range(_DRAWS):
+            own = [np.roll(self.residual[rows], rng.integers(1, max(rows.stop - rows.start, 2)), axis=0) for rows in self.logs]
+            out.append(np.concatenate(own))
+        return np.stack(out, axis=2).transpose(1, 0, 2)
+
+
+def _between(each: np.ndarray, spans: np.ndarray) -> np.ndarray:
+    """Sums of what each cell has over spans of them."""
+    total = np.concatenate([np.zeros((1, *each.shape[1:])), np.cumsum(each, axis=0)])
+    return total[spans[:, 1]] - total[spans[:, 0]]
+
+
+def stretches(t, logs: Sequence[slice], left, torque) -> np.ndarray:
+    """(n,) bool: when a body of a known torque (n, dof) is there, by what is left (n, dof) without it, log by log; a stretch or a gap
+    that takes less than what a second of it takes on the average is none.
+
+    Args:
+        t: (n,) [s].
+
+    Source: the two-state path of least loss (Viterbi 1967).
+    """
+    square = np.sum(torque**2, axis=1)
+    gain = 2.0 * np.sum(left * torque, axis=1) - square
+    price = 0.5 * _SHORTEST * float(square.mean() / np.median(np.diff(t[logs[0]])))
+    path = np.zeros(len(t), dtype=bool)
+    for rows in logs:
+        without, with_, came = 0.0, 0.0, []  # came: whether the state before was the other one
+        for own in gain[rows].tolist():
+            came.append((with_ - price > without, without - price > with_))
+            without, with_ = max(without, with_ - price), max(with_, without - price) + own
+        there = with_ > without
+        for k in range(rows.stop - 1, rows.start - 1, -1):
+            path[k] = there
+            there ^= came[k - rows.start][there]
+    return path
+
+
+def told(rows, there: np.ndarray, pieces: Sequence[Piece]) -> list[str]:
+    """Stretches (n,) bool of the rows of a motion as an option of the payload gives them; what goes on to the end of a log goes on
+    to its last row.
+
+    Args:
+        rows: `rows.Rows` of the pieces, those of one log together.
+    """
+    out = []
+    for own in of_logs(rows.log):
+        name, clock = pieces[rows.piece[own.start]].source, rows.t[own]
+        whole = [piece.t for piece in pieces if piece.source == name]
+        first, last = whole[0][0], whole[-1][-1]
+        step = float(np.median(np.diff(clock)))
+        begins, ends = (np.flatnonzero(np.diff(there[own].astype(int), prepend=0, append=0) == sign) for sign in (1, -1))
+        for a, b in zip(begins, ends):
+            start, stop = (first if a == 0 else clock[a]), (last if b == len(clock) else clock[b - 1]) + step
+            out.append(f"{name} {start:.2f} {stop:.2f}")
+    return out
+
+
+def of_logs(log: np.ndarray) -> list[slice]:
+    """The rows of each log, of the number (n,) of the log of each row."""
+    cuts = np.concatenate([[0], np.flatnonzero(np.diff(log)) + 1, [len(log)]])
+    return [slice(a, b) for a, b in zip(cuts, cuts[1:])]
