@@ -70,7 +70,7 @@ class Masses:
             return (
                 "no effect that can hide in them brings them back, and these logs hardly tell them: "
                 f"`prior.weight: {self.stronger:g}` does, and costs {_percent(self.costs)} of the "
-                "error on data held apart"
+                "error on data held apart; where the URDF's are what is wrong, keep these"
             )
         if not (auto or self.effect):
             return (

@@ -330,10 +330,10 @@ def test_a_log_is_read_otherwise_only_where_the_others_then_predict_it(left, tol
     n, robot = 200, SimpleNamespace(dof=2)
     rows = SimpleNamespace(log=np.repeat([0, 1], n), use=np.ones((2 * n, 2), bool), tau=np.zeros((2 * n, 2)), columns=np.zeros((2, 2 * n, 3)))
     look = SimpleNamespace(robot=robot, excited=[SimpleNamespace(enough=True)] * 2)
-    monkeypatch.setattr(one_log, "_told_by", lambda seen, use: (np.zeros(3), np.array([0.05, 0.1])))
+    monkeypatch.setattr(one_log, "told_by", lambda rows, model, use: (np.zeros(3), np.array([0.05, 0.1])))
     turned = lambda read: isinstance(read, Reading) and read.torque_factor[0] < 0.0 < read.angle_factor[0]
     plain, better = np.array([1.0, 0.01]), np.array([left, 0.01])
     monkeypatch.setattr(one_log, "_squares", lambda first, *rest: better if turned(first) else plain)
-    monkeypatch.setattr(one_log, "_as_read", lambda seen, k, reading: (reading, None, None))
-    found = one_log._read_otherwise(look, SimpleNamespace(rows=rows), 0)
+    monkeypatch.setattr(one_log, "as_read", lambda seen, reading, k: (reading, None, None))
+    found = one_log._read_otherwise(look, SimpleNamespace(rows=rows, model=None), 0)
     assert (found is not None) is told and (not told or found[2:5] == ("sign_flipped", (0,), "torque"))

@@ -32,7 +32,7 @@ FAULTS = (
 _OF_ANGLES = (
     "angle_wrap", "wrong_unit", "coarse_values", "standstill", "not_excited", "limit_exceeded",
 )  # fmt: skip
-_READINGS = ("among", "columns", "one_log")  # the modules that ask how columns are read
+_READINGS = ("among", "columns", "one_log", "unmoved")  # the modules that ask how columns are read
 
 
 def check(experiment: Experiment) -> list[Fault]:

@@ -1,9 +1,8 @@
 """What the search found, as `sysid add` gives it: each effect written into the experiment and
 fitted as the user's fit is.
 
-So what a diagnosis states is what comes of it; of several effects, what comes of all: one missing
-bends the parameters of another, which no deviation knows. The test logs only refuse: then the next
-likeliest that is tied is fitted, but not beside a claim, where some rest speaks for somebody.
+So what a diagnosis states is what comes of it, of several effects what comes of all. The test logs
+only refuse: then the next likeliest is fitted, but not beside a claim, where a rest speaks for any.
 """
 
 from __future__ import annotations
@@ -81,9 +80,10 @@ def claimed(
             continue
         if why:
             refused[~number] = last, Refused(*own)
-        step = replace(step, choice=step.choice.headed(head))
-        near = [one for one in near if one[1] >= _LIKELY or id(one[0]) in fits]
-        near.sort(key=lambda one: one[0] is not head)
+        beaten = {m.candidate.key for m, _ in near if id(m) in fits}  # refused: no rivals
+        step = replace(step, choice=step.choice.headed(head).without(beaten))
+        tied = lambda m, p: m is head or (p >= _LIKELY and free(m.candidate))  # noqa: B023, E731
+        near = [one for one in step.choice.members if tied(*one)][:_FITTED]
         fits = [fits[id(m)] if id(m) in fits else with_(pipeline.fit_grown, m) for m, _ in near]
         found = [finding(last, a, m, p, step, len(stands)) for a, (m, p) in zip(fits, near)]
         set_ = tuple((*m.candidate.named(fit.joints), p) for m, p in step.choice.members)

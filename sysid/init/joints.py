@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from .. import beyond
 from ..errors import ConfigError, LogError
 from ..robot import HELD, Robot, followers
 from .guess import Guess
@@ -82,6 +83,22 @@ def chosen(
     passed += [HELD.format(name, leader) for name, leader in moving.items()]
     doubt = "; ".join(passed)
     return order, [*out, Guess("robot.lock", lock, "; ".join(whys), doubt)] if whys else out
+
+
+def unmoved(robot: Robot, signals: Signals, data: list[Logged]) -> list[str]:
+    """What to look at where a log has angle and torque of a joint that the robot's file does not
+    know; of one that is fixed there a check says so.
+    """
+    first = data[0].table
+    known = {*robot.joints, *robot.locked}
+    patterns = signals.position.pattern, signals.torque.pattern
+    columns = beyond.beyond(signals.rest, *patterns, known)
+    try:
+        moving = beyond.moving(columns, first.load(list(columns.values()))) if columns else []
+    except LogError:  # of what nobody asked for
+        return []
+    new = [joint for joint in moving if joint not in robot.source.joints]
+    return ["; ".join(beyond.says(joint, columns[joint], ())) for joint in new]
 
 
 def _passed_over(signals: Signals, joint: str) -> list[str]:

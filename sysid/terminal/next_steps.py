@@ -59,7 +59,7 @@ def mended_first(document: dict, experiment, masses: dict) -> bool:
     elif masses.get("command"):
         next_line(masses["command"], out=out)
     elif masses.get("stronger"):
-        next_step("fit", target, first=f"the masses cannot be meant: write `weight: {masses['stronger']:g}` under `prior:` in {experiment.path}", out=out)
+        next_step("fit", target, first=f"the masses are far from the URDF's: where that is right, write `weight: {masses['stronger']:g}` under `prior:` in {experiment.path}", out=out)
     elif unchecked:
         next_step("check", target, first="the masses cannot be meant: see what the logs say", out=out)
     else:

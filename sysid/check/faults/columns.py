@@ -9,6 +9,7 @@ from itertools import combinations, product
 import numpy as np
 
 from ...units import of_joint
+from ..as_read import left_free
 from ..equations import LIKELY, Equations, Reading, Scored
 from ..fault import ERROR, WARNING, Fault
 from ..look import Look
@@ -18,6 +19,7 @@ AFTER, SENSELESS = 2, ("wrong_unit", "angle_wrap")
 # otherwise: what is left falls to a third of its power.
 _BETTER = 1.0
 _ROUNDS = 4
+_TRIED = 8  # readings that are clear, of which each is a fit
 _QUARTERS = (1, 2, -1)  # turns by which a log's zero may be off the URDF's
 _EXPLAINS = 0.2  # of a joint's torque squared: less of the URDF's torque tells no factor
 # and of so much that a factor, were it free, explains much more
@@ -43,15 +45,32 @@ def find(look: Look) -> Iterator[Fault]:
             if any(look.excited[j].enough for j in own[1][1])
         ]
         tried = [(made, told, equations.scored(made)) for made, told in others]
-        tried = [(s.loss, made, told, s) for made, told, s in tried if _clear(scored, s, *told[1:])]
+        tried = [
+            (s.loss, made, told, s)
+            for made, told, s in tried
+            if _clear(scored, s, told[1]) and _masses_tell(look, reading, made, s, *told[1:])
+        ]
         # as it is, and in another unit, it may leave the least
         if not tried or equations.scored(reading, free=True).loss < min(loss for loss, *_ in tried):
             break
-        _, reading, _, scored = min(tried, key=lambda one: one[0])
+        reading, scored = _likeliest(look, tried)
     # each says all that is to be written, as one entry replaces another
     for told in _differences(reading):
         yield from _told(look, reading, *told)
     yield from _factors(look, equations, reading, scored)
+
+
+def _likeliest(look: Look, tried: list[tuple]) -> tuple[Reading, Scored]:
+    """Of readings (loss, made, told, scored) that are all clear, the one of least loss among those by
+    which bodies, whatever these are, explain the torque as well as by any.
+
+    Masses of a URDF are wrong by more than two readings of one column differ: an axis that points the
+    other way turns gravity round as another zero does.
+    """
+    near = sorted(tried, key=lambda one: one[0])[:_TRIED]
+    left = [left_free(look.seen, made) for _, made, *_ in near] if len(near) > 1 else [0.0]
+    _, made, _, scored = next(o for o, own in zip(near, left) if own <= min(left) + _BETTER)
+    return made, scored
 
 
 def readings(
@@ -88,13 +107,18 @@ def _turned(factors, j: int) -> tuple:
     return tuple(-f if k == j else f for k, f in enumerate(factors))
 
 
-def _clear(before: Scored, after: Scored, joints, word: str) -> bool:
-    # with both signs turned friction is as it was: masses alone tell, where they explain torque
-    if word == "angle and torque" and not np.all(after.taken[list(joints)] > _EXPLAINS):
-        return False
+def _clear(before: Scored, after: Scored, joints) -> bool:
     known = before.known & after.known
     gain = np.log(before.left / after.left) * known
     return bool(gain.sum() > _BETTER * len(joints) and np.all(gain[list(joints)] > 0.0))
+
+
+def _masses_tell(look: Look, before: Reading, made: Reading, scored: Scored, joints, word) -> bool:
+    """Whether a reading is told by masses where these alone can: with both signs turned friction is as
+    it was. They do where the URDF's explain the torque, or where others explain it better so."""
+    if word != "angle and torque" or np.all(scored.taken[list(joints)] > _EXPLAINS):
+        return True
+    return left_free(look.seen, made) < left_free(look.seen, before) - _BETTER * len(joints)
 
 
 def _differences(reading: Reading) -> Iterator[tuple[str, tuple[int, ...], str | int]]:
@@ -143,6 +167,9 @@ def _told(look: Look, reading: Reading, kind: str, joints, word) -> Iterator[Fau
             says = (
                 f"the {word} of {name} has the sign against the URDF's: as it is, "
                 "friction would drive the joint or gravity lift it"
+                if word != "angle and torque"
+                else f"the angle and the torque of {name} have the sign against the URDF's: its axis "
+                "points the other way there"
             )
             do = "; ".join(_negated(look, key, name, reading) for key in kinds)
         if "position" in kinds and look.experiment.data.zero:  # which is of the angle as it is read

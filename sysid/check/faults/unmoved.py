@@ -1,0 +1,36 @@
+"""Whether a log has the angle and the torque of a joint that the robot's file does not move."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from ... import beyond
+from ...errors import LogError
+from ...recording import table_of
+from ..fault import ERROR, WARNING, Fault
+from ..look import Look
+
+AFTER, SENSELESS = 1, ()
+_MOST = 2**20  # rows: a longer log is read span by span, and not for columns that nobody uses
+
+
+def find(look: Look) -> Iterator[Fault]:
+    """joint_order, of columns that belong to no joint of the robot that moves."""
+    data, robot = look.experiment.data, look.robot
+    patterns = data.columns.position, data.columns.torque
+    log = min(look.logs, key=lambda one: one.samples)
+    if log.samples > _MOST or not all(isinstance(one, str) for one in patterns):
+        return
+    known, told = {*robot.joints, *robot.locked, *data.position, *data.torque}, {}
+    for name in log.spec.names:
+        try:
+            table = table_of(name, log.spec, look.experiment.folder)
+            columns = beyond.beyond(table.names, *patterns, known)
+            values = table.load(list(columns.values())) if columns else {}
+        except LogError:  # of what nobody asked for
+            continue
+        told |= {joint: columns[joint] for joint in beyond.moving(columns, values)}
+    for joint, column in told.items():
+        fixed = joint in robot.source.joints
+        severity = ERROR if fixed else WARNING
+        yield Fault("joint_order", severity, *beyond.says(joint, column, robot.source.joints))
