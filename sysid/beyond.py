@@ -12,8 +12,8 @@ _MOVES = 1e-2  # rad or m, or what stands for them in degrees or mm: less is a j
 def beyond(
     names: Iterable[str], angle: str | None, torque: str | None, joints: Collection[str]
 ) -> dict[str, str]:
-    """{name of a joint: column of its angle} of those that are none of `joints` and have both an angle
-    and a torque.
+    """{name of a joint: column of its angle} of those that are none of `joints` and have both an
+    angle and a torque.
 
     Args:
         names: of all columns. angle, torque: patterns with {joint}; what says nothing beside the

@@ -11,7 +11,7 @@ import pytest
 from scripts.blind_parts.robots import experiment_of
 from scripts.check_parts import faults
 from sysid import check, pipeline
-from sysid.check import FAULTS
+from sysid.check import FAULTS, written
 from sysid.check.equations import Reading
 from sysid.check.faults import columns, one_log
 from sysid.check.look import looked
@@ -318,7 +318,7 @@ def test_a_zero_is_of_the_angle_as_it_is_read():
     data = SimpleNamespace(zero={"a": 0.3}, torque={"b": {"x": -1}}, position={})
     look = SimpleNamespace(robot=SimpleNamespace(joints=("a", "b")), experiment=SimpleNamespace(data=data), column=lambda key, joint: f"{key}_{joint}")
     turned = Reading((0, 1), (0, 1), (-1, 1), (-1, 1), zero=(np.pi / 2, 0.0))
-    said = {fault.fault: fault.do for told in columns._differences(turned) for fault in columns._told(look, turned, *told)}
+    said = {fault.fault: fault.do for told in columns._differences(turned) for fault in written.told(look, turned, *told)}
     assert "write data.zero: {a: 1.2708}" in said["sign_flipped"] and "write data.zero: {a: 1.2708}" in said["limit_exceeded"]
     assert "write data.position: {a: {position_a: -1}}; add to data.torque: {a: {torque_a: -1}}" in said["sign_flipped"]
 

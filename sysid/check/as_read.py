@@ -26,19 +26,22 @@ def as_read(
     own = rows.log == log if log is not None else np.ones(len(rows.log), dtype=bool)
     tau = rows.of(seen.motion, "tau")[own][:, list(reading.torque)]
     tau = tau * np.array(reading.torque_factor)
-    if order == sorted(order) and np.all(turn > 0.0) and not any(reading.zero):
+    plain = order == sorted(order) and np.all(turn > 0.0) and not any(reading.zero)
+    if plain and reading.gravity is None:
         return tau, rows.columns[:, own], rows.use[own]
     pieces = (p for p in seen.motion.pieces if log is None or p.log == log)
-    read = tuple(_read(piece, order, turn, reading.zero) for piece in pieces)
+    read = tuple(_read(piece, order, turn, reading) for piece in pieces)
     found = stack(seen.model, replace(seen.motion, pieces=read), seen.stride)
     return tau, found.columns, found.use
 
 
-def _read(piece: Piece, order: list[int], turn, zero) -> Piece:
-    """A piece with its joints' motion in another order, with other signs and other zeros."""
+def _read(piece: Piece, order: list[int], turn, reading: Reading) -> Piece:
+    """A piece as a reading has it."""
     own = {name: getattr(piece, name)[:, order] * turn for name in ("q", "qd", "qdd")}
-    own["q"] = own["q"] + zero
-    return replace(piece, **own, use=None if piece.use is None else piece.use[:, order])
+    own["q"] = own["q"] + reading.zero
+    down = piece.gravity if reading.gravity is None else np.array(reading.gravity)
+    use = None if piece.use is None else piece.use[:, order]
+    return replace(piece, **own, use=use, gravity=down)
 
 
 def told_by(rows: Rows, model: Model, use) -> tuple[np.ndarray, np.ndarray]:

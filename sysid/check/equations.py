@@ -28,13 +28,15 @@ FEWEST = 50  # rows by which a joint can be told anything
 @dataclass(frozen=True)
 class Reading:
     """How columns are read: the joint whose column each joint's angle and torque (dof,) really is,
-    their factors (dof,), and the angles [rad] of the URDF at which these read zero."""
+    their factors (dof,), and the angles [rad] of the URDF at which these read zero; gravity (3,) in
+    the base, None for the experiment's."""
 
     angle: tuple[int, ...]
     torque: tuple[int, ...]
     angle_factor: tuple[float, ...]
     torque_factor: tuple[float, ...]
     zero: tuple[float, ...]
+    gravity: tuple[float, ...] | None = None
 
     @staticmethod
     def plain(dof: int) -> Reading:
@@ -91,7 +93,8 @@ class Equations:
         for q, qd, qdd, smoother, rows in self.pieces:
             q, qd, qdd = (a[:, own] * factor for a in (q, qd, qdd))
             q = q + reading.zero
-            p = regressor.torque(self.robot, self.robot.prior, q, qd, qdd)
+            down = None if reading.gravity is None else np.array(reading.gravity)
+            p = regressor.torque(self.robot, self.robot.prior, q, qd, qdd, gravity=down)
             stacked = np.stack([p, qdd, qd, np.sign(qd), np.ones_like(q)])
             columns.append(smoother.at(np.moveaxis(stacked, 1, 2), rows))
         columns = np.concatenate(columns, axis=2)

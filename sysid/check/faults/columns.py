@@ -9,10 +9,12 @@ from itertools import combinations, product
 import numpy as np
 
 from ...units import of_joint
+from .. import written
 from ..as_read import left_free
 from ..equations import LIKELY, Equations, Reading, Scored
 from ..fault import ERROR, WARNING, Fault
 from ..look import Look
+from ..mounting import gravities
 
 AFTER, SENSELESS = 2, ("wrong_unit", "angle_wrap")
 # Log of squares that another reading must take off, in all and of each joint whose column it reads
@@ -25,8 +27,6 @@ _EXPLAINS = 0.2  # of a joint's torque squared: less of the URDF's torque tells 
 # and of so much that a factor, were it free, explains much more
 _TAKES, _CLEAR = 0.01, 3.0  # the same; logarithm of the squares that are left
 _THOUSAND = (500.0, 2000.0)
-_KEYS = {"angle": "position", "torque": "torque"}
-_OUT_OF = "or take it as it is, where the URDF is what is wrong"
 
 
 def find(look: Look) -> Iterator[Fault]:
@@ -36,6 +36,7 @@ def find(look: Look) -> Iterator[Fault]:
         return
     reading = Reading.plain(look.robot.dof)
     scored = equations.scored(reading)
+    mounted = gravities(equations)
     turning = np.flatnonzero(~np.asarray(look.robot.prismatic)).tolist()
     for _ in range(_ROUNDS):
         # of joints that hardly move any reading of the columns tells as little
@@ -43,6 +44,9 @@ def find(look: Look) -> Iterator[Fault]:
             own
             for own in readings(reading, look.robot.dof, turning)
             if any(look.excited[j].enough for j in own[1][1])
+        ]
+        others += [
+            (replace(reading, gravity=down), ("mass_implausible", (), down)) for down in mounted
         ]
         tried = [(made, told, equations.scored(made)) for made, told in others]
         tried = [
@@ -54,9 +58,8 @@ def find(look: Look) -> Iterator[Fault]:
         if not tried or equations.scored(reading, free=True).loss < min(loss for loss, *_ in tried):
             break
         reading, scored = _likeliest(look, tried)
-    # each says all that is to be written, as one entry replaces another
-    for told in _differences(reading):
-        yield from _told(look, reading, *told)
+    for other in _differences(reading):
+        yield from written.told(look, reading, *other)
     yield from _factors(look, equations, reading, scored)
 
 
@@ -110,7 +113,8 @@ def _turned(factors, j: int) -> tuple:
 def _clear(before: Scored, after: Scored, joints) -> bool:
     known = before.known & after.known
     gain = np.log(before.left / after.left) * known
-    return bool(gain.sum() > _BETTER * len(joints) and np.all(gain[list(joints)] > 0.0))
+    least = _BETTER * (len(joints) or 2)  # all joints feel gravity
+    return bool(gain.sum() > least and np.all(gain[list(joints)] > 0.0))
 
 
 def _masses_tell(look: Look, before: Reading, made: Reading, scored: Scored, joints, word) -> bool:
@@ -137,77 +141,11 @@ def _differences(reading: Reading) -> Iterator[tuple[str, tuple[int, ...], str |
         turned = [word for word, factor in zip(("angle", "torque"), factors) if factor < 0.0]
         if turned:
             yield "sign_flipped", (j,), " and ".join(turned)
+    if reading.gravity is not None:
+        yield "mass_implausible", (), reading.gravity
     for j, zero in enumerate(reading.zero):
         if quarters := round(zero / (np.pi / 2)):
             yield "limit_exceeded", (j,), quarters
-
-
-def _told(look: Look, reading: Reading, kind: str, joints, word) -> Iterator[Fault]:
-    """What is said of one thing in which a reading differs from the experiment's."""
-    names = [look.robot.joints[j] for j in joints]
-    if kind == "limit_exceeded":
-        turn = {1: "a quarter turn", 2: "half a turn", -1: "a quarter turn back"}[word]
-        says = (
-            f"the zero of {names[0]}'s angle looks {turn} from the URDF's: from there the URDF's "
-            "robot explains the torques"
-        )
-        do = f"write data.zero: {_zeros(look, reading)}; {_OUT_OF}"
-        yield Fault(kind, WARNING, says, do, names[0])
-        return
-    kinds = ["position", "torque"] if word in ("", "angle and torque") else [_KEYS[word]]
-    for name in names:
-        if kind == "joint_order":
-            what = f"the {word} columns" if word else "the columns"
-            says = (
-                f"{what} of {', '.join(names[:-1])} and {names[-1]} look exchanged: the URDF's robot "
-                "explains them in the other order"
-            )
-            do = "; ".join(_exchanged(look, key, reading) for key in kinds)
-        else:
-            says = (
-                f"the {word} of {name} has the sign against the URDF's: as it is, "
-                "friction would drive the joint or gravity lift it"
-                if word != "angle and torque"
-                else f"the angle and the torque of {name} have the sign against the URDF's: its axis "
-                "points the other way there"
-            )
-            do = "; ".join(_negated(look, key, name, reading) for key in kinds)
-        if "position" in kinds and look.experiment.data.zero:  # which is of the angle as it is read
-            do += f"; write data.zero: {_zeros(look, reading)}"
-        yield Fault(kind, ERROR, says, f"{do}; {_OUT_OF}", name)
-
-
-def _zeros(look: Look, reading: Reading) -> str:
-    """The zeros of all joints, those that the experiment has among them."""
-    known, joints = look.experiment.data.zero, look.robot.joints
-    own = zip(joints, reading.angle, reading.angle_factor, reading.zero)
-    zeros = {joint: turn * known.get(joints[k], 0.0) + more for joint, k, turn, more in own}
-    return f"{{{', '.join(f'{joint}: {at:.6g}' for joint, at in zeros.items() if at)}}}"
-
-
-def _in_order(look: Look, key: str, reading: Reading) -> list[str | None]:
-    """The column of each joint in the order of a reading; None where it is no single one."""
-    order = reading.angle if key == "position" else reading.torque
-    return [look.column(key, look.robot.joints[k]) for k in order]
-
-
-def _exchanged(look: Look, key: str, reading: Reading) -> str:
-    every = _in_order(look, key, reading)
-    if None in every:
-        return f"exchange them in data.columns.{key}"
-    return f"write data.columns.{key}: [{', '.join(every)}]"
-
-
-def _negated(look: Look, key: str, joint: str, reading: Reading) -> str:
-    """How an experiment says that a column has the other sign."""
-    factors = reading.angle_factor if key == "position" else reading.torque_factor
-    own = zip(look.robot.joints, factors, _in_order(look, key, reading))
-    sums = getattr(look.experiment.data, key)
-    turned = {n: c for n, factor, c in own if factor < 0.0 and c is not None and n not in sums}
-    if joint not in turned:
-        return f"log the {key} with the other sign"
-    written = ", ".join(f"{name}: {{{column}: -1}}" for name, column in turned.items())
-    return f"{'add to' if sums else 'write'} data.{key}: {{{written}}}"
 
 
 def _factors(look: Look, equations: Equations, reading: Reading, scored: Scored) -> Iterator[Fault]:
@@ -267,7 +205,7 @@ def _thousandth(look: Look, reading: Reading, joint: str, factor: float, every: 
         return f"is it in mN m, or kN m? give it in {plain}"
     unit = ("m" if factor > 1.0 else "k") + plain
     at = look.robot.joints.index(joint)
-    column = _in_order(look, "torque", reading)[at]
+    column = written.in_order(look, "torque", reading)[at]
     if every and not look.robot.prismatic.any():
         return f"if it is in {unit} set data.units.torque: {unit}"
     if column is None:

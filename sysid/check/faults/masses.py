@@ -25,6 +25,7 @@ AFTER, SENSELESS = (
         "torque_in_amperes",
         "commanded_torque",
         "effort_missing",
+        "mass_implausible",  # as an error: gravity is another
     ),
 )
 # Times the URDF's: weights of simulated arms with masses and centres drawn about theirs, and of

@@ -1,0 +1,56 @@
+"""How a robot may be mounted: the directions of gravity in its base that its torques speak for."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .. import regressor
+from .equations import FEWEST, Equations
+
+_APART = np.cos(np.radians(25.0))  # nearer to what the experiment says, a tilt of the base is found
+
+
+def gravities(equations: Equations) -> list[tuple[float, ...]]:
+    """Other directions of gravity (3,) [m/s^2], as large: along an axis of the base, and the one by
+    which the URDF's bodies explain the torques best.
+
+    What weight they have is linear in it: tau_j = p_j(g = 0) + G_j g + I qdd_j + Fv qd_j
+    + Fc sign(qd_j) + b.
+    """
+    own, size = equations.robot.gravity, float(np.linalg.norm(equations.robot.gravity))
+    if not size > 0.0:
+        return []
+    axes = [sign * size * axis for axis in np.eye(3) for sign in (1.0, -1.0)]
+    best, out = _best(equations), []
+    for one in [*axes, *([] if best is None else [size * best])]:
+        if all(one @ other < _APART * size**2 for other in (own, *out)):
+            out.append(one)
+    return [tuple(np.round(one, 2) + 0.0) for one in out]
+
+
+def _best(equations: Equations) -> np.ndarray | None:
+    """The direction (3,), of size one; None where the torques tell none."""
+    robot, parts = equations.robot, []
+    for q, qd, qdd, smoother, rows in equations.pieces:
+        still = np.zeros_like(q)
+        p = regressor.torque(robot, robot.prior, q, qd, qdd, gravity=np.zeros(3))
+        weights = [
+            regressor.torque(robot, robot.prior, q, still, still, gravity=axis)
+            for axis in np.eye(3)
+        ]
+        stacked = np.stack([p, *weights, qdd, qd, np.sign(qd), np.ones_like(q)])
+        parts.append(smoother.at(np.moveaxis(stacked, 1, 2), rows))
+    columns, squares, scores = np.concatenate(parts, axis=2), np.zeros((3, 3)), np.zeros(3)
+    for j, use in enumerate(equations.use.T):
+        tau = equations.tau[use, j]
+        if use.sum() < FEWEST or not np.ptp(tau) > 0.0:
+            continue
+        p, *rest = columns[:, j, use] / np.std(tau)
+        turn, _ = np.linalg.qr(np.array(rest[3:]).T)
+        bare = lambda a: a - turn @ (turn.T @ a)  # noqa: E731, B023
+        weight, left = bare(np.array(rest[:3]).T), bare(tau / np.std(tau) - p)
+        squares += weight.T @ weight
+        scores += weight.T @ left
+    found = np.linalg.lstsq(squares, scores, rcond=1e-6)[0]
+    size = float(np.linalg.norm(found))
+    return found / size if size > 0.0 else None

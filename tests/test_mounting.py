@@ -1,0 +1,79 @@
+"""A robot that is mounted otherwise than its file says, an axis that points the other way, joints that the file does not move."""
+
+import shutil
+
+import numpy as np
+import polars as pl
+import pytest
+
+from scripts.blind_parts.robots import experiment_of
+from sysid import beyond, check, pipeline
+from sysid.simulate import simulate, write
+
+
+@pytest.fixture(scope="module")
+def mounted(tmp_path_factory):
+    """Writes logs of a planar arm under a gravity; its experiment file says that it stands upright."""
+    made = {}
+
+    def make(gravity):
+        if gravity not in made:
+            folder = tmp_path_factory.mktemp("mounted")
+            experiment, _ = experiment_of("planar", folder)
+            spec = experiment.robot.model_copy(update={"gravity": list(gravity)})
+            machine, *_ = pipeline.build(experiment.model_copy(update={"robot": spec}))
+            write(simulate(machine, seed=3, duration=12.0, rate=250.0), experiment, folder / "logs")
+            config = folder / "logs" / "config.yaml"
+            assert "gravity: [0.0, 0.0, -9.81]" in config.read_text()
+            made[gravity] = folder / "logs"
+        return made[gravity]
+
+    return make
+
+
+@pytest.mark.parametrize("gravity", [(9.81, 0.0, 0.0), (-6.94, 0.0, -6.94)])
+def test_gravity_that_points_elsewhere_is_told(gravity, mounted):
+    (found,) = check.check(pipeline.load(mounted(gravity)))
+    assert found.severity == "error" and "gravity looks like" in found.says and "robot.gravity: [" in found.do
+    told = np.array([float(one) for one in found.do.partition("[")[2].partition("]")[0].split(",")])
+    assert told @ gravity > np.cos(np.radians(10.0)) * 9.81**2
+
+
+def test_gravity_as_the_file_says_is_no_fault(mounted):
+    assert check.check(pipeline.load(mounted((0.0, 0.0, -9.81)))) == []
+
+
+def test_an_axis_that_points_the_other_way_is_told_though_friction_hides_masses(mounted, tmp_path):
+    logs = shutil.copytree(mounted((0.0, 0.0, -9.81)), tmp_path / "logs")
+    for name in ("train.csv", "test.csv"):
+        table = pl.read_csv(logs / name)
+        speed = np.gradient(table["q_elbow"].to_numpy(), table["t"].to_numpy())
+        dry = table["tau_elbow"] + pl.Series(3.0 * np.sign(speed))
+        table.with_columns(q_elbow=-table["q_elbow"], tau_elbow=-dry).write_csv(logs / name)
+    found = [f for f in check.check(pipeline.load(logs)) if f.severity == "error"]
+    assert [(f.fault, f.joint) for f in found] == [("sign_flipped", "elbow")]
+    assert "angle and the torque of elbow" in found[0].says and "q_elbow: -1" in found[0].do and "tau_elbow: -1" in found[0].do
+
+
+def test_a_joint_that_the_robots_file_does_not_move_is_told(mounted, tmp_path):
+    logs = shutil.copytree(mounted((0.0, 0.0, -9.81)), tmp_path / "logs")
+    for name in ("train.csv", "test.csv"):
+        table = pl.read_csv(logs / name)
+        wave = np.sin(table["t"].to_numpy())
+        table.with_columns(q_wrist=pl.Series(wave), tau_wrist=pl.Series(0.1 * wave)).write_csv(logs / name)
+    (found,) = check.check(pipeline.load(logs))
+    assert (found.fault, found.severity) == ("joint_order", "warning") and "q_wrist moves" in found.says and "no joint wrist" in found.says
+    urdf = logs / "robot.urdf"
+    fixed = '<link name="hand"/><joint name="wrist" type="fixed"><parent link="{}"/><child link="hand"/></joint></robot>'
+    last = pipeline.build(pipeline.load(logs))[0].source.joints["elbow"].child
+    urdf.write_text(urdf.read_text().replace("</robot>", fixed.format(last)))
+    (found,) = check.check(pipeline.load(logs))
+    assert (found.fault, found.severity) == ("joint_order", "error") and "fixed joint" in found.says
+
+
+def test_columns_of_other_joints():
+    names = ["t", "q_a", "tau_a", "q_b", "tau_b", "q_c", "volts", "qd_b"]
+    assert beyond.beyond(names, "q_{joint}", "tau_{joint}", ["a"]) == {"b": "q_b"}  # c has no torque
+    assert beyond.beyond(names, "q_{joint}", "tau_{joint}", ["a", "b"]) == {}
+    assert beyond.beyond(names, "{joint}", "tau_{joint}", ["a"]) == {} == beyond.beyond(names, None, "tau_{joint}", ["a"])
+    assert beyond.moving({"b": "q_b", "c": "q_c"}, {"q_b": np.zeros(3), "q_c": np.arange(3.0)}) == ["c"]
