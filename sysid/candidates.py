@@ -124,7 +124,7 @@ def candidates(model: Model, extra=(), logs: Sequence[str] = ()) -> list[Candida
 def together(groups, robot: Robot) -> list[Candidate]:
     """Of what was asked in single logs only, in those that have most of it together: of its first
     coefficient, which is a mass and none of a load is negative, as each log alone tells it, for two
-    logs up to all but one.
+    logs up to all but one; of what may have either sign, in the fewer of these and all others.
 
     Args:
         groups: candidates that were asked, with their `coefficients`.
@@ -141,8 +141,11 @@ def together(groups, robot: Robot) -> list[Candidate]:
         if max(map(len, ranked)) == 1:
             _, one = own[ranked[0]]
             for count in range(2, len(ranked)):
-                options = dict(one.options) | {"logs": [log for (log,) in sorted(ranked[:count])]}
-                out.append(made(one.effect, one.joint, options, robot))
+                few = one.effect.either_way and 2 * count > len(ranked)
+                logs = [log for (log,) in sorted(ranked[count:] if few else ranked[:count])]
+                if len(logs) > 1:
+                    options = dict(one.options) | {"logs": logs}
+                    out.append(made(one.effect, one.joint, options, robot))
     return out
 
 

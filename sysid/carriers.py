@@ -60,16 +60,28 @@ def _stretches(candidate: Candidate, view, fit: Fit, test: Motion) -> list[str]:
 def _weighed(candidate: Candidate, view, fit: Fit, test: Motion) -> tuple:
     """The rows of test logs, what is left of them (n, dof) without a candidate, and its torque (n, dof) at the size that a view of the
     training logs gives it; each joint by its error in the fit."""
-    found, first = row.measured(test, 1), 10 * view.model.bodies
-    own = [first + k for k, c in enumerate(view.model.coefficients) if (c.effect, c.joint) == candidate.key]
-    # with the bodies that stand beside it: those of a model without it have a part of it already
-    effect, model = candidate.effect, view.model
-    columns = row.signature(model, test, row.seen(model, test), effect, candidate.joint, {}, 1, found.use)
-    size = view.x[own] if not model.coefficients[own[0] - first].of_body else _possible(view.x[own])
-    left = (found.tau - row.predicted(model, test, view.x, 1)) * found.use
+    found, model = row.measured(test, 1), view.model
     error = np.array(list(fit.rms("train").values()))
     weight = np.where(error > 0.0, 1.0 / np.maximum(error, 1e-300), 0.0)
-    return found, left * weight, (columns @ size).T * weight
+    # with the bodies that stand beside it: those of a model without it have a part of it already
+    without = row.predicted(model, test, view.x, 1)
+    return found, (found.tau - without) * found.use * weight, _torque(candidate, view, test, found, without) * weight
+
+
+def _torque(candidate: Candidate, view, test: Motion, found, without: np.ndarray) -> np.ndarray:
+    """The torque (n, dof) of a candidate in test logs, at the size that a view of the training logs gives it: of one that is no
+    column, what it changes of what is predicted `without` it."""
+    model, effect = view.model, candidate.effect
+    if candidate.nonlinear:
+        terms = tuple((effect, js) if (one.name, js) == (effect.name, (candidate.joint,)) else (one, js) for one, js in model.terms)
+        return (row.predicted(replace(model, terms=terms), test, view.x, 1) - without) * found.use
+    first = 10 * model.bodies
+    own = [first + k for k, c in enumerate(model.coefficients) if (c.effect, c.joint) == candidate.key]
+    size = view.x[own] if not model.coefficients[own[0] - first].of_body else _possible(view.x[own])
+    columns = row.signature(model, test, row.seen(model, test), effect, candidate.joint, {}, 1, found.use)
+    out = np.zeros_like(without)
+    out.T[candidate.touches(model.robot.dof)] = columns @ size
+    return out
 
 
 def _possible(pi: np.ndarray) -> np.ndarray:

@@ -52,6 +52,7 @@ class Effect(ABC):
         `torque` that is constant beside a stiffness, `zero` that is added to q; and of an effect of the whole robot `gravity`
         or `inertia`, a body on a link.
     asked: {shape value: what the user says of it}.
+    either_way: of some logs and of all others, with the other sign, it is the same beside what all share.
     group, level: of logs, at which alone it is there; None where it is in all (see `per_level`).
     """
 
@@ -73,6 +74,7 @@ class Effect(ABC):
     uses_needed: ClassVar[bool] = False
     mimics_mass: ClassVar[bool] = False
     elementwise: ClassVar[bool] = False
+    either_way: ClassVar[bool] = False
     simulators: ClassVar[dict[str, str]] = {}
     given_coefficients: Mapping[str, float] = MappingProxyType({})
     asked: Mapping[str, Asked] = MappingProxyType({})

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from itertools import combinations
 from math import inf, nan
 
 from .errors import ConfigError
@@ -42,6 +44,24 @@ def stretches(effect, option: str) -> list[tuple[str, float, float]]:
             allowed = "LOG START STOP: a log's name under `data`, and two times [s] of its clock, the second one later"
             raise ConfigError(f"{effect.name}.{option} has {text!r}", where="model.effects", allowed=allowed, do="correct it, as in 'pick.csv 3.2 7.9'")
     return out
+
+
+_MOST, _EVERY = 8, 4  # logs that are tried: of more, each is a small part; and of which any may have it together
+
+
+def subsets(logs: Sequence[str], *, half: bool = False) -> list[dict]:
+    """Options of an effect that may be in any of few logs, but not in all; of more in each alone: where it is then follows from how
+    much of it each has.
+
+    Args:
+        half: of logs and all others only the fewer, where the effect may have either sign beside what all logs share.
+    """
+    if not 1 < len(logs) <= _MOST:
+        return []
+    counts = range(1, len(logs) // 2 + 1 if half else len(logs)) if len(logs) <= _EVERY else (1,)
+    sets = [own for count in counts for own in combinations(logs, count)]
+    # of two halves the one without the last log: what came later is what changed
+    return [{"logs": list(own)} for own in sets if not (half and 2 * len(own) == len(logs) and logs[-1] not in own)]
 
 
 def logs_of(options: dict) -> list[str]:

@@ -219,7 +219,7 @@ def test_every_effect_keeps_its_contract(name):
     before = {key: np.array(getattr(piece, key)) for key in ("t", "q", "qd", "qdd", "tau", "load")}
     for joint in [-1] if found.scope == "robot" else range(robot.dof):
         variants = found.variants(robot, joint)
-        assert variants
+        assert variants or found.among(["a.csv", "b.csv"])
         for options in variants:
             own = found.given(**options).bound(robot, joint)
             shapes = middle(own, robot, piece, joint)
@@ -274,7 +274,9 @@ def test_every_effect_is_recovered_where_excited_and_not_where_not(name):
         if joint == hidden:
             columns = found.columns(seen, joint, **shapes)
             tau[:, joint] += values @ columns
-    others = tuple(term for term in structure.terms if term[0].name in {"viscous", "coulomb"} - {name})
+    # what friction is more in some logs is that friction where there is one log
+    beside = {"viscous", "coulomb"} - ({"viscous", "coulomb"} if name == "friction_change" else {name})
+    others = tuple(term for term in structure.terms if term[0].name in beside)
     held = tuple(((len(others), *key[1:]), value) for key, value in held)
     model = Model(robot, (*others, (found, (hidden, elsewhere))), shapes=tuple(value for _, value in held), held=held)
     motion = replace(clean, pieces=(replace(piece, tau=tau),))

@@ -1,16 +1,12 @@
 """A load that some logs carry, or parts of them."""
 
-from itertools import combinations
-
 import numpy as np
 
 from ..effect import LinkEffect
-from ..effect_options import stretches, texts
+from ..effect_options import stretches, subsets, texts
 from ..effect_parameters import Linear, called
 from ..inertia import PARAMETERS, UNITS
 from ..regressor import body_motions, wrench_columns
-
-_MOST, _EVERY = 8, 4  # logs that are tried: of more, each is a small part; and of which any may have it together
 
 
 class Payload(LinkEffect):
@@ -44,11 +40,7 @@ class Payload(LinkEffect):
         return chosen
 
     def among(self, logs):
-        """In any of few, but not in all; of more in each alone: where it is then follows from how much of it each has."""
-        if not 1 < len(logs) <= _MOST:
-            return []
-        counts = range(1, len(logs)) if len(logs) <= _EVERY else (1,)
-        return [{"logs": list(own)} for count in counts for own in combinations(logs, count)]
+        return subsets(logs)
 
     @property
     def instantaneous(self):

@@ -1,0 +1,44 @@
+"""Friction that is another in some logs."""
+
+import numpy as np
+
+from ..effect import TorqueEffect
+from ..effect_options import subsets, texts
+from ..effect_parameters import Linear
+
+
+class FrictionChange(TorqueEffect):
+    """Friction is another in some logs than in the others: grease that was renewed, a seal or a belt that was tightened, a cold morning."""
+
+    name = "friction_change"
+    equation = "tau = dFv qd + dFc sign(qd) in some logs"
+    looks_like = "residual in proportion to speed, and a step wherever it changes sign, in some logs alone"
+    tied_with = ("warmup", "viscous and coulomb, exactly where all logs have it")
+    separate_by = "the same motion in logs before and after"
+    source = "Simoni, Beschi, Legnani & Visioli 2017"
+    options = {"logs": "the logs that have it, by their names under `data`"}
+
+    instantaneous = False  # q, qd and qdd do not say the log
+    either_way = True
+    logs = None
+    dFv = Linear("N m s/rad", says="what the viscous coefficient is more there")
+    dFc = Linear("N m", says="what Coulomb friction is more there")
+
+    def given(self, **options):
+        chosen = super().given(**options)
+        texts(chosen, "logs")
+        return chosen
+
+    def variants(self, robot, joint):
+        """None: in all logs it is what every joint has."""
+        return []
+
+    def among(self, logs):
+        return subsets(logs, half=self.either_way)
+
+    def present(self, motion):
+        return self.logs is None or motion.source in self.logs
+
+    def columns(self, motion, joint):
+        there = float(self.present(motion))
+        return there * np.stack([motion.qd[:, joint], motion.direction(joint)])
