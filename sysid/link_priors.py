@@ -9,6 +9,13 @@ from .inertia import pseudo
 from .inertia.consistency import is_consistent
 
 LINK = "link:"
+_GRAM = 1e-3  # kg: a robot of which no link weighs so much is none
+_WIDE = 3.0  # m: no link of a small robot has a greater radius of gyration
+
+
+def placeholders(masses) -> bool:
+    """Whether the masses [kg] that a URDF states, some of which may be zero, are there because something has to be."""
+    return bool(len(masses)) and 0.0 < max(masses) < _GRAM
 
 
 def link_priors(source: urdf.Urdf, model: pin.Model, bodies: list) -> np.ndarray:
@@ -22,13 +29,18 @@ def link_priors(source: urdf.Urdf, model: pin.Model, bodies: list) -> np.ndarray
         solids = [moved(link.geometry, f) for link, f in links if link.geometry is not None]
         stated.append(np.sum(inertials, 0) if inertials else None)
         shapes.append(np.sum(solids, 0) if solids else None)
+    if light := placeholders([pi[0] for pi in stated if pi is not None]):
+        stated = [None] * len(stated)
+    long = sum(float(np.linalg.norm(place.translation)) for place in model.jointPlacements)
     masses = [pi[0] for pi in stated if pi is not None and is_consistent(pi)]
     typical = float(np.median(masses)) if masses else None
     out = []
     for body, pi, solid in zip(bodies, stated, shapes):
         children = [model.jointPlacements[i].translation for i in range(1, model.njoints) if model.parents[i] == body.row + 1]
         reach = max(children, key=np.linalg.norm, default=np.zeros(3))
-        out.append(prior.usable(body.name, pi, solid, reach, typical))
+        if pi is not None and prior.wider(pi, max(3.0 * long, _WIDE)):
+            pi = np.array([*pi[:4], *np.zeros(6)])  # in another unit: mass and centre of mass are kept
+        out.append(prior.usable(body.name, pi, solid, reach, typical, light=light))
     return np.array(out)
 
 

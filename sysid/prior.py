@@ -20,7 +20,7 @@ LIGHTEST = _SMALLEST = 1e-12
 _DEFAULT_MASS = 1.0  # kg, where no other body of the robot states one
 
 
-def usable(name: str, stated: np.ndarray | None, geometry: np.ndarray | None, reach: np.ndarray, typical_mass: float | None):
+def usable(name: str, stated: np.ndarray | None, geometry: np.ndarray | None, reach: np.ndarray, typical_mass: float | None, *, light: bool = False):
     """A possible prior body (10,) about its joint frame.
 
     Args:
@@ -29,6 +29,7 @@ def usable(name: str, stated: np.ndarray | None, geometry: np.ndarray | None, re
         geometry: uniform solid of its primitive shapes (10,), or None.
         reach: (3,) [m], from its joint's frame to the farthest next joint; zero for a last link.
         typical_mass: median mass [kg] of the robot's usable bodies, or None.
+        light: that it is not stated as no link of the robot's file weighs a gram.
     """
     if stated is not None and not stated[0] == 0.0 and abs(stated[0]) < LIGHTEST:
         stated = None
@@ -36,6 +37,7 @@ def usable(name: str, stated: np.ndarray | None, geometry: np.ndarray | None, re
         return stated
     mass = float(stated[0]) if stated is not None and stated[0] > 0.0 else None
     problem = "states no inertia" if stated is None or not np.any(stated) else "has an impossible inertia"
+    problem = "weighs next to nothing, as all links do," if light else problem
     if mass is not None and (raised := _raised(stated)) is not None:
         _tell(name, problem, "its mass and centre of mass are kept and its second moments raised to be positive")
         return raised
@@ -54,6 +56,11 @@ def usable(name: str, stated: np.ndarray | None, geometry: np.ndarray | None, re
     mass = typical_mass or _DEFAULT_MASS
     _tell(name, problem, f"the prior is a ball of {mass:.3g} kg and radius {radius:.3g} m midway to the next joint")
     return pseudo.sphere(mass, 0.5 * np.asarray(reach), radius)
+
+
+def wider(pi, radius: float) -> bool:
+    """Whether the radius of gyration of a body (10,) of some mass is greater than a radius [m]."""
+    return bool(pi[0] >= LIGHTEST and np.sqrt(np.abs(_moments(pi)).max() / pi[0]) > radius)
 
 
 def measurable(pi) -> bool:

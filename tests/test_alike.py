@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from sysid.statement.alike import read_alike
+from sysid.statement.alike import changed_alike, read_alike
 
 
 def heads(**times) -> list:
@@ -37,3 +37,12 @@ def test_who_is_late_by_another_time_or_by_none_that_is_known_is_not_among_them(
 )
 def test_two_or_other_times_are_a_cause_each(times):
     assert not [*read_alike(heads(**times))]
+
+
+def test_friction_that_changed_in_the_same_logs_is_one_cause():
+    def changed(joint, *logs):
+        return SimpleNamespace(effect="friction_change", joint=joint, candidate=SimpleNamespace(options=(("logs", logs),)))
+
+    (said,) = changed_alike([changed("a", "x", "y"), changed("b", "y", "x"), changed("c", "x", "y"), changed("d", "z")])
+    assert said.startswith("the friction of a, b and c is another in the same logs (x, y): one cause is likelier")
+    assert not [*changed_alike([changed("a", "x"), changed("b", "x"), changed("c", "y")])]

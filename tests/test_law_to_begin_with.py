@@ -6,7 +6,7 @@ import pytest
 
 from sysid.formula import Formula
 from sysid.formula.text import parse
-from sysid.statement.laws import to_begin_with
+from sysid.statement.laws import of_bodies, to_begin_with
 
 
 def entry(*follows, left: float = 0.6) -> dict:
@@ -58,3 +58,11 @@ def test_none_that_is_in_the_model_already():
     assert to_begin_with(entry(("q_elbow", 0.6)), "arm", there) is None
     assert to_begin_with(entry(("q_wrist", 0.6)), "arm", there) and to_begin_with(entry(("qd_wrist", 0.6, "time")), "arm", there)
     assert to_begin_with({"joint": "wrist", "share_left": 0.5, "depends_on": []}, "arm", ()) is None
+
+
+def test_what_follows_another_joints_acceleration_is_the_bodies():
+    for own in (("q_wrist", 0.6, "qdd_elbow"), ("qdd_elbow", 0.6), ("qd_wrist", 0.6, "qdd_elbow and direction")):
+        assert of_bodies(entry(own)) and to_begin_with(entry(own), "arm", ()) is None
+    for own in (("qdd_wrist", 0.6), ("q_wrist", 0.6, "qdd_wrist"), ("qd_elbow", 0.6), ("time", 0.6)):
+        assert not of_bodies(entry(own))
+    assert not of_bodies({"joint": "wrist"})

@@ -530,3 +530,21 @@ def test_a_steady_tone_in_the_noise_is_told(size, share):
     said = found(q, 0.004, rng.normal(size=len(q)) + hum, nothing(q, 0.004) + 1e-9 * q[:, 1], size=0.0).detail
     told = re.search(r"(\d+) % of the noise's power a steady tone of 17.3 Hz", said)
     assert ("tone" not in said) if share is None else float(told[1]) / 100.0 == pytest.approx(share, abs=0.03)
+
+
+@pytest.mark.parametrize("noise", [white, coloured])
+def test_logs_of_several_rates_have_the_noise_of_each(noise):
+    """White noise of one size has another density at each rate: of all together it looked slow, and no floor was known."""
+    rng, parts = np.random.default_rng(4), []
+    for step in (0.01, 0.004, 1.0 / 150.0):
+        q = wandering(20.0, step, rng)
+        e = noise(len(q), step, rng)
+        residual = np.zeros_like(q)
+        residual[:, 1] = e + 0.2 * stribeck(q, step)
+        parts.append((residual, torque(q, step) + residual, q, step, e))
+    residual, measured, angles, steps, e = zip(*parts)
+    told = floor(residual, measured, angles, steps, 1)
+    true = np.sqrt(np.mean(np.concatenate(e) ** 2))
+    assert told.rms is not None and abs(told.rms - true) < 0.1 * true and "each sampling rate by itself" in told.detail
+    alike = floor(residual[:1] * 2, measured[:1] * 2, angles[:1] * 2, (0.01, 0.0101), 1)
+    assert "each sampling rate" not in alike.detail

@@ -26,7 +26,7 @@ ORDER = [
     "per_level", "config_errors", "config", "addition", "model_parameters", "slides", "scales", "terms", "needed", "kept_columns", "model", "listed_effects", "drives", "instants", "inverse_dynamics", "with_torque", "stretches", "rows", "tangents", "objective", "projection", "landscape", "multistart", "source",
     "reduction", "triangles", "linearised", "compress", "symmetric_matrices", "central_path", "interior", "nearby", "certificate", "trust_region", "solve", "prior_weight", "uncertainty", "differences", "prediction", "carried", "posed_problem", "given_shapes", "estimate",
     "long_prediction", "base_parameters", "held_apart", "masses", "plausible", "blows", "settled", "deflection_starts", "shape_search", "shape", "bumps", "filter_errors", "filters", "fit_document", "results", "earlier_fit", "shape_refinement", "notices", "experiment_logs", "locked_joints", "thinning",
-    "experiment_file", "yaml_edit", "effect_entry", "urdf_export", "gains", "late", "load_doubt", "simulate", "rollout", "pipeline", "run", "export", "beyond", "check", "init", "comparison",
+    "experiment_file", "yaml_edit", "effect_entry", "urdf_export", "gains", "late", "load_doubt", "simulate", "rollout", "pipeline", "run", "export", "inertials", "beyond", "check", "init", "comparison",
     "transfer", "noise", "candidates", "candidate_columns", "picks", "carriers", "end_stops", "suspected", "design", "view", "failures", "unexplained", "left_open", "misread", "borne_out", "shown", "diagnose", "changes", "online", "fleet", "statement", "loop", "report",
     "studies", "studio", "terminal", "cli", "__main__",
 ]  # fmt: skip

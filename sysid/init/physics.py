@@ -16,6 +16,7 @@ from .. import check, config
 from ..check.equations import LIKELY, Equations, Reading
 from ..check.look import Look, looked
 from ..errors import LogError
+from ..inertials import unmeant
 from ..units import DEGREE, of_joint
 from ..warned import noticed
 from . import shafts
@@ -143,11 +144,14 @@ def held_against(
         out = replace(out, guesses={k: g for k, g in out.guesses.items() if g is not amperes})
     with noticed():
         look = looked(config.experiment(out.tree, path))
-        if not (named or servos or found.torque.meaning.unit) and (unit := torque_unit(look)):
+        why = unmeant(look.robot)  # then no unit is held against it
+        if not (why or named or servos or found.torque.meaning.unit) and (
+            unit := torque_unit(look)
+        ):
             out = out.having(*unit)
             look = looked(config.experiment(out.tree, path))
         angles = out.guesses["data.units.position"]
-        small = angles.value == "rad" and not found.position.meaning.unit and not rad
+        small = angles.value == "rad" and not (found.position.meaning.unit or rad or why)
         how = {"currents": amperes is not None or servos, "alone": angles.alone}
         gear = shafts.ratio(look, angles.alone) if small and angles.alone else None
         if small and (turned := [angles.alone] if gear else in_degrees(look, **how)):
@@ -156,7 +160,8 @@ def held_against(
                 told = replace(told, value=beside.value | told.value)
             out = out.having(replace(angles, doubt=""), told)
             look = looked(config.experiment(out.tree, path))
-        scales = None if servos else factors(look, certain=amperes is not None)
+        told = amperes is not None
+        scales = None if servos or (why and not told) else factors(look, certain=told)
         if scales:
             out = out.having(*_scaled(amperes, scales, out.guesses["robot.joints"].value))
             look = looked(config.experiment(out.tree, path))
@@ -169,6 +174,7 @@ def held_against(
         )
     if any(fault.fault == "angle_wrap" for fault in faults):
         out = replace(out, notes=tuple(note for note in out.notes if note not in wrapped))
+    out = replace(out, notes=(*out.notes, *([f"{why}; correct it"] if why else [])))
     return replace(out, notes=(*out.notes, *dict.fromkeys(f"{f.says}: {f.do}" for f in faults)))
 
 

@@ -14,6 +14,7 @@ import numpy as np
 from . import outliers, repeats
 from .hum import hum
 from .of_angles import OfAngles
+from .rates import by_rate, of_each
 from .rest import Shared, rest_of, shared_by
 from .spectrum import spectrum_of, weighed
 from .stretches import FEWEST_SAMPLES, bridged, whole
@@ -98,8 +99,7 @@ def floors(
     step: Sequence[float], *, use: Sequence[np.ndarray] | None = None,
     angles: OfAngles | None = None,
 ) -> tuple[NoiseFloor, ...]:  # fmt: skip
-    """The noise floors of all joints' torques; what `floor` says of each, at less cost. See
-    there."""
+    """The noise floors of all joints' torques: what `floor` says of each, at less cost."""
     memory: dict[bytes, Shared] = {}
     joints = range(residual[0].shape[1] if len(residual) else 0)
     given = {"use": use, "memory": memory, "angles": angles}
@@ -123,6 +123,9 @@ def estimate(
     """The floor of one joint and how sure it is. See `floor`."""
     lengths = [len(r) for r in residual]
     use = [np.ones(n, dtype=bool) for n in lengths] if use is None else _of_joint(use, joint)
+    if len(rates := by_rate(step)) > 1:
+        given = (residual, measured, q, step), joint, use, {} if memory is None else memory, angles
+        return of_each(rates, estimate, *given)
     columns, logged = (_of_joint(x, joint) for x in (residual, measured))
     inside = np.concatenate([c[u] for c, u in zip(columns, use)]) if lengths else np.zeros(0)
     size = max((float(np.abs(m[u]).max(initial=0.0)) for m, u in zip(logged, use)), default=0.0)

@@ -27,6 +27,11 @@ class OfAngles:
     band: float
     known: Sequence[np.ndarray] = ()
 
+    def of(self, pieces: Sequence[int]) -> "OfAngles":
+        """The same of some pieces, by their numbers."""
+        known = [self.known[k] for k in pieces] if len(self.known) else ()
+        return replace(self, torque=[self.torque[k] for k in pieces], known=known)
+
     def squares(self) -> np.ndarray:
         """(dof,) its mean square over the rows that are known."""
         sums = sum((v**2 * use).mean(0).sum(0) for v, use in zip(self.torque, self.known))

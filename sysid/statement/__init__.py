@@ -4,7 +4,7 @@ document.py  the JSON document
 text.py      the verdict on each joint, in lines
 tables.py    what it rests on, in tables
 laws.py      a law of one's own to begin with, where no effect explains what is left
-alike.py     torques that are read late on many joints, by much the same
+alike.py     what many joints have alike: torques read late, friction that changed in the same logs
 sizes.py     what logs could have shown, as a table
 faults.py    what `sysid check` found, in lines
 changes.py   the JSON document of what changed on a new log

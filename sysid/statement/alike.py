@@ -1,4 +1,5 @@
-"""Torques that are read late on many joints, by much the same: one cause, and not one on each."""
+"""What many joints have alike is one cause, and not one on each: torques that are read late by much
+the same, friction that is another in the same logs."""
 
 from __future__ import annotations
 
@@ -38,3 +39,23 @@ def read_alike(findings: Sequence) -> Iterator[str]:
         f"{high:.2g} ms: one cause is likelier than one on each joint, as torque and angles of "
         "different clocks or cycles, or a command that was logged in the place of the torque"
     )
+
+
+def changed_alike(findings: Sequence) -> Iterator[str]:
+    """What is said of claims' heads of which many are friction that is another in the same logs.
+
+    Args:
+        findings: of each claim the head: effect, joint, candidate.
+    """
+    by_logs: dict[frozenset, list[str]] = {}
+    for one in findings:
+        if one.effect == "friction_change":
+            logs = dict(one.candidate.options).get("logs", ())
+            by_logs.setdefault(frozenset(logs), []).append(one.joint)
+    for logs, joints in by_logs.items():
+        if len(joints) >= _MANY:
+            yield (
+                f"the friction of {listed(joints, 'and')} is another in the same logs "
+                f"({', '.join(sorted(logs))}): one cause is likelier than one on each joint, as "
+                "the temperature, lubricant, or another robot of the kind"
+            )

@@ -16,9 +16,9 @@ from ..model_parameters import ROBOT
 from ..plausible import outdated
 from ..units import of_joint
 from . import where
-from .alike import read_alike
+from .alike import changed_alike, read_alike
 from .claims import chances, claims, confidence_set, finding, ties
-from .laws import to_begin_with
+from .laws import BODIES, of_bodies, to_begin_with
 
 
 def document(found: Diagnosis, run="") -> dict:
@@ -98,7 +98,8 @@ def _document(found: Diagnosis, run) -> dict:
         "notices": [
             *(n for n in fit.notices if n not in gone),
             *found.notices,
-            *read_alike([claim.head for claim in found.claims]),
+            *read_alike(heads := [claim.head for claim in found.claims]),
+            *changed_alike(heads),
         ],
         "logs": list(fit.logs),
         "versions": versions(),
@@ -124,7 +125,10 @@ def _floor(floor) -> dict:
 
 
 def _with_law(entry: dict, fit) -> dict:
-    """What is `unknown` with a law of one's own to begin with, where one variable stands out."""
+    """What is `unknown` with a law of one's own to begin with, where one variable stands out; and
+    that it is the bodies', where it is."""
+    if entry["status"] == "unknown" and of_bodies(entry):
+        return entry | {"says": "; ".join([*filter(None, [entry.get("says")]), BODIES])}
     joints = fit.model.robot.joints
     there = {(e.name, joints[j]) for e, own in fit.model.terms for j in own if j != ROBOT}
     known = entry["status"] == "unknown" and to_begin_with(entry, fit.experiment.path, there)

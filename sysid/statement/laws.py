@@ -25,6 +25,20 @@ _TERMS = {
 _OF_SPEED = {"": "a*qd*abs(qd) + b*qd**2 + c*qd**3", DIRECTION: "a*s*qd**2 + b*qd**2 + c*qd**3"}
 
 
+BODIES = (
+    "torque that follows the acceleration of another joint is what bodies make: an axis, a length "
+    "or a zero of the robot's file may be wrong, or a body is missing there"
+)
+
+
+def of_bodies(entry: dict) -> bool:
+    """Whether what a joint's residual follows most, as its document has it, is the acceleration of
+    another joint, alone or with something else: no law of that joint."""
+    most = entry.get("depends_on", ())[:1]
+    said = [v for one in most for v in (one["variable"], *one.get("with", "").split(" and "))]
+    return any(v.startswith("qdd_") and v != f"qdd_{entry['joint']}" for v in said)
+
+
 def to_begin_with(entry: dict, path, there: Collection[tuple[str, str]]) -> dict | None:
     """{effect, joint, options, command} for a joint that is `unknown`, as its document has it.
 
@@ -34,7 +48,7 @@ def to_begin_with(entry: dict, path, there: Collection[tuple[str, str]]) -> dict
         path: of the experiment file. there: (effect, joint) of the model's.
     """
     joint, told = entry["joint"], entry.get("depends_on", ())
-    if not told or told[0]["share"] < _MOST * entry["share_left"]:
+    if not told or told[0]["share"] < _MOST * entry["share_left"] or of_bodies(entry):
         return None
     near = [one for one in told if one["share"] >= _NEARLY * told[0]["share"]]
     first = min(near, key=lambda one: "with" in one)

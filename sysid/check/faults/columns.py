@@ -8,6 +8,7 @@ from itertools import combinations, product
 
 import numpy as np
 
+from ...inertials import unmeant
 from ...units import of_joint
 from .. import written
 from ..as_read import left_free
@@ -150,6 +151,11 @@ def _differences(reading: Reading) -> Iterator[tuple[str, tuple[int, ...], str |
 
 def _factors(look: Look, equations: Equations, reading: Reading, scored: Scored) -> Iterator[Fault]:
     """How much larger or smaller the torque is than the URDF's masses ask for."""
+    if why := unmeant(look.robot):
+        yield Fault(
+            "mass_implausible", WARNING, why, "correct it; what a fit finds is the logs' own"
+        )
+        return
     free = equations.scored(reading, free=True)
     logged = np.any([log.tally.swing > 0.0 for log in look.logs], axis=0)  # else none was
     clear = (free.taken > _TAKES) & (np.log(scored.left / free.left) > _CLEAR)
@@ -183,7 +189,7 @@ def _factors(look: Look, equations: Equations, reading: Reading, scored: Scored)
                 says,
                 (
                     "if it is a current set data.units.torque: A and torque_constant, the "
-                    "gear's ratio included"
+                    "gear's ratio included; or the masses of the robot's file are so much too large"
                     if every
                     else "is it the motor's, before a gear, or a current? give it in N m, on the "
                     "joint's side"

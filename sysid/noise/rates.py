@@ -1,0 +1,48 @@
+"""Stretches of several sampling rates: the same noise of a sample has another density at each, so
+that each rate is asked by itself."""
+
+import math
+from collections.abc import Callable, Sequence
+
+ALIKE = 0.05  # of a step: stamps of one logger scatter less
+
+
+def by_rate(step: Sequence[float]) -> list[list[int]]:
+    """The numbers of stretches of one sampling rate, for each; step: [s] of each."""
+    out: list[list[int]] = []
+    for k in sorted(range(len(step)), key=lambda k: step[k]):
+        if out and step[k] <= (1.0 + ALIKE) * step[out[-1][0]]:
+            out[-1].append(k)
+        else:
+            out.append([k])
+    return out
+
+
+def of_each(
+    rates: list[list[int]], estimate: Callable, given: tuple, joint: int, use, memory: dict, angles
+):
+    """What `floor.estimate` makes of the stretches of each rate, together.
+
+    Args:
+        given: residual, measured, q and step of each stretch. use, memory, angles: as there.
+    """
+    found = []
+    for k, own in enumerate(rates):
+        parts = ([x[n] for n in own] for x in given)
+        drawn, counts = angles and angles.of(own), [use[n] for n in own]
+        how = {"use": counts, "memory": memory.setdefault(k, {}), "angles": drawn}
+        found.append(estimate(*parts, joint, **how))
+    return _together(found, [int(sum(use[n].sum() for n in own)) for own in rates])
+
+
+def _together(found: Sequence, rows: Sequence[int]):
+    """The `Estimate` of all rows, of that of each rate and how many rows it has."""
+    share = [own / max(sum(rows), 1) for own in rows]
+    square = lambda name: sum(w * getattr(one, name) ** 2 for w, one in zip(share, found))  # noqa: E731
+    mean = lambda name: math.sqrt(square(name))  # noqa: E731
+    rms, errors = mean("rms"), [w * one.rms * one.std for w, one in zip(share, found)]
+    most, worst = (max(range(len(found)), key=sizes.__getitem__) for sizes in (share, errors))
+    std = math.sqrt(sum(own**2 for own in errors)) / rms if rms > 0.0 else 0.0
+    method = next((one.method for one in (found[most], *found) if one.method != "none"), "none")
+    detail = f"{found[most].detail}; each sampling rate by itself"
+    return type(found[0])(rms, std, method, detail, found[worst].doubt, mean("own"), mean("least"))
