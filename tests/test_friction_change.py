@@ -1,12 +1,15 @@
 """What is another in some logs: friction after a repair, an encoder's zero that was set anew; told with the logs that have it."""
 
+import copy
+from types import SimpleNamespace
+
 import numpy as np
 import polars as pl
 import pytest
 
 from scripts.blind_parts.robots import experiment_of
 from sysid import pipeline, vocabulary
-from sysid.candidates import candidates, together
+from sysid.candidates import Candidate, together
 from sysid.diagnose.diagnosis import diagnose
 from sysid.effect_options import subsets
 from sysid.simulate import simulate, write
@@ -53,3 +56,19 @@ def test_logs_that_may_have_it(count, half, sizes):
     sets = [set(own["logs"]) for own in subsets([f"{k}.csv" for k in range(count)], half=half)]
     assert [len(own) for own in sets] == sizes
     assert not half or not any(one | other == {f"{k}.csv" for k in range(count)} and not one & other for one in sets for other in sets if one is not other)
+
+
+def test_of_many_logs_the_fewer_are_named():
+    """By how much of it each has; a load has no such other side."""
+    robot = SimpleNamespace(joints=("a", "b"), dof=2)
+
+    def asked(name, amounts):
+        effect = copy.copy(vocabulary.find(name))
+        joint = 0 if effect.scope == "joint" else -1
+        effect.bound = lambda *_: effect
+        effect.given = lambda **_: effect
+        return [SimpleNamespace(candidate=Candidate(effect, joint, (("logs", (f"{k}.csv",)),)), coefficients=[own]) for k, own in enumerate(amounts)]
+
+    logs = lambda name: [set(dict(one.options)["logs"]) for one in together(asked(name, [0.0, 3.0, 0.1, 2.0, 0.2]), robot)]  # noqa: E731
+    assert logs("friction_change") == [{"1.csv", "3.csv"}, {"0.csv", "2.csv"}]
+    assert logs("payload") == [{"1.csv", "3.csv"}, {"1.csv", "3.csv", "4.csv"}, {"1.csv", "2.csv", "3.csv", "4.csv"}]

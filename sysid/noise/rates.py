@@ -38,8 +38,8 @@ def of_each(
 def _together(found: Sequence, rows: Sequence[int]):
     """The `Estimate` of all rows, of that of each rate and how many rows it has."""
     share = [own / max(sum(rows), 1) for own in rows]
-    square = lambda name: sum(w * getattr(one, name) ** 2 for w, one in zip(share, found))  # noqa: E731
-    mean = lambda name: math.sqrt(square(name))  # noqa: E731
+    both = list(zip(share, found))
+    mean = lambda name: math.sqrt(sum(w * getattr(one, name) ** 2 for w, one in both))  # noqa: E731
     rms, errors = mean("rms"), [w * one.rms * one.std for w, one in zip(share, found)]
     most, worst = (max(range(len(found)), key=sizes.__getitem__) for sizes in (share, errors))
     std = math.sqrt(sum(own**2 for own in errors)) / rms if rms > 0.0 else 0.0
