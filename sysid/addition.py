@@ -88,9 +88,12 @@ def likely(others) -> list:
 def designs(added: str, head: tuple[str, str], others) -> str:
     """What is typed for a motion that separates an effect (effect, joint), which the command
     `added` adds, from those it is not told from: (effect, joint, probability)."""
-    suspects = ",".join(apart(head, others))
-    target = shlex.split(added)[2]
-    return shlex.join(["sysid", "design", target, "--separate", suspects, "--out", "next"])
+    return separating(shlex.split(added)[2], apart(head, others))
+
+
+def separating(target: str, suspects: Sequence[str]) -> str:
+    """What is typed for a motion that tells suspects EFFECT:JOINT of an experiment, as it is typed, from each other."""
+    return shlex.join(["sysid", "design", target, "--separate", ",".join(suspects), "--out", "next"])
 
 
 def another_log(path) -> str:

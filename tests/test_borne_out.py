@@ -7,7 +7,7 @@ import pytest
 
 from sysid import blocks, borne_out, comparison, vocabulary
 from sysid.blocks import parameters
-from sysid.borne_out import doubted, in_doubt, size_told
+from sysid.borne_out import doubted, first_borne_out, in_doubt, size_told
 from sysid.candidates import Candidate
 from sysid.comparison import Difference
 from sysid.effect import NotFinite
@@ -246,3 +246,27 @@ def test_beside_a_claim_the_test_error_falls_by_its_standard_error(monkeypatch, 
     said = in_doubt(before, after, after, cogging) or ""
     assert said == doubted(before, after, lambda: before, after, cogging) or not refused
     assert ("less than its standard error, beside what is on that joint already" in said) is refused
+
+
+@pytest.mark.parametrize(
+    ("members", "head", "refused"),
+    [  # (name, refused, size told, test error)
+        ([("a", False, True, 1.0), ("b", False, True, 0.5)], "a", ""),
+        ([("a", True, True, 1.0), ("b", False, True, 0.5)], "b", "a"),
+        ([("a", False, False, 1.0), ("b", False, True, 0.5)], "b", "a"),
+        ([("a", False, False, 1.0), ("b", False, True, 1.5)], "a", ""),
+        ([("a", False, False, 1.0), ("b", False, False, 0.5), ("c", False, True, 0.7)], "c", "a"),
+        ([("a", False, False, 1.0), ("b", True, True, 0.5)], "a", "b"),
+        ([("a", True, False, 1.0), ("b", True, True, 0.5)], None, "ab"),
+    ],
+)
+def test_one_whose_size_is_told_comes_before_one_whose_is_not(members, head, refused, monkeypatch):
+    by_name = {name: own for name, *own in members}
+    made = [SimpleNamespace(candidate=SimpleNamespace(name=name, key=(name, 0))) for name in by_name]
+    monkeypatch.setattr(borne_out, "doubted", lambda last, after, candidate: "no" if by_name[candidate.name][0] else None)
+    monkeypatch.setattr(borne_out, "size_told", lambda fit, name, joint: by_name[name][1])
+    monkeypatch.setattr(borne_out.comparison, "together", lambda one, other: SimpleNamespace(delta_rms=by_name[other][2] - by_name[one][2]))
+    found, fits, whys = first_borne_out(made, None, lambda how, member: (member.candidate.name,))
+    assert (found and found.candidate.name) == head
+    assert "".join(one.candidate.name for one in made if id(one) in whys) == refused
+    assert found is None or fits[id(found)] == head

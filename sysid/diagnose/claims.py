@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from .. import pipeline
-from ..borne_out import beside, doubted, size_told, tried
+from ..borne_out import beside, first_borne_out, size_told, tried
 from ..carriers import with_tests
 from ..estimate import Fit
 from ..failures import taken
@@ -71,7 +71,8 @@ def claimed(
         free = lambda one: one.key not in there and one.kind not in heads  # noqa: B023, E731
         near = [first, *(m for m in other if free(m[0].candidate))]
         most = 1 if beside(last, step.candidate) else _FITTED
-        head, fits, why = _borne_out([m for m, _ in near[:most]], last, with_)
+        head, fits, whys = first_borne_out([m for m, _ in near[:most]], last, with_)
+        why = whys.get(id(first[0]))
         own = *step.candidate.named(fit.joints), why
         refused.pop(number, None)
         if head is None:
@@ -80,7 +81,7 @@ def claimed(
             continue
         if why:
             refused[~number] = last, Refused(*own)
-        beaten = {m.candidate.key for m, _ in near if id(m) in fits}  # refused: no rivals
+        beaten = {m.candidate.key for m, _ in near if id(m) in whys}  # no rivals of what stands
         step = replace(step, choice=step.choice.headed(head).without(beaten))
         tied = lambda m, p: m is head or (p >= _LIKELY and free(m.candidate))  # noqa: B023, E731
         near = [one for one in step.choice.members if tied(*one)][:_FITTED]
@@ -95,16 +96,3 @@ def claimed(
     claims = [claim.beside_all(step, last) for claim, step in zip(claims, own)]
     there = {(claim.head.effect, claim.head.joint) for claim in claims}
     return claims, [own for _, own in refused.values() if (own.effect, own.joint) not in there]
-
-
-def _borne_out(near: list[Member], last: Fit, with_: Callable):
-    """The first that fits bear out, of those that logs cannot tell apart, and the fits by the id of
-    who is in them; and why they do not bear out the head, None where they do."""
-    fits, whys = {}, []
-    for member in near:
-        after, *others = with_(pipeline.refit, member)  # and under one prior, the last one's or its
-        fits[id(member)] = after
-        whys.append(doubted(last, *others, after, member.candidate))
-        if whys[-1] is None:
-            return member, fits, whys[0]
-    return None, fits, whys[0]
