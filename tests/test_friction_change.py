@@ -48,6 +48,11 @@ def test_a_zero_that_was_set_anew_is_named_with_its_logs(tmp_path):
     assert abs(numbers["d"]["value"] - 0.06) < 3.0 * numbers["d"]["std"]
 
 
+def test_without_logs_it_is_refused(experiment, cli):
+    folder = experiment(config={"model.effects": ["viscous", "coulomb", {"friction_change": {"joints": ["elbow"]}}]})
+    cli("fit", folder).complains("friction_change needs logs")
+
+
 @pytest.mark.parametrize(("count", "half", "sizes"), [
     (1, True, []), (2, True, [1]), (3, True, [1] * 3), (4, True, [1] * 4 + [2] * 3), (5, True, [1] * 5), (9, True, []),
     (2, False, [1] * 2), (3, False, [1] * 3 + [2] * 3), (4, False, [1] * 4 + [2] * 6 + [3] * 4), (8, False, [1] * 8),

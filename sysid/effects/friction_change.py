@@ -5,6 +5,7 @@ import numpy as np
 from ..effect import TorqueEffect
 from ..effect_options import subsets, texts
 from ..effect_parameters import Linear
+from ..errors import ConfigError
 
 
 class FrictionChange(TorqueEffect):
@@ -28,6 +29,11 @@ class FrictionChange(TorqueEffect):
         chosen = super().given(**options)
         texts(chosen, "logs")
         return chosen
+
+    def bound(self, robot, joint):
+        if self.logs is None:
+            raise ConfigError("friction_change needs logs", where="model.effects", allowed="the logs that have it, as logs: [after.csv]", do="name them; in all logs it is viscous and coulomb")
+        return self
 
     def variants(self, robot, joint):
         """None: in all logs it is what every joint has."""
