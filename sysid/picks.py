@@ -23,10 +23,10 @@ _CELLS = 240  # of time, in all logs: where a stretch may begin and end at first
 _SHORTEST = 1.0  # s: of a stretch
 _TIMES = 1.4  # how much longer the next length that is tried is
 _DRAWS = 99  # of chance: a residual that beats them all is there at one per cent
-_MASS = slice(0, 4)  # m and m c: what a load is seen by first
+MASS = slice(0, 4)  # m and m c: what a load is seen by first
 _RIDGE = 1e-6  # of what the body takes, where a short stretch tells a part of it alone
 _ROUNDS = 10  # of body and times in turn
-_TAKES = 0.25  # of some joint's squared residual: less hides behind whatever else is missing
+TAKES = 0.25  # of some joint's squared residual: less hides behind whatever else is missing
 _WHOLE = 0.95  # of a log's rows: that is all of it
 
 
@@ -53,13 +53,13 @@ def picked(view) -> list[Payload]:
     if any(effect.name == name.name for effect, _ in view.model.terms):
         return []
     (columns,) = columns_of(view.source, made(name, ROBOT, {}, view.model.robot), [{}])
-    parts = _Parts.of(view, columns[:, :, _MASS] * view.weights[:, None, None])
+    parts = _Parts.of(view, columns[:, :, MASS] * view.weights[:, None, None])
     there = parts.first()
     if there is None:
         return []
     there, shares = parts.settled(there)
     held = [there[rows].mean() for rows in parts.logs]
-    if shares.max() < _TAKES or all(share < 1.0 - _WHOLE or share > _WHOLE for share in held):
+    if shares.max() < TAKES or all(share < 1.0 - _WHOLE or share > _WHOLE for share in held):
         return []  # whole logs are asked anyway
     return [Picked(told(view.rows, there, view.motion.pieces))]
 

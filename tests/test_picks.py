@@ -1,6 +1,7 @@
 """A load that is picked up and put down within a log: found with its times, named with its mass; none where none is."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pinocchio as pin
@@ -9,39 +10,39 @@ import pytest
 from scipy.signal import savgol_filter
 
 from scripts.blind_parts.robots import experiment_of
-from sysid import effect_options, pipeline, vocabulary
+from sysid import effect_options, loads, pipeline, vocabulary
 from sysid.diagnose.diagnosis import diagnose
 from sysid.errors import ConfigError
 from sysid.picks import _Parts, of_logs, stretches
 from sysid.simulate import simulate, write
 from sysid.statement.document import document
+from sysid.view import first_view
 
 MASS, AT = 0.9, np.array([0.05, 0.0, -0.1])  # kg; m, in the frame of the last link
 HELD = {"train.csv": (4.0, 9.5), "test.csv": (6.0, 15.0)}
 
 
-def loaded(folder):
-    """A simulated planar arm that holds a body for a while in each log: Pinocchio says what torque it takes."""
+def holding(folder, held, **how):
+    """A simulated planar arm that holds a body for a while in logs, {log: (kg, start, stop)}: Pinocchio says what torque that takes."""
     machine_of, machine = experiment_of("planar", folder)
-    write(simulate(machine, seed=5, duration=15.0, rate=200.0), machine_of, folder / "logs")
+    write(simulate(machine, seed=5, rate=200.0, **{"duration": 15.0, **how}), machine_of, folder / "logs")
     model = pin.buildModelFromUrdf(str(folder / "logs" / "robot.urdf"))
-    body = pin.Inertia(MASS, AT, 0.002 * np.eye(3))
     for joint in range(1, model.njoints):
-        model.inertias[joint] = pin.Inertia.Zero() if joint < model.njoints - 1 else body
-    data = model.createData()
+        model.inertias[joint] = pin.Inertia.Zero()
     names = [model.names[k] for k in range(1, model.njoints)]
-    for name, (start, stop) in HELD.items():
+    for name, (mass, start, stop) in held.items():
+        model.inertias[model.njoints - 1] = pin.Inertia(mass, AT, 0.002 * mass * np.eye(3))
+        data = model.createData()
         table = pl.read_csv(folder / "logs" / name)
         t, q = table["t"].to_numpy(), table[[f"q_{joint}" for joint in names]].to_numpy()
         qd, qdd = (savgol_filter(q, 31, 4, deriv=k, delta=t[1] - t[0], axis=0) for k in (1, 2))
-        held = (t >= start) & (t < stop)
-        torque = np.array([pin.rnea(model, data, *row) for row in zip(q, qd, qdd)]) * held[:, None]
+        torque = np.array([pin.rnea(model, data, *row) for row in zip(q, qd, qdd)]) * ((t >= start) & (t < stop))[:, None]
         table.with_columns((pl.col(f"tau_{joint}") + torque[:, k]).alias(f"tau_{joint}") for k, joint in enumerate(names)).write_csv(folder / "logs" / name)
     return folder / "logs"
 
 
 def test_a_load_for_a_while_is_named_with_its_times_and_its_mass(tmp_path):
-    told = document(diagnose(pipeline.load(loaded(tmp_path))))
+    told = document(diagnose(pipeline.load(holding(tmp_path, {log: (MASS, *ends) for log, ends in HELD.items()}))))
     (found,) = [f for f in told["findings"] if f["joins_as_step"] is not None]
     assert (found["effect"], found["joint"]) == ("payload", "*")
     mass = found["parameters"]["payload.*.m"]
@@ -110,3 +111,26 @@ def test_a_log_that_is_none_is_refused_and_a_run_repeats_its_stretches(experimen
     assert again.status == 0
     own, other = (json.loads((said.run / "fit.json").read_text())["parameters"] for said in (first, again))
     assert own == other and any(p["name"].startswith("payload") for p in own)
+
+
+@pytest.fixture(scope="module")
+def campaign(tmp_path_factory):
+    """A first view of four logs, three of which have loads of their own."""
+    held = {f"train_{k}.csv": (mass, 0.0, 20.0) for k, mass in ((1, 0.4), (3, 0.8), (4, 0.4))}
+    experiment = pipeline.started(pipeline.load(holding(tmp_path_factory.mktemp("loads"), held, logs=4, duration=7.0)))
+    fit = pipeline.fit(experiment)
+    return first_view(fit.experiment, fit)
+
+
+def test_loads_that_differ_from_log_to_log_are_told_with_their_levels(campaign):
+    found = loads.loads(campaign)
+    assert found == pytest.approx({"train_1.csv": 0.4, "train_2.csv": 0.0, "train_3.csv": 0.8, "train_4.csv": 0.4}, abs=0.05)
+    (said,) = loads.told(campaign)
+    groups = json.loads(said.partition("groups: {load: ")[2].partition("}`")[0])
+    assert groups == {"load_0": ["train_2.csv"], "load_1": ["train_1.csv", "train_4.csv"], "load_2": ["train_3.csv"]}
+
+
+def test_one_load_or_none_is_no_campaign(campaign):
+    assert loads.levels(np.array([0.0, 1.0, 0.05])) == [[0, 2], [1]]
+    short = replace(campaign, settled=replace(campaign.settled, rows=replace(campaign.rows, log=np.minimum(campaign.rows.log, 1))))
+    assert loads.loads(short) == {} and not [*loads.told(short)]

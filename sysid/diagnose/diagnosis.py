@@ -17,7 +17,7 @@ from functools import cache, partial
 
 import numpy as np
 
-from .. import borne_out, pipeline, thinning
+from .. import borne_out, loads, pipeline, thinning
 from ..candidates import Candidate, candidates
 from ..estimate import Fit
 from ..failures import Failure, HeldOut, failures, fallen
@@ -116,5 +116,5 @@ def diagnose(
         could = detectable(view, asked, candidates(view.model, extra))
         events, part = (*view.motion.events, *test.events), () if whole else measured.notices
         told = tuple(claims), tuple(said), tuple(could), tuple(where), events, view, first, then
-        say = tuple(refused), (*wrong, *part, *notices(claims, refused))
+        say = tuple(refused), (*wrong, *part, *notices(claims, refused), *loads.told(after))
         return Diagnosis(fit, dict(zip(fit.joints, found)), *told, *say)
