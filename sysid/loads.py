@@ -59,11 +59,11 @@ def levels(more: np.ndarray) -> list[list[int]]:
     """The numbers of masses (n,) that are one load, the lightest first."""
     out: list[list[int]] = []
     for number in np.argsort(more).tolist():
-        if out and more[number] - more[out[-1][0]] <= _APART * np.ptp(more):
+        if out and more[number] - more[out[-1]].min() <= _APART * np.ptp(more):
             out[-1].append(number)
         else:
             out.append([number])
-    return out
+    return [sorted(own) for own in out]
 
 
 def told(view) -> Iterator[str]:
