@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from .specs import EffectSpec, Experiment
+from .vocabulary import find, vocabulary
 
 #: below it a probability is told as "less than"
 LIKELY = 0.01
@@ -75,9 +76,10 @@ def command(path, effect: str, joints: list[str] | None, options: dict) -> str:
 
 
 def apart(head: tuple[str, str], others) -> list[str]:
-    """An effect and what it is not told from, as `sysid design --separate` names them."""
+    """An effect and what it is not told from, as `sysid design --separate` names them; nothing where no motion can tell them."""
     told = likely(others) or others[:1]
-    return [f"{e}:{j}" for e, j in (head, *(m[:2] for m in told))]
+    suspects = [f"{e}:{j}" for e, j in (head, *(m[:2] for m in told)) if moved(e)]
+    return suspects if len(suspects) > 1 else []
 
 
 def likely(others) -> list:
@@ -85,10 +87,16 @@ def likely(others) -> list:
     return [m for m in others if m[2] >= LIKELY]
 
 
+def moved(effect: str) -> bool:
+    """Whether a motion can show an effect of that name: not what is there in some logs and not in others, whatever moves."""
+    return not (effect in vocabulary() and find(effect).needs_logs)
+
+
 def designs(added: str, head: tuple[str, str], others) -> str:
     """What is typed for a motion that separates an effect (effect, joint), which the command
-    `added` adds, from those it is not told from: (effect, joint, probability)."""
-    return separating(shlex.split(added)[2], apart(head, others))
+    `added` adds, from those it is not told from: (effect, joint, probability); empty where none can."""
+    suspects = apart(head, others)
+    return separating(shlex.split(added)[2], suspects) if suspects else ""
 
 
 def separating(target: str, suspects: Sequence[str]) -> str:

@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterable, Mapping
 
 import numpy as np
 
-_MOVES = 1e-2  # rad or m, or what stands for them in degrees or mm: less is a joint that was held
+_MOVES = {"rad": 1e-2, "deg": 0.6, "mm": 10.0}  # less is a joint that was held
 
 
 def beyond(
@@ -35,9 +35,29 @@ def beyond(
     return found
 
 
-def moving(columns: Mapping[str, str], values: Mapping[str, np.ndarray]) -> list[str]:
-    """The joints whose angle goes anywhere."""
-    return [joint for joint, column in columns.items() if np.ptp(values[column]) > _MOVES]
+def moving(
+    columns: Mapping[str, str], values: Mapping[str, np.ndarray], unit: str = "rad"
+) -> list[str]:
+    """The joints whose angle goes anywhere. unit: of angles."""
+    least = _MOVES.get(unit, _MOVES["rad"])
+    own = {joint: np.asarray(values[column], dtype=float) for joint, column in columns.items()}
+    known = {joint: values[np.isfinite(values)] for joint, values in own.items()}
+    return [joint for joint, values in known.items() if len(values) and np.ptp(values) > least]
+
+
+def carries(every: Mapping, joint: str, moved: Collection[str]) -> bool:
+    """Whether one of the joints that move hangs behind a joint.
+
+    Args:
+        every: {name: joint} of the robot's file, each with its `parent` and `child` link.
+    """
+    behind = [every[joint].child] if joint in every else []
+    for link in behind:  # which grows as it is gone through
+        after = [(name, own.child) for name, own in every.items() if own.parent == link]
+        if any(name in moved for name, _ in after):
+            return True
+        behind += [child for _, child in after]
+    return False
 
 
 def says(joint: str, column: str, fixed: Collection[str]) -> tuple[str, str]:
@@ -50,7 +70,7 @@ def says(joint: str, column: str, fixed: Collection[str]) -> tuple[str, str]:
         return (
             f"{column} moves, and {joint} is a fixed joint in the robot's file: what it carries is "
             "taken to stand still, and its torque is not used",
-            f"make {joint} revolute or prismatic there",
+            f"make {joint} revolute or prismatic there; a gripper's finger may stay as it is",
         )
     return (
         f"{column} moves, and the robot's file has no joint {joint}: what it carries is in no "

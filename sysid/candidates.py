@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from .deflection import Deflection
 from .effect import Effect, MotionEffect, SensorEffect, WrenchEffect
 from .listed_effects import found as found_effect
@@ -124,20 +126,24 @@ def candidates(model: Model, extra=(), logs: Sequence[str] = ()) -> list[Candida
 def together(groups, robot: Robot) -> list[Candidate]:
     """Of what was asked in single logs only, in those that have most of it together: of its first
     coefficient, which is a mass and none of a load is negative, as each log alone tells it, for two
-    logs up to all but one; of what may have either sign, in the fewer of these and all others.
+    logs up to all but one; of what may have either sign, by what its coefficients differ in most, in
+    the fewer of these and all others.
 
     Args:
-        groups: candidates that were asked, with their `coefficients`.
+        groups: candidates that were asked, with their `coefficients` and `sizes`.
     """
     asked: dict[tuple, dict[tuple, tuple]] = {}
     for group in groups:
         options = dict(group.candidate.options)
         if logs := options.pop("logs", None):
             own = asked.setdefault((*group.candidate.key, *options.items()), {})
-            own[logs] = group.coefficients[0], group.candidate
+            own[logs] = np.array(group.coefficients) * group.sizes, group.candidate
     out = []
     for own in asked.values():
-        ranked = sorted(own, key=lambda logs: own[logs][0], reverse=True)
+        much = dict(zip(own, _much([amounts for amounts, _ in own.values()])))
+        if not next(iter(own.values()))[1].effect.either_way:
+            much = {logs: amounts[0] for logs, (amounts, _) in own.items()}
+        ranked = sorted(own, key=much.__getitem__, reverse=True)
         if max(map(len, ranked)) == 1:
             _, one = own[ranked[0]]
             for count in range(2, len(ranked)):
@@ -147,6 +153,13 @@ def together(groups, robot: Robot) -> list[Candidate]:
                     options = dict(one.options) | {"logs": logs}
                     out.append(made(one.effect, one.joint, options, robot))
     return out
+
+
+def _much(amounts) -> np.ndarray:
+    """How much (n,) of an effect each log has, of its coefficients (n, k), each in units of what it does: along the direction in which
+    they differ most."""
+    away = np.array(amounts) - np.mean(amounts, axis=0)
+    return away @ np.linalg.svd(away, full_matrices=False)[2][0]
 
 
 def made(effect: Effect, joint: int, options: dict, robot: Robot) -> Candidate:

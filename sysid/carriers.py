@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from . import blocks
 from . import rows as row
 from .candidates import Candidate, made
 from .estimate import Fit
@@ -13,6 +14,8 @@ from .inertia.consistency import is_consistent
 from .inertia.pseudo import from_central
 from .motion import Motion
 from .picks import of_logs, stretches, told
+
+_PARTS, _CLEAR = 12, 2.0  # stretches of a log's rows, by which a fall is held against its standard error
 
 
 def with_tests(choice, fit: Fit, test: Motion):
@@ -47,14 +50,26 @@ def _carriers(candidate: Candidate, view, fit: Fit, test: Motion) -> list[str]:
     found, left, torque = _weighed(_in(candidate, {"logs": names}, fit), view, fit, test)
     gain = np.sum(left**2 - (left - torque) ** 2, axis=1)
     source = np.array([piece.source for piece in test.pieces])[found.piece]
-    return [name for name in names if gain[source == name].sum() > 0.0]
+    return [name for name in names if _falls(gain[source == name])]
 
 
 def _stretches(candidate: Candidate, view, fit: Fit, test: Motion) -> list[str]:
     """The stretches of the test logs that have a load that parts of training logs have."""
     names = dict.fromkeys(piece.source for piece in test.pieces)
     found, left, torque = _weighed(_in(candidate, {"logs": list(names)}, fit), view, fit, test)
-    return told(found, stretches(found.t, of_logs(found.log), left, torque), test.pieces)
+    gain, there = np.sum(left**2 - (left - torque) ** 2, axis=1), stretches(found.t, of_logs(found.log), left, torque)
+    # of each log on its own: by stretches that were chosen for it the error falls somewhat in any case
+    own = [rows for rows in of_logs(found.log) if _falls(gain[rows][there[rows]])]
+    kept = np.zeros_like(there)
+    for rows in own:
+        kept[rows] = there[rows]
+    return told(found, kept, test.pieces)
+
+
+def _falls(gain: np.ndarray) -> bool:
+    """Whether what rows (n,) take falls together by more than twice its standard error over stretches of them."""
+    parts = [part.sum() for part in np.array_split(gain, min(_PARTS, max(len(gain), 1)))]
+    return bool(np.sum(parts) > _CLEAR * blocks.standard_error(np.array(parts)) and np.sum(parts) > 0.0)
 
 
 def _weighed(candidate: Candidate, view, fit: Fit, test: Motion) -> tuple:

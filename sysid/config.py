@@ -21,7 +21,7 @@ from .log_spec import LogSpec
 from .mistyped import FEW, standing
 from .readers import is_log_folder, listed
 from .specs import ENTRY, EffectSpec, Experiment, is_own
-from .vocabulary import vocabulary
+from .vocabulary import of_logs, vocabulary
 from .yaml_text import parse_yaml, plain
 
 _LARGEST_FILE = 1_000_000  # bytes
@@ -129,7 +129,7 @@ def _listed(experiment: Experiment, lines) -> Experiment:
         raise refused(location, said, (), lines, experiment.path)
     names = [log.name for log in (*data.train, *data.test)]
     asked = [(("preprocess", "mask", k, "log"), mask.log) for k, mask in enumerate(experiment.preprocess.mask)]
-    for k, spec in enumerate(experiment.model.effects):
+    for k, spec in ((k, spec) for k, spec in enumerate(experiment.model.effects) if of_logs(spec.name)):
         asked += [(("model", "effects", k), log) for log in effect_options.logs_of(spec.options)]
     for location, log in asked:
         if log not in names:

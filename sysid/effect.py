@@ -53,6 +53,7 @@ class Effect(ABC):
         or `inertia`, a body on a link.
     asked: {shape value: what the user says of it}.
     either_way: of some logs and of all others, with the other sign, it is the same beside what all share.
+    needs_logs: it is there in some logs alone, which are named.
     group, level: of logs, at which alone it is there; None where it is in all (see `per_level`).
     """
 
@@ -75,6 +76,7 @@ class Effect(ABC):
     mimics_mass: ClassVar[bool] = False
     elementwise: ClassVar[bool] = False
     either_way: ClassVar[bool] = False
+    needs_logs: ClassVar[bool] = False
     simulators: ClassVar[dict[str, str]] = {}
     given_coefficients: Mapping[str, float] = MappingProxyType({})
     asked: Mapping[str, Asked] = MappingProxyType({})

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import combinations
 from math import inf, nan
 
@@ -70,3 +70,13 @@ def logs_of(options: dict) -> list[str]:
     lists = (options.get(name) if isinstance(options.get(name), list) else [] for name in ("logs", "stretches"))
     own, parts = ([text for text in one if isinstance(text, str)] for one in lists)
     return own + [text.rsplit(None, 2)[0] for text in parts if len(text.split()) > 2]
+
+
+def renamed(options: dict, named: Mapping[str, str]) -> dict:
+    """Options whose logs have other names, {name: the new one}."""
+    out, known = dict(options), lambda name: named.get(name, name)
+    if isinstance(own := options.get("logs"), list):
+        out["logs"] = [known(name) for name in own]
+    if isinstance(own := options.get("stretches"), list):
+        out["stretches"] = [" ".join([known(name), *times]) for name, *times in (text.rsplit(None, 2) for text in own)]
+    return out

@@ -11,7 +11,7 @@ from .robot import Robot
 
 _POSES = 64  # held still
 _OVER = 3.0  # times the torque that the file allows its drives: of forty robots of example-robot-data none needs more than 0.61 of it
-_ALIKE = 1e-6  # of a number: less is the same
+_ALIKE = 1e-6  # of a number, and m: less is the same, and nothing
 
 
 def unmeant(robot: Robot) -> str:
@@ -52,10 +52,13 @@ def _stated(robot: Robot) -> list:
 
 
 def _one_for_all(robot: Robot) -> bool:
-    """Whether all links have one and the same inertia, and their file states it."""
+    """Whether all links have one and the same inertia about their joint's own frame, and their file states it: links that are alike
+    hang on their joints."""
     links = [pi for body, pi in zip(robot.bodies, robot.prior) if body.kind == "link"]
     if len(links) < 2 or len(_stated(robot)) < len(links):
         return False
-    masses, _, central = zip(*(pseudo.to_central(pi) for pi in links))
+    masses, centres, central = zip(*(pseudo.to_central(pi) for pi in links))
+    if np.abs(centres).max() > _ALIKE:
+        return False
     numbers = np.column_stack([masses, [np.linalg.eigvalsh(own) for own in central]])
     return bool(np.all(np.ptp(numbers, axis=0) <= _ALIKE * np.abs(numbers).max(axis=0)))

@@ -52,16 +52,43 @@ def picked(view) -> list[Payload]:
     name = find(Payload.name)
     if any(effect.name == name.name for effect, _ in view.model.terms):
         return []
+    if _twice(view.motion.pieces):
+        return []
     (columns,) = columns_of(view.source, made(name, ROBOT, {}, view.model.robot), [{}])
     parts = _Parts.of(view, columns[:, :, MASS] * view.weights[:, None, None])
     there = parts.first()
     if there is None:
         return []
-    there, shares = parts.settled(there)
+    there, shares, mass = parts.settled(there)
     held = [there[rows].mean() for rows in parts.logs]
-    if shares.max() < TAKES or all(share < 1.0 - _WHOLE or share > _WHOLE for share in held):
+    if not mass > 0.0 or shares.max() < TAKES or all(share < 1.0 - _WHOLE or share > _WHOLE for share in held):
         return []  # whole logs are asked anyway
-    return [Picked(told(view.rows, there, view.motion.pieces))]
+    # what acts on single joints for a while, a torque's zero, a friction, is no body
+    speed = view.rows.of(view.motion, "qd")
+    plain = np.stack([np.ones_like(speed), speed, np.sign(speed)], axis=2).transpose(1, 0, 2) * view.rows.use.T[:, :, None]
+    if parts.takes(_apart(plain), there) >= parts.takes(parts.body, there):
+        return []
+    found = told(view.rows, there, view.motion.pieces)
+    return [Picked(found)] if found else []
+
+
+def _apart(columns: np.ndarray) -> np.ndarray:
+    """Columns (dof, n, k) of every joint as columns of all (dof, n, dof k), each of size one."""
+    dof, n, k = columns.shape
+    out = np.zeros((dof, n, dof, k))
+    for j, own in enumerate(columns):
+        out[j, :, j] = own / np.maximum(np.linalg.norm(own, axis=0), 1e-300)
+    return out.reshape(dof, n, dof * k)
+
+
+def _twice(pieces: Sequence[Piece]) -> bool:
+    """Whether two logs of one name have the same times: no stretch of a name tells which."""
+    spans: dict[str, dict[int, list[float]]] = {}
+    for piece in pieces:
+        own = spans.setdefault(piece.source, {}).setdefault(piece.log, [np.inf, -np.inf])
+        own[:] = min(own[0], piece.t[0]), max(own[1], piece.t[-1])
+    every = [sorted(logs.values()) for logs in spans.values()]
+    return any(one[1] > other[0] for logs in every for one, other in zip(logs, logs[1:]))
 
 
 @dataclass(frozen=True)
@@ -107,23 +134,32 @@ class _Parts:
         there[cells[best[0]].start : cells[best[1] - 1].stop] = True
         return there
 
-    def settled(self, there: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(n,) bool of all stretches that have the body of some, body and stretches found in turn; and what it takes of each joint's
-        squared residual (dof,)."""
-        square = np.maximum(np.sum(self.residual**2, axis=0), 1e-300)
+    def settled(self, there: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+        """(n,) bool of all stretches that have the body of some, body and stretches found in turn; what it takes of each joint's
+        squared residual (dof,); and its mass, on the scale of its column."""
         for _ in range(_ROUNDS):
-            body = self.body * there[:, None]
-            shared = sum(a.T @ p for a, p in zip(self.model, body))
-            left = sum(p.T @ p for p in body) - shared.T @ shared
-            size = np.linalg.lstsq(left, sum(p.T @ self.residual[:, j] for j, p in enumerate(body)), rcond=1e-9)[0]
-            torque = (self.body @ size).T  # (n, dof)
-            bare = self.residual + (self.model @ (shared @ size)).T
-            shares = 1.0 - np.sum((bare - torque * there[:, None]) ** 2, axis=0) / square
-            again = stretches(self.t, self.logs, bare, torque)
-            if (again == there).all():
+            size, bare = self._fitted(self.body, there)
+            again = stretches(self.t, self.logs, bare, (self.body @ size).T)
+            if (again == there).all() or not again.any():
                 break
             there = again
-        return there, shares
+        size, bare = self._fitted(self.body, there)
+        left = np.sum((bare - (self.body @ size).T * there[:, None]) ** 2, axis=0)
+        return there, 1.0 - left / np.maximum(np.sum(self.residual**2, axis=0), 1e-300), float(size[0])
+
+    def takes(self, columns: np.ndarray, there: np.ndarray) -> float:
+        """What columns (dof, n, k) on some rows take of the squared residual, all else fitted anew."""
+        size, bare = self._fitted(columns, there)
+        return float(np.sum(self.residual**2) - np.sum((bare - (columns @ size).T * there[:, None]) ** 2))
+
+    def _fitted(self, columns: np.ndarray, there: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The sizes (k,) of columns (dof, n, k) on some rows, and what is left (n, dof) without them and without what the model made of
+        them."""
+        body = columns * there[:, None]
+        shared = sum(a.T @ p for a, p in zip(self.model, body))
+        left = sum(p.T @ p for p in body) - shared.T @ shared
+        size = np.linalg.lstsq(left, sum(p.T @ self.residual[:, j] for j, p in enumerate(body)), rcond=1e-9)[0]
+        return size, self.residual + (self.model @ (shared @ size)).T
 
     def _cells(self) -> list[slice]:
         """Rows of short stretches of time, none in two logs."""
@@ -172,10 +208,9 @@ def stretches(t, logs: Sequence[slice], left, torque) -> np.ndarray:
     Source: the two-state path of least loss (Viterbi 1967).
     """
     square = np.sum(torque**2, axis=1)
-    gain = 2.0 * np.sum(left * torque, axis=1) - square
-    price = 0.5 * _SHORTEST * float(square.mean() / np.median(np.diff(t[logs[0]])))
-    path = np.zeros(len(t), dtype=bool)
-    for rows in logs:
+    gain, path = 2.0 * np.sum(left * torque, axis=1) - square, np.zeros(len(t), dtype=bool)
+    for rows in (rows for rows in logs if rows.stop - rows.start > 1):
+        price = 0.5 * _SHORTEST * float(square.mean() / np.median(np.diff(t[rows])))
         without, with_, came = 0.0, 0.0, []  # came: whether the state before was the other one
         for own in gain[rows].tolist():
             came.append((with_ - price > without, without - price > with_))
@@ -189,21 +224,23 @@ def stretches(t, logs: Sequence[slice], left, torque) -> np.ndarray:
 
 def told(rows, there: np.ndarray, pieces: Sequence[Piece]) -> list[str]:
     """Stretches (n,) bool of the rows of a motion as an option of the payload gives them; what goes on to the end of a log goes on
-    to its last row.
+    beyond what a low-pass has of it.
 
     Args:
         rows: `rows.Rows` of the pieces, those of one log together.
     """
     out = []
-    for own in of_logs(rows.log):
+    for own in (own for own in of_logs(rows.log) if own.stop - own.start > 1):
         name, clock = pieces[rows.piece[own.start]].source, rows.t[own]
-        whole = [piece.t for piece in pieces if piece.source == name]
-        first, last = whole[0][0], whole[-1][-1]
+        whole = [piece for piece in pieces if piece.log == rows.log[own.start]]
+        hidden = (3 + (whole[0].smoother.reach if whole[0].smoother else 0)) * whole[0].step
+        first, last = whole[0].t[0] - hidden, whole[-1].t[-1] + hidden
         step = float(np.median(np.diff(clock)))
         begins, ends = (np.flatnonzero(np.diff(there[own].astype(int), prepend=0, append=0) == sign) for sign in (1, -1))
         for a, b in zip(begins, ends):
-            start, stop = (first if a == 0 else clock[a]), (last if b == len(clock) else clock[b - 1]) + step
-            out.append(f"{name} {start:.2f} {stop:.2f}")
+            start, stop = (first if a == 0 else clock[a]), (last if b == len(clock) else clock[b - 1] + step)
+            if stop - start > 0.5 * _SHORTEST:
+                out.append(f"{name} {start:.2f} {stop:.2f}")
     return out
 
 

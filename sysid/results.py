@@ -12,15 +12,17 @@ Each file is written under a temporary name and renamed, so that a run folder ne
 import io
 import json
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from . import bounded, state
 from .differences import told
+from .effect_options import renamed
 from .estimate import Fit
 from .filters import settled
 from .fit_document import document
 from .specs import Experiment, is_own
+from .vocabulary import of_logs
 from .whole_files import folder, sunk, write_together
 
 
@@ -112,20 +114,18 @@ def _relocated(experiment: Experiment, run: Path) -> dict:
     if experiment.robot.joints is None:
         tree["robot"].pop("joints", None)
     for key in ("effects", "candidates"):
-        tree["model"][key] = [_entry(effect, moved) for effect in tree["model"][key]]
+        tree["model"][key] = [_entry(effect, moved, named) for effect in tree["model"][key]]
     return tree
 
 
-def _entry(effect: dict, moved: Callable[[str], str]) -> dict | str:
-    """An entry of `model.effects` as an experiment file writes it, its paths moved."""
+def _entry(effect: dict, moved: Callable[[str], str], named: Mapping[str, str]) -> dict | str:
+    """An entry of `model.effects` as an experiment file writes it, its paths moved, its logs as they are named then."""
     given = {"joints": effect.get("joints"), "per": effect.get("per"), "except": effect.get("spared")}
     own = {**{key: value for key, value in given.items() if value}, **effect["options"]}
     if "formula" in effect["options"]:
         return own
-    if isinstance(own.get("logs"), list):
-        own["logs"] = [moved(name) if isinstance(name, str) else name for name in own["logs"]]
-    if isinstance(own.get("stretches"), list):
-        own["stretches"] = [" ".join([moved(name), *times]) for name, *times in (text.rsplit(None, 2) for text in own["stretches"])]
+    if of_logs(effect["name"]):
+        own = renamed(own, named)
     name = effect["name"]
     if is_own(name):
         file, _, kind = name.rpartition(":")

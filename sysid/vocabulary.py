@@ -52,3 +52,8 @@ def describe(effect: Effect) -> dict:
         "options": dict(effect.options), "looks_like": effect.looks_like, "tied_with": list(effect.tied_with),
         "separate_by": effect.separate_by, "maneuvers": list(effect.maneuvers), "source": effect.source,
     }  # fmt: skip
+
+
+def of_logs(name: str) -> bool:
+    """Whether an effect of that name is in the vocabulary, and may be in some logs alone, which its options name."""
+    return name in vocabulary() and not {"logs", "stretches"}.isdisjoint(find(name).options)

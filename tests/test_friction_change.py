@@ -72,8 +72,10 @@ def test_of_many_logs_the_fewer_are_named():
         joint = 0 if effect.scope == "joint" else -1
         effect.bound = lambda *_: effect
         effect.given = lambda **_: effect
-        return [SimpleNamespace(candidate=Candidate(effect, joint, (("logs", (f"{k}.csv",)),)), coefficients=[own]) for k, own in enumerate(amounts)]
+        return [SimpleNamespace(candidate=Candidate(effect, joint, (("logs", (f"{k}.csv",)),)), coefficients=np.array(own), sizes=np.array([1.0, 100.0])[: len(own)]) for k, own in enumerate(amounts)]
 
-    logs = lambda name: [set(dict(one.options)["logs"]) for one in together(asked(name, [0.0, 3.0, 0.1, 2.0, 0.2]), robot)]  # noqa: E731
-    assert logs("friction_change") == [{"1.csv", "3.csv"}, {"0.csv", "2.csv"}]
-    assert logs("payload") == [{"1.csv", "3.csv"}, {"1.csv", "3.csv", "4.csv"}, {"1.csv", "2.csv", "3.csv", "4.csv"}]
+    logs = lambda name, own: [set(dict(one.options)["logs"]) for one in together(asked(name, own), robot)]  # noqa: E731
+    # of dry friction alone, whatever the viscous one's noise is
+    dry = [[0.3, 0.0], [-0.2, 0.3], [0.4, 0.01], [0.1, 0.2], [-0.5, 0.02]]
+    assert {"1.csv", "3.csv"} in logs("friction_change", dry) and max(map(len, logs("friction_change", dry))) == 2
+    assert logs("payload", [[0.0], [3.0], [0.1], [2.0], [0.2]]) == [{"1.csv", "3.csv"}, {"1.csv", "3.csv", "4.csv"}, {"1.csv", "2.csv", "3.csv", "4.csv"}]

@@ -49,6 +49,9 @@ def test_one_inertia_for_all_is_a_placeholder(tmp_path):
     box = '<inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>'
     machine = loaded(re.sub(r"<inertial>.*</inertial>", box, TWO), tmp_path)
     assert "one and the same inertia" in inertials.unmeant(machine)
+    # rods that are alike hang on their joints
+    rod = box.replace("<mass", '<origin xyz="0 0 -0.2"/><mass')
+    assert inertials.unmeant(loaded(re.sub(r"<inertial>.*</inertial>", rod, TWO), tmp_path)) == ""
 
 
 def test_moments_of_another_unit_are_not_believed(tmp_path):

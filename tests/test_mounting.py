@@ -39,6 +39,11 @@ def test_gravity_that_points_elsewhere_is_told(gravity, mounted):
     assert told @ gravity > np.cos(np.radians(10.0)) * 9.81**2
 
 
+def test_torque_without_gravity_says_nothing_of_where_it_points(mounted):
+    """As arms log it that take it off themselves."""
+    assert not [f for f in check.check(pipeline.load(mounted((0.0, 0.0, 0.0)))) if "gravity looks" in f.says]
+
+
 def test_gravity_as_the_file_says_is_no_fault(mounted):
     assert check.check(pipeline.load(mounted((0.0, 0.0, -9.81)))) == []
 
@@ -68,7 +73,10 @@ def test_a_joint_that_the_robots_file_does_not_move_is_told(mounted, tmp_path):
     last = pipeline.build(pipeline.load(logs))[0].source.joints["elbow"].child
     urdf.write_text(urdf.read_text().replace("</robot>", fixed.format(last)))
     (found,) = check.check(pipeline.load(logs))
-    assert (found.fault, found.severity) == ("joint_order", "error") and "fixed joint" in found.says
+    assert (found.fault, found.severity) == ("joint_order", "warning") and "fixed joint" in found.says  # at the end, as a gripper's
+    moved = pipeline.build(pipeline.load(logs))[0].source.joints
+    assert beyond.carries(moved, "shoulder", ["elbow"]) and not beyond.carries(moved, "wrist", ["elbow", "shoulder"])
+    assert not beyond.carries(moved, "nobody", ["elbow"])
 
 
 def test_columns_of_other_joints():
@@ -76,4 +84,5 @@ def test_columns_of_other_joints():
     assert beyond.beyond(names, "q_{joint}", "tau_{joint}", ["a"]) == {"b": "q_b"}  # c has no torque
     assert beyond.beyond(names, "q_{joint}", "tau_{joint}", ["a", "b"]) == {}
     assert beyond.beyond(names, "{joint}", "tau_{joint}", ["a"]) == {} == beyond.beyond(names, None, "tau_{joint}", ["a"])
-    assert beyond.moving({"b": "q_b", "c": "q_c"}, {"q_b": np.zeros(3), "q_c": np.arange(3.0)}) == ["c"]
+    assert beyond.moving({"b": "q_b", "c": "q_c"}, {"q_b": np.zeros(3), "q_c": np.array([0.0, np.nan, 2.0])}) == ["c"]
+    assert beyond.moving({"b": "q_b"}, {"q_b": np.arange(3.0) * 0.1}, "deg") == [] != beyond.moving({"b": "q_b"}, {"q_b": np.arange(3.0) * 0.1})

@@ -7,29 +7,33 @@ import numpy as np
 from .. import regressor
 from .equations import FEWEST, Equations
 
-_APART = np.cos(np.radians(25.0))  # nearer to what the experiment says, a tilt of the base is found
+_NEAR = np.cos(np.radians(25.0))  # nearer to what the experiment says, a tilt of the base is found
+_LEAST = (
+    0.3  # of gravity: torque that has less of it has none, as of arms that take it off themselves
+)
 
 
 def gravities(equations: Equations) -> list[tuple[float, ...]]:
-    """Other directions of gravity (3,) [m/s^2], as large: along an axis of the base, and the one by
-    which the URDF's bodies explain the torques best.
+    """Another direction of gravity (3,) [m/s^2], as large, by which the URDF's bodies explain the
+    torques best: along an axis of the base where it is near one. None where the torques have
+    nothing of gravity.
 
     What weight they have is linear in it: tau_j = p_j(g = 0) + G_j g + I qdd_j + Fv qd_j
     + Fc sign(qd_j) + b.
     """
     own, size = equations.robot.gravity, float(np.linalg.norm(equations.robot.gravity))
-    if not size > 0.0:
+    best = _best(equations) if size > 0.0 else np.zeros(3)
+    if not np.linalg.norm(best) > _LEAST * size:
         return []
+    best = size * best / np.linalg.norm(best)
     axes = [sign * size * axis for axis in np.eye(3) for sign in (1.0, -1.0)]
-    best, out = _best(equations), []
-    for one in [*axes, *([] if best is None else [size * best])]:
-        if all(one @ other < _APART * size**2 for other in (own, *out)):
-            out.append(one)
-    return [tuple(np.round(one, 2) + 0.0) for one in out]
+    axis = max(axes, key=lambda one: one @ best)
+    down = axis if axis @ best > _NEAR * size**2 else best
+    return [] if down @ own > _NEAR * size**2 else [tuple(np.round(down, 2) + 0.0)]
 
 
-def _best(equations: Equations) -> np.ndarray | None:
-    """The direction (3,), of size one; None where the torques tell none."""
+def _best(equations: Equations) -> np.ndarray:
+    """The gravity (3,) [m/s^2] that the torques tell; zero where they tell none."""
     robot, parts = equations.robot, []
     for q, qd, qdd, smoother, rows in equations.pieces:
         still = np.zeros_like(q)
@@ -51,6 +55,4 @@ def _best(equations: Equations) -> np.ndarray | None:
         weight, left = bare(np.array(rest[:3]).T), bare(tau / np.std(tau) - p)
         squares += weight.T @ weight
         scores += weight.T @ left
-    found = np.linalg.lstsq(squares, scores, rcond=1e-6)[0]
-    size = float(np.linalg.norm(found))
-    return found / size if size > 0.0 else None
+    return np.linalg.lstsq(squares, scores, rcond=1e-6)[0]

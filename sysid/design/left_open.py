@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from ..addition import LIKELY
+from ..addition import LIKELY, moved
 
 
 @dataclass(frozen=True)
@@ -45,6 +45,6 @@ def _members(among) -> dict[tuple[str, str], float]:
 
 
 def _likely(tie: dict[tuple[str, str], float]) -> tuple[tuple[str, str], ...]:
-    """Those of a set that are worth a motion."""
+    """Those of a set that are worth a motion, and that one can show."""
     head, others = list(tie)[:1], list(tie)[1:]
-    return (*head, *(one for one in others if tie[one] >= LIKELY))
+    return tuple(one for one in (*head, *others) if (one in head or tie[one] >= LIKELY) and moved(one[0]))

@@ -21,6 +21,7 @@ class FrictionChange(TorqueEffect):
 
     instantaneous = False  # q, qd and qdd do not say the log
     either_way = True
+    needs_logs = True
     logs = None
     dFv = Linear("N m s/rad", says="what the viscous coefficient is more there")
     dFc = Linear("N m", says="what Coulomb friction is more there")
@@ -32,7 +33,7 @@ class FrictionChange(TorqueEffect):
 
     def bound(self, robot, joint):
         if self.logs is None:
-            raise ConfigError("friction_change needs logs", where="model.effects", allowed="the logs that have it, as logs: [after.csv]", do="name them; in all logs it is viscous and coulomb")
+            raise ConfigError("friction_change needs logs", where="model.effects", allowed="the logs that have it, as logs: [after.csv]", do="name them; in all logs it is viscous and coulomb, which may be per a group of logs")
         return self
 
     def variants(self, robot, joint):

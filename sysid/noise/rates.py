@@ -43,6 +43,8 @@ def _together(found: Sequence, rows: Sequence[int]):
     rms, errors = mean("rms"), [w * one.rms * one.std for w, one in zip(share, found)]
     most, worst = (max(range(len(found)), key=sizes.__getitem__) for sizes in (share, errors))
     std = math.sqrt(sum(own**2 for own in errors)) / rms if rms > 0.0 else 0.0
-    method = next((one.method for one in (found[most], *found) if one.method != "none"), "none")
-    detail = f"{found[most].detail}; each sampling rate by itself"
-    return type(found[0])(rms, std, method, detail, found[worst].doubt, mean("own"), mean("least"))
+    told = next((one for one in (found[most], *found) if one.method != "none"), found[most])
+    detail = f"{told.detail}; each sampling rate by itself" if told.detail else ""
+    return type(found[0])(
+        rms, std, told.method, detail, found[worst].doubt, mean("own"), mean("least")
+    )

@@ -165,9 +165,10 @@ def _head(f: dict, of: Told, joint: str, width: int, said: dict[str, str]) -> li
         rest = listed(rivals(told, f, of.little[f["command"]]), "or")
         words = f"  {untold_from(f['probability'])} {rest}"
         out += wrapped(words, width, "    ")
-        words = f"  to separate them: {f['separate_by']}; or, if a motion can, by"
-        out += wrapped(words, width, "    ")
-        out.append(designs(f["command"], (f["effect"], f["joint"]), told))
+        line = designs(f["command"], (f["effect"], f["joint"]), told)
+        more = "; or, if a motion can, by" if line else ""
+        out += wrapped(f"  to separate them: {f['separate_by']}{more}", width, "    ")
+        out += [line] if line else []
     if few := [placed(e, j, f["joint"]) for e, j, p in others if p < LIKELY]:
         words = f"  not ruled out, though less than 1 % likely: {listed(few, 'and')}"
         out += wrapped(words, width, "    ")

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from functools import cache, partial
 from itertools import combinations, product
 
 import numpy as np
@@ -35,8 +36,13 @@ def find(look: Look) -> Iterator[Fault]:
     equations = look.equations
     if equations is None:
         return
+    if why := unmeant(look.robot):  # then nothing is held against its masses
+        yield Fault(
+            "mass_implausible", WARNING, why, "correct it; what a fit finds is the logs' own"
+        )
+        return
     reading = Reading.plain(look.robot.dof)
-    scored = equations.scored(reading)
+    scored, free = equations.scored(reading), cache(partial(left_free, look.seen))
     mounted = gravities(equations)
     turning = np.flatnonzero(~np.asarray(look.robot.prismatic)).tolist()
     for _ in range(_ROUNDS):
@@ -53,18 +59,18 @@ def find(look: Look) -> Iterator[Fault]:
         tried = [
             (s.loss, made, told, s)
             for made, told, s in tried
-            if _clear(scored, s, told[1]) and _masses_tell(look, reading, made, s, *told[1:])
+            if _clear(scored, s, told[1]) and _masses_tell(free, reading, made, s, *told[1:])
         ]
         # as it is, and in another unit, it may leave the least
         if not tried or equations.scored(reading, free=True).loss < min(loss for loss, *_ in tried):
             break
-        reading, scored = _likeliest(look, tried)
+        reading, scored = _likeliest(free, tried)
     for other in _differences(reading):
         yield from written.told(look, reading, *other)
     yield from _factors(look, equations, reading, scored)
 
 
-def _likeliest(look: Look, tried: list[tuple]) -> tuple[Reading, Scored]:
+def _likeliest(free: Callable, tried: list[tuple]) -> tuple[Reading, Scored]:
     """Of readings (loss, made, told, scored) that are all clear, the one of least loss among those by
     which bodies, whatever these are, explain the torque as well as by any.
 
@@ -72,7 +78,7 @@ def _likeliest(look: Look, tried: list[tuple]) -> tuple[Reading, Scored]:
     other way turns gravity round as another zero does.
     """
     near = sorted(tried, key=lambda one: one[0])[:_TRIED]
-    left = [left_free(look.seen, made) for _, made, *_ in near] if len(near) > 1 else [0.0]
+    left = [free(made) for _, made, *_ in near] if len(near) > 1 else [0.0]
     _, made, _, scored = next(o for o, own in zip(near, left) if own <= min(left) + _BETTER)
     return made, scored
 
@@ -118,12 +124,14 @@ def _clear(before: Scored, after: Scored, joints) -> bool:
     return bool(gain.sum() > least and np.all(gain[list(joints)] > 0.0))
 
 
-def _masses_tell(look: Look, before: Reading, made: Reading, scored: Scored, joints, word) -> bool:
+def _masses_tell(
+    free: Callable, before: Reading, made: Reading, scored: Scored, joints, word
+) -> bool:
     """Whether a reading is told by masses where these alone can: with both signs turned friction is as
     it was. They do where the URDF's explain the torque, or where others explain it better so."""
     if word != "angle and torque" or np.all(scored.taken[list(joints)] > _EXPLAINS):
         return True
-    return left_free(look.seen, made) < left_free(look.seen, before) - _BETTER * len(joints)
+    return free(made) < free(before) - _BETTER * len(joints)
 
 
 def _differences(reading: Reading) -> Iterator[tuple[str, tuple[int, ...], str | int]]:

@@ -29,8 +29,9 @@ def find(look: Look) -> Iterator[Fault]:
             values = table.load(list(columns.values())) if columns else {}
         except LogError:  # of what nobody asked for
             continue
-        told |= {joint: columns[joint] for joint in beyond.moving(columns, values)}
+        told |= {
+            joint: columns[joint] for joint in beyond.moving(columns, values, data.units.position)
+        }
     for joint, column in told.items():
-        fixed = joint in robot.source.joints
-        severity = ERROR if fixed else WARNING
+        severity = ERROR if beyond.carries(robot.source.joints, joint, robot.joints) else WARNING
         yield Fault("joint_order", severity, *beyond.says(joint, column, robot.source.joints))
