@@ -54,6 +54,28 @@ def test_effects_speak_of_any_joint():
     assert "joint's motor" in vocabulary.describe(vocabulary.find("joint_coupling"))["summary"]
 
 
+def test_ctrl_c_while_a_library_begins_is_an_interrupt(monkeypatch, cli, experiment):
+    """It says that it cannot begin; of any other reason that is an error."""
+    from sysid import pipeline
+
+    def begins(reason):
+        def load(*_, **__):
+            try:
+                raise reason
+            except BaseException as error:
+                raise ImportError("initialization failed") from error
+
+        return load
+
+    folder = experiment()
+    monkeypatch.setattr(pipeline, "load", begins(KeyboardInterrupt()))
+    said = cli("fit", folder)
+    assert (said.status, said.err.splitlines()[-1]) == (130, "sysid: interrupted; nothing was written")
+    monkeypatch.setattr(pipeline, "load", begins(ValueError("no")))
+    said = cli("fit", folder)
+    assert said.status == 1 and "internal error, ImportError" in said.err
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 @pytest.mark.parametrize(("command", "kept"), [("discover", "the steps that were shown are kept"), ("diagnose", "nothing was written")])
 def test_ctrl_c_says_what_is_kept(experiment, tmp_path, command, kept):

@@ -54,12 +54,21 @@ def main() -> None:
             from ..mistyped import said
 
             _fail(said(error), getattr(error, "exit_code", 2))
-        if os.environ.get("SYSID_DEBUG"):
-            raise
-        _fail(f"internal error, {type(error).__name__}: {error}; SYSID_DEBUG=1 shows where", 1)
+        if not _of_ctrl_c(error):
+            if os.environ.get("SYSID_DEBUG"):
+                raise
+            _fail(f"internal error, {type(error).__name__}: {error}; SYSID_DEBUG=1 shows where", 1)
+        status = _INTERRUPTED
     if status == _INTERRUPTED:  # typer makes an exit of Ctrl-C and says nothing
         _fail(f"interrupted; {_kept(sys.argv[1:])}", _INTERRUPTED)
     _end(status if isinstance(status, int) else 0)
+
+
+def _of_ctrl_c(error: BaseException | None) -> bool:
+    """Whether an error comes of Ctrl-C: a library that is imported then says that it cannot begin."""
+    while error is not None and not isinstance(error, KeyboardInterrupt):
+        error = error.__cause__ or error.__context__
+    return error is not None
 
 
 def _allowed(untrusted) -> bool:
