@@ -8,7 +8,8 @@ by how far the residual falls. Only stretches that take more than chance gives o
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -27,6 +28,7 @@ MASS = slice(0, 4)  # m and m c: what a load is seen by first
 _RIDGE = 1e-6  # of what the body takes, where a short stretch tells a part of it alone
 _ROUNDS = 10  # of body and times in turn
 TAKES = 0.25  # of some joint's squared residual: less hides behind whatever else is missing
+_BEYOND = 0.1  # more must be left by all that acts on each joint alone: noise that is slow is taken by either
 _WHOLE = 0.95  # of a log's rows: that is all of it
 
 
@@ -56,20 +58,19 @@ def picked(view) -> list[Payload]:
         return []
     (columns,) = columns_of(view.source, made(name, ROBOT, {}, view.model.robot), [{}])
     parts = _Parts.of(view, columns[:, :, MASS] * view.weights[:, None, None])
-    there = parts.first()
-    if there is None:
+    if (found := parts.found()) is None:
         return []
-    there, shares, mass = parts.settled(there)
-    held = [there[rows].mean() for rows in parts.logs]
-    if not mass > 0.0 or shares.max() < TAKES or all(share < 1.0 - _WHOLE or share > _WHOLE for share in held):
+    there, *_ = found
+    if all(share < 1.0 - _WHOLE or share > _WHOLE for share in (there[rows].mean() for rows in parts.logs)):
         return []  # whole logs are asked anyway
     # what acts on single joints for a while, a torque's zero, a friction, is no body
     speed = view.rows.of(view.motion, "qd")
     plain = np.stack([np.ones_like(speed), speed, np.sign(speed)], axis=2).transpose(1, 0, 2) * view.rows.use.T[:, :, None]
-    if parts.takes(_apart(plain), there) >= parts.takes(parts.body, there):
+    whole = np.sum(parts.residual**2)
+    if whole - parts.takes(_apart(plain), there) < (1.0 + _BEYOND) * (whole - parts.takes(parts.body, there)):
         return []
-    found = told(view.rows, there, view.motion.pieces)
-    return [Picked(found)] if found else []
+    said = told(view.rows, there, view.motion.pieces)
+    return [Picked(said)] if said else []
 
 
 def _apart(columns: np.ndarray) -> np.ndarray:
@@ -108,15 +109,16 @@ class _Parts:
         logs = tuple(of_logs(view.rows.log))
         return cls(columns / np.maximum(size, 1e-300), view.design.columns, view.design.residual, logs, view.rows.t)
 
-    def first(self) -> np.ndarray | None:
-        """(n,) bool of the stretch that takes most; None where chance takes as much."""
+    def first(self) -> tuple[np.ndarray, np.ndarray]:
+        """Of the residual and of each draw of chance the rows (1 + draws, 2), from one to before another, of the stretch that takes
+        most, and what that takes (1 + draws,)."""
         cells = self._cells()
         sums = lambda a, b: np.stack([sum(a[j][s].T @ b[j][s] for j in range(len(a))) for s in cells])  # noqa: E731
-        shifted = self._shifted(np.random.default_rng(1))
+        shifted = self.drawn
         squares, cross = sums(self.body, self.body), sums(self.model, self.body)
         scores = sums(self.body, shifted)  # (cells, 4, 1 + draws)
         level = sum(a.T @ own for a, own in zip(self.model, shifted))  # what the model takes of each (k, 1 + draws)
-        best, most = None, np.zeros(shifted.shape[2])
+        best, most = np.zeros((shifted.shape[2], 2), dtype=int), np.zeros(shifted.shape[2])
         for spans in self._spans(cells):
             within = lambda a: _between(a, spans)  # noqa: E731, B023
             own, shared = within(squares), within(cross)
@@ -125,14 +127,27 @@ class _Parts:
             score = within(scores) - np.swapaxes(shared, 1, 2) @ level
             size = np.linalg.solve(left, score)
             gain = np.where(size[:, 0] > 0.0, np.sum(size * score, axis=1), 0.0)  # no load is lighter than none
-            if gain[:, 0].max() > most[0]:
-                best = spans[int(gain[:, 0].argmax())]
-            most = np.maximum(most, gain.max(axis=0))
-        if best is None or most[0] <= most[1:].max():
+            here, more = spans[gain.argmax(axis=0)], gain.max(axis=0) > most
+            best[more], most = here[more], np.maximum(most, gain.max(axis=0))
+        starts, stops = np.array([cell.start for cell in cells]), np.array([cell.stop for cell in cells])
+        return np.column_stack([starts[best[:, 0]], stops[np.maximum(best[:, 1], 1) - 1]]), most
+
+    def found(self) -> tuple[np.ndarray, np.ndarray, float] | None:
+        """The stretches (n,) bool, what the body takes of each joint's squares (dof,), and its mass on the scale of its column; None
+        where chance takes as much, or where the body is none."""
+        rows, most = self.first()
+        if not most[0] > most[1:].max():
             return None
-        there = np.zeros(len(self.t), dtype=bool)
-        there[cells[best[0]].start : cells[best[1] - 1].stop] = True
-        return there
+        within = lambda k: (np.arange(len(self.t)) >= rows[k, 0]) & (np.arange(len(self.t)) < rows[k, 1])  # noqa: E731
+        there, shares, mass = self.settled(within(0))
+        if not mass > 0.0 or shares.max() < TAKES:
+            return None
+        takes = self.takes(self.body, there)
+        for k in range(1, len(most)):  # and so do stretches that are found in a draw as these were
+            one = replace(self, residual=self.drawn[:, :, k].T)
+            if one.takes(self.body, one.settled(within(k))[0]) >= takes:
+                return None
+        return there, shares, mass
 
     def settled(self, there: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
         """(n,) bool of all stretches that have the body of some, body and stretches found in turn; what it takes of each joint's
@@ -183,9 +198,10 @@ class _Parts:
             length *= _TIMES
             least = max(least + 1, int(length))
 
-    def _shifted(self, rng) -> np.ndarray:
+    @cached_property
+    def drawn(self) -> np.ndarray:
         """The residual (dof, n, 1 + draws), first as it is, then each log's turned round in time: what it is, and not when."""
-        out = [self.residual]
+        rng, out = np.random.default_rng(1), [self.residual]
         for _ in range(_DRAWS):
             own = [np.roll(self.residual[rows], rng.integers(1, max(rows.stop - rows.start, 2)), axis=0) for rows in self.logs]
             out.append(np.concatenate(own))

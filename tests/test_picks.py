@@ -98,12 +98,12 @@ def test_stretches_are_found_with_the_body_and_chance_finds_none():
     held = np.zeros(800, dtype=bool)
     held[60:220], held[500:600] = True, True
     found = 0
-    for seed in range(20):
+    for seed in range(8):
         own, _ = parts(np.random.default_rng(seed), held, 150.0)
-        there, shares, mass = own.settled(own.first())
+        there, shares, mass = own.found()
         assert np.mean(there != held) < 0.02 and shares.max() > 0.25 and mass > 0.0
-        found += parts(np.random.default_rng(100 + seed), 0.0 * held)[0].first() is not None
-    assert found <= 2  # at one per cent, three of twenty come once in a thousand times
+        found += parts(np.random.default_rng(100 + seed), 0.0 * held)[0].found() is not None
+    assert found <= 1  # at one per cent, two of eight come once in four hundred times
 
 
 def test_a_stretch_takes_more_than_a_second_does():
@@ -160,3 +160,12 @@ def test_one_load_or_none_is_no_campaign(campaign):
     assert loads.levels(np.array([0.0, 1.0, 0.05])) == [[0, 2], [1]]
     short = replace(campaign, settled=replace(campaign.settled, rows=replace(campaign.rows, log=np.minimum(campaign.rows.log, 1))))
     assert loads.loads(short) == {} and not [*loads.told(short)]
+
+
+def test_slow_noise_in_moves_is_no_load(tmp_path):
+    """Of noise that lasts for 0.3 s, in logs of a few moves, a body in stretches that are chosen for it took 30 %, and so did what acts on each joint."""
+    machine_of, machine = experiment_of("planar", tmp_path)
+    write(simulate(machine, seed=1168531279, duration=20.0, rate=200.0, colour=0.3, motion="moves"), machine_of, tmp_path / "logs")
+    experiment = pipeline.started(pipeline.load(tmp_path / "logs"))
+    fit = pipeline.fit(experiment)
+    assert picked(first_view(fit.experiment, fit)) == []
