@@ -95,19 +95,20 @@ def _twice(pieces: Sequence[Piece]) -> bool:
 @dataclass(frozen=True)
 class _Parts:
     """What is looked at: weighted columns of the body (dof, n, 4), each of size one, of the model (dof, n, k) and the residual
-    (n, dof); the rows of each log; t (n,) [s]."""
+    (n, dof); the rows of each log; t (n,) [s]; which rows count, use (n, dof)."""
 
     body: np.ndarray
     model: np.ndarray
     residual: np.ndarray
     logs: tuple[slice, ...]
     t: np.ndarray
+    use: np.ndarray
 
     @classmethod
     def of(cls, view, columns: np.ndarray) -> _Parts:
         size = np.sqrt(np.einsum("jnk,jnk->k", columns, columns))
         logs = tuple(of_logs(view.rows.log))
-        return cls(columns / np.maximum(size, 1e-300), view.design.columns, view.design.residual, logs, view.rows.t)
+        return cls(columns / np.maximum(size, 1e-300), view.design.columns, view.design.residual, logs, view.rows.t, view.rows.use)
 
     def first(self) -> tuple[np.ndarray, np.ndarray]:
         """Of the residual and of each draw of chance the rows (1 + draws, 2), from one to before another, of the stretch that takes
@@ -203,8 +204,13 @@ class _Parts:
         """The residual (dof, n, 1 + draws), first as it is, then each log's turned round in time: what it is, and not when."""
         rng, out = np.random.default_rng(1), [self.residual]
         for _ in range(_DRAWS):
-            own = [np.roll(self.residual[rows], rng.integers(1, max(rows.stop - rows.start, 2)), axis=0) for rows in self.logs]
-            out.append(np.concatenate(own))
+            own = np.zeros_like(self.residual)
+            for rows in self.logs:
+                turn = rng.uniform()
+                for j, use in enumerate(self.use[rows].T):  # among the rows that count: elsewhere there is nothing to take
+                    there = rows.start + np.flatnonzero(use)
+                    own[there, j] = np.roll(self.residual[there, j], int(turn * len(there)))
+            out.append(own)
         return np.stack(out, axis=2).transpose(1, 0, 2)
 
 

@@ -91,7 +91,7 @@ def parts(rng, held, size=1.0):
     residual = slow(800, 2) + torque * held[:, None]
     level = sum(a.T @ residual[:, j] for j, a in enumerate(turn))
     residual = residual - np.stack([a @ level for a in turn], axis=1)
-    return _Parts(body, turn, residual, tuple(of_logs(np.repeat([0, 1], 400))), t), torque
+    return _Parts(body, turn, residual, tuple(of_logs(np.repeat([0, 1], 400))), t, np.ones((800, 2), dtype=bool)), torque
 
 
 def test_stretches_are_found_with_the_body_and_chance_finds_none():
