@@ -25,6 +25,7 @@ _SHORTEST = 1.0  # s: of a stretch
 _TIMES = 1.4  # how much longer the next length that is tried is
 _DRAWS = 99  # of chance: a residual that beats them all is there at one per cent
 MASS = slice(0, 4)  # m and m c: what a load is seen by first
+_TURN = 0.1  # of a log, at least: by less it is much as it was
 _RIDGE = 1e-6  # of what the body takes, where a short stretch tells a part of it alone
 _ROUNDS = 10  # of body and times in turn
 TAKES = 0.25  # of some joint's squared residual: less hides behind whatever else is missing
@@ -206,7 +207,7 @@ class _Parts:
         for _ in range(_DRAWS):
             own = np.zeros_like(self.residual)
             for rows in self.logs:
-                turn = rng.uniform()
+                turn = rng.uniform(_TURN, 1.0 - _TURN)
                 for j, use in enumerate(self.use[rows].T):  # among the rows that count: elsewhere there is nothing to take
                     there = rows.start + np.flatnonzero(use)
                     own[there, j] = np.roll(self.residual[there, j], int(turn * len(there)))
