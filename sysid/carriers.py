@@ -10,10 +10,10 @@ from . import blocks
 from . import rows as row
 from .candidates import Candidate, made
 from .estimate import Fit
+from .for_a_while import of_logs, stretches, told
 from .inertia.consistency import is_consistent
 from .inertia.pseudo import from_central
 from .motion import Motion
-from .picks import of_logs, stretches, told
 
 _PARTS, _CLEAR = 12, 2.0  # stretches of a log's rows, by which a fall is held against its standard error
 

@@ -36,6 +36,8 @@ def build(robot: Robot, effects, folder: Path = Path(), signals=(), groups: Mapp
         effect = found(spec, folder, signals)
         if effect.scope == "robot" and spec.joints is not None:
             raise ConfigError(f"model.effects: {effect.name} is an effect of the whole robot", allowed="no joints", do="leave `joints` out")
+        if effect.needs_logs and effect.logs is None and spec.per is None:
+            raise ConfigError(f"model.effects: {effect.name} needs logs", allowed="the logs that have it, as logs: [after.csv]", do="name them, or the group that it is per")
         names = ["*"] if effect.scope == "robot" else spec.joints if spec.joints is not None else list(robot.joints)
         joints = []
         for name in names:

@@ -10,8 +10,9 @@ import numpy as np
 from .candidate_columns import columns_of
 from .candidates import made
 from .effects.payload import Payload
+from .for_a_while import of_logs
 from .model_parameters import ROBOT
-from .picks import MASS, TAKES, of_logs
+from .picks import MASS, TAKES
 from .vocabulary import find
 
 _APART = 0.1  # of the greatest difference: loads that differ by less are one level

@@ -128,9 +128,9 @@ def test_a_load_is_looked_for_as_a_body_that_can_be():
 def test_logs_that_have_most_of_it_are_asked_together():
     """Of five logs each is asked alone; then the two with most of it, three, and four."""
     robot, masses = arm()[1].robot, {"a": 0.1, "b": 0.7, "c": -0.2, "d": 0.8, "e": 0.6}
-    group = lambda logs, mass: SimpleNamespace(candidate=made(Payload(), -1, {"logs": list(logs)}, robot), coefficients=[mass, 9.0])  # noqa: E731
+    group = lambda logs, mass: SimpleNamespace(candidate=made(Payload(), -1, {"logs": list(logs)}, robot), coefficients=[mass, 9.0], sizes=[1.0, 1.0])  # noqa: E731
     asked = [group(log, mass) for log, mass in masses.items()]
-    other = SimpleNamespace(candidate=made(find("gravity_tilt"), -1, {}, robot), coefficients=[5.0])
+    other = SimpleNamespace(candidate=made(find("gravity_tilt"), -1, {}, robot), coefficients=[5.0], sizes=[1.0])
     assert [dict(one.options)["logs"] for one in together([*asked, other], robot)] == [("b", "d"), ("b", "d", "e"), ("a", "b", "d", "e")]
     # of few all were asked already
     assert together([group("a", 1.0), group("b", 2.0), group("c", 2.0), group("ab", 2.0)], robot) == [] == together([other], robot)

@@ -14,7 +14,8 @@ from scripts.blind_parts.robots import experiment_of
 from sysid import effect_options, loads, pipeline, vocabulary
 from sysid.diagnose.diagnosis import diagnose
 from sysid.errors import ConfigError
-from sysid.picks import _Parts, _twice, of_logs, picked, stretches, told
+from sysid.for_a_while import of_logs, stretches, told, twice
+from sysid.picks import _Parts, picked
 from sysid.simulate import simulate, write
 from sysid.statement.document import document
 from sysid.view import first_view
@@ -76,7 +77,7 @@ def test_stretches_are_told_in_the_clock_of_their_log():
     assert told(rows, rows.t > 25.005, pieces) == ["x.csv 25.01 29.99"]
     assert told(rows, (rows.t > 3.005) & (rows.t < 8.995) | (rows.t > 20.0) & (rows.t < 21.995), pieces) == ["x.csv 3.01 9.00", "x.csv 20.00 22.00"]
     assert told(rows, (rows.t > 3.0) & (rows.t < 3.2), pieces) == []
-    assert not _twice(pieces) and _twice([*pieces, piece(2, t[1] + 2.0)]) and not _twice([piece(0, t[0]), piece(0, t[0] + 5.0)])
+    assert not twice(pieces) and twice([*pieces, piece(2, t[1] + 2.0)]) and not twice([piece(0, t[0]), piece(0, t[0] + 5.0)])
 
 
 def parts(rng, held, size=1.0):

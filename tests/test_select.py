@@ -306,9 +306,10 @@ def test_another_variant_of_what_joined_later_may_stand_for_a_head_that_is_refus
     def borne_out(near, last, with_):
         asked.append([m.candidate for m in near])
         good = [m for m in near if borne and m is two]
-        return (good[0], {id(two): SimpleNamespace()}, "no") if good else (None, {}, "no")
+        whys = {id(m): "no" for m in near if m not in good}
+        return (good[0], {id(two): SimpleNamespace()}, whys) if good else (None, {}, whys)
 
-    monkeypatch.setattr(claims, "_borne_out", borne_out)
+    monkeypatch.setattr(claims, "first_borne_out", borne_out)
     monkeypatch.setattr(claims, "taken", lambda *views: np.zeros(2))
     monkeypatch.setattr(claims, "rejoined", lambda first, own: own)
     monkeypatch.setattr(claims.pipeline, "fit_grown", lambda *given, **how: SimpleNamespace())

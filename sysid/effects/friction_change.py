@@ -5,7 +5,6 @@ import numpy as np
 from ..effect import TorqueEffect
 from ..effect_options import subsets, texts
 from ..effect_parameters import Linear
-from ..errors import ConfigError
 
 
 class FrictionChange(TorqueEffect):
@@ -19,7 +18,6 @@ class FrictionChange(TorqueEffect):
     source = "Simoni, Beschi, Legnani & Visioli 2017"
     options = {"logs": "the logs that have it, by their names under `data`"}
 
-    instantaneous = False  # q, qd and qdd do not say the log
     either_way = True
     needs_logs = True
     logs = None
@@ -31,10 +29,9 @@ class FrictionChange(TorqueEffect):
         texts(chosen, "logs")
         return chosen
 
-    def bound(self, robot, joint):
-        if self.logs is None:
-            raise ConfigError("friction_change needs logs", where="model.effects", allowed="the logs that have it, as logs: [after.csv]", do="name them; in all logs it is viscous and coulomb, which may be per a group of logs")
-        return self
+    @property
+    def instantaneous(self):
+        return self.logs is None
 
     def variants(self, robot, joint):
         """None: in all logs it is what every joint has."""
