@@ -3,11 +3,11 @@
 import numpy as np
 
 from ..effect import TorqueEffect
-from ..effect_options import subsets, texts
 from ..effect_parameters import Linear
+from ..in_logs import InLogs
 
 
-class FrictionChange(TorqueEffect):
+class FrictionChange(InLogs, TorqueEffect):
     """Friction is another in some logs than in the others: grease that was renewed, a seal or a belt that was tightened, a cold morning."""
 
     name = "friction_change"
@@ -18,30 +18,13 @@ class FrictionChange(TorqueEffect):
     source = "Simoni, Beschi, Legnani & Visioli 2017"
     options = {"logs": "the logs that have it, by their names under `data`"}
 
-    either_way = True
     needs_logs = True
-    logs = None
     dFv = Linear("N m s/rad", says="what the viscous coefficient is more there")
     dFc = Linear("N m", says="what Coulomb friction is more there")
-
-    def given(self, **options):
-        chosen = super().given(**options)
-        texts(chosen, "logs")
-        return chosen
-
-    @property
-    def instantaneous(self):
-        return self.logs is None
 
     def variants(self, robot, joint):
         """None: in all logs it is what every joint has."""
         return []
-
-    def among(self, logs):
-        return subsets(logs, half=self.either_way)
-
-    def present(self, motion):
-        return self.logs is None or motion.source in self.logs
 
     def columns(self, motion, joint):
         there = float(self.present(motion))
