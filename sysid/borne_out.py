@@ -95,6 +95,19 @@ def first_borne_out(near: Sequence, last: Fit, with_: Callable):
     return found, fits, whys
 
 
+def beaten(near: Sequence, head, fits: dict, whys: dict) -> set:
+    """The keys of members that fits do not bear out and that leave clearly more of the test logs than
+    the head: they are no rivals of it. Of those that read torque late none is: the noise of angles
+    bends their fits."""
+    out = set()
+    for member in near:
+        if id(member) in whys and id(member) in fits and member.candidate.late is None:
+            risen = comparison.together(fits[id(head)], fits[id(member)])
+            clear = risen.delta_rms > max(CLEAR * risen.se, _WORTH)
+            out |= {member.candidate.key} if clear else set()
+    return out
+
+
 def beside(fit: Fit, candidate: Candidate) -> bool:
     """Whether a fit has an effect on a candidate's joint beyond what every joint has: a law that is
     not quite the catalogue's leaves a rest, and what the training logs have of it the test logs must

@@ -16,7 +16,7 @@ import polars
 import pytest
 from ruamel.yaml import YAML
 
-from sysid import effect_entry, fit_document, loop, pipeline, results, simulate, vocabulary
+from sysid import borne_out, effect_entry, fit_document, loop, pipeline, results, simulate, vocabulary
 from sysid.addition import command, grown, spelled
 from sysid.candidates import Candidate
 from sysid.diagnose import claims, select, steps
@@ -255,8 +255,8 @@ def test_what_the_test_logs_refuse_is_not_claimed(simulated, tmp_path):
 @pytest.mark.long
 def test_where_fits_refuse_the_head_the_next_of_its_set_is_claimed(simulated, monkeypatch):
     """Logs that cannot tell a bias from friction that differs with the direction cannot refuse both by refusing one."""
-    real = claims.doubted
-    monkeypatch.setattr(claims, "doubted", lambda *given: "not it" if given[-1].name == "torque_bias" else real(*given))
+    real = borne_out.doubted
+    monkeypatch.setattr(borne_out, "doubted", lambda *given: "not it" if given[-1].name == "torque_bias" else real(*given))
     experiment = pipeline.load(simulated(*BIAS))
     found = diagnose(experiment)
     (claim,) = found.claims
@@ -265,7 +265,7 @@ def test_where_fits_refuse_the_head_the_next_of_its_set_is_claimed(simulated, mo
     assert [f.effect for f in claim.findings] == ["asymmetric_coulomb", "torque_bias"]
     assert claim.head.command.split()[3] == "asymmetric_coulomb" and claim.after.parameters_of("asymmetric_coulomb", 1)
     assert [name for name, *_ in claim.set] == ["asymmetric_coulomb", "torque_bias"]
-    monkeypatch.setattr(claims, "doubted", lambda *given: f"not {given[-1].name}")
+    monkeypatch.setattr(borne_out, "doubted", lambda *given: f"not {given[-1].name}")
     (refused,) = diagnose(experiment).refused
     assert (refused.effect, refused.why) == ("torque_bias", "not torque_bias")
 
@@ -273,7 +273,7 @@ def test_where_fits_refuse_the_head_the_next_of_its_set_is_claimed(simulated, mo
 @pytest.mark.long
 def test_what_is_refused_alone_is_asked_again_beside_what_stands(simulated, monkeypatch):
     """The search found the first beside the second: fits may bear it out only with that one in the model."""
-    real, asked = claims.doubted, []
+    real, asked = borne_out.doubted, []
 
     def doubted(before, *others):
         candidate = others[-1]
@@ -281,7 +281,7 @@ def test_what_is_refused_alone_is_asked_again_beside_what_stands(simulated, monk
         alone = candidate.name == asked[0] and not before.model.terms[-1][0].name == "load_friction"
         return "too much else is missing" if alone else real(before, *others)
 
-    monkeypatch.setattr(claims, "doubted", doubted)
+    monkeypatch.setattr(borne_out, "doubted", doubted)
     found = diagnose(pipeline.load(simulated(*TWO)))
     first, second = ("cogging", "load_friction")
     assert asked == [first, second, first]

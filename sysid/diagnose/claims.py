@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from .. import pipeline
-from ..borne_out import beside, first_borne_out, size_told, tried
+from ..borne_out import beaten, beside, first_borne_out, size_told, tried
 from ..carriers import with_tests
 from ..estimate import Fit
 from ..failures import taken
@@ -81,10 +81,10 @@ def claimed(
             continue
         if why:
             refused[~number] = last, Refused(*own)
-        beaten = {m.candidate.key for m, _ in near if id(m) in whys}  # no rivals of what stands
-        step = replace(step, choice=step.choice.headed(head).without(beaten))
-        tied = lambda m, p: m is head or (p >= _LIKELY and free(m.candidate))  # noqa: B023, E731
-        near = [one for one in step.choice.members if tied(*one)][:_FITTED]
+        no_rivals = beaten([m for m, _ in near], head, fits, whys)
+        step = replace(step, choice=step.choice.headed(head).without(no_rivals))
+        listed = {id(m) for m, p in near if p >= _LIKELY or id(m) in fits}
+        near = [one for one in step.choice.members if id(one[0]) in listed]
         fits = [fits[id(m)] if id(m) in fits else with_(pipeline.fit_grown, m) for m, _ in near]
         found = [finding(last, a, m, p, step, len(stands)) for a, (m, p) in zip(fits, near)]
         set_ = tuple((*m.candidate.named(fit.joints), p) for m, p in step.choice.members)
