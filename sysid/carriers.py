@@ -10,7 +10,7 @@ from . import blocks
 from . import rows as row
 from .candidates import Candidate, made
 from .estimate import Fit
-from .for_a_while import of_logs, stretches, told
+from .for_a_while import stretches, told
 from .inertia.consistency import is_consistent
 from .inertia.pseudo import from_central
 from .motion import Motion
@@ -57,9 +57,9 @@ def _stretches(candidate: Candidate, view, fit: Fit, test: Motion) -> list[str]:
     """The stretches of the test logs that have a load that parts of training logs have."""
     names = dict.fromkeys(piece.source for piece in test.pieces)
     found, left, torque = _weighed(_in(candidate, {"logs": list(names)}, fit), view, fit, test)
-    gain, there = np.sum(left**2 - (left - torque) ** 2, axis=1), stretches(found.t, of_logs(found.log), left, torque)
+    gain, there = np.sum(left**2 - (left - torque) ** 2, axis=1), stretches(found.t, blocks.by_block(found.log), left, torque)
     # of each log on its own: by stretches that were chosen for it the error falls somewhat in any case
-    own = [rows for rows in of_logs(found.log) if _falls(gain[rows][there[rows]])]
+    own = [rows for rows in blocks.by_block(found.log) if _falls(gain[rows][there[rows]])]
     kept = np.zeros_like(there)
     for rows in own:
         kept[rows] = there[rows]

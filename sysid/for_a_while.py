@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from .blocks import by_block
 from .motion import Piece
 
 SHORTEST = 1.0  # s: of a stretch
@@ -53,7 +54,7 @@ def told(rows, there: np.ndarray, pieces: Sequence[Piece]) -> list[str]:
         rows: `rows.Rows` of the pieces, those of one log together.
     """
     out = []
-    for own in (own for own in of_logs(rows.log) if own.stop - own.start > 1):
+    for own in (own for own in by_block(rows.log) if own.stop - own.start > 1):
         name, clock = pieces[rows.piece[own.start]].source, rows.t[own]
         whole = [piece for piece in pieces if piece.log == rows.log[own.start]]
         hidden = (3 + (whole[0].smoother.reach if whole[0].smoother else 0)) * whole[0].step
@@ -65,9 +66,3 @@ def told(rows, there: np.ndarray, pieces: Sequence[Piece]) -> list[str]:
             if stop - start > 0.5 * SHORTEST:
                 out.append(f"{name} {start:.2f} {stop:.2f}")
     return out
-
-
-def of_logs(log: np.ndarray) -> list[slice]:
-    """The rows of each log, of the number (n,) of the log of each row."""
-    cuts = np.concatenate([[0], np.flatnonzero(np.diff(log)) + 1, [len(log)]])
-    return [slice(a, b) for a, b in zip(cuts, cuts[1:])]

@@ -7,10 +7,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from .blocks import by_block
 from .candidate_columns import columns_of
 from .candidates import made
 from .effects.payload import Payload
-from .for_a_while import of_logs
 from .model_parameters import ROBOT
 from .picks import MASS, TAKES
 from .vocabulary import find
@@ -26,7 +26,7 @@ def loads(view) -> dict[str, float]:
     Args:
         view: of the model, a `view.View`.
     """
-    parts = of_logs(view.rows.log)
+    parts = by_block(view.rows.log)
     if len(parts) < 3 or any(effect.name == Payload.name for effect, _ in view.model.terms):
         return {}
     (columns,) = columns_of(view.source, made(find(Payload.name), ROBOT, {}, view.model.robot), [{}])

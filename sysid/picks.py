@@ -13,10 +13,11 @@ from functools import cached_property
 
 import numpy as np
 
+from .blocks import by_block
 from .candidate_columns import columns_of
 from .candidates import made
 from .effects.payload import Payload
-from .for_a_while import SHORTEST, of_logs, stretches, told, twice
+from .for_a_while import SHORTEST, stretches, told, twice
 from .model_parameters import ROBOT
 from .vocabulary import find
 
@@ -97,7 +98,7 @@ class _Parts:
     @classmethod
     def of(cls, view, columns: np.ndarray) -> _Parts:
         size = np.sqrt(np.einsum("jnk,jnk->k", columns, columns))
-        logs = tuple(of_logs(view.rows.log))
+        logs = tuple(by_block(view.rows.log))
         return cls(columns / np.maximum(size, 1e-300), view.design.columns, view.design.residual, logs, view.rows.t, view.rows.use)
 
     def first(self) -> tuple[np.ndarray, np.ndarray]:
@@ -173,8 +174,7 @@ class _Parts:
         size, out = max(0.5 * SHORTEST, seconds / _CELLS), []
         for rows in self.logs:
             number = ((self.t[rows] - self.t[rows][0]) / size).astype(int)
-            cuts = np.concatenate([[0], np.flatnonzero(np.diff(number)) + 1, [len(number)]]) + rows.start
-            out += [slice(a, b) for a, b in zip(cuts, cuts[1:])]
+            out += [slice(rows.start + own.start, rows.start + own.stop) for own in by_block(number)]
         return out
 
     def _spans(self, cells: list[slice]) -> Iterator[np.ndarray]:

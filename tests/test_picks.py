@@ -12,9 +12,10 @@ from scipy.signal import savgol_filter
 
 from scripts.blind_parts.robots import experiment_of
 from sysid import effect_options, loads, pipeline, vocabulary
+from sysid.blocks import by_block
 from sysid.diagnose.diagnosis import diagnose
 from sysid.errors import ConfigError
-from sysid.for_a_while import of_logs, stretches, told, twice
+from sysid.for_a_while import stretches, told, twice
 from sysid.picks import _Parts, picked
 from sysid.simulate import simulate, write
 from sysid.statement.document import document
@@ -92,7 +93,7 @@ def parts(rng, held, size=1.0):
     residual = slow(800, 2) + torque * held[:, None]
     level = sum(a.T @ residual[:, j] for j, a in enumerate(turn))
     residual = residual - np.stack([a @ level for a in turn], axis=1)
-    return _Parts(body, turn, residual, tuple(of_logs(np.repeat([0, 1], 400))), t, np.ones((800, 2), dtype=bool)), torque
+    return _Parts(body, turn, residual, tuple(by_block(np.repeat([0, 1], 400))), t, np.ones((800, 2), dtype=bool)), torque
 
 
 def test_stretches_are_found_with_the_body_and_chance_finds_none():

@@ -125,3 +125,9 @@ def summed(blocks, values, size: int | None = None) -> np.ndarray:
 def folds(count: int, most: int = 10) -> np.ndarray:
     """The fold (count,) of each block: neighbours together."""
     return np.arange(count) * min(most, count) // count
+
+
+def by_block(number: np.ndarray) -> list[slice]:
+    """The rows of each block, or log, of its number (n,): these stand in the order of the rows."""
+    cuts = np.concatenate([[0], np.flatnonzero(np.diff(number)) + 1, [len(number)]])
+    return [slice(a, b) for a, b in zip(cuts, cuts[1:])]

@@ -1,6 +1,7 @@
 """What a diagnosis looks at: a model settled on the motion of logs, and its least squares."""
 
-from .design import Design, Sums, by_block, designed, instrumented, summed
+from ..blocks import by_block
+from .design import Design, Sums, designed, instrumented, summed
 from .falls import falls
 from .joining import COMPARED, allowed, around, even, joined, shapes_in, shapes_of, weighed
 from .laws import law

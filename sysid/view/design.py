@@ -102,12 +102,6 @@ def instrumented(
     return r - np.einsum("jnk,k->nj", a, change), change
 
 
-def by_block(number: np.ndarray) -> list[slice]:
-    """The rows of each block; blocks are numbered in the order of the rows."""
-    cuts = np.concatenate([[0], np.flatnonzero(np.diff(number)) + 1, [len(number)]])
-    return [slice(a, b) for a, b in zip(cuts, cuts[1:])]
-
-
 def freed(squares: np.ndarray) -> np.ndarray:
     """(blocks, k, k) R by which A_b R A_b' + 1 is (1 - H_b)^(-1/2) of each block's rows A_b, where
     H_b = A_b A_b' is what a fit takes of their noise: times it, what the fit left of noise of one

@@ -8,7 +8,7 @@ import numpy as np
 
 from .. import blocks
 from ..lowpass import calm
-from .design import by_block, freed, instrumented
+from .design import freed, instrumented
 from .view import View
 
 
@@ -20,7 +20,7 @@ def losses(view: View, number: np.ndarray) -> np.ndarray:
     Row by row it is the square of (1 - H)^(-1/2) r, with H what the fold has of the fit: the product
     itself is one only of a fold, and its parts may be of either sign.
     """
-    design, spans = view.design, by_block(number)
+    design, spans = view.design, blocks.by_block(number)
     fold = blocks.folds(len(spans))
     out = np.zeros((len(spans), len(view.weights)))
     for f in range(fold.max() + 1):
@@ -42,7 +42,7 @@ def slow_losses(view: View, number: np.ndarray) -> np.ndarray:
     left, change = instrumented(design, use, *how)
     more = design.rough_residual - np.einsum("jnk,k->nj", design.rough_columns, change)
     told = np.sum(calm(left * use, *how) ** 2 - calm(more, *how) ** 2, axis=1)
-    return np.add.reduceat(told, [rows.start for rows in by_block(number)])
+    return np.add.reduceat(told, [rows.start for rows in blocks.by_block(number)])
 
 
 def taken(view: View, before: np.ndarray, after: np.ndarray) -> np.ndarray:

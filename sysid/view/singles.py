@@ -18,7 +18,6 @@ from scipy.special import log_ndtr, ndtri
 
 from .. import blocks
 from ..projection import DATA, FLAT, NOISE
-from .design import by_block
 from .stationary import drawn
 
 Columns = Callable[[], Iterable[tuple[list[str], np.ndarray]]]
@@ -173,7 +172,7 @@ class _Asker:
     each block tells of the model's own parameters."""
 
     def __init__(self, view, j: int, rng: np.random.Generator, draws: int):
-        design, sums, self.spans = view.design, view.sums, by_block(view.blocks)
+        design, sums, self.spans = view.design, view.sums, blocks.by_block(view.blocks)
         size = len(design.residual)
         told = np.zeros((len(self.spans), design.columns.shape[2], draws))
         for k, columns in enumerate(design.columns):

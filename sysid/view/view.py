@@ -19,7 +19,7 @@ from ..settled import Settled
 from ..shape import settle
 from ..source import Source
 from ..specs import Experiment
-from .design import Design, Sums, by_block, designed, instrumented, summed
+from .design import Design, Sums, designed, instrumented, summed
 from .stationary import spectra
 
 _FOLDS = 10
@@ -155,7 +155,7 @@ class View:
     @cached_property
     def sums(self) -> Sums:
         """The design's sums over blocks."""
-        return summed(self.design, by_block(self.blocks))
+        return summed(self.design, blocks.by_block(self.blocks))
 
     def rms(self) -> np.ndarray:
         """(dof,) of the low-passed residual on the training rows."""
