@@ -29,7 +29,8 @@ _ANGLES = 4.0
 # Laws are evaluated at this many samples a cycle of the cutoff: what is steeper than that, friction
 # at a reversal, is left out anyway.
 _SAMPLES_PER_CYCLE = 16.0
-_ROWS_PER_CYCLE = 4.2  # 63 Hz at 15 Hz: the sizes that can be told are those of 100 Hz to a thousandth
+# 63 Hz at 15 Hz: the sizes that can be told are those of 100 Hz to a thousandth
+_ROWS_PER_CYCLE = 4.2
 # The mean of so many frequencies of white noise is so far above its own in one of fifty thousand
 _TOGETHER, _ABOVE = 9, 3.0
 _SELDOM = 0.05  # of an octave
