@@ -24,10 +24,9 @@ from .angles import noise_of
 LEAST = 15.0  # Hz: where friction's laws and ripple still show, several times what an arm moves at
 _MOTION = 4.0  # and this many times the motion's own bandwidth, if that is more
 _SHARE = 0.25  # of the residual's power may be made by the angles' noise at the end of the band
-# the angles' own low-pass, as a multiple of the cutoff: derivatives need some, laws of motion none
-_ANGLES = 4.0
-# Laws are evaluated at this many samples a cycle of the cutoff: what is steeper than that, friction
-# at a reversal, is left out anyway.
+_ANGLES = 4.0  # cutoffs of the angles' own low-pass: derivatives need some, laws of motion none
+# Laws are evaluated at this many samples a cycle of the cutoff: friction at a reversal, which is
+# steeper, is left out anyway.
 _SAMPLES_PER_CYCLE = 16.0
 # 63 Hz at 15 Hz: the sizes that can be told are those of 100 Hz to a thousandth
 _ROWS_PER_CYCLE = 4.2
