@@ -12,6 +12,7 @@ _MOVING = 1.5  # quanta a sample: what moves as fast repeats no value
 _ABOUT = 4  # samples to either side whose speed is what the joint had
 # samples and s of torque: a shorter repeat costs less than the rows that a filter's reach would
 _FEWEST, _SHORTEST = 4, 0.02
+_FEW = 10  # repeats
 _HELD = 10  # samples at least of an angle that froze and never caught up
 _OFTEN = 0.25  # of the rows: what comes more often is the logger's way, not an event
 
@@ -20,8 +21,10 @@ def held_torque(tau, step: float, *, among: int = 1) -> list[tuple[int, int]]:
     """First and last samples of runs in which one joint's torque (n,), `step` [s] apart, is held.
 
     Where a share p of the samples repeats the one before, the longest of n runs of chance has
-    1 + ln(n / chance) / ln(1 / p) samples; p is that of the other runs. And a run is entered or
-    left by a jump that is none of the values' own grain: a coarse signal leaves its crest by one.
+    1 + ln(n / chance) / ln(1 / p) samples; p is that of the other runs, or the share of their
+    repeats that go on: coarse values that were resampled repeat seldom, but then for long. And a
+    run is entered or left by a jump that is none of the values' own grain: a coarse signal leaves
+    its crest by one.
 
     Args:
         among: as of `spikes`.
@@ -33,13 +36,21 @@ def held_torque(tau, step: float, *, among: int = 1) -> list[tuple[int, int]]:
     every = np.array(runs(size == 0.0), dtype=int).reshape(-1, 2) + [0, 1]  # samples
     long = np.zeros(len(every), dtype=bool)
     length = every[:, 1] - every[:, 0] + 1
+
+    def longer(p: float) -> np.ndarray:
+        longest = 1.0 + np.log(n * among / CHANCE) / np.log(1.0 / min(p, 1.0 - 1.0 / n))
+        return length > max(longest, _FEWEST, _SHORTEST / step)
+
     while True:
         p = max(np.sum(length[~long] - 1), 1.0) / max(n - 1 - np.sum(length[long] - 1), 2.0)
-        longest = 1.0 + np.log(n * among / CHANCE) / np.log(1.0 / min(p, 1.0 - 1.0 / n))
-        more = long | (length > max(longest, _FEWEST, _SHORTEST / step))
+        more = long | longer(p)
         if np.array_equal(more, long):
             break
         long = more
+    repeats = np.sum(length[~long] - 1)
+    # of few repeats nobody knows how many go on: some, as if it were the share of all
+    on = (repeats - np.sum(~long) + _FEW * p) / (repeats + _FEW)
+    long &= longer(max(p, on))
     ends = np.concatenate([[0.0], size, [0.0]])
     grain, usual = _GRAINS * quantum(tau), np.median(size[size > 0.0])
     extreme = (tau == tau.min()) | (tau == tau.max())  # what clips gets there at any slope

@@ -16,6 +16,7 @@ from ..carriers import with_tests
 from ..estimate import Fit
 from ..failures import taken
 from ..motion import Motion
+from ..simpler import with_simpler
 from ..unexplained import Refused, raw
 from .findings import Finding, finding
 from .refits import Member
@@ -82,10 +83,12 @@ def claimed(
         if why:
             refused[~number] = last, Refused(*own)
         no_rivals = beaten([m for m, _ in near], head, fits, whys)
-        step = replace(step, choice=step.choice.headed(head).without(no_rivals))
-        listed = {id(m) for m, p in near if p >= _LIKELY or id(m) in fits}
+        choice = step.choice.headed(head).without(no_rivals)
+        alone = lambda member: with_(pipeline.fit_grown, member)  # noqa: E731
+        step = replace(step, choice=with_simpler(choice, fits, alone))
+        listed = {id(m) for m, p in near if p >= _LIKELY} | set(fits)
         near = [one for one in step.choice.members if id(one[0]) in listed]
-        fits = [fits[id(m)] if id(m) in fits else with_(pipeline.fit_grown, m) for m, _ in near]
+        fits = [fits[id(m)] if id(m) in fits else alone(m) for m, _ in near]
         found = [finding(last, a, m, p, step, len(stands)) for a, (m, p) in zip(fits, near)]
         set_ = tuple((*m.candidate.named(fit.joints), p) for m, p in step.choice.members)
         stands[number] = Claim(step, tuple(found), last, fits[0], set_)
