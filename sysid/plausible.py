@@ -69,9 +69,11 @@ def _left(joint: str) -> str:
 
 
 def outdated(fit: Fit, last: Fit) -> list[str]:
-    """Notices of a fit on means by log that another one, with what is claimed, has none of."""
+    """Notices of a fit on means by log, and on masses and what would bring them back, that another one, with what is claimed, has none
+    of."""
     before, after = ({joint: found[0] for joint, found in other_means(one, one.logs).items()} for one in (fit, last))
     gone = tuple(_left(joint) for joint in before if after.get(joint, 0.0) <= _SHARE)
+    gone += (fit.masses["says"],) if fit.masses and not last.masses else ()
     return [notice for notice in fit.notices if notice.startswith(gone)]
 
 

@@ -57,6 +57,8 @@ def test_logs_are_checked_before_an_effect_mends_what_wrong_columns_bent(capsys,
     assert "next: sysid check" in capsys.readouterr().out
     assert mended_first(heavy, experiment, masses)
     assert "next: sysid add arm payload" in capsys.readouterr().out
+    assert not mended_first(heavy, experiment, masses, diagnosed=False)  # bodies hide some effects, a diagnosis asks all
+    assert capsys.readouterr().out == ""
     (tmp_path / "check.json").write_text(json.dumps({"ok": True, "faults": []}))
     assert mended_first(worse, experiment, masses)  # it has been checked
     assert "next: sysid add arm payload" in capsys.readouterr().out

@@ -60,5 +60,13 @@ def test_a_mean_by_log_that_a_claim_takes_is_no_longer_told(monkeypatch):
     means = {"fit": {"a": (0.5,), "b": (0.4,)}, "last": {"a": (0.02,), "b": (0.4,)}}
     monkeypatch.setattr(plausible, "other_means", lambda one, logs: means[one.name])
     said = [f"what is left of {joint} is another in some logs, in the mean +1 N m in a.csv" for joint in "ab"]
-    fit, last = (SimpleNamespace(name=name, logs=(), notices=["rows are left out", *said]) for name in means)
+    fit, last = (SimpleNamespace(name=name, logs=(), notices=["rows are left out", *said], masses={}) for name in means)
     assert outdated(fit, last) == said[:1] and outdated(fit, fit) == []
+
+
+def test_masses_that_a_claim_brings_back_are_no_longer_told(monkeypatch):
+    """What else would have brought them back is beside what was named."""
+    monkeypatch.setattr(plausible, "other_means", lambda one, logs: {})
+    says = "implausible masses, the URDF's in brackets: fore 9 kg (2 kg); the effect spring brings them back"
+    fit, last = (SimpleNamespace(logs=(), notices=[says], masses=own) for own in ({"says": says}, {}))
+    assert outdated(fit, last) == [says] and outdated(fit, fit) == []

@@ -37,12 +37,13 @@ def implausible(document: dict) -> list[str]:
     return [notice for notice in document["notices"] if notice.startswith(BEGINS)]
 
 
-def mended_first(document: dict, experiment, masses: dict) -> bool:
+def mended_first(document: dict, experiment, masses: dict, *, diagnosed: bool = True) -> bool:
     """Tell what is done before anything that rests on numbers that cannot be meant: what brings masses back, where that is
     known; else a check of the logs, once. False where there is nothing of the kind.
 
     Args:
         masses: of a fit, as `masses.document` has them.
+        diagnosed: whether all effects were asked; else a diagnosis names more of them than those that bodies can hide.
     """
     if not implausible(document):
         return False
@@ -56,6 +57,8 @@ def mended_first(document: dict, experiment, masses: dict) -> bool:
     elif masses.get("prior_weight") is not None:
         adds = f" and type {masses['command']}" if masses.get("command") else ""
         next_step("fit", target, first=f"the masses cannot be meant: write `weight: auto` under `prior:` in {experiment.path}{adds}", out=out)
+    elif masses.get("command") and not diagnosed:
+        return False
     elif masses.get("command"):
         next_line(masses["command"], out=out)
     elif masses.get("stronger"):
