@@ -19,6 +19,7 @@ from functools import cached_property
 import numpy as np
 
 from .clock_jumps import light, spread, within
+from .jump_response import JumpResponse
 from .motion import Piece
 from .outliers import CHANCE, NORMAL, NOTHING, SHORT, SPIKE, quantum, ratio, runs
 from .running import running
@@ -28,8 +29,9 @@ _TOP = 0.95  # of the largest about it: a jump stands within a few samples of th
 _MOST = 0.5  # of the square of what a torque does there, which is a jump's wave
 _WHOLLY = 0.99  # of a torque, that is a wave: noise and a filter's edge leave no more
 _LATE = 0.03  # s: as far as effects have torque stamped too late or too early
+_BESIDE = 3  # jumps within two windows of one, the greatest
+_SELDOM = 2.33  # deviations: noise of an acceleration has that sign and size in a row of a hundred
 _ROUNDS = 4  # of two jumps within a window the greater hides a part of the other
-_ROUNDING = 1e-12  # of what a second pass takes away of a jump by one, squared; of a wave's ends
 
 
 def jumps(
@@ -44,12 +46,12 @@ def jumps(
         counts: of each piece the rows (n, dof) bool in which a joint moves and is not disturbed.
     """
     out = [np.zeros(piece.q.shape, dtype=bool) for piece in pieces]
-    known: dict[float, _Response | None] = {}
+    known: dict[float, JumpResponse | None] = {}
     seen: list[_Seen] = []
     for piece, smoother, moves, found in zip(pieces, smoothers, counts, out):
         if 0 < 6 * smoother.reach < len(piece.t):
             if smoother.step not in known:
-                known[smoother.step] = _Response.of(smoother, piece)
+                known[smoother.step] = JumpResponse.of(smoother, piece)
             response = known[smoother.step]
             if response and (one := _seen(piece, response, moves, found)):
                 seen.append(one)
@@ -70,16 +72,18 @@ def jumps(
 @dataclass(frozen=True)
 class _Seen:
     """Of a piece in which joints move in the rows `moves` (n, dof): the jumps `size` (n, dof) of
-    its accelerations, each joint's in units of what noise may be, `limits` (dof,); its torque
+    its accelerations, each joint's in units of what noise may be, `limits` (dof,), of joints that
+    have any; `every` (n, dof) of all; its torque
     without spikes, `level` (n, dof), and how far it jumps, `told` (n, dof); `rest` (n, dof) of the
     torque beyond the filter's band, as large as white noise in it, as the fit sees it; `found` (n,
     dof), where its bent rows are told.
     """
 
-    response: _Response
+    response: JumpResponse
     piece: Piece
     moves: np.ndarray
     size: np.ndarray
+    every: np.ndarray
     limits: np.ndarray
     level: np.ndarray
     told: np.ndarray
@@ -109,7 +113,7 @@ class _Seen:
 
         Source: Högbom 1974 (CLEAN).
         """
-        reach, memory = self.response.near, self.response.memory
+        reach = self.response.near
         near = running(self.sure.astype(float), 2 * reach + 1, "max") > 0.0
         left, at, by = np.where(near[:, None], self.size, 0.0), [], []
         for _ in range(_ROUNDS):
@@ -119,11 +123,19 @@ class _Seen:
             if not found:
                 break
             at, by = at + found, by + [*left[found]]
-            for k in found:  # of two within a window each may have a part of the other
-                jump, low, high = left[k].copy(), max(0, k - memory), min(len(left), k + memory + 1)
-                start = low - k + memory
-                left[low:high] -= self.response.alike[start : start + high - low, None] * jump
+            left = self._without(left, found)
         return np.array(at, dtype=int), np.reshape(by, (len(at), self.size.shape[1]))
+
+    def _without(self, values: np.ndarray, at) -> np.ndarray:
+        """Values (n, ...) less the waves of jumps at rows, of each what those before it left."""
+        left, memory = values.copy(), self.response.memory
+        for k in at:  # of two within a window each may have a part of the other
+            if not 0 <= k < len(left):  # torque that is late ends later than the log
+                continue
+            low, high = max(0, k - memory), min(len(left), k + memory + 1)
+            wave = self.response.alike[low - k + memory : high - k + memory]
+            left[low:high] -= np.multiply.outer(wave, left[k].copy())
+        return left
 
     @cached_property
     def apart(self) -> np.ndarray:
@@ -163,7 +175,46 @@ class _Seen:
         return bends, np.where(bends > response.over * noise, chance, 0.0)
 
 
-def _seen(piece: Piece, response: _Response, moves: np.ndarray, found: np.ndarray) -> _Seen | None:
+    def beside(self, j: int, late: int) -> np.ndarray:
+        """(jumps,) as `bends`, of jumps within a window of each other, whose waves joint j's torque
+        holds in sum: none of them is most of what it does."""
+        (at, by), reach = self.tops, self.response.near
+        told, out = _about(self.told[:, j] * self.moves[:, j], at + late, reach), np.zeros(len(at))
+        along = by / np.linalg.norm(by, axis=1, keepdims=True)
+        counts = _about(self.moves[:, j].astype(float), at, reach)
+        for k, here in enumerate(_about(self.size, at, reach)):
+            near = np.flatnonzero(np.abs(at - at[k]) <= 2 * reach)
+            near = near[np.argsort(-np.linalg.norm(by[near], axis=1))][:_BESIDE]
+            if len(near) < 2:
+                continue
+            waves = (here @ along[near].T) * counts[k][:, None]
+            theirs = waves @ np.linalg.lstsq(waves, told[k], rcond=1e-6)[0]
+            if np.sum(theirs**2) > _MOST * np.sum(told[k] ** 2):
+                # what it tells of a jump stands where that is
+                seen = near[np.abs(at[near] - at[k]) <= reach]
+                out[seen] = np.maximum(out[seen], np.abs(theirs[at[seen] - at[k] + reach]))
+        return out
+
+
+    def felt(self, j: int, least: float, late: int, known) -> tuple[np.ndarray, np.ndarray]:
+        """Rows beside the `known` ones in which joint j's torque jumps by more than `least`, and by
+        how much, where its acceleration does so too: there a jump need not outgrow the noise of
+        every row, as that of a coarse encoder, but only of one in a hundred."""
+        reach, told = self.response.near, self._without(self.told[:, j] * self.moves[:, j], known)
+        size, own = np.abs(told), np.roll(self.every[:, j] * self.moves[:, j], late)
+        size[: (edge := reach + self.response.smoother.reach)] = size[-edge:] = 0.0  # seen from one side
+        top = (size > least) & (size >= _TOP * running(size, 2 * reach + 1, "max"))
+        at = np.array([a + int(np.argmax(size[a : b + 1])) for a, b in runs(top)], dtype=int)
+        waves, torques = (_about(values, at, reach) for values in (own, told))
+        both = np.einsum("kw,kw->k", waves, torques)
+        theirs = ratio(both**2, np.sum(waves**2, axis=1) * np.sum(torques**2, axis=1))
+        seldom = _SELDOM / np.sqrt(2.0 * np.log(self.every.size / CHANCE))
+        heavy = size[at] >= self.light[j] * self.limits[j] * np.abs(own[at])
+        alike = (own[at] * np.sign(told[at]) > seldom) & (theirs > _MOST) & (both > 0.0)
+        return at[alike & heavy], size[at][alike & heavy]
+
+
+def _seen(piece: Piece, response: JumpResponse, moves: np.ndarray, found: np.ndarray) -> _Seen | None:
     """None where no acceleration jumps and no clock was corrected."""
     of_angle = response.jumps(piece.qdd)
     noise = response.noise * piece.noise
@@ -178,7 +229,7 @@ def _seen(piece: Piece, response: _Response, moves: np.ndarray, found: np.ndarra
     level = running(piece.measured, 2 * SPIKE + 1, "median", "edge")  # a spike comes back
     told = response.jumps(level - response.taken(level)) / response.passed
     rest = response.taken(piece.measured) / response.rest * response.kept
-    return _Seen(response, piece, moves, size * jumping, limits, level, told, rest, found)
+    return _Seen(response, piece, moves, size * jumping, size, limits, level, told, rest, found)
 
 
 def _bent(seen: _Seen, j: int, noise: float, late: int) -> np.ndarray:
@@ -187,9 +238,12 @@ def _bent(seen: _Seen, j: int, noise: float, late: int) -> np.ndarray:
     response, tau, piece = seen.response, seen.piece.measured[:, j], seen.piece
     least = max(noise, response.kept * max(quantum(tau) / np.sqrt(12.0), NOTHING * np.std(tau)))
     (torque,) = seen.bends(j, least, range(late, late + 1))[0]
+    torque = np.maximum(torque, seen.beside(j, late))
     bends = torque > response.over * least
     far = np.searchsorted(-response.beyond, -((least / torque[bends]) ** 2))
     out = within(seen.tops[0][bends] + late, far, len(tau))
+    at, torque = seen.felt(j, response.over * least, late, seen.tops[0][bends] + late)
+    out |= within(at, np.searchsorted(-response.beyond, -((least / torque) ** 2)), len(tau))
     if piece.clock:
         reach, own = int(np.ceil(piece.clock / piece.step)), seen.told[:, j] * seen.moves[:, j]
         inertia = j, seen.light[j]
@@ -219,68 +273,3 @@ def _about(values: np.ndarray, at: np.ndarray, reach: int) -> np.ndarray:
     inside = (rows >= 0) & (rows < len(values))
     inside = inside.reshape(*inside.shape, *np.ones(values.ndim - 1, dtype=int))
     return np.where(inside, values[np.clip(rows, 0, len(values) - 1)], 0.0)
-
-
-@dataclass(frozen=True)
-class _Response:
-    """What a smoother makes of a jump of an acceleration by one.
-
-    wave (k,): what a second pass takes away of it, over its sum of squares. passed: what `wave`
-    sees of a torque's jump by one that was smoothed once. noise: RMS of what `wave` sees of white
-    noise of one in the angle; rest: of what a pass takes away of white noise of one; kept: of what
-    the fit sees of such noise in torque. near: as of `Blur.reach`. beyond (n,): as of
-    `Smoother.bent_beyond`. over: how many times its noise a torque jumps where the filter's error
-    within `near` samples is as large as that noise, RMS. alike (2 memory + 1,): what a jump by one
-    is told to be before and after.
-    """
-
-    smoother: Smoother
-    wave: np.ndarray
-    passed: float
-    noise: float
-    rest: float
-    kept: float
-    near: int
-    beyond: np.ndarray
-    over: float
-    alike: np.ndarray
-    memory: int
-
-    @classmethod
-    def of(cls, smoother: Smoother, piece: Piece) -> _Response | None:
-        """None of a smoother that takes nothing away: a polynomial through as many samples."""
-        t, middle, _, bent = smoother.of_a_jump()
-        both = piece.smoother is not None
-        taken = lambda values: (values - smoother(values))[:, 0]  # noqa: E731
-        wave = taken(bent)[middle]
-        if not (size := np.sum(wave**2)) > _ROUNDING:
-            return None
-        jump, pulse = np.heaviside(t, 0.5), (t == 0.0).astype(float)
-        passed = taken(smoother(jump))[middle] @ wave / size
-        half = len(wave) // 2
-        seen = np.flatnonzero(np.abs(wave) > np.sqrt(_ROUNDING) * np.abs(wave).max())
-        memory = int(np.abs(seen - half).max())
-        wave = wave[half - memory : half + memory + 1] / size
-        noise = np.linalg.norm(np.convolve(taken(smoother.differentiate(pulse)[2]), wave))
-        rest = np.linalg.norm(taken(pulse))
-        kept = float(np.linalg.norm(smoother(pulse))) if both else 1.0
-        beyond = smoother.bent_beyond(both=both)[: (2 if both else 1) * smoother.reach]
-        over = float(np.sqrt((2 * piece.blur.reach + 1) / beyond[0]))
-        alike = np.convolve(wave, wave[::-1]) * size
-        return cls(
-            smoother, wave, float(passed), float(noise), float(rest), kept, piece.blur.reach,
-            beyond, over, alike, 2 * memory,
-        )  # fmt: skip
-
-    def jumps(self, values) -> np.ndarray:
-        """Of values (n, k) that the filter has seen once: the jump at each row, by what a pass
-        takes away where it sees both sides."""
-        taken, wave, edge = self.taken(values), self.wave[::-1], self.smoother.reach
-        taken[:edge] = taken[-edge:] = 0.0
-        return np.stack([np.convolve(own, wave, mode="same") for own in taken.T], axis=1)
-
-    def taken(self, values) -> np.ndarray:
-        """What a pass takes away of values (n, k), which go on beyond their ends as they came."""
-        edge = self.smoother.reach
-        beyond = np.pad(values, ((edge, edge), (0, 0)), mode="reflect", reflect_type="odd")
-        return values - self.smoother(beyond)[edge:-edge]

@@ -219,3 +219,34 @@ def test_a_row_that_both_sides_saw_filtered_has_less_noise(filtered):
     (piece,) = before.pieces
     white = 0.02 * np.sqrt(np.sum(piece.smoother(np.eye(2001))[:, 1000] ** 2))
     assert error(before) > 1.3 * white and error(after) < 1.15 * white
+
+
+@pytest.mark.parametrize(("bits", "used"), [(12, 0.74), (13, 0.74)])
+def test_a_jump_that_a_coarse_encoder_hides_is_told_by_the_torque(bits, used):
+    """Of 12 bits most accelerations jump by less than what noise makes in some row of the log, and the torque shows each. No more goes
+    than where the encoder shows them."""
+    t, q, qdd = moves(24.0, 4.0, 0.004)
+    grain, rng = 2.0 * np.pi / 2**bits, np.random.default_rng(2)
+    tau = INERTIA * qdd + 0.3 * rng.normal(size=len(t))
+    kept = motion(tau, np.round(q / grain) * grain, t, window=0.2)
+    (piece,) = kept.pieces
+    rest = (piece.tau - INERTIA * piece.qdd)[piece.core][piece.use[piece.core]]
+    assert np.sqrt(np.mean(rest**2)) < 1.1 * np.median(np.abs(rest)) / 0.6745  # no tail: 2.1 times that, were the jumps in it
+    assert piece.use[piece.core].mean() == pytest.approx(used, abs=0.03)
+
+
+@pytest.mark.parametrize("gaps", [(0.02, 0.06), (0.04, 0.1), (0.06, 0.14)])
+def test_of_jumps_within_a_window_each_bends_the_torque(gaps):
+    """Three joints set off one after another, and each feels the others, a fourth all of them: no wave is most of what its torque does.
+    What the true model leaves is its noise; were they told one by one it would be up to nine times that."""
+    rng, t = np.random.default_rng(1), np.arange(24000) * STEP
+    starts = np.arange(1.0, 23.0, 2.0)
+    later, way = np.cumsum(rng.uniform(*gaps, (2, len(starts))), axis=0), np.resize([3.0, -3.0], len(starts))
+    own = [sum(by * (t >= at) for by, at in zip(ways, starts + late)) for ways, late in ((way, 0.0), (way, later[0]), (-way, later[1]))]
+    qdd = np.stack([*own, 0.0 * t], axis=1) + 2.0 * np.sin(2.0 * np.pi * np.outer(t, [0.3, 0.4, 0.5, 0.6]))
+    inertia = np.array([[2.0, 0.3, -0.4, -1.0], [0.3, 2.0, 0.2, 1.1], [-0.4, 0.2, 1.5, 0.9], [-1.0, 1.1, 0.9, 0.5]])
+    log = log_of(t, np.stack([twice(one) for one in qdd.T], axis=1), qdd @ inertia + NOISE * rng.normal(size=qdd.shape))
+    (piece,) = prepare([log], PreprocessSpec(window=0.2), tuple("abcd")).pieces
+    rest, use = (piece.tau - piece.qdd @ inertia)[piece.core], piece.use[piece.core]
+    assert [np.sqrt(np.mean(own[at] ** 2)) for own, at in zip(rest.T, use.T)] == pytest.approx(4 * [NOISE], rel=0.1)
+    assert use.mean() > 0.5
