@@ -28,8 +28,8 @@ _ANGLES = 4.0  # cutoffs of the angles' own low-pass: derivatives need some, law
 # Laws are evaluated at this many samples a cycle of the cutoff: friction at a reversal, which is
 # steeper, is left out anyway.
 _SAMPLES_PER_CYCLE = 16.0
-# 63 Hz at 15 Hz: the sizes that can be told are those of 100 Hz to a thousandth
-_ROWS_PER_CYCLE = 4.2
+# 62 Hz at 15 Hz: the sizes that can be told are those of 100 Hz to a thousandth
+_ROWS_PER_CYCLE = 4.1
 # The mean of so many frequencies of white noise is so far above its own in one of fifty thousand
 _TOGETHER, _ABOVE = 9, 3.0
 _SELDOM = 0.05  # of an octave
@@ -137,7 +137,7 @@ def stride_of(motion: Motion, cutoff: float) -> int:
     """Every how many samples a row is kept: several a cycle of the cutoff, and no more than fit in
     memory."""
     step = float(np.median([piece.step for piece in motion.pieces]))
-    fine = max(1, round(1.0 / (step * cutoff * _ROWS_PER_CYCLE)))
+    fine = max(1, int(1.0 / (step * cutoff * _ROWS_PER_CYCLE)))
     return max(fine, -(-motion.samples // MOST_ROWS))
 
 
