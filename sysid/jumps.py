@@ -174,7 +174,6 @@ class _Seen:
         chance = np.log((1.0 - _MOST) / (1.0 - np.minimum(theirs, _WHOLLY)))
         return bends, np.where(bends > response.over * noise, chance, 0.0)
 
-
     def beside(self, j: int, late: int) -> np.ndarray:
         """(jumps,) as `bends`, of jumps within a window of each other, whose waves joint j's torque
         holds in sum: none of them is most of what it does."""
@@ -193,8 +192,9 @@ class _Seen:
                 # what it tells of a jump stands where that is
                 seen = near[np.abs(at[near] - at[k]) <= reach]
                 out[seen] = np.maximum(out[seen], np.abs(theirs[at[seen] - at[k] + reach]))
+        if late:  # as in `bends`
+            out[out < self.light[j] * self.limits[j] * np.abs(by[:, j])] = 0.0
         return out
-
 
     def felt(self, j: int, least: float, late: int, known) -> tuple[np.ndarray, np.ndarray]:
         """Rows beside the `known` ones in which joint j's torque jumps by more than `least`, and by
@@ -202,7 +202,9 @@ class _Seen:
         every row, as that of a coarse encoder, but only of one in a hundred."""
         reach, told = self.response.near, self._without(self.told[:, j] * self.moves[:, j], known)
         size, own = np.abs(told), np.roll(self.every[:, j] * self.moves[:, j], late)
-        size[: (edge := reach + self.response.smoother.reach)] = size[-edge:] = 0.0  # seen from one side
+        size[: (edge := reach + self.response.smoother.reach)] = size[-edge:] = (
+            0.0  # seen from one side
+        )
         top = (size > least) & (size >= _TOP * running(size, 2 * reach + 1, "max"))
         at = np.array([a + int(np.argmax(size[a : b + 1])) for a, b in runs(top)], dtype=int)
         waves, torques = (_about(values, at, reach) for values in (own, told))
@@ -214,7 +216,9 @@ class _Seen:
         return at[alike & heavy], size[at][alike & heavy]
 
 
-def _seen(piece: Piece, response: JumpResponse, moves: np.ndarray, found: np.ndarray) -> _Seen | None:
+def _seen(
+    piece: Piece, response: JumpResponse, moves: np.ndarray, found: np.ndarray
+) -> _Seen | None:
     """None where no acceleration jumps and no clock was corrected."""
     of_angle = response.jumps(piece.qdd)
     noise = response.noise * piece.noise

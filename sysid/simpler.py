@@ -1,4 +1,5 @@
-"""What needs fewer numbers than a claim and tells as much: a law of which a number is nothing beside its deviation may be a simpler one."""
+"""Whether a claim's law is a simpler one: one of its numbers is nothing beside its deviation, and
+an effect without such a number tells as much."""
 
 from __future__ import annotations
 
@@ -6,35 +7,50 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from . import comparison
+from .borne_out import CLEAR, first_borne_out
 from .estimate import Fit
+from .view import View, holds
 
-_NOTHING = 2.0  # standard deviations
 
+def with_simpler(
+    choice, view: View, last: Fit, fits: dict, with_: Callable, may: Callable[..., bool]
+):
+    """A choice whose head a fit bore out, or with a simpler effect at its head and the old head
+    beside it, as likely.
 
-def with_simpler(choice, fits: dict, fit_with: Callable[..., Fit]):
-    """A choice that a fit bore out, with what is simpler at its head where the log holds no number that it lacks: of an offset the law of
-    a spring fits a little more, the stiffness that says so is nothing beside its deviation, and the offset alone predicts test logs as well.
+    The simpler effect is one that the head's columns hold, by a fit of its own it is borne out, and
+    its test error is no more than a standard error greater. So an offset, of which the law of a
+    spring fits a little more, is no spring: the stiffness is nothing beside its deviation.
 
     Args:
-        choice: of effects that may be in each other's place. fits: {id of a member: its fit}, the head's among them; those made here join.
-        fit_with: fits the model with a member.
+        choice: of effects that may be in each other's place. view: of the model without them.
+        last: its fit. fits: {id of a member: its fit}, the head's among them; those made here join.
+        with_: fits the model with a member. may: whether a member may join, as no fit refused it.
     """
-    head, fit = choice.head, fits[id(choice.head)]
-    values = fit.parameters_of(*head.candidate.key).values()
-    if all(abs(at) >= _NOTHING * std for at, std, _ in values if std == std):
+    head = choice.head
+    fit, there = fits[id(head)], {id(member) for member, _ in choice.members}
+    own = fit.parameters_of(*head.candidate.key).values()
+    if all(abs(at) >= CLEAR * std for at, std, _ in own if std == std):
         return choice
-    at, known, simple = head.candidate.joint, {id(m) for m, _ in choice.members}, []
-    for member in choice.close:
-        if member.candidate.joint == at and member.group.numbers < head.group.numbers:
-            fits[id(member)] = fits.get(id(member)) or fit_with(member)
-            risen = comparison.together(fit, fits[id(member)])
+    simple = []
+    for member in (m for m in choice.close if may(m) and holds(view, head, m)):
+        found, told, _ = first_borne_out([member], last, with_)
+        if found is member:
+            fits |= told
+            risen = comparison.together(fit, told[id(member)])
             simple += [member] if risen.delta_rms <= risen.se else []
     if not simple:
         return choice
-    chance = dict.fromkeys(map(id, simple), next(p for m, p in choice.members if m is head))
-    every = [(m, max(p, chance.get(id(m), 0.0))) for m, p in choice.members] + [(m, chance[id(m)]) for m in simple if id(m) not in known]
-    whole = sum(p for _, p in every)
-    members = tuple((m, p / whole) for m, p in sorted(every, key=lambda one: (-one[1], id(one[0]) not in chance)))
-    kept = {id(m) for m, _ in members}
-    choice = replace(choice, members=members, beaten=tuple(m for m in choice.beaten if id(m) not in kept))
-    return choice.headed(min(simple, key=lambda member: member.candidate.simplicity))
+    chances = {id(member): p for member, p in choice.members}
+    chances |= {id(m): max(chances[id(head)], chances.get(id(m), 0.0)) for m in simple}
+    every = [m for m, _ in choice.members] + [m for m in simple if id(m) not in there]
+    whole, first = sum(chances.values()), {id(m) for m in simple}
+    every.sort(key=lambda m: (-chances[id(m)], id(m) not in first))
+    best = min(simple, key=lambda member: member.candidate.simplicity)
+    grown = replace(
+        choice,
+        members=tuple((m, chances[id(m)] / whole) for m in every),
+        beaten=tuple(m for m in choice.beaten if id(m) not in chances),
+        gain=choice.gain + (head.losses - best.losses).sum(axis=1),
+    )
+    return grown.headed(best)

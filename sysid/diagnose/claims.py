@@ -2,7 +2,8 @@
 fitted as the user's fit is.
 
 So what a diagnosis states is what comes of it, of several effects what comes of all. The test logs
-only refuse: then the next likeliest is fitted, but not beside a claim, where a rest speaks for any.
+only refuse: then the next likeliest is fitted, but not beside a claim, where a rest speaks for any;
+and of a law with an idle number they may say that a simpler one is as good.
 """
 
 from __future__ import annotations
@@ -84,11 +85,12 @@ def claimed(
             refused[~number] = last, Refused(*own)
         no_rivals = beaten([m for m, _ in near], head, fits, whys)
         choice = step.choice.headed(head).without(no_rivals)
-        alone = lambda member: with_(pipeline.fit_grown, member)  # noqa: E731
-        step = replace(step, choice=with_simpler(choice, fits, alone))
+        may = lambda m: most > 1 and id(m) not in whys and free(m.candidate)  # noqa: B023, E731
+        choice = with_simpler(choice, step.before, last, fits, with_, may)
+        step = replace(step, choice=choice)
         listed = {id(m) for m, p in near if p >= _LIKELY} | set(fits)
         near = [one for one in step.choice.members if id(one[0]) in listed]
-        fits = [fits[id(m)] if id(m) in fits else alone(m) for m, _ in near]
+        fits = [fits[id(m)] if id(m) in fits else with_(pipeline.fit_grown, m) for m, _ in near]
         found = [finding(last, a, m, p, step, len(stands)) for a, (m, p) in zip(fits, near)]
         set_ = tuple((*m.candidate.named(fit.joints), p) for m, p in step.choice.members)
         stands[number] = Claim(step, tuple(found), last, fits[0], set_)
