@@ -12,7 +12,7 @@ _MOVING = 1.5  # quanta a sample: what moves as fast repeats no value
 _ABOUT = 4  # samples to either side whose speed is what the joint had
 # samples and s of torque: a shorter repeat costs less than the rows that a filter's reach would
 _FEWEST, _SHORTEST = 4, 0.02
-_FEW = 10  # repeats
+_FEW = 10  # repeats, of which nobody knows how many go on: some, as if it were the share of all
 _HELD = 10  # samples at least of an angle that froze and never caught up
 _OFTEN = 0.25  # of the rows: what comes more often is the logger's way, not an event
 
@@ -47,10 +47,13 @@ def held_torque(tau, step: float, *, among: int = 1) -> list[tuple[int, int]]:
         if np.array_equal(more, long):
             break
         long = more
-    repeats = np.sum(length[~long] - 1)
-    # of few repeats nobody knows how many go on: some, as if it were the share of all
-    on = (repeats - np.sum(~long) + _FEW * p) / (repeats + _FEW)
-    long &= longer(max(p, on))
+    # a level that comes again is a grain's, one that a freeze holds comes once
+    short = every[~long]
+    levels = np.unique(np.round(tau[short[:, 0]], 12 - int(np.ceil(np.log10(size.max())))))
+    if len(short) > 2 * len(levels):
+        repeats = np.sum(length[~long] - 1)
+        on = (repeats - len(short) + _FEW * p) / (repeats + _FEW)
+        long &= longer(max(p, on))
     ends = np.concatenate([[0.0], size, [0.0]])
     grain, usual = _GRAINS * quantum(tau), np.median(size[size > 0.0])
     extreme = (tau == tau.min()) | (tau == tau.max())  # what clips gets there at any slope

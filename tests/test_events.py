@@ -518,3 +518,16 @@ def test_coarse_values_that_were_resampled_are_not_held():
         tau = np.round(rng.normal(0.0, rng.uniform(1.0, 3.0), len(t)) + 4.0 * np.sin(0.8 * taken))
         told += bool(held_torque(np.interp(t, taken, tau), 0.01, among=6))
     assert told <= 2
+
+
+@pytest.mark.parametrize("freezes", [0, 20])
+def test_a_freeze_is_found_beside_many_short_ones(freezes):
+    """These say nothing of how coarse a torque is: what each holds comes once."""
+    rng, found = np.random.default_rng(0), 0
+    for _ in range(20):
+        tau = rng.normal(0.0, 1.0, 2000) + 5.0 * np.sin(np.arange(2000) * 0.02)
+        for first in range(20, 20 + 80 * freezes, 80):
+            tau[first : first + 4] = tau[first]
+        tau[1800:1820] = tau[1800] + 2.0  # entered and left by a jump
+        found += any(a <= 1801 and b >= 1818 for a, b in held_torque(tau, 0.01, among=6))
+    assert found == 20
