@@ -528,6 +528,6 @@ def test_a_freeze_is_found_beside_many_short_ones(freezes):
         tau = rng.normal(0.0, 1.0, 2000) + 5.0 * np.sin(np.arange(2000) * 0.02)
         for first in range(20, 20 + 80 * freezes, 80):
             tau[first : first + 4] = tau[first]
-        tau[1800:1820] = tau[1800] + 2.0  # entered and left by a jump
+        tau[1800:1820] = tau[1800] + 6.0  # entered and left by a jump
         found += any(a <= 1801 and b >= 1818 for a, b in held_torque(tau, 0.01, among=6))
     assert found == 20
