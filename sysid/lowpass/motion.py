@@ -133,11 +133,11 @@ def narrowed(cutoff: float, share: float) -> float:
     return cutoff * min(1.0, (_SHARE / max(share, 1e-12)) ** 0.25)
 
 
-def stride_of(motion: Motion, cutoff: float) -> int:
-    """Every how many samples a row is kept: several a cycle of the cutoff, and no more than fit in
+def stride_of(motion: Motion, cutoff: float, rows: float = _ROWS_PER_CYCLE) -> int:
+    """Every how many samples a row is kept: `rows` a cycle of the cutoff, and no more than fit in
     memory."""
     step = float(np.median([piece.step for piece in motion.pieces]))
-    fine = max(1, int(1.0 / (step * cutoff * _ROWS_PER_CYCLE)))
+    fine = max(1, int(1.0 / (step * cutoff * rows)))
     return max(fine, -(-motion.samples // MOST_ROWS))
 
 
