@@ -29,7 +29,7 @@ _TOP = 0.95  # of the largest about it: a jump stands within a few samples of th
 _MOST = 0.5  # of the square of what a torque does there, which is a jump's wave
 _WHOLLY = 0.99  # of a torque, that is a wave: noise and a filter's edge leave no more
 _LATE = 0.03  # s: as far as effects have torque stamped too late or too early
-_BESIDE = 3  # jumps within two windows of one, the greatest
+_SUPERPOSED = 3  # jumps within two windows of one, the greatest
 _SELDOM = 2.33  # deviations: noise of an acceleration has that sign and size in a row of a hundred
 _ROUNDS = 4  # of two jumps within a window the greater hides a part of the other
 
@@ -174,7 +174,7 @@ class _Seen:
         chance = np.log((1.0 - _MOST) / (1.0 - np.minimum(theirs, _WHOLLY)))
         return bends, np.where(bends > response.over * noise, chance, 0.0)
 
-    def beside(self, j: int, late: int) -> np.ndarray:
+    def superposed(self, j: int, late: int) -> np.ndarray:
         """(jumps,) as `bends`, of jumps within a window of each other, whose waves joint j's torque
         holds in sum: none of them is most of what it does."""
         (at, by), reach = self.tops, self.response.near
@@ -183,7 +183,7 @@ class _Seen:
         counts = _about(self.moves[:, j].astype(float), at, reach)
         for k, here in enumerate(_about(self.size, at, reach)):
             near = np.flatnonzero(np.abs(at - at[k]) <= 2 * reach)
-            near = near[np.argsort(-np.linalg.norm(by[near], axis=1))][:_BESIDE]
+            near = near[np.argsort(-np.linalg.norm(by[near], axis=1))][:_SUPERPOSED]
             if len(near) < 2:
                 continue
             waves = (here @ along[near].T) * counts[k][:, None]
@@ -196,15 +196,16 @@ class _Seen:
             out[out < self.light[j] * self.limits[j] * np.abs(by[:, j])] = 0.0
         return out
 
-    def felt(self, j: int, least: float, late: int, known) -> tuple[np.ndarray, np.ndarray]:
+    def hidden_by_noise(
+        self, j: int, least: float, late: int, known
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Rows beside the `known` ones in which joint j's torque jumps by more than `least`, and by
         how much, where its acceleration does so too: there a jump need not outgrow the noise of
         every row, as that of a coarse encoder, but only of one in a hundred."""
         reach, told = self.response.near, self._without(self.told[:, j] * self.moves[:, j], known)
         size, own = np.abs(told), np.roll(self.every[:, j] * self.moves[:, j], late)
-        size[: (edge := reach + self.response.smoother.reach)] = size[-edge:] = (
-            0.0  # seen from one side
-        )
+        edge = reach + self.response.smoother.reach
+        size[:edge] = size[-edge:] = 0.0  # seen from one side
         top = (size > least) & (size >= _TOP * running(size, 2 * reach + 1, "max"))
         at = np.array([a + int(np.argmax(size[a : b + 1])) for a, b in runs(top)], dtype=int)
         waves, torques = (_about(values, at, reach) for values in (own, told))
@@ -242,11 +243,11 @@ def _bent(seen: _Seen, j: int, noise: float, late: int) -> np.ndarray:
     response, tau, piece = seen.response, seen.piece.measured[:, j], seen.piece
     least = max(noise, response.kept * max(quantum(tau) / np.sqrt(12.0), NOTHING * np.std(tau)))
     (torque,) = seen.bends(j, least, range(late, late + 1))[0]
-    torque = np.maximum(torque, seen.beside(j, late))
+    torque = np.maximum(torque, seen.superposed(j, late))
     bends = torque > response.over * least
     far = np.searchsorted(-response.beyond, -((least / torque[bends]) ** 2))
     out = within(seen.tops[0][bends] + late, far, len(tau))
-    at, torque = seen.felt(j, response.over * least, late, seen.tops[0][bends] + late)
+    at, torque = seen.hidden_by_noise(j, response.over * least, late, seen.tops[0][bends] + late)
     out |= within(at, np.searchsorted(-response.beyond, -((least / torque) ** 2)), len(tau))
     if piece.clock:
         reach, own = int(np.ceil(piece.clock / piece.step)), seen.told[:, j] * seen.moves[:, j]
