@@ -146,11 +146,17 @@ class _Seen:
         return np.linalg.norm(by, axis=1) >= most
 
     @cached_property
-    def waves(self) -> np.ndarray:
-        """(jumps, window) of each the wave about it, of the accelerations as they jump there."""
+    def about(self) -> tuple[np.ndarray, np.ndarray]:
+        """Of each jump `size` (jumps, window, dof) about it, and the accelerations as they jump
+        there (jumps, dof), of length one."""
         at, by = self.tops
         along = by / np.linalg.norm(by, axis=1, keepdims=True)
-        return np.einsum("kwj,kj->kw", _about(self.size, at, self.response.near), along)
+        return _about(self.size, at, self.response.near), along
+
+    @cached_property
+    def waves(self) -> np.ndarray:
+        """(jumps, window) of each the wave about it, of the accelerations as they jump there."""
+        return np.einsum("kwj,kj->kw", *self.about)
 
     def bends(self, j: int, noise: float, lags: range) -> tuple[np.ndarray, np.ndarray]:
         """Of each jump, so many samples later (lags, jumps): by how much, at most, a torque of its
@@ -179,9 +185,9 @@ class _Seen:
         holds in sum: none of them is most of what it does."""
         (at, by), reach = self.tops, self.response.near
         told, out = _about(self.told[:, j] * self.moves[:, j], at + late, reach), np.zeros(len(at))
-        along = by / np.linalg.norm(by, axis=1, keepdims=True)
+        sizes, along = self.about
         counts = _about(self.moves[:, j].astype(float), at, reach)
-        for k, here in enumerate(_about(self.size, at, reach)):
+        for k, here in enumerate(sizes):
             near = np.flatnonzero(np.abs(at - at[k]) <= 2 * reach)
             near = near[np.argsort(-np.linalg.norm(by[near], axis=1))][:_SUPERPOSED]
             if len(near) < 2:
