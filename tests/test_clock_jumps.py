@@ -25,6 +25,8 @@ def test_errors_are_near_the_noise_where_stamps_were_wrong(simulated, monkeypatc
     over = lambda: [error / noise[joint] for joint, error in pipeline.fit(pipeline.load(folder)).rms("train").items()]  # noqa: E731
     without = over()
     monkeypatch.setattr(jumps, "spread", lambda told, *_: (np.zeros(0, dtype=int), np.zeros(0)))
+    # a jump that was spread is told by several waves as well, in some logs
+    monkeypatch.setattr(jumps._Seen, "superposed", lambda seen, *_: np.zeros(len(seen.tops[0])))
     assert all(a < b for a, b in zip(without, over())) and np.mean(without) < 1.5 < np.mean(over())
 
 
