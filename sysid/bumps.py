@@ -32,7 +32,6 @@ _EFFECTS = ("viscous", "coulomb", "torque_bias", "armature")  # what any joint h
 _NEARBY = 0.5  # s to either side whose median a burst must exceed
 _OFTEN = 3.0  # s of log to a burst: what comes more often is how the machine moves, and no accident
 _SHARE = 0.2  # of how far torque goes within twice a burst's time: of a quick move less is left
-_ROWS = 6.67  # a cycle of the cutoff, 100 a second at 15 Hz: a knock may stand in one
 _FEWEST = 50  # rows of a joint that have a usual
 _WHITE = 0.706  # z75 - z50 of a normal variable's size over its median
 _PASSES = 2  # the second with every joint weighted by what the first leaves
@@ -64,7 +63,7 @@ def bumps(robot: Robot, logs: Sequence[Log], *, among: int = 1) -> list[Event]:
     if (motion := lowpassed(calm, robot.joints, cutoff, known=own_band)) is None:
         return shown
     model = build(robot, [EffectSpec(name=name) for name in _EFFECTS])
-    stride, playing = stride_of(motion, cutoff, _ROWS), set[int]()
+    stride, playing = stride_of(motion, cutoff), set[int]()
     while (seen := _seen(robot, model, motion, stride, shown, among, playing)).often:
         # what a joint does alone time and again is its own: the others say what else there is, two
         # of them at once, and what signals show on it stands

@@ -307,7 +307,7 @@ def test_another_variant_of_what_joined_later_may_stand_for_a_head_that_is_refus
         asked.append([m.candidate for m in near])
         good = [m for m in near if borne and m is two]
         whys = {id(m): "no" for m in near if m not in good}
-        return (good[0], {id(two): SimpleNamespace()}, whys) if good else (None, {}, whys)
+        return (good[0], {id(two): SimpleNamespace(parameters_of=lambda *_: {})}, whys) if good else (None, {}, whys)
 
     monkeypatch.setattr(claims, "first_borne_out", borne_out)
     monkeypatch.setattr(claims, "taken", lambda *views: np.zeros(2))

@@ -24,12 +24,12 @@ from .angles import noise_of
 LEAST = 15.0  # Hz: where friction's laws and ripple still show, several times what an arm moves at
 _MOTION = 4.0  # and this many times the motion's own bandwidth, if that is more
 _SHARE = 0.25  # of the residual's power may be made by the angles' noise at the end of the band
-_ANGLES = 4.0  # cutoffs of the angles' own low-pass: derivatives need some, laws of motion none
-# Laws are evaluated at this many samples a cycle of the cutoff: friction at a reversal, which is
-# steeper, is left out anyway.
+# the angles' own low-pass, as a multiple of the cutoff: derivatives need some, laws of motion none
+_ANGLES = 4.0
+# Laws are evaluated at this many samples a cycle of the cutoff: what is steeper than that, friction
+# at a reversal, is left out anyway.
 _SAMPLES_PER_CYCLE = 16.0
-# 62 Hz at 15 Hz: the sizes that can be told are those of 100 Hz to a thousandth
-_ROWS_PER_CYCLE = 4.1
+_ROWS_PER_CYCLE = 6.67  # 100 Hz at 15 Hz
 # The mean of so many frequencies of white noise is so far above its own in one of fifty thousand
 _TOGETHER, _ABOVE = 9, 3.0
 _SELDOM = 0.05  # of an octave
@@ -133,11 +133,11 @@ def narrowed(cutoff: float, share: float) -> float:
     return cutoff * min(1.0, (_SHARE / max(share, 1e-12)) ** 0.25)
 
 
-def stride_of(motion: Motion, cutoff: float, rows: float = _ROWS_PER_CYCLE) -> int:
-    """Every how many samples a row is kept: `rows` a cycle of the cutoff, and no more than fit in
+def stride_of(motion: Motion, cutoff: float) -> int:
+    """Every how many samples a row is kept: several a cycle of the cutoff, and no more than fit in
     memory."""
     step = float(np.median([piece.step for piece in motion.pieces]))
-    fine = max(1, int(1.0 / (step * cutoff * rows)))
+    fine = max(1, round(1.0 / (step * cutoff * _ROWS_PER_CYCLE)))
     return max(fine, -(-motion.samples // MOST_ROWS))
 
 

@@ -113,7 +113,7 @@ def _in_both(found: NoiseFloor, fit: Fit, joint: int) -> NoiseFloor:
             continue
         error, doubt = block_rms(squares)
         if found.rms - (1.0 + DOUBT) * error > 2.0 * math.hypot(found.std, doubt):
-            times = f"{found.rms / max(error, 1e-300):.2g} times the whole error on the {part} logs"
+            times = f"{found.rms / max(error, 1e-300):.2g} times the error on the {part} logs"
             why = "noise is louder in some logs than in others, or misfit stands in it"
             why = f"not determined: what nothing predicts is {times}: {why} ({found.detail})"
             return NoiseFloor(None, None, "none", why, None, found.high, error, found.halved)
