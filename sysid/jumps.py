@@ -251,16 +251,16 @@ def _bent(seen: _Seen, j: int, noise: float, late: int) -> np.ndarray:
     (torque,) = seen.bends(j, least, range(late, late + 1))[0]
     torque = np.maximum(torque, seen.superposed(j, late))
     bends = torque > response.over * least
-    far = np.searchsorted(-response.beyond, -((least / torque[bends]) ** 2))
-    out = within(seen.tops[0][bends] + late, far, len(tau))
-    at, torque = seen.hidden_by_noise(j, response.over * least, late, seen.tops[0][bends] + late)
-    out |= within(at, np.searchsorted(-response.beyond, -((least / torque) ** 2)), len(tau))
+    far = lambda torque: np.searchsorted(-response.beyond, -((least / torque) ** 2))  # noqa: E731
+    known = seen.tops[0][bends] + late
+    out = within(known, far(torque[bends]), len(tau))
+    at, torque = seen.hidden_by_noise(j, response.over * least, late, known)
+    out |= within(at, far(torque), len(tau))
     if piece.clock:
         reach, own = int(np.ceil(piece.clock / piece.step)), seen.told[:, j] * seen.moves[:, j]
         inertia = j, seen.light[j]
         at, torque = spread(own, response.over * least, seen.level[:, j], piece.qdd, reach, inertia)
-        far = np.searchsorted(-response.beyond, -((least / torque) ** 2)) + reach
-        out |= within(at, far, len(tau))
+        out |= within(at, far(torque) + reach, len(tau))
     return out
 
 

@@ -49,8 +49,7 @@ def held_torque(tau, step: float, *, among: int = 1) -> list[tuple[int, int]]:
         long = more
     # a level that comes again is a grain's, one that a freeze holds comes once
     short = every[~long]
-    levels = np.unique(np.round(tau[short[:, 0]], 12 - int(np.ceil(np.log10(size.max())))))
-    if len(short) > 2 * len(levels):
+    if len(short) > 2 * len(np.unique(tau[short[:, 0]])):
         repeats = np.sum(length[~long] - 1)
         on = (repeats - len(short) + _FEW * p) / (repeats + _FEW)
         long &= longer(max(p, on))

@@ -28,7 +28,7 @@ def with_simpler(
         with_: fits the model with a member. may: whether a member may join, as no fit refused it.
     """
     head = choice.head
-    fit, there = fits[id(head)], {id(member) for member, _ in choice.members}
+    fit = fits[id(head)]
     own = fit.parameters_of(*head.candidate.key).values()
     if all(abs(at) >= CLEAR * std for at, std, _ in own if std == std):
         return choice
@@ -41,16 +41,17 @@ def with_simpler(
             simple += [member] if risen.delta_rms <= risen.se else []
     if not simple:
         return choice
-    chances = {id(member): p for member, p in choice.members}
-    chances |= {id(m): max(chances[id(head)], chances.get(id(m), 0.0)) for m in simple}
-    every = [m for m, _ in choice.members] + [m for m in simple if id(m) not in there]
-    whole, first = sum(chances.values()), {id(m) for m in simple}
-    every.sort(key=lambda m: (-chances[id(m)], id(m) not in first))
+    chance = next(p for member, p in choice.members if member is head)
+    least = dict.fromkeys(map(id, simple), chance)
+    every = [*choice.members, *((m, 0.0) for m in choice.beaten if id(m) in least)]
+    every = [(m, max(p, least.get(id(m), 0.0))) for m, p in every]
+    every.sort(key=lambda one: (-one[1], id(one[0]) not in least))
+    whole = sum(p for _, p in every)
     best = min(simple, key=lambda member: member.candidate.simplicity)
     grown = replace(
         choice,
-        members=tuple((m, chances[id(m)] / whole) for m in every),
-        beaten=tuple(m for m in choice.beaten if id(m) not in chances),
+        members=tuple((m, p / whole) for m, p in every),
+        beaten=tuple(m for m in choice.beaten if id(m) not in least),
         gain=choice.gain + (head.losses - best.losses).sum(axis=1),
     )
     return grown.headed(best)

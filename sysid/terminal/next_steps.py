@@ -57,9 +57,9 @@ def mended_first(document: dict, experiment, masses: dict, *, diagnosed: bool = 
     elif masses.get("prior_weight") is not None:
         adds = f" and type {masses['command']}" if masses.get("command") else ""
         next_step("fit", target, first=f"the masses cannot be meant: write `weight: auto` under `prior:` in {experiment.path}{adds}", out=out)
-    elif masses.get("command") and not diagnosed:
-        return False
     elif masses.get("command"):
+        if not diagnosed:
+            return False
         next_line(masses["command"], out=out)
     elif masses.get("stronger"):
         next_step("fit", target, first=f"the masses are far from the URDF's: where that is right, write `weight: {masses['stronger']:g}` under `prior:` in {experiment.path}", out=out)
