@@ -22,6 +22,7 @@ from .groups import levels_of
 from .held_rows import without_held
 from .log_spec import DataSpec, LogSpec
 from .recording import Recording, recorded
+from .resampling import MISSING, resampled
 from .rounded_stamps import ROUNDED, off_steady
 from .segment import GAP_STEPS, Segment
 from .slips import SLOWEST
@@ -195,7 +196,7 @@ def _segments(t, signals, where: str, breaks: Iterable[int] = ()):
         longest = steps[cuts - 1].max()
         warn(f"{where}: {cuts.size} gap(s), the longest {longest:.4g} s, split the log into {cuts.size + breaks.size + 1} segments", above=2)
     cuts = np.union1d(cuts, breaks).astype(int)
-    resampled, off, lost = 0, 0.0, 0.0
+    uneven, off, lost = 0, 0.0, 0.0
     bounds = [0, *cuts.tolist(), len(t)]
     for a, b in zip(bounds[:-1], bounds[1:]):
         part = {name: values[a:b] for name, values in signals.items()}
@@ -212,18 +213,18 @@ def _segments(t, signals, where: str, breaks: Iterable[int] = ()):
             continue
         own = np.diff(clock)
         # as many samples as were measured: the mean step, without the samples that are missing
-        own = float(np.mean(own[own < 1.5 * step]))
+        own = float(np.mean(own[own < MISSING * step]))
         if told:
             clock, off = true.t, max(off, true.off)
-        clock, part = _resampled(clock, part, own)
+        clock, part = resampled(clock, part, own)
         if told:
             rows = (left := true.at(clock, own)).inside
             lost, left = max(lost, own * rows.start, own * (len(clock) - rows.stop)), left.of(rows)
             clock, part = clock[rows], {name: values[rows] for name, values in part.items()}
-        resampled += 1
+        uneven += 1
         yield replace(segment(clock, own, part), clock=left)
     inside = np.delete(steps, cuts - 1)
-    if resampled and inside.min() < 0.999 * inside.max():
+    if uneven and inside.min() < 0.999 * inside.max():
         warn(f"{where}: steps of {inside.min():.4g} to {inside.max():.4g} s were resampled to a uniform {own:.4g} s", above=2)
     if off > 0.0:
         said = f"{where}: the time stamps are off by {1e3 * off:.2g} ms (RMS), as the joints' angles show, and were corrected"
@@ -235,19 +236,6 @@ def segment(t, step, part) -> Segment:
     """Signals by name, those of no joint as `signals.name`, over an even clock t (n,) [s]."""
     signals = {name.removeprefix("signals."): values for name, values in part.items() if name.startswith("signals.")}
     return Segment(t, step, part["q"], part["tau"], part.get("qd"), part.get("qdd"), signals)
-
-
-def _resampled(t, part, step):
-    from scipy.interpolate import make_interp_spline
-
-    samples = int(np.floor((t[-1] - t[0]) / step + 1e-9)) + 1
-    clock = t[0] + step * np.arange(samples)
-    out = {}
-    for name, values in part.items():
-        # angles are smooth, torque and the rest carry noise that a cubic would overshoot on
-        order = 3 if name in ("q", "qd") and len(t) > 3 else 1
-        out[name] = make_interp_spline(t, values, k=order, axis=0)(clock)
-    return clock, out
 
 
 def sha256(path: Path) -> str:
