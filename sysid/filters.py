@@ -11,6 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from . import too_narrow
 from .blocks import within_one_error
 from .drives import slowest
 from .errors import SysidError
@@ -44,8 +45,9 @@ def compare(
         progress, mapped: as of `begun`.
 
     Returns:
-        {"filter", "order", "window" or "cutoff", "torque", "chosen": "given" or "held-out error", "held_out": [
-        {"window" or "cutoff": value, "relative_error": geometric mean over the joints, "rms": {joint: N m}}, ...]}; neighbours are half and
+        {"filter", "order", "window" or "cutoff", "torque", "chosen": "given", "usual" or "held-out error", "held_out": [
+        {"window" or "cutoff": value, "relative_error": geometric mean over the joints, "rms": {joint: N m}}, ...]}; and "too_narrow": {"key",
+        "given", "value", "rms": {joint: [N m, less with that value]}} where angles are noisy for a filter that was given; neighbours are half and
         double the value where it was given, the whole grid where it was `auto`, as a low-pass on both sides is where no cutoff is said.
     """
     return begun(experiment, model, logs, prior, progress=progress, mapped=mapped)()
@@ -54,7 +56,7 @@ def compare(
 def is_given(experiment: Experiment) -> bool:
     """Whether an experiment says which filter is taken: its neighbours are compared with it, and change nothing."""
     spec = experiment.preprocess
-    return not lowpassed(experiment) and (spec.filter == "none" or getattr(spec, _key(spec)) != "auto")
+    return not lowpassed(experiment) and (spec.filter == "none" or _key(spec) in _given(spec))
 
 
 def begun(
@@ -101,8 +103,15 @@ def begun(
             chosen = {name: best[name] for name in candidates[0]}
             if len(tried) > 1 and best in (tried[0], tried[-1]):
                 warn(f"preprocess.{key}: auto chose {best[key]:g}, the end of what was tried; give a number to go further")
+        elif wider := too_narrow.wider(tried, key, value):
+            if key not in _given(spec):
+                warn(f"preprocess.{key}: {too_narrow.said(wider)}; as none is given, it is chosen by that")
+                asks = experiment.model_copy(update={"preprocess": spec.model_copy(update={key: "auto"})})
+                return compare(asks, model, logs, prior, progress=progress, mapped=mapped)
+            said["too_narrow"] = wider
+            warn(f"preprocess.{key}: {too_narrow.said(wider)}; `{key}: auto` chooses by that")
         shown = [{name: entry[name] for name in (key, "relative_error", "rms")} for entry in tried]
-        return {**said, "order": spec.order, **chosen, "chosen": "held-out error" if automatic else "given", "held_out": shown}
+        return {**said, "order": spec.order, **chosen, "chosen": "held-out error" if automatic else "given" if key in _given(spec) else "usual", "held_out": shown}
 
     return result
 

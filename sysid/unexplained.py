@@ -15,6 +15,7 @@ from .failures import HeldOut, fallen
 from .given_shapes import at_edges
 from .model_parameters import ROBOT
 from .plausible import other_means
+from .too_narrow import noise_as_law
 
 _MOST = 0.5  # of what stands above a floor, or of a square
 _FITTED = 0.1  # of what is left on test logs: a fit is made to see whether it takes more there
@@ -167,6 +168,12 @@ def cause(
         f"its error{where} is {_times(error, floor)}, and nothing in the motion of these logs "
         "predicts the rest"
     )
+
+
+def otherwise(fit: Fit, floors, still: Sequence[str] = ()) -> dict[str, str]:
+    """{joint: why} of joints of which something else than a law may be what the motion predicts: a
+    filter that is too narrow for the angles, and what `by_log` says."""
+    return noise_as_law(fit.filters) | by_log(fit, floors, still)
 
 
 def by_log(fit: Fit, floors, still: Sequence[str] = ()) -> dict[str, str]:

@@ -51,16 +51,19 @@ def test_logs_are_checked_before_an_effect_mends_what_wrong_columns_bent(capsys,
     file.write_text("robot: {}\n")
     experiment = SimpleNamespace(path=file, name="arm")
     masses = {"command": "sysid add arm payload", "prior_weight": None}
-    worse = {"notices": ["implausible: the model is worse than none on the test logs of elbow (R2 -2); are its columns, signs and units right? `sysid check` says"], "run": str(tmp_path)}
+    worse = {
+        "notices": ["implausible: the model is worse than none on the test logs of elbow (R2 -2); are its columns, signs and units right? `sysid check` says"],
+        "run": str(tmp_path),
+    }
     heavy = {"notices": ["implausible masses, the URDF's in brackets: fore 0.765 kg (2.5 kg)"], "run": str(tmp_path)}
-    assert mended_first(worse, experiment, masses)
+    assert mended_first(worse, experiment, SimpleNamespace(masses=masses, filters={}))
     assert "next: sysid check" in capsys.readouterr().out
-    assert mended_first(heavy, experiment, masses)
+    assert mended_first(heavy, experiment, SimpleNamespace(masses=masses, filters={}))
     assert "next: sysid add arm payload" in capsys.readouterr().out
-    assert not mended_first(heavy, experiment, masses, diagnosed=False)  # bodies hide some effects, a diagnosis asks all
+    assert not mended_first(heavy, experiment, SimpleNamespace(masses=masses, filters={}), diagnosed=False)  # bodies hide some effects, a diagnosis asks all
     assert capsys.readouterr().out == ""
     (tmp_path / "check.json").write_text(json.dumps({"ok": True, "faults": []}))
-    assert mended_first(worse, experiment, masses)  # it has been checked
+    assert mended_first(worse, experiment, SimpleNamespace(masses=masses, filters={}))  # it has been checked
     assert "next: sysid add arm payload" in capsys.readouterr().out
 
 
@@ -140,7 +143,9 @@ def test_a_joint_that_is_locked_and_moves_is_told(experiment, cli):
         assert said.status == 0 and "locked joints" not in said.out, said.err
 
 
-@pytest.mark.parametrize(("kind", "angle", "told"), [("revolute", 0.0, False), ("revolute", 0.3, True), ("revolute", 2.0 * np.pi, True), ("continuous", 2.0 * np.pi, False)])
+@pytest.mark.parametrize(
+    ("kind", "angle", "told"), [("revolute", 0.0, False), ("revolute", 0.3, True), ("revolute", 2.0 * np.pi, True), ("continuous", 2.0 * np.pi, False)]
+)
 def test_a_joint_that_is_locked_where_it_stands_is_not(experiment, cli, kind, angle, told):
     turned = lambda text: text.replace('name="elbow" type="revolute"', f'name="elbow" type="{kind}"')  # noqa: E731
     assert kind == "revolute" or turned(URDF) != URDF
@@ -200,8 +205,14 @@ def test_of_two_of_which_one_can_do_all_that_the_other_does_only_one_is_told(cap
 
 def test_where_another_log_is_needed_its_design_is_typed_next(capsys):
     """And no page to look at."""
-    found = SimpleNamespace(fit=SimpleNamespace(masses={}, joints=("a",)))
-    document = {"verdict": [{"joint": "a", "status": "unresolved", "says": ""}], "findings": [], "notices": [], "run": "runs/arm", "next_log": "sysid design arm --out next"}
+    found = SimpleNamespace(fit=SimpleNamespace(masses={}, filters={}, joints=("a",)))
+    document = {
+        "verdict": [{"joint": "a", "status": "unresolved", "says": ""}],
+        "findings": [],
+        "notices": [],
+        "run": "runs/arm",
+        "next_log": "sysid design arm --out next",
+    }
     _after_diagnosis(found, document, SimpleNamespace(path=Path("arm/config.yaml"), name="arm"))
     assert capsys.readouterr().out.splitlines()[-1] == "next: sysid design arm --out next"
     _after_diagnosis(found, {**document, "next_log": None}, SimpleNamespace(path=Path("arm/config.yaml"), name="arm"))
@@ -211,7 +222,7 @@ def test_where_another_log_is_needed_its_design_is_typed_next(capsys):
 @pytest.mark.parametrize("steps", [(1, 2), (2, 1)])
 def test_what_is_promised_one_after_another_is_printed_in_that_order(steps, capsys):
     """A verdict stands by joint; the order is printed where the second joint's effect came first."""
-    found, experiment = SimpleNamespace(fit=SimpleNamespace(masses={}, joints=("a", "b"))), SimpleNamespace(path=Path("arm/config.yaml"), name="arm")
+    found, experiment = SimpleNamespace(fit=SimpleNamespace(masses={}, filters={}, joints=("a", "b"))), SimpleNamespace(path=Path("arm/config.yaml"), name="arm")
     on = {"a": "sysid add arm spring --joint a", "b": "sysid add arm spring --joint b"}
     verdict = [{"joint": joint, "status": "missing", "commands": [command]} for joint, command in on.items()]
     findings = [{"command": command, "joins_as_step": step} for command, step in zip(on.values(), steps)]

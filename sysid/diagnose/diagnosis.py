@@ -29,7 +29,7 @@ from ..shown import ShownDiagnosis
 from ..specs import Experiment
 from ..suspected import suspected
 from ..transfer import transfers
-from ..unexplained import by_log, notices, of_few_blocks
+from ..unexplained import notices, of_few_blocks, otherwise
 from ..view import View, elsewhere, first_view, law, too_short
 from ..warned import noticed
 from . import select
@@ -108,7 +108,7 @@ def diagnose(
             return of_few_blocks(own, partial(refitted, after), then, j, least, fitted)
 
         more = refused, transfers(last, view.cutoff), weighed, lambda j: law(after, j, again())
-        rest = then_asked.near, few, beyond, fallen(first, then), by_log(last, found, test.still)
+        rest = then_asked.near, few, beyond, fallen(first, then), otherwise(last, found, test.still)
         named = verdicts(fit, claims, after.unknown, found, *more, *rest)
         said = unasked(named) if wrong else left_open(named, beyond, select.WORTH)
         levels = np.array([f.rms or e for f, e in zip(found, last.rms("test").values())])

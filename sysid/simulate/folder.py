@@ -150,7 +150,8 @@ def _config(experiment: Experiment, robot: Robot, logs: list[str]) -> str:
     tree = {
         "robot": {**spec, "urdf": "robot.urdf", "joints": list(robot.joints), "gravity": list(experiment.robot.gravity)},
         "data": {"train": [name for name in logs if name != "test.csv"], "test": ["test.csv"]},
-        "preprocess": preprocess.model_dump(exclude_none=True),
+        # a window that is the usual one is not said: where angles are noisy for it, a fit chooses
+        "preprocess": preprocess.model_dump(exclude_none=True, exclude_defaults=True),
         "model": {"inertia": experiment.model.inertia, "effects": effects},
         "prior": {**experiment.prior.model_dump(exclude_none=True), "weight": AUTO, "source": "urdf"},
         "solver": experiment.solver.model_dump(exclude_none=True, exclude={"weighting"}),

@@ -91,6 +91,7 @@ def _document(found: Diagnosis, run) -> dict:
             "rms_test_after": dict(zip(joints, found.last.rms().tolist())),
         },
         "next_log": None,
+        "too_narrow": fit.filters.get("too_narrow"),
         "unused": list(fit.unused),
         "not_claimed": [
             {"effect": r.effect, "joint": r.joint, "why": r.why} for r in found.refused

@@ -45,7 +45,7 @@ def prepared(experiment: Experiment) -> Prepared:
         train = read(experiment, machine, experiment.data.train)
         refuse_no_torque(train)
         preprocess = experiment.preprocess
-        if "auto" in (preprocess.window, preprocess.cutoff) or filtering.lowpassed(experiment):
+        if not filtering.is_given(experiment):
             preprocess = filtering.settled(preprocess, filtering.compare(experiment, structure, train, prior))
         motion = prepare(train, preprocess, machine.joints)
         refuse_no_row(motion)

@@ -57,7 +57,7 @@ def _after_diagnosis(found, document: dict, experiment) -> None:
     even = [v["joint"] for v in document["verdict"] if "weighting" in v]
     target, out = typed(experiment.path), out_of(experiment, document["run"])
     # what the evidence names comes first: it is told with the masses as they are, and may be what bends them
-    if first is None and mended_first(document, experiment, found.fit.masses):
+    if first is None and mended_first(document, experiment, found.fit):
         return
     if first is not None or may:
         next_line(first["command"] if first else may[0], out=out)

@@ -67,7 +67,7 @@ def show_fit(fit: Fit, document: dict) -> None:
     print(document["prior"]["says"])
     show_notices(document)
     print(f"run folder: {document['run']}")
-    if not mended_first(document, fit.experiment, fit.masses, diagnosed=False):
+    if not mended_first(document, fit.experiment, fit, diagnosed=False):
         next_step("diagnose", typed(fit.experiment.path), out=out_of(fit.experiment, document["run"]))
 
 

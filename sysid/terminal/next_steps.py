@@ -37,23 +37,26 @@ def implausible(document: dict) -> list[str]:
     return [notice for notice in document["notices"] if notice.startswith(BEGINS)]
 
 
-def mended_first(document: dict, experiment, masses: dict, *, diagnosed: bool = True) -> bool:
+def mended_first(document: dict, experiment, fit, *, diagnosed: bool = True) -> bool:
     """Tell what is done before anything that rests on numbers that cannot be meant: what brings masses back, where that is
     known; else a check of the logs, once. False where there is nothing of the kind.
 
     Args:
-        masses: of a fit, as `masses.document` has them.
+        fit: whose masses and filter are looked at.
         diagnosed: whether all effects were asked; else a diagnosis names more of them than those that bodies can hide.
     """
-    if not implausible(document):
+    out, target, masses = out_of(experiment, document["run"]), typed(experiment.path), fit.masses
+    narrow = fit.filters.get("too_narrow") if _open(document) else None
+    if not (narrow or implausible(document)):
         return False
-    out, target = out_of(experiment, document["run"]), typed(experiment.path)
     if any(WRONG in notice for notice in implausible(document)):
         next_step("check", target, first="correct the columns, or what the experiment file says of them", out=out)
         return True
     unchecked = not _checked(document, experiment)
     if unchecked and any(ASK in notice for notice in implausible(document)):  # wrong columns make masses, and effects that mend them
         next_step("check", target, first="how joints are explained cannot be meant: see what the logs say", out=out)
+    elif narrow:  # noise of the angles bends masses too
+        next_step("fit", target, first=f"angles are noisy for this filter: write `{narrow['key']}: auto` under `preprocess:` in {experiment.path}", out=out)
     elif masses.get("prior_weight") is not None:
         adds = f" and type {masses['command']}" if masses.get("command") else ""
         next_step("fit", target, first=f"the masses cannot be meant: write `weight: auto` under `prior:` in {experiment.path}{adds}", out=out)
@@ -68,6 +71,11 @@ def mended_first(document: dict, experiment, masses: dict, *, diagnosed: bool = 
     else:
         return False
     return True
+
+
+def _open(document: dict) -> bool:
+    """Whether something is left to explain, of a diagnosis; of a fit nobody knows."""
+    return any(v["status"] != "complete" for v in document.get("verdict", ({"status": ""},)))
 
 
 def _checked(document: dict, experiment) -> bool:

@@ -1,0 +1,40 @@
+"""A filter that is too narrow for how noisy angles are: one that smooths more leaves clearly less."""
+
+from __future__ import annotations
+
+from .blocks import within_one_error
+
+_LESS = 0.9  # of a joint's error: in the rest a noise floor may be in doubt (noise.floor.DOUBT)
+
+
+def wider(tried: list[dict], key: str, value: float) -> dict:
+    """Of a filter that was given, the neighbour that smooths more, where it leaves less by more than one standard error, and of some
+    joint by a tenth, in which a noise floor may be in doubt: angles are noisy for what was given. {} where it does not."""
+    least = min(tried, key=lambda entry: entry["relative_error"], default={})
+    given = next((entry for entry in tried if entry[key] == value), least)
+    smooths = given is not least and (least[key] > value) == (key == "window")
+    if not smooths or len(given["folds"]) != len(least["folds"]) or within_one_error([least["folds"], given["folds"]], 0)[1]:
+        return {}
+    less = {joint: [rms, least["rms"][joint]] for joint, rms in given["rms"].items() if least["rms"][joint] < rms}
+    return {"key": key, "given": value, "value": least[key], "rms": less} if any(wide < _LESS * rms for rms, wide in less.values()) else {}
+
+
+def said(wider: dict) -> str:
+    """What a wider one leaves, in words."""
+    joint, (rms, less) = min(wider["rms"].items(), key=lambda one: one[1][1] / one[1][0])
+    unit = "s" if wider["key"] == "window" else "Hz"
+    return (
+        f"angles are noisy for {wider['given']:g} {unit}: with {wider['value']:g} {unit} {len(wider['rms'])} of the joints have less error on stretches "
+        f"of the training logs that were held apart ({joint}: {less:.4g} instead of {rms:.4g})"
+    )
+
+
+def noise_as_law(chosen: dict) -> dict[str, str]:
+    """{joint: why} of joints of which what a motion predicts may be noise of the angles, for which a filter that was given is too narrow."""
+    wider = chosen.get("too_narrow") or {"rms": {}}
+    return {
+        joint: f"angles are noisy for a {wider['key']} of {wider['given']:g}, and with {wider['value']:g} its error on stretches held apart falls from "
+        f"{rms:.4g} to {less:.4g}: noise that inertia makes torque of bends the bodies, and what the motion predicts may be that; write "
+        f"`{wider['key']}: auto` under `preprocess:` in the experiment file, and fit again"
+        for joint, (rms, less) in wider["rms"].items()
+    }

@@ -1,0 +1,84 @@
+"""A filter that is too narrow for how noisy angles are: chosen where none is said, told where one is."""
+
+import json
+
+import numpy as np
+import pytest
+
+from sysid import too_narrow
+from sysid.statement import where
+from sysid.unexplained import otherwise
+
+from .conftest import JOINTS
+
+
+def noisy(size):
+    """Angles of a log with white noise of a size [rad]."""
+
+    def change(columns):
+        rng = np.random.default_rng(5)
+        angles = {f"q_{joint}": columns[f"q_{joint}"] + size * rng.standard_normal(len(columns["t"])) for joint in JOINTS}
+        return columns | angles
+
+    return change
+
+
+@pytest.mark.parametrize("size", [2e-5, 3e-3])
+def test_a_window_that_is_not_said_is_chosen_where_angles_are_noisy_for_it(experiment, cli, size):
+    """Of 3 mrad a window of 0.1 s at 200 Hz leaves 2 rad/s^2 in the accelerations; of 0.02 mrad nothing."""
+    file = experiment(train=noisy(size), test=noisy(size))
+    said = cli("fit", file)
+    found = json.loads((said.run / "fit.json").read_text())["filter"]
+    assert "too_narrow" not in found
+    if size < 1e-4:
+        assert found["window"] == 0.1 and found["chosen"] == "usual" and "angles are noisy" not in said.out
+    else:
+        assert found["window"] > 0.1 and found["chosen"] == "held-out error" and len(found["held_out"]) > 3
+        assert "as none is given, it is chosen by that" in " ".join(said.out.split())
+
+
+def test_a_window_that_is_said_stays_and_is_told(experiment, cli):
+    file = experiment(config={"preprocess.window": 0.1}, train=noisy(3e-3), test=noisy(3e-3))
+    said = cli("fit", file)
+    found = json.loads((said.run / "fit.json").read_text())["filter"]
+    assert found["window"] == 0.1 and found["chosen"] == "given"
+    narrow = found["too_narrow"]
+    assert narrow["key"] == "window" and narrow["given"] == 0.1 and narrow["value"] == 0.2
+    assert all(less < rms for rms, less in narrow["rms"].values()) and any(less < 0.9 * rms for rms, less in narrow["rms"].values())
+    lines = said.out.split("next:")
+    assert "write `window: auto` under `preprocess:`" in " ".join(lines[0].split()) and lines[1].startswith(" sysid fit ")
+
+
+def entry(window, error, rms, scatter=0.01):
+    folds = 2.0 * np.log(error) + scatter * np.array([-1.0, 1.0, -1.0, 1.0])
+    return {"window": window, "relative_error": error, "rms": dict(zip(JOINTS, rms)), "folds": folds.tolist()}
+
+
+def test_only_what_smooths_more_and_leaves_clearly_less_is_told():
+    given = entry(0.1, 0.2, (1.0, 1.0))
+    wider = too_narrow.wider([entry(0.05, 0.3, (2.0, 2.0)), given, entry(0.2, 0.15, (0.8, 1.1))], "window", 0.1)
+    assert wider == {"key": "window", "given": 0.1, "value": 0.2, "rms": {JOINTS[0]: [1.0, 0.8]}}
+    # of one that smears reversals less the rows about them are left out in any case
+    assert not too_narrow.wider([entry(0.05, 0.1, (0.5, 0.5)), given, entry(0.2, 0.3, (2.0, 2.0))], "window", 0.1)
+    # less by chance; or by less than a noise floor is in doubt
+    blurred = given | {"folds": (np.array(given["folds"]) + np.array([1.0, -1.0, 1.0, -1.0])).tolist()}
+    assert not too_narrow.wider([blurred, entry(0.2, 0.19, (0.8, 0.8))], "window", 0.1)
+    assert not too_narrow.wider([given, entry(0.2, 0.19, (0.95, 0.95))], "window", 0.1)
+    # a lower cutoff smooths more
+    cut = [{**one, "cutoff": 1.0 / one.pop("window")} for one in (entry(0.1, 0.2, (1.0, 1.0)), entry(0.2, 0.15, (0.8, 0.8)))]
+    assert too_narrow.wider(cut, "cutoff", 10.0)["value"] == 5.0
+
+
+def test_noise_of_angles_is_no_law_and_asks_for_no_log():
+    class Found:
+        filters = {"too_narrow": {"key": "window", "given": 0.1, "value": 0.2, "rms": {"elbow": [1.0, 0.8]}}}
+        predictions = {}
+        joints = JOINTS
+        logs = ()
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("sysid.unexplained.other_means", lambda *_: {})
+        said = otherwise(Found(), ())
+    assert list(said) == ["elbow"] and "`window: auto` under `preprocess:`" in said["elbow"]
+    verdict = [{"joint": joint, "status": "unresolved"} for joint in JOINTS]
+    assert where.blind({"verdict": verdict, "too_narrow": Found.filters["too_narrow"]}) == ["shoulder"]
