@@ -317,6 +317,17 @@ def test_spikes_that_nobody_masked_do_not_raise_it(share):
         assert result.rms == pytest.approx(e[:, j].std(), rel=0.06)
 
 
+@pytest.mark.parametrize("missing", [nothing, load_friction])
+@pytest.mark.parametrize("seed", [1, 2, 3, 4])
+def test_noise_that_grows_with_the_speed_is_noise(seed, missing):
+    """As ripple of a drive does: 0.4 at rest and four times as much at the usual speed. What is loud stands in many rows together."""
+    rng, step = np.random.default_rng(seed), 0.004
+    q = wandering(30.0, step, rng)
+    speed = np.abs(np.gradient(q[:, 1], step))
+    e = (0.4 + 1.2 * speed / speed.std()) * rng.normal(size=len(q))
+    assert found(q, step, e, missing(q, step)).rms == pytest.approx(e.std(), rel=0.12)
+
+
 def test_knocks_that_nobody_masked_hardly_raise_it():
     """What rings on below the noise stays; without the treatment it is half as much again."""
     residual, measured, q, step, e = case()
@@ -510,7 +521,7 @@ def test_a_floor_under_a_low_pass_is_what_comes_through(simulated):
     """Angles that are hardly smoothed make torque's noise many times what a low-pass lets through of it, and none of that is white."""
     folder = simulated("noise under a low-pass", seed=8, duration=16.0, rate=1000.0, encoder=14)
     text = (folder / "config.yaml").read_text()
-    (folder / "low.yaml").write_text(text.replace("  torque: raw\n", "  torque: low-pass\n"))
+    (folder / "low.yaml").write_text(text.replace("  torque: raw\n", "  torque: low-pass\n  window: 0.1\n"))
     experiment = pipeline.load(folder / "low.yaml")
     fit = pipeline.fit(experiment)
     read = experiment_logs.read_all(experiment)

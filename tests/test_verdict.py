@@ -481,7 +481,9 @@ def asked_of_elbow(error: float, *, gain: float = 0.3, chance: float = 1e-3, nea
         seen.append(j)
         return Law(chance, "q_elbow and qd_shoulder", gain)
 
-    found = verdicts(fitted(error), [], [NOISE, NOISE], [floor(), floor()], (), (), weighed, agreed, lambda j, own, there: near if own > 0 else None, beyond=beyond, **more)
+    found = verdicts(
+        fitted(error), [], [NOISE, NOISE], [floor(), floor()], (), (), weighed, agreed, lambda j, own, there: near if own > 0 else None, beyond=beyond, **more
+    )
     return found[1], seen
 
 
@@ -546,7 +548,9 @@ def test_another_mean_in_each_log_is_no_law():
     assert found.status == "unresolved" and found.says.startswith("what is left may be stribeck")
 
 
-@pytest.mark.parametrize(("square", "floor", "said"), [(0.5, 0.9, True), (0.5, 0.5, True), (0.2, 0.5, False), (0.2, None, False), (0.6, None, True), (0.2, 1.1, False)])
+@pytest.mark.parametrize(
+    ("square", "floor", "said"), [(0.5, 0.9, True), (0.5, 0.5, True), (0.2, 0.5, False), (0.2, None, False), (0.6, None, True), (0.2, 1.1, False)]
+)
 def test_a_mean_by_log_is_told_where_it_is_most_of_what_is_no_noise(monkeypatch, square, floor, said):
     monkeypatch.setattr(unexplained, "other_means", lambda fit, logs, still: {"elbow": (square / 1.0, square, "+1 in a.csv")})
     fit = SimpleNamespace(joints=("shoulder", "elbow"), logs=())
@@ -605,6 +609,13 @@ def test_a_law_stands_beside_what_is_claimed():
     some = [claim("torque_gain", "elbow", [0.0, 0.8], fitted(1.3))]
     by = lambda share: verdicts(fitted(3.0), some, [NOISE, left(0.2)], [floor(), floor()], law=lambda j: Law(1e-9, "q_elbow and q_shoulder", share))[1]  # noqa: E731
     assert by(0.3).status == "missing" and by(0.9).status == "unknown" and by(0.9).left.share == pytest.approx(0.9)
+
+
+def test_at_a_floor_what_follows_an_acceleration_is_no_law():
+    """It is what inertia makes of the angles' noise, or what a filter leaves; clearly above the floor it may be anything."""
+    by = lambda error, of: verdicts(fitted(error), (), [NOISE, NOISE], [floor(), floor()], law=lambda j: Law(1e-9, of, 0.05))[1].status  # noqa: E731
+    assert [by(1.08, of) for of in ("qdd_elbow", "qdd_elbow and qd_shoulder", "qd_elbow")] == ["complete", "complete", "unknown"]
+    assert by(1.5, "qdd_elbow") == "unknown"
 
 
 def test_what_explains_the_training_logs_alone_may_be_another_law():

@@ -96,8 +96,8 @@ def verdicts(
         # where a floor is known, other weights say how much of the rest loud joints make
         whole |= took is not None and floors[j].rms is None and (1.0 + _LEFT) * took[j] >= 1.0
         seen, among = left[j], sum(asked)
-        if law and asked[j] and then > 0.0:
-            seen = seen.with_law(law(j), among, WORTH)
+        if law and asked[j] and then > 0.0 and not ((one := law(j)).inertial and reaches[j]):
+            seen = seen.with_law(one, among, WORTH)  # noise of angles at a floor is no law
         remains = seen if asked[j] and seen.predictable(among, WORTH) else None
         part = remains.share if remains else 1.0
         looks = near(j, part * seen.total, bool(remains))

@@ -30,6 +30,12 @@ class Law:
     variables: str
     share: float
 
+    @property
+    def inertial(self) -> bool:
+        """Whether it is of an acceleration: what inertia makes of the angles' noise, and what a
+        filter leaves of an acceleration that changes quickly, go with it."""
+        return "qdd_" in self.variables
+
     def predicts(self, joints: int, worth: float) -> bool:
         """Whether it predicts a part worth having, as one of two questions asked of each of
         `joints`."""

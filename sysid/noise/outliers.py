@@ -26,6 +26,7 @@ _MOST = 0.25  # of the rows; where more stand out, they are no exception
 _SLOW, _MOST_SLOW, _LARGER = 0.12, 0.25, 2.0
 _ALIKE = 10  # groups of values by the size of the noise about them
 _KNOWN = 4.0  # the most that its square is larger than drawn
+_LOUD = 40  # samples: of fewer a median is off by more than a fifth
 
 
 def without(
@@ -40,6 +41,7 @@ def without(
     shortest = min(steps)
     longest = max(1, int(_SHARE / (bandwidth * shortest))) if bandwidth > 0.0 else 1
     kept, values, all_rows = list(kept), list(values), sum(int(k.sum()) for k in kept)
+    louder = None
     for level in range(int(math.log2(longest)) + 1):
         width = 2**level
         steps_of = [_step(v, k, width) for v, k in zip(values, kept)]
@@ -58,6 +60,10 @@ def without(
             number = [max(n / (2 * width + 1), len(v)) for v, n in zip(drawn, spans)]
             unsure = [1.0 + 2.0 / math.sqrt(2.0 * n) for n in number]
             usual = _by_local(steps_of, local, typical, unsure)
+        if louder is None:
+            about = [0.5 / (bandwidth * step) if bandwidth > 0.0 else 0.0 for step in steps]
+            louder = [_louder(*own) for own in zip(steps_of, usual, about)]
+        usual = [own * more[width - 1 : width - 1 + len(own)] for own, more in zip(usual, louder)]
         found = []
         for d, k, scale in zip(steps_of, kept, usual):
             most = np.maximum(_OUTLYING * scale, _DIGITS * digit)
@@ -72,6 +78,17 @@ def without(
         values = [bridged(v, f) if f.sum() > 2 else v for v, f in zip(values, found)]
         kept = [f if f.sum() > 2 else k for f, k in zip(found, kept)]
     return kept, values
+
+
+def _louder(differences: np.ndarray, usual: np.ndarray, samples: float) -> np.ndarray:
+    """How many times louder than usual (n,) noise is about each row, one at least: by the median
+    over so many samples of differences from one to the next, which no misfit and no spike moves."""
+    size = max(_LOUD, round(samples)) | 1
+    if len(differences) < size:
+        return np.ones(len(differences))
+    times = np.abs(differences) / np.maximum(usual, 1e-300)
+    times[np.isnan(times)] = NORMAL  # in a gap
+    return np.maximum(running(times, size, "median") / NORMAL, 1.0)
 
 
 def of_drawn(values, kept, drawn, steps, bandwidth: float) -> float:

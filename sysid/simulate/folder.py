@@ -151,7 +151,7 @@ def _config(experiment: Experiment, robot: Robot, logs: list[str]) -> str:
         "robot": {**spec, "urdf": "robot.urdf", "joints": list(robot.joints), "gravity": list(experiment.robot.gravity)},
         "data": {"train": [name for name in logs if name != "test.csv"], "test": ["test.csv"]},
         # a window that is the usual one is not said: where angles are noisy for it, a fit chooses
-        "preprocess": preprocess.model_dump(exclude_none=True, exclude_defaults=True),
+        "preprocess": preprocess.model_dump(exclude_none=True, exclude={"window"} if preprocess.window == PreprocessSpec().window else None),
         "model": {"inertia": experiment.model.inertia, "effects": effects},
         "prior": {**experiment.prior.model_dump(exclude_none=True), "weight": AUTO, "source": "urdf"},
         "solver": experiment.solver.model_dump(exclude_none=True, exclude={"weighting"}),
