@@ -14,6 +14,7 @@ from .segment import gaps
 from .warned import warn
 
 _FEWEST = 4  # rows: fewer may be alike by chance
+_REGULAR = 0.8  # of the new values: coarse ones that are alike by chance come after any number of rows
 
 
 def without_held(samples: Recording) -> Recording:
@@ -24,6 +25,14 @@ def without_held(samples: Recording) -> Recording:
     again = np.all(np.diff(q, axis=0) == 0.0, axis=1) & np.all(np.diff(tau, axis=0) == 0.0, axis=1)
     apart = np.union1d(samples.breaks, gaps(samples.t)).astype(int)
     again[apart - 1] = False
+    if (every := _every(again)) > 1:
+        step = every * float(np.median(np.diff(samples.t)))
+        warn(
+            f"{samples.where}: new values come every {every} rows ({step:.3g} s): the rows between "
+            "only repeat them, and are left out",
+            above=2,
+        )
+        return _with(samples, np.append(True, ~again))
     found = {
         (a, b + 1) for a, b in runs(again) if b - a + 1 >= _FEWEST
     }  # the sample and its repeats
@@ -44,6 +53,22 @@ def without_held(samples: Recording) -> Recording:
         "which are left out",
         above=2,
     )
+    return _with(samples, kept)
+
+
+def _every(again) -> int:
+    """Rows from one new value to the next of rows (n,) that are the one before `again`: of a log
+    that was written faster than its values came; one of any other."""
+    steps = np.diff(np.flatnonzero(np.append(True, ~again)))
+    if len(steps) < SHORT:
+        return 1
+    usual = int(np.median(steps))
+    late = 1 if usual > 2 else 0  # rows that a value may come early or late
+    return usual if np.mean(np.abs(steps - usual) <= late) > _REGULAR else 1
+
+
+def _with(samples: Recording, kept) -> Recording:
+    """Samples with those rows (n,) alone that are kept."""
     place = np.cumsum(kept) - kept  # how many of the rows before each are kept
     signals = {name: values[kept] for name, values in samples.signals.items()}
     breaks = place[samples.breaks]

@@ -82,7 +82,7 @@ def assembled(samples: Recording, log: LogSpec, data: DataSpec, joints: tuple[st
     hashes = {name: sha256(path) for name, path in samples.files.items()}
     each = list(hashes.values())
     whole = each[0] if len(each) == 1 else hashlib.sha256("".join(each).encode()).hexdigest()
-    segments = tuple(_segments(samples.t, samples.signals, samples.where, samples.breaks))
+    segments = tuple(_segments(samples.t, samples.signals, samples.where, samples.breaks, linear=data.resampling == "linear"))
     return Log(
         samples.name, next(iter(samples.files.values())), whole, segments, lacking, hashes=hashes, unused=tuple(data.unused),
         levels=levels_of(data.groups, log),
@@ -187,7 +187,7 @@ def _convert(signals, data: DataSpec, joints, prismatic, where: str, drives) -> 
             warn(said, above=2)
 
 
-def _segments(t, signals, where: str, breaks: Iterable[int] = ()):
+def _segments(t, signals, where: str, breaks: Iterable[int] = (), *, linear: bool = False):
     breaks = np.array(breaks, dtype=int)
     steps = np.diff(t)
     step = float(np.median(np.delete(steps, breaks - 1)))
@@ -216,7 +216,7 @@ def _segments(t, signals, where: str, breaks: Iterable[int] = ()):
         own = float(np.mean(own[own < MISSING * step]))
         if told:
             clock, off = true.t, max(off, true.off)
-        clock, part = resampled(clock, part, own)
+        clock, part = resampled(clock, part, own, linear=linear)
         if told:
             rows = (left := true.at(clock, own)).inside
             lost, left = max(lost, own * rows.start, own * (len(clock) - rows.stop)), left.of(rows)

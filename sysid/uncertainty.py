@@ -164,7 +164,7 @@ def whitening(hessian) -> np.ndarray:
     """A basis (size, range) with basis' hessian basis = 1."""
     scale = np.sqrt(np.where(np.diagonal(hessian) > 0.0, np.diagonal(hessian), 1.0))
     values, vectors = eigen.symmetric(hessian / np.outer(scale, scale))
-    kept = values >= _FLAT * values[-1]
+    kept = values >= _FLAT * values.max(initial=0.0)
     return vectors[:, kept] / np.sqrt(values[kept]) / scale[:, None]
 
 

@@ -228,7 +228,7 @@ def test_an_angle_is_not_unwrapped_across_a_gap(wrapped, tmp_path):
 
 
 def test_rows_in_which_nothing_came_are_left_out(tmp_path):
-    """What a robot at rest repeats, and a logger that writes each value twice, stays."""
+    """What a robot at rest repeats stays."""
     made, file = columns(20.0, 0.005), tmp_path / "a.csv"
     n = len(made["t"])
     held = {name: values.copy() for name, values in made.items()}
@@ -245,10 +245,32 @@ def test_rows_in_which_nothing_came_are_left_out(tmp_path):
     resting = {name: values.copy() for name, values in made.items()}
     for name in list(made)[1:]:
         resting[name][400:] = resting[name][400]
-    twice = {name: values if name == "t" else np.repeat(values[::6], 6)[:n] for name, values in made.items()}
-    for other in (resting, twice, made):
+    for other in (resting, made):
         file.write_text(csv(other))
         assert sum(len(s.t) for s in read(file).segments) == n
+
+
+@pytest.mark.parametrize("every", [2, 6])
+def test_rows_between_new_values_are_left_out(every, tmp_path):
+    """A log that was written faster than its values came: each comes with its own time, now and then a row early or late. Coarse
+    values that are alike by chance come after any number of rows."""
+    made, file = columns(20.0, 0.005), tmp_path / "a.csv"
+    n, rng = len(made["t"]), np.random.default_rng(0)
+    fresh = np.unique(np.append(0, every * np.arange(1, n // every) + (rng.random(n // every - 1) < 0.04)))
+    last = np.searchsorted(fresh, np.arange(n), side="right") - 1
+    file.write_text(csv({name: values if name == "t" else values[fresh[last]] for name, values in made.items()}))
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        found = read(file)
+    assert any(f"new values come every {every} rows" in str(w.message) for w in told)
+    assert sum(len(s.t) for s in found.segments) == pytest.approx(n / every, rel=0.03)
+    assert np.abs(found.segments[0].q[5:-5, 0] - np.interp(found.segments[0].t[5:-5], made["t"], made["q_shoulder"])).max() < 5e-3
+    coarse = {name: values if name == "t" else np.round(values / (0.02 * np.ptp(values))) * 0.02 * np.ptp(values) for name, values in made.items()}
+    file.write_text(csv(coarse))
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        read(file)
+    assert not [w for w in told if "new values come" in str(w.message)]
 
 
 @pytest.mark.filterwarnings("ignore")

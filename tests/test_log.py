@@ -211,6 +211,8 @@ def test_resampled_torque_is_as_noisy_as_logged():
     _, found = resampled(t, {"tau": noise, "signals.linear": noise}, 0.01)
     assert found["tau"].std(axis=0) == pytest.approx([1.0, 1.0], abs=0.03)
     assert found["signals.linear"].std() < 0.87
+    _, plain = resampled(t, {"tau": noise}, 0.01, linear=True)
+    np.testing.assert_array_equal(plain["tau"], found["signals.linear"])
     assert abs(np.corrcoef(found["tau"][1:, 0], found["tau"][:-1, 0])[0, 1]) < 0.1
 
 

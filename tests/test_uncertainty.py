@@ -178,3 +178,8 @@ def test_what_stands_at_a_bound_of_its_own_or_hardly_follows_holds_nothing_back(
     assert uncertainty._root_mean_square(0.0, 0.02, 2.0) == pytest.approx(0.01 / np.sqrt(3.0), rel=0.01)  # an even one
     z = 2.0
     assert uncertainty._root_mean_square(4.0, np.inf, 2.0) == pytest.approx(np.sqrt(1.0 + z**2 - z * norm.pdf(z) / norm.sf(z)), rel=0.01)
+
+
+def test_nothing_is_white_already():
+    """Of no columns there is no basis, and nothing breaks: a joint of which no row is left."""
+    assert uncertainty.whitening(np.zeros((0, 0))).shape == (0, 0)
