@@ -138,16 +138,18 @@ def in_doubt(before: Fit, after: Fit, told: Fit, candidate: Candidate) -> str | 
     if not fell and still:
         return "the fit's own error does not fall with it"
     little = change.delta_rms > -_WORTH * unit
-    if not whole and (still or little) and not size_told(told, *candidate.key):
-        falls = "nor the fall of the test error beside its own"
-        falls = falls if still else f"and the test error falls by less than {100.0 * _WORTH:.2g} %"
+    more = not whole and beside(before, candidate)
+    if not whole and (still or little or more) and not size_told(told, *candidate.key):
+        falls = f"and the test error falls by less than {100.0 * _WORTH:.2g} %"
+        falls = falls if little else "beside what is on that joint already"
+        falls = "nor the fall of the test error beside its own" if still else falls
         return f"its size is nothing beside its deviation, {falls}"
     # what moves a joint may show in the torque of those that it carries, or that carry it; and a
     # torque that is read wrongly is made up for by bodies, which those that carry them bear
     read = isinstance(candidate.effect, SensorEffect) and change.delta_rms < 0.0
     wide = len(candidate.touches(2)) > 1 or (read and size_told(told, *candidate.key))
     wide = wide and comparison.falls(before, after, _NOTHING)
-    unsure = little and change.delta_rms > -change.se and beside(before, candidate)
+    unsure = little and change.delta_rms > -change.se and more
     if (change.delta_rms > -_NOTHING * unit or unsure) and not wide:
         falls = "hardly falls" if change.delta_rms < 0.0 else "does not fall"
         if unsure and change.delta_rms <= -_NOTHING * unit:

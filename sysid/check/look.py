@@ -27,6 +27,7 @@ from .tally import SPAN
 
 _TRAVELS, _MOVES = (0.1, 0.02), 0.05  # rad, m; rad/s: less tells nothing of a body
 _HAS = ("armature", "viscous", "coulomb", "torque_bias")  # what any joint has
+_IN_BAND = 4.0  # times the frequency below which speeds stay: an inertia is told there, and noise is cut off
 
 
 @dataclass(frozen=True)
@@ -107,13 +108,20 @@ class Look:
         return self._seen(self.part("train"))
 
     @cached_property
+    def in_band(self) -> Seen | None:
+        """The same of the training logs, of little more than the motion's own band: beyond it noise of
+        coarse angles, which inertia makes torque of, is more than motion."""
+        return self._seen(self.part("train"), _IN_BAND)
+
+    @cached_property
     def every(self) -> Seen | None:
         """The same of all logs, in the order of `logs`."""
         return self._seen(self.logs)
 
-    def _seen(self, logged: Sequence[Logged]) -> Seen | None:
+    def _seen(self, logged: Sequence[Logged], times: float = np.inf) -> Seen | None:
         read = [log.log for log in logged]
         cutoff = widest(read, known=(own_band := band(read)))
+        cutoff = min(cutoff, times * own_band) if own_band > 0.0 else cutoff
         motion = lowpassed(read, self.robot.joints, cutoff, known=own_band)
         if motion is None or motion.samples < FEWEST:
             return None

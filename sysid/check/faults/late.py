@@ -24,9 +24,9 @@ _MANY, _ALIKE = 2, 0.5
 
 def find(look: Look) -> Iterator[Fault]:
     """delayed_signal."""
-    if look.seen is None:
+    if (seen := look.in_band) is None:
         return
-    rows = look.seen.rows
+    rows = seen.rows
     step = max(log.step for log in look.part("train"))
     lags, apart, asked = np.linspace(-_MOST, _MOST, _LAGS), dict[str, tuple[float, ...]](), 0
     found: list[Fault] = []
@@ -35,14 +35,14 @@ def find(look: Look) -> Iterator[Fault]:
         told = use.sum() >= FEWEST and np.ptp(rows.tau[use, j]) > 0.0
         if not told or not look.excited[j].enough:
             continue
-        left = _left(look.seen, j, lags)
+        left = _left(seen, j, lags)
         squares = np.sum(left**2, axis=1)
         best, none = int(np.argmin(squares)), len(lags) // 2
         lag, pause = float(lags[best]), max(_LEAST[0], _LEAST[1] * step)
         gain = float(np.log(squares[none] / squares[best]))
         t, piece = rows.t[use], rows.piece[use]
         memory = blocks.memory(
-            left[best][:, None], np.ones((len(t), 1), bool), piece, look.seen.step
+            left[best][:, None], np.ones((len(t), 1), bool), piece, seen.step
         )
         count = int(blocks.numbered(t, piece, memory=memory).max()) + 1
         asked += 1
