@@ -16,6 +16,7 @@ from sysid.check.equations import Reading
 from sysid.check.faults import columns, one_log
 from sysid.check.look import looked
 from sysid.simulate import simulate, write
+from tests.conftest import JOINTS, motion
 
 RATE, SECONDS = 500.0, 15.0
 
@@ -245,7 +246,9 @@ def test_an_angle_and_its_torque_that_one_log_has_with_the_other_sign_are_named_
     assert "the angle and torque of elbow has in train_1.csv alone" in found[0].says
 
 
-@pytest.mark.parametrize(("joint", "zero", "turn"), [("shoulder", 0.5 * np.pi, "a quarter turn"), ("elbow", -0.5 * np.pi, "a quarter turn back"), ("shoulder", np.pi, "half a turn")])
+@pytest.mark.parametrize(
+    ("joint", "zero", "turn"), [("shoulder", 0.5 * np.pi, "a quarter turn"), ("elbow", -0.5 * np.pi, "a quarter turn back"), ("shoulder", np.pi, "half a turn")]
+)
 def test_a_zero_that_is_a_quarter_turn_off_is_said_and_mended(joint, zero, turn, made, tmp_path):
     logs = shutil.copytree(made(), tmp_path / "logs")
     for file in ("train.csv", "test.csv"):
@@ -337,3 +340,23 @@ def test_a_log_is_read_otherwise_only_where_the_others_then_predict_it(left, tol
     monkeypatch.setattr(one_log, "as_read", lambda seen, reading, k: (reading, None, None))
     found = one_log._read_otherwise(look, SimpleNamespace(rows=rows, model=None), 0)
     assert (found is not None) is told and (not told or found[2:5] == ("sign_flipped", (0,), "torque"))
+
+
+@pytest.mark.parametrize("late", [0.0, 0.02])
+def test_coarse_angles_are_no_delay(experiment, late):
+    """Of angles in steps of 2 mrad the accelerations are noise, and torque that is read early would make up for the inertia that is
+    missing then; a delay that is there is told all the same."""
+
+    def coarse(columns):
+        t = np.arange(0.0, 40.0, 0.01)
+        q, qd, qdd = motion(t, 3)
+        out = {"t": t}
+        for j, joint in enumerate(JOINTS):
+            tau = 0.3 * qd[:, j] + 0.08 * np.sign(qd[:, j]) + 0.06 * qdd[:, j]
+            tau = np.interp(t - late, t, tau) + 0.02 * np.random.default_rng(j).standard_normal(len(t))
+            out |= {f"q_{joint}": np.round(q[:, j] / 0.002) * 0.002, f"tau_{joint}": tau}
+        return out
+
+    free = {"robot.gravity": [0.0, 0.0, 0.0], "model.effects": ["viscous", "coulomb", "armature"]}
+    found = [f for f in check.check(pipeline.load(experiment(config=free, train=coarse, test=coarse))) if f.fault == "delayed_signal"]
+    assert {f.joint for f in found} == (set(JOINTS) if late else set())

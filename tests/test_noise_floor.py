@@ -1,14 +1,17 @@
 import re
+import shutil
 import time
 from dataclasses import replace
 
 import numpy as np
+import polars as pl
 import pytest
 from scipy.signal import butter, lfilter, sosfiltfilt
 
 from sysid import experiment_logs, pipeline
+from sysid.diagnose.diagnosis import diagnose
 from sysid.gaussian import Gaussian
-from sysid.noise import NoiseFloor, floor, floors, repeats
+from sysid.noise import NoiseFloor, as_of_test, floor, floors, repeats
 from sysid.noise.of_fit import floors_of_fit
 from sysid.noise.of_pieces import filtered
 
@@ -515,6 +518,29 @@ def test_under_a_low_pass_a_torque_hidden_by_the_angles_noise_is_not_known(size,
 def test_what_is_drawn_counts_where_rows_do():
     drawn, kept = [np.array([[1.0, 3.0], [1.0, 5.0]])], [np.array([True, False])]
     assert repeats.mean_square(drawn, kept) == 1.0 and repeats.mean_square(None, kept) == 0.0
+
+
+def test_noise_that_is_louder_in_the_training_logs_has_two_floors(simulated, tmp_path):
+    """Three times as loud there: each part's error is at its own, and nothing is missing."""
+    folder = shutil.copytree(simulated("quiet test", seed=21, duration=16.0), tmp_path / "louder")
+    table, rng = pl.read_csv(folder / "train.csv"), np.random.default_rng(3)
+    experiment = pipeline.load(folder)
+    quiet = pipeline.fit(experiment).rms("test")
+    louder = [pl.col(f"tau_{joint}") + np.sqrt(8.0) * quiet[joint] * rng.normal(size=table.height) for joint in quiet]
+    table.with_columns(louder).write_csv(folder / "train.csv")
+    experiment = pipeline.load(folder)
+    fit = pipeline.fit(experiment)
+    floors_, _ = floors_of_fit(experiment, fit, fit.model, fit.x, experiment_logs.read_all(experiment).parts)
+    for joint, one in zip(fit.joints, floors_):
+        assert one.rms == pytest.approx(quiet[joint], rel=0.1) and one.train == pytest.approx(3.0 * quiet[joint], rel=0.1)
+        assert "on the training logs" in one.detail
+    assert all(one.reached(error) for one, error in zip(floors_, as_of_test(fit.rms("train"), floors_).values()))
+    assert {v.status for v in diagnose(experiment, fit=fit).verdict} == {"complete"}
+
+
+def test_errors_of_training_logs_are_seen_against_their_own_noise():
+    both, louder = NoiseFloor(1.0, 0.02, "spectral", ""), NoiseFloor(1.0, 0.02, "spectral", "", train=4.0)
+    assert as_of_test({"a": 1.5, "b": 6.0}, [both, louder]) == {"a": 1.5, "b": 1.5}
 
 
 def test_a_floor_under_a_low_pass_is_what_comes_through(simulated):

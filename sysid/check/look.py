@@ -27,7 +27,7 @@ from .tally import SPAN
 
 _TRAVELS, _MOVES = (0.1, 0.02), 0.05  # rad, m; rad/s: less tells nothing of a body
 _HAS = ("armature", "viscous", "coulomb", "torque_bias")  # what any joint has
-_IN_BAND = 4.0  # times the frequency below which speeds stay: an inertia is told there, and noise is cut off
+_IN_BAND = 4.0  # times the frequency below which speeds stay: tells inertia, and cuts noise off
 
 
 @dataclass(frozen=True)
@@ -109,8 +109,8 @@ class Look:
 
     @cached_property
     def in_band(self) -> Seen | None:
-        """The same of the training logs, of little more than the motion's own band: beyond it noise of
-        coarse angles, which inertia makes torque of, is more than motion."""
+        """The same of the training logs in little more than the motion's own band: beyond it noise
+        of coarse angles, which inertia makes torque of, is more than motion."""
         return self._seen(self.part("train"), _IN_BAND)
 
     @cached_property

@@ -10,7 +10,7 @@ import numpy as np
 from ..candidates import Candidate
 from ..estimate import Fit
 from ..flexible import Law, Unknown
-from ..noise.floor import DOUBT
+from ..noise import DOUBT, as_of_test
 from ..transfer import Transfer, quieter
 from ..unexplained import by_weights, cause, explains, in_vain, loudest, noisy, not_all, smeared
 from .ask import HALF
@@ -70,7 +70,8 @@ def verdicts(
             square on the test logs, low-passed. means: {joint: why} where most is a mean by log.
     """
     last = claims[-1].after if claims else fit
-    firsts, errors = ((f.rms("train"), quieter(f.rms("test"), carried)) for f in (fit, last))
+    trained = [as_of_test(f.rms("train"), floors) for f in (fit, last)]
+    firsts, errors = zip(trained, (quieter(f.rms("test"), carried) for f in (fit, last)))
     weighed, most = weighed or {}, {j: max(e[j] for e in errors) for j in fit.joints}
     by_joint = list(zip(fit.joints, floors))
     reaches = [floor.reached(most[joint]) for joint, floor in by_joint]

@@ -13,46 +13,13 @@ import numpy as np
 
 from . import outliers, repeats
 from .hum import hum
+from .noise_floor import UNSURE, NoiseFloor
 from .of_angles import OfAngles
 from .rates import by_rate, of_each
 from .rest import Shared, rest_of, shared_by
 from .spectrum import spectrum_of, weighed
 from .stretches import FEWEST_SAMPLES, bridged, whole
 from .uneven import with_uneven
-
-#: standard error over RMS beyond which a floor is not given: two of them are the 25 % that one can
-#: judge an error by
-UNSURE = 0.12
-DOUBT = 0.1  # of a floor: what it may be in doubt by and still be called reached
-
-
-@dataclass(frozen=True)
-class NoiseFloor:
-    """RMS of a joint's torque noise [N m or N] and its standard error, None where the log does not
-    determine them.
-
-    method: "repeats", "spectral" or "none". detail: how it was found, or why not. low, high: at
-        least and at most [N m or N], None where nothing is known. about: the estimate that was too
-        unsure to be `rms`, None where there is none. halved: half of the angles' window [s], and
-        the errors that it leaves on the training logs and on the test logs; where it was asked.
-    """
-
-    rms: float | None
-    std: float | None
-    method: str
-    detail: str
-    low: float | None = None
-    high: float | None = None
-    about: float | None = None
-    halved: tuple[float, float, float] | None = None
-
-    def reached(self, error: float) -> bool:
-        """Whether an error is at it, as far as it is known."""
-        return self.rms is not None and error <= (1.0 + DOUBT) * self.rms + 2.0 * self.std
-
-    def within(self, error: float) -> bool:
-        """Whether an error is no more than it, by its standard error."""
-        return self.rms is not None and error <= self.rms + self.std
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from ..prediction import Prediction, predict
 from ..preprocess import on_both_sides, prepare
 from ..projection import NOISE
 from ..specs import Experiment, PreprocessSpec
-from .floor import DOUBT, NoiseFloor
+from .noise_floor import DOUBT, NoiseFloor
 from .of_angles import of_angles
 from .of_pieces import filtered, floors_of
 from .repeats import MADE, block_rms
@@ -45,11 +45,13 @@ def floors_of_fit(
     plain = spec.model_copy(update={"torque": "raw"})
     motions = [prepare(part, plain, fit.joints) for part in logs]
 
-    def floors(model: Model, x) -> tuple[list[NoiseFloor], list[Prediction], np.ndarray]:
-        pieces = [piece for motion in motions for piece in motion.pieces]
-        told = [predict(model, x, motion) for motion in motions]
+    def floors(
+        model: Model, x, parts: slice = slice(None)
+    ) -> tuple[list[NoiseFloor], list[Prediction], np.ndarray]:
+        pieces = [piece for motion in motions[parts] for piece in motion.pieces]
+        told = [predict(model, x, motion) for motion in motions[parts]]
         predicted = np.concatenate([one.predicted for one in told])
-        angles = of_angles(logs, motions, told, plain, (model, x))
+        angles = of_angles(logs[parts], motions[parts], told, plain, (model, x))
         return list(floors_of(pieces, predicted, angles=angles)), told, angles.squares()
 
     found, told, made = floors(model, x)
@@ -74,7 +76,25 @@ def floors_of_fit(
         found = [_alone(*own) for own in zip(found, np.sqrt(now).tolist(), most.tolist())]
     elif not all(one.reached(error) for one, error in zip(found, most)):
         found = _halved(found, spec, fit, logs)
-    return [_in_both(one, fit, j) for j, one in enumerate(found)], dict(zip(fit.joints, left))
+    found = [_in_both(one, fit, j) for j, one in enumerate(found)]
+    if sides is None and not all(one.reached(error) for one, error in zip(found, most)):
+        each = [floors(model, x, slice(k, k + 1))[0] for k in range(len(logs))]
+        found = [
+            one if one.reached(e) else _of_each(one, *own)
+            for one, e, *own in zip(found, most, *each)
+        ]
+    return found, dict(zip(fit.joints, left))
+
+
+def _of_each(found: NoiseFloor, train: NoiseFloor, test: NoiseFloor) -> NoiseFloor:
+    """The floor of the test logs with that of the training logs, where noise is clearly louder in
+    the one part than in the other; else the one of both."""
+    if train.rms is None or test.rms is None:
+        return found
+    if abs(test.rms - train.rms) <= 2.0 * math.hypot(train.std, test.std):
+        return found
+    detail = f"{test.detail}; {train.rms:.3g} on the training logs"
+    return replace(test, train=train.rms, detail=detail, halved=found.halved)
 
 
 def _alone(found: NoiseFloor, made: float, error: float) -> NoiseFloor:

@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from .floor import UNSURE, NoiseFloor, floors
+from .floor import floors
+from .noise_floor import UNSURE, NoiseFloor
 from .of_angles import OfAngles
 from .repeats import MADE
 
