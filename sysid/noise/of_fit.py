@@ -94,7 +94,11 @@ def _of_each(found: NoiseFloor, train: NoiseFloor, test: NoiseFloor) -> NoiseFlo
     if abs(test.rms - train.rms) <= 2.0 * math.hypot(train.std, test.std):
         return found
     detail = f"{test.detail}; {train.rms:.3g} on the training logs"
-    return replace(test, train=train.rms, detail=detail, halved=found.halved)
+    halved = found.halved
+    if halved is not None:
+        window, before, after = halved
+        halved = window, before * test.rms / train.rms, after
+    return replace(test, train=train.rms, detail=detail, halved=halved)
 
 
 def _alone(found: NoiseFloor, made: float, error: float) -> NoiseFloor:
