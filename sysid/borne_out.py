@@ -138,10 +138,10 @@ def in_doubt(before: Fit, after: Fit, told: Fit, candidate: Candidate) -> str | 
     if not fell and still:
         return "the fit's own error does not fall with it"
     little = change.delta_rms > -_WORTH * unit
-    more = not whole and beside(before, candidate)
+    more = beside(before, candidate)
     if not whole and (still or little or more) and not size_told(told, *candidate.key):
         falls = f"and the test error falls by less than {100.0 * _WORTH:.2g} %"
-        falls = falls if little else "beside what is on that joint already"
+        falls = falls if little else "and another effect is on that joint already"
         falls = "nor the fall of the test error beside its own" if still else falls
         return f"its size is nothing beside its deviation, {falls}"
     # what moves a joint may show in the torque of those that it carries, or that carry it; and a

@@ -28,6 +28,7 @@ from .workers import Mapped
 _WINDOWS = (0.02, 0.03, 0.05, 0.07, 0.1, 0.15, 0.2, 0.3, 0.4, 0.6, 0.8)  # s
 _CUTOFFS = (1.0, 1.5, 2.0, 3.0, 5.0, 7.0, 10.0, 15.0, 20.0, 30.0, 50.0, 100.0)  # Hz
 _SLOW = (0.3, 0.5, 0.7)  # Hz, of a low-pass on both sides beside these: an arm of 300 kg moves at half a hertz
+_SETTLED = ("window", "cutoff", "torque")
 _USUAL = {"window": 0.1, "cutoff": 10.0}  # s and Hz
 # Windows of an angle, a cycle of the low-pass on both sides. A polynomial of order 4 is -3 dB at 1.56 / window: friction's jump is smeared
 # over a short time only, and the noise that comes through stays behind the low-pass.
@@ -105,9 +106,11 @@ def begun(
                 warn(f"preprocess.{key}: auto chose {best[key]:g}, the end of what was tried; give a number to go further")
         elif wider := too_narrow.wider(tried, key, value):
             if key not in _given(spec):
-                warn(f"preprocess.{key}: {too_narrow.said(wider)}; as none is given, it is chosen by that")
                 asks = experiment.model_copy(update={"preprocess": spec.model_copy(update={key: "auto"})})
-                return compare(asks, model, logs, prior, progress=progress, mapped=mapped)
+                other = compare(asks, model, logs, prior, progress=progress, mapped=mapped)
+                if other[key] != value:  # which leaves rows that tell fewer coefficients
+                    warn(f"preprocess.{key}: {too_narrow.said(wider)}; as none is given, it is chosen by that")
+                    return other
             said["too_narrow"] = wider
             warn(f"preprocess.{key}: {too_narrow.said(wider)}; `{key}: auto` chooses by that")
         shown = [{name: entry[name] for name in (key, "relative_error", "rms")} for entry in tried]
@@ -198,9 +201,14 @@ def _best(tried: list[dict], key: str, usual: float) -> dict:
     return min(tied, key=lambda entry: (entry["untold"], abs(np.log(entry[key] / usual))))
 
 
+def same(one: dict, other: dict) -> bool:
+    """Whether two choices are one filter."""
+    return all(one.get(key) == other.get(key) for key in _SETTLED)
+
+
 def settled(spec: PreprocessSpec, chosen: dict) -> PreprocessSpec:
     """The preprocessing with `auto` replaced by what was chosen."""
-    return spec.model_copy(update={key: chosen[key] for key in ("window", "cutoff", "torque") if key in chosen})
+    return spec.model_copy(update={key: chosen[key] for key in _SETTLED if key in chosen})
 
 
 def torque_band(spec: PreprocessSpec) -> str:

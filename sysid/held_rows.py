@@ -32,7 +32,7 @@ def without_held(samples: Recording) -> Recording:
             "only repeat them, and are left out",
             above=2,
         )
-        return _with(samples, np.append(True, ~again))
+        return without_held(_with(samples, _one_of(again, every)))
     found = {
         (a, b + 1) for a, b in runs(again) if b - a + 1 >= _FEWEST
     }  # the sample and its repeats
@@ -65,6 +65,16 @@ def _every(again) -> int:
     usual = int(np.median(steps))
     late = 1 if usual > 2 else 0  # rows that a value may come early or late
     return usual if np.mean(np.abs(steps - usual) <= late) > _REGULAR else 1
+
+
+def _one_of(again, every: int) -> np.ndarray:
+    """One of each `every` rows (n,): the new ones, and where none came for longer, as at rest, those
+    that would have been."""
+    kept = np.append(True, ~again)
+    for a, b in runs(again):
+        if b - a + 1 > every + 1:
+            kept[a + every : b + 2 : every] = True
+    return kept
 
 
 def _with(samples: Recording, kept) -> Recording:

@@ -179,19 +179,20 @@ def _fit(experiment: Experiment, filters: dict | None, strength: PriorWeight | N
 
 
 def refit(experiment: Experiment, before: Fit, *, filters: dict | None = None, **how) -> tuple[Fit, Fit, Callable[[], Fit]]:
-    """Fit an experiment that grew from a fitted one: as its file says; under that one's prior; and, if asked for, that one under this fit's prior.
+    """Fit an experiment that grew from a fitted one: as its file says; under that one's prior; if asked for, that one under this.
 
-    Two models are compared under one prior. Where its weight is chosen, what was missing before may let it be another: the
-    second and the third fit are the first and the one before where it is the same, and else have their shape values, which a
-    prior of the bodies hardly moves.
+    Two models are compared under one prior and one filter. Where its weight is chosen, what was missing may let it be another:
+    the second and the third fit are the first and the one before where it is the same, else with their shape values.
 
     Args:
         filters, how: as of `fit`.
     """
     after, logs = fit_grown(experiment, before, filters=filters, **how), how.get("measured")
-    if after.strength.value == before.strength.value:
-        return after, after, lambda: before
-    return after, _under(before.strength, after, logs), lambda: _under(after.strength, before, logs)
+    same = filtering.same(after.filters, own := before.filters)
+    alike = after if same else fit_grown(experiment, before, filters=own, **how)
+    if alike.strength.value == before.strength.value:
+        return after, alike, lambda: before
+    return after, _under(before.strength, alike, logs), lambda: _under(after.strength, before, logs)
 
 
 def _under(strength: PriorWeight, found: Fit, measured: Read | None) -> Fit:

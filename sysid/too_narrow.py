@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from .blocks import within_one_error
 
-_LESS = 0.9  # of a joint's error: in the rest a noise floor may be in doubt (noise.floor.DOUBT)
+# Of a joint's error: in the rest a noise floor may be in doubt (noise.DOUBT); and of the other joints, half of that
+_LESS, _ALSO = 0.9, 0.95
 
 
 def wider(tried: list[dict], key: str, value: float) -> dict:
@@ -15,7 +16,7 @@ def wider(tried: list[dict], key: str, value: float) -> dict:
     smooths = given is not least and (least[key] > value) == (key == "window")
     if not smooths or len(given["folds"]) != len(least["folds"]) or within_one_error([least["folds"], given["folds"]], 0)[1]:
         return {}
-    less = {joint: [rms, least["rms"][joint]] for joint, rms in given["rms"].items() if least["rms"][joint] < rms}
+    less = {joint: [rms, least["rms"][joint]] for joint, rms in given["rms"].items() if least["rms"][joint] < _ALSO * rms}
     return {"key": key, "given": value, "value": least[key], "rms": less} if any(wide < _LESS * rms for rms, wide in less.values()) else {}
 
 

@@ -64,6 +64,7 @@ def test_only_what_smooths_more_and_leaves_clearly_less_is_told():
     blurred = given | {"folds": (np.array(given["folds"]) + np.array([1.0, -1.0, 1.0, -1.0])).tolist()}
     assert not too_narrow.wider([blurred, entry(0.2, 0.19, (0.8, 0.8))], "window", 0.1)
     assert not too_narrow.wider([given, entry(0.2, 0.19, (0.95, 0.95))], "window", 0.1)
+    assert list(too_narrow.wider([given, entry(0.2, 0.15, (0.8, 0.99))], "window", 0.1)["rms"]) == [JOINTS[0]]
     # a lower cutoff smooths more
     cut = [{**one, "cutoff": 1.0 / one.pop("window")} for one in (entry(0.1, 0.2, (1.0, 1.0)), entry(0.2, 0.15, (0.8, 0.8)))]
     assert too_narrow.wider(cut, "cutoff", 10.0)["value"] == 5.0

@@ -265,6 +265,15 @@ def test_rows_between_new_values_are_left_out(every, tmp_path):
     assert any(f"new values come every {every} rows" in str(w.message) for w in told)
     assert sum(len(s.t) for s in found.segments) == pytest.approx(n / every, rel=0.03)
     assert np.abs(found.segments[0].q[5:-5, 0] - np.interp(found.segments[0].t[5:-5], made["t"], made["q_shoulder"])).max() < 5e-3
+    rests = {name: values.copy() for name, values in made.items()}
+    for name in list(made)[1:]:
+        rests[name] = rests[name][fresh[last]]
+        rests[name][1200:2400] = rests[name][1200]
+    file.write_text(csv(rests))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SysidWarning)
+        found = read(file)
+    assert len(found.segments) == 1 and found.samples == pytest.approx(n / every, rel=0.03)  # what a robot at rest repeats stays
     coarse = {name: values if name == "t" else np.round(values / (0.02 * np.ptp(values))) * 0.02 * np.ptp(values) for name, values in made.items()}
     file.write_text(csv(coarse))
     with warnings.catch_warnings(record=True) as told:

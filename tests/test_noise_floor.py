@@ -11,7 +11,7 @@ from scipy.signal import butter, lfilter, sosfiltfilt
 from sysid import experiment_logs, pipeline
 from sysid.diagnose.diagnosis import diagnose
 from sysid.gaussian import Gaussian
-from sysid.noise import NoiseFloor, as_of_test, floor, floors, repeats
+from sysid.noise import NoiseFloor, as_of_test, floor, floors, outliers, repeats
 from sysid.noise.of_fit import floors_of_fit
 from sysid.noise.of_pieces import filtered
 
@@ -541,6 +541,34 @@ def test_noise_that_is_louder_in_the_training_logs_has_two_floors(simulated, tmp
 def test_errors_of_training_logs_are_seen_against_their_own_noise():
     both, louder = NoiseFloor(1.0, 0.02, "spectral", ""), NoiseFloor(1.0, 0.02, "spectral", "", train=4.0)
     assert as_of_test({"a": 1.5, "b": 6.0}, [both, louder]) == {"a": 1.5, "b": 1.5}
+
+
+def test_noise_that_is_louder_in_the_middle_of_a_log_is_not_more_than_there_is():
+    """A window weighs the middle three times as much as the rest; and what is loud there is no burst where it goes with the speed."""
+    rng, step = np.random.default_rng(5), 0.004
+    q = wandering(30.0, step, rng) * np.hanning(7500)[:, None]
+    e = (0.3 + 2.0 * np.abs(np.gradient(q[:, 1], step)) / np.abs(np.gradient(q[:, 1], step)).max()) * rng.normal(size=len(q))
+    result = found(q, step, e, nothing(q, step))
+    assert result.rms == pytest.approx(e.std(), rel=0.08) and result.std < 0.06 * result.rms
+
+
+@pytest.mark.parametrize(("length", "most"), [(10, 1.1), (25, 1.25)])
+def test_bursts_at_any_speed_are_left_out(length, most):
+    """They are louder than what is usual at their speed."""
+    rng, n = np.random.default_rng(6), 20_000
+    v = rng.normal(size=n)
+    v[np.arange(n) % 400 < length] *= 20.0
+    (kept,), _ = outliers.without([v], [np.ones(n, dtype=bool)], [0.01], 1.0, speeds=[np.sin(0.03 * np.arange(n))])
+    assert np.sqrt(np.mean(v[kept] ** 2)) < most and kept.mean() > 0.8
+
+
+@pytest.mark.parametrize("speeds", [True, False])
+def test_values_that_hardly_change_have_no_usual_step(speeds):
+    """Of values that come three times each most steps are zero."""
+    rng = np.random.default_rng(7)
+    v = np.repeat(rng.normal(size=400), 3)
+    (kept,), _ = outliers.without([v], [np.ones(len(v), dtype=bool)], [0.01], 1.0, speeds=[rng.normal(size=len(v))] if speeds else None)
+    assert kept.shape == v.shape
 
 
 def test_a_floor_under_a_low_pass_is_what_comes_through(simulated):

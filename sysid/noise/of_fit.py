@@ -78,7 +78,11 @@ def floors_of_fit(
         found = _halved(found, spec, fit, logs)
     found = [_in_both(one, fit, j) for j, one in enumerate(found)]
     if sides is None and not all(one.reached(error) for one, error in zip(found, most)):
-        each = [floors(model, x, slice(k, k + 1))[0] for k in range(len(logs))]
+        parts = [slice(k, k + 1) for k in range(len(logs))]
+        each = [floors(model, x, part)[0] for part in parts]
+        if np.any(more):
+            others = [floors(fit.model, fit.x, part)[0] for part in parts]
+            each = [[b if w else a for a, b, w in zip(*own, more)] for own in zip(each, others)]
         found = [
             one if one.reached(e) else _of_each(one, *own)
             for one, e, *own in zip(found, most, *each)
@@ -91,7 +95,8 @@ def _of_each(found: NoiseFloor, train: NoiseFloor, test: NoiseFloor) -> NoiseFlo
     the one part than in the other; else the one of both."""
     if train.rms is None or test.rms is None:
         return found
-    if abs(test.rms - train.rms) <= 2.0 * math.hypot(train.std, test.std):
+    apart, ratio = abs(test.rms - train.rms), max(test.rms, train.rms) / min(test.rms, train.rms)
+    if apart <= 2.0 * math.hypot(train.std, test.std) or ratio <= 1.0 + DOUBT:
         return found
     detail = f"{test.detail}; {train.rms:.3g} on the training logs"
     halved = found.halved

@@ -26,17 +26,18 @@ _MOST = 0.25  # of the rows; where more stand out, they are no exception
 _SLOW, _MOST_SLOW, _LARGER = 0.12, 0.25, 2.0
 _ALIKE = 10  # groups of values by the size of the noise about them
 _KNOWN = 4.0  # the most that its square is larger than drawn
-_LOUD = 40  # samples: of fewer a median is off by more than a fifth
 
 
 def without(
     values: list[np.ndarray], kept: list[np.ndarray], steps: list[float], bandwidth: float,
     digit: float = 0.0, drawn: list[np.ndarray] | None = None,
+    speeds: list[np.ndarray] | None = None,
 ) -> tuple[list[np.ndarray], list[np.ndarray]]:  # fmt: skip
     """Which rows (n,) of each run are kept, and the values with what is left out bridged.
 
     `digit` is the least difference of logged torques [N m or N]: that much is no outlier. `drawn`
     (draws, n) is what the angles' noise makes of each run: where there is more, more is usual.
+    `speeds` (n,) are the joint's: as a drive's ripple does, noise may grow with them.
     """
     shortest = min(steps)
     longest = max(1, int(_SHARE / (bandwidth * shortest))) if bandwidth > 0.0 else 1
@@ -60,10 +61,11 @@ def without(
             number = [max(n / (2 * width + 1), len(v)) for v, n in zip(drawn, spans)]
             unsure = [1.0 + 2.0 / math.sqrt(2.0 * n) for n in number]
             usual = _by_local(steps_of, local, typical, unsure)
-        if louder is None:
-            about = [0.5 / (bandwidth * step) if bandwidth > 0.0 else 0.0 for step in steps]
-            louder = [_louder(*own) for own in zip(steps_of, usual, about)]
-        usual = [own * more[width - 1 : width - 1 + len(own)] for own, more in zip(usual, louder)]
+        if width == 1 and speeds is not None:
+            louder = _louder([np.abs(d) / typical for d in steps_of], speeds)
+        if louder is not None:
+            more = [typical * own[width : width + len(d)] for own, d in zip(louder, steps_of)]
+            usual = [np.maximum(*own) for own in zip(usual, more)]
         found = []
         for d, k, scale in zip(steps_of, kept, usual):
             most = np.maximum(_OUTLYING * scale, _DIGITS * digit)
@@ -80,15 +82,22 @@ def without(
     return kept, values
 
 
-def _louder(differences: np.ndarray, usual: np.ndarray, samples: float) -> np.ndarray:
-    """How many times louder than usual (n,) noise is about each row, one at least: by the median
-    over so many samples of differences from one to the next, which no misfit and no spike moves."""
-    size = max(_LOUD, round(samples)) | 1
-    if len(differences) < size:
-        return np.ones(len(differences))
-    times = np.abs(differences) / np.maximum(usual, 1e-300)
-    times[np.isnan(times)] = NORMAL  # in a gap
-    return np.maximum(running(times, size, "median") / NORMAL, 1.0)
+def _louder(sizes: list[np.ndarray], speeds: list[np.ndarray]) -> list[np.ndarray]:
+    """How many times louder than usual noise is at each row (n,) of runs, one at least, where it
+    grows with the size of a speed (n,).
+
+    By medians of `sizes` (n - 1,) over what is usual, of differences from one sample to the next,
+    among rows of about the same speed: no misfit is so fast, and no burst is in most such rows.
+    """
+    size = np.concatenate(sizes)
+    speed = np.concatenate([np.abs(v)[: len(d)] for v, d in zip(speeds, sizes)])
+    there = np.flatnonzero(np.isfinite(size))
+    if (bins := min(_ALIKE, len(there) // _ALIKE**2)) < 2:
+        return [np.ones(len(v)) for v in speeds]
+    by_speed = np.array_split(there[np.argsort(speed[there])], bins)
+    at, times = (np.array([np.median(x[own]) for own in by_speed]) for x in (speed, size))
+    grows = np.maximum(np.maximum.accumulate(times / NORMAL), 1.0)
+    return [np.interp(np.abs(v), at, grows) for v in speeds]
 
 
 def of_drawn(values, kept, drawn, steps, bandwidth: float) -> float:

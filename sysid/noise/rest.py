@@ -59,7 +59,9 @@ def rest_of(shared: Shared, raw, torque, joint: int, drawn):
     kept = outliers.away_from_reversals(runs, shared.motion.v, even, kept)
     rest = [bridged(v, k) for v, k in zip(rest, kept)]
     digit = outliers.digit_of(np.concatenate([m[run.counts] for m, run in zip(torque, runs)]))
-    kept, _ = outliers.without(rest, kept, steps, shared.bandwidth, digit, drawn)
+    ends = np.cumsum([len(v) for v in rest])[:-1]
+    speeds = np.split(shared.motion.v[:, joint], ends)
+    kept, _ = outliers.without(rest, kept, steps, shared.bandwidth, digit, drawn, speeds)
     # once more, without what no noise does
     if not all(np.array_equal(own, all_) for own, all_ in zip(kept, counts)):
         found = asked.removed_from(raw, kept)

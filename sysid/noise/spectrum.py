@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .colours import models
+from .stretches import lost
 
 _BANDS_PER_OCTAVE = 6
 _MANY_RUNS = 8  # take little of the first ordinate with their common mean
@@ -77,7 +78,8 @@ def spectrum_of(values: list[np.ndarray], kept: list[np.ndarray], steps: list[fl
         mean = y[k].mean() if first == 2 else 0.0
         power = np.abs(np.fft.rfft((y - mean) * window)[first:-1]) ** 2 / (window @ window)
         frequency.append(at)
-        density.append(2.0 * step * power / (1.0 - _lost(k, window**2, at * step)))
+        power *= _over_all(y, k, window**2) / (1.0 - lost(k, window**2, at * step))
+        density.append(2.0 * step * power)
     frequency, density = np.concatenate(frequency), np.concatenate(density)
     band = np.log2(frequency / frequency.min()) * _BANDS_PER_OCTAVE + 1e-9
     _, band, count = np.unique(band.astype(np.int64), return_inverse=True, return_counts=True)
@@ -91,18 +93,12 @@ def spectrum_of(values: list[np.ndarray], kept: list[np.ndarray], steps: list[fl
     )  # fmt: skip
 
 
-def _lost(kept: np.ndarray, weight: np.ndarray, frequency: np.ndarray) -> np.ndarray | float:
-    """Share of the noise power that bridging gaps loses, at frequencies [1/sample]: all of it
-    within the gap where that is long against a period, none where it is short."""
-    if kept.all():
-        return 0.0
-    edges = np.flatnonzero(np.diff(np.concatenate([[True], kept, [True]]).astype(np.int8)))
-    length, total = edges[1::2] - edges[::2], np.concatenate([[0.0], np.cumsum(weight)])
-    share = (total[edges[1::2]] - total[edges[::2]]) / total[-1]
-    lengths, which = np.unique(length, return_inverse=True)
-    grid = np.geomspace(frequency[0], frequency[-1], 60)
-    lost = (1.0 - np.sinc(np.outer(grid, lengths)) ** 2) @ np.bincount(which, share)
-    return np.minimum(np.interp(frequency, grid, lost), 0.9)
+def _over_all(values, kept, weight) -> float:
+    """How much louder noise is, by steps from row to row, than where a window weighs most."""
+    pairs = kept[1:] & kept[:-1]
+    square, weight = np.diff(values)[pairs] ** 2, weight[1:][pairs]
+    seen = float(weight @ square)
+    return float(square.mean() * weight.sum()) / seen if seen > 0.0 else 1.0
 
 
 def weighed(

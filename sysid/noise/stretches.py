@@ -166,3 +166,17 @@ def bandwidth_of(runs: list[Run]) -> float:
     total = np.cumsum(np.concatenate(power)[order], axis=0)
     within = np.argmax(total >= _BANDWIDTH_SHARE * total[-1], axis=0)
     return float(np.concatenate(frequency)[order][within.max()])
+
+
+def lost(kept: np.ndarray, weight: np.ndarray, frequency: np.ndarray) -> np.ndarray | float:
+    """Share of the noise power that bridging gaps loses, at frequencies [1/sample]: all of it
+    within the gap where that is long against a period, none where it is short."""
+    if kept.all():
+        return 0.0
+    edges = np.flatnonzero(np.diff(np.concatenate([[True], kept, [True]]).astype(np.int8)))
+    length, total = edges[1::2] - edges[::2], np.concatenate([[0.0], np.cumsum(weight)])
+    share = (total[edges[1::2]] - total[edges[::2]]) / total[-1]
+    lengths, which = np.unique(length, return_inverse=True)
+    grid = np.geomspace(frequency[0], frequency[-1], 60)
+    lost = (1.0 - np.sinc(np.outer(grid, lengths)) ** 2) @ np.bincount(which, share)
+    return np.minimum(np.interp(frequency, grid, lost), 0.9)

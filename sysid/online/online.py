@@ -10,6 +10,7 @@ import numpy as np
 from .. import experiment_logs, pipeline
 from ..errors import SysidError
 from ..estimate import Fit
+from ..filters import settled
 from ..log_spec import LogSpec
 from ..prior_weight import number
 from ..run import Run, read_run
@@ -67,9 +68,9 @@ class Online:
         each = max(1, round(_AVERAGED / step))
         self._tick = each * PER_TICK
         self.tick = self._tick * step
-        self._begin = lambda: Stream(
-            self.model, self.experiment.preprocess, step, standstill, self._tick
-        )
+        spec = found.experiment.preprocess
+        spec = settled(spec, found.filters) if isinstance(found, Fit) else spec
+        self._begin = lambda: Stream(self.model, spec, step, standstill, self._tick)
         self._stream = self._begin()
         self._follower = self._followed(found, 1.0 if memory is None else np.exp(-step / memory))
         self._follows, self._watch = follow, None

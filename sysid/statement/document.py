@@ -122,6 +122,7 @@ def _floor(floor) -> dict:
         "floor_method": floor.method,
         "floor_detail": floor.detail,
         "noise_floor_within": [floor.low, floor.high],
+        **({} if floor.train is None else {"noise_floor_train": floor.train}),
     }
 
 
