@@ -179,10 +179,11 @@ def _fit(experiment: Experiment, filters: dict | None, strength: PriorWeight | N
 
 
 def refit(experiment: Experiment, before: Fit, *, filters: dict | None = None, **how) -> tuple[Fit, Fit, Callable[[], Fit]]:
-    """Fit an experiment that grew from a fitted one: as its file says; under that one's prior; if asked for, that one under this.
+    """Fit an experiment that grew from a fitted one.
 
-    Two models are compared under one prior and one filter. Where its weight is chosen, what was missing may let it be another:
-    the second and the third fit are the first and the one before where it is the same, else with their shape values.
+    Returns:
+        the fit as its file says; the same under the prior and the filter of the one before; and what
+        makes the one before under its prior. Where no weight differs, that is the one before.
 
     Args:
         filters, how: as of `fit`.
