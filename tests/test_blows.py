@@ -11,6 +11,7 @@ from sysid.blows import _STAGES, _sets, scatter, striking, struck
 from sysid.config import load
 from sysid.diagnose.ask import ask
 from sysid.diagnose.refits import refitted
+from sysid.filters import settled
 from sysid.prior_weight import with_weight
 from sysid.view import first_view, joined
 
@@ -22,7 +23,8 @@ HIDDEN = "backlash:elbow:b=0.012"
 @pytest.fixture(scope="module")
 def fitted(simulated):
     folder = simulated("play", HIDDEN, seed=6, duration=15.0)
-    file = edited(folder, "with", model={"effects": ["viscous", "coulomb", {"backlash": {"joints": ["elbow"]}}, "armature"]})
+    model = {"effects": ["viscous", "coulomb", {"backlash": {"joints": ["elbow"]}}, "armature"]}
+    file = edited(folder, "with", model=model, preprocess={"window": 0.1})
     (truth,) = json.loads((folder / "truth.json").read_text())["hidden"]
     return pipeline.fit(load(file)), truth["values"]["b"]
 
@@ -41,7 +43,9 @@ def test_the_width_of_play_is_within_its_deviation(fitted):
 def test_a_wrong_hollow_is_left(fitted, begun):
     """Also that of a play that is next to none, at which a way downhill may end."""
     fit, _ = fitted
-    motion = pipeline.prepare(pipeline.read(fit.experiment, fit.model.robot, fit.experiment.data.train), fit.experiment.preprocess, fit.joints)
+    motion = pipeline.prepare(
+        pipeline.read(fit.experiment, fit.model.robot, fit.experiment.data.train), settled(fit.experiment.preprocess, fit.filters), fit.joints
+    )
     (own,) = striking(fit.model).values()
     off = fit.model.with_shapes([s * (begun if k == own[0] else 1.0) for k, s in enumerate(fit.model.shapes)])
     held = shape.settle(fit.experiment, off, motion, fit.prior, weights=fit.weights, hold=True)
@@ -63,7 +67,9 @@ def test_a_load_that_is_renewed_costs_nothing(fitted):
     """Other bodies' load has blows at other times: what was found under one load stays where those of the bodies that are found leave
     more."""
     fit, _ = fitted
-    motion = pipeline.prepare(pipeline.read(fit.experiment, fit.model.robot, fit.experiment.data.train), fit.experiment.preprocess, fit.joints)
+    motion = pipeline.prepare(
+        pipeline.read(fit.experiment, fit.model.robot, fit.experiment.data.train), settled(fit.experiment.preprocess, fit.filters), fit.joints
+    )
     costs = []
     for weight in (1e-3, 0.1, 10.0, 100.0):
         experiment = with_weight(fit.experiment, weight)

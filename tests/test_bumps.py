@@ -53,7 +53,7 @@ def test_pushes_that_no_signal_shows_are_found_and_left_out(pushed):
         total += len(done)
     # one in a few comes while two of three joints turn round, where no row counts anyway
     assert total == 6 and hit >= 4
-    plain = experiment.model_copy(update={"preprocess": experiment.preprocess.model_copy(update={"events": "keep"})})
+    plain = experiment.model_copy(update={"preprocess": experiment.preprocess.model_copy(update={"events": "keep", "window": 0.1})})
     errors = [pipeline.fit(one).rms("test").values() for one in (experiment, plain)]
     assert sum(errors[0]) < 0.8 * sum(errors[1])
     assert all(not log.events for log in read(plain)[1])

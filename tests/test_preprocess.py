@@ -268,14 +268,21 @@ def test_a_given_filter_is_shown_beside_half_and_double():
     experiment, structure, _, _, prior = arm()
     made = arm_log(structure.robot, np.random.default_rng(3), seconds=10)
     found = filters.compare(experiment, structure, [made], prior)
-    assert found["window"] == 0.1 and found["chosen"] == "given"
+    assert found["window"] == 0.1 and found["chosen"] == "usual"
+    said = experiment.model_copy(update={"preprocess": experiment.preprocess.model_copy(update={"window": 0.1})})
+    assert filters.compare(said, structure, [made], prior) == {**found, "chosen": "given"}
     assert [entry["window"] for entry in found["held_out"]] == [0.05, 0.1, 0.2]
     assert all(0 < entry["relative_error"] < 1 for entry in found["held_out"])
 
 
 def test_a_filter_that_leaves_a_coefficient_untold_wins_no_tie():
     """What a coupling of two joints rubs may differ from their own friction only near reversals, which a wide window leaves out."""
-    one = lambda window, error, untold: {"window": window, "relative_error": error, "folds": [np.log(error) + x for x in np.random.default_rng(int(1e3 * window)).normal(0, 0.3, 4)], "untold": untold}  # noqa: E731
+    one = lambda window, error, untold: {
+        "window": window,
+        "relative_error": error,
+        "folds": [np.log(error) + x for x in np.random.default_rng(int(1e3 * window)).normal(0, 0.3, 4)],
+        "untold": untold,
+    }  # noqa: E731
     rest = [one(0.05, 0.066, 0), one(0.07, 0.067, 0)]  # they differ by less than by their scatter
     assert filters._best([*rest, one(0.1, 0.062, 0)], "window", 0.1)["window"] == 0.1
     assert filters._best([*rest, one(0.1, 0.062, 1)], "window", 0.1)["window"] == 0.07

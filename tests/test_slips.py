@@ -106,7 +106,11 @@ def test_they_are_told_and_no_row_is_left_out_for_them(experiment):
         return out
 
     fits = {}
-    for name, how in (("clean", {}), ("slipped", {"train": slipped}), ("kept", {"train": slipped, "config": {"preprocess.events": "keep"}})):
+    for name, how in (
+        ("clean", {}),
+        ("slipped", {"train": slipped}),
+        ("kept", {"train": slipped, "config": {"preprocess.events": "keep", "preprocess.window": 0.1}}),
+    ):
         fits[name] = pipeline.fit(pipeline.load(experiment(name=name, **how)))
     told = [n for n in fits["slipped"].notices if "early or late" in n]
     (event,) = [e for e in fits["slipped"].events if e["kind"] == "slip"]
