@@ -12,7 +12,7 @@ from sysid import experiment_logs, pipeline
 from sysid.diagnose.diagnosis import diagnose
 from sysid.gaussian import Gaussian
 from sysid.noise import NoiseFloor, as_of_test, floor, floors, outliers, repeats
-from sysid.noise.of_fit import floors_of_fit
+from sysid.noise.of_fit import _of_each, floors_of_fit
 from sysid.noise.of_pieces import filtered
 
 
@@ -536,6 +536,17 @@ def test_noise_that_is_louder_in_the_training_logs_has_two_floors(simulated, tmp
         assert "on the training logs" in one.detail
     assert all(one.reached(error) for one, error in zip(floors_, as_of_test(fit.rms("train"), floors_).values()))
     assert {v.status for v in diagnose(experiment, fit=fit).verdict} == {"complete"}
+
+
+@pytest.mark.parametrize(
+    ("train", "test", "two"), [(1.0, 1.3, True), (1.3, 1.0, True), (1.0, 1.05, False), (0.0, 1.0, False), (None, 1.0, False), (0.0, 0.0, False)]
+)
+def test_floors_are_two_where_they_clearly_differ(train, test, two):
+    both = NoiseFloor(1.1, 0.01, "spectral", "", halved=(0.05, 2.0, 1.0))
+    floor_of = lambda rms: NoiseFloor(rms, None if rms is None else 0.01, "spectral", "here")  # noqa: E731
+    seen = _of_each(both, floor_of(train), floor_of(test))
+    assert (seen.rms, seen.train) == ((test, train) if two else (1.1, None))
+    assert seen.halved == ((0.05, 2.0 * test / train, 1.0) if two else both.halved)
 
 
 def test_errors_of_training_logs_are_seen_against_their_own_noise():

@@ -93,10 +93,10 @@ def floors_of_fit(
 def _of_each(found: NoiseFloor, train: NoiseFloor, test: NoiseFloor) -> NoiseFloor:
     """The floor of the test logs with that of the training logs, where noise is clearly louder in
     the one part than in the other; else the one of both."""
-    if train.rms is None or test.rms is None:
+    if not (train.rms and test.rms):  # not known, or nothing is noisy
         return found
-    apart, ratio = abs(test.rms - train.rms), max(test.rms, train.rms) / min(test.rms, train.rms)
-    if apart <= 2.0 * math.hypot(train.std, test.std) or ratio <= 1.0 + DOUBT:
+    least, most = sorted((train.rms, test.rms))
+    if most - least <= max(2.0 * math.hypot(train.std, test.std), DOUBT * least):
         return found
     detail = f"{test.detail}; {train.rms:.3g} on the training logs"
     halved = found.halved
