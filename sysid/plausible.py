@@ -13,6 +13,8 @@ _EFFORT, _FEWEST = 1.5, 3  # times what the URDF allows the drive, and in how ma
 BEGINS = "implausible"  # a notice that makes all the rest doubtful
 WRONG = "a check of these logs finds their columns wrong"
 ASK = "are its columns, signs and units right? `sysid check` says"
+IN_EACH_LOG = "most of what is left is another mean in each log"
+OF_ITS_OWN = "`data.groups`, and an effect that is `per:` a group, give each its own"
 _ALIKE = 1.1  # times an error: two that differ by less are alike
 _BLOCKS = 10  # of a log, whose means say how far its own may be off
 _CHANCE = 1e-3  # of a log that stands apart from the others, were there nothing
@@ -58,10 +60,7 @@ def _apart(fit: Fit, logs: Sequence[dict], still: Sequence[str]) -> Iterator[str
     """Joints whose error has another mean in some logs, where that is much of it."""
     for joint, (share, _, said) in other_means(fit, logs, still).items():
         if share > _SHARE:
-            yield (
-                f"{_left(joint)}, in the mean {said}: a torque's zero that was set anew, a load, or what hangs "
-                "on the place; `data.groups`, and an effect that is `per:` a group, give each its own"
-            )
+            yield (f"{_left(joint)}, in the mean {said}: a torque's zero that was set anew, a load, or what hangs on the place; {OF_ITS_OWN}")
 
 
 def _left(joint: str) -> str:

@@ -52,8 +52,9 @@ class Rows:
 
 
 def stride_for(motion: Motion, most: int) -> int:
-    """The stride that leaves at most `most` rows."""
-    return max(1, -(-motion.samples // most))
+    """The stride that leaves at most `most` rows, and of rows that a low-pass makes alike one."""
+    alike = min((1 if piece.smoother is None else piece.smoother.every for piece in motion.outlines), default=1)
+    return max(alike, -(-motion.samples // most))
 
 
 def starts(motion: Motion, stride: int) -> list[slice]:

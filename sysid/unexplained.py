@@ -14,7 +14,7 @@ from .estimate import Fit
 from .failures import HeldOut, fallen
 from .given_shapes import at_edges
 from .model_parameters import ROBOT
-from .plausible import other_means
+from .plausible import IN_EACH_LOG, OF_ITS_OWN, other_means
 from .too_narrow import noise_as_law
 
 _MOST = 0.5  # of what stands above a floor, or of a square
@@ -189,8 +189,8 @@ def by_log(fit: Fit, floors, still: Sequence[str] = ()) -> dict[str, str]:
         misfit = square / share - (floor.rms or floor.low or 0.0) ** 2
         if misfit > 0.0 and square > _MOST * misfit:
             out[joint] = (
-                f"most of what is left is another mean in each log ({said}): a torque's zero that "
-                "was set anew, a load, or what hangs on the place"
+                f"{IN_EACH_LOG} ({said}): a torque's zero that was set anew, a load, or what hangs "
+                f"on the place; {OF_ITS_OWN}"
             )
     return out
 

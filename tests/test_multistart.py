@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from sysid import config, multistart, pipeline, shape, shape_refinement, vocabulary
+from sysid import config, multistart, pipeline, rows, shape, shape_refinement, vocabulary
 from sysid.compress import compress
 from sysid.estimate import identify
 from sysid.landscape import Landscape, at_zero, landscape
@@ -266,3 +266,23 @@ def test_nearly_what_failed_is_not_tried_again(monkeypatch):
     monkeypatch.setattr(shape, "_moving", lambda *_: (np.array([0, 1]), system, right, 1.0))
     found = shape._descended(SimpleNamespace(model=model(np.zeros(2)), objective=1.0), None, solved, None, 0.6)
     assert found.objective == 0.5 and all(then < 0.7 * first for first, then in zip(tried, tried[1:])), tried
+
+
+def test_of_rows_that_a_low_pass_makes_alike_one_is_searched():
+    """A search of every row of a low-pass finds what it finds of those that are not alike, and the cost of each
+    step goes with their number.
+    """
+    experiment, model, _, prior, joint = bumped()
+    log = arm_log(model.robot, np.random.default_rng(3), seconds=6.0, noise=0.1, coulomb=1.0)
+    (segment,) = log.segments
+    q, c, w = segment.q[:, joint], -0.4, 0.15
+    segment.tau[:, joint] += 2.0 * np.exp(-(((q - c) / w) ** 2))
+    spec = experiment.preprocess.model_copy(update={"torque": "low-pass", "cutoff": 3.0})
+    motion = prepare([log], spec, model.robot.joints)
+    every = motion.pieces[0].smoother.every
+    assert every > 5 and rows.stride_for(motion, 6000) == every
+    assert rows.stride_for(motion, motion.samples // (4 * every)) >= 4 * every
+    found = shape.settle(experiment, model, motion, prior)
+    all_rows = shape.settle(experiment, model, motion, prior, stride=1)
+    np.testing.assert_allclose(found.model.shapes, all_rows.model.shapes, rtol=0.02)
+    np.testing.assert_allclose(found.model.shapes, [c, w], atol=0.05)

@@ -7,7 +7,7 @@ import numpy as np
 from ..end_stops import END, LAWS
 from ..failures import Failure
 from ..fit_document import number
-from ..plausible import WRONG
+from ..plausible import IN_EACH_LOG, WRONG
 from .words import listed, wrapped
 
 
@@ -57,7 +57,9 @@ def blind(document: dict) -> list[str]:
     return [
         v["joint"]
         for v in open_
-        if not {"may_be", "weighting"} & v.keys() and v["joint"] not in known
+        if not {"may_be", "weighting"} & v.keys()
+        and v["joint"] not in known
+        and not (v.get("says") or "").startswith(IN_EACH_LOG)  # each log would have its own again
     ]
 
 
