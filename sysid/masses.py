@@ -33,6 +33,7 @@ from .vocabulary import find, vocabulary
 # A stronger prior is told that costs no more of the error, root mean square, than nobody sees; of
 # so many, each three times the last
 _UNSEEN, _STRONGER = 0.01, 8
+SAYS_CHECK = " (`sysid check` says)"
 _ROWS = 6000  # enough to tell masses from effects; a long log need not be read whole for it
 
 
@@ -42,7 +43,8 @@ class Masses:
 
     far: (link, its joint, mass, the URDF's mass) [kg]. weight: of a prior, where that it is chosen
     is part of the cure. effect: a word of the vocabulary, "" where none is part of it; joints: that
-    lack it, None for all or the robot. command: what adds it.
+    lack it, None for all or the robot. command: what adds it. doubted: columns may be wrong, and are
+    asked first.
     """
 
     far: tuple[tuple[str, str, float, float], ...]
@@ -52,6 +54,7 @@ class Masses:
     command: str = ""
     stronger: float | None = None
     costs: float = 0.0
+    doubted: bool = False
 
     @property
     def says(self) -> str:
@@ -64,6 +67,8 @@ class Masses:
     @property
     def do(self) -> str:
         """The cure, in words."""
+        if self.doubted:
+            return f"columns, signs or units may be wrong, which come first{SAYS_CHECK}"
         auto = "" if self.weight is None else f"`prior.weight: auto` (it takes {self.weight:g})"
         where = f" on {', '.join(self.joints)}" if self.joints else ""
         if self.stronger is not None:
@@ -74,8 +79,8 @@ class Masses:
             )
         if not (auto or self.effect):
             return (
-                "no effect that can hide in them brings them back: columns or units may be wrong "
-                "(`sysid check` says), or the logs do not tell them (a larger prior.weight)"
+                "no effect that can hide in them brings them back: columns or units may be wrong"
+                f"{SAYS_CHECK}, or the logs do not tell them (a larger prior.weight)"
             )
         effect = f"the effect {self.effect}{where}" if self.effect else ""
         what = f"{effect} with {auto}" if effect and auto else effect or auto
@@ -139,6 +144,12 @@ def implausible(found: Fit, motion: Motion | None) -> Masses | None:
     if not listed:
         return None
     return Masses(listed) if motion is None else replace(_cure(found, motion), far=listed)
+
+
+def doubted(found: Masses | None, worse: bool) -> Masses | None:
+    """The masses of a fit; without a cure where it is worse than none on a joint: its columns come
+    first, for which what brings masses back may make up."""
+    return Masses(found.far, doubted=True) if found and worse else found
 
 
 @dataclass(frozen=True)

@@ -42,7 +42,7 @@ from .notices import (
     tell_still,
     tell_undetermined,
 )
-from .plausible import implausible
+from .plausible import WORSE, implausible
 from .prediction import Prediction, predict
 from .prior_weight import PriorWeight, with_weight
 from .robot import Robot
@@ -149,8 +149,6 @@ def _fit(experiment: Experiment, filters: dict | None, strength: PriorWeight | N
         tell_undetermined(found, motion)
         with _timed(seconds, "masses", tell):  # what other fits are compared with has been asked what it lacks
             heavy = masses.implausible(found, motion if filters is None else None)
-        if heavy is not None:
-            warn(heavy.says)
         with _timed(seconds, "predict", tell):
             predictions = {"train": predicted(structure, found.x, motion)}
             samples, left_out = {"train": motion.samples}, {"train": _left_out(motion)}
@@ -170,7 +168,9 @@ def _fit(experiment: Experiment, filters: dict | None, strength: PriorWeight | N
         if not scale_is_told(experiment, machine.joints):
             warn("no joint's torque is known in N m: these logs tell masses, friction and gains up to one common factor, which the prior's masses choose; one known gain, or a payload of known mass, settles it")
         tell("left", 0.0)
-        for text in implausible(replace(found, predictions=predictions), motion.still, provenance):
+        doubts = [*implausible(replace(found, predictions=predictions), motion.still, provenance)]
+        heavy = masses.doubted(heavy, any(WORSE in text for text in doubts))
+        for text in doubts if heavy is None else [heavy.says, *doubts]:
             warn(text)
     return replace(
         found, masses=masses.document(heavy), predictions=predictions, samples=samples, left_out=left_out, seconds=seconds, filters=chosen,

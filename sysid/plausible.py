@@ -11,6 +11,7 @@ from .estimate import Fit
 
 _EFFORT, _FEWEST = 1.5, 3  # times what the URDF allows the drive, and in how many samples
 BEGINS = "implausible"  # a notice that makes all the rest doubtful
+WORSE = "the model is worse than none on the test logs of"
 WRONG = "a check of these logs finds their columns wrong"
 ASK = "are its columns, signs and units right? `sysid check` says"
 IN_EACH_LOG = "most of what is left is another mean in each log"
@@ -35,7 +36,7 @@ def implausible(fit: Fit, still: Sequence[str] = (), logs: Sequence[dict] = ()) 
     carries = (test["rms"] <= _ALIKE * train["rms"]) & (train["r2"] > 0.0)
     worse = [f"{joint} (R2 {r2:.2g})" for joint, r2, well in zip(fit.joints, test["r2"], carries) if r2 < 0.0 and not well and joint not in stands]
     if worse:
-        yield f"{BEGINS}: the model is worse than none on the test logs of {', '.join(worse)}; {ASK}"
+        yield f"{BEGINS}: {WORSE} {', '.join(worse)}; {ASK}"
     if moved := [joint for joint in stands if np.isfinite(test["r2"][fit.joints.index(joint)]) and joint not in _held(fit)]:
         yield (
             f"the test logs do not show {', '.join(moved)} in motion: the error there is friction at rest, which no model tells, and "

@@ -6,7 +6,6 @@ the same mass and centre of mass with its second moments raised to be positive; 
 primitive shapes; a ball. A stated mass is kept in all of them.
 """
 
-
 import numpy as np
 
 from .inertia import pseudo
@@ -17,6 +16,7 @@ from .warned import warn
 _THINNEST = 1e-3
 # kg, and of a radius of gyration m^2 (a micrometre): no body of a robot has less, and squares of much less are zero
 LIGHTEST = _SMALLEST = 1e-12
+IMPOSSIBLE = "has an impossible inertia"
 _DEFAULT_MASS = 1.0  # kg, where no other body of the robot states one
 
 
@@ -36,7 +36,7 @@ def usable(name: str, stated: np.ndarray | None, geometry: np.ndarray | None, re
     if stated is not None and is_consistent(stated) and _well_conditioned(stated):
         return stated
     mass = float(stated[0]) if stated is not None and stated[0] > 0.0 else None
-    problem = "states no inertia" if stated is None or not np.any(stated) else "has an impossible inertia"
+    problem = "states no inertia" if stated is None or not np.any(stated) else IMPOSSIBLE
     problem = "weighs next to nothing, as all links do," if light else problem
     if mass is not None and (raised := _raised(stated)) is not None:
         _tell(name, problem, "its mass and centre of mass are kept and its second moments raised to be positive")

@@ -1,6 +1,7 @@
 """The log doctor: every fault is found where it is planted, and a clean log has none."""
 
 import json
+import re
 import shutil
 from types import SimpleNamespace
 
@@ -14,7 +15,7 @@ from sysid import check, pipeline
 from sysid.check import FAULTS, written
 from sysid.check.equations import Reading
 from sysid.check.faults import columns, one_log
-from sysid.check.look import looked
+from sysid.check.look import Look, looked
 from sysid.simulate import simulate, write
 from tests.conftest import JOINTS, motion
 
@@ -360,3 +361,33 @@ def test_coarse_angles_are_no_delay(experiment, late):
     free = {"robot.gravity": [0.0, 0.0, 0.0], "model.effects": ["viscous", "coulomb", "armature"]}
     found = [f for f in check.check(pipeline.load(experiment(config=free, train=coarse, test=coarse))) if f.fault == "delayed_signal"]
     assert {f.joint for f in found} == (set(JOINTS) if late else set())
+
+
+@pytest.mark.parametrize("files, says, do", [(["train.csv"], "there alone", "that file"), (["train.csv", "test.csv"], "in every log", "data.columns.position")])
+def test_angles_and_torques_that_changed_places_are_told_and_nothing_of_them(files, says, do, made, tmp_path):
+    logs = shutil.copytree(made(), tmp_path / "logs")
+    for file in files:
+        frame = pl.read_csv(logs / file)
+        pairs = [(f"q_{joint}", f"tau_{joint}") for joint in JOINTS]
+        frame.rename({a: b for pair in pairs for a, b in (pair, pair[::-1])}).write_csv(logs / file)
+    found = [f for f in check.check(pipeline.load(logs)) if f.severity == "error"]
+    assert [(f.fault, f.log) for f in found] == [("joint_order", file) for file in files]
+    assert all(says in f.says and do in f.do for f in found)
+
+
+def test_an_inertia_of_the_robot_s_file_that_no_body_has_is_told(made, tmp_path):
+    logs = shutil.copytree(made(), tmp_path / "logs")
+    (urdf,) = logs.glob("*.urdf")
+    text = urdf.read_text()
+    mass = re.findall(r'<mass value="([^"]+)"', text)[-1]
+    urdf.write_text(text.replace(f'<mass value="{mass}"', f'<mass value="-{mass}"'))
+    (fault,) = [f for f in check.check(pipeline.load(logs)) if "impossible inertia" in f.says]
+    assert fault.fault == "mass_implausible" and "correct the file" in fault.do
+
+
+def test_a_joint_that_goes_far_however_slowly_is_excited(made):
+    """A telescope turns at 0.04 rad/s, and gravity tells what it carries."""
+    slow = SimpleNamespace(part="train", step=0.01, samples=20_000, tally=SimpleNamespace(travel=np.array([0.9])), speeds=lambda j: np.full(100, 0.039))
+    near = SimpleNamespace(**{**vars(slow), "tally": SimpleNamespace(travel=np.array([0.2]))})
+    robot = SimpleNamespace(prismatic=[False], dof=1)
+    assert Look(None, robot, (slow,)).excited[0].enough and not Look(None, robot, (near,)).excited[0].enough

@@ -153,3 +153,11 @@ def test_a_stronger_prior_is_told_where_it_hardly_costs_anything(least, expected
     assert told.stronger == expected
     said = replace(told, far=(("link", "joint", 9.0, 2.0),)).says
     assert ("prior.weight: 1000" in said and "0.5 %" in said) if expected else "columns or units may be wrong" in said
+
+
+def test_of_a_fit_that_is_worse_than_none_columns_come_before_what_brings_masses_back():
+    far = masses.Masses((("forearm", "elbow", 0.1, 1.0),), effect="spring", command="sysid add there spring")
+    assert masses.doubted(far, False) is far and masses.doubted(None, True) is None
+    told = masses.document(masses.doubted(far, True))
+    assert told["command"] is None and told["far"] == masses.document(far)["far"]
+    assert "sysid check" in told["says"] and "sysid add" not in told["says"]

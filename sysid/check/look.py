@@ -26,6 +26,7 @@ from .logged import Logged, read
 from .tally import SPAN
 
 _TRAVELS, _MOVES = (0.1, 0.02), 0.05  # rad, m; rad/s: less tells nothing of a body
+_FAR = 5.0  # times that travel, half a radian: gravity tells, however slowly a joint goes so far
 _HAS = ("armature", "viscous", "coulomb", "torque_bias")  # what any joint has
 _IN_BAND = 4.0  # times the frequency below which speeds stay: tells inertia, and cuts noise off
 
@@ -64,11 +65,12 @@ class Moves:
 
 @dataclass(frozen=True)
 class Look:
-    """An experiment, its robot and all its logs."""
+    """An experiment, its robot and all its logs; what there is to know of the robot's file."""
 
     experiment: Experiment
     robot: Robot
     logs: tuple[Logged, ...]
+    of_the_robot: tuple[str, ...] = ()
 
     def part(self, name: str) -> list[Logged]:
         """The logs of "train" or "test"."""
@@ -89,7 +91,8 @@ class Look:
         travel = max(float(log.tally.travel[j]) for log in self.part("train"))
         speeds = np.concatenate([log.speeds(j) for log in long]) if long else np.zeros(1)
         top = float(np.quantile(speeds, 0.99))
-        enough = travel >= _TRAVELS[slides] and top >= _MOVES * (1.0 if not slides else 0.2)
+        least, slow = _TRAVELS[slides], top < _MOVES * (1.0 if not slides else 0.2)
+        enough = travel >= (_FAR * least if slow else least)
         return Moves(enough, travel, top, speeds)
 
     def column(self, key: str, joint: str) -> str | None:
@@ -168,5 +171,6 @@ class Look:
 def looked(experiment: Experiment) -> Look:
     """Read everything that an experiment names. Raises SysidError, as a fit would."""
     experiment = pipeline.started(experiment)
-    machine, *_ = pipeline.build(experiment)
-    return Look(experiment, machine, read(experiment, machine))
+    with noticed() as notices:
+        machine, *_ = pipeline.build(experiment)
+    return Look(experiment, machine, read(experiment, machine), tuple(notices))

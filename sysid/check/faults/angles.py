@@ -13,7 +13,7 @@ from ..fault import ERROR, WARNING, Fault
 from ..look import Logged, Look
 from ..tally import FASTER, lag_of
 
-AFTER, SENSELESS = 1, ("wrong_unit",)
+AFTER, SENSELESS = 1, ("wrong_unit", "joint_order")
 _COARSE = TURN / 2**12  # rad: a velocity by differences then is mostly steps
 _STILL, _MOSTLY = 0.01, 0.6  # of a joint's top speed; of the samples
 

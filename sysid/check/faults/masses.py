@@ -9,6 +9,8 @@ import numpy as np
 
 from ... import blocks
 from ...listed_effects import build
+from ...masses import SAYS_CHECK
+from ...prior import IMPOSSIBLE
 from ...projection import inverted, spanned
 from ...robot import Robot
 from ...rows import stack
@@ -37,7 +39,11 @@ _PASSES = 3  # the last two with every joint weighted by what the one before lef
 
 def find(look: Look) -> Iterator[Fault]:
     """mass_implausible: by the torque that holds each link, and by a fit of the experiment as it
-    is, which says what brings masses back."""
+    is, which says what brings masses back; and inertias of the robot's file that no body has."""
+    for told in look.of_the_robot:
+        if IMPOSSIBLE in told:
+            says, _, do = told.partition("; ")
+            yield Fault("mass_implausible", WARNING, says, f"correct the file; as it is, {do}")
     if look.seen is None:
         return
     weights = weighed(look.seen)
@@ -76,7 +82,8 @@ def find(look: Look) -> Iterator[Fault]:
                 f"a fit gives the link of {link['joint']} {link['mass']:.3g} kg, the URDF "
                 f"{link['urdf']:.3g} kg"
             )
-            yield Fault("mass_implausible", WARNING, says, far["do"], link["joint"])
+            do = far["do"].replace(SAYS_CHECK, "")
+            yield Fault("mass_implausible", WARNING, says, do, link["joint"])
 
 
 @dataclass(frozen=True)
