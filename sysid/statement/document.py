@@ -61,6 +61,7 @@ def _document(found: Diagnosis, run) -> dict:
                 "power": d.power,
                 "at": dict(d.at),
                 "at_units": _units(d, fit),
+                "options": dict(d.candidate.options),
             }
             for d in found.detectable
             if d.size is not None

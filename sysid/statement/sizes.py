@@ -42,6 +42,14 @@ def shown(document: dict, joints: Sequence[str], width: int) -> list[str]:
     if shaped := dict.fromkeys(d["effect"] for d in document["detectable"] if d["at"]):
         words = f"  {', '.join(shaped)}: at the values of their shape that show them best"
         out += wrapped(words, width, "    ")
+    own_options = {d["effect"]: d["options"] for d in document["detectable"] if d.get("options")}
+    said = [
+        f"{effect} with {name}: {value}"
+        for effect, options in own_options.items()
+        for name, value in options.items()
+    ]
+    if said:
+        out += wrapped(f"  {', '.join(said)}; otherwise it may show less", width, "    ")
     somewhere = {effect for effect, *_ in sizes}
     named = {f["effect"] for f in document["findings"] if f["joins_as_step"]}
     for other in (False, True):
