@@ -1,20 +1,24 @@
-"""Rows that only repeat the angles and torques of the one before while the robot moves: messages that
-did not arrive. They are no samples, and are left out."""
+"""Values that only repeat those of the row before while the robot moves. Where angles and torques do,
+nothing arrived: these rows are no samples, and are left out. Torque alone came at a rate of its own."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
-from .outliers import SHORT, runs
+from .outliers import SHORT, quantum, runs
 from .recording import Recording
 from .repeats import held_angle
+from .resampling import moved
 from .segment import gaps
 from .warned import warn
 
 _FEWEST = 4  # rows: fewer may be alike by chance
-_REGULAR = 0.8  # of the new values: coarse ones that are alike by chance come after any number of rows
+_GRAINS = 2.5  # of a torque's grain: two and the rounding; less is how coarse values move
+_REGULAR = 0.8  # of the new values: coarse ones alike by chance come after any number of rows
 
 
 def without_held(samples: Recording) -> Recording:
@@ -23,7 +27,7 @@ def without_held(samples: Recording) -> Recording:
     if len(q) < SHORT:
         return samples
     again = np.all(np.diff(q, axis=0) == 0.0, axis=1) & np.all(np.diff(tau, axis=0) == 0.0, axis=1)
-    apart = np.union1d(samples.breaks, gaps(samples.t)).astype(int)
+    apart = _apart(samples)
     again[apart - 1] = False
     if (every := _every(again)) > 1:
         step = every * float(np.median(np.diff(samples.t)))
@@ -54,6 +58,44 @@ def without_held(samples: Recording) -> Recording:
         above=2,
     )
     return _with(samples, kept)
+
+
+def at_own_times(samples: Recording, joints: Sequence[str]) -> Recording:
+    """Samples with torque that came more seldom than angles, and was held, as it was in the rows
+    between: on average it is read half a hold late. What came nearest is moved along its slope.
+    """
+    t, tau = samples.t, samples.signals["tau"]
+    if len(t) < SHORT:
+        return samples
+    apart, out, told = _apart(samples), tau.copy(), {}
+    ends = [0, *apart, len(t)]
+    for j, own in enumerate(tau.T):
+        again = np.diff(own) == 0.0
+        again[apart - 1] = False
+        jump = np.median(np.abs(np.diff(own))[~again]) if not again.all() else 0.0
+        if (every := _every(again)) < 2 or jump < _GRAINS * quantum(own):
+            continue  # coarse values repeat as they come
+        told.setdefault(every, []).append(joints[j])
+        new = np.flatnonzero(_one_of(again, every))
+        step = every * float(np.median(np.diff(t)))
+        for first, last in pairwise(ends):
+            fresh = new[(new >= first) & (new < last)]
+            if len(fresh) > 2:
+                here = slice(first, last)
+                out[here, j] = moved(t[fresh], own[fresh, None], t[here], step)[:, 0]
+    for every, names in told.items():
+        warn(
+            f"{samples.where}: the torque of {', '.join(names)} is new every {every} rows only and held "
+            "between, which reads it late: there what came nearest is moved along its slope; where "
+            "the drive held it so, write `resampling: held` under `data:`",
+            above=2,
+        )
+    return replace(samples, signals=samples.signals | {"tau": out}) if told else samples
+
+
+def _apart(samples: Recording) -> np.ndarray:
+    """The rows before which a recording breaks off or has a gap."""
+    return np.union1d(samples.breaks, gaps(samples.t)).astype(int)
 
 
 def _every(again) -> int:

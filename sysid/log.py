@@ -19,7 +19,7 @@ from .events import Event
 from .finite import check_finite
 from .full_turns import followed, going_on
 from .groups import levels_of
-from .held_rows import without_held
+from .held_rows import at_own_times, without_held
 from .log_spec import DataSpec, LogSpec
 from .recording import Recording, recorded
 from .resampling import MISSING, resampled
@@ -79,6 +79,7 @@ def assembled(samples: Recording, log: LogSpec, data: DataSpec, joints: tuple[st
     resampled, gaps and ends of recordings split it."""
     samples = arrivals.evened(going_on(samples, joints, prismatic))
     lacking, samples = unwritten.told(samples, joints), without_held(samples)
+    samples = samples if data.resampling == "held" else at_own_times(samples, joints)
     hashes = {name: sha256(path) for name, path in samples.files.items()}
     each = list(hashes.values())
     whole = each[0] if len(each) == 1 else hashlib.sha256("".join(each).encode()).hexdigest()

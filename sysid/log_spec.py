@@ -118,7 +118,7 @@ class DataSpec(Spec):
     signals: dict[str, Annotated[Any, BeforeValidator(checked_column)]] = {}
     units: UnitsSpec = UnitsSpec()
     rate: Positive | None = None
-    resampling: Literal["nearest", "linear"] = "nearest"
+    resampling: Literal["nearest", "linear", "held"] = "nearest"
     torque: dict[str, Sum] = {}
     position: dict[str, Annotated[dict[str, NonZero], Field(min_length=1)]] = {}
     zero: dict[str, Annotated[float, AfterValidator(_finite)]] = {}

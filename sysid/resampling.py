@@ -22,7 +22,7 @@ def resampled(t, signals, step: float, *, linear: bool = False) -> tuple[np.ndar
     out = {}
     for name, values in signals.items():
         if name == "tau" and len(t) > 2 and not linear:
-            out[name] = _moved(t, values, clock, step)
+            out[name] = moved(t, values, clock, step)
             continue
         # angles are smooth, the rest carries noise that a cubic would overshoot on
         order = 3 if name in ("q", "qd") and len(t) > 3 else 1
@@ -30,7 +30,7 @@ def resampled(t, signals, step: float, *, linear: bool = False) -> tuple[np.ndar
     return clock, out
 
 
-def _moved(t, torque, clock, step: float) -> np.ndarray:
+def moved(t, torque, clock, step: float) -> np.ndarray:
     """Torque (n, dof) at a `clock` (m,) [s]: what was measured nearest, moved by the slope about it.
 
     So it is as noisy as it was logged, in every row: the mean of both neighbours loses a third of the

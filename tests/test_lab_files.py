@@ -282,6 +282,33 @@ def test_rows_between_new_values_are_left_out(every, tmp_path):
     assert not [w for w in told if "new values come" in str(w.message)]
 
 
+@pytest.mark.parametrize("every", [2, 4, 9])
+def test_torque_that_came_more_seldom_than_angles_is_not_read_late(every, tmp_path):
+    """Held, it is half a hold late; as its drive may have held it so, the user can say so. Its noise stays what it was."""
+    made, file = columns(40.0, 0.005), tmp_path / "a.csv"
+    n, rng, slopes = len(made["t"]), np.random.default_rng(0), np.gradient(made["tau_elbow"], 0.005)
+    fresh = np.unique(np.append(0, every * np.arange(1, n // every) + (rng.random(n // every - 1) < 0.04)))
+    last = np.searchsorted(fresh, np.arange(n), side="right") - 1
+    noise = 0.05 * rng.standard_normal(n)
+    held = (made["tau_elbow"] + noise)[fresh[last]]
+    file.write_text(csv(made | {"tau_elbow": held}))
+    with pytest.warns(SysidWarning, match=f"the torque of elbow is new every {every} rows only and held between"):
+        (segment,) = read(file).segments
+    delay = lambda tau: -np.sum((tau - made["tau_elbow"]) * slopes) / np.sum(slopes**2)  # noqa: E731
+    late = 0.5 * (every - 1) * 0.005
+    assert delay(held) == pytest.approx(late, abs=0.002) and abs(delay(segment.tau[:, 1])) < 0.15 * late + 5e-4
+    assert np.std(segment.tau[:, 1] - made["tau_elbow"]) == pytest.approx(0.05, rel=0.25)
+    np.testing.assert_allclose(segment.tau[:, 0], made["tau_shoulder"], atol=1e-12)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        (segment,) = read(file, resampling="held").segments
+        np.testing.assert_allclose(segment.tau[:, 1], held, atol=1e-12)
+        for grain in (0.01, 0.1):  # coarse torque repeats as it comes
+            coarse = np.round(made["tau_elbow"] / grain) * grain
+            file.write_text(csv(made | {"tau_elbow": coarse}))
+            np.testing.assert_allclose(read(file).segments[0].tau[:, 1], coarse, atol=1e-12)
+
+
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize("size", [2, 3])
 def test_packets_whose_samples_all_have_one_stamp_are_even(size, tmp_path):
