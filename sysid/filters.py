@@ -13,12 +13,13 @@ import numpy as np
 
 from . import too_narrow
 from .blocks import within_one_error
-from .drives import slowest
+from .drives import slowest, with_drives
 from .errors import SysidError
 from .filter_errors import held_out
 from .log import Log
 from .lowpass import band
 from .model import Model
+from .plain_model import plain
 from .preprocess import needs
 from .spans import Spans
 from .specs import Experiment, PreprocessSpec
@@ -70,6 +71,8 @@ def begun(
             None: there is this one.
     """
     spec, low = experiment.preprocess, lowpassed(experiment)
+    # not what an effect leaves that only some robots have: when one is added, the filter stays
+    model = with_drives(plain(experiment, model.robot), experiment)
     if low and (_servos(experiment) or "cutoff" in _given(spec)):
         return lambda: of_the_motion(experiment, model, logs, prior)
     said = {"filter": spec.filter, "torque": spec.torque, "standstill": spec.standstill}

@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+import yaml
 
 from sysid import too_narrow
 from sysid.statement import where
@@ -47,6 +48,18 @@ def test_a_window_that_is_said_stays_and_is_told(experiment, cli):
     assert all(less < rms for rms, less in narrow["rms"].values()) and any(less < 0.9 * rms for rms, less in narrow["rms"].values())
     lines = said.out.split("next:")
     assert "write `window: auto` under `preprocess:`" in " ".join(lines[0].split()) and lines[1].startswith(" sysid fit ")
+
+
+def test_an_effect_that_is_added_chooses_no_other_filter(experiment, cli):
+    """What is promised of an effect is behind one filter, and so is what comes of it."""
+    file = experiment(config={"preprocess.window": "auto"}, train=noisy(3e-3), test=noisy(3e-3))
+    known = [json.loads((cli("fit", file).run / "fit.json").read_text())["filter"]]
+    config = file / "config.yaml"
+    text = yaml.safe_load(config.read_text())
+    text["model"] = {"effects": ["viscous", "coulomb", {"stribeck": {"joints": [JOINTS[1]]}}, "torque_bias"]}
+    config.write_text(yaml.safe_dump(text))
+    known.append(json.loads((cli("fit", file).run / "fit.json").read_text())["filter"])
+    assert known[0] == known[1] and known[0]["chosen"] == "held-out error"
 
 
 def entry(window, error, rms, scatter=0.01):

@@ -12,13 +12,13 @@ from .. import experiment_logs, pipeline
 from ..errors import SysidError
 from ..estimate import Fit
 from ..events import UNWRITTEN
-from ..listed_effects import build, found
 from ..lowpass import band, lowpassed, stride_of, widest
 from ..model import Model
 from ..motion import Motion
+from ..plain_model import plain
 from ..robot import Robot
 from ..rows import Rows, stack
-from ..specs import EffectSpec, Experiment
+from ..specs import Experiment
 from ..trusted import Untrusted
 from ..warned import noticed
 from .equations import FEWEST, Equations
@@ -27,7 +27,6 @@ from .tally import SPAN
 
 _TRAVELS, _MOVES = (0.1, 0.02), 0.05  # rad, m; rad/s: less tells nothing of a body
 _FAR = 5.0  # times that travel, half a radian: gravity tells, however slowly a joint goes so far
-_HAS = ("armature", "viscous", "coulomb", "torque_bias")  # what any joint has
 _IN_BAND = 4.0  # times the frequency below which speeds stay: tells inertia, and cuts noise off
 
 
@@ -128,23 +127,8 @@ class Look:
         motion = lowpassed(read, self.robot.joints, cutoff, known=own_band)
         if motion is None or motion.samples < FEWEST:
             return None
-        model, stride = self._plain, stride_of(motion, cutoff)
+        model, stride = plain(self.experiment, self.robot), stride_of(motion, cutoff)
         return Seen(motion, stride, model, stack(model, motion, stride))
-
-    @property
-    def _plain(self) -> Model:
-        """Rigid bodies with what any joint has, and with columns that the experiment says differ
-        between logs."""
-        spec, joints = self.experiment, self.robot.joints
-        args = spec.folder, spec.data.logged
-        effects = [(one, found(one, *args)) for one in spec.model.effects if one.per is not None]
-        differ = [one for one, effect in effects if effect.coefficients() and not effect.shapes()]
-        for name in _HAS:
-            own = [one.joints or joints for one in differ if one.name == name]
-            if left := [joint for joint in joints if not any(joint in them for them in own)]:
-                differ.append(EffectSpec(name=name, joints=left))
-        with noticed():
-            return build(self.robot, differ, *args, spec.data.groups)
 
     @cached_property
     def fit(self) -> Fit | None:
