@@ -12,6 +12,7 @@ from .candidates import Candidate
 from .effect import NotFinite, SensorEffect
 from .estimate import Fit
 from .model_parameters import ROBOT
+from .plausible import centred
 from .unexplained import Refused, changed, explains
 
 CLEAR = 2.0  # standard deviations
@@ -122,6 +123,8 @@ def in_doubt(before: Fit, after: Fit, told: Fit, candidate: Candidate) -> str | 
     own, whole = candidate.judged_by(before.joints), candidate.joint == ROBOT
     if whole:  # what held bodies against its lack may hold them against it
         after = min((after, told), key=lambda one: comparison.together(before, one).delta_rms)
+    if "logs" in dict(candidate.options) and _is_zero(before, after, own, whole):
+        return "another zero of each log's torque leaves less"
     fell = any(after.rms("train")[joint] < before.rms("train")[joint] for joint in own)
     if whole:
         change, unit, still = comparison.together(before, after), 1.0, True
@@ -173,6 +176,17 @@ def in_doubt(before: Fit, after: Fit, told: Fit, candidate: Candidate) -> str | 
     if all(one.delta_rms > one.se for one in paid):
         return "with it the test error of all joints together rises, whether as the fit weighs them or each by its own"
     return None
+
+
+def _is_zero(before: Fit, after: Fit, own: Sequence[str], whole: bool) -> bool:
+    """Whether a torque's zero that was set anew in each log leaves clearly less of the test logs than
+    what is in some of them does."""
+    zero = centred(before)
+    if whole:
+        changes = [comparison.together(zero, after)]
+    else:
+        changes = [d for d in comparison.compare(zero, after) if d.joint in own]
+    return all(d.delta_rms > d.se for d in changes)
 
 
 def size_told(fit: Fit, effect: str, joint: int) -> bool:

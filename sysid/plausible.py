@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from .blocks import averaged
 from .estimate import Fit
+from .prediction import Prediction
 
 _EFFORT, _FEWEST = 1.5, 3  # times what the URDF allows the drive, and in how many samples
 BEGINS = "implausible"  # a notice that makes all the rest doubtful
 WORSE = "the model is worse than none on the test logs of"
 WRONG = "a check of these logs finds their columns wrong"
 ASK = "are its columns, signs and units right? `sysid check` says"
-IN_EACH_LOG = "most of what is left is another mean in each log"
-OF_ITS_OWN = "`data.groups`, and an effect that is `per:` a group, give each its own"
+IN_EACH_LOG = "what is left is another mean in each log"
+OF_ITS_OWN = "`data.groups`, and an effect that is `per:` a group, give each its own; a zero is best set alike before every log"
 _ALIKE = 1.1  # times an error: two that differ by less are alike
 _BLOCKS = 10  # of a log, whose means say how far its own may be off
 _CHANCE = 1e-3  # of a log that stands apart from the others, were there nothing
@@ -75,6 +77,18 @@ def outdated(fit: Fit, last: Fit) -> list[str]:
     gone = tuple(_left(joint) for joint in before if after.get(joint, 0.0) <= _SHARE)
     gone += (fit.masses["says"],) if fit.masses and not last.masses else ()
     return [notice for notice in fit.notices if notice.startswith(gone)]
+
+
+def centred(fit: Fit) -> Fit:
+    """A fit with what it leaves of each test log about its mean there, of every joint: as with a torque's zero that was set anew in each."""
+    told = fit.predictions["test"].thinned(_MOST)
+    predicted, use = np.array(told.predicted), np.ones(told.predicted.shape, dtype=bool) if told.use is None else told.use
+    for log in np.unique(told.log):
+        own = told.log == log
+        left = np.where(use[own], told.measured[own] - predicted[own], 0.0)
+        predicted[own] += left.sum(0) / np.maximum(use[own].sum(0), 1)
+    shifted = Prediction(told.log, told.t, told.measured, predicted, told.use, told.joints, told.units)
+    return replace(fit, predictions={**fit.predictions, "test": shifted})
 
 
 def other_means(fit: Fit, logs: Sequence[dict], still: Sequence[str] = ()) -> dict[str, tuple[float, float, str]]:

@@ -2,9 +2,26 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
+from .tried_formula import falls_with
+
 
 class ShownDiagnosis:
     """What `Diagnosis` shows of itself; its data stand there."""
+
+    def falls_with(self, joint: str, options: dict) -> bool:
+        """Whether the test error of a joint falls with a formula on it, beside all claims; each is
+        fitted once."""
+        key = joint, *options.items()
+        if key not in self._formulas:
+            last = self.claims[-1].after if self.claims else self.fit
+            self._formulas[key] = falls_with(last, joint, options)
+        return self._formulas[key]
+
+    @cached_property
+    def _formulas(self) -> dict[tuple, bool]:
+        return {}
 
     def __repr__(self) -> str:
         told = [

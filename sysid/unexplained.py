@@ -13,8 +13,8 @@ from .effect import NotFinite
 from .estimate import Fit
 from .failures import HeldOut, fallen
 from .given_shapes import at_edges
+from .mean_by_log import by_log
 from .model_parameters import ROBOT
-from .plausible import IN_EACH_LOG, OF_ITS_OWN, other_means
 from .too_narrow import noise_as_law
 
 _MOST = 0.5  # of what stands above a floor, or of a square
@@ -174,25 +174,6 @@ def otherwise(fit: Fit, floors, still: Sequence[str] = ()) -> dict[str, str]:
     """{joint: why} of joints of which something else than a law may be what the motion predicts: a
     filter that is too narrow for the angles, and what `by_log` says."""
     return noise_as_law(fit.filters) | by_log(fit, floors, still)
-
-
-def by_log(fit: Fit, floors, still: Sequence[str] = ()) -> dict[str, str]:
-    """{joint: why} of joints of whose error above the NoiseFloor, or above what is noise in any
-    case where it is not known, most is another mean in each log.
-
-    Args:
-        still: joints that stand in the test logs, whose friction may be any there.
-    """
-    out = {}
-    for joint, (share, square, said) in other_means(fit, fit.logs, still).items():
-        floor = floors[fit.joints.index(joint)]
-        misfit = square / share - (floor.rms or floor.low or 0.0) ** 2
-        if misfit > 0.0 and square > _MOST * misfit:
-            out[joint] = (
-                f"{IN_EACH_LOG} ({said}): a torque's zero that was set anew, a load, or what hangs "
-                f"on the place; {OF_ITS_OWN}"
-            )
-    return out
 
 
 def smeared(errors: Sequence[float], floor) -> bool:

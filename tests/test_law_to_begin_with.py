@@ -60,6 +60,19 @@ def test_none_that_is_in_the_model_already():
     assert to_begin_with({"joint": "wrist", "share_left": 0.5, "depends_on": []}, "arm", ()) is None
 
 
+def test_of_laws_the_first_that_a_fit_bears_out():
+    """One that lets the test error rise is refused by `sysid add`, and is not offered."""
+    asked = []
+
+    def only(what):
+        return lambda joint, options: asked.append((joint, options["name"])) or options["name"] == what
+
+    several = entry(("q_elbow", 0.6), ("q_wrist", 0.55), ("time", 0.5))
+    found = to_begin_with(several, "arm", (), only("law_of_q"))
+    assert found["options"]["name"] == "law_of_q" and asked == [("wrist", "law_of_q_elbow"), ("wrist", "law_of_q")]
+    assert to_begin_with(several, "arm", (), only("law_of_t")) is None  # each is a fit: two are made
+
+
 def test_what_follows_another_joints_acceleration_is_the_bodies():
     for own in (("q_wrist", 0.6, "qdd_elbow"), ("qdd_elbow", 0.6), ("qd_wrist", 0.6, "qdd_elbow and direction")):
         assert of_bodies(entry(own)) and to_begin_with(entry(own), "arm", ()) is None

@@ -1,5 +1,6 @@
 """What a fit says of its own numbers: a joint that stands in the test logs, an error that is another in each log."""
 
+import json
 import shutil
 from types import SimpleNamespace
 
@@ -51,7 +52,12 @@ def test_torque_that_hardly_varies_in_the_test_logs_is_no_fault_of_the_model(tra
     """Noise alone is left there, as in the training logs, and it is more than the torque varies by."""
     part = lambda rms, r2: SimpleNamespace(errors=lambda: {"rms": np.array([rms]), "r2": np.array([r2])}, greatest=lambda fewest: np.zeros((fewest, 1)))  # noqa: E731
     source = SimpleNamespace(joints={"yaw": SimpleNamespace(effort=np.inf)})
-    fit = SimpleNamespace(joints=("yaw",), predictions={"train": part(train, r2), "test": part(test, -0.26)}, model=SimpleNamespace(robot=SimpleNamespace(source=source), coefficients=()), held=())
+    fit = SimpleNamespace(
+        joints=("yaw",),
+        predictions={"train": part(train, r2), "test": part(test, -0.26)},
+        model=SimpleNamespace(robot=SimpleNamespace(source=source), coefficients=()),
+        held=(),
+    )
     assert any("worse than none" in text for text in implausible(fit)) == said
 
 
@@ -70,3 +76,22 @@ def test_masses_that_a_claim_brings_back_are_no_longer_told(monkeypatch):
     says = "implausible masses, the URDF's in brackets: fore 9 kg (2 kg); the effect spring brings them back"
     fit, last = (SimpleNamespace(logs=(), notices=[says], masses=own) for own in ({"says": says}, {}))
     assert outdated(fit, last) == [says] and outdated(fit, fit) == []
+
+
+def test_a_torque_s_zero_that_was_set_anew_is_told_and_no_log_is_designed(experiment, cli):
+    """In the test log the elbow's torque has another zero: no effect that is there, and another log would have its own again."""
+    size = 0.3
+
+    def noisy(seed, zero):
+        def change(columns):
+            rng = np.random.default_rng(seed)
+            tau = {name: columns[name] + 0.02 * rng.standard_normal(len(columns["t"])) for name in columns if name.startswith("tau_")}
+            return columns | tau | {"tau_elbow": tau["tau_elbow"] + zero}
+
+        return change
+
+    said = cli("diagnose", experiment(train=noisy(1, 0.0), test=noisy(2, size)))
+    found = json.loads((said.run / "diagnosis.json").read_text())
+    elbow = next(v for v in found["verdict"] if v["joint"] == "elbow")
+    assert elbow["status"] == "unresolved" and elbow["says"].startswith(plausible.IN_EACH_LOG) and not found["findings"]
+    assert found["next_log"] is None and "sysid design" not in said.out

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from scripts.blind_parts import cases, robots
-from sysid import borne_out, config, pipeline, unexplained
+from sysid import borne_out, config, mean_by_log, pipeline, unexplained
 from sysid.blocks import Belief
 from sysid.candidates import Candidate, candidates
 from sysid.comparison import Difference
@@ -546,17 +546,29 @@ def test_another_mean_in_each_log_is_no_law():
     assert "another mean" not in quiet.says  # nothing is predicted that it would be
     found, _ = asked_of_elbow(3.0, near=(Candidate(find("stribeck"), 1, ()), 0.02), means={"elbow": "another mean"})
     assert found.status == "unresolved" and found.says.startswith("what is left may be stribeck")
+    # where about its means the error is noise, nothing else need be there, and no log carries a zero
+    all_of_it = {"elbow": "what is left is another mean in each log"}
+    for near in (None, (Candidate(find("stribeck"), 1, ()), 0.02)):
+        found, _ = asked_of_elbow(3.0, near=near, means=all_of_it)
+        assert found.status == "unresolved" and found.says == all_of_it["elbow"] and found.may is None
+    moved = [Transfer("elbow", 3.0, 0.1, (20.0,))]
+    for means, carries in ((all_of_it, False), ({}, True)):
+        found = verdicts(fitted(3.0, train=1.0), (), [NOISE] * 2, [floor()] * 2, carried=moved, means=means)[1]
+        assert found.status == "unresolved" and bool(found.carries) is carries
 
 
 @pytest.mark.parametrize(
     ("square", "floor", "said"), [(0.5, 0.9, True), (0.5, 0.5, True), (0.2, 0.5, False), (0.2, None, False), (0.6, None, True), (0.2, 1.1, False)]
 )
 def test_a_mean_by_log_is_told_where_it_is_most_of_what_is_no_noise(monkeypatch, square, floor, said):
-    monkeypatch.setattr(unexplained, "other_means", lambda fit, logs, still: {"elbow": (square / 1.0, square, "+1 in a.csv")})
-    fit = SimpleNamespace(joints=("shoulder", "elbow"), logs=())
-    level = SimpleNamespace(rms=None if floor is None else floor**0.5, low=None)
-    found = unexplained.by_log(fit, [None, level])
-    assert list(found) == ["elbow"] * said and (not said or "+1 in a.csv" in found["elbow"])
+    monkeypatch.setattr(mean_by_log, "other_means", lambda fit, logs, still: {"elbow": (square / 1.0, square, "+1 in a.csv")})
+    fit = SimpleNamespace(joints=("shoulder", "elbow"), logs=(), rms=lambda part: {"elbow": {"train": 1.0, "test": 0.5}[part]})
+    for left, begins in ((0.9, "what is left is another mean"), (2.0, "most of what is left is another mean")):
+        monkeypatch.setattr(mean_by_log, "centred", lambda fit: SimpleNamespace(rms=lambda part: {"elbow": left}))  # noqa: B023
+        level = SimpleNamespace(rms=None if floor is None else floor**0.5, low=None, reached=lambda error: error < 1.0)
+        found = mean_by_log.by_log(fit, [None, level])
+        assert list(found) == ["elbow"] * said
+        assert not said or ("+1 in a.csv" in found["elbow"] and found["elbow"].startswith(begins))
 
 
 def test_of_those_that_test_logs_alone_can_ask_the_one_that_takes_most(monkeypatch):

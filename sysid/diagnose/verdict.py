@@ -11,6 +11,7 @@ from ..candidates import Candidate
 from ..estimate import Fit
 from ..flexible import Law, Unknown
 from ..noise import DOUBT, as_of_test
+from ..plausible import IN_EACH_LOG
 from ..transfer import Transfer, quieter
 from ..unexplained import by_weights, cause, explains, in_vain, loudest, noisy, not_all, smeared
 from .ask import HALF
@@ -123,8 +124,11 @@ def verdicts(
             effect, p = looks or (None, 1.0)
             may = effect if p > LEVEL else None  # what stands above the level was fitted, in vain
             why = cause(both, floors[j], effect, may, without, louder)
-            if remains and not looks and then > 0.0 and not evens[j]:
-                why = dict(means).get(joint, why)
+            mean = dict(means).get(joint, "")
+            if then > 0.0 and not evens[j] and mean.startswith(IN_EACH_LOG):
+                why, may = mean, None
+            elif mean and remains and not looks and then > 0.0 and not evens[j]:
+                why = mean
             why += "".join({r.effect: f"; {r.told}" for r in refused if r.joint == joint}.values())
             told = ("unresolved", others, explained, remains, why, may, evens[j])
         elif not claims or (floors[j].reached(first) and not (done or fell)):
@@ -134,4 +138,5 @@ def verdicts(
             told = ("explained", who, explained)
         out.append(Verdict(joint, *told))
     said = {found.joint: found.says for found in carried}
-    return [replace(one, carries=said.get(one.joint, "")) for one in out]
+    zeros = [one.says.startswith(IN_EACH_LOG) for one in out]  # which is not carried anywhere
+    return [o if z else replace(o, carries=said.get(o.joint, "")) for o, z in zip(out, zeros)]

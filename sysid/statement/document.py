@@ -49,7 +49,7 @@ def _document(found: Diagnosis, run) -> dict:
         "findings": [finding(f, claim, found) for claim in found.claims for f in claim.findings],
         "claims": list(claims(found)),
         "verdict": [
-            _with_law(_verdict(v, fit.experiment.path, joints), fit) for v in found.verdict
+            _with_law(_verdict(v, fit.experiment.path, joints), found) for v in found.verdict
         ],
         "detectable": [
             {
@@ -127,14 +127,16 @@ def _floor(floor) -> dict:
     }
 
 
-def _with_law(entry: dict, fit) -> dict:
+def _with_law(entry: dict, found: Diagnosis) -> dict:
     """What is `unknown` with a law of one's own to begin with, where one variable stands out; and
     that it is the bodies', where it is."""
     if entry["status"] == "unknown" and of_bodies(entry):
         return entry | {"says": "; ".join([*filter(None, [entry.get("says")]), BODIES])}
-    joints = fit.model.robot.joints
+    if entry["status"] != "unknown":
+        return entry
+    fit, joints = found.fit, found.fit.joints
     there = {(e.name, joints[j]) for e, own in fit.model.terms for j in own if j != ROBOT}
-    known = entry["status"] == "unknown" and to_begin_with(entry, fit.experiment.path, there)
+    known = to_begin_with(entry, fit.experiment.path, there, found.falls_with)
     return entry | ({"law": known} if known else {})
 
 

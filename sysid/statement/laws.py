@@ -7,7 +7,7 @@ where that takes part, show how much there is, and their plot what the law looks
 from __future__ import annotations
 
 import re
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from pathlib import Path
 
 from ..addition import command
@@ -16,6 +16,7 @@ from ..formula.text import OTHER
 
 _MOST = 0.5  # of what functions of the motion predict: less, and another variable has more
 _NEARLY = 0.8  # of what most predict: one variable that does says it more simply than two
+_TRIED = 2  # of these: each is a fit
 # without what nearly every model has, a constant, Coulomb and viscous friction
 _TERMS = {
     "": "a*{0} + b*{0}**2 + c*{0}**3",
@@ -39,20 +40,37 @@ def of_bodies(entry: dict) -> bool:
     return any(v.startswith("qdd_") and v != f"qdd_{entry['joint']}" for v in said)
 
 
-def to_begin_with(entry: dict, path, there: Collection[tuple[str, str]]) -> dict | None:
+def to_begin_with(
+    entry: dict,
+    path,
+    there: Collection[tuple[str, str]],
+    borne_out: Callable[[str, dict], bool] = lambda *_: True,
+) -> dict | None:
     """{effect, joint, options, command} for a joint that is `unknown`, as its document has it.
 
-    None where nothing that a formula may hold stands out, or such a law is in the model already.
+    None where nothing that a formula may hold stands out, such a law is in the model already, or no
+    fit bears one out.
 
     Args:
-        path: of the experiment file. there: (effect, joint) of the model's.
+        path: of the experiment file. there: (effect, joint) of the model's. borne_out: of a joint
+            and options of a formula, whether a fit with it has less error on the test logs.
     """
     joint, told = entry["joint"], entry.get("depends_on", ())
     if not told or told[0]["share"] < _MOST * entry["share_left"] or of_bodies(entry):
         return None
     near = [one for one in told if one["share"] >= _NEARLY * told[0]["share"]]
-    first = min(near, key=lambda one: "with" in one)
-    variable, other = _in_formula(first["variable"], joint), first.get("with", "")
+    for one in sorted(near, key=lambda one: "with" in one)[:_TRIED]:
+        options = _options(one, joint)
+        if options is None or (options["name"], joint) in there or not borne_out(joint, options):
+            continue
+        adds = command(Path(path), "formula", [joint], options)
+        return {"effect": "formula", "joint": joint, "options": options, "command": adds}
+    return None
+
+
+def _options(told: dict, joint: str) -> dict | None:
+    """Of a formula of what a residual follows; None where none may hold that."""
+    variable, other = _in_formula(told["variable"], joint), told.get("with", "")
     if other and other != DIRECTION:
         other = _in_formula(other, joint)
     if variable is None or other is None:
@@ -64,11 +82,7 @@ def to_begin_with(entry: dict, path, there: Collection[tuple[str, str]]) -> dict
     name = re.sub(
         "[^a-z0-9_]", "_", "_and_".join(("law_of_" + variable, other)[: 1 + bool(other)]).lower()
     )
-    if (name, joint) in there:
-        return None
-    options = {"formula": formula, "name": name}
-    adds = command(Path(path), "formula", [joint], options)
-    return {"effect": "formula", "joint": joint, "options": options, "command": adds}
+    return {"formula": formula, "name": name}
 
 
 def _in_formula(variable: str, joint: str) -> str | None:

@@ -59,7 +59,7 @@ def blind(document: dict) -> list[str]:
         for v in open_
         if not {"may_be", "weighting"} & v.keys()
         and v["joint"] not in known
-        and not (v.get("says") or "").startswith(IN_EACH_LOG)  # each log would have its own again
+        and IN_EACH_LOG not in (v.get("says") or "")  # each log would have its own again
     ]
 
 

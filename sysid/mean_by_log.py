@@ -1,0 +1,36 @@
+"""Joints of which what is left is another mean in each log: a torque's zero that was set anew."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cache
+
+from .estimate import Fit
+from .noise import DOUBT
+from .plausible import IN_EACH_LOG, OF_ITS_OWN, centred, other_means
+
+_MOST = 0.5  # of what stands above a floor
+
+
+def by_log(fit: Fit, floors, still: Sequence[str] = ()) -> dict[str, str]:
+    """{joint: why} of joints of whose error above the NoiseFloor, or above what is noise in any
+    case where it is not known, on all logs or on the test logs, most is another mean in each log.
+
+    Args:
+        still: joints that stand in the test logs, whose friction may be any there.
+    """
+    out, about = {}, cache(lambda: centred(fit).rms("test"))
+    for joint, (share, square, said) in other_means(fit, fit.logs, still).items():
+        floor, error = floors[fit.joints.index(joint)], fit.rms("test")[joint]
+        noise, rest = (floor.rms or floor.low or 0.0) ** 2, about()[joint]
+        misfits = (square / share - noise, square), (error**2 - noise, error**2 - rest**2)
+        if any(misfit > 0.0 and taken > _MOST * misfit for misfit, taken in misfits):
+            # about its mean in each log the error is noise: then nothing else is missing
+            trained = fit.rms("train")[joint]
+            settled = floor.reached(rest) if floor.rms else rest <= (1.0 + DOUBT) * trained
+            most = "" if settled else "most of "
+            out[joint] = (
+                f"{most}{IN_EACH_LOG} ({said}): a torque's zero that was set anew, a load, or what hangs "
+                f"on the place; {OF_ITS_OWN}"
+            )
+    return out
