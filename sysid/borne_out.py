@@ -18,6 +18,7 @@ from .unexplained import Refused, changed, explains
 CLEAR = 2.0  # standard deviations
 _LIKELY = 0.05  # less is not listed
 _WORTH = 1.5e-2  # of an error: what is worth having, three per cent of its square (`select`)
+_VISIBLE = 0.1  # of an error: what falls by less and has no size of its own is no name
 _USUAL = ("viscous", "coulomb", "torque_bias", "armature")  # of every joint, as `sysid init` has it
 _NOTHING = 5e-3  # of an error: a hundredth of its square, the least that is told in per cent
 
@@ -142,9 +143,12 @@ def in_doubt(before: Fit, after: Fit, told: Fit, candidate: Candidate) -> str | 
         return "the fit's own error does not fall with it"
     little = change.delta_rms > -_WORTH * unit
     more = beside(before, candidate)
-    if not whole and (still or little or more) and not size_told(told, *candidate.key):
-        falls = f"and the test error falls by less than {100.0 * _WORTH:.2g} %"
-        falls = falls if little else "and another effect is on that joint already"
+    # where joints count by their noise, deviations of quiet ones are no larger than they are
+    least = _WORTH if told.weights is None else _VISIBLE
+    hardly = change.delta_rms > -least * unit
+    if not whole and (still or hardly or more) and not size_told(told, *candidate.key):
+        falls = f"and the test error falls by less than {100.0 * least:.2g} %"
+        falls = falls if hardly else "and another effect is on that joint already"
         falls = "nor the fall of the test error beside its own" if still else falls
         return f"its size is nothing beside its deviation, {falls}"
     # what moves a joint may show in the torque of those that it carries, or that carry it; and a

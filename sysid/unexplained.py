@@ -15,6 +15,7 @@ from .failures import HeldOut, fallen
 from .given_shapes import at_edges
 from .mean_by_log import by_log
 from .model_parameters import ROBOT
+from .plausible import AT_REST
 from .too_narrow import noise_as_law
 
 _MOST = 0.5  # of what stands above a floor, or of a square
@@ -172,8 +173,10 @@ def cause(
 
 def otherwise(fit: Fit, floors, still: Sequence[str] = ()) -> dict[str, str]:
     """{joint: why} of joints of which something else than a law may be what the motion predicts: a
-    filter that is too narrow for the angles, and what `by_log` says."""
-    return noise_as_law(fit.filters) | by_log(fit, floors, still)
+    filter that is too narrow for the angles, what `by_log` says, and rest."""
+    at_rest = f"{AT_REST}; log it moving, or leave it out with robot.lock"
+    rests = dict.fromkeys(still, at_rest)
+    return noise_as_law(fit.filters) | by_log(fit, floors, still) | rests
 
 
 def smeared(errors: Sequence[float], floor) -> bool:

@@ -16,7 +16,7 @@ from sysid.effect import NotFinite
 class Told(SimpleNamespace):
     """A fit as far as `in_doubt` looks at it: the error of its joint."""
 
-    joints = ("shoulder", "elbow")
+    joints, weights = ("shoulder", "elbow"), None
     model = SimpleNamespace(terms=())
 
     def rms(self, part):
@@ -91,7 +91,9 @@ def test_a_quiet_joints_own_error_may_rise_where_that_on_the_test_logs_clearly_f
     assert (said == "the fit's own error does not fall with it") is refused and (said is None) is not refused
 
 
-@pytest.mark.parametrize(("effect", "se", "refused"), [("current_lag", 0.06, False), ("delay", 0.06, False), ("current_lag", 0.2, True), ("torque_gain", 0.06, True)])
+@pytest.mark.parametrize(
+    ("effect", "se", "refused"), [("current_lag", 0.06, False), ("delay", 0.06, False), ("current_lag", 0.2, True), ("torque_gain", 0.06, True)]
+)
 def test_what_reads_torque_late_makes_torque_of_the_angles_noise(monkeypatch, effect, se, refused):
     """In the fit's own error, which rises with it, as well: one standard error of the test error bears it out."""
     before, after = Told(error=1.0), Told(error=1.1)
@@ -206,6 +208,33 @@ def test_of_an_untold_size_a_fall_that_is_not_worth_having_says_nothing(monkeypa
     monkeypatch.setattr(comparison, "together", lambda *_, weighed=False: Difference("a", "b", "*", fall, 0.002))
     why = in_doubt(before, after, after, Candidate(vocabulary.find("cogging"), 1, ())) or ""
     assert ("falls by less than 1.5 %" in why) is refused and (refused or not why)
+
+
+@pytest.mark.parametrize(("fall", "told", "refused"), [(-0.03, False, True), (-0.03, True, False), (-0.2, False, False)])
+def test_where_joints_count_by_their_noise_a_size_is_told_or_the_effect_is_plain(monkeypatch, fall, told, refused):
+    """A bump of friction left a rest of which elasticity of 4.3e-5 +- 2.5e-5 took 2 % of the error."""
+    before, after = Told(error=1.0), Told(error=1.0 + fall, weights=np.ones(2))
+    monkeypatch.setattr(borne_out, "size_told", lambda *_: told)
+    monkeypatch.setattr(comparison, "compare", lambda *_: (Difference("a", "b", "elbow", fall, 0.002),))
+    monkeypatch.setattr(comparison, "together", lambda *_, weighed=False: Difference("a", "b", "*", fall, 0.002))
+    why = in_doubt(before, after, after, Candidate(vocabulary.find("cogging"), 1, ())) or ""
+    assert ("falls by less than 10 %" in why) is refused and (refused or not why)
+
+
+@pytest.mark.parametrize(("rest", "refused"), [(0.5, True), (0.9, False)])
+def test_what_is_in_some_logs_is_refused_where_a_zero_of_each_leaves_less(monkeypatch, rest, refused):
+    """A control whose torque's zero was set anew had a payload of 0.12 +- 0.025 kg in two logs; with a true one no zero does."""
+    before, after, zero = Told(error=1.0), Told(error=0.7), Told(error=rest)
+    monkeypatch.setattr(borne_out, "centred", lambda fit: zero)
+    monkeypatch.setattr(borne_out, "size_told", lambda *_: True)
+    change = lambda a, b: b.error - a.error  # noqa: E731
+    monkeypatch.setattr(comparison, "compare", lambda a, b: (Difference("a", "b", "elbow", change(a, b), 0.02),))
+    monkeypatch.setattr(comparison, "together", lambda a, b, weighed=False: Difference("a", "b", "*", change(a, b), 0.02))
+    for word, joint in (("payload", -1), ("friction_change", 1)):
+        some = Candidate(vocabulary.find(word), joint, (("logs", ("a.csv",)),))
+        why = in_doubt(before, after, after, some) or ""
+        assert ("another zero of each log" in why) is refused and (refused or not why)
+    assert not in_doubt(before, after, after, Candidate(vocabulary.find("cogging"), 1, ()))
 
 
 def test_the_share_of_a_misfit_that_a_fit_takes(monkeypatch):

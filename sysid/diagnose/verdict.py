@@ -11,7 +11,7 @@ from ..candidates import Candidate
 from ..estimate import Fit
 from ..flexible import Law, Unknown
 from ..noise import DOUBT, as_of_test
-from ..plausible import IN_EACH_LOG
+from ..plausible import SETTLED
 from ..transfer import Transfer, quieter
 from ..unexplained import by_weights, cause, explains, in_vain, loudest, noisy, not_all, smeared
 from .ask import HALF
@@ -125,7 +125,7 @@ def verdicts(
             may = effect if p > LEVEL else None  # what stands above the level was fitted, in vain
             why = cause(both, floors[j], effect, may, without, louder)
             mean = dict(means).get(joint, "")
-            if then > 0.0 and not evens[j] and mean.startswith(IN_EACH_LOG):
+            if then > 0.0 and not evens[j] and mean.startswith(SETTLED):
                 why, may = mean, None
             elif mean and remains and not looks and then > 0.0 and not evens[j]:
                 why = mean
@@ -138,5 +138,5 @@ def verdicts(
             told = ("explained", who, explained)
         out.append(Verdict(joint, *told))
     said = {found.joint: found.says for found in carried}
-    zeros = [one.says.startswith(IN_EACH_LOG) for one in out]  # which is not carried anywhere
+    zeros = [one.says.startswith(SETTLED) for one in out]  # which is not carried anywhere
     return [o if z else replace(o, carries=said.get(o.joint, "")) for o, z in zip(out, zeros)]

@@ -7,7 +7,7 @@ import numpy as np
 from ..end_stops import END, LAWS
 from ..failures import Failure
 from ..fit_document import number
-from ..plausible import IN_EACH_LOG, WRONG
+from ..plausible import SETTLED, WRONG
 from .words import listed, wrapped
 
 
@@ -59,7 +59,7 @@ def blind(document: dict) -> list[str]:
         for v in open_
         if not {"may_be", "weighting"} & v.keys()
         and v["joint"] not in known
-        and IN_EACH_LOG not in (v.get("says") or "")  # each log would have its own again
+        and not any(why in (v.get("says") or "") for why in SETTLED)  # as it would be again
     ]
 
 
