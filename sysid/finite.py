@@ -23,10 +23,9 @@ def filled(values, name: str, where: str) -> tuple[np.ndarray, list[tuple[int, i
     found = runs(empty)
     alone = sum(b - a + 1 for a, b in found if b - a < SPIKE)
     if 2 * empty.sum() > len(values) or alone > _OFTEN * len(values):
-        raise LogError(
-            f"{name} is written in {100 * (1 - empty.mean()):.2g} % of the rows", where=where, allowed="a value in most rows",
-            do="leave the rows without it out: what is left is as fast as it was logged",
-        )  # fmt: skip
+        seldom = "leave the rows without it out: what is left is as fast as it was logged"
+        do = seldom if alone > _OFTEN * len(values) else "leave the file out, or name the joint in data.unused, and the other joints keep all their rows"
+        raise LogError(f"{name} is written in {100 * (1 - empty.mean()):.2g} % of the rows", where=where, allowed="a value in most rows", do=do)
     rows = np.arange(len(values))
     return np.where(empty, np.interp(rows, rows[~empty], values[~empty]), values), found
 
@@ -45,9 +44,10 @@ def check_finite(values, name: str, where: str, *, joints=(), t=None, first: int
     row, *column = (int(k) for k in np.argwhere(~(np.abs(values) <= _LARGEST))[0])
     joint = f" of joint {joints[column[0]]!r}" if column else ""
     bad = int(np.sum(~(np.abs(values.reshape(len(values), -1)) <= _LARGEST).all(axis=1)))
-    left = "the row" if bad == 1 else f"the row, and {bad - 1} more like it,"
+    left = "leave the row out" if bad == 1 else f"leave the row, and {bad - 1} more like it, out"
+    do = f"{left}; a gap is split there" if bad < len(values) else "no row of it is one: name another column under data.columns, or leave the file out"
     at = "" if t is None else f", t = {t[row]:.6g} s"
     raise LogError(
         f"{name.removeprefix('signals.')}{joint} is {values[row, *column]:g}", where=f"{where} row {first + row} counted from 0{at}",
-        allowed=f"finite numbers, at most {_LARGEST:g} in size", do=f"leave {left} out; a gap is split there",
+        allowed=f"finite numbers, at most {_LARGEST:g} in size", do=do,
     )  # fmt: skip

@@ -11,6 +11,7 @@ from .look import Look
 
 _KEYS = {"angle": "position", "torque": "torque"}
 _OUT_OF = "or take it as it is, where the URDF is what is wrong"
+_OUT_OF_ZERO = f"{_OUT_OF}, an axis of it, or where gravity points"
 
 
 def told(look: Look, reading: Reading, kind: str, joints, word) -> Iterator[Fault]:
@@ -30,7 +31,7 @@ def told(look: Look, reading: Reading, kind: str, joints, word) -> Iterator[Faul
             f"the zero of {names[0]}'s angle looks {turn} from the URDF's: from there the URDF's "
             "robot explains the torques"
         )
-        do = f"write data.zero: {_zeros(look, reading)}; {_OUT_OF}"
+        do = f"write data.zero: {_zeros(look, reading)}; {_OUT_OF_ZERO}"
         yield Fault(kind, WARNING, says, do, names[0])
         return
     kinds = ["position", "torque"] if word in ("", "angle and torque") else [_KEYS[word]]

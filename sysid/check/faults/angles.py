@@ -145,6 +145,10 @@ def _of_training(look: Look, j: int, joint: str) -> Iterator[Fault]:
     own, long = look.part("train"), look.with_speeds
     moves = look.excited[j]
     if not moves.enough:
+        worked = any(log.tally.swing[j] > 0.0 for log in own)
+        dead = (
+            "is it the joint's column? its torque changes; " if not moves.travel and worked else ""
+        )
         yield Fault(
             "not_excited",
             WARNING,
@@ -152,7 +156,7 @@ def _of_training(look: Look, j: int, joint: str) -> Iterator[Fault]:
                 f"{joint} travels {moves.travel:.2g} at up to {moves.top:.2g} a second in the "
                 "training logs: what it carries and its friction stay as the prior says"
             ),
-            "log it moving, or leave it out with robot.lock",
+            f"{dead}log it moving, or leave it out with robot.lock",
             joint,
             rows=sum(log.samples for log in own),
         )

@@ -41,9 +41,7 @@ def find(look: Look) -> Iterator[Fault]:
         lag, pause = float(lags[best]), max(_LEAST[0], _LEAST[1] * step)
         gain = float(np.log(squares[none] / squares[best]))
         t, piece = rows.t[use], rows.piece[use]
-        memory = blocks.memory(
-            left[best][:, None], np.ones((len(t), 1), bool), piece, seen.step
-        )
+        memory = blocks.memory(left[best][:, None], np.ones((len(t), 1), bool), piece, seen.step)
         count = int(blocks.numbered(t, piece, memory=memory).max()) + 1
         asked += 1
         ends = _at_ends(left, lags, rows.log[use], t, count)
