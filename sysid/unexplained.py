@@ -19,6 +19,8 @@ from .plausible import AT_REST
 from .too_narrow import noise_as_law
 
 _MOST = 0.5  # of what stands above a floor, or of a square
+_ROWS = 20_000  # that tell when logs begin
+_ANEW = 0.5  # of the shortest log: further apart, clocks go on from one to the next
 _FITTED = 0.1  # of what is left on test logs: a fit is made to see whether it takes more there
 WEIGHED = "`weighting: noise` under `solver:` in the experiment file"
 LOW_PASS = "`torque: low-pass` under `preprocess:` in the experiment file"
@@ -260,8 +262,25 @@ def notices(claims, refused: Sequence[Refused]) -> list[str]:
     """What to know beside claims, and of what is not claimed."""
     heads = [c.head for c in claims if c.after.weights is None and not c.head.size_told]
     told = [f"{r.effect} on {r.joint} is not claimed: {r.why}" for r in refused]
-    told += at_edges(claims[-1].after) if claims else []
+    told += [*at_edges(claims[-1].after), *clocks_anew(claims)] if claims else []
     return told + [hidden_by_weights(head.effect, head.joint) for head in heads]
+
+
+def clocks_anew(claims) -> list[str]:
+    """What to know where friction is another in some logs and the clock of each starts anew: over one
+    clock it may be warmth that it goes with."""
+    on = [c.head.joint for c in claims if c.head.effect == "friction_change"]
+    if not on:
+        return []
+    parts = [told.thinned(_ROWS) for told in claims[-1].after.predictions.values()]
+    clocks = [own.t[own.log == k] for own in parts for k in np.unique(own.log)]
+    if np.ptp([own.min() for own in clocks]) > _ANEW * min(np.ptp(own) for own in clocks):
+        return []
+    return [
+        f"friction_change on {', '.join(on)} may be `warmup`, where these logs were taken one after "
+        "another: it is asked over one clock, and theirs start anew; write into them the time since "
+        "the robot was switched on"
+    ]
 
 
 def hidden_by_weights(effect: str, joint: str) -> str:

@@ -571,6 +571,23 @@ def test_a_mean_by_log_is_told_where_it_is_most_of_what_is_no_noise(monkeypatch,
         assert not said or ("+1 in a.csv" in found["elbow"] and found["elbow"].startswith(begins))
 
 
+@pytest.mark.parametrize(
+    ("effect", "starts", "told"),
+    [("friction_change", (0.0, 0.2, 0.0), True), ("friction_change", (0.0, 70.0, 140.0), False), ("stribeck", (0.0, 0.0, 0.0), False)],
+)
+def test_friction_that_is_another_in_each_log_may_be_warmth_over_one_clock(effect, starts, told):
+    """Three logs of a cold, a warmer and a warm robot, each with a clock of its own, hide that time goes on."""
+
+    def logs(own):
+        t = np.concatenate([start + np.arange(0.0, 50.0, 0.5) for start in own])
+        return SimpleNamespace(t=t, log=np.repeat(np.arange(len(own)), 100), thinned=lambda most: logs(own))
+
+    after = SimpleNamespace(predictions={"train": logs(starts[:2]), "test": logs(starts[2:])})
+    claims = [SimpleNamespace(head=SimpleNamespace(effect=effect, joint="elbow"), after=after)]
+    found = unexplained.clocks_anew(claims)
+    assert len(found) == told and (not told or "`warmup`" in found[0])
+
+
 def test_of_those_that_test_logs_alone_can_ask_the_one_that_takes_most(monkeypatch):
     groups = [SimpleNamespace(candidate=SimpleNamespace(kind=kind), signed=signed, testable=testable, taken=taken) for kind, signed, testable, taken in (
         ("a", True, False, 1.0), ("a", True, False, 2.0), ("b", True, False, -3.0), ("c", True, True, 9.0), ("d", False, False, 9.0), ("e", True, False, 0.0)
