@@ -20,7 +20,7 @@ _LIKELY = 0.05  # less is not listed
 _WORTH = 1.5e-2  # of an error: what is worth having, three per cent of its square (`select`)
 _VISIBLE = 0.1  # of an error: what falls by less and has no size of its own is no name
 _USUAL = ("viscous", "coulomb", "torque_bias", "armature")  # of every joint, as `sysid init` has it
-_NOTHING = 5e-3  # of an error: a hundredth of its square, the least that is told in per cent
+NOTHING = 5e-3  # of an error: a hundredth of its square, the least that is told in per cent
 
 
 def tried(how: Callable, candidate: Candidate, last: Fit, **known):
@@ -155,11 +155,11 @@ def in_doubt(before: Fit, after: Fit, told: Fit, candidate: Candidate) -> str | 
     # torque that is read wrongly is made up for by bodies, which those that carry them bear
     read = isinstance(candidate.effect, SensorEffect) and change.delta_rms < 0.0
     wide = len(candidate.touches(2)) > 1 or (read and size_told(told, *candidate.key))
-    wide = wide and comparison.falls(before, after, _NOTHING)
+    wide = wide and comparison.falls(before, after, NOTHING)
     unsure = little and change.delta_rms > -change.se and more
-    if (change.delta_rms > -_NOTHING * unit or unsure) and not wide:
+    if (change.delta_rms > -NOTHING * unit or unsure) and not wide:
         falls = "hardly falls" if change.delta_rms < 0.0 else "does not fall"
-        if unsure and change.delta_rms <= -_NOTHING * unit:
+        if unsure and change.delta_rms <= -NOTHING * unit:
             falls = "falls by less than its standard error, beside what is on that joint already"
         return f"with it the error on the test logs {falls} ({rise})"
     if not whole and (other := comparison.spoiled(before, (after, told), own)):
@@ -169,7 +169,7 @@ def in_doubt(before: Fit, after: Fit, told: Fit, candidate: Candidate) -> str | 
     if whole:
         risen = comparison.rises(before, told, None)
     else:
-        risen = shown.delta_rms > 0.0 and not (wide and comparison.falls(before, told, _NOTHING))
+        risen = shown.delta_rms > 0.0 and not (wide and comparison.falls(before, told, NOTHING))
     if risen:
         return "as `sysid add` fits it, the error on the test logs rises"
     # as the fit weighs them, as it trades what a quiet joint loses for what a loud one gains; and
@@ -184,13 +184,16 @@ def in_doubt(before: Fit, after: Fit, told: Fit, candidate: Candidate) -> str | 
 
 def _is_zero(before: Fit, after: Fit, own: Sequence[str], whole: bool) -> bool:
     """Whether a torque's zero that was set anew in each log leaves clearly less of the test logs than
-    what is in some of them does."""
+    what is in some of them does, and this takes nothing of what the zeros leave."""
+
+    def change(first: Fit, second: Fit):
+        if whole:
+            return [comparison.together(first, second)]
+        return [d for d in comparison.compare(first, second) if d.joint in own]
+
     zero = centred(before)
-    if whole:
-        changes = [comparison.together(zero, after)]
-    else:
-        changes = [d for d in comparison.compare(zero, after) if d.joint in own]
-    return all(d.delta_rms > d.se for d in changes)
+    less = all(d.delta_rms > d.se for d in change(zero, after))
+    return less and not any(d.delta_rms < -d.se for d in change(zero, centred(after)))
 
 
 def size_told(fit: Fit, effect: str, joint: int) -> bool:

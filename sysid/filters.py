@@ -71,13 +71,13 @@ def begun(
             None: there is this one.
     """
     spec, low = experiment.preprocess, lowpassed(experiment)
-    # not what an effect leaves that only some robots have: when one is added, the filter stays
-    model = with_drives(plain(experiment, model.robot), experiment)
     if low and (_servos(experiment) or "cutoff" in _given(spec)):
         return lambda: of_the_motion(experiment, model, logs, prior)
     said = {"filter": spec.filter, "torque": spec.torque, "standstill": spec.standstill}
     if spec.filter == "none":
         return lambda: {**said, "chosen": "given", "held_out": []}
+    # not what an effect leaves that only some robots have: when one is added, the filter stays
+    model = with_drives(plain(experiment, model.robot), experiment)
     key = "cutoff" if low else _key(spec)
     value = "auto" if low else getattr(spec, key)
     automatic = value == "auto"

@@ -45,7 +45,7 @@ def check_finite(values, name: str, where: str, *, joints=(), t=None, first: int
     joint = f" of joint {joints[column[0]]!r}" if column else ""
     bad = int(np.sum(~(np.abs(values.reshape(len(values), -1)) <= _LARGEST).all(axis=1)))
     left = "leave the row out" if bad == 1 else f"leave the row, and {bad - 1} more like it, out"
-    do = f"{left}; a gap is split there" if bad < len(values) else "no row of it is one: name another column under data.columns, or leave the file out"
+    do = f"{left}; a gap is split there" if bad < len(values) else "no row of it is a number: name another column for it, or leave the file out"
     at = "" if t is None else f", t = {t[row]:.6g} s"
     raise LogError(
         f"{name.removeprefix('signals.')}{joint} is {values[row, *column]:g}", where=f"{where} row {first + row} counted from 0{at}",

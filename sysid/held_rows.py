@@ -9,6 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from .motor_side import command_name
 from .outliers import SHORT, quantum, runs
 from .recording import Recording
 from .repeats import held_angle
@@ -69,20 +70,27 @@ def at_own_times(samples: Recording, joints: Sequence[str]) -> Recording:
         return samples
     apart, out, told = _apart(samples), tau.copy(), {}
     ends = [0, *apart, len(t)]
+    # what a drive's command makes is held as the drive holds it
+    made = [f"signals.{command_name(joint)}" in samples.signals for joint in joints]
     for j, own in enumerate(tau.T):
+        if made[j]:
+            continue
         again = np.diff(own) == 0.0
         again[apart - 1] = False
         jump = np.median(np.abs(np.diff(own))[~again]) if not again.all() else 0.0
         if (every := _every(again)) < 2 or jump < _GRAINS * quantum(own):
             continue  # coarse values repeat as they come
         told.setdefault(every, []).append(joints[j])
-        new = np.flatnonzero(_one_of(again, every))
+        new = np.flatnonzero(np.append(True, ~again))
         step = every * float(np.median(np.diff(t)))
         for first, last in pairwise(ends):
             fresh = new[(new >= first) & (new < last)]
             if len(fresh) > 2:
                 here = slice(first, last)
                 out[here, j] = moved(t[fresh], own[fresh, None], t[here], step)[:, 0]
+        for a, b in runs(again):
+            if b - a + 1 > every + 1:  # rest, or nothing arrived: as it was, for who looks for that
+                out[a : b + 2, j] = own[a : b + 2]
     for every, names in told.items():
         warn(
             f"{samples.where}: the torque of {', '.join(names)} is new every {every} rows only and held "

@@ -68,7 +68,7 @@ class Masses:
     def do(self) -> str:
         """The cure, in words."""
         if self.doubted:
-            return f"columns, signs or units may be wrong, which come first{SAYS_CHECK}"
+            return f"columns, signs or units may be wrong, and come first{SAYS_CHECK}"
         auto = "" if self.weight is None else f"`prior.weight: auto` (it takes {self.weight:g})"
         where = f" on {', '.join(self.joints)}" if self.joints else ""
         if self.stronger is not None:

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from functools import cache
 
 from .estimate import Fit
-from .noise import DOUBT
 from .plausible import IN_EACH_LOG, OF_ITS_OWN, centred, other_means
 
 _MOST = 0.5  # of what stands above a floor
@@ -19,16 +18,20 @@ def by_log(fit: Fit, floors, still: Sequence[str] = ()) -> dict[str, str]:
     Args:
         still: joints that stand in the test logs, whose friction may be any there.
     """
-    out, about = {}, cache(lambda: centred(fit).rms("test"))
+    out, about = {}, cache(lambda: centred(fit))
     for joint, (share, square, said) in other_means(fit, fit.logs, still).items():
         floor, error = floors[fit.joints.index(joint)], fit.rms("test")[joint]
-        noise, rest = (floor.rms or floor.low or 0.0) ** 2, about()[joint]
+        noise, rest = (floor.rms or floor.low or 0.0) ** 2, about().rms("test")[joint]
         misfits = (square / share - noise, square), (error**2 - noise, error**2 - rest**2)
         if any(misfit > 0.0 and taken > _MOST * misfit for misfit, taken in misfits):
-            # about its mean in each log the error is noise: then nothing else is missing
-            trained = fit.rms("train")[joint]
-            settled = floor.reached(rest) if floor.rms else rest <= (1.0 + DOUBT) * trained
-            most = "" if settled else "most of "
+            # about its mean in each log the error is noise: then nothing else is missing; of what is
+            # read in parts nobody knows
+            whole = all(
+                len(own.t) == len(fit.predictions[part].t)
+                for part, own in about().predictions.items()
+            )
+            left = max(rest, about().rms("train")[joint])
+            most = "" if floor.rms and whole and floor.reached(left) else "most of "
             out[joint] = (
                 f"{most}{IN_EACH_LOG} ({said}): a torque's zero that was set anew, a load, or what hangs "
                 f"on the place; {OF_ITS_OWN}"

@@ -35,18 +35,18 @@ def implausible(fit: Fit, still: Sequence[str] = (), logs: Sequence[dict] = ()) 
         still: joints that stand in the test logs. logs: what logs there are, part and name of each, as documents have them.
     """
     train, test = (fit.predictions[part].errors() for part in ("train", "test"))
-    stands = [joint for joint in fit.joints if joint in still]
+    rests = [joint for joint in fit.joints if joint in still]
     # at the error of the training logs, which it does explain, the torque of the test logs hardly varies
     carries = (test["rms"] <= _ALIKE * train["rms"]) & (train["r2"] > 0.0)
-    worse = [f"{joint} (R2 {r2:.2g})" for joint, r2, well in zip(fit.joints, test["r2"], carries) if r2 < 0.0 and not well and joint not in stands]
+    worse = [f"{joint} (R2 {r2:.2g})" for joint, r2, well in zip(fit.joints, test["r2"], carries) if r2 < 0.0 and not well and joint not in rests]
     if worse:
         yield f"{BEGINS}: {WORSE} {', '.join(worse)}; {ASK}"
-    if moved := [joint for joint in stands if np.isfinite(test["r2"][fit.joints.index(joint)]) and joint not in _held(fit)]:
+    if moved := [joint for joint in rests if np.isfinite(test["r2"][fit.joints.index(joint)]) and joint not in stands(fit)]:
         yield (
             f"the test logs do not show {', '.join(moved)} in motion: the error there is friction at rest, which no model tells, and "
             "says nothing of the model; hold out a log in which it moves"
         )
-    yield from _apart(fit, logs, stands)
+    yield from _apart(fit, logs, rests)
     robot, greatest = fit.model.robot, fit.predictions["train"].greatest(_FEWEST)
     for j, joint in enumerate(fit.joints):
         allowed = robot.source.joints[joint].effort
@@ -55,7 +55,7 @@ def implausible(fit: Fit, still: Sequence[str] = (), logs: Sequence[dict] = ()) 
             yield f"{BEGINS}: the torque of {joint} reaches {torque.max():.4g}, the URDF allows its drive {allowed:.4g}; {ASK}"
 
 
-def _held(fit: Fit) -> set[str]:
+def stands(fit: Fit) -> set[str]:
     """Joints whose friction is held, as they stand in the training logs, too."""
     own = zip(fit.model.coefficients, fit.held)
     return {fit.joints[c.joint] for c, held in own if held and c.effect == "coulomb" and c.joint >= 0}
@@ -82,15 +82,18 @@ def outdated(fit: Fit, last: Fit) -> list[str]:
 
 
 def centred(fit: Fit) -> Fit:
-    """A fit with what it leaves of each test log about its mean there, of every joint: as with a torque's zero that was set anew in each."""
-    told = fit.predictions["test"].thinned(_MOST)
+    """A fit with what it leaves of each log about its mean there, of every joint: as with a torque's zero that was set anew in each.
+    Of logs that do not stand in memory, of a part."""
+    return replace(fit, predictions={part: _centred(told.thinned(_MOST)) for part, told in fit.predictions.items()})
+
+
+def _centred(told: Prediction) -> Prediction:
     predicted, use = np.array(told.predicted), np.ones(told.predicted.shape, dtype=bool) if told.use is None else told.use
     for log in np.unique(told.log):
         own = told.log == log
         left = np.where(use[own], told.measured[own] - predicted[own], 0.0)
         predicted[own] += left.sum(0) / np.maximum(use[own].sum(0), 1)
-    shifted = Prediction(told.log, told.t, told.measured, predicted, told.use, told.joints, told.units)
-    return replace(fit, predictions={**fit.predictions, "test": shifted})
+    return Prediction(told.log, told.t, told.measured, predicted, told.use, told.joints, told.units)
 
 
 def other_means(fit: Fit, logs: Sequence[dict], still: Sequence[str] = ()) -> dict[str, tuple[float, float, str]]:

@@ -73,4 +73,4 @@ class ShownDiagnosis:
     def _document(self) -> dict:
         from .statement.document import document
 
-        return document(self)
+        return document(self, laws=False)  # of which each is a fit

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from . import comparison, pipeline
 from .addition import grown
+from .borne_out import NOTHING
 from .errors import SysidError
 from .estimate import Fit
 
-_NOTHING = 5e-3  # of an error: a hundredth of its square, the least that is told in per cent
-
 
 def falls_with(fit: Fit, joint: str, options: dict) -> bool:
-    """Whether the error of a joint on the test logs falls with a formula there, as `sysid add` would
-    fit it, and no other joint's rises more.
+    """Whether the error of a joint on the test logs falls with a formula there, beside what the fit
+    has, and no other joint's rises more.
 
     Args:
         options: of the effect `formula`.
@@ -20,8 +19,8 @@ def falls_with(fit: Fit, joint: str, options: dict) -> bool:
     try:
         spec = grown(fit.experiment, "formula", [joint], options, every=fit.joints)
         after = pipeline.fit_grown(spec, fit, filters=fit.filters)
-    except SysidError:  # a number that is none, on some of these logs
+        (change,) = [d for d in comparison.compare(fit, after) if d.joint == joint]
+        falls = -change.delta_rms > NOTHING * fit.rms("test")[joint]
+        return falls and not comparison.spoiled(fit, (after,), [joint])
+    except SysidError:  # a number that is none, on some of these logs; or logs that changed since
         return False
-    (change,) = [d for d in comparison.compare(fit, after) if d.joint == joint]
-    falls = -change.delta_rms > _NOTHING * fit.rms("test")[joint]
-    return falls and not comparison.spoiled(fit, (after,), [joint])

@@ -15,12 +15,11 @@ from .failures import HeldOut, fallen
 from .given_shapes import at_edges
 from .mean_by_log import by_log
 from .model_parameters import ROBOT
-from .plausible import AT_REST
+from .one_clock import clocks_anew
+from .plausible import AT_REST, stands
 from .too_narrow import noise_as_law
 
 _MOST = 0.5  # of what stands above a floor, or of a square
-_ROWS = 20_000  # that tell when logs begin
-_ANEW = 0.5  # of the shortest log: further apart, clocks go on from one to the next
 _FITTED = 0.1  # of what is left on test logs: a fit is made to see whether it takes more there
 WEIGHED = "`weighting: noise` under `solver:` in the experiment file"
 LOW_PASS = "`torque: low-pass` under `preprocess:` in the experiment file"
@@ -176,9 +175,10 @@ def cause(
 def otherwise(fit: Fit, floors, still: Sequence[str] = ()) -> dict[str, str]:
     """{joint: why} of joints of which something else than a law may be what the motion predicts: a
     filter that is too narrow for the angles, what `by_log` says, and rest."""
-    at_rest = f"{AT_REST}; log it moving, or leave it out with robot.lock"
-    rests = dict.fromkeys(still, at_rest)
-    return noise_as_law(fit.filters) | by_log(fit, floors, still) | rests
+    at_rest = f"{AT_REST}; hold out a log in which it moves, or leave it out with robot.lock"
+    trained = lambda joint: floors[fit.joints.index(joint)].reached(fit.rms("train")[joint])  # noqa: E731
+    rests = {joint: at_rest for joint in still if joint in stands(fit) or trained(joint)}
+    return rests | noise_as_law(fit.filters) | by_log(fit, floors, still)
 
 
 def smeared(errors: Sequence[float], floor) -> bool:
@@ -264,23 +264,6 @@ def notices(claims, refused: Sequence[Refused]) -> list[str]:
     told = [f"{r.effect} on {r.joint} is not claimed: {r.why}" for r in refused]
     told += [*at_edges(claims[-1].after), *clocks_anew(claims)] if claims else []
     return told + [hidden_by_weights(head.effect, head.joint) for head in heads]
-
-
-def clocks_anew(claims) -> list[str]:
-    """What to know where friction is another in some logs and the clock of each starts anew: over one
-    clock it may be warmth that it goes with."""
-    on = [c.head.joint for c in claims if c.head.effect == "friction_change"]
-    if not on:
-        return []
-    parts = [told.thinned(_ROWS) for told in claims[-1].after.predictions.values()]
-    clocks = [own.t[own.log == k] for own in parts for k in np.unique(own.log)]
-    if np.ptp([own.min() for own in clocks]) > _ANEW * min(np.ptp(own) for own in clocks):
-        return []
-    return [
-        f"friction_change on {', '.join(on)} may be `warmup`, where these logs were taken one after "
-        "another: it is asked over one clock, and theirs start anew; write into them the time since "
-        "the robot was switched on"
-    ]
 
 
 def hidden_by_weights(effect: str, joint: str) -> str:

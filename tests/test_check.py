@@ -363,7 +363,7 @@ def test_coarse_angles_are_no_delay(experiment, late):
     assert {f.joint for f in found} == (set(JOINTS) if late else set())
 
 
-@pytest.mark.parametrize("files, says, do", [(["train.csv"], "there alone", "that file"), (["train.csv", "test.csv"], "in every log", "data.columns.position")])
+@pytest.mark.parametrize("files, says, do", [(["train.csv"], "exchanged in train", "that file"), (["train.csv", "test.csv"], "as in every log", "data.columns.position")])
 def test_angles_and_torques_that_changed_places_are_told_and_nothing_of_them(files, says, do, made, tmp_path):
     logs = shutil.copytree(made(), tmp_path / "logs")
     for file in files:

@@ -91,7 +91,7 @@ def test_noise_of_angles_is_no_law_and_asks_for_no_log():
         logs = ()
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("sysid.unexplained.other_means", lambda *_: {})
+        patch.setattr("sysid.mean_by_log.other_means", lambda *_: {})
         said = otherwise(Found(), ())
     assert list(said) == ["elbow"] and "`window: auto` under `preprocess:`" in said["elbow"]
     verdict = [{"joint": joint, "status": "unresolved"} for joint in JOINTS]

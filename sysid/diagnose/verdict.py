@@ -126,7 +126,7 @@ def verdicts(
             why = cause(both, floors[j], effect, may, without, louder)
             mean = dict(means).get(joint, "")
             if then > 0.0 and not evens[j] and mean.startswith(SETTLED):
-                why, may = mean, None
+                why, may, remains = mean, None, None
             elif mean and remains and not looks and then > 0.0 and not evens[j]:
                 why = mean
             why += "".join({r.effect: f"; {r.told}" for r in refused if r.joint == joint}.values())

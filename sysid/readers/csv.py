@@ -49,8 +49,9 @@ class CsvTable(Table):
         if self._header and bare and 2 * sum(map(units.is_unit, below)) > len(cells):
             self._above, self.stated = 2, {n: u.strip("[]()") for n, u in zip(cells, below)}
         # how wide the table is, a reader goes by this line
-        if self._above == 1 and second.strip() and len(below) < len(cells):
-            raise LogError(f"{len(below)} cells where the first line has {len(cells)}", where=f"{path} line 2", do="correct the row or leave it out")
+        named = max((k + 1 for k, cell in enumerate(cells) if cell), default=0)
+        if self._above == 1 and second.strip() and len(below) < named:
+            raise LogError(f"{len(below)} cells where the first line has {named}", where=f"{path} line 2", do="correct the row, or the first line")
         # columns that no name stands above shift the names, or not: nobody can know
         if any(below := self._cells(second.decode("utf-8", errors="replace"))[len(cells) :]):
             raise LogError(f"{len(cells) + len(below)} cells where the first line has {len(cells)}", where=f"{path} line 2", do="name every column in the first line")

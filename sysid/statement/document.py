@@ -21,18 +21,20 @@ from .claims import chances, claims, confidence_set, finding, ties
 from .laws import BODIES, of_bodies, to_begin_with
 
 
-def document(found: Diagnosis, run="") -> dict:
+def document(found: Diagnosis, run="", *, laws: bool = True) -> dict:
     """The document of `sysid diagnose`. NaN is None.
+
+    laws: whether laws to begin with are fitted, and told where they are borne out.
 
     next_log: the command that designs the log to take next, where these do not say why an error
     stands, and neither an effect that may be it nor how the fit weighs its joints does.
     """
-    out = _document(found, run)
+    out = _document(found, run, laws)
     blind = where.blind(out)
     return {**out, "next_log": another_log(found.fit.experiment.path) if blind else None}
 
 
-def _document(found: Diagnosis, run) -> dict:
+def _document(found: Diagnosis, run, laws: bool) -> dict:
     fit, joints = found.fit, found.fit.joints
     rms = {part: dict(zip(joints, fit.predictions[part].told())) for part in ("train", "test")}
     gone = outdated(fit, found.claims[-1].after) if found.claims else ()
@@ -49,7 +51,7 @@ def _document(found: Diagnosis, run) -> dict:
         "findings": [finding(f, claim, found) for claim in found.claims for f in claim.findings],
         "claims": list(claims(found)),
         "verdict": [
-            _with_law(_verdict(v, fit.experiment.path, joints), found) for v in found.verdict
+            _with_law(_verdict(v, fit.experiment.path, joints), found, laws) for v in found.verdict
         ],
         "detectable": [
             {
@@ -127,12 +129,12 @@ def _floor(floor) -> dict:
     }
 
 
-def _with_law(entry: dict, found: Diagnosis) -> dict:
+def _with_law(entry: dict, found: Diagnosis, laws: bool) -> dict:
     """What is `unknown` with a law of one's own to begin with, where one variable stands out; and
     that it is the bodies', where it is."""
     if entry["status"] == "unknown" and of_bodies(entry):
         return entry | {"says": "; ".join([*filter(None, [entry.get("says")]), BODIES])}
-    if entry["status"] != "unknown":
+    if entry["status"] != "unknown" or not laws:
         return entry
     fit, joints = found.fit, found.fit.joints
     there = {(e.name, joints[j]) for e, own in fit.model.terms for j in own if j != ROBOT}

@@ -59,12 +59,12 @@ def to_begin_with(
     if not told or told[0]["share"] < _MOST * entry["share_left"] or of_bodies(entry):
         return None
     near = [one for one in told if one["share"] >= _NEARLY * told[0]["share"]]
-    for one in sorted(near, key=lambda one: "with" in one)[:_TRIED]:
-        options = _options(one, joint)
-        if options is None or (options["name"], joint) in there or not borne_out(joint, options):
-            continue
-        adds = command(Path(path), "formula", [joint], options)
-        return {"effect": "formula", "joint": joint, "options": options, "command": adds}
+    every = (_options(one, joint) for one in sorted(near, key=lambda one: "with" in one))
+    new = [own for own in every if own and (own["name"], joint) not in there]
+    for options in new[:_TRIED]:
+        if borne_out(joint, options):
+            adds = command(Path(path), "formula", [joint], options)
+            return {"effect": "formula", "joint": joint, "options": options, "command": adds}
     return None
 
 

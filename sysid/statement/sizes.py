@@ -42,14 +42,13 @@ def shown(document: dict, joints: Sequence[str], width: int) -> list[str]:
     if shaped := dict.fromkeys(d["effect"] for d in document["detectable"] if d["at"]):
         words = f"  {', '.join(shaped)}: at the values of their shape that show them best"
         out += wrapped(words, width, "    ")
-    own_options = {d["effect"]: d["options"] for d in document["detectable"] if d.get("options")}
-    said = [
-        f"{effect} with {name}: {value}"
-        for effect, options in own_options.items()
-        for name, value in options.items()
-    ]
+    kinds: dict[str, set[tuple]] = {}
+    for d in document["detectable"]:
+        kinds.setdefault(d["effect"], set()).add(tuple((d.get("options") or {}).items()))
+    alike = [(effect, *own) for effect, own in kinds.items() if len(own) == 1]
+    said = [f"{effect} with {name}: {value}" for effect, own in alike for name, value in own]
     if said:
-        out += wrapped(f"  {', '.join(said)}; otherwise it may show less", width, "    ")
+        out += wrapped(f"  {', '.join(said)}; with another option less may show", width, "    ")
     somewhere = {effect for effect, *_ in sizes}
     named = {f["effect"] for f in document["findings"] if f["joins_as_step"]}
     for other in (False, True):

@@ -59,7 +59,9 @@ def blind(document: dict) -> list[str]:
         for v in open_
         if not {"may_be", "weighting"} & v.keys()
         and v["joint"] not in known
-        and not any(why in (v.get("says") or "") for why in SETTLED)  # as it would be again
+        and not any(
+            why in (v.get("says") or "") for why in SETTLED
+        )  # of which another tells no more
     ]
 
 
