@@ -27,9 +27,8 @@ def without_held(samples: Recording) -> Recording:
     q, tau = samples.signals["q"], samples.signals["tau"]
     if len(q) < SHORT:
         return samples
-    again = np.all(np.diff(q, axis=0) == 0.0, axis=1) & np.all(np.diff(tau, axis=0) == 0.0, axis=1)
     apart = _apart(samples)
-    again[apart - 1] = False
+    again = _again(np.column_stack([q, tau]), apart)
     if (every := _every(again)) > 1:
         step = every * float(np.median(np.diff(samples.t)))
         warn(
@@ -44,17 +43,17 @@ def without_held(samples: Recording) -> Recording:
     if not found:
         return samples
     # a joint at least went on as it came, and made up for it at once
-    moved = sorted(found & {run for own in q.T for run in held_angle(own)})
-    moved = [(a + 1, b) for a, b in moved if not np.any((apart > a) & (apart <= b + 1))]
-    if not moved:
+    went_on = sorted(found & {run for own in q.T for run in held_angle(own)})
+    went_on = [(a + 1, b) for a, b in went_on if not np.any((apart > a) & (apart <= b + 1))]
+    if not went_on:
         return samples
     kept = np.ones(len(q), dtype=bool)
-    for a, b in moved:
+    for a, b in went_on:
         kept[a : b + 1] = False
     count = len(q) - int(kept.sum())
     warn(
-        f"{samples.where}: {count} rows, {len(moved)} times, only repeat the row before while the "
-        f"robot moves, the first at {samples.t[moved[0][0]]:.4g} s: messages that did not arrive, "
+        f"{samples.where}: {count} rows, {len(went_on)} times, only repeat the row before while the "
+        f"robot moves, the first at {samples.t[went_on[0][0]]:.4g} s: messages that did not arrive, "
         "which are left out",
         above=2,
     )
@@ -73,13 +72,9 @@ def at_own_times(samples: Recording, joints: Sequence[str]) -> Recording:
     # what a drive's command makes is held as the drive holds it
     made = [f"signals.{command_name(joint)}" in samples.signals for joint in joints]
     for j, own in enumerate(tau.T):
-        if made[j]:
+        again = _again(own, apart)
+        if made[j] or (every := _of_torque(own, again)) < 2:
             continue
-        again = np.diff(own) == 0.0
-        again[apart - 1] = False
-        jump = np.median(np.abs(np.diff(own))[~again]) if not again.all() else 0.0
-        if (every := _every(again)) < 2 or jump < _GRAINS * quantum(own):
-            continue  # coarse values repeat as they come
         told.setdefault(every, []).append(joints[j])
         new = np.flatnonzero(np.append(True, ~again))
         step = every * float(np.median(np.diff(t)))
@@ -99,6 +94,31 @@ def at_own_times(samples: Recording, joints: Sequence[str]) -> Recording:
             above=2,
         )
     return replace(samples, signals=samples.signals | {"tau": out}) if told else samples
+
+
+def seldom(samples: Recording) -> bool:
+    """Whether the values of a log, or a joint's torque, come more seldom than its rows."""
+    q, tau = samples.signals["q"], samples.signals["tau"]
+    if len(q) < SHORT:
+        return False
+    apart = _apart(samples)
+    return _every(_again(np.column_stack([q, tau]), apart)) > 1 or any(
+        _of_torque(own, _again(own, apart)) > 1 for own in tau.T
+    )
+
+
+def _again(values, apart) -> np.ndarray:
+    """(n - 1,) bool: rows (n, ...) whose values are those of the one before, in one go."""
+    same = np.diff(values, axis=0) == 0.0
+    again = same if same.ndim == 1 else same.all(axis=1)
+    again[apart - 1] = False
+    return again
+
+
+def _of_torque(own, again) -> int:
+    """As `_every`, of a joint's torque (n,); coarse values repeat as they come, and come in all rows."""
+    jump = np.median(np.abs(np.diff(own))[~again]) if not again.all() else 0.0
+    return 1 if jump < _GRAINS * quantum(own) else _every(again)
 
 
 def _apart(samples: Recording) -> np.ndarray:

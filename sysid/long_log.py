@@ -1,8 +1,8 @@
 """A long log read span by span, wherever its file can be: its clock in a first pass, its signals
 when they are asked for.
 
-A file can where it is Parquet, its clock is even (gaps aside) and no recording ends in it. Any
-other is read whole, as a short one is, and then looked at in the same spans.
+A file can where it is Parquet, its clock is even (gaps aside), no recording ends in it, and values come
+as often as rows. Any other is read whole, as a short one is, and then looked at in the same spans.
 """
 
 from __future__ import annotations
@@ -20,12 +20,14 @@ from . import recorded_columns, recording, spans, units
 from .even_clock import EvenClock, Stretch
 from .full_turns import going_on
 from .groups import levels_of
+from .held_rows import seldom
 from .log import Log
 from .log_spec import DataSpec, LogSpec
 from .segment import Segment
 from .spans import Spans, edges, of_segment
 from .warned import noticed, warn
 
+_LOOKED = 20_000  # rows that tell how often values come
 _DEGREES = re.compile(r"joint '.*' reaches")  # a notice whose number differs from span to span
 
 
@@ -114,9 +116,9 @@ class _Source:
         self._table, self._told = table, set()
 
     def log(self) -> Log | None:
-        """The log; None where its clock is not even."""
+        """The log; None where its clock is not even, or values come more seldom than rows."""
         found = self._stretches()
-        if found is None:
+        if found is None or seldom(self._samples(found[0], 0, min(found[0].rows, _LOOKED))):
             return None
         stretches = [(_Rows(self, one), one.rows) for one in found]
         digest = logs.sha256(self._table.path)
@@ -128,6 +130,13 @@ class _Source:
 
     def rows(self, stretch: Stretch, first: int, last: int, wrapped: bool = False) -> Segment:
         """Rows of a stretch, whose angles go on where they jump by a turn, or are `wrapped`."""
+        samples = self._samples(stretch, first, last, wrapped)
+        t = stretch.begin + stretch.step * np.arange(first, last)
+        return logs.segment(t, stretch.step, samples.signals)
+
+    def _samples(
+        self, stretch: Stretch, first: int, last: int, wrapped: bool = False
+    ) -> recording.Recording:
         row = stretch.row + first
         part = self._table.between(row, stretch.row + last)
         spec = self._spec.model_copy(update={"start": None, "stop": None})
@@ -141,8 +150,7 @@ class _Source:
             if key not in self._told:
                 self._told.add(key)
                 warn(said)
-        t = stretch.begin + stretch.step * np.arange(first, last)
-        return logs.segment(t, stretch.step, samples.signals)
+        return samples
 
     def _stretches(self) -> list[Stretch] | None:
         """The stretches without a gap of the piece that is asked for; None where its clock is not

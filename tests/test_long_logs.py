@@ -1,5 +1,6 @@
 """Long logs in spans: what is found of them is what is found of the log as one."""
 
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -354,7 +355,9 @@ def test_a_diagnosis_of_a_part_of_the_logs_finds_what_is_missing(tmp_path, monke
     monkeypatch.setattr(spans, "SPAN", 16_000)
     monkeypatch.setattr(thinning, "MOST", 20_000)
     found = sysid.diagnose(sysid.load(tmp_path))
-    assert [(claim.head.effect, claim.head.joint) for claim in found.claims] == [("stribeck", "knee")]
+    assert [(claim.head.effect, claim.head.joint) for claim in found.claims] == [
+        ("stribeck", "knee")
+    ]
     assert found.claims[0].after.samples == found.fit.samples
     assert "was asked of" in found.notices[0]
 
@@ -372,3 +375,29 @@ def test_a_robot_of_a_fleet_says_the_same_of_logs_in_spans(monkeypatch):
         assert told.any() and np.array_equal(told, np.isfinite(other.values))
         assert np.max(np.abs(other.values - one.values)[told] / std) < 1e-6
         np.testing.assert_allclose(other.variance[told], one.variance[told], rtol=1e-6)
+
+
+@pytest.mark.parametrize("every", [1, 5])
+def test_a_long_log_whose_torque_comes_seldom_is_read_as_a_short_one(
+    every, tmp_path, short_spans, monkeypatch
+):
+    """Span by span nobody would know what comes next; where values come as often as rows nothing is
+    read whole."""
+    frame = leg_table()
+    names = [name for name in frame.columns if name.startswith("tau")]
+    rows = (np.arange(frame.height) // every) * every
+    rng = np.random.default_rng(0)
+    noisy = {n: frame[n].to_numpy() + 0.05 * rng.standard_normal(frame.height) for n in names}
+    held = frame.with_columns([pl.Series(n, own[rows]) for n, own in noisy.items()])
+    held.write_parquet(tmp_path / "held.parquet")
+    spec = experiment(tmp_path / "held.parquet")
+    machine, _, _ = pipeline.build(spec)
+    how = (spec.data.train[0], spec.data, machine.joints, machine.prismatic, spec.folder)
+    assert (long_log.in_spans(*how, logs.NO_ACTUATORS) is None) is (every > 1)
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        found, whole = long_log.read(*how), logs.read(*how)
+    assert any(f"new every {every} rows" in str(one.message) for one in told) is (every > 1)
+    read = np.concatenate([segment.tau for segment in found.segments])
+    assert isinstance(found.segments, spans.Spans)
+    np.testing.assert_allclose(read, np.concatenate([s.tau for s in whole.segments]), atol=1e-12)

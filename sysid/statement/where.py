@@ -59,9 +59,7 @@ def blind(document: dict) -> list[str]:
         for v in open_
         if not {"may_be", "weighting"} & v.keys()
         and v["joint"] not in known
-        and not any(
-            why in (v.get("says") or "") for why in SETTLED
-        )  # of which another tells no more
+        and not any(why in (v.get("says") or "") for why in SETTLED)  # another tells no more
     ]
 
 
