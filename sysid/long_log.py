@@ -118,7 +118,9 @@ class _Source:
     def log(self) -> Log | None:
         """The log; None where its clock is not even, or values come more seldom than rows."""
         found = self._stretches()
-        if found is None or seldom(self._samples(found[0], 0, min(found[0].rows, _LOOKED))):
+        if found is None or seldom(
+            self._samples(found[0], 0, min(found[0].rows, _LOOKED, spans.SPAN))
+        ):
             return None
         stretches = [(_Rows(self, one), one.rows) for one in found]
         digest = logs.sha256(self._table.path)
