@@ -10,6 +10,7 @@ from .motion import Piece
 from .smoother import Smoother
 
 _ROUNDING = 1e-12  # of what a second pass takes away of a jump by one, squared; of a wave's ends
+_ONE = 1e-6  # of the largest of their singular values: waves that are one
 
 
 @dataclass(frozen=True)
@@ -75,3 +76,35 @@ class JumpResponse:
         edge = self.smoother.reach
         beyond = np.pad(values, ((edge, edge), (0, 0)), mode="reflect", reflect_type="odd")
         return values - self.smoother(beyond)[edge:-edge]
+
+
+def overlapping(
+    at: np.ndarray, by: np.ndarray, reach: int, most: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Of jumps at rows (jumps,) and as large as `by` (jumps, dof) those that have others within
+    twice the reach of their waves: their numbers (m,), those of the `most` greatest there (m,
+    most), of fewer the last once more, and how many they are (m,)."""
+    order, size = np.argsort(at), np.linalg.norm(by, axis=1)
+    low = np.searchsorted(at[order], at - 2 * reach)
+    high = np.searchsorted(at[order], at + 2 * reach, "right")
+    several = np.flatnonzero(high - low > 1)
+    found = [order[low[k] : high[k]] for k in several]
+    found = [own[np.argsort(-size[own])][:most] for own in found]
+    others = [own[np.minimum(np.arange(most), len(own) - 1)] for own in found]
+    number = np.array([len(own) for own in found], dtype=int)
+    return several, np.reshape(others, (len(several), most)).astype(int), number
+
+
+def about(values: np.ndarray, at: np.ndarray, reach: int) -> np.ndarray:
+    """(k, 2 reach + 1, ...) of values (n, ...) about the rows `at` (k,); zero beyond their ends."""
+    rows = at[:, None] + np.arange(-reach, reach + 1)
+    inside = (rows >= 0) & (rows < len(values))
+    inside = inside.reshape(*inside.shape, *np.ones(values.ndim - 1, dtype=int))
+    return np.where(inside, values[np.clip(rows, 0, len(values) - 1)], 0.0)
+
+
+def in_span(columns: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Of values (m, n) the part (m, n) that their own columns (m, n, k) span."""
+    across, sizes, _ = np.linalg.svd(columns, full_matrices=False)
+    across = across * (sizes > _ONE * sizes[:, :1])[:, None, :]
+    return np.einsum("mnk,ml,mlk->mn", across, values, across, optimize=True)

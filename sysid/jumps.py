@@ -19,7 +19,7 @@ from functools import cached_property
 import numpy as np
 
 from .clock_jumps import light, spread, within
-from .jump_response import JumpResponse
+from .jump_response import JumpResponse, about, in_span, overlapping
 from .motion import Piece
 from .outliers import CHANCE, NORMAL, NOTHING, SHORT, SPIKE, quantum, ratio, runs
 from .running import running
@@ -151,7 +151,7 @@ class _Seen:
         there (jumps, dof), of length one."""
         at, by = self.tops
         along = by / np.linalg.norm(by, axis=1, keepdims=True)
-        return _about(self.size, at, self.response.near), along
+        return about(self.size, at, self.response.near), along
 
     @cached_property
     def waves(self) -> np.ndarray:
@@ -163,9 +163,9 @@ class _Seen:
         size is bent, times what the fit sees of the noise of joint j's; zero where its torque has
         no such wave; and how surprising it is that it has."""
         (at, by), reach, response = self.tops, self.response.near, self.response
-        waves = self.waves * _about(self.moves[:, j].astype(float), at, reach)
+        waves = self.waves * about(self.moves[:, j].astype(float), at, reach)
         far = max(-lags.start, lags[-1])
-        told = _about(self.told[:, j] * self.moves[:, j], at, reach + far)
+        told = about(self.told[:, j] * self.moves[:, j], at, reach + far)
         told = np.lib.stride_tricks.sliding_window_view(told, 2 * reach + 1, axis=1)
         told = told[:, far + lags.start : far + lags.stop]
         both, whole = np.einsum("kw,klw->lk", waves, told), np.einsum("klw,klw->lk", told, told)
@@ -180,24 +180,31 @@ class _Seen:
         chance = np.log((1.0 - _MOST) / (1.0 - np.minimum(theirs, _WHOLLY)))
         return bends, np.where(bends > response.over * noise, chance, 0.0)
 
+    @cached_property
+    def near(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """`overlapping` jumps, and the waves (m, window, _SUPERPOSED) of each and its neighbours,
+        zero beyond these."""
+        (at, by), (sizes, along) = self.tops, self.about
+        several, others, number = overlapping(at, by, self.response.near, _SUPERPOSED)
+        waves = np.einsum("kwj,ksj->kws", sizes[several], along[others])
+        return several, others, waves * (np.arange(_SUPERPOSED) < number[:, None, None])
+
     def superposed(self, j: int, late: int) -> np.ndarray:
         """(jumps,) as `bends`, of jumps within a window of each other, whose waves joint j's torque
         holds in sum: none of them is most of what it does."""
-        (at, by), reach = self.tops, self.response.near
-        told, out = _about(self.told[:, j] * self.moves[:, j], at + late, reach), np.zeros(len(at))
-        sizes, along = self.about
-        counts = _about(self.moves[:, j].astype(float), at, reach)
-        for k, here in enumerate(sizes):
-            near = np.flatnonzero(np.abs(at - at[k]) <= 2 * reach)
-            near = near[np.argsort(-np.linalg.norm(by[near], axis=1))][:_SUPERPOSED]
-            if len(near) < 2:
-                continue
-            waves = (here @ along[near].T) * counts[k][:, None]
-            theirs = waves @ np.linalg.lstsq(waves, told[k], rcond=1e-6)[0]
-            if np.sum(theirs**2) > _MOST * np.sum(told[k] ** 2):
-                # what it tells of a jump stands where that is
-                seen = near[np.abs(at[near] - at[k]) <= reach]
-                out[seen] = np.maximum(out[seen], np.abs(theirs[at[seen] - at[k] + reach]))
+        (at, by), (several, others, waves), reach = self.tops, self.near, self.response.near
+        out = np.zeros(len(at))
+        if not len(several):
+            return out
+        told = about(self.told[:, j] * self.moves[:, j], at[several] + late, reach)
+        counts = about(self.moves[:, j].astype(float), at[several], reach)
+        theirs = in_span(waves * counts[:, :, None], told)
+        most = np.sum(theirs**2, axis=1) > _MOST * np.sum(told**2, axis=1)
+        # what it tells of a jump stands where that is
+        apart = at[others] - at[several][:, None]
+        seen = most[:, None] & (np.abs(apart) <= reach)
+        there = np.take_along_axis(theirs, np.clip(apart + reach, 0, 2 * reach), axis=1)
+        np.maximum.at(out, others[seen], np.abs(there[seen]))
         if late:  # as in `bends`
             out[out < self.light[j] * self.limits[j] * np.abs(by[:, j])] = 0.0
         return out
@@ -214,7 +221,7 @@ class _Seen:
         size[:edge] = size[-edge:] = 0.0  # seen from one side
         top = (size > least) & (size >= _TOP * running(size, 2 * reach + 1, "max"))
         at = np.array([a + int(np.argmax(size[a : b + 1])) for a, b in runs(top)], dtype=int)
-        waves, torques = (_about(values, at, reach) for values in (own, told))
+        waves, torques = (about(values, at, reach) for values in (own, told))
         both = np.einsum("kw,kw->k", waves, torques)
         theirs = ratio(both**2, np.sum(waves**2, axis=1) * np.sum(torques**2, axis=1))
         seldom = _SELDOM / np.sqrt(2.0 * np.log(self.every.size / CHANCE))
@@ -276,11 +283,3 @@ def _late(seen: list[_Seen], j: int, noise: float) -> int:
     chance = sum(one.bends(j, noise, lags)[1] @ one.apart for one in seen)
     best = int(np.argmax(chance))
     return lags[best] if chance[best] > chance[most] + np.log(len(lags) / CHANCE) else 0
-
-
-def _about(values: np.ndarray, at: np.ndarray, reach: int) -> np.ndarray:
-    """(k, 2 reach + 1, ...) of values (n, ...) about the rows `at` (k,); zero beyond their ends."""
-    rows = at[:, None] + np.arange(-reach, reach + 1)
-    inside = (rows >= 0) & (rows < len(values))
-    inside = inside.reshape(*inside.shape, *np.ones(values.ndim - 1, dtype=int))
-    return np.where(inside, values[np.clip(rows, 0, len(values) - 1)], 0.0)
