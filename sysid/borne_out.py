@@ -12,6 +12,7 @@ from .candidates import Candidate
 from .effect import NotFinite, SensorEffect
 from .estimate import Fit
 from .model_parameters import ROBOT
+from .plain_model import PLAIN
 from .plausible import centred
 from .unexplained import Refused, changed, explains
 
@@ -19,7 +20,6 @@ CLEAR = 2.0  # standard deviations
 _LIKELY = 0.05  # less is not listed
 _WORTH = 1.5e-2  # of an error: what is worth having, three per cent of its square (`select`)
 _VISIBLE = 0.1  # of an error: what falls by less and has no size of its own is no name
-_USUAL = ("viscous", "coulomb", "torque_bias", "armature")  # of every joint, as `sysid init` has it
 NOTHING = 5e-3  # of an error: a hundredth of its square, the least that is told in per cent
 
 
@@ -115,7 +115,7 @@ def beside(fit: Fit, candidate: Candidate) -> bool:
     not quite the catalogue's leaves a rest, and what the training logs have of it the test logs must
     have as well."""
     own = (effect.name for effect, joints in fit.model.terms if candidate.joint in joints)
-    return any(name not in (*_USUAL, candidate.name) for name in own)
+    return any(name not in (*PLAIN, candidate.name) for name in own)
 
 
 def in_doubt(before: Fit, after: Fit, told: Fit, candidate: Candidate) -> str | None:
@@ -131,8 +131,7 @@ def in_doubt(before: Fit, after: Fit, told: Fit, candidate: Candidate) -> str | 
         change, unit, still = comparison.together(before, after), 1.0, True
         rise = f"{changed(change.delta_rms)} over all joints"
     else:
-        changes = [comparison.compare(before, one) for one in (after, told)]
-        change, shown = (next(d for d in one if d.joint == own[0]) for one in changes)
+        change, shown = (comparison.of_joint(before, one, own[0]) for one in (after, told))
         unit = before.rms("test")[own[0]]
         rise = changed(change.delta_rms / max(unit, 1e-300))
         still = any(-d.delta_rms < CLEAR * d.se for d in (change, shown))
@@ -189,7 +188,7 @@ def _is_zero(before: Fit, after: Fit, own: Sequence[str], whole: bool) -> bool:
     def change(first: Fit, second: Fit):
         if whole:
             return [comparison.together(first, second)]
-        return [d for d in comparison.compare(first, second) if d.joint in own]
+        return [comparison.of_joint(first, second, joint) for joint in own]
 
     zero = centred(before)
     less = all(d.delta_rms > d.se for d in change(zero, after))

@@ -74,6 +74,11 @@ def compare(first: Fit, second: Fit, names: tuple[str, str] | None = None) -> Di
     )
 
 
+def of_joint(first: Fit, second: Fit, joint: str) -> Difference:
+    """`compare` of one joint that both have."""
+    return next(d for d in compare(first, second) if d.joint == joint)
+
+
 def together(first: Fit, second: Fit, *, weighed: bool = False) -> Difference:
     """Two fits compared over all joints, each joint's residual in units of its RMS under the first:
     `delta_rms` is a share of what the error was. Raises SysidError, as `compare`.

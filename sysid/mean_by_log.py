@@ -8,7 +8,7 @@ from functools import cache
 from .estimate import Fit
 from .plausible import IN_EACH_LOG, OF_ITS_OWN, centred, other_means
 
-_MOST = 0.5  # of what stands above a floor
+MOST = 0.5  # of what stands above a floor, or of a square
 
 
 def by_log(fit: Fit, floors, still: Sequence[str] = ()) -> dict[str, str]:
@@ -23,7 +23,7 @@ def by_log(fit: Fit, floors, still: Sequence[str] = ()) -> dict[str, str]:
         floor, error = floors[fit.joints.index(joint)], fit.rms("test")[joint]
         noise, rest = (floor.rms or floor.low or 0.0) ** 2, about().rms("test")[joint]
         misfits = (square / share - noise, square), (error**2 - noise, error**2 - rest**2)
-        if any(misfit > 0.0 and taken > _MOST * misfit for misfit, taken in misfits):
+        if any(misfit > 0.0 and taken > MOST * misfit for misfit, taken in misfits):
             # about its mean in each log the error is noise: then nothing else is missing; of what is
             # read in parts nobody knows
             whole = all(

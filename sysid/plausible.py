@@ -65,7 +65,7 @@ def _apart(fit: Fit, logs: Sequence[dict], still: Sequence[str]) -> Iterator[str
     """Joints whose error has another mean in some logs, where that is much of it."""
     for joint, (share, _, said) in other_means(fit, logs, still).items():
         if share > _SHARE:
-            yield (f"{_left(joint)}, in the mean {said}: a torque's zero that was set anew, a load, or what hangs on the place; {OF_ITS_OWN}")
+            yield f"{_left(joint)}, in the mean {said}: a torque's zero that was set anew, a load, or what hangs on the place; {OF_ITS_OWN}"
 
 
 def _left(joint: str) -> str:

@@ -19,7 +19,7 @@ def falls_with(fit: Fit, joint: str, options: dict) -> bool:
     try:
         spec = grown(fit.experiment, "formula", [joint], options, every=fit.joints)
         after = pipeline.fit_grown(spec, fit, filters=fit.filters)
-        (change,) = [d for d in comparison.compare(fit, after) if d.joint == joint]
+        change = comparison.of_joint(fit, after, joint)
         falls = -change.delta_rms > NOTHING * fit.rms("test")[joint]
         return falls and not comparison.spoiled(fit, (after,), [joint])
     except SysidError:  # a number that is none, on some of these logs; or logs that changed since

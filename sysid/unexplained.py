@@ -13,13 +13,12 @@ from .effect import NotFinite
 from .estimate import Fit
 from .failures import HeldOut, fallen
 from .given_shapes import at_edges
-from .mean_by_log import by_log
+from .mean_by_log import MOST, by_log
 from .model_parameters import ROBOT
 from .one_clock import clocks_anew
 from .plausible import AT_REST, stands
 from .too_narrow import noise_as_law
 
-_MOST = 0.5  # of what stands above a floor, or of a square
 _FITTED = 0.1  # of what is left on test logs: a fit is made to see whether it takes more there
 WEIGHED = "`weighting: noise` under `solver:` in the experiment file"
 LOW_PASS = "`torque: low-pass` under `preprocess:` in the experiment file"
@@ -52,7 +51,7 @@ class Refused:
         taken = f"{100 * share:.0f} % of that error's square"
         low = f"; under the low-pass of a diagnosis it takes {taken}"
         low += f"; with {LOW_PASS} a fit may bear it out" * self.raw
-        return said + low * bool(share >= _MOST)
+        return said + low * bool(share >= MOST)
 
 
 def not_claimed(effect: str, why: str) -> str:
@@ -99,7 +98,7 @@ def of_few_blocks(
             continue
     best = max(shares, key=shares.get, default=None)
     # less than a tenth may fall by chance, where one of several is picked
-    if best and shares[best] > _FITTED and (shares[best] >= least or fitted(best) >= _MOST):
+    if best and shares[best] > _FITTED and (shares[best] >= least or fitted(best) >= MOST):
         return best, 1.0
     return None
 
@@ -188,7 +187,7 @@ def smeared(errors: Sequence[float], floor) -> bool:
     if floor.rms is None or floor.halved is None:
         return False
     parts = [both for both in zip(errors, floor.halved[1:]) if not floor.reached(both[0])]
-    gone = (e**2 - half**2 > _MOST * (e**2 - floor.rms**2) for e, half in parts)
+    gone = (e**2 - half**2 > MOST * (e**2 - floor.rms**2) for e, half in parts)
     return bool(parts) and all(gone)
 
 
@@ -220,9 +219,9 @@ def noisy(before: float, after: float, floor) -> bool:
     Args:
         before, after: errors on the same logs without it and with it.
     """
-    if floor.rms is None or _MOST * after**2 > floor.rms**2:
+    if floor.rms is None or MOST * after**2 > floor.rms**2:
         return False
-    return explains(before, after, floor.rms) >= _MOST or floor.reached(after)
+    return explains(before, after, floor.rms) >= MOST or floor.reached(after)
 
 
 def by_weights(fit, joint: str, floor: float | None, weighed: dict[str, float]) -> bool:
@@ -234,7 +233,7 @@ def by_weights(fit, joint: str, floor: float | None, weighed: dict[str, float]) 
     if floor is None or fit.weights is not None:
         return False
     square = fit.rms("test")[joint] ** 2
-    return square - weighed.get(joint, square**0.5) ** 2 > _MOST * abs(square - floor**2)
+    return square - weighed.get(joint, square**0.5) ** 2 > MOST * abs(square - floor**2)
 
 
 def loudest(errors: dict[str, float], floors, asked) -> str:
