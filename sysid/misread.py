@@ -15,8 +15,8 @@ _LEFT = 0.1  # of a torque's square about its mean: a fit that leaves more may r
 
 
 def misread(fit: Fit) -> list[str]:
-    """What a check says of the columns of logs that a fit explains badly: a notice for each joint
-    that it names, none where the columns are read rightly."""
+    """What a check says of the columns of logs that a fit explains badly: a notice for each cure,
+    none where the columns are read rightly."""
     errors = [prediction.errors()["r2"] for prediction in fit.predictions.values()]
     badly = any(np.any(r2[np.isfinite(r2)] < 1.0 - _LEFT) for r2 in errors)
     if not (badly or any(notice.startswith(BEGINS) for notice in fit.notices)):
@@ -24,8 +24,18 @@ def misread(fit: Fit) -> list[str]:
     # bodies take much of another zero upon themselves: it is told where they cannot be meant
     meant = not any(notice.startswith(BEGINS) for notice in fit.notices)
     found = check.misread(fit.experiment)
-    found = {f.says: f for f in found if not (meant and f.severity != check.ERROR)}
-    return [f"{BEGINS}: {WRONG}: {fault.says}; {fault.do}" for fault in found.values()]
+    groups: dict[tuple[str, str], list[check.Fault]] = {}
+    for fault in found:
+        if fault.severity == check.ERROR or not meant:
+            groups.setdefault((fault.fault, fault.do), []).append(fault)
+    return [f"{BEGINS}: {WRONG}: {_said(own)}; {do}" for (_, do), own in groups.items()]
+
+
+def _said(faults: Sequence[check.Fault]) -> str:
+    """Of faults that one thing cures what the first says, and of which joints it is."""
+    joints = list(dict.fromkeys(fault.joint for fault in faults))
+    more = f"; {len(joints)} such in all: {', '.join(joints)}" if len(joints) > 1 else ""
+    return f"{faults[0].says}{more}"
 
 
 def unasked(verdicts: Sequence) -> list:
@@ -33,7 +43,7 @@ def unasked(verdicts: Sequence) -> list:
     what."""
     why = "the columns of these logs look wrong, and what is left may be no more than that"
     return [
-        replace(one, status="unresolved", says=why, left=None, may=None, even=False)
+        replace(one, status="unresolved", says=why, left=None, may=None, even=False, carries="")
         if one.status in ("unknown", "unresolved")
         else one
         for one in verdicts

@@ -3,6 +3,7 @@
 import json
 import re
 import shutil
+from itertools import product
 from types import SimpleNamespace
 
 import numpy as np
@@ -226,6 +227,41 @@ def test_a_load_or_an_offset_that_turns_a_torque_is_no_wrong_sign(what, made, tm
     assert not [f for f in check.check(pipeline.load(logs)) if f.fault in ("sign_flipped", "joint_order") and f.log]
 
 
+@pytest.mark.parametrize("key", ["tau", "q"])
+def test_all_torques_or_all_angles_of_the_other_sign_are_told_as_that(key, made, tmp_path):
+    """One joint at a time gravity or an angle would turn round instead; what is written is right."""
+    logs = shutil.copytree(made(), tmp_path / "logs")
+    for file, joint in product(("train.csv", "test.csv"), ("shoulder", "elbow")):
+        turned(logs, file, f"{key}_{joint}")
+    found = [f for f in check.check(pipeline.load(logs)) if f.severity == "error"]
+    word = {"tau": "torque", "q": "angle"}[key]
+    assert [(f.fault, f.joint) for f in found] == [("sign_flipped", "shoulder"), ("sign_flipped", "elbow")]
+    assert all(f.says.startswith(f"the {word} of") for f in found)
+
+
+@pytest.mark.parametrize("file, train", [("test.csv", 3), ("train_2.csv", 3), ("test.csv", 1)])
+@pytest.mark.parametrize("factor, said", [(1000.0, "1000 times"), (1.0 / 60.0, "one 60th of")])
+def test_the_torques_of_one_log_in_another_unit_are_told_with_it(factor, said, file, train, made, tmp_path):
+    logs = shutil.copytree(made(logs=train, duration=6.0), tmp_path / "logs")
+    pl.read_csv(logs / file).with_columns(pl.col("tau_shoulder", "tau_elbow") * factor).write_csv(logs / file)
+    found = [f for f in check.check(pipeline.load(logs)) if f.severity == "error"]
+    assert [(f.fault, f.log, f.joint) for f in found] == [("wrong_unit", file, "")]
+    assert found[0].says.startswith(f"the torques in {file} are {said} what")
+
+
+@pytest.mark.parametrize(
+    "column, factor, said", [("q_", 180.0 / np.pi, "if test.csv alone is, give it in rad"), ("t", 1e3, "in another unit than the other logs'")]
+)
+def test_another_unit_of_one_log_is_not_set_for_all(column, factor, said, made, tmp_path):
+    logs = shutil.copytree(made(), tmp_path / "logs")
+    own = [name for name in pl.read_csv(logs / "test.csv").columns if name.startswith(column)]
+    own = own if column != "t" else ["t"]
+    pl.read_csv(logs / "test.csv").with_columns(pl.col(*own) * factor).write_csv(logs / "test.csv")
+    errors = [f for f in check.check(pipeline.load(logs)) if f.severity == "error"]
+    assert {f.fault for f in errors} == {"wrong_unit"} and {f.log for f in errors} == {"test.csv"}
+    assert all(said in f.do for f in errors)
+
+
 @pytest.mark.parametrize("file", ["train_2.csv", "test.csv"])
 @pytest.mark.parametrize("keys, word", [(["tau"], "the torque columns"), (["q"], "the angle columns"), (["q", "tau"], "the columns")])
 def test_columns_that_one_log_has_in_another_order_are_named_with_it(keys, word, file, made, tmp_path):
@@ -363,7 +399,9 @@ def test_coarse_angles_are_no_delay(experiment, late):
     assert {f.joint for f in found} == (set(JOINTS) if late else set())
 
 
-@pytest.mark.parametrize("files, says, do", [(["train.csv"], "exchanged in train", "that file"), (["train.csv", "test.csv"], "as in every log", "data.columns.position")])
+@pytest.mark.parametrize(
+    "files, says, do", [(["train.csv"], "exchanged in train", "that file"), (["train.csv", "test.csv"], "as in every log", "data.columns.position")]
+)
 def test_angles_and_torques_that_changed_places_are_told_and_nothing_of_them(files, says, do, made, tmp_path):
     logs = shutil.copytree(made(), tmp_path / "logs")
     for file in files:

@@ -1,5 +1,6 @@
 """A diagnosis of logs whose columns are not read as they were written names nothing on joints that are not at their floor."""
 
+import shutil
 from types import SimpleNamespace
 
 import numpy as np
@@ -35,6 +36,21 @@ def test_what_is_wrong_with_the_columns_comes_first(turned):
     assert {v["status"] for v in told["verdict"]} <= {"unresolved", "complete"}
     (elbow,) = [v for v in told["verdict"] if v["joint"] == "elbow"]
     assert elbow["status"] == "unresolved" and "columns of these logs look wrong" in elbow["says"]
+
+
+@pytest.mark.parametrize(
+    "column, factor, said", [("tau_", 1e3, "the torques in test.csv are 1000 times what"), ("q_", 180.0 / np.pi, "2 such in all: shoulder, elbow")]
+)
+def test_a_test_log_in_another_unit_is_told_once_and_nothing_is_made_of_it(column, factor, said, turned, tmp_path):
+    logs = shutil.copytree(turned, tmp_path / "logs")
+    mended = pl.read_csv(logs / "train.csv").with_columns(-pl.col("tau_elbow"))
+    mended.write_csv(logs / "train.csv")
+    table = pl.read_csv(logs / "test.csv").with_columns(-pl.col("tau_elbow"))
+    table.with_columns(pl.col(*(name for name in table.columns if name.startswith(column))) * factor).write_csv(logs / "test.csv")
+    told = document(diagnose(pipeline.load(logs)))
+    (first,) = [notice for notice in told["notices"] if WRONG in notice]
+    assert said in first and told["next_log"] is None and told["findings"] == []
+    assert not any("carry" in v["says"] for v in told["verdict"])
 
 
 def test_a_fit_that_explains_its_torques_is_not_asked(monkeypatch):

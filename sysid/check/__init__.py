@@ -32,7 +32,8 @@ FAULTS = (
 _OF_ANGLES = (
     "angle_wrap", "wrong_unit", "coarse_values", "standstill", "not_excited", "limit_exceeded",
 )  # fmt: skip
-_READINGS = ("among", "columns", "one_log", "unmoved")  # the modules that ask how columns are read
+# the modules that ask how columns are read
+_READINGS = ("among", "angles", "columns", "one_log", "unit_of_log", "unmoved")
 
 
 def check(experiment: Experiment) -> list[Fault]:
@@ -55,7 +56,9 @@ def misread(experiment: Experiment) -> list[Fault]:
     """The errors of how an experiment's columns are read: their order, signs and units."""
     with noticed():
         found = _found(looked(experiment), _READINGS)
-        return [f for f in found if f.severity == ERROR or f.fault == "limit_exceeded"]
+        # a zero that is off, of all logs; not an angle beyond a limit, in one
+        zero = lambda f: f.fault == "limit_exceeded" and not f.log  # noqa: E731
+        return [f for f in found if f.severity == ERROR or zero(f)]
 
 
 def _found(look, asked: Collection[str] = ()) -> Iterator[Fault]:

@@ -132,7 +132,10 @@ def _millimetres(look: Look, joint: str) -> str:
 
 
 def _degrees(look: Look, log: Logged, joint: str) -> str:
-    """What to write where a joint's angle is in degrees: as all are, or as it alone."""
+    """What to write where a joint's angle is in degrees: as all are, or as it alone, or in one log."""
+    if not all(any(own.far.count for own in one.tally.joints) for one in look.logs):
+        unit = "set data.units.position: deg"
+        return f"if all logs are in degrees {unit}; if {log.log.name} alone is, give it in rad"
     far = [one for one, own in zip(look.robot.joints, log.tally.joints) if own.far.count]
     column = look.column("position", joint)
     if len(far) > 1 or column is None or look.robot.dof < 2:

@@ -21,7 +21,7 @@ def find(look: Look) -> Iterator[Fault]:
     """wrong_unit of time; clock_gap, clock_jitter, slow_logger."""
     for log in look.logs:
         if not _STEPS[0] <= log.step <= _STEPS[1]:
-            yield _unit(log)
+            yield _unit(log, look)
             continue
         gaps, jitter = log.tally.gaps, log.tally.jitter
         if gaps.count:
@@ -88,7 +88,8 @@ def _off(log: Logged) -> float:
     return max((s.clock.deviation for s in log.log.segments if s.clock is not None), default=0.0)
 
 
-def _unit(log: Logged) -> Fault:
+def _unit(log: Logged, look: Look) -> Fault:
+    alike = all(not _STEPS[0] <= one.step <= _STEPS[1] for one in look.logs)
     return Fault(
         "wrong_unit",
         ERROR,
@@ -96,7 +97,9 @@ def _unit(log: Logged) -> Fault:
             f"{log.log.name} has {log.step:.3g} s from sample to sample, "
             f"{log.tally.end - log.tally.begin:.4g} s in all"
         ),
-        "set data.units.time (s, ms, us, ns)",
+        "set data.units.time (s, ms, us, ns)"
+        if alike
+        else "its stamps are in another unit than the other logs': give them in the same",
         log=log.log.name,
         rows=log.samples,
     )

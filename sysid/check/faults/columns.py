@@ -22,7 +22,7 @@ AFTER, SENSELESS = 2, ("wrong_unit", "angle_wrap")
 # Log of squares that another reading must take off, in all and of each joint whose column it reads
 # otherwise: what is left falls to a third of its power.
 _BETTER = 1.0
-_ROUNDS = 4
+_ROUNDS = 4  # at least; each joint may have one
 _TRIED = 8  # readings that are clear, of which each is a fit
 _QUARTERS = (1, 2, -1)  # turns by which a log's zero may be off the URDF's
 _EXPLAINS = 0.2  # of a joint's torque squared: less of the URDF's torque tells no factor
@@ -45,13 +45,14 @@ def find(look: Look) -> Iterator[Fault]:
     scored, free = equations.scored(reading), cache(partial(left_free, look.seen))
     mounted = gravities(equations)
     turning = np.flatnonzero(~np.asarray(look.robot.prismatic)).tolist()
-    for _ in range(_ROUNDS):
+    for _ in range(max(_ROUNDS, look.robot.dof)):
         # of joints that hardly move any reading of the columns tells as little
         others = [
             own
             for own in readings(reading, look.robot.dof, turning)
             if any(look.excited[j].enough for j in own[1][1])
         ]
+        others += _of_all(reading, look)
         others += [
             (replace(reading, gravity=down), ("mass_implausible", (), down)) for down in mounted
         ]
@@ -107,6 +108,19 @@ def readings(
             replace(reading, angle_factor=angle, torque_factor=torque),
             ("sign_flipped", (j,), "angle and torque"),
         )
+
+
+def _of_all(reading: Reading, look: Look) -> Iterator[tuple[Reading, tuple]]:
+    """Readings in which the torques, or the angles, of all joints have the other sign: one cause,
+    of which each joint shows a part."""
+    move = tuple(j for j in range(look.robot.dof) if look.excited[j].enough)
+    if len(move) > 1:
+        other = {
+            f"{word}_factor": getattr(reading, f"{word}_factor") for word in ("torque", "angle")
+        }
+        for word, factors in other.items():
+            turned = tuple(-factor for factor in factors)
+            yield replace(reading, **{word: turned}), ("sign_flipped", move, word.split("_")[0])
 
 
 def _swapped(order, i: int, j: int) -> tuple:
@@ -177,7 +191,7 @@ def _factors(look: Look, equations: Equations, reading: Reading, scored: Scored)
     every = off.sum() > 0.5 * tells.sum()
     for j in np.flatnonzero(tells if every else off):
         name, own = look.robot.joints[j], float(free.factor[j])
-        says = f"the torque of {name} is {_times(own)} what the URDF's masses need"
+        says = f"the torque of {name} is {times(own)} what the URDF's masses need"
         thousand = _THOUSAND[0] < max(own, 1.0 / own) < _THOUSAND[1]
         if not (every or thousand):
             if np.log(scored.left[j] / free.left[j]) > _BETTER:
@@ -229,5 +243,7 @@ def _thousandth(look: Look, reading: Reading, joint: str, factor: float, every: 
     return f"if it is in {unit} {how} data.torque: {{{joint}: {{{column}: {sign}{scale}}}}}"
 
 
-def _times(factor: float) -> str:
-    return f"{factor:.2g} times" if factor >= 1.0 else f"one {1.0 / factor:.2g}th of"
+def times(factor: float) -> str:
+    """A factor in words, before "what"."""
+    digits = lambda number: f"{float(f'{number:.2g}'):g}"  # noqa: E731
+    return f"{digits(factor)} times" if factor >= 1.0 else f"one {digits(1.0 / factor)}th of"

@@ -9,10 +9,11 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..as_read import as_read, told_by
-from ..equations import FEWEST, Reading
+from ..equations import Reading
 from ..fault import ERROR, Fault
 from ..look import Look, Seen
 from .columns import readings
+from .unit_of_log import asked_of
 
 AFTER = 3
 SENSELESS = ("wrong_unit", "angle_wrap", "joint_order", "sign_flipped")
@@ -53,10 +54,7 @@ def _read_otherwise(look: Look, seen: Seen, k: int) -> tuple | None:
     own = rows.log == k
     rest = rows.use & ~own[:, None]
     here = rows.use & own[:, None]
-    asked = [
-        j for j in range(look.robot.dof) if look.excited[j].enough and rest[:, j].sum() > FEWEST
-    ]
-    asked = [j for j in asked if here[:, j].sum() > FEWEST]
+    asked = [j for j in asked_of(look, rest) if j in asked_of(look, here)]
     if not asked:
         return None
     x, usual = told_by(seen.rows, seen.model, rest)
