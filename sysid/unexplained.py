@@ -211,17 +211,20 @@ def explains(before: float, after: float, floor: float) -> float:
     return (before**2 - after**2) / misfit if misfit > 0 else float("nan")
 
 
-def noisy(before: float, after: float, floor) -> bool:
-    """Whether what an effect leaves may be noise, by a NoiseFloor that is known: most of the error's
-    square with it is, and there is no more above it than the effect took, or no more than the
-    floor's doubt.
+def may_be_noise(before: float, after: Sequence[float], floor) -> bool:
+    """Whether what an effect leaves may be noise, by a NoiseFloor that is known, or what a filter
+    smears: it is at the floor on the training logs; or most of its square is noise, and there is no
+    more above it than the effect took, or no more than the floor's doubt.
 
     Args:
-        before, after: errors on the same logs without it and with it.
+        before: the error on the test logs without it. after: with it, on the training logs and on
+            the test logs.
     """
-    if floor.rms is None or MOST * after**2 > floor.rms**2:
+    if floor.reached(after[0]) or smeared(after, floor):
+        return True
+    if floor.rms is None or MOST * after[1] ** 2 > floor.rms**2:
         return False
-    return explains(before, after, floor.rms) >= MOST or floor.reached(after)
+    return explains(before, after[1], floor.rms) >= MOST or floor.reached(after[1])
 
 
 def by_weights(fit, joint: str, floor: float | None, weighed: dict[str, float]) -> bool:

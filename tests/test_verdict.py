@@ -49,10 +49,20 @@ def fitted(elbow: float, shoulder: float = 1.0, train: float | None = None):
     return SimpleNamespace(joints=JOINTS, rms=rms.get, weights=None, model=SimpleNamespace(terms=()))
 
 
-def claim(effect: str, joint: str, shares, after):
+def looked(elbow: float, at_zero=()):
+    """A view whose joints leave so much, of which the elbow's friction is held at zero or not."""
+    problem = SimpleNamespace(certify=lambda x: SimpleNamespace(at_zero={*at_zero}), coordinates=SimpleNamespace(held=[False]))
+    model = SimpleNamespace(coefficients=(SimpleNamespace(joint=1),))
+    return SimpleNamespace(model=model, rms=lambda: np.array([1.0, elbow]), settled=SimpleNamespace(problem=problem, x=None))
+
+
+SAME = looked(1.0), looked(1.0)
+
+
+def claim(effect: str, joint: str, shares, after, views=SAME):
     number = -1 if joint == "*" else JOINTS.index(joint)
     head = SimpleNamespace(effect=effect, joint=joint, candidate=SimpleNamespace(joint=number), tied_with=(), command=f"sysid add x {effect}")
-    return SimpleNamespace(head=head, step=SimpleNamespace(shares=np.array(shares)), after=after, set=((effect, joint, 1.0),))
+    return SimpleNamespace(head=head, step=SimpleNamespace(shares=np.array(shares), before=views[0], after=views[1]), after=after, set=((effect, joint, 1.0),))
 
 
 def floor(value: float | None = 1.0, std: float = 0.02) -> NoiseFloor:
@@ -161,6 +171,13 @@ def test_an_effect_on_it_is_missing():
     said = _verdict(found)
     assert said["effect"] == "torque_bias" and said["set"] == [{"effect": "torque_bias", "joint": "elbow", "probability": 1.0}]
     assert said["command"] == "sysid add x torque_bias" and said["also"] == [] and said["explained"] == found.explained
+
+
+@pytest.mark.parametrize("at_zero, status", [((), "unknown"), ((0,), "missing")])
+def test_what_friction_that_may_be_negative_takes_is_counted_where_a_fit_holds_it_at_zero(at_zero, status):
+    """In slow motion negative friction is most of a Stribeck effect: that takes a third of a design's squares and all of a fit's."""
+    stribeck = claim("stribeck", "elbow", [0.0, 0.3], fitted(1.1), (looked(4.0, at_zero), looked(0.5)))
+    assert elbow(4.0, [stribeck], rest=left(0.5)).status == status
 
 
 def test_two_effects_stand_in_their_order():

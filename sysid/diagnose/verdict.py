@@ -13,7 +13,8 @@ from ..flexible import Law, Unknown
 from ..noise import DOUBT, as_of_test
 from ..plausible import SETTLED
 from ..transfer import Transfer, quieter
-from ..unexplained import by_weights, cause, explains, in_vain, loudest, noisy, not_all, smeared
+from ..unexplained import by_weights, cause, explains, in_vain, loudest, may_be_noise, not_all
+from ..view import taken_where_held
 from .ask import HALF
 from .claims import Claim
 from .select import LEVEL, WORTH
@@ -81,7 +82,7 @@ def verdicts(
     # an error that is no more than noise, however joints are weighed, or than its drift, lacks none
     asked = [not f.within(min(most[j], weighed.get(j, np.inf))) for j, f in by_joint]
     asked = [own and not (at and one.drifts) for own, at, one in zip(asked, reaches, left)]
-    out = []
+    held, out = claims and taken_where_held(claims[0].step.before, claims[-1].step.after), []
     for j, joint in enumerate(fit.joints):
         taking = [c for c in claims if c.head.joint == joint or c.step.shares[j] >= WORTH]
         pairs = [tuple(one[joint] for one in part) for part in zip(firsts, errors)]
@@ -93,8 +94,7 @@ def verdicts(
         explained = explains(first, then, low) if claims else float("nan")
         # who leaves more than noise, which no log has more of than another's error, is no name
         whole = (1.0 + _LEFT) * explains(first, then, min(*both, noise)) >= 1.0
-        whole |= noisy(*pairs[1], floors[j]) or floors[j].reached(both[0])
-        whole |= smeared(both, floors[j])
+        whole |= may_be_noise(first, both, floors[j])
         # where a floor is known, other weights say how much of the rest loud joints make
         whole |= took is not None and floors[j].rms is None and (1.0 + _LEFT) * took[j] >= 1.0
         seen, among = left[j], sum(asked)
@@ -106,7 +106,8 @@ def verdicts(
         looks = looks or in_vain(refused, fit.joints, j, HALF * part)
         looks = looks or (asked[j] and not own and few(j, HALF * part)) or None
         # of whichever logs they explain less of: where these do not carry over, another law may
-        taken = max(min(sum(c.step.shares[j] for c in own or others), explained), 0.0)
+        taken = max(sum(c.step.shares[j] for c in own or others), held[j] if own else 0.0)
+        taken = max(min(taken, explained), 0.0)
         little = remains is None or remains.share * max(1.0 - taken, 0.0) <= _PREDICTED * taken
         further = beyond(j, looks[0]) if looks and remains and beyond and not own else None
         further = further if further and further.predicts(among, WORTH) else None

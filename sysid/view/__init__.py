@@ -5,7 +5,7 @@ from .design import Design, Sums, designed, instrumented, summed
 from .falls import falls
 from .joining import COMPARED, allowed, around, even, joined, shapes_in, shapes_of, weighed
 from .laws import law
-from .losses import losses, slow_losses, taken, took
+from .losses import losses, slow_losses, taken, taken_where_held, took
 from .opened import elsewhere, first_view, too_short
 from .overlap import alike, holds, slow_part
 from .singles import greatest
@@ -38,6 +38,7 @@ __all__ = [
     "slow_part",
     "summed",
     "taken",
+    "taken_where_held",
     "too_short",
     "took",
     "weighed",

@@ -7,6 +7,7 @@ from __future__ import annotations
 import numpy as np
 
 from .. import blocks
+from ..landscape import at_zero
 from ..lowpass import calm
 from .design import freed, instrumented
 from .view import View
@@ -56,3 +57,13 @@ def took(view: View, after: View) -> tuple[np.ndarray, np.ndarray]:
     share (dof,) of each joint's loss."""
     base, then = (losses(one, view.blocks) for one in (view, after))
     return (base - then).sum(axis=1), taken(view, base, then)
+
+
+def taken_where_held(view: View, after: View) -> np.ndarray:
+    """The share (dof,) of each joint's squares in a view that goes as fits have them, of joints whose
+    friction the view holds at zero, of others none: a design is free of that bound, and negative
+    friction, which no joint has, is most of a Stribeck effect in slow motion."""
+    model, whole, left = view.model, view.rms() ** 2, after.rms() ** 2
+    held = {model.coefficients[k].joint for k in at_zero(view.settled)}
+    here = np.isin(np.arange(len(whole)), sorted(held))
+    return np.where(here & (whole > 0.0), 1.0 - left / np.maximum(whole, 1e-300), 0.0)
