@@ -119,6 +119,38 @@ def test_friction_that_grew_is_named_on_its_joint(fitted):
     assert verdict(said, "shoulder")["status"] == "complete" and verdict(said, "elbow")["effect"] == "coulomb"
 
 
+def test_a_change_that_a_few_fast_moments_show_is_named(fitted, planar):
+    """Three quarters of what more viscous friction takes lie in a tenth of the log: raw squares scatter, and every block says so."""
+    experiment = pipeline.load(fitted)
+    rate, rng = 250.0, np.random.default_rng(9)
+    t = np.arange(int(24 * rate)) / rate
+    slow = smooth(t, 9, 1.2)
+    clock = np.cumsum(np.where((t % 12.0 > 5.0) & (t % 12.0 < 6.2), 3.0, 0.35)) / rate  # the same path, and now and then fast along it
+    q = np.stack([np.interp(clock, t, own) for own in slow[0].T], axis=1)
+    q = np.stack([np.convolve(np.pad(own, 40, mode="edge"), np.hanning(81) / np.hanning(81).sum(), "valid") for own in q.T], axis=1)
+    qd, qdd = np.gradient(q, 1 / rate, axis=0), np.gradient(np.gradient(q, 1 / rate, axis=0), 1 / rate, axis=0)
+    tau = regressor.torque(planar, np.array(planar.prior) * 1.1, q, qd, qdd) + np.array([0.3, 0.6]) * qd + np.array([0.5, 0.3]) * np.sign(qd)
+    tau += rng.normal(0.0, 0.1, q.shape)
+    columns = {"t": t} | {f"{key}_{joint}": own[:, j] for key, own in (("q", q), ("tau", tau)) for j, joint in enumerate(planar.joints)}
+    (fitted / "fast.csv").write_text(csv(columns))
+    found = changed(experiment, fitted / "run", [str(fitted / "fast.csv")])
+    assert [(c.effect, c.joint) for c in found.changes] == [("viscous", "elbow")]
+
+
+def test_a_change_within_the_log_is_said_to_be_left(fitted, planar):
+    """Half a log has a bias, which neither half tells of the other: what is left is not called complete."""
+    written(planar, fitted / "begins.csv", 8, bias=0.0, seconds=24.0)
+    own = (fitted / "begins.csv").read_text().splitlines()
+    at = own[0].split(",").index("tau_elbow")
+    late = [line.split(",") for line in own[1:]]
+    for row in late[len(late) // 2 :]:
+        row[at] = str(float(row[at]) + 1.5)
+    (fitted / "begins.csv").write_text("\n".join([own[0], *map(",".join, late)]) + "\n")
+    said = what_changed(fitted, "begins.csv")
+    assert said["findings"] == [] and verdict(said, "shoulder") == {"joint": "shoulder", "status": "complete"}
+    assert verdict(said, "elbow")["status"] == "unresolved" and "times the noise" in verdict(said, "elbow")["says"]
+
+
 def test_questions_about_a_change_that_cannot_be_asked(fitted, tmp_path):
     experiment = pipeline.load(fitted)
     log = [str(fitted / "same.csv")]

@@ -19,7 +19,6 @@ from ..model_parameters import ROBOT
 from ..projection import inverted
 
 BLOCKS, _MOST = 24, 12  # blocks, over the whole log; changes
-_SUPPORT = 3.0  # standard errors
 # of the squared residual: below it, a held model's errors on another motion look like changes
 _WORTH = 0.1
 
@@ -79,7 +78,7 @@ class Question:
 
     def taken(self, key: Key, before, after) -> tuple[float, float]:
         """The share that a change takes of sums of squares (blocks, dof) on its joints, weighed,
-        and how many standard errors it stands from zero."""
+        and how many standard errors it stands from zero: few, where a few blocks have most."""
         joints = slice(None) if key[1] == ROBOT else [key[1]]
         fall = ((before - after) * self.weights**2)[:, joints].sum(1)
         whole = max(float(np.sum((before * self.weights**2)[:, joints])), 1e-300)
@@ -92,7 +91,7 @@ class Question:
         first, then = ((own * self.weights**2)[:, joints].sum(1) for own in (before, after))
         return z_score((first - then) / np.maximum(first + then, 1e-300))
 
-    def supported(self, least: float = 0.0) -> list[Key]:
+    def supported(self, least: float) -> list[Key]:
         """The changes that the halves support, the one that takes most first, each beside those.
 
         Args:
@@ -105,9 +104,8 @@ class Question:
             for key in self.spans:
                 if key not in chosen:
                     after = self.across([*chosen, key])
-                    share, z = self.taken(key, current, after)
-                    even = share >= _WORTH and self.evenly(key, current, after) >= least
-                    if even and z >= _SUPPORT:
+                    share = self.taken(key, current, after)[0]
+                    if share >= _WORTH and self.evenly(key, current, after) >= least:
                         found[key] = (share, after)
             if not found:
                 break

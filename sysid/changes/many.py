@@ -11,9 +11,8 @@ from pathlib import Path
 from .. import datasets
 from ..errors import LogError, SysidError
 from .held import Held, held
-from .new_log import Changed, asked
+from .new_log import RATE, Changed, asked
 
-RATE = 0.05
 _TOGETHER = 8  # logs that a process takes at once
 
 

@@ -24,13 +24,15 @@ from .halves import question as asked_of
 from .held import Held, held
 from .signatures import TILT, about
 
+RATE = 0.05
 _ROUNDS, _NEAR = 5, 1e-4  # about a tilt; rad: what rounds may still change of it
 
 
 @dataclass(frozen=True)
 class Changed:
-    """What is different on a log: RMS [N m] per joint of the held model and with the changes, the
-    noise floor, the changes, and what had no visible signature. notes: what to know of the
+    """What is different on a log: RMS [N m or N] per joint of the held model and with the changes,
+    under the low-pass; the changes. floors, left: of the torque as logged the noise floor and what
+    the model with the changes leaves, where they were asked for. notes: what to know of the
     numbers."""
 
     joints: tuple[str, ...]
@@ -39,6 +41,7 @@ class Changed:
     floors: tuple
     changes: tuple[Change, ...]
     notes: tuple[str, ...]
+    left: np.ndarray | None = None
 
 
 def changed(
@@ -58,14 +61,14 @@ def changed(
 
 
 def asked(
-    model: Held, logs: list[str], *, floors: bool = False, rate: float | None = None, among: int = 1
+    model: Held, logs: list[str], *, floors: bool = False, rate: float = RATE, among: int = 1
 ) -> Changed:  # fmt: skip
     """What is different on logs, with a model held.
 
     Args:
         logs: as of `changed`. floors: whether the noise floors are asked for too, which costs as
             much as all else; without them there are none.
-        rate: of false alarms among so many questions like this one; None: three standard errors.
+        rate: of false alarms among so many logs like this one.
 
     Raises:
         SysidError: no such log, or one too short to be split in halves.
@@ -90,20 +93,25 @@ def asked(
     changes, tilt = (), None
     for _ in range(_ROUNDS):  # what a tilt does bends with it
         question = asked_of(tried, residual, by_size(after), blocks)
-        least = {} if rate is None else {"least": support(rate, among * len(tried))}
-        chosen = question.supported(**least)
+        least = support(rate, among * len(tried))
+        chosen = question.supported(least)
         changes, after = together(structure, question, chosen)
         if changes:  # a joint counts by what is left of it, not by what the changes made of it
             question = question.weighed(by_size(after))
-            changes, after = together(structure, question, question.supported(**least) or chosen)
+            changes, after = together(structure, question, question.supported(least) or chosen)
         before, tilt = tilt, _tilt(changes)
         told = tilt is not None and before is not None
         if np.abs(tilt - before).max() < _NEAR if told else tilt is before:
             break
         residual, tried = about(structure, x, motion, stride, data, tilt)
     rms = [np.sqrt(own / counted) for own in (squares, after)]
-    found = _floors(structure, x, motion) if floors else ()
-    return Changed(robot.joints, *rms, found, changes, _notes(experiment, changes))
+    said = changes, _notes(experiment, changes)
+    if not floors:
+        return Changed(robot.joints, *rms, (), *said)
+    found, whole = _as_logged(structure, x, motion)
+    # what is as slow as motion the low-pass leaves as it is
+    left = np.sqrt(np.maximum(whole - (rms[0] ** 2 - rms[1] ** 2), 0.0))
+    return Changed(robot.joints, *rms, found, *said, left)
 
 
 def _tilt(changes: Sequence[Change]) -> np.ndarray | None:
@@ -116,11 +124,17 @@ def _tilt(changes: Sequence[Change]) -> np.ndarray | None:
     return None
 
 
-def _floors(structure: Model, x, motion) -> tuple:
+def _as_logged(structure: Model, x, motion) -> tuple[tuple, np.ndarray]:
+    """The noise floor of each joint's torque as logged, and what the model leaves of it (dof,)."""
     count = 10 * structure.bodies
     bodies, rest = x[:count].reshape(-1, 10), x[count:]
-    predicted = np.concatenate([structure.torque(piece, bodies, rest) for piece in motion.pieces])
-    return floors_of(motion.pieces, predicted)
+    predicted = [structure.torque(piece, bodies, rest) for piece in motion.pieces]
+    squares = rows = np.zeros(len(motion.joints))
+    for piece, told in zip(motion.pieces, predicted):
+        use = 1.0 if piece.use is None else piece.use[piece.core]
+        squares = squares + np.sum((piece.measured[piece.core] - told) ** 2 * use, axis=0)
+        rows = rows + np.sum(np.ones(told.shape) * use, axis=0)
+    return floors_of(motion.pieces, np.concatenate(predicted)), squares / np.maximum(rows, 1)
 
 
 def _located(log: str) -> str:

@@ -5,40 +5,53 @@ from __future__ import annotations
 from ..changes import Change, Changed
 from ..fit_document import number
 
+_CLEAR = 1.5  # times what looks like noise where a floor is not known
+
 
 def document(found: Changed, run="") -> dict:
     """The document of `sysid diagnose --model`."""
-    touched = lambda joint: [c for c in found.changes if c.joint in (joint, "*")]  # noqa: E731
+    verdict = [_verdict(found, j) for j in range(len(found.joints))]
     return {
         "joints": {
-            joint: {
+            own["joint"]: {
                 "rms": {"held": float(found.rms_held[j]), "after": float(found.rms_after[j])},
+                "left_as_logged": float(found.left[j]),
                 "noise_floor": found.floors[j].rms,
                 "noise_floor_se": None
                 if found.floors[j].std is None
                 else number(found.floors[j].std),
                 "floor_method": found.floors[j].method,
-                "status": "missing" if touched(joint) else "complete",
+                "status": own["status"],
             }
-            for j, joint in enumerate(found.joints)
+            for j, own in enumerate(verdict)
         },
         "findings": [_finding(change) for change in found.changes],
         "not_visible": [],
-        "verdict": [
-            {
-                "joint": joint,
-                "status": "missing",
-                "effect": touched(joint)[0].effect,
-                "tied_with": [],
-                "also": [c.effect for c in touched(joint)[1:]],
-            }
-            if touched(joint)
-            else {"joint": joint, "status": "complete"}
-            for joint in found.joints
-        ],
+        "verdict": verdict,
         "notices": list(found.notes),
         "run": str(run),
     }
+
+
+def _verdict(found: Changed, j: int) -> dict:
+    joint, floor, error = found.joints[j], found.floors[j], float(found.left[j])
+    if effects := [c.effect for c in found.changes if c.joint in (joint, "*")]:
+        first, *also = effects
+        return {"joint": joint, "status": "missing", "effect": first, "tied_with": [], "also": also}
+    if floor.reached(error):
+        return {"joint": joint, "status": "complete"}
+    noise = floor.rms or floor.about or 0.0
+    says = (
+        f"its noise floor is not known ({floor.detail}), so nobody can say whether anything changed"
+    )
+    if floor.rms or error > _CLEAR * noise > 0.0:
+        about = "" if floor.rms else "about "
+        says = (
+            f"its error is {about}{error / max(noise, 1e-300):.2g} times the noise, and no change "
+            "that lasts all of the log takes it: it comes within the log, or the model does not "
+            "carry over to what is new in it"
+        )
+    return {"joint": joint, "status": "unresolved", "says": says}
 
 
 def _finding(c: Change) -> dict:

@@ -87,10 +87,19 @@ def show_verdict(of, width: int) -> None:
 
 def show_changed(document: dict) -> None:
     """What is different on a log while a fitted model is held."""
-    rows = [[joint, number(entry["rms"]["held"]), number(entry["rms"]["after"])] for joint, entry in document["joints"].items()]
-    table("the held model on the new log, low-passed at 15 Hz [N m or N]", ["joint", "RMS held", "RMS with the changes"], rows)
+    rows = [
+        [joint, *(number(v) for v in (*entry["rms"].values(), entry["left_as_logged"])), "not known" if entry["noise_floor"] is None else number(entry["noise_floor"])]
+        for joint, entry in document["joints"].items()
+    ]
+    table("the held model on the new log, low-passed at 15 Hz; with the changes as logged, and the noise floor of that [N m or N]", ["joint", "RMS held", "RMS with the changes", "as logged", "noise floor"], rows)
+    open_yet = [v for v in document["verdict"] if v["status"] == "unresolved"]
     if not document["findings"]:
-        print("nothing has changed that one half of the log would tell of the other")
+        print("no change is told that lasts all of the log" if open_yet else "nothing has changed: all joints are at their noise floor")
+    for v in open_yet:
+        for line in text.wrapped(f"{v['joint']}: {v['says']}", terminal_width(), "  "):
+            print(line)
+    if any("comes within the log" in v["says"] for v in open_yet):
+        print("when it comes `sysid.Online` tells in Python, which is fed the log row by row")
     for f in document["findings"]:
         print(f"{f['effect']} on {f['joint']}: removes {text.percent(max(f['misfit_removed'], 0.0))} of the squared residual")
         for name, p in f["parameters"].items():
