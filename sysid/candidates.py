@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 
@@ -118,8 +119,9 @@ def candidates(model: Model, extra=(), logs: Sequence[str] = ()) -> list[Candida
             if (effect.name, joint) in there:
                 out += _richer(model, effect.name, joint)
                 continue
-            for options in [*effect.variants(robot, joint), *effect.among(logs)]:
-                out.append(made(effect, joint, options, robot))
+            options = [*effect.variants(robot, joint), *effect.among(logs)]
+            for own, there in product(options, effect.places(robot)):
+                out.append(made(effect, joint, own | there, robot))
     return out
 
 

@@ -141,6 +141,10 @@ class Effect(ABC):
         tried alone, logs that have much of its first coefficient are then tried together."""
         return []
 
+    def places(self, robot) -> list[dict]:
+        """The options of where on the robot it is worth trying, beside those of the others."""
+        return [{}]
+
     def richer(self, **shapes: float) -> list[tuple[dict, dict[str, float]]]:
         """What may take its place where the model has it: options, with the shape values at which to try these.
 

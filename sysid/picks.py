@@ -7,9 +7,10 @@ by how far the residual falls. Only stretches that take more than chance gives o
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from types import MappingProxyType
 
 import numpy as np
 
@@ -29,25 +30,28 @@ _TURN = 0.1  # of a log, at least: by less it is much as it was
 _RIDGE = 1e-6  # of what the body takes, where a short stretch tells a part of it alone
 _ROUNDS = 10  # of body and times in turn
 TAKES = 0.25  # of some joint's squared residual: less hides behind whatever else is missing
-_BEYOND = 0.1  # more must be left by all that acts on each joint alone: noise that is slow is taken by either
+_MORE = 1.25  # times what all that acts on each joint alone takes: of a torque's zero that moved it is as much
 _WHOLE = 0.95  # of a log's rows: that is all of it
 
 
 class Picked(Payload):
-    """A payload that is asked during stretches that were found."""
+    """A payload that is asked during stretches that were found, on the link by which they were."""
 
-    def __init__(self, found: Sequence[str] = ()):
-        self.found = list(found)
+    def __init__(self, found: Sequence[str] = (), place: Mapping[str, str] = MappingProxyType({})):
+        self.found, self.place = list(found), dict(place)
 
     def variants(self, robot, joint):
-        return [{"stretches": self.found}]
+        return [{"stretches": self.found, **self.place}]
 
     def among(self, logs):
         return []
 
+    def places(self, robot):
+        return [{}]
+
 
 def picked(view) -> list[Payload]:
-    """The payload to be asked during stretches of a view's training logs; none where no stretch stands out.
+    """The payload to be asked during stretches of a view's training logs, by the hand that has it; none where no stretch stands out.
 
     Args:
         view: of the model, a `view.View`.
@@ -57,21 +61,26 @@ def picked(view) -> list[Payload]:
         return []
     if twice(view.motion.pieces):
         return []
-    (columns,) = columns_of(view.source, made(name, ROBOT, {}, view.model.robot), [{}])
+    found = [own for place in name.places(view.model.robot) if (own := _by(view, place))]
+    return [max(found, key=lambda own: own[0])[1]] if found else []
+
+
+def _by(view, place: Mapping[str, str]) -> tuple[float, Picked] | None:
+    """What a payload of stretches takes of the squared residual, held where a place says, and that payload; None where there is none."""
+    (columns,) = columns_of(view.source, made(find(Payload.name), ROBOT, dict(place), view.model.robot), [{}])
     parts = _Parts.of(view, columns[:, :, MASS] * view.weights[:, None, None])
     if (found := parts.found()) is None:
-        return []
+        return None
     there, *_ = found
     if all(share < 1.0 - _WHOLE or share > _WHOLE for share in (there[rows].mean() for rows in parts.logs)):
-        return []  # whole logs are asked anyway
+        return None  # whole logs are asked anyway
     # what acts on single joints for a while, a torque's zero, a friction, is no body
-    speed = view.rows.of(view.motion, "qd")
+    speed, takes = view.rows.of(view.motion, "qd"), parts.takes(parts.body, there)
     plain = np.stack([np.ones_like(speed), speed, np.sign(speed)], axis=2).transpose(1, 0, 2) * view.rows.use.T[:, :, None]
-    whole = np.sum(parts.residual**2)
-    if whole - parts.takes(_apart(plain), there) < (1.0 + _BEYOND) * (whole - parts.takes(parts.body, there)):
-        return []
+    if takes < _MORE * parts.takes(_apart(plain), there):
+        return None
     said = told(view.rows, there, view.motion.pieces)
-    return [Picked(said)] if said else []
+    return (takes, Picked(said, place)) if said else None
 
 
 def _apart(columns: np.ndarray) -> np.ndarray:

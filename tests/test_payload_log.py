@@ -8,7 +8,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from sysid import carriers, experiment_file, loop, pipeline
+from scripts.blind_parts.robots import PLANAR
+from sysid import carriers, experiment_file, loop, pipeline, regressor
 from sysid.candidates import Candidate, made, together
 from sysid.diagnose.diagnosis import diagnose
 from sysid.effects.payload import Payload
@@ -16,7 +17,9 @@ from sysid.inertia.pseudo import rotational_inertia, sphere
 from sysid.statement.document import document
 from sysid.view import allowed
 from sysid.vocabulary import find
+from tests.conftest import csv
 from tests.problems import arm
+from tests.test_lowpass import smooth
 
 
 @pytest.fixture(scope="module")
@@ -134,3 +137,48 @@ def test_logs_that_have_most_of_it_are_asked_together():
     assert [dict(one.options)["logs"] for one in together([*asked, other], robot)] == [("b", "d"), ("b", "d", "e"), ("a", "b", "d", "e")]
     # of few all were asked already
     assert together([group("a", 1.0), group("b", 2.0), group("c", 2.0), group("ab", 2.0)], robot) == [] == together([other], robot)
+
+
+@pytest.fixture(scope="module")
+def two_arms(tmp_path_factory, planar):
+    """Three logs of two planar arms on one base; in the second and the third the left one, which is not last in the URDF, holds a
+    load."""
+    folder = tmp_path_factory.mktemp("two_arms")
+    both, joints = PLANAR.replace("</robot>", ""), []
+    for side in ("l", "r"):
+        own = PLANAR[PLANAR.index(' <link name="upper"') : PLANAR.index("</robot>")]
+        for name in ("upper", "fore", "shoulder", "elbow"):
+            own = own.replace(f'"{name}"', f'"{side}_{name}"')
+        both = both[: both.index(' <link name="upper"')] + own if side == "l" else both + own
+        joints += [f"{side}_shoulder", f"{side}_elbow"]
+    (folder / "robot.urdf").write_text(both + "</robot>\n")
+    (folder / "config.yaml").write_text(
+        "robot: {urdf: robot.urdf}\ndata: {train: [one.csv, two.csv], test: [three.csv]}\nmodel: {effects: [viscous, coulomb]}\n"
+    )
+    load = np.array([0.8, 0.8 * 0.3, 0.0, 0.0, 0.002, 0.8 * 0.3**2 + 0.003, 0.8 * 0.3**2 + 0.003, 0.0, 0.0, 0.0])
+    for seed, (log, ends) in enumerate({"one": (0.0, 0.0), "two": (0.0, 99.0), "three": (0.0, 99.0)}.items()):
+        t, columns = np.arange(3000) / 250.0, {}
+        for number, side in enumerate("lr"):
+            q, qd, qdd = smooth(t, 10 * seed + number, 1.2)
+            held = ((t >= ends[0]) & (t < ends[1]) & (side == "l"))[:, None]
+            bodies = [np.array(planar.prior), np.array(planar.prior)]
+            bodies[1][-1] += load
+            empty, full = (regressor.torque(planar, pi, q, qd, qdd) for pi in bodies)
+            tau = np.where(held, full, empty) + 0.3 * qd + 0.4 * np.sign(qd) + np.random.default_rng(seed).normal(0.0, 0.1, q.shape)
+            for j, joint in enumerate(("shoulder", "elbow")):
+                columns |= {f"q_{side}_{joint}": q[:, j], f"tau_{side}_{joint}": tau[:, j]}
+        (folder / f"{log}.csv").write_text(csv({"t": t} | columns))
+    return folder
+
+
+def test_a_load_in_another_hand_than_the_last_is_named_with_its_link(two_arms):
+    said = document(diagnose(pipeline.load(two_arms)))
+    (found,) = [f for f in said["findings"] if f["joins_as_step"] is not None]
+    assert (found["effect"], found["options"]["link"]) == ("payload", "l_fore") and "two.csv" in found["options"]["logs"]
+    assert "--option link=l_fore" in found["command"]
+    assert {v["joint"]: v["status"] for v in said["verdict"]} == {
+        "l_shoulder": "missing",
+        "l_elbow": "missing",
+        "r_shoulder": "complete",
+        "r_elbow": "complete",
+    }

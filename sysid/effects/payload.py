@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..effect import LinkEffect
+from ..effect import LinkEffect, last_link
 from ..effect_options import stretches, subsets, texts
 from ..effect_parameters import Linear, called
 from ..inertia import PARAMETERS, UNITS
@@ -38,6 +38,12 @@ class Payload(LinkEffect):
         texts(chosen, "logs")
         stretches(chosen, "stretches")
         return chosen
+
+    def places(self, robot):
+        """The last link, and others that carry no link: other hands, other feet."""
+        links = [body for body in robot.bodies if body.kind == "link"]
+        carrying = {robot.parents[body.row] for body in links} | {robot.bodies[last_link(robot)].row}
+        return [{}, *({"link": body.name} for body in links if body.row not in carrying)]
 
     def among(self, logs):
         return subsets(logs)
