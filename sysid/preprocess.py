@@ -139,9 +139,7 @@ def _piece(number: int, segment: Segment, spec: PreprocessSpec) -> Piece | None:
     if len(segment.t) < needs(spec, segment.step):
         return None
     if spec.filter == "none":
-        if segment.qd is None or segment.qdd is None:
-            raise ConfigError("preprocess.filter is none and velocity or acceleration was not logged", allowed="savitzky-golay, butterworth, or data.columns.velocity and .acceleration", do="choose a filter")
-        q, qd, qdd = segment.q, segment.qd, segment.qdd
+        q, qd, qdd = unfiltered(segment)
     else:
         q, qd, qdd = smoother.differentiate(segment.q)
     edge = smoother.reach
@@ -159,6 +157,13 @@ def _piece(number: int, segment: Segment, spec: PreprocessSpec) -> Piece | None:
         smoother=sides, core=core, rest=np.zeros(q.shape[1]),
         noise=np.sqrt(np.mean((segment.q[rows] - q[rows]) ** 2, axis=0)), sight=None if sides is not None or spec.filter == "none" else smoother, clock=segment.spread,
     )  # fmt: skip
+
+
+def unfiltered(segment: Segment) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Angle, speed and acceleration (n, dof) as logged. Raises ConfigError where these are not."""
+    if segment.qd is None or segment.qdd is None:
+        raise ConfigError("preprocess.filter is none and velocity or acceleration was not logged", allowed="savitzky-golay, butterworth, or data.columns.velocity and .acceleration", do="choose a filter")
+    return segment.q, segment.qd, segment.qdd
 
 
 def _reaches(spec: PreprocessSpec, step: float) -> tuple[float, float]:

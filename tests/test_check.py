@@ -17,6 +17,7 @@ from sysid.check import FAULTS, written
 from sysid.check.equations import Reading
 from sysid.check.faults import columns, one_log
 from sysid.check.look import Look, looked
+from sysid.errors import ConfigError
 from sysid.simulate import simulate, write
 from tests.conftest import JOINTS, motion
 
@@ -70,6 +71,15 @@ def test_every_fault_is_found_where_it_is(fault, made, tmp_path):
 @pytest.mark.parametrize("seed", [5, 6, 7])
 def test_a_clean_log_has_no_fault(seed, made):
     assert check.check(pipeline.load(made(seed=seed))) == []
+
+
+def test_logs_that_no_fit_takes_are_refused_by_a_check(made, tmp_path):
+    """Without a filter speeds and accelerations must be logged; a check that found no fault sent on to a fit that was refused."""
+    logs = shutil.copytree(made(), tmp_path / "logs")
+    experiment = pipeline.load(logs)
+    spec = experiment.preprocess.model_copy(update={"filter": "none"})
+    with pytest.raises(ConfigError, match="filter is none"):
+        check.check(experiment.model_copy(update={"preprocess": spec}))
 
 
 @pytest.mark.parametrize("what", ["deg", "ms", "mNm"])

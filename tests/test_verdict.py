@@ -25,6 +25,7 @@ from sysid.left_open import left_open
 from sysid.noise import NoiseFloor
 from sysid.simulate import simulate, write
 from sysid.statement.document import _verdict, dependences
+from sysid.statement.laws import tone
 from sysid.statement.words import elsewhere
 from sysid.transfer import Transfer
 from sysid.unexplained import Refused, changed, smeared
@@ -171,6 +172,13 @@ def test_an_effect_on_it_is_missing():
     said = _verdict(found)
     assert said["effect"] == "torque_bias" and said["set"] == [{"effect": "torque_bias", "joint": "elbow", "probability": 1.0}]
     assert said["command"] == "sysid add x torque_bias" and said["also"] == [] and said["explained"] == found.explained
+
+
+@pytest.mark.parametrize("share, only", [(0.19, True), (0.3, False)])
+def test_a_tone_that_is_all_that_is_left_is_no_law_of_the_motion(share, only):
+    left = {"depends_on": [{"variable": "a steady tone", "share": 0.19, "hertz": 13.0}], "share_left": share}
+    assert bool(tone(left)) is only and (not only or tone(left).startswith("a steady tone of 13 Hz holds 19 % of what is left: a hum"))
+    assert tone({"depends_on": [{"variable": "q_elbow", "share": 0.4}], "share_left": 0.4}) == tone({}) == ""
 
 
 @pytest.mark.parametrize("at_zero, status", [((), "unknown"), ((0,), "missing")])

@@ -16,6 +16,7 @@ from ..lowpass import band, lowpassed, stride_of, widest
 from ..model import Model
 from ..motion import Motion
 from ..plain_model import plain
+from ..preprocess import unfiltered
 from ..robot import Robot
 from ..rows import Rows, stack
 from ..specs import Experiment
@@ -157,4 +158,8 @@ def looked(experiment: Experiment) -> Look:
     experiment = pipeline.started(experiment)
     with noticed() as notices:
         machine, *_ = pipeline.build(experiment)
-    return Look(experiment, machine, read(experiment, machine), tuple(notices))
+    logs = read(experiment, machine)
+    if experiment.preprocess.filter == "none":  # a fit would refuse them
+        for log in logs:
+            unfiltered(log.log.segments[0])
+    return Look(experiment, machine, logs, tuple(notices))

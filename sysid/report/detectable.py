@@ -5,8 +5,8 @@ from __future__ import annotations
 from ..estimate import Fit
 from ..statement.sizes import possible, size
 from ..statement.words import followed
+from .left import left_words
 from .section import Section
-from .verdict import left_words
 from .words import SPACE, percentage, quantity, unit_of
 
 

@@ -6,7 +6,8 @@ from ..addition import LIKELY, apart, designs, likely
 from ..estimate import Fit
 from ..given_shapes import given_shapes, said_of_shapes
 from ..statement import text, where
-from ..statement.words import either, followed, near, option, otherwise, percent, refused, untold
+from ..statement.words import either, near, option, otherwise, percent, refused, untold
+from .left import left_words
 from .section import Section
 from .words import (
     SPACE,
@@ -14,10 +15,8 @@ from .words import (
     chance,
     known,
     level,
-    percentage,
     placed,
     plus_minus,
-    quantity,
     raised,
     units,
 )
@@ -178,22 +177,3 @@ def _claim(head: dict, tied: list[dict], joint: str, several: bool) -> dict:
         "design": designs(head["command"], effect, told) if told else "",
         "separate": ",".join(apart(effect, told)) if told else "",
     }
-
-
-def left_words(found: dict, fit: Fit) -> str:
-    """How much of what is left the motion predicts, and which variables; empty where nothing."""
-    if "share_left" not in found:
-        return ""
-    alone = [
-        f"{followed(d, lambda v: _named(v, fit))} {percentage(d['share'])}"
-        for d in found["depends_on"][:3]
-        if d["variable"] != "several variables together"
-    ]
-    whole = f"The motion predicts {percentage(found['share_left'])} of what is left"
-    return whole + (f" ({', '.join(alone)})" if alone else "")
-
-
-def _named(variable: str, fit: Fit) -> str:
-    """A variable that a residual follows, escaped, with the article that a sentence needs."""
-    words = quantity(variable, fit)
-    return words if words == variable else f"the {words}"

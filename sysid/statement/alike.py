@@ -37,7 +37,8 @@ def read_alike(findings: Sequence) -> Iterator[str]:
     yield (
         f"the torques of {listed([*late], 'and')} are {how} by much the same, {low:.2g} to "
         f"{high:.2g} ms: one cause is likelier than one on each joint, as torque and angles of "
-        "different clocks or cycles, or a command that was logged in the place of the torque"
+        "different clocks or cycles, a filter of the drives, or a command that was logged in the "
+        "place of the torque; without --joint `sysid add` gives every joint one"
     )
 
 

@@ -13,6 +13,7 @@ from pathlib import Path
 from ..addition import command
 from ..flexible.functions import DIRECTION
 from ..formula.text import OTHER
+from .words import percent
 
 _MOST = 0.5  # of what functions of the motion predict: less, and another variable has more
 _NEARLY = 0.8  # of what most predict: one variable that does says it more simply than two
@@ -93,3 +94,15 @@ def _in_formula(variable: str, joint: str) -> str | None:
     if of == joint and kind in ("q", "qd", "qdd", "load"):
         return kind
     return variable if OTHER.fullmatch(variable) else None
+
+
+def tone(v: dict) -> str:
+    """What is said of a verdict of which all that is left above the floor is a steady tone; empty
+    where it is more."""
+    first = next(iter(v.get("depends_on", ())), {})
+    if "hertz" not in first or first["share"] < v["share_left"]:
+        return ""
+    return (
+        f"a steady tone of {first['hertz']:.3g} Hz holds {percent(first['share'])} of what is "
+        "left: a hum of the drive or the mains, or a vibration, and no function of the motion"
+    )

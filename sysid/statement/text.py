@@ -6,7 +6,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from ..addition import LIKELY, designs, likely
+from ..unexplained import LOW_PASS
 from . import where
+from .laws import tone
 from .rivals import as_little, other_options, rivals
 from .words import (
     all_of,
@@ -34,6 +36,7 @@ ANOTHER = "a motion that tells most of what these logs leave open"
 TRIED = "to try it, and see the held-out error before and after"
 NO_MORE = "no further effect is supported by these logs"
 OWN = "a law of your own can be tried: `sysid effects formula`"
+FILTERED = f"with {LOW_PASS} it goes, where it is faster than the cutoff"
 BEGIN = "to begin with, a polynomial in what it follows"
 _TOGETHER = "several variables together"
 
@@ -112,7 +115,8 @@ def _joint(v: dict, of: Told, width: int, said: dict[str, str]) -> list[str]:
         lines += [f"  {TRIED}", v["may_be"]["command"]]
     if status == "unknown":
         law = v.get("law")
-        lines += wrapped(f"  {OWN}{f'; {BEGIN}' if law else ''}", width, "    ")
+        own = FILTERED if tone(v) else f"{OWN}{f'; {BEGIN}' if law else ''}"
+        lines += wrapped(f"  {own}", width, "    ")
         lines += [law["command"]] if law else []
     return lines
 
@@ -181,7 +185,9 @@ def _with_options(f: dict) -> str:
 
 
 def _left(v: dict) -> str:
-    """What of the rest of a joint's error the motion predicts."""
+    """What of the rest of a joint's error the motion predicts, or a tone holds."""
+    if told := tone(v):
+        return told
     whole = f"the motion predicts {percent(v['share_left'])} of what is left"
     alone = [
         f"{followed(d, quantity)} {percent(d['share'])}"
