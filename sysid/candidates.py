@@ -120,8 +120,8 @@ def candidates(model: Model, extra=(), logs: Sequence[str] = ()) -> list[Candida
                 out += _richer(model, effect.name, joint)
                 continue
             options = [*effect.variants(robot, joint), *effect.among(logs)]
-            for own, there in product(options, effect.places(robot)):
-                out.append(made(effect, joint, own | there, robot))
+            for own, where in product(options, effect.places(robot)):
+                out.append(made(effect, joint, own | where, robot))
     return out
 
 

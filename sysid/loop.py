@@ -14,7 +14,7 @@ from pathlib import Path
 
 from . import bounded, comparison, config, experiment_file, fit_document, pipeline, results, state, whole_files
 from .addition import spelled
-from .borne_out import size_told
+from .borne_out import CLEAR, size_told
 from .diagnose.diagnosis import Diagnosis, diagnose
 from .effect_entry import asked, with_effect
 from .errors import SysidError
@@ -233,10 +233,10 @@ def _untold(added: Added, name: str) -> str:
     model, before = added.after.model, {*added.before.model.names, *(v.name for v in added.before.model.shape_values)}
     new = {(c.effect, c.joint) for c in model.coefficients if c.name not in before}
     new |= {(model.terms[v.term][0].name, v.joint) for v in model.shape_values if v.name not in before}
-    falls = any(-d.delta_rms > d.se for d in added.differences)
+    falls = any(-d.delta_rms > CLEAR * d.se for d in added.differences)
     if added.refused or not new or falls or any(size_told(added.after, *own) for own in new):
         return ""
     return (
-        f"nothing in these logs speaks for {name}: its size is nothing beside its standard deviation, and no held-out error falls by more than its "
-        f"standard error; take it out of model.effects in {added.experiment.path} unless you know that it is there"
+        f"nothing in these logs speaks for {name}: its size is nothing beside its standard deviation, and no held-out error falls by two of its "
+        f"standard errors; take it out of model.effects in {added.experiment.path} unless you know that it is there"
     )
