@@ -130,7 +130,9 @@ def root_of(data: bytes, path: Path) -> ElementTree.Element:
         checker.Parse(data, True)
         return ElementTree.fromstring(data)
     except (expat.ExpatError, ElementTree.ParseError, ValueError, LookupError) as error:
-        raise RobotError(f"not XML ({error})", where=str(path), do="give a URDF file") from None
+        # a prefix of xacro's that nobody has expanded
+        do = "run xacro on it and give the URDF that it prints" if b"xacro:" in data else "give a URDF file"
+        raise RobotError(f"not XML ({error})", where=str(path), do=do) from None
 
 
 def rotation_rpy(rpy) -> np.ndarray:

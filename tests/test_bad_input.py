@@ -255,6 +255,7 @@ URDF_FAULTS = {
     "not XML": ("link: base\n", ["not XML", "line 1"]),
     "broken off": (lambda text: text[: len(text) // 2], ["not XML", "line"]),
     "binary": (bytes(range(256)), ["not XML"]),
+    "xacro": (lambda text: text.replace("</robot>", '<xacro:include filename="x"/></robot>'), ["not XML", "run xacro"]),
     "other XML": ("<html><body/></html>", ["<html>", "allowed: <robot>"]),
     "no links": ('<robot name="arm"/>', ["no link"]),
     "document type": (replaced(("<robot", "<!DOCTYPE robot><robot")), ["document type", "remove"]),
@@ -332,7 +333,7 @@ LOG_FAULTS = {
     "column twice": (lambda c: csv(c).replace("q_elbow", "q_shoulder", 1), ["two columns are named 'q_shoulder'", "rename"]),
     "no header for names": (lambda c: csv(c, header=False), ["'q_shoulder' is not there", "allowed: 0, 1, 2, 3, 4"]),
     "binary": (bytes(range(256)) * 10, ["not text"]),
-    "UTF-16": (lambda c: csv(c).encode("utf-16"), ["not text"]),
+    "UTF-16": (lambda c: csv(c).encode("utf-16"), ["text in UTF-16", "save it as UTF-8"]),
     "no file": (None, ["no such file"]),
 }
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import csv
 import io
 import re
@@ -29,7 +30,8 @@ class CsvTable(Table):
         try:
             first = data.decode("utf-8-sig").rstrip("\r\n")
         except UnicodeDecodeError:
-            raise LogError("not text", where=str(path), do="give a CSV file") from None
+            wide = data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
+            raise LogError("text in UTF-16" if wide else "not text", where=str(path), do="save it as UTF-8" if wide else "give a CSV file") from None
         if "\0" in first or len(data) == _LINE:
             raise LogError("not text" if "\0" in first else f"a first line of more than {_LINE} bytes", where=str(path), do="give a CSV file")
         if not first.strip():
