@@ -32,9 +32,11 @@ def misread(fit: Fit) -> list[str]:
 
 
 def _said(faults: Sequence[check.Fault]) -> str:
-    """Of faults that one thing cures what the first says, and of which joints it is."""
-    joints = list(dict.fromkeys(fault.joint for fault in faults))
-    more = f"; {len(joints)} such in all: {', '.join(joints)}" if len(joints) > 1 else ""
+    """Of faults that one thing cures what the first says, and where it is."""
+    joints = list(dict.fromkeys(fault.joint for fault in faults if fault.joint))
+    logs = list(dict.fromkeys(fault.log for fault in faults if fault.log))
+    where = [", ".join(names) for names in (joints, logs) if len(names) > 1]
+    more = f"; {len(faults)} such in all: {' in '.join(where)}" if where else ""
     return f"{faults[0].says}{more}"
 
 

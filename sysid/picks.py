@@ -1,4 +1,4 @@
-"""What a robot picks up and puts down within a log: when, by the torque that a body on its last link needs.
+"""What a robot picks up and puts down within a log: when, by the torque that a body on its last link, or in another hand, needs.
 
 A model of the whole log has a part of such a load all the time and lacks the rest for a while, and no function of the motion
 predicts which. Two times and a body are looked for together: the body by least squares beside everything in the model, the times
@@ -61,15 +61,26 @@ def picked(view) -> list[Payload]:
         return []
     if twice(view.motion.pieces):
         return []
-    found = [own for place in name.places(view.model.robot) if (own := _by(view, place))]
+    places = name.places(view.model.robot)
+    parts = [_Parts.of(view, _column(view, place)) for place in places]
+    chance = max(own.first[1][1:].max() for own in parts)  # of whichever place takes most in a draw
+    found = [own for place, one in zip(places, parts) if (own := _by(view, one, place, chance))]
     return [max(found, key=lambda own: own[0])[1]] if found else []
 
 
-def _by(view, place: Mapping[str, str]) -> tuple[float, Picked] | None:
-    """What a payload of stretches takes of the squared residual, held where a place says, and that payload; None where there is none."""
+def _column(view, place: Mapping[str, str]) -> np.ndarray:
+    """Weighted columns (dof, n, 4) of a payload that is held where a place says."""
     (columns,) = columns_of(view.source, made(find(Payload.name), ROBOT, dict(place), view.model.robot), [{}])
-    parts = _Parts.of(view, columns[:, :, MASS] * view.weights[:, None, None])
-    if (found := parts.found()) is None:
+    return columns[:, :, MASS] * view.weights[:, None, None]
+
+
+def _by(view, parts: _Parts, place: Mapping[str, str], chance: float) -> tuple[float, Picked] | None:
+    """What a payload of stretches takes of the squared residual, held where a place says, and that payload; None where there is none.
+
+    Args:
+        chance: what draws of chance take, at most.
+    """
+    if (found := parts.found(chance)) is None:
         return None
     there, *_ = found
     if all(share < 1.0 - _WHOLE or share > _WHOLE for share in (there[rows].mean() for rows in parts.logs)):
@@ -110,6 +121,7 @@ class _Parts:
         logs = tuple(by_block(view.rows.log))
         return cls(columns / np.maximum(size, 1e-300), view.design.columns, view.design.residual, logs, view.rows.t, view.rows.use)
 
+    @cached_property
     def first(self) -> tuple[np.ndarray, np.ndarray]:
         """Of the residual and of each draw of chance the rows (1 + draws, 2), from one to before another, of the stretch that takes
         most, and what that takes (1 + draws,)."""
@@ -133,11 +145,15 @@ class _Parts:
         starts, stops = np.array([cell.start for cell in cells]), np.array([cell.stop for cell in cells])
         return np.column_stack([starts[best[:, 0]], stops[np.maximum(best[:, 1], 1) - 1]]), most
 
-    def found(self) -> tuple[np.ndarray, np.ndarray, float] | None:
+    def found(self, chance: float = 0.0) -> tuple[np.ndarray, np.ndarray, float] | None:
         """The stretches (n,) bool, what the body takes of each joint's squares (dof,), and its mass on the scale of its column; None
-        where chance takes as much, or where the body is none."""
-        rows, most = self.first()
-        if not most[0] > most[1:].max():
+        where chance takes as much, or where the body is none.
+
+        Args:
+            chance: what draws of chance take for other bodies, at most.
+        """
+        rows, most = self.first
+        if not most[0] > max(most[1:].max(), chance):
             return None
         within = lambda k: (np.arange(len(self.t)) >= rows[k, 0]) & (np.arange(len(self.t)) < rows[k, 1])  # noqa: E731
         there, shares, mass = self.settled(within(0))

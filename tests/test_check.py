@@ -9,10 +9,11 @@ from types import SimpleNamespace
 import numpy as np
 import polars as pl
 import pytest
+from scipy.signal import savgol_filter
 
 from scripts.blind_parts.robots import experiment_of
 from scripts.check_parts import faults
-from sysid import check, pipeline
+from sysid import check, pipeline, regressor
 from sysid.check import FAULTS, written
 from sysid.check.equations import Reading
 from sysid.check.faults import columns, one_log
@@ -237,6 +238,14 @@ def test_a_load_or_an_offset_that_turns_a_torque_is_no_wrong_sign(what, made, tm
     assert not [f for f in check.check(pipeline.load(logs)) if f.fault in ("sign_flipped", "joint_order") and f.log]
 
 
+def test_signs_of_all_are_those_of_the_joints_that_tell():
+    """A joint that stands, or whose torque is not used, has no sign that is wrong."""
+    made = [reading for reading, _ in columns._of_all(Reading.plain(3), [0, 2])]
+    assert [one.torque_factor for one in made] == [(-1.0, 1.0, -1.0), (1.0, 1.0, 1.0)]
+    assert [one.angle_factor for one in made] == [(1.0, 1.0, 1.0), (-1.0, 1.0, -1.0)]
+    assert not [*columns._of_all(Reading.plain(3), [1])]
+
+
 @pytest.mark.parametrize("key", ["tau", "q"])
 def test_all_torques_or_all_angles_of_the_other_sign_are_told_as_that(key, made, tmp_path):
     """One joint at a time gravity or an angle would turn round instead; what is written is right."""
@@ -249,14 +258,38 @@ def test_all_torques_or_all_angles_of_the_other_sign_are_told_as_that(key, made,
     assert all(f.says.startswith(f"the {word} of") for f in found)
 
 
-@pytest.mark.parametrize("file, train", [("test.csv", 3), ("train_2.csv", 3), ("test.csv", 1)])
-@pytest.mark.parametrize("factor, said", [(1000.0, "1000 times"), (1.0 / 60.0, "one 60th of")])
-def test_the_torques_of_one_log_in_another_unit_are_told_with_it(factor, said, file, train, made, tmp_path):
-    logs = shutil.copytree(made(logs=train, duration=6.0), tmp_path / "logs")
-    pl.read_csv(logs / file).with_columns(pl.col("tau_shoulder", "tau_elbow") * factor).write_csv(logs / file)
+@pytest.mark.parametrize("files", [["test.csv"], ["train_2.csv"], ["train_1.csv", "train_3.csv"], ["train_1.csv", "test.csv"]])
+@pytest.mark.parametrize("factor, said", [(1000.0, "1000 times"), (1.0 / 60.0, "1/60 of")])
+def test_the_torques_of_logs_in_another_unit_are_told_with_these(factor, said, files, made, tmp_path):
+    """Of as many that have it as have not, those are wrong that the URDF's masses are far from."""
+    logs = shutil.copytree(made(logs=3, duration=6.0), tmp_path / "logs")
+    for file in files:
+        pl.read_csv(logs / file).with_columns(pl.col("tau_shoulder", "tau_elbow") * factor).write_csv(logs / file)
     found = [f for f in check.check(pipeline.load(logs)) if f.severity == "error"]
-    assert [(f.fault, f.log, f.joint) for f in found] == [("wrong_unit", file, "")]
-    assert found[0].says.startswith(f"the torques in {file} are {said} what")
+    assert {(f.fault, f.log, f.joint) for f in found} == {("wrong_unit", file, "") for file in files}
+    assert all(f.says.startswith(f"the torques in {f.log} are {said} what the other logs tell") and f.log in f.do for f in found)
+
+
+@pytest.mark.parametrize("file", ["train.csv", "test.csv"])
+def test_of_two_logs_the_one_that_the_urdf_is_far_from_is_in_another_unit(file, made, tmp_path):
+    logs = shutil.copytree(made(), tmp_path / "logs")
+    pl.read_csv(logs / file).with_columns(pl.col("tau_shoulder", "tau_elbow") * 1000.0).write_csv(logs / file)
+    found = [f for f in check.check(pipeline.load(logs)) if f.severity == "error"]
+    assert [(f.fault, f.log) for f in found] == [("wrong_unit", file)] and "what the other log tells" in found[0].says
+
+
+def test_a_heavy_load_in_one_log_is_no_other_unit(made, tmp_path):
+    """Twice the arm's own mass on its last link makes all torques four times as large."""
+    logs = shutil.copytree(made(logs=3, duration=6.0), tmp_path / "logs")
+    arm = pipeline.build(pipeline.load(logs))[0]
+    table = pl.read_csv(logs / "train_2.csv")
+    q = table.select("q_shoulder", "q_elbow").to_numpy()
+    qd, qdd = (savgol_filter(q, 31, 4, deriv=k, delta=float(table["t"][1] - table["t"][0]), axis=0) for k in (1, 2))
+    pi = np.zeros_like(arm.prior)
+    pi[1] = [12.0, 12.0 * 0.3, 0.0, 0.0, 0.02, 12.0 * 0.09 + 0.02, 12.0 * 0.09 + 0.02, 0.0, 0.0, 0.0]
+    more = regressor.torque(arm, pi, q, qd, qdd)
+    table.with_columns(tau_shoulder=table["tau_shoulder"] + more[:, 0], tau_elbow=table["tau_elbow"] + more[:, 1]).write_csv(logs / "train_2.csv")
+    assert not [f for f in check.check(pipeline.load(logs)) if f.fault == "wrong_unit" and f.log]
 
 
 @pytest.mark.parametrize(
@@ -379,7 +412,7 @@ def test_a_log_is_read_otherwise_only_where_the_others_then_predict_it(left, tol
     a bias hidden in it, a wrist's sign was turned so in one log of four, and nothing was diagnosed any more."""
     n, robot = 200, SimpleNamespace(dof=2)
     rows = SimpleNamespace(log=np.repeat([0, 1], n), use=np.ones((2 * n, 2), bool), tau=np.zeros((2 * n, 2)), columns=np.zeros((2, 2 * n, 3)))
-    look = SimpleNamespace(robot=robot, excited=[SimpleNamespace(enough=True)] * 2)
+    look = SimpleNamespace(robot=robot, asked=lambda use: [0, 1])
     monkeypatch.setattr(one_log, "told_by", lambda rows, model, use: (np.zeros(3), np.array([0.05, 0.1])))
     turned = lambda read: isinstance(read, Reading) and read.torque_factor[0] < 0.0 < read.angle_factor[0]
     plain, better = np.array([1.0, 0.01]), np.array([left, 0.01])

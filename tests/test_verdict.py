@@ -53,7 +53,7 @@ def fitted(elbow: float, shoulder: float = 1.0, train: float | None = None):
 def looked(elbow: float, at_zero=()):
     """A view whose joints leave so much, of which the elbow's friction is held at zero or not."""
     problem = SimpleNamespace(certify=lambda x: SimpleNamespace(at_zero={*at_zero}), coordinates=SimpleNamespace(held=[False]))
-    model = SimpleNamespace(coefficients=(SimpleNamespace(joint=1),))
+    model = SimpleNamespace(coefficients=(SimpleNamespace(joint=1, effect="viscous"),))
     return SimpleNamespace(model=model, rms=lambda: np.array([1.0, elbow]), settled=SimpleNamespace(problem=problem, x=None))
 
 

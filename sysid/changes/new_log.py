@@ -126,15 +126,15 @@ def _tilt(changes: Sequence[Change]) -> np.ndarray | None:
 
 def _as_logged(structure: Model, x, motion) -> tuple[tuple, np.ndarray]:
     """The noise floor of each joint's torque as logged, and what the model leaves of it (dof,)."""
-    count = 10 * structure.bodies
-    bodies, rest = x[:count].reshape(-1, 10), x[count:]
+    first = 10 * structure.bodies
+    bodies, rest = x[:first].reshape(-1, 10), x[first:]
     predicted = [structure.torque(piece, bodies, rest) for piece in motion.pieces]
-    squares = rows = np.zeros(len(motion.joints))
+    squares = count = np.zeros(len(motion.joints))
     for piece, told in zip(motion.pieces, predicted):
         use = 1.0 if piece.use is None else piece.use[piece.core]
         squares = squares + np.sum((piece.measured[piece.core] - told) ** 2 * use, axis=0)
-        rows = rows + np.sum(np.ones(told.shape) * use, axis=0)
-    return floors_of(motion.pieces, np.concatenate(predicted)), squares / np.maximum(rows, 1)
+        count = count + np.sum(np.ones(told.shape) * use, axis=0)
+    return floors_of(motion.pieces, np.concatenate(predicted)), squares / np.maximum(count, 1)
 
 
 def _located(log: str) -> str:

@@ -86,6 +86,11 @@ class Look:
         """Of each joint."""
         return [self._moves(j) for j in range(self.robot.dof)]
 
+    def asked(self, use) -> list[int]:
+        """The joints that move enough and of which enough rows (n, dof) are used."""
+        enough = np.sum(use, axis=0) > FEWEST
+        return [j for j in range(self.robot.dof) if self.excited[j].enough and enough[j]]
+
     def _moves(self, j: int) -> Moves:
         long, slides = self.with_speeds, bool(self.robot.prismatic[j])
         travel = max(float(log.tally.travel[j]) for log in self.part("train"))
@@ -160,6 +165,6 @@ def looked(experiment: Experiment) -> Look:
         machine, *_ = pipeline.build(experiment)
     logs = read(experiment, machine)
     if experiment.preprocess.filter == "none":  # a fit would refuse them
-        for log in logs:
+        for log in (one for one in logs if len(one.log.segments)):
             unfiltered(log.log.segments[0])
     return Look(experiment, machine, logs, tuple(notices))

@@ -74,7 +74,7 @@ def verdicts(
     last = claims[-1].after if claims else fit
     trained = [as_of_test(f.rms("train"), floors) for f in (fit, last)]
     firsts, errors = zip(trained, (quieter(f.rms("test"), carried) for f in (fit, last)))
-    weighed, most = weighed or {}, {j: max(e[j] for e in errors) for j in fit.joints}
+    out, weighed, most = [], weighed or {}, {j: max(e[j] for e in errors) for j in fit.joints}
     by_joint = list(zip(fit.joints, floors))
     reaches = [floor.reached(most[joint]) for joint, floor in by_joint]
     evens = [by_weights(last, joint, floor.rms, weighed) for joint, floor in by_joint]
@@ -82,7 +82,6 @@ def verdicts(
     # an error that is no more than noise, however joints are weighed, or than its drift, lacks none
     asked = [not f.within(min(most[j], weighed.get(j, np.inf))) for j, f in by_joint]
     asked = [own and not (at and one.drifts) for own, at, one in zip(asked, reaches, left)]
-    held, out = claims and taken_where_held(claims[0].step.before, claims[-1].step.after), []
     for j, joint in enumerate(fit.joints):
         taking = [c for c in claims if c.head.joint == joint or c.step.shares[j] >= WORTH]
         pairs = [tuple(one[joint] for one in part) for part in zip(firsts, errors)]
@@ -106,7 +105,8 @@ def verdicts(
         looks = looks or in_vain(refused, fit.joints, j, HALF * part)
         looks = looks or (asked[j] and not own and few(j, HALF * part)) or None
         # of whichever logs they explain less of: where these do not carry over, another law may
-        taken = max(sum(c.step.shares[j] for c in own or others), held[j] if own else 0.0)
+        held = taken_where_held(own[0].step.before, own[-1].step.after)[j] if own else 0.0
+        taken = max(sum(c.step.shares[j] for c in own or others), held)
         taken = max(min(taken, explained), 0.0)
         little = remains is None or remains.share * max(1.0 - taken, 0.0) <= _PREDICTED * taken
         further = beyond(j, looks[0]) if looks and remains and beyond and not own else None

@@ -18,7 +18,7 @@ class Payload(LinkEffect):
 
     name = "payload"
     equation = "tau = J' (f, n) of a body with m, h, I on the link"
-    looks_like = "residual like the last link's, in some logs alone, or for a part of a log"
+    looks_like = "residual like the last link's, or another hand's, in some logs alone, or for a part of a log"
     tied_with = ("the link that holds it, exactly in a single log", "torque_gain")
     separate_by = "the same motion with the payload and without"
     source = "Swevers, Verdonck, Naumer, Pieters & Biber 2002"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from ..changes import Change, Changed
 from ..fit_document import number
 
-_CLEAR = 1.5  # times what looks like noise where a floor is not known
+_ABOVE = 2.0  # times what looks like noise, where that is not known well: then it is no noise
 
 
 def document(found: Changed, run="") -> dict:
@@ -38,20 +38,19 @@ def _verdict(found: Changed, j: int) -> dict:
     if effects := [c.effect for c in found.changes if c.joint in (joint, "*")]:
         first, *also = effects
         return {"joint": joint, "status": "missing", "effect": first, "tied_with": [], "also": also}
-    if floor.reached(error):
+    if error == 0.0 or floor.reached(error):  # of a torque that is not used nothing is left
         return {"joint": joint, "status": "complete"}
     noise = floor.rms or floor.about or 0.0
+    if not (floor.rms or error > _ABOVE * noise > 0.0):
+        why = "so nobody can say what error is left above it"
+        says = f"its noise floor is not known ({floor.detail}), {why}"
+        return {"joint": joint, "status": "unresolved", "says": says, "times_noise": None}
+    times, about = error / max(noise, 1e-300), "" if floor.rms else "about "
     says = (
-        f"its noise floor is not known ({floor.detail}), so nobody can say whether anything changed"
+        f"its error is {about}{times:.2g} times the noise, and no change that lasts all of the log "
+        "takes it: it comes within the log, or the model does not carry over to what is new in it"
     )
-    if floor.rms or error > _CLEAR * noise > 0.0:
-        about = "" if floor.rms else "about "
-        says = (
-            f"its error is {about}{error / max(noise, 1e-300):.2g} times the noise, and no change "
-            "that lasts all of the log takes it: it comes within the log, or the model does not "
-            "carry over to what is new in it"
-        )
-    return {"joint": joint, "status": "unresolved", "says": says}
+    return {"joint": joint, "status": "unresolved", "says": says, "times_noise": times}
 
 
 def _finding(c: Change) -> dict:

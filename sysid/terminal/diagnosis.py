@@ -93,13 +93,16 @@ def show_changed(document: dict) -> None:
     ]
     table("the held model on the new log, low-passed at 15 Hz; with the changes as logged, and the noise floor of that [N m or N]", ["joint", "RMS held", "RMS with the changes", "as logged", "noise floor"], rows)
     open_yet = [v for v in document["verdict"] if v["status"] == "unresolved"]
+    above = any(v["times_noise"] for v in open_yet)
     if not document["findings"]:
-        print("no change is told that lasts all of the log" if open_yet else "nothing has changed: all joints are at their noise floor")
+        said = "nothing has changed, for all that is known of the noise"
+        said = "no change is told that lasts all of the log" if above else said
+        print(said if open_yet else "nothing has changed: all joints are at their noise floor")
     for v in open_yet:
         for line in text.wrapped(f"{v['joint']}: {v['says']}", terminal_width(), "  "):
             print(line)
-    if any("comes within the log" in v["says"] for v in open_yet):
-        print("when it comes `sysid.Online` tells in Python, which is fed the log row by row")
+    if above:
+        print("where it comes within the log, `sysid.Online` tells when, in Python: it is fed the log row by row")
     for f in document["findings"]:
         print(f"{f['effect']} on {f['joint']}: removes {text.percent(max(f['misfit_removed'], 0.0))} of the squared residual")
         for name, p in f["parameters"].items():

@@ -64,6 +64,7 @@ def taken_where_held(view: View, after: View) -> np.ndarray:
     friction the view holds at zero, of others none: a design is free of that bound, and negative
     friction, which no joint has, is most of a Stribeck effect in slow motion."""
     model, whole, left = view.model, view.rms() ** 2, after.rms() ** 2
-    held = {model.coefficients[k].joint for k in at_zero(view.settled)}
-    here = np.isin(np.arange(len(whole)), sorted(held))
-    return np.where(here & (whole > 0.0), 1.0 - left / np.maximum(whole, 1e-300), 0.0)
+    bound = (model.coefficients[k] for k in at_zero(view.settled))
+    held = {c.joint for c in bound if c.effect in ("coulomb", "viscous")}
+    here = np.isin(np.arange(len(whole)), sorted(held)) & (whole > 0.0)
+    return np.where(here, 1.0 - left / np.maximum(whole, 1e-300), 0.0)

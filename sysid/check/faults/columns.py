@@ -22,7 +22,7 @@ AFTER, SENSELESS = 2, ("wrong_unit", "angle_wrap")
 # Log of squares that another reading must take off, in all and of each joint whose column it reads
 # otherwise: what is left falls to a third of its power.
 _BETTER = 1.0
-_ROUNDS = 4  # at least; each joint may have one
+_ROUNDS = 4, 8  # at least, and at most: each joint may have one thing in which it differs
 _TRIED = 8  # readings that are clear, of which each is a fit
 _QUARTERS = (1, 2, -1)  # turns by which a log's zero may be off the URDF's
 _EXPLAINS = 0.2  # of a joint's torque squared: less of the URDF's torque tells no factor
@@ -45,14 +45,16 @@ def find(look: Look) -> Iterator[Fault]:
     scored, free = equations.scored(reading), cache(partial(left_free, look.seen))
     mounted = gravities(equations)
     turning = np.flatnonzero(~np.asarray(look.robot.prismatic)).tolist()
-    for _ in range(max(_ROUNDS, look.robot.dof)):
+    for _ in range(np.clip(look.robot.dof, *_ROUNDS)):
         # of joints that hardly move any reading of the columns tells as little
         others = [
             own
             for own in readings(reading, look.robot.dof, turning)
             if any(look.excited[j].enough for j in own[1][1])
         ]
-        others += _of_all(reading, look)
+        others += _of_all(
+            reading, [j for j in np.flatnonzero(scored.known) if look.excited[j].enough]
+        )
         others += [
             (replace(reading, gravity=down), ("mass_implausible", (), down)) for down in mounted
         ]
@@ -110,17 +112,19 @@ def readings(
         )
 
 
-def _of_all(reading: Reading, look: Look) -> Iterator[tuple[Reading, tuple]]:
-    """Readings in which the torques, or the angles, of all joints have the other sign: one cause,
-    of which each joint shows a part."""
-    move = tuple(j for j in range(look.robot.dof) if look.excited[j].enough)
-    if len(move) > 1:
-        other = {
-            f"{word}_factor": getattr(reading, f"{word}_factor") for word in ("torque", "angle")
-        }
-        for word, factors in other.items():
-            turned = tuple(-factor for factor in factors)
-            yield replace(reading, **{word: turned}), ("sign_flipped", move, word.split("_")[0])
+def _of_all(reading: Reading, joints: Sequence[int]) -> Iterator[tuple[Reading, tuple]]:
+    """Readings in which the torques, or the angles, of some joints have the other sign: of all that
+    tell, one cause, of which each shows a part."""
+    if len(joints) < 2:
+        return
+    for word in ("torque", "angle"):
+        factors = getattr(reading, f"{word}_factor")
+        for j in joints:
+            factors = _turned(factors, j)
+        yield (
+            replace(reading, **{f"{word}_factor": factors}),
+            ("sign_flipped", tuple(joints), word),
+        )
 
 
 def _swapped(order, i: int, j: int) -> tuple:
@@ -245,5 +249,5 @@ def _thousandth(look: Look, reading: Reading, joint: str, factor: float, every: 
 
 def times(factor: float) -> str:
     """A factor in words, before "what"."""
-    digits = lambda number: f"{float(f'{number:.2g}'):g}"  # noqa: E731
-    return f"{digits(factor)} times" if factor >= 1.0 else f"one {digits(1.0 / factor)}th of"
+    digits = lambda number: f"{float(f'{number:.2g}'):.6g}"  # noqa: E731 - 1000, and not 1e+03
+    return f"{digits(factor)} times" if factor >= 1.0 else f"1/{digits(1.0 / factor)} of"

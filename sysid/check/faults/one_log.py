@@ -13,7 +13,6 @@ from ..equations import Reading
 from ..fault import ERROR, Fault
 from ..look import Look, Seen
 from .columns import readings
-from .unit_of_log import asked_of
 
 AFTER = 3
 SENSELESS = ("wrong_unit", "angle_wrap", "joint_order", "sign_flipped")
@@ -54,7 +53,7 @@ def _read_otherwise(look: Look, seen: Seen, k: int) -> tuple | None:
     own = rows.log == k
     rest = rows.use & ~own[:, None]
     here = rows.use & own[:, None]
-    asked = [j for j in asked_of(look, rest) if j in asked_of(look, here)]
+    asked = [j for j in look.asked(rest) if j in look.asked(here)]
     if not asked:
         return None
     x, usual = told_by(seen.rows, seen.model, rest)
