@@ -119,7 +119,7 @@ def _seen(
     ]
     for near in places:
         aside |= near  # a fit that has not seen them says whether they follow it
-    often = lambda: sum(not _same(shown, event) for event in found) * _OFTEN > span  # noqa: E731
+    often = lambda: len(found) * _OFTEN > span  # noqa: E731
     while not often():
         more, strange = _bursts(rows, parts, kinds, aside, step, level, alone=not but)
         most = np.maximum(most, strange)
