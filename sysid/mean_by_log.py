@@ -6,12 +6,12 @@ from collections.abc import Sequence
 from functools import cache
 
 from .estimate import Fit
-from .plausible import IN_EACH_LOG, OF_ITS_OWN, centred, other_means
+from .plausible import IN_EACH_LOG, OF_ITS_OWN, Reason, centred, other_means
 
 MOST = 0.5  # of what stands above a floor, or of a square
 
 
-def by_log(fit: Fit, floors, still: Sequence[str] = ()) -> dict[str, str]:
+def by_log(fit: Fit, floors, still: Sequence[str] = ()) -> dict[str, Reason]:
     """{joint: why} of joints of whose error above the NoiseFloor, or above what is noise in any
     case where it is not known, on all logs or on the test logs, most is another mean in each log.
 
@@ -31,9 +31,10 @@ def by_log(fit: Fit, floors, still: Sequence[str] = ()) -> dict[str, str]:
                 for part, own in about().predictions.items()
             )
             left = max(rest, about().rms("train")[joint])
-            most = "" if floor.rms and whole and floor.reached(left) else "most of "
-            out[joint] = (
-                f"{most}{IN_EACH_LOG} ({said}): a torque's zero that was set anew, a load, or what hangs "
-                f"on the place; {OF_ITS_OWN}"
+            alone = bool(floor.rms and whole and floor.reached(left))
+            out[joint] = Reason(
+                f"{'' if alone else 'most of '}{IN_EACH_LOG} ({said}): a torque's zero that was set "
+                f"anew, a load, or what hangs on the place; {OF_ITS_OWN}",
+                settles=alone,
             )
     return out

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,13 +18,21 @@ WRONG = "a check of these logs finds their columns wrong"
 ASK = "are its columns, signs and units right? `sysid check` says"
 IN_EACH_LOG = "what is left is another mean in each log"
 AT_REST = "it stands in the test logs, and what is left is friction at rest, which no model tells"
-SETTLED = (IN_EACH_LOG, AT_REST)  # which settle what is left, whatever else may be
 OF_ITS_OWN = "`data.groups`, and an effect that is `per:` a group, give each its own; a zero is best set alike before every log"
 _ALIKE = 1.1  # times an error: two that differ by less are alike
 _BLOCKS = 10  # of a log, whose means say how far its own may be off
 _CHANCE = 1e-3  # of a log that stands apart from the others, were there nothing
 _SHARE = 0.1  # of a joint's squared error that its logs' means must make
 _MOST = 200_000  # rows that tell a mean
+
+
+@dataclass(frozen=True)
+class Reason:
+    """What else than a law of the robot may be what is left of a joint, in words, of which no other log tells more. settles: all of
+    it, whatever else may be."""
+
+    says: str
+    settles: bool = False
 
 
 def implausible(fit: Fit, still: Sequence[str] = (), logs: Sequence[dict] = ()) -> Iterator[str]:

@@ -16,7 +16,7 @@ from .given_shapes import at_edges
 from .mean_by_log import MOST, by_log
 from .model_parameters import ROBOT
 from .one_clock import clocks_anew
-from .plausible import AT_REST, stands
+from .plausible import AT_REST, Reason, stands
 from .too_narrow import noise_as_law
 
 _FITTED = 0.1  # of what is left on test logs: a fit is made to see whether it takes more there
@@ -171,13 +171,18 @@ def cause(
     )
 
 
-def otherwise(fit: Fit, floors, still: Sequence[str] = ()) -> dict[str, str]:
+def otherwise(fit: Fit, floors, still: Sequence[str] = ()) -> dict[str, Reason]:
     """{joint: why} of joints of which something else than a law may be what the motion predicts: a
     filter that is too narrow for the angles, what `by_log` says, and rest."""
-    at_rest = f"{AT_REST}; hold out a log in which it moves, or leave it out with robot.lock"
+    hold_out = f"{AT_REST}; hold out a log in which it moves, or leave it out with robot.lock"
     trained = lambda joint: floors[fit.joints.index(joint)].reached(fit.rms("train")[joint])  # noqa: E731
-    rests = {joint: at_rest for joint in still if joint in stands(fit) or trained(joint)}
-    return rests | noise_as_law(fit.filters) | by_log(fit, floors, still)
+    rests = {
+        joint: Reason(hold_out, settles=True)
+        for joint in still
+        if joint in stands(fit) or trained(joint)
+    }
+    narrow = {joint: Reason(why) for joint, why in noise_as_law(fit.filters).items()}
+    return rests | narrow | by_log(fit, floors, still)
 
 
 def smeared(errors: Sequence[float], floor) -> bool:

@@ -93,6 +93,6 @@ def test_noise_of_angles_is_no_law_and_asks_for_no_log():
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("sysid.mean_by_log.other_means", lambda *_: {})
         said = otherwise(Found(), ())
-    assert list(said) == ["elbow"] and "`window: auto` under `preprocess:`" in said["elbow"]
+    assert list(said) == ["elbow"] and "`window: auto` under `preprocess:`" in said["elbow"].says and not said["elbow"].settles
     verdict = [{"joint": joint, "status": "unresolved"} for joint in JOINTS]
     assert where.blind({"verdict": verdict, "too_narrow": Found.filters["too_narrow"]}) == ["shoulder"]

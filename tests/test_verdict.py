@@ -23,6 +23,7 @@ from sysid.flexible import Law, Unknown
 from sysid.flexible.unknown import LEVEL
 from sysid.left_open import left_open
 from sysid.noise import NoiseFloor
+from sysid.plausible import Reason
 from sysid.simulate import simulate, write
 from sysid.statement.document import _verdict, dependences
 from sysid.statement.laws import tone
@@ -563,19 +564,19 @@ def test_noise_that_is_louder_in_the_test_logs_is_no_misfit(louder, status):
 
 def test_another_mean_in_each_log_is_no_law():
     """What functions of the motion predict by saying which log it is."""
-    found, _ = asked_of_elbow(3.0, means={"elbow": "another mean in each log"})
+    found, _ = asked_of_elbow(3.0, means={"elbow": Reason("another mean in each log")})
     assert found.status == "unresolved" and found.says.startswith("another mean in each log") and found.left is not None
-    found, _ = asked_of_elbow(3.0, means={"shoulder": "another mean in each log"})
+    found, _ = asked_of_elbow(3.0, means={"shoulder": Reason("another mean in each log")})
     assert found.status == "unknown"
-    quiet, _ = asked_of_elbow(3.0, chance=0.5, means={"elbow": "another mean"})
+    quiet, _ = asked_of_elbow(3.0, chance=0.5, means={"elbow": Reason("another mean")})
     assert "another mean" not in quiet.says  # nothing is predicted that it would be
-    found, _ = asked_of_elbow(3.0, near=(Candidate(find("stribeck"), 1, ()), 0.02), means={"elbow": "another mean"})
+    found, _ = asked_of_elbow(3.0, near=(Candidate(find("stribeck"), 1, ()), 0.02), means={"elbow": Reason("another mean")})
     assert found.status == "unresolved" and found.says.startswith("what is left may be stribeck")
     # where about its means the error is noise, nothing else need be there, and no log carries a zero
-    all_of_it = {"elbow": "what is left is another mean in each log"}
+    all_of_it = {"elbow": Reason("what is left is another mean in each log", settles=True)}
     for near in (None, (Candidate(find("stribeck"), 1, ()), 0.02)):
         found, _ = asked_of_elbow(3.0, near=near, means=all_of_it)
-        assert found.status == "unresolved" and found.says == all_of_it["elbow"] and found.may is None
+        assert found.status == "unresolved" and found.says == all_of_it["elbow"].says and found.reason is all_of_it["elbow"] and found.may is None
     moved = [Transfer("elbow", 3.0, 0.1, (20.0,))]
     for means, carries in ((all_of_it, False), ({}, True)):
         found = verdicts(fitted(3.0, train=1.0), (), [NOISE] * 2, [floor()] * 2, carried=moved, means=means)[1]
@@ -594,7 +595,8 @@ def test_a_mean_by_log_is_told_where_it_is_most_of_what_is_no_noise(monkeypatch,
         found = mean_by_log.by_log(fit, [None, level])
         assert list(found) == ["elbow"] * said
         begins = begins if floor else "most of what is left is another mean"  # nobody knows whether more is missing
-        assert not said or ("+1 in a.csv" in found["elbow"] and found["elbow"].startswith(begins))
+        assert not said or ("+1 in a.csv" in found["elbow"].says and found["elbow"].says.startswith(begins))
+        assert not said or found["elbow"].settles == begins.startswith("what")
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ from ..candidates import Candidate
 from ..estimate import Fit
 from ..flexible import Law, Unknown
 from ..noise import DOUBT, as_of_test
-from ..plausible import SETTLED
+from ..plausible import Reason
 from ..transfer import Transfer, quieter
 from ..unexplained import by_weights, cause, explains, in_vain, loudest, may_be_noise, not_all
 from ..view import taken_where_held
@@ -33,6 +33,7 @@ class Verdict:
     share of the joint's misfit on the test logs that all claims take, NaN where there is none.
     left: what functions of the motion predict of the rest, or None. says: why something is left.
     may: the effect that may be it. even: whether weights make it. carries: why test logs err more.
+    reason: what else than a law it is, of which no other log tells more.
     """
 
     joint: str
@@ -44,6 +45,7 @@ class Verdict:
     may: Candidate | None = None
     even: bool = False
     carries: str = ""
+    reason: Reason | None = None
 
 
 def verdicts(
@@ -59,7 +61,7 @@ def verdicts(
     few: Callable[[int, float], tuple[Candidate, float] | None] = lambda *_: None,
     beyond: Callable[[int, Candidate], Law | None] | None = None,
     took: Sequence[float] | None = None,
-    means: Mapping[str, str] | tuple = (),
+    means: Mapping[str, Reason] | tuple = (),
 ) -> list[Verdict]:
     """The verdict on every joint.
 
@@ -69,7 +71,7 @@ def verdicts(
             weighed: {joint: RMS where each counts by its noise}. law: the function that stands out
             most of what is left of a joint; beyond: the same with what `near`, or by test logs
             alone `few`, says may be it in the model. took: what all claims take of each joint's
-            square on the test logs, low-passed. means: {joint: why} where most is a mean by log.
+            square on the test logs, low-passed. means: {joint: why} where no law may be it.
     """
     last = claims[-1].after if claims else fit
     trained = [as_of_test(f.rms("train"), floors) for f in (fit, last)]
@@ -124,14 +126,12 @@ def verdicts(
             without = weighed[joint] if evens[j] else None
             effect, p = looks or (None, 1.0)
             may = effect if p > LEVEL else None  # what stands above the level was fitted, in vain
-            why = cause(both, floors[j], effect, may, without, louder)
-            mean = dict(means).get(joint, "")
-            if then > 0.0 and not evens[j] and mean.startswith(SETTLED):
-                why, may, remains = mean, None, None
-            elif mean and remains and not looks and then > 0.0 and not evens[j]:
-                why = mean
+            mean = dict(means).get(joint) if then > 0.0 and not evens[j] else None
+            mean = mean if mean and (mean.settles or (remains and not looks)) else None
+            why = mean.says if mean else cause(both, floors[j], effect, may, without, louder)
+            may, remains = (None, None) if mean and mean.settles else (may, remains)
             why += "".join({r.effect: f"; {r.told}" for r in refused if r.joint == joint}.values())
-            told = ("unresolved", others, explained, remains, why, may, evens[j])
+            told = ("unresolved", others, explained, remains, why, may, evens[j], "", mean)
         elif not claims or (floors[j].reached(first) and not (done or fell)):
             told = ("complete",)
         else:
@@ -139,5 +139,5 @@ def verdicts(
             told = ("explained", who, explained)
         out.append(Verdict(joint, *told))
     said = {found.joint: found.says for found in carried}
-    zeros = [one.says.startswith(SETTLED) for one in out]  # which is not carried anywhere
-    return [o if z else replace(o, carries=said.get(o.joint, "")) for o, z in zip(out, zeros)]
+    settled = [o.reason is not None and o.reason.settles for o in out]  # it is not carried anywhere
+    return [o if s else replace(o, carries=said.get(o.joint, "")) for o, s in zip(out, settled)]

@@ -175,6 +175,8 @@ def _verdict(v: Verdict, path="config.yaml", joints=()) -> dict:
         out["may_be"] = {**told, "command": adds}
     if v.even:
         out["weighting"] = "noise"
+    if v.reason is not None:
+        out["settled"] = True
     if v.left is not None:
         out |= {"depends_on": dependences(v.left), "share_left": v.left.share}
     elif v.status == "unknown":

@@ -7,7 +7,7 @@ import numpy as np
 from ..end_stops import END, LAWS
 from ..failures import Failure
 from ..fit_document import number
-from ..plausible import SETTLED, WRONG
+from ..plausible import WRONG
 from .words import listed, wrapped
 
 
@@ -59,7 +59,7 @@ def blind(document: dict) -> list[str]:
         for v in open_
         if not {"may_be", "weighting"} & v.keys()
         and v["joint"] not in known
-        and not any(why in (v.get("says") or "") for why in SETTLED)  # another tells no more
+        and not v.get("settled")  # no other log tells more
     ]
 
 
