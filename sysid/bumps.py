@@ -21,6 +21,7 @@ from .lowpass import band, lowpassed, stride_of, widest
 from .model import Model
 from .motion import Motion
 from .outliers import BURST, CHANCE, bursts, ratio, surprise
+from .plain_model import PLAIN
 from .projection import inverted
 from .robot import Robot
 from .rows import Rows, measured, telling
@@ -28,7 +29,6 @@ from .running import running
 from .specs import EffectSpec
 from .stretches import stretches
 
-_EFFECTS = ("viscous", "coulomb", "torque_bias", "armature")  # what any joint has
 _NEARBY = 0.5  # s to either side whose median a burst must exceed
 _OFTEN = 3.0  # s of log to a burst: what comes more often is how the machine moves, and no accident
 _SHARE = 0.2  # of how far torque goes within twice a burst's time: of a quick move less is left
@@ -62,7 +62,7 @@ def bumps(robot: Robot, logs: Sequence[Log], *, among: int = 1) -> list[Event]:
     cutoff = widest(logs, known=(own_band := band(logs)))
     if (motion := lowpassed(calm, robot.joints, cutoff, known=own_band)) is None:
         return shown
-    model = build(robot, [EffectSpec(name=name) for name in _EFFECTS])
+    model = build(robot, [EffectSpec(name=name) for name in PLAIN])
     stride, playing = stride_of(motion, cutoff), set[int]()
     while (seen := _seen(robot, model, motion, stride, shown, among, playing)).often:
         # what a joint does alone time and again is its own: the others say what else there is, two

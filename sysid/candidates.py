@@ -13,13 +13,10 @@ from .effect import Effect, MotionEffect, SensorEffect, WrenchEffect
 from .listed_effects import found as found_effect
 from .model import Model
 from .model_parameters import ROBOT, place
+from .plain_model import PLAIN
 from .robot import Robot
 from .specs import Experiment, is_own
 from .vocabulary import find, vocabulary
-
-# What every model has to begin with is added first where it lacks; then what has a law; then what
-# can bend to anything.
-_PLAIN = ("viscous", "coulomb", "armature", "torque_bias")
 
 
 @dataclass(frozen=True)
@@ -104,8 +101,8 @@ class Candidate:
 
     @property
     def simplicity(self) -> tuple:
-        """Sorts the simplest first."""
-        return (self.parameters, self.name not in _PLAIN, self.name)
+        """Sorts the simplest first, of these what any joint has."""
+        return (self.parameters, self.name not in PLAIN, self.name)
 
 
 def candidates(model: Model, extra=(), logs: Sequence[str] = ()) -> list[Candidate]:

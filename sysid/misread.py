@@ -45,7 +45,7 @@ def unasked(verdicts: Sequence) -> list:
     what."""
     why = "the columns of these logs look wrong, and what is left may be no more than that"
     return [
-        replace(one, status="unresolved", says=why, left=None, may=None, even=False)
+        replace(one, status="unresolved", says=why, left=None, may=None, even=False, reason=None)
         if one.status in ("unknown", "unresolved")
         else one
         for one in verdicts

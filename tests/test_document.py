@@ -146,7 +146,7 @@ def test_what_is_unresolved_needs_another_log(found):
     """The command that designs it is told where a joint is unresolved, and only there; in words, on a line of its own, whole."""
     target = found.fit.experiment.path.parent
     for status, command in (("unresolved", f"sysid design {target} --out next"), ("complete", None)):
-        verdict = tuple(replace(v, status=status, claims=(), says="why", left=None, may=None, even=False) for v in found.verdict)
+        verdict = tuple(replace(v, status=status, claims=(), says="why", left=None, may=None, even=False, reason=None) for v in found.verdict)
         other = replace(found, verdict=verdict)
         said = document(other, "runs/x")
         assert said["next_log"] == command

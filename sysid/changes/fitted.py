@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..blocks import jackknife
+from ..blocks import jackknife, z_score
 from ..carried import BALL, WEAK
 from ..inertia import DIVERGENCES, PARAMETERIZATIONS
 from ..inertia.pseudo import from_pseudo, to_pseudo
@@ -52,7 +52,8 @@ def together(model: Model, asked: Question, chosen) -> tuple[tuple[Change, ...],
     with_all, out = asked.across(chosen), []
     for key, own in spans.items():
         rest = asked.across([other for other in chosen if other != key])
-        share, z = asked.taken(key, rest, with_all)
+        share = asked.share(key, rest, with_all)
+        z = z_score(asked.weighted_sum(key, rest - with_all))
         error = share / z if z else np.nan
         joint = place(key[1], model.robot.joints)
         by_data = [one[own, own] for one in spreads]

@@ -76,19 +76,20 @@ class Question:
             self._kept[known] = self.squares(places, c)
         return self._kept[known]
 
-    def taken(self, key: Key, before, after) -> tuple[float, float]:
-        """The share that a change takes of sums of squares (blocks, dof) on its joints, weighed,
-        and how many standard errors it stands from zero: few, where a few blocks have most."""
+    def weighted_sum(self, key: Key, squares: np.ndarray) -> np.ndarray:
+        """(blocks,) sums of squares (blocks, dof) over the joints of a change, as they count."""
         joints = slice(None) if key[1] == ROBOT else [key[1]]
-        fall = ((before - after) * self.weights**2)[:, joints].sum(1)
-        whole = max(float(np.sum((before * self.weights**2)[:, joints])), 1e-300)
-        return float(fall.sum() / whole), z_score(fall)
+        return (squares * self.weights**2)[:, joints].sum(1)
+
+    def share(self, key: Key, before, after) -> float:
+        """What a change takes of sums of squares (blocks, dof) on its joints, as they count."""
+        first, then = (self.weighted_sum(key, own) for own in (before, after))
+        return float(np.sum(first - then) / max(np.sum(first), 1e-300))
 
     def evenly(self, key: Key, before, after) -> float:
         """How many standard errors the share that a change takes of each block's own square stands
         from zero: where the change is clear, all blocks say so, however much each has of it."""
-        joints = slice(None) if key[1] == ROBOT else [key[1]]
-        first, then = ((own * self.weights**2)[:, joints].sum(1) for own in (before, after))
+        first, then = (self.weighted_sum(key, own) for own in (before, after))
         return z_score((first - then) / np.maximum(first + then, 1e-300))
 
     def supported(self, least: float) -> list[Key]:
@@ -104,7 +105,7 @@ class Question:
             for key in self.spans:
                 if key not in chosen:
                     after = self.across([*chosen, key])
-                    share = self.taken(key, current, after)[0]
+                    share = self.share(key, current, after)
                     if share >= _WORTH and self.evenly(key, current, after) >= least:
                         found[key] = (share, after)
             if not found:

@@ -18,7 +18,7 @@ from ..units import of_joint
 from . import where
 from .alike import changed_alike, read_alike
 from .claims import chances, claims, confidence_set, finding, ties
-from .laws import BODIES, of_bodies, to_begin_with
+from .laws import BODIES, TOGETHER, of_bodies, to_begin_with
 
 
 def document(found: Diagnosis, run="", *, laws: bool = True) -> dict:
@@ -194,4 +194,4 @@ def dependences(found: Unknown) -> list[dict]:
         for share, words in alone[:4]
         for name, _, other in [words.partition(" and ")]
     ]
-    return out or [{"variable": "several variables together", "share": found.share}]
+    return out or [{"variable": TOGETHER, "share": found.share}]

@@ -13,8 +13,9 @@ from pathlib import Path
 from ..addition import command
 from ..flexible.functions import DIRECTION
 from ..formula.text import OTHER
-from .words import percent
+from .words import followed, percent
 
+TOGETHER = "several variables together"
 _MOST = 0.5  # of what functions of the motion predict: less, and another variable has more
 _NEARLY = 0.8  # of what most predict: one variable that does says it more simply than two
 _TRIED = 2  # of these: each is a fit
@@ -94,6 +95,25 @@ def _in_formula(variable: str, joint: str) -> str | None:
     if of == joint and kind in ("q", "qd", "qdd", "load"):
         return kind
     return variable if OTHER.fullmatch(variable) else None
+
+
+def predicted(entry: dict, word: Callable[[str], str], share: Callable[[float], str]) -> str:
+    """What of the rest of a joint's error the motion predicts or a tone holds; empty where nothing.
+
+    Args:
+        entry: as a document has it. word, share: how a variable and a share are written.
+    """
+    if "share_left" not in entry:
+        return ""
+    if told := tone(entry):
+        return told
+    whole = f"the motion predicts {share(entry['share_left'])} of what is left"
+    alone = [
+        f"{followed(d, word)} {share(d['share'])}"
+        for d in entry["depends_on"][:3]
+        if d["variable"] != TOGETHER
+    ]
+    return whole + (f" ({', '.join(alone)})" if alone else "")
 
 
 def tone(v: dict) -> str:

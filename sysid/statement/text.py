@@ -8,13 +8,12 @@ from typing import TYPE_CHECKING
 from ..addition import LIKELY, designs, likely
 from ..unexplained import LOW_PASS
 from . import where
-from .laws import tone
+from .laws import predicted, tone
 from .rivals import as_little, other_options, rivals
 from .words import (
     all_of,
     either,
     elsewhere,
-    followed,
     listed,
     near,
     option,
@@ -38,7 +37,6 @@ NO_MORE = "no further effect is supported by these logs"
 OWN = "a law of your own can be tried: `sysid effects formula`"
 FILTERED = f"with {LOW_PASS} it goes, where it is faster than the cutoff"
 BEGIN = "to begin with, a polynomial in what it follows"
-_TOGETHER = "several variables together"
 
 
 @dataclass(frozen=True)
@@ -103,7 +101,8 @@ def _joint(v: dict, of: Told, width: int, said: dict[str, str]) -> list[str]:
         ),
     }[status]()
     lines = wrapped(f"{joint}: {status}: {first}", width, "  ")
-    rest = wrapped(f"  {_left(v)}", width, "    ") if "share_left" in v else []
+    left = predicted(v, quantity, percent)
+    rest = wrapped(f"  {left}", width, "    ") if left else []
     if status == "unknown":
         lines += rest
     for head in heads:
@@ -182,16 +181,3 @@ def _head(f: dict, of: Told, joint: str, width: int, said: dict[str, str]) -> li
 def _with_options(f: dict) -> str:
     own = [f"{name} {option(value)}" for name, value in f["options"].items()]
     return f"{f['effect']} with {listed(own or ['none'], 'and')}"
-
-
-def _left(v: dict) -> str:
-    """What of the rest of a joint's error the motion predicts, or a tone holds."""
-    if told := tone(v):
-        return told
-    whole = f"the motion predicts {percent(v['share_left'])} of what is left"
-    alone = [
-        f"{followed(d, quantity)} {percent(d['share'])}"
-        for d in v["depends_on"][:3]
-        if d["variable"] != _TOGETHER
-    ]
-    return whole + (f" ({', '.join(alone)})" if alone else "")

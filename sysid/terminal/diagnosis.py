@@ -88,16 +88,19 @@ def show_verdict(of, width: int) -> None:
 def show_changed(document: dict) -> None:
     """What is different on a log while a fitted model is held."""
     rows = [
-        [joint, *(number(v) for v in (*entry["rms"].values(), entry["left_as_logged"])), "not known" if entry["noise_floor"] is None else number(entry["noise_floor"])]
+        [joint, *(number(v) for v in (entry["rms"]["held"], entry["rms"]["after"], entry["left_as_logged"])), "not known" if entry["noise_floor"] is None else number(entry["noise_floor"])]
         for joint, entry in document["joints"].items()
     ]
     table("the held model on the new log, low-passed at 15 Hz; with the changes as logged, and the noise floor of that [N m or N]", ["joint", "RMS held", "RMS with the changes", "as logged", "noise floor"], rows)
     open_yet = [v for v in document["verdict"] if v["status"] == "unresolved"]
     above = any(v["times_noise"] for v in open_yet)
     if not document["findings"]:
-        said = "nothing has changed, for all that is known of the noise"
-        said = "no change is told that lasts all of the log" if above else said
-        print(said if open_yet else "nothing has changed: all joints are at their noise floor")
+        if above:
+            print("no change is told that lasts all of the log")
+        elif open_yet:
+            print("nothing has changed, for all that is known of the noise")
+        else:
+            print("nothing has changed: all joints are at their noise floor")
     for v in open_yet:
         for line in text.wrapped(f"{v['joint']}: {v['says']}", terminal_width(), "  "):
             print(line)
