@@ -9,11 +9,14 @@ import numpy as np
 import pytest
 
 from scripts.blind_parts.robots import PLANAR
-from sysid import carriers, experiment_file, loop, pipeline, regressor
+from sysid import carriers, experiment_file, loop, pipeline, regressor, results
 from sysid.candidates import Candidate, made, together
+from sysid.changes import changed
 from sysid.diagnose.diagnosis import diagnose
 from sysid.effects.payload import Payload
 from sysid.inertia.pseudo import rotational_inertia, sphere
+from sysid.statement.changes import document as changes_document
+from sysid.statement.changes import named
 from sysid.statement.document import document
 from sysid.view import allowed
 from sysid.vocabulary import find
@@ -182,3 +185,18 @@ def test_a_load_in_another_hand_than_the_last_is_named_with_its_link(two_arms):
         "r_shoulder": "complete",
         "r_elbow": "complete",
     }
+
+
+def test_a_load_that_came_into_another_hand_is_what_changed(two_arms, tmp_path):
+    """Against the model of a log without it: with its link, and no bias that stood for it before it joined."""
+    config = two_arms / "before.yaml"
+    config.write_text((two_arms / "config.yaml").read_text().replace("one.csv, two.csv", "one.csv"))
+    experiment = pipeline.load(config)
+    results.write(pipeline.fit(experiment), tmp_path / "run")
+    said = changes_document(changed(experiment, tmp_path / "run", [str(two_arms / "two.csv")]))
+    (found,) = said["findings"]
+    mass = found["parameters"]["payload.*.m"]
+    assert (found["effect"], found["options"]) == ("payload", {"link": "l_fore"}) and abs(mass["value"] - 0.8) < 3.0 * mass["std"] + 0.01
+    assert named(found) == "payload on *, link l_fore"
+    untouched = [said["joints"][joint]["rms"] for joint in ("r_shoulder", "r_elbow")]
+    assert all(rms["after"] == pytest.approx(rms["held"], rel=0.02) for rms in untouched)

@@ -8,6 +8,7 @@ that is physically possible; standard deviations are those of leaving a block of
 (jackknife).
 
     held.py        the fitted model of a run folder
+    hands.py       which link holds a load, where several may
     signatures.py  the columns of each change that could be
     halves.py      which of them one half of the log tells of the other
     fitted.py      these together on the whole log, with their deviations

@@ -3,7 +3,7 @@ block of time out, to first order."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -25,13 +25,15 @@ _ROUNDS = 3  # of what is believed of a body's size
 @dataclass(frozen=True)
 class Change:
     """A change that the new log supports. removed: share of the squared residual of the held-out
-    half that it removes, with its standard error; parameters {name: (value, std, unit)}."""
+    half that it removes, with its standard error; parameters {name: (value, std, unit)}; options:
+    of the effect, where these are not the usual ones."""
 
     effect: str
     joint: str
     removed: float
     removed_se: float
     parameters: dict[str, tuple[float, float, str]]
+    options: dict[str, str] = field(default_factory=dict)
 
 
 def together(model: Model, asked: Question, chosen) -> tuple[tuple[Change, ...], np.ndarray]:

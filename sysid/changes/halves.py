@@ -93,25 +93,31 @@ class Question:
         return z_score((first - then) / np.maximum(first + then, 1e-300))
 
     def supported(self, least: float) -> list[Key]:
-        """The changes that the halves support, the one that takes most first, each beside those.
+        """The changes that the halves support, what takes most first, each beside all others.
 
         Args:
             least: standard errors that each must stand from zero `evenly`.
         """
         chosen: list[Key] = []
-        current = self.across(chosen)
+
+        def beside(key: Key, others: Sequence[Key]) -> float | None:
+            """What a change takes beside others; None where the halves do not support it."""
+            before, after = self.across(others), self.across([*others, key])
+            share = self.share(key, before, after)
+            clear = share >= _WORTH and self.evenly(key, before, after) >= least
+            return share if clear else None
+
         while len(chosen) < _MOST:
-            found = {}
-            for key in self.spans:
-                if key not in chosen:
-                    after = self.across([*chosen, key])
-                    share = self.share(key, current, after)
-                    if share >= _WORTH and self.evenly(key, current, after) >= least:
-                        found[key] = (share, after)
+            new = {key: beside(key, chosen) for key in self.spans if key not in chosen}
+            found = {key: share for key, share in new.items() if share is not None}
             if not found:
                 break
-            best = max(found, key=lambda key: found[key][0])
-            chosen, current = [*chosen, best], found[best][1]
+            chosen.append(max(found, key=found.get))
+        # what joined first may have stood for what joined after it: a bias for a load
+        for key in list(chosen):
+            others = [other for other in chosen if other != key]
+            if beside(key, others) is None:
+                chosen = others
         return chosen
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +21,7 @@ from ..warned import noticed
 from .fitted import Change, together
 from .halves import BLOCKS, support
 from .halves import question as asked_of
+from .hands import PAYLOAD, hands, holding
 from .held import Held, held
 from .signatures import TILT, about
 
@@ -90,10 +91,14 @@ def asked(
     blocks = numbered(data.t, data.piece, shortest=np.inf, fewest=BLOCKS)
     residual, tried = about(structure, x, motion, stride, data)
     squares = after = (residual**2).sum(axis=0)
+    hand = holding(structure, motion, stride, data.use, residual, by_size(after), blocks)
+    if hand:
+        residual, tried = about(structure, x, motion, stride, data, hand=hand)
+    questions = len(tried) + len(hands(robot)) - 1
     changes, tilt = (), None
     for _ in range(_ROUNDS):  # what a tilt does bends with it
         question = asked_of(tried, residual, by_size(after), blocks)
-        least = support(rate, among * len(tried))
+        least = support(rate, among * questions)
         chosen = question.supported(least)
         changes, after = together(structure, question, chosen)
         if changes:  # a joint counts by what is left of it, not by what the changes made of it
@@ -103,8 +108,9 @@ def asked(
         told = tilt is not None and before is not None
         if np.abs(tilt - before).max() < _NEAR if told else tilt is before:
             break
-        residual, tried = about(structure, x, motion, stride, data, tilt)
+        residual, tried = about(structure, x, motion, stride, data, tilt, hand)
     rms = [np.sqrt(own / counted) for own in (squares, after)]
+    changes = tuple(replace(c, options=hand) if c.effect == PAYLOAD[0] else c for c in changes)
     said = changes, _notes(experiment, changes)
     if not floors:
         return Changed(robot.joints, *rms, (), *said)

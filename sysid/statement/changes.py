@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from ..changes import Change, Changed
 from ..fit_document import number
+from .words import option
 
 _ABOVE = 2.0  # times what looks like noise, where that is not known well: then it is no noise
 
@@ -57,6 +58,7 @@ def _finding(c: Change) -> dict:
     return {
         "effect": c.effect,
         "joint": c.joint,
+        "options": c.options,
         "misfit_removed": c.removed,
         "misfit_removed_se": number(c.removed_se),
         "parameters": {
@@ -65,6 +67,12 @@ def _finding(c: Change) -> dict:
         },
         "tied_with": [],
     }
+
+
+def named(finding: dict) -> str:
+    """A change in words: its joint, and its options where these are not the usual ones."""
+    options = (f", {name} {option(value)}" for name, value in finding["options"].items())
+    return f"{finding['effect']} on {finding['joint']}{''.join(options)}"
 
 
 def many_document(found: dict[str, Changed], failed: dict[str, str], held, run="") -> dict:

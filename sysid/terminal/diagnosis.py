@@ -5,6 +5,7 @@ from rich.text import Text
 
 from ..addition import typed
 from ..statement import sizes, tables, text, where
+from ..statement.changes import named
 from ..unexplained import WEIGHED
 from .next_steps import implausible, mended_first, next_line, next_step, out_of
 from .tables import number, show_notices, table, terminal_width
@@ -107,7 +108,7 @@ def show_changed(document: dict) -> None:
     if above:
         print("where it comes within the log, `sysid.Online` tells when, in Python: it is fed the log row by row")
     for f in document["findings"]:
-        print(f"{f['effect']} on {f['joint']}: removes {text.percent(max(f['misfit_removed'], 0.0))} of the squared residual")
+        print(f"{named(f)}: removes {text.percent(max(f['misfit_removed'], 0.0))} of the squared residual")
         for name, p in f["parameters"].items():
             print(f"  {text.valued(name, p)}" if p["std"] is not None else f"  {name}: this log does not tell it")
     show_notices(document)

@@ -3,6 +3,7 @@
 from rich.console import Console
 from rich.markup import escape
 
+from ..statement.changes import named
 from .tables import number, show_notices, table
 
 
@@ -32,7 +33,7 @@ def show_against(document: dict) -> None:
     """What is different on each of many logs while a fitted model is held."""
     rows = []
     for log, entry in document["logs"].items():
-        changes = [f"{f['effect']} on {f['joint']}" + (f" {m['value']:.3g} kg" if (m := f["parameters"].get("payload.*.m")) and m["std"] is not None else "") for f in entry["changes"]]
+        changes = [named(f) + (f", {m['value']:.3g} kg" if (m := f["parameters"].get("payload.*.m")) and m["std"] is not None else "") for f in entry["changes"]]
         ratio = max((entry["rms_held"][j] / after if after else 1.0) for j, after in entry["rms_after"].items())
         rows.append([log, ", ".join(changes) or "nothing changed", f"{ratio:.3g}"])
     table(f"against {document['against']}: what changed, and how many times smaller the error of a joint is with it", ["log", "changed", "times"], rows)
