@@ -1,9 +1,10 @@
-"""Loads that differ from log to log, as an arm's last link tells them: three and more are levels of a group, and no effect."""
+"""Loads that differ from log to log, as the link that holds them tells them: three and more are levels of a group, and no effect."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -19,17 +20,34 @@ _APART = 0.1  # of the greatest difference: loads that differ by less are one le
 _CLEAR = 5.0  # standard deviations of white noise, which is what these are told with
 
 
-def loads(view) -> dict[str, float]:
-    """{training log: mass [kg] on the last link, more than in the log that has least}, where it is another in three logs and more,
-    and takes a quarter of some joint's squared residual; empty elsewhere.
+@dataclass(frozen=True)
+class Loads:
+    """{training log: mass [kg], more than in the log that has least}, of a payload with some options, and the share that these loads
+    take of the weighted squared residual of all joints."""
+
+    masses: dict[str, float]
+    options: Mapping[str, str]
+    takes: float
+
+
+def loads(view) -> Loads | None:
+    """The loads of whichever link they take most on, where they are others in three logs and more, and take a quarter of some joint's
+    squared residual; None elsewhere.
 
     Args:
         view: of the model, a `view.View`.
     """
+    payload = find(Payload.name)
+    if len(np.unique(view.rows.log)) < 3 or any(effect.name == payload.name for effect, _ in view.model.terms):
+        return None
+    found = [own for options in payload.places(view.model.robot) if (own := _held(view, options))]
+    return max(found, key=lambda own: own.takes, default=None)
+
+
+def _held(view, options: Mapping[str, str]) -> Loads | None:
+    """Loads on the link that a payload's options name."""
     parts = by_block(view.rows.log)
-    if len(parts) < 3 or any(effect.name == Payload.name for effect, _ in view.model.terms):
-        return {}
-    (columns,) = columns_of(view.source, made(find(Payload.name), ROBOT, {}, view.model.robot), [{}])
+    (columns,) = columns_of(view.source, made(find(Payload.name), ROBOT, dict(options), view.model.robot), [{}])
     body, design = columns[:, :, MASS] * view.weights[:, None, None], view.design
     size = np.maximum(np.sqrt(np.einsum("jnk,jnk->k", body, body)), 1e-300)
     body, k = body / size, len(size)
@@ -45,15 +63,16 @@ def loads(view) -> dict[str, float]:
     rest = design.residual - torque.T + (design.columns @ (shared @ found)).T
     square, after = (np.maximum(np.sum(one**2, axis=0), 1e-300) for one in (design.residual, rest))
     if not (1.0 - after / square).max() > TAKES:
-        return {}
+        return None
     # what all logs have alike is the link's own, and told by none
     centred = np.eye(len(parts)) - 1.0 / len(parts)
     variance = np.diag(centred @ inverse[::k, ::k] @ centred) * after.sum() / max(view.rows.use.sum(), 1)
     mass = found[::k] / size[0]
     more = mass - mass.min()
     if len(levels(more)) < 3 or not more.max() > _CLEAR * np.sqrt(variance.max()) / size[0]:
-        return {}
-    return {view.motion.pieces[view.rows.piece[s.start]].source: float(own) for s, own in zip(parts, more)}
+        return None
+    masses = {view.motion.pieces[view.rows.piece[s.start]].source: float(own) for s, own in zip(parts, more)}
+    return Loads(masses, options, float(1.0 - after.sum() / square.sum()))
 
 
 def levels(more: np.ndarray) -> list[list[int]]:
@@ -69,12 +88,15 @@ def levels(more: np.ndarray) -> list[list[int]]:
 
 def told(view) -> Iterator[str]:
     """What is said of loads that differ from log to log, with what an experiment file says of them."""
-    if not (found := loads(view)):
+    if (found := loads(view)) is None:
         return
-    logs, masses = list(found), np.array(list(found.values()))
+    logs, masses = list(found.masses), np.array(list(found.masses.values()))
     groups = {f"load_{n}": [logs[k] for k in own] for n, own in enumerate(levels(masses))}
-    each = ", ".join(f"{log} +{mass:.3g} kg" for log, mass in found.items())
+    each = ", ".join(f"{log} +{mass:.3g} kg" for log, mass in found.masses.items())
+    link = found.options.get("link")
+    held = f"link: {json.dumps(link)}, " if link else ""
     yield (
-        f"the load on the last link is another from log to log: {each}; levels of a group say so: write `groups: {{load: {json.dumps(groups)}}}` under "
-        "`data:`, each test log at the level whose load it has, and `{payload: {per: load, except: [load_0]}}` under `model.effects`"
+        f"the load on {link or 'the last link'} is another from log to log: {each}; levels of a group say so: "
+        f"write `groups: {{load: {json.dumps(groups)}}}` under "
+        f"`data:`, each test log at the level whose load it has, and `{{payload: {{{held}per: load, except: [load_0]}}}}` under `model.effects`"
     )

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from scripts.blind_parts.robots import PLANAR
-from sysid import carriers, experiment_file, loop, pipeline, regressor, results
+from sysid import carriers, experiment_file, loads, loop, pipeline, regressor, results
 from sysid.candidates import Candidate, made, together
 from sysid.changes import changed
 from sysid.diagnose.diagnosis import diagnose
@@ -18,7 +18,7 @@ from sysid.inertia.pseudo import rotational_inertia, sphere
 from sysid.statement.changes import document as changes_document
 from sysid.statement.changes import named
 from sysid.statement.document import document
-from sysid.view import allowed
+from sysid.view import allowed, first_view
 from sysid.vocabulary import find
 from tests.conftest import csv
 from tests.problems import arm
@@ -142,6 +142,24 @@ def test_logs_that_have_most_of_it_are_asked_together():
     assert together([group("a", 1.0), group("b", 2.0), group("c", 2.0), group("ab", 2.0)], robot) == [] == together([other], robot)
 
 
+LEFT = np.array([0.8, 0.8 * 0.3, 0.0, 0.0, 0.002, 0.8 * 0.3**2 + 0.003, 0.8 * 0.3**2 + 0.003, 0.0, 0.0, 0.0])  # of the fore link's frame
+
+
+def two_armed_log(planar, path, seed: int, load, ends: tuple[float, float]) -> None:
+    """12 s of two planar arms, of which the left one holds a load between two times."""
+    t, columns = np.arange(3000) / 250.0, {}
+    for number, side in enumerate("lr"):
+        q, qd, qdd = smooth(t, 10 * seed + number, 1.2)
+        held = ((t >= ends[0]) & (t < ends[1]) & (side == "l"))[:, None]
+        bodies = [np.array(planar.prior), np.array(planar.prior)]
+        bodies[1][-1] += load
+        empty, full = (regressor.torque(planar, pi, q, qd, qdd) for pi in bodies)
+        tau = np.where(held, full, empty) + 0.3 * qd + 0.4 * np.sign(qd) + np.random.default_rng(seed).normal(0.0, 0.1, q.shape)
+        for j, joint in enumerate(("shoulder", "elbow")):
+            columns |= {f"q_{side}_{joint}": q[:, j], f"tau_{side}_{joint}": tau[:, j]}
+    path.write_text(csv({"t": t} | columns))
+
+
 @pytest.fixture(scope="module")
 def two_arms(tmp_path_factory, planar):
     """Three logs of two planar arms on one base; in the second and the third the left one, which is not last in the URDF, holds a
@@ -158,19 +176,8 @@ def two_arms(tmp_path_factory, planar):
     (folder / "config.yaml").write_text(
         "robot: {urdf: robot.urdf}\ndata: {train: [one.csv, two.csv], test: [three.csv]}\nmodel: {effects: [viscous, coulomb]}\n"
     )
-    load = np.array([0.8, 0.8 * 0.3, 0.0, 0.0, 0.002, 0.8 * 0.3**2 + 0.003, 0.8 * 0.3**2 + 0.003, 0.0, 0.0, 0.0])
     for seed, (log, ends) in enumerate({"one": (0.0, 0.0), "two": (0.0, 99.0), "three": (0.0, 99.0)}.items()):
-        t, columns = np.arange(3000) / 250.0, {}
-        for number, side in enumerate("lr"):
-            q, qd, qdd = smooth(t, 10 * seed + number, 1.2)
-            held = ((t >= ends[0]) & (t < ends[1]) & (side == "l"))[:, None]
-            bodies = [np.array(planar.prior), np.array(planar.prior)]
-            bodies[1][-1] += load
-            empty, full = (regressor.torque(planar, pi, q, qd, qdd) for pi in bodies)
-            tau = np.where(held, full, empty) + 0.3 * qd + 0.4 * np.sign(qd) + np.random.default_rng(seed).normal(0.0, 0.1, q.shape)
-            for j, joint in enumerate(("shoulder", "elbow")):
-                columns |= {f"q_{side}_{joint}": q[:, j], f"tau_{side}_{joint}": tau[:, j]}
-        (folder / f"{log}.csv").write_text(csv({"t": t} | columns))
+        two_armed_log(planar, folder / f"{log}.csv", seed, LEFT, ends)
     return folder
 
 
@@ -200,3 +207,18 @@ def test_a_load_that_came_into_another_hand_is_what_changed(two_arms, tmp_path):
     assert named(found) == "payload on *, link l_fore"
     untouched = [said["joints"][joint]["rms"] for joint in ("r_shoulder", "r_elbow")]
     assert all(rms["after"] == pytest.approx(rms["held"], rel=0.02) for rms in untouched)
+
+
+def test_loads_of_another_hand_that_differ_from_log_to_log_name_its_link(two_arms, planar, tmp_path):
+    """Nothing, 0.8 kg and 1.6 kg in the left hand: levels of a group, of a payload on that link."""
+    for seed, (log, times) in enumerate((("first", 0.0), ("second", 1.0), ("third", 2.0))):
+        two_armed_log(planar, tmp_path / f"{log}.csv", 20 + seed, times * LEFT, (0.0, 99.0))
+    shutil.copy(two_arms / "robot.urdf", tmp_path)
+    text = "robot: {urdf: robot.urdf}\ndata: {train: [first.csv, second.csv, third.csv], test: [first.csv]}\nmodel: {effects: [viscous, coulomb]}\n"
+    (tmp_path / "config.yaml").write_text(text)
+    experiment = pipeline.started(pipeline.load(tmp_path))
+    view = first_view(experiment, pipeline.fit(experiment))
+    found = loads.loads(view)
+    assert found.options == {"link": "l_fore"} and found.masses == pytest.approx({"first.csv": 0.0, "second.csv": 0.8, "third.csv": 1.6}, abs=0.05)
+    (said,) = loads.told(view)
+    assert said.startswith("the load on l_fore is another from log to log") and '`{payload: {link: "l_fore", per: load, except: [load_0]}}`' in said
