@@ -40,7 +40,8 @@ def jumps(
     """Of each piece the rows (n, dof) bool that the filter bends for a joint's torque where an
     acceleration jumps: about each jump that makes an error greater than that torque's noise, until
     less is left beyond than the noise of a single row, or as far as the filter sees. Most of what
-    the torque itself does there must be such a wave.
+    the torque itself does there must be such a wave. Where a joint's torque is bent anywhere, the
+    ends of logs, which show half a wave, may be so too.
 
     Args:
         counts: of each piece the rows (n, dof) bool in which a joint moves and is not disturbed.
@@ -66,6 +67,9 @@ def jumps(
             late = _late(alike, j, noise)
             for one in alike:
                 one.found[:, j] = _bent(one, j, noise, late)
+        if any(one.found[:, j].any() for one in seen):
+            for one in seen:
+                one.found[one.ends, j] = True
     return out
 
 
@@ -94,6 +98,13 @@ class _Seen:
     def step(self) -> float:
         """From row to row [s]."""
         return self.response.smoother.step
+
+    @property
+    def ends(self) -> list[int]:
+        """The rows about the log's ends that a jump may bend which is seen from one side only, and
+        is not told by its wave."""
+        far = self.response.smoother.reach + self.response.near
+        return [*range(far), *range(-far, 0)]
 
     @cached_property
     def light(self) -> np.ndarray:

@@ -14,6 +14,7 @@ from sysid.smoother import Smoother
 from sysid.specs import PreprocessSpec
 
 STEP, INERTIA, NOISE = 1e-3, 2.0, 0.02
+ENDS = 100  # rows: twice what the filter sees
 
 
 def twice(qdd, step=STEP):
@@ -67,6 +68,15 @@ def test_the_true_model_leaves_the_noise_where_an_acceleration_jumps():
     # a jump or a reversal every half or whole second, and no more about each than the filter sees
     (piece,) = kept.pieces
     assert 1.0 - piece.use.mean() < 18 * 0.1 / 12.0 + 0.01
+
+
+@pytest.mark.parametrize("after", [0.02, 0.06, 0.09])
+@pytest.mark.parametrize("end", [1, -1])
+def test_a_jump_at_an_end_of_a_log_is_left_out_too(after, end):
+    """Half of its wave is in the log, or less: an acceleration that jumped 0.1 s before the end was nine tenths of a control's error."""
+    t, q, qdd = moves(11.5 + after)
+    tau = (INERTIA * qdd + NOISE * np.random.default_rng(0).normal(size=len(t)))[::end]
+    assert error(motion(tau, q[::end], t)) == pytest.approx(NOISE, rel=0.1)
 
 
 @pytest.mark.parametrize("samples", [-28, -15, -4, 0, 12, 25])
@@ -125,7 +135,7 @@ def test_a_jump_of_several_deviations_is_found_in_its_place():
     rng, t, places = np.random.default_rng(2), np.arange(8000) * STEP, (2.0, 5.1)
     qdd = np.sum([t >= place for place in places], axis=0) * 0.3
     tau = INERTIA * qdd + 0.1 * rng.normal(size=len(t))
-    rows, times = found(t, twice(qdd) + 1e-7 * rng.normal(size=len(t)), tau)
+    rows, times = (own[ENDS:-ENDS] for own in found(t, twice(qdd) + 1e-7 * rng.normal(size=len(t)), tau))  # an end may hide another
     apart = np.min([np.abs(times[rows[:, 0]] - place) for place in places], axis=0)
     assert all(np.abs(times[rows[:, 0]] - place).min() <= 5 * STEP for place in places) and apart.max() <= 0.05
 
