@@ -112,6 +112,19 @@ def test_two_repeats_suffice_and_drift_with_time_is_no_noise():
     assert result.method == "repeats" and result.rms == pytest.approx(e.std(), rel=0.05)
 
 
+@pytest.mark.parametrize("times", [1.0, 1.5])
+def test_a_log_that_repeats_says_nothing_of_others_where_noise_is_not_the_same(times):
+    """A fast multisine, whose noise is louder than that of the moves beside it: its repeats were above all that is left, and no floor was known."""
+    rng, step = np.random.default_rng(8), 0.008
+    angles = [periodic(30.0, step, 0.1, rng), wandering(30.0, step, rng)]
+    noise = [size * white(len(q), step, rng) for size, q in zip((times, 1.0), angles)]
+    left = [np.outer(e, [0.0, 1.0, 0.0]) for e in noise]
+    logged = [torque(q, step) + own for q, own in zip(angles, left)]
+    result = floor(left, logged, angles, [step, step], 1)
+    assert result.rms == pytest.approx(np.concatenate(noise).std(), rel=0.07)
+    assert ("logs that repeat by themselves" in result.detail) is (times > 1.0)
+
+
 def test_repeats_are_found_across_rows_that_do_not_count():
     """Standstill parts the log into pieces shorter than a period."""
     rng, step = np.random.default_rng(16), 0.008

@@ -90,9 +90,10 @@ def estimate(
     """The floor of one joint and how sure it is. See `floor`."""
     lengths = [len(r) for r in residual]
     use = [np.ones(n, dtype=bool) for n in lengths] if use is None else _of_joint(use, joint)
+    memory = {} if memory is None else memory
+    given = (residual, measured, q, step), joint, use, memory, angles
     if len(rates := by_rate(step)) > 1:
-        given = (residual, measured, q, step), joint, use, {} if memory is None else memory, angles
-        return of_each(rates, estimate, *given)
+        return of_each(rates, estimate, *given, "each sampling rate by itself")
     columns, logged = (_of_joint(x, joint) for x in (residual, measured))
     inside = np.concatenate([c[u] for c, u in zip(columns, use)]) if lengths else np.zeros(0)
     size = max((float(np.abs(m[u]).max(initial=0.0)) for m, u in zip(logged, use)), default=0.0)
@@ -101,7 +102,7 @@ def estimate(
         return Estimate(own, own, "none", "", "no sample counts", own)
     if own <= 1e-12 * size:
         return _certain(own, "the model leaves nothing of the torque", own)
-    shared = shared_by(q, step, use, {} if memory is None else memory, angles)
+    shared = shared_by(q, step, use, memory, angles)
     runs, bandwidth = shared.runs, shared.bandwidth
     if not runs:
         why = f"{len(inside)} samples, no {FEWEST_SAMPLES} of them together, are too few"
@@ -130,7 +131,12 @@ def estimate(
             k = next(k for k, period in enumerate(shared.periods) if period is not None)
             count = int(lengths[k] / shared.periods[k] + 0.01)
             words = f"period of {shared.periods[k] * step[k]:.3f} s found, {count} repeats"
-            return _bounded(*found, "repeats", words, "the repeats differ", own)
+            repeated = _bounded(*found, "repeats", words, "the repeats differ", own)
+            again, once = shared.repeating
+            if not once or repeated.std <= UNSURE * repeated.rms:
+                return repeated
+            # noise is not the same in all, as where it is louder in faster motion
+            return of_each([again, once], estimate, *given, "logs that repeat by themselves")
     steps = [run.step for run in runs]
     spectrum = spectrum_of(rest, kept, steps)
     made = None

@@ -23,6 +23,12 @@ class Shared:
     bandwidth: float
     periods: list[float | None]  # of each stretch [samples]
 
+    @property
+    def repeating(self) -> tuple[list[int], list[int]]:
+        """The numbers of the stretches that repeat, and of those that do not."""
+        again = [k for k, period in enumerate(self.periods) if period is not None]
+        return again, [k for k, period in enumerate(self.periods) if period is None]
+
 
 def shared_by(q, step, use, memory: dict, angles) -> Shared:
     """What the joints share whose rows that count are `use`, made once."""
