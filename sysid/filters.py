@@ -14,13 +14,14 @@ import numpy as np
 from . import too_narrow
 from .blocks import within_one_error
 from .drives import slowest, with_drives
-from .errors import SysidError
+from .errors import ConfigError, SysidError
 from .filter_errors import held_out
 from .log import Log
 from .lowpass import band
 from .model import Model
 from .plain_model import plain
 from .preprocess import needs
+from .smoother import Smoother
 from .spans import Spans
 from .specs import Experiment, PreprocessSpec
 from .warned import noticed, warn
@@ -80,10 +81,11 @@ def begun(
     model = with_drives(plain(experiment, model.robot), experiment)
     key = "cutoff" if low else _key(spec)
     value = "auto" if low else getattr(spec, key)
-    automatic = value == "auto"
-    values = ((*_SLOW, *_CUTOFFS) if low else _WINDOWS if key == "window" else _CUTOFFS) if automatic else (value / 2, value, value * 2)
     shortened = [_middle(log) for log in logs]
     step = max(segment.step for log in shortened for segment in log.segments)
+    cannot = "" if low or value == "auto" or key in _given(spec) else _impossible(spec, step)
+    automatic = value == "auto" or bool(cannot)
+    values = ((*_SLOW, *_CUTOFFS) if low else _WINDOWS if key == "window" else _CUTOFFS) if automatic else (value / 2, value, value * 2)
     candidates = [{"cutoff": value, "window": _window(spec, value, step)} if low else {key: value} for value in values]
     edge = _widest_edge(spec, candidates, shortened)
     # a file that others read, they read themselves
@@ -102,7 +104,9 @@ def begun(
             if not tried and low:  # too short to hold a part of them out
                 return of_the_motion(experiment, model, logs, prior)
             if not tried:
-                raise SysidError(f"no {key} suits the logs", where="preprocess", do=f"give {key} a number")
+                raise SysidError(f"no {key} suits the logs", where="preprocess", do=f"log faster or longer, or give {key} a number")
+            if cannot:
+                warn(f"{cannot}; as none is given, it is chosen by the error on stretches of the training logs that were held apart")
             best = _best(tried, key, _USUAL[key])
             chosen = {name: best[name] for name in candidates[0]}
             if len(tried) > 1 and best in (tried[0], tried[-1]):
@@ -117,9 +121,24 @@ def begun(
             said["too_narrow"] = wider
             warn(f"preprocess.{key}: {too_narrow.said(wider)}; `{key}: auto` chooses by that")
         shown = [{name: entry[name] for name in (key, "relative_error", "rms")} for entry in tried]
-        return {**said, "order": spec.order, **chosen, "chosen": "held-out error" if automatic else "given" if key in _given(spec) else "usual", "held_out": shown}
+        return {
+            **said,
+            "order": spec.order,
+            **chosen,
+            "chosen": "held-out error" if automatic else "given" if key in _given(spec) else "usual",
+            "held_out": shown,
+        }
 
     return result
+
+
+def _impossible(spec: PreprocessSpec, step: float) -> str:
+    """Why a filter cannot be of samples so many seconds apart; empty where it can."""
+    try:
+        Smoother(spec, step)
+    except ConfigError as error:
+        return str(error).partition(";")[0]
+    return ""
 
 
 def _key(spec: PreprocessSpec) -> str:
@@ -155,7 +174,9 @@ def lowpassed(experiment: Experiment) -> bool:
     """Whether both sides of an experiment go under a low-pass: where it says so, and where a joint's torque is made of its own angle, a
     servo's, and it says nothing of filters."""
     spec = experiment.preprocess
-    return spec.filter != "none" and (spec.torque == "low-pass" or (_servos(experiment) and not spec.model_fields_set & {"filter", "window", "cutoff", "torque"}))
+    return spec.filter != "none" and (
+        spec.torque == "low-pass" or (_servos(experiment) and not spec.model_fields_set & {"filter", "window", "cutoff", "torque"})
+    )
 
 
 def of_the_motion(experiment: Experiment, model: Model, logs: Sequence[Log], prior) -> dict:

@@ -16,16 +16,17 @@ from .warned import noticed
 _SHOWN = 4  # joints by name: of a humanoid whose arm is identified thirty may move
 
 
-def elsewhere(experiment: Experiment, robot: Robot) -> str:
-    """What is wrong with the locks of such joints, in words; empty where nothing is. A link that
-    moves while its model stands is in every joint's torque that carries it, and looks like one of
-    their effects.
+def elsewhere(experiment: Experiment, robot: Robot, *, named: bool = False) -> dict[str, str]:
+    """{joint: where it is locked and where logs have it} of such joints. A link that moves while its
+    model stands is in every joint's torque that carries it, and looks like one of their effects.
 
-    Of joints that `robot.lock` names somebody has said where they stand; of others only columns that
-    go by a pattern of the joints' names are found.
+    Args:
+        named: of joints that `robot.lock` names, of which somebody has said where they stand, and
+            not of the others. Only columns that go by a pattern of the joints' names are found.
     """
     types = {joint: robot.source.joints[joint].type for joint in robot.locked}
-    left, told = [joint for joint in robot.locked if joint not in experiment.robot.lock], []
+    left = [joint for joint in robot.locked if (joint in experiment.robot.lock) is named]
+    told: dict[str, str] = {}
     for spec in experiment.data.train if left else ():
         with noticed():
             found = _angles(experiment, spec, left, types)
@@ -36,17 +37,21 @@ def elsewhere(experiment: Experiment, robot: Robot) -> str:
             if np.abs(off).max(initial=0.0) > TRAVELS:
                 left.remove(joint)
                 unit = "m" if types[joint] == "prismatic" else "rad"
-                told.append(
+                told[joint] = (
                     f"{joint} at {angle:.3g} {unit}, which {spec.name} has from {q.min():.3g} to "
                     f"{q.max():.3g}"
                 )
-    if not told:
-        return ""
-    shown = [*told[:_SHOWN], *([f"{len(told) - _SHOWN} more"] if len(told) > _SHOWN else [])]
+    return told
+
+
+def says(told: dict[str, str]) -> tuple[str, str]:
+    """What is said of such joints, and what to do about it."""
+    every = [*told.values()]
+    shown = [*every[:_SHOWN], *([f"{len(every) - _SHOWN} more"] if len(every) > _SHOWN else [])]
     return (
-        f"locked joints that move, or stand elsewhere: {'; '.join(shown)}. Name them in "
-        "robot.joints (and in data.unused where their torque is not usable), or say in robot.lock "
-        "where they stand"
+        f"locked joints that move, or stand elsewhere: {'; '.join(shown)}",
+        "name them in robot.joints (and in data.unused where their torque is not usable), or say in "
+        "robot.lock where they stand",
     )
 
 
@@ -60,7 +65,9 @@ def _angles(experiment: Experiment, spec, joints: list[str], types: dict) -> dic
         there = [joint for joint in joints if table.has(pattern.replace("{joint}", joint))]
         if not there:
             return {}
-        columns = experiment.data.columns.model_copy(update={"velocity": None, "acceleration": None})
+        columns = experiment.data.columns.model_copy(
+            update={"velocity": None, "acceleration": None}
+        )
         nothing = {"columns": columns, "position": {}, "torque": {}, "signals": {}, "groups": {}}
         data = experiment.data.model_copy(update={**nothing, "unused": there})
         slides = np.array([types[joint] == "prismatic" for joint in there])

@@ -168,12 +168,14 @@ class _Columns:
 @dataclass(frozen=True)
 class _Asked:
     """Data with the columns of what may join: the bodies under a weight of the prior, and squares
-    (stretches, joints) of each stretch held apart, rows (stretches, joints)."""
+    (stretches, joints) of each stretch held apart, rows (stretches, joints). bounds: between which
+    the last coefficients may be."""
 
     found: Fit
     data: Compressed
     coefficients: tuple[Coefficient, ...]
     moving: np.ndarray
+    bounds: tuple[tuple[float, float], ...] = ()
 
     @property
     def _posing(self) -> tuple:
@@ -186,8 +188,12 @@ class _Asked:
         return held_apart(*self._posing, self.found.weights)
 
     def plausible(self, weight: float) -> bool:
-        """Whether all masses are."""
+        """Whether all masses are, and slopes are gone along no farther than their values may go:
+        nothing tells a tilt about the axis that two joints share, and 9000 rad of it took a mass."""
         x = solved(pose(*self._posing, self.found.weights), weight)
+        last = x[len(x) - len(self.bounds) :]
+        if not all(low <= value <= high for value, (low, high) in zip(last, self.bounds)):
+            return False
         robot = self.found.model.robot
         return not far(robot, x[: 10 * len(robot.bodies)].reshape(-1, 10))
 
@@ -247,26 +253,26 @@ def _passed(found: Fit, motion: Motion, thin: int, weight: float, bends: bool) -
     x[: found.model.size] = np.append(found.prior.ravel(), found.coefficients)
     source = Linearised(wide, x) if bends else wide
     data = compress(source, motion, thin=thin)
-    own, names = range(found.model.size), found.model.coefficients
-    was = _Asked(found, data.only(own), names, moving_coefficients(found.model, motion))
+    base, names = range(found.model.size), found.model.coefficients
+    was = _Asked(found, data.only(base), names, moving_coefficients(found.model, motion))
     before, out = was.apart.squares(found.strength.value / thin), {}
     for term, (effect, joints) in enumerate(
         wide.terms[len(found.model.terms) :], len(found.model.terms)
     ):
+        bounds: tuple[tuple[float, float], ...] = ()
         if bends:
-            free = [wide.shape_values[k] for k in source.free]
-            slopes = [k for k, value in enumerate(free) if value.term == term]
-            more = [
-                Coefficient(effect.name, v.joint, v.name, v.unit, False)
-                for v in (free[k] for k in slopes)
-            ]
+            free = [(wide.shape_values[k], wide.shapes[k]) for k in source.free]
+            slopes = [k for k, (value, _) in enumerate(free) if value.term == term]
+            own = [free[k] for k in slopes]
+            more = [Coefficient(effect.name, v.joint, v.name, v.unit, False) for v, _ in own]
+            bounds = tuple((v.low - at, v.high - at) for v, at in own)
             columns = [wide.size + k for k in slopes]
         else:
             more = [c for c in wide.coefficients[len(names) :] if c.effect == effect.name]
             columns = [10 * wide.bodies + wide.coefficients.index(c) for c in more]
         joined = (*names, *more)
         moves = moving_coefficients(_Columns(wide.robot, joined), motion)
-        asked = _Asked(found, data.only([*own, *columns]), joined, moves)
+        asked = _Asked(found, data.only([*base, *columns]), joined, moves, bounds)
         if asked.plausible(weight) and (error := asked.error(weight, before)) < np.inf:
             every = len(joints) == wide.robot.dof or joints == (ROBOT,)
             out[effect.name, None if every else tuple(wide.robot.joints[j] for j in joints)] = error

@@ -114,7 +114,7 @@ def _fit(experiment: Experiment, filters: dict | None, strength: PriorWeight | N
             train = measured.train if measured else read(experiment, machine, experiment.data.train, structure=structure, mapped=mapped)
         refuse_no_torque(train)
         if filters is None and (locks := locked_joints.elsewhere(experiment, machine)):
-            warn(locks)
+            warn("; ".join(locked_joints.says(locks)))
         seen = samples_of("train", train) if filters is None else []
         provenance = [_provenance("train", log, spec) for log, spec in zip(train, experiment.data.train)]
         with _timed(seconds, "filters", tell):

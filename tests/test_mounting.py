@@ -39,9 +39,45 @@ def test_gravity_that_points_elsewhere_is_told(gravity, mounted):
     assert told @ gravity > np.cos(np.radians(10.0)) * 9.81**2
 
 
-def test_torque_without_gravity_says_nothing_of_where_it_points(mounted):
-    """As arms log it that take it off themselves."""
-    assert not [f for f in check.check(pipeline.load(mounted((0.0, 0.0, 0.0)))) if "gravity looks" in f.says]
+def test_torque_without_gravity_is_told(mounted, tmp_path):
+    """As arms log it that take it off themselves; and it is no fault where the experiment says so."""
+    logs = shutil.copytree(mounted((0.0, 0.0, 0.0)), tmp_path / "logs")
+    (found,) = check.check(pipeline.load(logs))
+    assert (found.fault, found.severity) == ("mass_implausible", "error") and "nothing of gravity" in found.says and "robot.gravity: [0, 0, 0]" in found.do
+    config = logs / "config.yaml"
+    config.write_text(config.read_text().replace("gravity: [0.0, 0.0, -9.81]", "gravity: [0, 0, 0]"))
+    assert check.check(pipeline.load(logs)) == []
+
+
+def test_gravity_that_the_file_says_there_is_none_of_is_told(mounted, tmp_path):
+    """As where an experiment file was copied from that of a planar robot."""
+    logs = shutil.copytree(mounted((0.0, 0.0, -9.81)), tmp_path / "logs")
+    config = logs / "config.yaml"
+    config.write_text(config.read_text().replace("gravity: [0.0, 0.0, -9.81]", "gravity: [0, 0, 0]"))
+    (found,) = check.check(pipeline.load(logs))
+    assert found.severity == "error" and "the experiment says none" in found.says and "robot.gravity: [0, 0, -9.81]" in found.do
+
+
+@pytest.mark.parametrize("shift", [0.15, -0.6])
+def test_recordings_that_did_not_begin_together_are_told(mounted, tmp_path, shift):
+    logs = shutil.copytree(mounted((0.0, 0.0, -9.81)), tmp_path / "logs")
+    for name in ("train.csv", "test.csv"):
+        table = pl.read_csv(logs / name)
+        t = table["t"].to_numpy()
+        table.with_columns(pl.Series(one, np.interp(t - shift, t, table[one].to_numpy())) for one in ("tau_shoulder", "tau_elbow")).write_csv(logs / name)
+    (found,) = [f for f in check.check(pipeline.load(logs)) if f.severity == "error"]
+    word, other = ("later", "earlier") if shift > 0.0 else ("earlier", "later")
+    assert found.fault == "delayed_signal" and f"look {abs(shift):.2g} s {word} than the motion" in found.says and f"{abs(shift):.2g} s {other}" in found.do
+
+
+def test_a_joint_that_is_locked_and_moves_is_told(mounted, tmp_path):
+    """An error where it carries a joint that is asked, else worth knowing, whether or not somebody said where it stands."""
+    logs = shutil.copytree(mounted((0.0, 0.0, -9.81)), tmp_path / "logs")
+    config, text = logs / "config.yaml", (logs / "config.yaml").read_text()
+    for joints, more, severity in (("elbow", "", "error"), ("shoulder", "", "warning"), ("shoulder", ", lock: {elbow: 0.3}", "warning")):
+        config.write_text("robot: {urdf: robot.urdf, joints: [" + joints + "]" + more + "}\n" + text[text.index("data:") :])
+        found = [f for f in check.check(pipeline.load(logs)) if f.fault == "joint_order"]
+        assert [f.severity for f in found] == [severity] and "locked joints that move" in found[0].says
 
 
 def test_gravity_as_the_file_says_is_no_fault(mounted):

@@ -136,7 +136,7 @@ def test_logs_of_which_no_row_counts_are_refused(experiment, cli):
 def test_a_joint_that_is_locked_and_moves_is_told(experiment, cli):
     folder = experiment(config={"robot.joints": ["shoulder"]})
     said = " ".join(cli("fit", folder).out.split())
-    assert "locked joints that move, or stand elsewhere: elbow at 0 rad, which train.csv has from -" in said and "Name them in robot.joints" in said
+    assert "locked joints that move, or stand elsewhere: elbow at 0 rad, which train.csv has from -" in said and "name them in robot.joints" in said
     # whoever says where it stands knows; and a column that goes by no name is not the elbow's
     for number, config in enumerate(({"robot.lock": {"elbow": 0.3}}, {"data.columns.position": ["q_shoulder"]}, {"data.columns.position": "q_shoulder"})):
         said = cli("fit", experiment(config={"robot.joints": ["shoulder"], **config}, name=f"other{number}"))

@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from .. import experiment_logs, pipeline
+from .. import experiment_logs, filters, pipeline
 from ..errors import SysidError
 from ..estimate import Fit
 from ..events import UNWRITTEN
@@ -19,6 +19,7 @@ from ..plain_model import plain
 from ..preprocess import unfiltered
 from ..robot import Robot
 from ..rows import Rows, stack
+from ..smoother import Smoother
 from ..specs import Experiment
 from ..trusted import Untrusted
 from ..warned import noticed
@@ -164,7 +165,9 @@ def looked(experiment: Experiment) -> Look:
     with noticed() as notices:
         machine, *_ = pipeline.build(experiment)
     logs = read(experiment, machine)
-    if experiment.preprocess.filter == "none":  # a fit would refuse them
-        for log in (one for one in logs if len(one.log.segments)):
-            unfiltered(log.log.segments[0])
+    for log in (one.log for one in logs if len(one.log.segments)):  # a fit would refuse them
+        if experiment.preprocess.filter == "none":
+            unfiltered(log.segments[0])
+        elif filters.is_given(experiment):
+            Smoother(experiment.preprocess, log.segments[0].step)
     return Look(experiment, machine, logs, tuple(notices))

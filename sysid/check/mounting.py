@@ -8,21 +8,24 @@ from .. import regressor
 from .equations import FEWEST, Equations
 
 _NEAR = np.cos(np.radians(25.0))  # nearer to what the experiment says, a tilt of the base is found
-_LEAST = (
-    0.3  # of gravity: torque that has less of it has none, as of arms that take it off themselves
-)
+# of gravity: of torque that has less than a third of it none tells where it points; one that has less
+# than a tenth has none, as of arms that take it off themselves
+_LEAST, _NOTHING = 0.3, 0.1
+_EARTH = 9.81  # m/s^2
 
 
 def gravities(equations: Equations) -> list[tuple[float, ...]]:
     """Another direction of gravity (3,) [m/s^2], as large, by which the URDF's bodies explain the
-    torques best: along an axis of the base where it is near one. None where the torques have
-    nothing of gravity.
+    torques best: along an axis of the base where it is near one. Zero where the torques have nothing
+    of gravity; none where they hardly tell.
 
     What weight they have is linear in it: tau_j = p_j(g = 0) + G_j g + I qdd_j + Fv qd_j
     + Fc sign(qd_j) + b.
     """
-    own, size = equations.robot.gravity, float(np.linalg.norm(equations.robot.gravity))
-    best = _best(equations) if size > 0.0 else np.zeros(3)
+    own, best = equations.robot.gravity, _best(equations)
+    size = float(np.linalg.norm(own)) or _EARTH
+    if np.linalg.norm(best) < _NOTHING * size and np.any(own):
+        return [(0.0, 0.0, 0.0)]
     if not np.linalg.norm(best) > _LEAST * size:
         return []
     best = size * best / np.linalg.norm(best)

@@ -11,6 +11,7 @@ from .look import Look
 
 _KEYS = {"angle": "position", "torque": "torque"}
 _OUT_OF = "or take it as it is, where the URDF is what is wrong"
+_MOUNTED = ", as of one that hangs on a wall or a ceiling"
 _OUT_OF_ZERO = f"{_OUT_OF}, an axis of it, or where gravity points"
 
 
@@ -19,11 +20,20 @@ def told(look: Look, reading: Reading, kind: str, joints, word) -> Iterator[Faul
     names = [look.robot.joints[j] for j in joints]
     if kind == "mass_implausible":
         told = f"[{', '.join(f'{g:g}' for g in word)}]"
-        says = (
-            f"gravity looks like {told} m/s^2 in the axes of the robot's base, as of one that "
-            "hangs on a wall or a ceiling: so the URDF's robot explains the torques"
-        )
-        yield Fault(kind, ERROR, says, f"write robot.gravity: {told}, where it is mounted so")
+        if not any(word):
+            says = (
+                "the torques have nothing of gravity, as of drives that take it off themselves: so "
+                "the URDF's robot explains them"
+            )
+            do = f"write robot.gravity: {told}, or log torques that have it"
+        else:
+            says = (
+                f"gravity looks like {told} m/s^2 in the axes of the robot's base"
+                f"{_MOUNTED if look.robot.gravity.any() else ', and the experiment says none'}: so "
+                "the URDF's robot explains the torques"
+            )
+            do = f"write robot.gravity: {told}, where it is mounted so"
+        yield Fault(kind, ERROR, says, do)
         return
     if kind == "limit_exceeded":
         turn = {1: "a quarter turn", 2: "half a turn", -1: "a quarter turn back"}[word]

@@ -1,10 +1,10 @@
-"""Whether a log has the angle and the torque of a joint that the robot's file does not move."""
+"""Whether a log moves a joint that the robot's file, or the experiment, does not move."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 
-from ... import beyond
+from ... import beyond, locked_joints
 from ...errors import LogError
 from ...recording import table_of
 from ..fault import ERROR, WARNING, Fault
@@ -17,6 +17,10 @@ _MOST = 2**20  # rows: a longer log is read span by span, and not for columns th
 def find(look: Look) -> Iterator[Fault]:
     """joint_order, of columns that belong to no joint of the robot that moves."""
     data, robot = look.experiment.data, look.robot
+    for named in (False, True):
+        if locks := locked_joints.elsewhere(look.experiment, robot, named=named):
+            borne = [beyond.carries(robot.source.joints, joint, robot.joints) for joint in locks]
+            yield Fault("joint_order", ERROR if any(borne) else WARNING, *locked_joints.says(locks))
     patterns = data.columns.position, data.columns.torque
     log = min(look.logs, key=lambda one: one.samples)
     if log.samples > _MOST or not all(isinstance(one, str) for one in patterns):
