@@ -97,7 +97,7 @@ class UnitsSpec(Spec):
     """The units of a log; everything behind the reader is SI."""
 
     time: Literal["s", "ms", "us", "ns"] = "s"
-    position: Literal["rad", "deg", "m", "mm"] = "rad"
+    position: Literal["rad", "deg", "turns", "m", "mm"] = "rad"
     torque: Literal["N m", "N", "A", "mN m", "N cm", "kN m", "mN", "kN"] = "N m"
     torque_constant: Annotated[dict[str, NonZero] | None, BeforeValidator(_constants)] = None
 

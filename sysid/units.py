@@ -7,7 +7,9 @@ import numpy as np
 
 TIME = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 DEGREE = round(math.pi / 180.0, 8)  # rad, as an experiment file says it
-POSITION = {"rad": 1.0, "m": 1.0, "deg": math.pi / 180.0, "mm": 1e-3}
+#: what an angle may be in, and a length
+ANGLES = {"rad": 1.0, "deg": math.pi / 180.0, "turns": 2.0 * math.pi}
+POSITION = {"m": 1.0, "mm": 1e-3, **ANGLES}
 _FORCES = {"N": 1.0, "mN": 1e-3, "kN": 1e3}
 _TORQUES = {"N m": 1.0, "mN m": 1e-3, "N cm": 1e-2, "kN m": 1e3}
 _FAR, _SLACK = 10.0, 0.1  # of the way between a joint's limits
@@ -20,13 +22,14 @@ WORDS = {
     | {"msec": "ms", "millis": "ms", "milliseconds": "ms", "us": "us", "usec": "us", "micros": "us"}
     | {"microseconds": "us", "ns": "ns", "nsec": "ns", "nanos": "ns", "nanoseconds": "ns"},
     "position": {"deg": "deg", "degree": "deg", "degrees": "deg", "rad": "rad", "rads": "rad"}
-    | {"radian": "rad", "radians": "rad", "mm": "mm", "m": "m"},
+    | {"radian": "rad", "radians": "rad", "mm": "mm", "m": "m"}
+    | {"rev": "turns", "revs": "turns", "revolutions": "turns", "turn": "turns", "turns": "turns"},
     "torque": {"nm": "N m"},
 }
 # what brackets in a header say beside these; units that no log may be in stand for themselves
 _SYMBOLS = {
     "time": {"µs": "us", "min": "min"},
-    "position": {"°": "deg", "cm": "cm", "rev": "rev", "turns": "turns", "mrad": "mrad"},
+    "position": {"°": "deg", "cm": "cm", "mrad": "mrad"},
     "torque": {"n": "N", "a": "A", "amp": "A", "amps": "A", "ma": "mA", "mnm": "mN m", "ncm": "N cm", "knm": "kN m", "kn": "kN", "mn": "mN"},
 }
 _BRACKETS = re.compile(r"[\[(]([^\[\]()]*)[\])]\s*$")
@@ -75,7 +78,7 @@ def agree(stated: str, taken: str) -> bool:
     """Whether numbers in one unit may be read in another: the same, or, as one unit is named for turning and for sliding
     joints, the other kind's own of which 1 is 1 (rad and m, N m and N)."""
     known = POSITION if taken in POSITION else TORQUE if taken in TORQUE else TIME
-    kind = (("rad", "deg"), ("m", "mm"), tuple(_TORQUES), tuple(_FORCES), ("A",), tuple(TIME))
+    kind = (tuple(ANGLES), ("m", "mm"), tuple(_TORQUES), tuple(_FORCES), ("A",), tuple(TIME))
     alike = any(stated in units and taken in units for units in kind)
     return stated == taken or (not alike and stated != "A" and taken != "A" and known.get(stated) == 1.0)
 

@@ -132,7 +132,7 @@ def test_units_of_speeds_and_of_sliding_joints(tmp_path):
     n = 20
     columns = {"t": np.arange(n) / 100, **{f"{signal}_{joint}": np.full(n, 90.0) for signal in ("q", "qd", "qdd", "tau") for joint in JOINTS}}
     file = write_table(tmp_path / "log.csv", columns)
-    for unit, hinge, slide in (("deg", np.pi / 2, 90.0), ("mm", 90.0, 0.09), ("m", 90.0, 90.0)):
+    for unit, hinge, slide in (("deg", np.pi / 2, 90.0), ("turns", 180.0 * np.pi, 90.0), ("mm", 90.0, 0.09), ("m", 90.0, 90.0)):
         data = log_spec.DataSpec.model_validate({"columns": {"velocity": "qd_{joint}", "acceleration": "qdd_{joint}"}, "units": {"position": unit}})
         segment = only(log.read(log_spec.LogSpec(file=str(file)), data, JOINTS, (False, True)))
         for values in (segment.q, segment.qd, segment.qdd):

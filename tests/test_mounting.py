@@ -58,6 +58,22 @@ def test_gravity_that_the_file_says_there_is_none_of_is_told(mounted, tmp_path):
     assert found.severity == "error" and "the experiment says none" in found.says and "robot.gravity: [0, 0, -9.81]" in found.do
 
 
+@pytest.mark.parametrize(("times", "stated", "unit"), [(0.5 / np.pi, "rad", "turns"), (1.0, "deg", "rad")])
+def test_angles_in_another_unit_than_the_file_says_are_told(mounted, tmp_path, times, stated, unit):
+    """Turns that were taken for rad; and rad that were taken for degrees, in which no joint moves enough to tell of anything else."""
+    logs = shutil.copytree(mounted((0.0, 0.0, -9.81)), tmp_path / "logs")
+    for name in ("train.csv", "test.csv"):
+        table = pl.read_csv(logs / name)
+        table.with_columns(pl.col("q_shoulder", "q_elbow") * times).write_csv(logs / name)
+    config = logs / "config.yaml"
+    config.write_text(config.read_text().replace("data:\n", f"data:\n  units: {{position: {stated}}}\n"))
+    assert pipeline.load(logs).data.units.position == stated
+    (found,) = [f for f in check.check(pipeline.load(logs)) if f.severity == "error"]
+    assert (found.fault, found.do) == ("wrong_unit", f"set data.units.position: {unit}")
+    config.write_text(config.read_text().replace(f"position: {stated}", f"position: {unit}"))
+    assert not [f for f in check.check(pipeline.load(logs)) if f.severity == "error"]
+
+
 @pytest.mark.parametrize("shift", [0.15, -0.6])
 def test_recordings_that_did_not_begin_together_are_told(mounted, tmp_path, shift):
     logs = shutil.copytree(mounted((0.0, 0.0, -9.81)), tmp_path / "logs")

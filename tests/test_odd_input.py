@@ -155,7 +155,7 @@ def test_units_that_agree_and_units_that_were_meant_are_read(experiment, cli):
 
 @pytest.mark.parametrize(
     ("name", "quantity", "unit"),
-    [("q1 [deg]", "position", "deg"), ("qd (deg/s)", "position", "deg"), ("q[0]", "position", ""), ("tau_a", "torque", ""), ("i [A]", "torque", "A"), ("t", "time", ""), ("tau [N m]", "torque", "N m")],
+    [("q1 [deg]", "position", "deg"), ("axis0 [rev]", "position", "turns"), ("v (turns/s)", "position", "turns"), ("qd (deg/s)", "position", "deg"), ("q[0]", "position", ""), ("tau_a", "torque", ""), ("i [A]", "torque", "A"), ("t", "time", ""), ("tau [N m]", "torque", "N m")],
 )  # fmt: skip
 def test_what_a_header_states(name, quantity, unit):
     assert units.in_header(name, quantity) == unit

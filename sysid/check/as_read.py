@@ -22,11 +22,11 @@ def as_read(
     """Torque (n, dof), columns (dof, n, size) and which rows count (n, dof) as a reading has them,
     of one log or of all of them.
     """
-    rows, order, turn = seen.rows, list(reading.angle), np.array(reading.angle_factor)
+    rows, order, turn = seen.rows, list(reading.angle), reading.turned
     own = rows.log == log if log is not None else np.ones(len(rows.log), dtype=bool)
     tau = rows.of(seen.motion, "tau")[own][:, list(reading.torque)]
     tau = tau * np.array(reading.torque_factor)
-    plain = order == sorted(order) and np.all(turn > 0.0) and not any(reading.zero)
+    plain = order == sorted(order) and np.all(turn == 1.0) and not any(reading.zero)
     if plain and reading.gravity is None:
         return tau, rows.columns[:, own], rows.use[own]
     pieces = (p for p in seen.motion.pieces if log is None or p.log == log)

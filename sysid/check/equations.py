@@ -29,7 +29,9 @@ FEWEST = 50  # rows by which a joint can be told anything
 class Reading:
     """How columns are read: the joint whose column each joint's angle and torque (dof,) really is,
     their factors (dof,), and the angles [rad] of the URDF at which these read zero; gravity (3,) in
-    the base, None for the experiment's."""
+    the base, None for the experiment's. unit: what all angles are in, "" for the experiment's, and
+    scale (dof,): what makes rad of these as they are read.
+    """
 
     angle: tuple[int, ...]
     torque: tuple[int, ...]
@@ -37,6 +39,13 @@ class Reading:
     torque_factor: tuple[float, ...]
     zero: tuple[float, ...]
     gravity: tuple[float, ...] | None = None
+    unit: str = ""
+    scale: tuple[float, ...] | float = 1.0
+
+    @property
+    def turned(self) -> np.ndarray:
+        """(dof,) by which what is read as an angle is multiplied."""
+        return np.array(self.angle_factor) * np.array(self.scale)
 
     @staticmethod
     def plain(dof: int) -> Reading:
@@ -88,7 +97,7 @@ class Equations:
         Args:
             free: whether the URDF's torque may have any factor.
         """
-        own, factor = list(reading.angle), np.array(reading.angle_factor)
+        own, factor = list(reading.angle), reading.turned
         columns = []
         for q, qd, qdd, smoother, rows in self.pieces:
             q, qd, qdd = (a[:, own] * factor for a in (q, qd, qdd))

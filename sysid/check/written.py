@@ -35,6 +35,10 @@ def told(look: Look, reading: Reading, kind: str, joints, word) -> Iterator[Faul
             do = f"write robot.gravity: {told}, where it is mounted so"
         yield Fault(kind, ERROR, says, do)
         return
+    if kind == "wrong_unit":
+        says = f"the angles look to be in {word}: so the URDF's robot explains the torques"
+        yield Fault(kind, ERROR, says, f"set data.units.position: {word}")
+        return
     if kind == "limit_exceeded":
         turn = {1: "a quarter turn", 2: "half a turn", -1: "a quarter turn back"}[word]
         says = (

@@ -8,6 +8,7 @@ import numpy as np
 from .. import beyond
 from ..errors import ConfigError, LogError
 from ..robot import HELD, Robot, followers
+from ..units import ANGLES
 from .guess import Guess
 from .logged import Logged, Signals
 from .robots import grips
@@ -123,7 +124,7 @@ def _told(data: list[Logged], joint: str) -> bool:
 def _si(unit: str, slides: bool) -> float:
     if slides:
         return 1e-3 if unit == "mm" else 1.0
-    return np.pi / 180.0 if unit == "deg" else 1.0
+    return ANGLES.get(unit, 1.0)
 
 
 def _locked(robot: Robot, joint: str, values) -> tuple[float, str]:

@@ -7,7 +7,7 @@ import numpy as np
 from ..errors import LogError
 from ..full_turns import TURN
 from ..log import DEGREES
-from ..units import DEGREE, in_millimetres
+from ..units import ANGLES, DEGREE, in_millimetres
 from .guess import Guess
 from .logged import Logged, Signals
 from .words import UNITS, words
@@ -91,7 +91,7 @@ def position_unit(
             allowed="rad or deg",
             do="log 2 pi / (counts a turn) * (count - count at zero), of the joint",
         )
-    if named in ("deg", "rad"):
+    if named in ANGLES:
         return Guess(key, named, f"the columns' names say {named}")
     largest = {joint: float(np.abs(values).max()) for joint, values in turning.items()}
     joint = max(largest, key=largest.get)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from .words import wrapped
 
+_MENDED = "angle_wrap"
 _WHOLE = 3  # places that are told one by one; of more the worst is told, and the others counted
 
 
@@ -23,6 +24,13 @@ def lines(document: dict, width: int) -> list[str]:
         for do in dict.fromkeys(f["do"] for f in own):
             out += wrapped(f"  -> {do}", width, "     ")
     return [*out, *wrapped(_sum(list(groups), document["ok"]), width, "  ")]
+
+
+def fit_can_be_made(document: dict) -> bool:
+    """Whether a fit of the logs is right as they are: without an error, or where it takes angles that
+    wrap to go on."""
+    errors = {f["fault"] for f in document["faults"] if f["severity"] == "error"}
+    return errors <= {_MENDED}
 
 
 def _told(own: list[dict]) -> list[str]:
@@ -52,5 +60,5 @@ def _sum(kinds: list[tuple[str, str]], ok: bool) -> str:
         return f"{said}, no error: these logs can be fitted"
     more = f" and {said}" if warnings else ""
     mended = "takes the angles to go on, and can be made"
-    then = mended if wrong == {"angle_wrap"} else "of these logs would be wrong"
+    then = mended if wrong == {_MENDED} else "of these logs would be wrong"
     return f"{errors} kind{'s' * (errors > 1)} of error{more}: a fit {then}"

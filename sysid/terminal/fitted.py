@@ -121,7 +121,8 @@ def _show_filter(chosen: dict) -> None:
 def show_check(document: dict, experiment, run) -> None:
     """Every fault of the logs with its cure, the gravest first."""
     print("\n".join(faults.lines(document, terminal_width())))
-    next_step("fit" if document["ok"] else "check", typed(experiment.path), first="" if document["ok"] else f"correct {experiment.path} or the logs", out=out_of(experiment, run))
+    done = faults.fit_can_be_made(document)
+    next_step("fit" if done else "check", typed(experiment.path), first="" if done else f"correct {experiment.path} or the logs", out=out_of(experiment, run))
 
 
 def show_comparison(document: dict, experiments) -> None:

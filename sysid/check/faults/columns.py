@@ -10,7 +10,7 @@ from itertools import combinations, product
 import numpy as np
 
 from ...inertials import unmeant
-from ...units import of_joint
+from ...units import ANGLES, TORQUE, of_joint
 from .. import written
 from ..as_read import left_free
 from ..equations import LIKELY, Equations, Reading, Scored
@@ -58,6 +58,7 @@ def find(look: Look) -> Iterator[Fault]:
         others += [
             (replace(reading, gravity=down), ("mass_implausible", (), down)) for down in mounted
         ]
+        others += _in_units(look, reading)
         tried = [(made, told, equations.scored(made)) for made, told in others]
         tried = [
             (s.loss, made, told, s)
@@ -127,6 +128,18 @@ def _of_all(reading: Reading, joints: Sequence[int]) -> Iterator[tuple[Reading, 
         )
 
 
+def _in_units(look: Look, reading: Reading) -> Iterator[tuple[Reading, tuple]]:
+    """Readings in which the angles of all joints that turn are in another unit, however little they
+    move in that of the experiment."""
+    own, turns = look.experiment.data.units.position, ~np.asarray(look.robot.prismatic)
+    if look.experiment.data.position or not turns.any() or reading.unit:
+        return
+    for unit, size in ANGLES.items():
+        if (times := size / ANGLES.get(own, 1.0)) != 1.0:
+            scale = tuple(np.where(turns, times, 1.0).tolist())
+            yield replace(reading, unit=unit, scale=scale), ("wrong_unit", (), unit)
+
+
 def _swapped(order, i: int, j: int) -> tuple:
     return tuple(order[{i: j, j: i}.get(k, k)] for k in range(len(order)))
 
@@ -168,6 +181,8 @@ def _differences(reading: Reading) -> Iterator[tuple[str, tuple[int, ...], str |
         turned = [word for word, factor in zip(("angle", "torque"), factors) if factor < 0.0]
         if turned:
             yield "sign_flipped", (j,), " and ".join(turned)
+    if reading.unit:
+        yield "wrong_unit", (), reading.unit
     if reading.gravity is not None:
         yield "mass_implausible", (), reading.gravity
     for j, zero in enumerate(reading.zero):
@@ -233,7 +248,10 @@ def _thousandth(look: Look, reading: Reading, joint: str, factor: float, every: 
     data, slides = look.experiment.data, look.robot.prismatic[look.robot.joints.index(joint)]
     plain = of_joint("N m", prismatic=bool(slides))
     own = joint in data.torque or joint in look.experiment.actuator
-    if data.units.torque not in ("N m", "N") or own:
+    said, size = data.units.torque, TORQUE.get(data.units.torque, 1.0)
+    if said not in ("A", "N m", "N") and not own and 0.5 < size / factor < 2.0:
+        return f"if it is in {plain}, and not in {said}, set data.units.torque: {plain}"
+    if said not in ("N m", "N") or own:
         return f"is it in mN m, or kN m? give it in {plain}"
     unit = ("m" if factor > 1.0 else "k") + plain
     at = look.robot.joints.index(joint)
