@@ -74,6 +74,22 @@ def test_angles_in_another_unit_than_the_file_says_are_told(mounted, tmp_path, t
     assert not [f for f in check.check(pipeline.load(logs)) if f.severity == "error"]
 
 
+@pytest.mark.parametrize(
+    ("of", "word", "times"),
+    [("elbow", "a speed, its own", 1.0), ("shoulder", "a speed, that of shoulder", 180.0 / np.pi), ("elbow", "an angle, its own", None)],
+)
+def test_a_torque_that_is_an_angle_or_a_speed_is_told(mounted, tmp_path, of, word, times):
+    logs = shutil.copytree(mounted((0.0, 0.0, -9.81)), tmp_path / "logs")
+    for name in ("train.csv", "test.csv"):
+        table = pl.read_csv(logs / name)
+        angle = table[f"q_{of}"].to_numpy()
+        noise = np.random.default_rng(1).normal(0.0, 0.01, len(angle))
+        own = angle if times is None else times * (np.gradient(angle, table["t"].to_numpy()) + noise)
+        table.with_columns(tau_elbow=pl.Series(own)).write_csv(logs / name)
+    found = [f for f in check.check(pipeline.load(logs)) if f.severity == "error"]
+    assert [(f.fault, f.joint) for f in found] == [("joint_order", "elbow")] and word in found[0].says
+
+
 @pytest.mark.parametrize("shift", [0.15, -0.6])
 def test_recordings_that_did_not_begin_together_are_told(mounted, tmp_path, shift):
     logs = shutil.copytree(mounted((0.0, 0.0, -9.81)), tmp_path / "logs")

@@ -33,7 +33,7 @@ _OF_ANGLES = (
     "angle_wrap", "wrong_unit", "coarse_values", "standstill", "not_excited", "limit_exceeded",
 )  # fmt: skip
 # the modules that ask how columns are read
-_READINGS = ("among", "angles", "columns", "one_log", "unit_of_log", "unmoved")
+_READINGS = ("among", "angles", "columns", "of_motion", "one_log", "unit_of_log", "unmoved")
 
 
 def check(experiment: Experiment) -> list[Fault]:
