@@ -14,14 +14,13 @@ import numpy as np
 from . import too_narrow
 from .blocks import within_one_error
 from .drives import slowest, with_drives
-from .errors import ConfigError, SysidError
+from .errors import SysidError
 from .filter_errors import held_out
 from .log import Log
 from .lowpass import band
 from .model import Model
 from .plain_model import plain
 from .preprocess import needs
-from .smoother import Smoother
 from .spans import Spans
 from .specs import Experiment, PreprocessSpec
 from .warned import noticed, warn
@@ -83,7 +82,7 @@ def begun(
     value = "auto" if low else getattr(spec, key)
     shortened = [_middle(log) for log in logs]
     step = max(segment.step for log in shortened for segment in log.segments)
-    cannot = "" if low or value == "auto" or key in _given(spec) else _impossible(spec, step)
+    cannot = "" if low or value == "auto" or key in _given(spec) else too_narrow.impossible(spec, step)
     automatic = value == "auto" or bool(cannot)
     values = ((*_SLOW, *_CUTOFFS) if low else _WINDOWS if key == "window" else _CUTOFFS) if automatic else (value / 2, value, value * 2)
     candidates = [{"cutoff": value, "window": _window(spec, value, step)} if low else {key: value} for value in values]
@@ -130,15 +129,6 @@ def begun(
         }
 
     return result
-
-
-def _impossible(spec: PreprocessSpec, step: float) -> str:
-    """Why a filter cannot be of samples so many seconds apart; empty where it can."""
-    try:
-        Smoother(spec, step)
-    except ConfigError as error:
-        return str(error).partition(";")[0]
-    return ""
 
 
 def _key(spec: PreprocessSpec) -> str:

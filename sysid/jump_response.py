@@ -77,6 +77,17 @@ class JumpResponse:
         beyond = np.pad(values, ((edge, edge), (0, 0)), mode="reflect", reflect_type="odd")
         return values - self.smoother(beyond)[edge:-edge]
 
+    def without(self, values: np.ndarray, at) -> np.ndarray:
+        """Values (n, ...) less the waves of jumps at rows, of each what those before it left."""
+        left, memory = values.copy(), self.memory
+        for k in at:  # of two within a window each may have a part of the other
+            if not 0 <= k < len(left):  # torque that is late ends later than the log
+                continue
+            low, high = max(0, k - memory), min(len(left), k + memory + 1)
+            wave = self.alike[low - k + memory : high - k + memory]
+            left[low:high] -= np.multiply.outer(wave, left[k].copy())
+        return left
+
 
 def overlapping(
     at: np.ndarray, by: np.ndarray, reach: int, most: int
@@ -108,3 +119,9 @@ def in_span(columns: np.ndarray, values: np.ndarray) -> np.ndarray:
     across, sizes, _ = np.linalg.svd(columns, full_matrices=False)
     across = across * (sizes > _ONE * sizes[:, :1])[:, None, :]
     return np.einsum("mnk,ml,mlk->mn", across, values, across, optimize=True)
+
+
+def off_a_line(values: np.ndarray) -> np.ndarray:
+    """How far each of values (k, n) goes from one side of its straight line to the other (k,)."""
+    along = np.linspace(-1.0, 1.0, values.shape[1])
+    return np.ptp(values - np.outer(values @ along / (along @ along), along), axis=1)

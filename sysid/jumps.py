@@ -19,7 +19,7 @@ from functools import cached_property
 import numpy as np
 
 from .clock_jumps import light, spread, within
-from .jump_response import JumpResponse, about, in_span, overlapping
+from .jump_response import JumpResponse, about, in_span, off_a_line, overlapping
 from .motion import Piece
 from .outliers import CHANCE, NORMAL, NOTHING, SHORT, SPIKE, quantum, ratio, runs
 from .running import running
@@ -69,7 +69,7 @@ def jumps(
                 one.found[:, j] = _bent(one, j, noise, late)
         if any(one.found[:, j].any() for one in seen):
             for one in seen:
-                one.found[one.ends, j] = True
+                one.found[:, j] |= one.at_ends(j, noise)
     return out
 
 
@@ -99,12 +99,22 @@ class _Seen:
         """From row to row [s]."""
         return self.response.smoother.step
 
-    @property
-    def ends(self) -> list[int]:
-        """The rows about the log's ends that a jump may bend which is seen from one side only, and
-        is not told by its wave."""
+    def at_ends(self, j: int, noise: float) -> np.ndarray:
+        """(n,) bool: the rows about a log's ends, where half a jump's wave does not tell it, of an end
+        in which joint j's torque or acceleration leaves a straight line by as much as a jump."""
         far = self.response.smoother.reach + self.response.near
-        return [*range(far), *range(-far, 0)]
+        out = np.zeros(len(self.level), dtype=bool)
+        most = self.response.over * self.least(j, noise), self.limits[j]
+        for end in (slice(far), slice(-far, None)):
+            own = np.stack([self.level[end, j], self.piece.qdd[end, j]])
+            out[end] = np.any(off_a_line(own) > most)
+        return out
+
+    def least(self, j: int, noise: float) -> float:
+        """What the fit sees of the noise of joint j's torque, and of what it is rounded to."""
+        tau = self.piece.measured[:, j]
+        rounded = max(quantum(tau) / np.sqrt(12.0), NOTHING * np.std(tau))
+        return max(noise, self.response.kept * rounded)
 
     @cached_property
     def light(self) -> np.ndarray:
@@ -134,19 +144,8 @@ class _Seen:
             if not found:
                 break
             at, by = at + found, by + [*left[found]]
-            left = self._without(left, found)
+            left = self.response.without(left, found)
         return np.array(at, dtype=int), np.reshape(by, (len(at), self.size.shape[1]))
-
-    def _without(self, values: np.ndarray, at) -> np.ndarray:
-        """Values (n, ...) less the waves of jumps at rows, of each what those before it left."""
-        left, memory = values.copy(), self.response.memory
-        for k in at:  # of two within a window each may have a part of the other
-            if not 0 <= k < len(left):  # torque that is late ends later than the log
-                continue
-            low, high = max(0, k - memory), min(len(left), k + memory + 1)
-            wave = self.response.alike[low - k + memory : high - k + memory]
-            left[low:high] -= np.multiply.outer(wave, left[k].copy())
-        return left
 
     @cached_property
     def apart(self) -> np.ndarray:
@@ -226,7 +225,10 @@ class _Seen:
         """Rows beside the `known` ones in which joint j's torque jumps by more than `least`, and by
         how much, where its acceleration does so too: there a jump need not outgrow the noise of
         every row, as that of a coarse encoder, but only of one in a hundred."""
-        reach, told = self.response.near, self._without(self.told[:, j] * self.moves[:, j], known)
+        reach, told = (
+            self.response.near,
+            self.response.without(self.told[:, j] * self.moves[:, j], known),
+        )
         size, own = np.abs(told), np.roll(self.every[:, j] * self.moves[:, j], late)
         edge = reach + self.response.smoother.reach
         size[:edge] = size[-edge:] = 0.0  # seen from one side
@@ -265,7 +267,7 @@ def _bent(seen: _Seen, j: int, noise: float, late: int) -> np.ndarray:
     """(n,) bool: the rows about jumps that bend the torque of joint j by more than its noise,
     `late` samples after these. What a jump is in its torque, that torque says."""
     response, tau, piece = seen.response, seen.piece.measured[:, j], seen.piece
-    least = max(noise, response.kept * max(quantum(tau) / np.sqrt(12.0), NOTHING * np.std(tau)))
+    least = seen.least(j, noise)
     (torque,) = seen.bends(j, least, range(late, late + 1))[0]
     torque = np.maximum(torque, seen.superposed(j, late))
     bends = torque > response.over * least

@@ -1,8 +1,11 @@
-"""A filter that is too narrow for how noisy angles are: one that smooths more leaves clearly less."""
+"""A filter that is too narrow, for how noisy angles are, where one that smooths more leaves clearly less, or to be one."""
 
 from __future__ import annotations
 
 from .blocks import within_one_error
+from .errors import ConfigError
+from .smoother import Smoother
+from .specs import PreprocessSpec
 
 # Of a joint's error: in the rest a noise floor may be in doubt (noise.DOUBT); and of the other joints, half of that
 _LESS, _ALSO = 0.9, 0.95
@@ -39,3 +42,12 @@ def noise_as_law(chosen: dict) -> dict[str, str]:
         f"`{wider['key']}: auto` under `preprocess:` in the experiment file, and fit again"
         for joint, (rms, less) in wider["rms"].items()
     }
+
+
+def impossible(spec: PreprocessSpec, step: float) -> str:
+    """Why a filter cannot be of samples so many seconds apart; empty where it can."""
+    try:
+        Smoother(spec, step)
+    except ConfigError as error:
+        return str(error).partition(";")[0]
+    return ""

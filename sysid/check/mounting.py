@@ -8,16 +8,16 @@ from .. import regressor
 from .equations import FEWEST, Equations
 
 _NEAR = np.cos(np.radians(25.0))  # nearer to what the experiment says, a tilt of the base is found
-# of gravity: of torque that has less than a third of it none tells where it points; one that has less
-# than a tenth has none, as of arms that take it off themselves
+# of gravity: torque that has less than a third of it does not tell where it points; one that has
+# less than a tenth has none, as of arms that take it off themselves
 _LEAST, _NOTHING = 0.3, 0.1
 _EARTH = 9.81  # m/s^2
 
 
 def gravities(equations: Equations) -> list[tuple[float, ...]]:
     """Another direction of gravity (3,) [m/s^2], as large, by which the URDF's bodies explain the
-    torques best: along an axis of the base where it is near one. Zero where the torques have nothing
-    of gravity; none where they hardly tell.
+    torques best: along an axis of the base where it is near one. Zero where the torques have
+    nothing of gravity; none where they hardly tell.
 
     What weight they have is linear in it: tau_j = p_j(g = 0) + G_j g + I qdd_j + Fv qd_j
     + Fc sign(qd_j) + b.

@@ -27,8 +27,8 @@ def lines(document: dict, width: int) -> list[str]:
 
 
 def fit_can_be_made(document: dict) -> bool:
-    """Whether a fit of the logs is right as they are: without an error, or where it takes angles that
-    wrap to go on."""
+    """Whether a fit of the logs is right as they are: without an error, or where it takes angles
+    that wrap to go on."""
     errors = {f["fault"] for f in document["faults"] if f["severity"] == "error"}
     return errors <= {_MENDED}
 
