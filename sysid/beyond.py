@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterable, Mapping
 
 import numpy as np
 
-_MOVES = {"rad": 1e-2, "deg": 0.6, "mm": 10.0}  # less is a joint that was held
+_MOVES = {"rad": 1e-2, "deg": 0.6, "turns": 1.6e-3, "mm": 10.0}  # less is a joint that was held
 
 
 def beyond(

@@ -10,6 +10,7 @@ from .motion import Piece
 from .smoother import Smoother
 
 _ROUNDING = 1e-12  # of what a second pass takes away of a jump by one, squared; of a wave's ends
+_CUBIC = 4  # coefficients
 _ONE = 1e-6  # of the largest of their singular values: waves that are one
 
 
@@ -121,7 +122,9 @@ def in_span(columns: np.ndarray, values: np.ndarray) -> np.ndarray:
     return np.einsum("mnk,ml,mlk->mn", across, values, across, optimize=True)
 
 
-def off_a_line(values: np.ndarray) -> np.ndarray:
-    """How far each of values (k, n) goes from one side of its straight line to the other (k,)."""
-    along = np.linspace(-1.0, 1.0, values.shape[1])
-    return np.ptp(values - np.outer(values @ along / (along @ along), along), axis=1)
+def off_a_cubic(values: np.ndarray) -> np.ndarray:
+    """How far each of values (k, n) goes from one side of its cubic to the other (k,)."""
+    if (count := values.shape[1]) <= _CUBIC:
+        return np.zeros(len(values))
+    basis, _ = np.linalg.qr(np.vander(np.linspace(-1.0, 1.0, count), _CUBIC))
+    return np.ptp(values - values @ basis @ basis.T, axis=1)

@@ -19,7 +19,7 @@ from functools import cached_property
 import numpy as np
 
 from .clock_jumps import light, spread, within
-from .jump_response import JumpResponse, about, in_span, off_a_line, overlapping
+from .jump_response import JumpResponse, about, in_span, off_a_cubic, overlapping
 from .motion import Piece
 from .outliers import CHANCE, NORMAL, NOTHING, SHORT, SPIKE, quantum, ratio, runs
 from .running import running
@@ -100,14 +100,15 @@ class _Seen:
         return self.response.smoother.step
 
     def at_ends(self, j: int, noise: float) -> np.ndarray:
-        """(n,) bool: the rows about a log's ends, where half a jump's wave does not tell it, of an end
-        in which joint j's torque or acceleration leaves a straight line by as much as a jump."""
-        far = self.response.smoother.reach + self.response.near
+        """(n,) bool: the rows about a piece's ends, where half a jump's wave does not tell it, a tenth
+        of it at most, of an end in which joint j's torque or acceleration leaves a cubic, as smooth
+        motion is, by as much as a jump."""
+        far = min(self.response.smoother.reach + self.response.near, len(self.level) // 10)
         out = np.zeros(len(self.level), dtype=bool)
         most = self.response.over * self.least(j, noise), self.limits[j]
         for end in (slice(far), slice(-far, None)):
             own = np.stack([self.level[end, j], self.piece.qdd[end, j]])
-            out[end] = np.any(off_a_line(own) > most)
+            out[end] = np.any(off_a_cubic(own) > most)
         return out
 
     def least(self, j: int, noise: float) -> float:

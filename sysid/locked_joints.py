@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from . import log, long_log
@@ -13,12 +15,22 @@ from .robot import Robot
 from .specs import Experiment
 from .warned import noticed
 
+_NAME = "name them in robot.joints (and in data.unused where their torque is not usable)"
+_SAY = "say in robot.lock where they stand"
 _SHOWN = 4  # joints by name: of a humanoid whose arm is identified thirty may move
 
 
-def elsewhere(experiment: Experiment, robot: Robot, *, named: bool = False) -> dict[str, str]:
-    """{joint: where it is locked and where logs have it} of such joints. A link that moves while its
-    model stands is in every joint's torque that carries it, and looks like one of their effects.
+@dataclass(frozen=True)
+class Off:
+    """Where a joint is locked and where a log has it, in words; whether it moves there."""
+
+    says: str
+    moves: bool
+
+
+def elsewhere(experiment: Experiment, robot: Robot, *, named: bool = False) -> dict[str, Off]:
+    """{joint: where it is} of such joints. A link that moves while its model stands is in every
+    joint's torque that carries it, and looks like one of their effects.
 
     Args:
         named: of joints that `robot.lock` names, of which somebody has said where they stand, and
@@ -26,7 +38,7 @@ def elsewhere(experiment: Experiment, robot: Robot, *, named: bool = False) -> d
     """
     types = {joint: robot.source.joints[joint].type for joint in robot.locked}
     left = [joint for joint in robot.locked if (joint in experiment.robot.lock) is named]
-    told: dict[str, str] = {}
+    told: dict[str, Off] = {}
     for spec in experiment.data.train if left else ():
         with noticed():
             found = _angles(experiment, spec, left, types)
@@ -37,21 +49,21 @@ def elsewhere(experiment: Experiment, robot: Robot, *, named: bool = False) -> d
             if np.abs(off).max(initial=0.0) > TRAVELS:
                 left.remove(joint)
                 unit = "m" if types[joint] == "prismatic" else "rad"
-                told[joint] = (
-                    f"{joint} at {angle:.3g} {unit}, which {spec.name} has from {q.min():.3g} to "
-                    f"{q.max():.3g}"
+                words = (
+                    f"{joint} at {angle:.3g} {unit}, which {spec.name} has from {q.min():.3g} to"
                 )
+                told[joint] = Off(f"{words} {q.max():.3g}", bool(np.ptp(q) > TRAVELS))
     return told
 
 
-def says(told: dict[str, str]) -> tuple[str, str]:
+def says(told: dict[str, Off]) -> tuple[str, str]:
     """What is said of such joints, and what to do about it."""
-    every = [*told.values()]
+    every = [own.says for own in told.values()]
+    stand = any(not own.moves for own in told.values())
     shown = [*every[:_SHOWN], *([f"{len(every) - _SHOWN} more"] if len(every) > _SHOWN else [])]
     return (
         f"locked joints that move, or stand elsewhere: {'; '.join(shown)}",
-        "name them in robot.joints (and in data.unused where their torque is not usable), or say in "
-        "robot.lock where they stand",
+        ", or ".join([_NAME] * any(own.moves for own in told.values()) + [_SAY] * stand),
     )
 
 

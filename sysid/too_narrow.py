@@ -1,4 +1,4 @@
-"""A filter that is too narrow, for how noisy angles are, where one that smooths more leaves clearly less, or to be one."""
+"""Filters that are too narrow: for how noisy angles are, as one that smooths more leaves clearly less, or for so few samples."""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""A robot that is mounted otherwise than its file says, an axis that points the other way, joints that the file does not move."""
+"""A robot that is mounted otherwise than its file says, an axis that points the other way, joints that the file does not move, and other
+readings of the columns that the equations tell; and robots of which nothing of that is said."""
 
 import shutil
 
@@ -154,3 +155,49 @@ def test_columns_of_other_joints():
     assert beyond.beyond(names, "{joint}", "tau_{joint}", ["a"]) == {} == beyond.beyond(names, None, "tau_{joint}", ["a"])
     assert beyond.moving({"b": "q_b", "c": "q_c"}, {"q_b": np.zeros(3), "q_c": np.array([0.0, np.nan, 2.0])}) == ["c"]
     assert beyond.moving({"b": "q_b"}, {"q_b": np.arange(3.0) * 0.1}, "deg") == [] != beyond.moving({"b": "q_b"}, {"q_b": np.arange(3.0) * 0.1})
+
+
+TABLE = """<robot name="table"><link name="base"/><link name="plate"><inertial><mass value="{mass}"/><origin xyz="0.1 0 0"/>
+<inertia ixx="{size}" iyy="{size}" izz="{size}" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="turn" type="continuous"><parent link="base"/><child link="plate"/><axis xyz="0 0 1"/></joint></robot>"""
+
+
+@pytest.mark.parametrize(("size", "viscous", "mass"), [(10.0, 0.3, 1.0), (30.0, 0.3, 1.0), (1.0, 1.0, 0.001)])
+def test_a_turntable_is_not_said_to_be_in_another_unit_or_a_speed(tmp_path, size, viscous, mass):
+    """Nothing of it has weight: masses of the URDF that are too large are like angles that are too small; and friction of one N m s/rad on a
+    light wheel is like its speed, which is worth knowing and no error."""
+    (tmp_path / "robot.urdf").write_text(TABLE.format(mass=mass * size, size=0.05 * mass * size))
+    t, rng = np.arange(4000) / 200.0, np.random.default_rng(4)
+    for name, shift in (("train", 0.0), ("test", 1.0)):
+        q = np.sin(1.3 * t + shift) + 0.6 * np.sin(3.1 * t + 2.0 * shift)
+        qd = 1.3 * np.cos(1.3 * t + shift) + 1.86 * np.cos(3.1 * t + 2.0 * shift)
+        qdd = -1.69 * np.sin(1.3 * t + shift) - 5.766 * np.sin(3.1 * t + 2.0 * shift)
+        tau = 0.06 * mass * qdd + viscous * qd + 0.01 * rng.normal(size=len(t))
+        pl.DataFrame({"t": t, "q_turn": q, "tau_turn": tau}).write_csv(tmp_path / f"{name}.csv")
+    (tmp_path / "config.yaml").write_text("robot: {urdf: robot.urdf}\ndata: {train: [train.csv], test: [test.csv]}\nmodel: {effects: [viscous]}\n")
+    found = check.check(pipeline.load(tmp_path))
+    assert not [f for f in found if "look to be in" in f.says or f.fault in ("delayed_signal", "joint_order") and f.severity == "error"]
+    assert any("is a speed, its own, or it has friction" in f.says for f in found) is (viscous == 1.0)
+
+
+def test_each_log_has_a_shift_of_its_own(mounted, tmp_path):
+    logs = shutil.copytree(mounted((0.0, 0.0, -9.81)), tmp_path / "logs")
+    table = pl.read_csv(logs / "train.csv")
+    t = table["t"].to_numpy()
+    for name, shift in (("train.csv", 0.3), ("late.csv", -0.5)):
+        table.with_columns(pl.Series(one, np.interp(t - shift, t, table[one].to_numpy())) for one in ("tau_shoulder", "tau_elbow")).write_csv(logs / name)
+    config = logs / "config.yaml"
+    config.write_text(config.read_text().replace("train: [train.csv]", "train: [train.csv, late.csv]"))
+    found = {f.log: f for f in check.check(pipeline.load(logs)) if f.fault == "delayed_signal"}
+    assert "0.3 s later" in found["train.csv"].says and "0.5 s earlier" in found["late.csv"].says
+
+
+def test_a_joint_that_stands_elsewhere_than_it_is_locked_is_worth_knowing(mounted, tmp_path):
+    logs = shutil.copytree(mounted((0.0, 0.0, -9.81)), tmp_path / "logs")
+    for name in ("train.csv", "test.csv"):
+        table = pl.read_csv(logs / name)
+        table.with_columns(q_shoulder=pl.Series(np.full(len(table), 0.7))).write_csv(logs / name)
+    config, text = logs / "config.yaml", (logs / "config.yaml").read_text()
+    config.write_text("robot: {urdf: robot.urdf, joints: [elbow]}\n" + text[text.index("data:") :])
+    (found,) = [f for f in check.check(pipeline.load(logs)) if "locked joints" in f.says]
+    assert found.severity == "warning" and found.do == "say in robot.lock where they stand"

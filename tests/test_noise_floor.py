@@ -122,7 +122,7 @@ def test_a_log_that_repeats_says_nothing_of_others_where_noise_is_not_the_same(t
     logged = [torque(q, step) + own for q, own in zip(angles, left)]
     result = floor(left, logged, angles, [step, step], 1)
     assert result.rms == pytest.approx(np.concatenate(noise).std(), rel=0.07)
-    assert ("logs that repeat by themselves" in result.detail) is (times > 1.0)
+    assert ("logs that repeat, and the others, each by themselves" in result.detail) is (times > 1.0)
 
 
 def test_repeats_are_found_across_rows_that_do_not_count():

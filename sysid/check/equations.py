@@ -97,6 +97,15 @@ class Equations:
         Args:
             free: whether the URDF's torque may have any factor.
         """
+        own, columns = list(reading.angle), self.columns(reading)
+        tau = self.tau[:, list(reading.torque)] * np.array(reading.torque_factor)
+        use = self.use[:, own]
+        found = [fitted(columns[:, j, use[:, j]], tau[use[:, j], j], free) for j in range(len(own))]
+        return Scored(*map(np.array, zip(*found)))
+
+    def columns(self, reading: Reading) -> np.ndarray:
+        """(5, dof, rows) of each joint the torque of the URDF's bodies, acceleration, speed, its
+        sign and a constant, as a reading has the angles."""
         own, factor = list(reading.angle), reading.turned
         columns = []
         for q, qd, qdd, smoother, rows in self.pieces:
@@ -106,16 +115,10 @@ class Equations:
             p = regressor.torque(self.robot, self.robot.prior, q, qd, qdd, gravity=down)
             stacked = np.stack([p, qdd, qd, np.sign(qd), np.ones_like(q)])
             columns.append(smoother.at(np.moveaxis(stacked, 1, 2), rows))
-        columns = np.concatenate(columns, axis=2)
-        tau = self.tau[:, list(reading.torque)] * np.array(reading.torque_factor)
-        use = self.use[:, own]
-        found = [
-            _fitted(columns[:, j, use[:, j]], tau[use[:, j], j], free) for j in range(len(own))
-        ]
-        return Scored(*map(np.array, zip(*found)))
+        return np.concatenate(columns, axis=2)
 
 
-def _fitted(columns, tau, free: bool) -> tuple[float, float, float, float, float, bool]:
+def fitted(columns, tau, free: bool) -> tuple[float, float, float, float, float, bool]:
     """Least squares of one joint's torque (n,) by columns (5, n), with their signs and the first
     one's bounds."""
     if len(tau) < FEWEST or not np.ptp(tau) > 0.0:

@@ -20,6 +20,7 @@ from ..preprocess import unfiltered
 from ..robot import Robot
 from ..rows import Rows, stack
 from ..smoother import Smoother
+from ..spans import Spans
 from ..specs import Experiment
 from ..trusted import Untrusted
 from ..warned import noticed
@@ -169,5 +170,6 @@ def looked(experiment: Experiment) -> Look:
         if experiment.preprocess.filter == "none":
             unfiltered(log.segments[0])
         elif filters.is_given(experiment):
-            Smoother(experiment.preprocess, log.segments[0].step)
+            slowest = 0.0 if isinstance(log.segments, Spans) else max(s.step for s in log.segments)
+            Smoother(experiment.preprocess, slowest or log.segments[0].step)
     return Look(experiment, machine, logs, tuple(notices))

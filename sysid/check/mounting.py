@@ -23,6 +23,8 @@ def gravities(equations: Equations) -> list[tuple[float, ...]]:
     + Fc sign(qd_j) + b.
     """
     own, best = equations.robot.gravity, _best(equations)
+    if best is None:
+        return []
     size = float(np.linalg.norm(own)) or _EARTH
     if np.linalg.norm(best) < _NOTHING * size and np.any(own):
         return [(0.0, 0.0, 0.0)]
@@ -35,8 +37,8 @@ def gravities(equations: Equations) -> list[tuple[float, ...]]:
     return [] if down @ own > _NEAR * size**2 else [tuple(np.round(down, 2) + 0.0)]
 
 
-def _best(equations: Equations) -> np.ndarray:
-    """The gravity (3,) [m/s^2] that the torques tell; zero where they tell none."""
+def _best(equations: Equations) -> np.ndarray | None:
+    """The gravity (3,) [m/s^2] that the torques tell; None where nothing tells."""
     robot, parts = equations.robot, []
     for q, qd, qdd, smoother, rows in equations.pieces:
         still = np.zeros_like(q)
@@ -58,4 +60,4 @@ def _best(equations: Equations) -> np.ndarray:
         weight, left = bare(np.array(rest[:3]).T), bare(tau / np.std(tau) - p)
         squares += weight.T @ weight
         scores += weight.T @ left
-    return np.linalg.lstsq(squares, scores, rcond=1e-6)[0]
+    return np.linalg.lstsq(squares, scores, rcond=1e-6)[0] if squares.any() else None

@@ -22,10 +22,13 @@ def told(look: Look, reading: Reading, kind: str, joints, word) -> Iterator[Faul
         told = f"[{', '.join(f'{g:g}' for g in word)}]"
         if not any(word):
             says = (
-                "the torques have nothing of gravity, as of drives that take it off themselves: so "
-                "the URDF's robot explains them"
+                "the torques have nothing of gravity, as where drives, springs or counterweights "
+                "take it off: so the URDF's robot explains them"
             )
-            do = f"write robot.gravity: {told}, or log torques that have it"
+            do = (
+                f"write robot.gravity: {told} where drives take it off, or log torques that have "
+                "it; springs and counterweights belong into the URDF, or the model as `spring`"
+            )
         else:
             says = (
                 f"gravity looks like {told} m/s^2 in the axes of the robot's base"

@@ -82,13 +82,13 @@ def position_unit(
     turning = {joint: values for joint, values in q.items() if not slides[joint]}
     if not turning:
         why = "the joints slide" + ("" if named else " and no name says another")
-        return Guess(key, named or "m", why)
+        return Guess(key, "m" if named in ANGLES else named or "m", why)
     if named == "counts" or all(_counts(values) for values in turning.values()):
         joint, values = next(iter(turning.items()))
         shown = f"{values.min():.0f} to {values.max():.0f}"
         raise LogError(
             f"the angle of {joint!r} is whole numbers from {shown}, counts of an encoder",
-            allowed="rad or deg",
+            allowed="rad, deg or turns",
             do="log 2 pi / (counts a turn) * (count - count at zero), of the joint",
         )
     if named in ANGLES:

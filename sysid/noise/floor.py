@@ -136,7 +136,12 @@ def estimate(
             if not once or repeated.std <= UNSURE * repeated.rms:
                 return repeated
             # noise is not the same in all, as where it is louder in faster motion
-            return of_each([again, once], estimate, *given, "logs that repeat by themselves")
+            return of_each(
+                [again, once],
+                estimate,
+                *given,
+                "logs that repeat, and the others, each by themselves",
+            )
     steps = [run.step for run in runs]
     spectrum = spectrum_of(rest, kept, steps)
     made = None

@@ -176,7 +176,7 @@ def _verdict(v: Verdict, path="config.yaml", joints=()) -> dict:
     if v.even:
         out["weighting"] = "noise"
     if v.reason is not None:
-        out["settled"] = True
+        out["needs_no_log"] = True
     if v.left is not None:
         out |= {"depends_on": dependences(v.left), "share_left": v.left.share}
     elif v.status == "unknown":

@@ -59,7 +59,7 @@ def blind(document: dict) -> list[str]:
         for v in open_
         if not {"may_be", "weighting"} & v.keys()
         and v["joint"] not in known
-        and not v.get("settled")  # no other log tells more
+        and not v.get("needs_no_log")  # no other log tells more
     ]
 
 

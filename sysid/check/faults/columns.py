@@ -22,6 +22,7 @@ AFTER, SENSELESS = 2, ("wrong_unit", "angle_wrap")
 # Log of squares that another reading must take off, in all and of each joint whose column it reads
 # otherwise: what is left falls to a third of its power.
 _BETTER = 1.0
+_LOSES = 0.1  # of that logarithm: by what a joint that hardly tells may seem to lose
 _ROUNDS = 4, 8  # at least, and at most: each joint may have one thing in which it differs
 _TRIED = 8  # readings that are clear, of which each is a fit
 _QUARTERS = (1, 2, -1)  # turns by which a log's zero may be off the URDF's
@@ -58,15 +59,18 @@ def find(look: Look) -> Iterator[Fault]:
         others += [
             (replace(reading, gravity=down), ("mass_implausible", (), down)) for down in mounted
         ]
-        others += _in_units(look, reading)
         tried = [(made, told, equations.scored(made)) for made, told in others]
+        # that all masses are as wrong explains as much where nothing has weight
+        loose = equations.scored(reading, free=True).loss
+        units = ((made, told, equations.scored(made)) for made, told in _in_units(look, reading))
+        tried += [own for own in units if own[2].loss < loose - _BETTER]
         tried = [
             (s.loss, made, told, s)
             for made, told, s in tried
             if _clear(scored, s, told[1]) and _masses_tell(free, reading, made, s, *told[1:])
         ]
         # as it is, and in another unit, it may leave the least
-        if not tried or equations.scored(reading, free=True).loss < min(loss for loss, *_ in tried):
+        if not tried or loose < min(loss for loss, *_ in tried):
             break
         reading, scored = _likeliest(free, tried)
     for other in _differences(reading):
@@ -131,8 +135,10 @@ def _of_all(reading: Reading, joints: Sequence[int]) -> Iterator[tuple[Reading, 
 def _in_units(look: Look, reading: Reading) -> Iterator[tuple[Reading, tuple]]:
     """Readings in which the angles of all joints that turn are in another unit, however little they
     move in that of the experiment."""
-    own, turns = look.experiment.data.units.position, ~np.asarray(look.robot.prismatic)
-    if look.experiment.data.position or not turns.any() or reading.unit:
+    data, turns = look.experiment.data, ~np.asarray(look.robot.prismatic)
+    own = data.units.position
+    # one unit is named for all, and what is a length in it would be another
+    if data.position or data.zero or reading.unit or (own not in ANGLES and not turns.all()):
         return
     for unit, size in ANGLES.items():
         if (times := size / ANGLES.get(own, 1.0)) != 1.0:
@@ -151,8 +157,9 @@ def _turned(factors, j: int) -> tuple:
 def _clear(before: Scored, after: Scored, joints) -> bool:
     known = before.known & after.known
     gain = np.log(before.left / after.left) * known
-    least = _BETTER * (len(joints) or 2)  # all joints feel gravity
-    return bool(gain.sum() > least and np.all(gain[list(joints)] > 0.0))
+    if not len(joints):  # all joints feel gravity, and a unit: none loses by it
+        return bool(gain.sum() > 2.0 * _BETTER and gain.min() > -_LOSES)
+    return bool(gain.sum() > _BETTER * len(joints) and np.all(gain[list(joints)] > 0.0))
 
 
 def _masses_tell(

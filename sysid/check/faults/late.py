@@ -8,20 +8,17 @@ import numpy as np
 
 from ... import blocks
 from ..equations import FEWEST
-from ..fault import ERROR, WARNING, Fault
+from ..fault import WARNING, Fault
 from ..look import Look, Seen
 
-AFTER, SENSELESS = 3, ("wrong_unit", "angle_wrap", "joint_order", "sign_flipped")
+AFTER = 3
+SENSELESS = ("wrong_unit", "angle_wrap", "joint_order", "sign_flipped", "delayed_signal")
 _MOST, _LAGS = 0.1, 81  # s to either side, and how many of them are tried
-# the same where the best is at an end of those: two recordings that were started by hand
-_FAR, _FAR_LAGS = 2.0, 401
 _LEAST = (0.004, 1.5)  # s, samples: less a drive's current loop has, or no step of the log shows
 _BETTER = 0.1  # of the logarithm of the joint's squares
 # Half of the blocks of time, each one value, times that logarithm: a likelihood ratio of one in
 # three thousand, as the best of many lags is taken on each of some joints
 _CLEAR = 8.0
-# a lag of seconds is told where torque is explained by it that was not: e^-1 of its squares
-_MUCH, _SPACING = 1.0, 0.02
 # Two clocks: joints whose lag changes, at least, and by how much the changes may differ
 _MANY, _ALIKE = 2, 0.5
 
@@ -34,7 +31,6 @@ def find(look: Look) -> Iterator[Fault]:
     step = max(log.step for log in look.part("train"))
     lags, apart, asked = np.linspace(-_MOST, _MOST, _LAGS), dict[str, tuple[float, ...]](), 0
     found: list[Fault] = []
-    far: dict[str, float] = {}
     for j, joint in enumerate(look.robot.joints):
         use = rows.use[:, j]
         told = use.sum() >= FEWEST and np.ptp(rows.tau[use, j]) > 0.0
@@ -45,8 +41,6 @@ def find(look: Look) -> Iterator[Fault]:
         best, none = int(np.argmin(squares)), len(lags) // 2
         lag, pause = float(lags[best]), max(_LEAST[0], _LEAST[1] * step)
         gain = float(np.log(squares[none] / squares[best]))
-        if best in (0, len(lags) - 1):
-            far |= _from_afar(seen, j, squares[none])
         t, piece = rows.t[use], rows.piece[use]
         memory = blocks.memory(left[best][:, None], np.ones((len(t), 1), bool), piece, seen.step)
         count = int(blocks.numbered(t, piece, memory=memory).max()) + 1
@@ -64,44 +58,9 @@ def find(look: Look) -> Iterator[Fault]:
             )
             do = "`sysid diagnose` says which; log both from the same cycle where it is a delay"
             found.append(Fault("delayed_signal", WARNING, says, do, joint))
-    if shifted := _shifted(far, asked):
-        yield shifted
-        return
     clocks = [*_clocks(apart, asked)]
     yield from clocks
     yield from (fault for fault in found if not clocks or fault.joint not in apart)
-
-
-def _from_afar(seen: Seen, j: int, before: float) -> dict[str, float]:
-    """{joint: lag [s]} of torque that is read much later or earlier and leaves much less of its
-    squares than before; of all rows that have it: some lags are longer than a log's ends."""
-    lags = np.linspace(-_FAR, _FAR, _FAR_LAGS)
-    squares = np.sum(_left(seen, j, lags) ** 2, axis=1)
-    best = int(np.argmin(squares))
-    clear = np.log(before / squares[best]) > _MUCH and best not in (0, len(lags) - 1)
-    return {seen.model.robot.joints[j]: float(lags[best])} if clear else {}
-
-
-def _shifted(far: dict[str, float], asked: int) -> Fault | None:
-    """What is said where most joints' torques are as late, or as early, beyond any drive's delay.
-
-    Args:
-        far: {joint: lag [s]} of those that are. asked: of how many joints.
-    """
-    if not far or 2 * len(far) <= asked:
-        return None
-    lags = np.array([*far.values()])
-    lag = float(np.median(lags))
-    if np.abs(lags - lag).max() > max(_SPACING, _ALIKE * abs(lag)):
-        return None
-    word, other = ("later", "earlier") if lag > 0 else ("earlier", "later")
-    return Fault(
-        "delayed_signal",
-        ERROR,
-        f"the torques of {', '.join(far)} look {abs(lag):.2g} s {word} than the motion: two "
-        "recordings that did not begin together look like that",
-        f"move the torques' time stamps {abs(lag):.2g} s {other}, or log both from the same clock",
-    )
 
 
 def _clocks(apart: dict[str, tuple[float, ...]], asked: int) -> Iterator[Fault]:

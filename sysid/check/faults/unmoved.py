@@ -19,7 +19,8 @@ def find(look: Look) -> Iterator[Fault]:
     data, robot = look.experiment.data, look.robot
     for named in (False, True):
         if locks := locked_joints.elsewhere(look.experiment, robot, named=named):
-            borne = [beyond.carries(robot.source.joints, joint, robot.joints) for joint in locks]
+            moved = [joint for joint, own in locks.items() if own.moves]
+            borne = [beyond.carries(robot.source.joints, joint, robot.joints) for joint in moved]
             yield Fault("joint_order", ERROR if any(borne) else WARNING, *locked_joints.says(locks))
     patterns = data.columns.position, data.columns.torque
     log = min(look.logs, key=lambda one: one.samples)
