@@ -27,7 +27,7 @@ def told(look: Look, reading: Reading, kind: str, joints, word) -> Iterator[Faul
             )
             do = (
                 f"write robot.gravity: {told} where drives take it off, or log torques that have "
-                "it; springs and counterweights belong into the URDF, or the model as `spring`"
+                "it; springs and counterweights belong in the URDF, or in the model as `spring`"
             )
         else:
             says = (
