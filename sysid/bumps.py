@@ -32,7 +32,6 @@ from .stretches import stretches
 _NEARBY = 0.5  # s to either side whose median a burst must exceed
 _OFTEN = 3.0  # s of log to a burst: what comes more often is how the machine moves, and no accident
 _SHARE = 0.2  # of how far torque goes within twice a burst's time: of a quick move less is left
-_BY_CHANCE = 0.05  # of rows about what a signal shows, that one of them is as surprising
 _FEWEST = 50  # rows of a joint that have a usual
 _WHITE = 0.706  # z75 - z50 of a normal variable's size over its median
 _PASSES = 2  # the second with every joint weighted by what the first leaves
@@ -76,10 +75,8 @@ def bumps(robot: Robot, logs: Sequence[Log], *, among: int = 1) -> list[Event]:
     found = seen.found
     for event, near in zip(shown, seen.places):
         # where no row counts it costs none
-        own = [robot.joints.index(joint) for joint in event.joints]
-        judged = not playing & {*own} and seen.counted[near][:, own].any()
-        least = np.log(max(seen.counted[near][:, own].sum(), 1) / _BY_CHANCE)
-        if not judged or seen.most[near][:, own].max() > max(0.5 * seen.level, least):
+        judged = not any(robot.joints[j] in event.joints for j in playing)
+        if not judged or not seen.counted[near].any() or seen.most[near].max() > 0.5 * seen.level:
             found = _merged(found, event)
     return found
 
