@@ -789,7 +789,7 @@ def test_what_smoothing_makes_of_an_error(errors, halves, said):
 def test_a_window_that_is_too_long_is_said_and_the_one_that_is_said_will_do(simulated):
     """Speeds that are trapezoids, with nothing hidden: acceleration jumps, and 0.2 s smear it where rows about jumps count."""
     path = simulated("trapezoids", seed=1, duration=20.0, motion="moves") / "config.yaml"
-    text = path.read_text().replace("window: 0.1", "window: 0.2")
+    text = path.read_text().replace("preprocess:\n", "preprocess:\n  window: 0.2\n")
     found = diagnose(config.loads(text.replace("standstill: auto", "standstill: mask"), path))
     assert not found.claims and {v.status for v in found.verdict} == {"unresolved"}
     for one in found.verdict:
