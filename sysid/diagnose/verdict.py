@@ -105,11 +105,11 @@ def verdicts(
         part = remains.share if remains else 1.0
         looks = near(j, part * seen.total, bool(remains))
         looks = looks or in_vain(refused, fit.joints, j, HALF * part)
-        looks = looks or (asked[j] and not own and few(j, HALF * part)) or None
+        stays = bool(remains or not (reaches[j] and first > 0.0))  # else nothing asks what it is
+        looks = looks or (stays and asked[j] and not own and few(j, HALF * part)) or None
         # of whichever logs they explain less of: where these do not carry over, another law may
         held = taken_where_held(own[0].step.before, own[-1].step.after)[j] if own else 0.0
-        taken = max(sum(c.step.shares[j] for c in own or others), held)
-        taken = max(min(taken, explained), 0.0)
+        taken = max(min(max(sum(c.step.shares[j] for c in own or others), held), explained), 0.0)
         little = remains is None or remains.share * max(1.0 - taken, 0.0) <= _PREDICTED * taken
         further = beyond(j, looks[0]) if looks and remains and beyond and not own else None
         further = further if further and further.predicts(among, WORTH) else None
@@ -122,7 +122,7 @@ def verdicts(
             why = not_all(looks[0].name, further.share) if further else ""
             why = why if remains else cause(both, floors[j])
             told = ("unknown", own or others, explained, remains, why)
-        elif not done and (remains or not (reaches[j] and first > 0.0)):
+        elif not done and stays:
             without = weighed[joint] if evens[j] else None
             effect, p = looks or (None, 1.0)
             may = effect if p > LEVEL else None  # what stands above the level was fitted, in vain

@@ -34,7 +34,7 @@ def products(
     found = _all(known, joint, piece, step)
     while part := list(islice(found, _PART)):
         words, values = zip(*part)
-        own = np.stack(values, axis=1)
+        own = np.stack(values).T  # each function's rows side by side in memory
         both = [w if f"qd_{joint}" in w.split(" and ") else f"{w} and {DIRECTION}" for w in words]
         for some, told in ((own, words), (direction * own, both)):
             kept, which = of_unit_size(some, use)

@@ -202,15 +202,17 @@ class _Asker:
         own, score = np.zeros((parts, count)), np.zeros((parts, count))
         for b, rows in enumerate(self.spans):
             cross[b] = self.columns[rows].T @ values[rows]
-            own[b] = np.sum(values[rows] ** 2, axis=0)
+            own[b] = np.einsum("nk,nk->k", values[rows], values[rows])
             score[b] = self.residual[rows] @ values[rows] - self.noise[rows] @ more[rows]
         absorbed = cross.sum(0)  # in the design's directions, in which the system is one
         score -= self.told @ absorbed
         mixed = cross - self.squares @ absorbed
         squares = own - np.einsum("bpk,pk->bk", cross + mixed, absorbed)
-        noisy = self.rough_columns.T @ more
-        noise = 2.0 * noisy - self.rough_squares @ absorbed
-        rough = np.sum(more**2, axis=0) - np.sum(absorbed * noise, axis=0)
+        noise, taken = self.rough_squares @ absorbed, np.einsum("nk,nk->k", more, more)
+        rough = 2.0 * (taken + np.sum(absorbed * noise, axis=0))  # at most
+        some = rough >= NOISE * squares.sum(0)
+        noise = 2.0 * (self.rough_columns.T @ more[:, some]) - noise[:, some]
+        rough[some] = taken[some] - np.sum(absorbed[:, some] * noise, axis=0)
         return own, squares, score, absorbed, mixed, rough
 
     def apart(self, column: np.ndarray, more: np.ndarray) -> tuple[np.ndarray, ...]:
