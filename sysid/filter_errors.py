@@ -21,11 +21,14 @@ _ROWS = 5_000  # enough to rank filters
 _EXACT = 1e-16  # squared relative error: less is rounding
 
 
-def held_out(experiment: Experiment, spec: PreprocessSpec, model: Model, logs: Sequence[Log], prior, edge: float) -> dict:
+def held_out(
+    experiment: Experiment, spec: PreprocessSpec, model: Model, logs: Sequence[Log], prior, edge: float, rows_of: PreprocessSpec | None = None
+) -> dict:  # fmt: skip
     """What a fit of a model to logs under a filter leaves of each stretch that it has not seen.
 
     Args:
-        logs: of one segment each. prior: bodies (bodies, 10). edge: [s] that are left out at both ends of each.
+        logs: of one segment each. prior: bodies (bodies, 10). edge: [s] that are left out at both ends of each. rows_of: a filter of which
+            the rows are fitted, where that is not `spec`.
 
     Returns:
         {"relative_error": geometric mean over the joints, "rms": {joint: N m or N}, "folds": logarithms of squared relative errors,
@@ -35,6 +38,9 @@ def held_out(experiment: Experiment, spec: PreprocessSpec, model: Model, logs: S
         SysidError: the filter cannot be, or the logs are too short to hold a part of them out.
     """
     motion = prepare(logs, spec, model.robot.joints)
+    if rows_of is not None:
+        pairs = zip(motion.pieces, prepare(logs, rows_of, motion.joints).pieces)
+        motion = replace(motion, pieces=tuple(_with_rows_of(*pair) for pair in pairs))
     model = finite(model.measured_by(motion), motion)
     motion = replace(motion, pieces=tuple(_trimmed(piece, logs[piece.log].segments[0], edge) for piece in motion.pieces))
     # against the torque as logged, over every row: what a filter smooths away or masks it has not explained
@@ -82,6 +88,13 @@ def _logarithm(squares: np.ndarray, size: np.ndarray, rows: np.ndarray, counts: 
     count = rows > 0
     error = squares[count] / rows[count] / size[count]
     return float(np.average(np.log(np.maximum(error, _EXACT)), weights=(rows * counts)[count]))
+
+
+def _with_rows_of(piece, other):
+    """The piece with the rows of another of the same segment alone."""
+    use, first = np.zeros(piece.q.shape, dtype=bool), int(np.argmin(np.abs(piece.t - other.t[0])))
+    use[first : first + len(other.t)] = True if other.use is None else other.use
+    return replace(piece, use=use if piece.use is None else use & piece.use)
 
 
 def _trimmed(piece, segment, edge: float):

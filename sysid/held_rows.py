@@ -37,14 +37,7 @@ def without_held(samples: Recording) -> Recording:
             above=2,
         )
         return without_held(_with(samples, _one_of(again, every)))
-    found = {
-        (a, b + 1) for a, b in runs(again) if b - a + 1 >= _FEWEST
-    }  # the sample and its repeats
-    if not found:
-        return samples
-    # a joint at least went on as it came, and made up for it at once
-    went_on = sorted(found & {run for own in q.T for run in held_angle(own)})
-    went_on = [(a + 1, b) for a, b in went_on if not np.any((apart > a) & (apart <= b + 1))]
+    went_on = dropouts(q, tau, apart)
     if not went_on:
         return samples
     kept = np.ones(len(q), dtype=bool)
@@ -58,6 +51,19 @@ def without_held(samples: Recording) -> Recording:
         above=2,
     )
     return _with(samples, kept)
+
+
+def dropouts(q, tau, apart) -> list[tuple[int, int]]:
+    """First and last rows of runs in which neither angles nor torques (n, dof) came while the robot
+    moved. apart: rows before which a recording breaks off or has a gap."""
+    again = _again(np.column_stack([q, tau]), apart)
+    # the sample and its repeats
+    found = {(a, b + 1) for a, b in runs(again) if b - a + 1 >= _FEWEST}
+    if not found:
+        return []
+    # a joint at least went on as it came, and made up for it at once
+    went_on = sorted(found & {run for own in q.T for run in held_angle(own, again)})
+    return [(a + 1, b) for a, b in went_on if not np.any((apart > a) & (apart <= b + 1))]
 
 
 def at_own_times(samples: Recording, joints: Sequence[str]) -> Recording:

@@ -76,22 +76,29 @@ def rests(q, first: int, last: int, usual: float) -> bool:
     return bool(np.ptp(own) <= reach)
 
 
-def held_angle(q) -> list[tuple[int, int]]:
+def held_angle(q, but=None) -> list[tuple[int, int]]:
     """First and last samples of runs in which one joint's angle (n,) repeats while the joint moves.
 
     About the run the joint moves by more than the angle's grain in every sample, so that no repeat
     is due to it; and what it missed meanwhile it makes up in one step, or it had moved as usual and
     is held to the end.
+
+    Args:
+        but: (n - 1,) bool, steps that say nothing of how the joint moves about a run.
     """
     n = len(q)
     step = np.diff(q)
+    moves = np.arange(n - 1) if but is None else np.flatnonzero(~but)
     size = np.abs(step)
     if n < SHORT or not size.any():
         return []
     grain, usual = quantum(q), np.sqrt(np.mean(step**2))
     found = []
     for a, b in runs(size == 0.0):  # steps; the samples are a to b + 1
-        before, after = size[max(a - _ABOUT, 0) : a], size[b + 2 : b + 2 + _ABOUT]
+        first, last = np.searchsorted(moves, [a, b + 2])
+        before, after = (
+            size[own] for own in (moves[max(first - _ABOUT, 0) : first], moves[last : last + _ABOUT])
+        )
         if not len(before) or not before.all() or not after.all():
             continue
         held, speed = b - a + 1, np.median(before)

@@ -12,6 +12,7 @@ from .specs import PreprocessSpec
 # `standstill: mask` leaves a joint's rows out below this share of its own rms speed, at most 0.03 rad/s or m/s:
 # there friction may have any value up to its greatest.
 _STANDSTILL_SHARE, STANDSTILL_MOST = 0.05, 0.03
+_SETTLES = 3e-4  # rad or m, or of a joint's way: one minute of arc, what makers of robot gears state as lost motion
 
 
 def without_standstill(piece: Piece, threshold, reach: int) -> Piece:
@@ -27,7 +28,8 @@ def clear_of_reversals(pieces, spec: PreprocessSpec) -> list[Piece]:
     which it may stand still.
 
     A joint may stand where its speed changes sign; where it is less than the filter makes of a stop amid accelerations as
-    large as those about it; and where the angle travels less, while the filter sees it, than its own noise would make it.
+    large as those about it; where the angle travels less, while the filter sees it, than its own noise would make it; and behind
+    each of these until it has gone as far as friction takes to be that of sliding: a controller that lost its command creeps.
     Where velocity was logged nobody knows how well: there it is as with `mask`.
     """
     if spec.filter == "none":
@@ -36,7 +38,7 @@ def clear_of_reversals(pieces, spec: PreprocessSpec) -> list[Piece]:
     smoothers = [Smoother(spec, piece.step) for piece in pieces]
     pieces = [replace(p, blur=Blur(*own.smear(p.smoother is not None), own.reach)) for p, own in zip(pieces, smoothers)]
     still = [_may_stand(piece, piece.qd, piece.qdd, piece.noise) for piece in pieces]
-    moving = [_apart(own, piece.blur.reach) & (True if piece.use is None else piece.use) for own, piece in zip(still, pieces)]
+    moving = [_sliding(own, piece.q, piece) & (True if piece.use is None else piece.use) for own, piece in zip(still, pieces)]
     bent = jumps(pieces, smoothers, moving)
     return [replace(piece, use=own & ~rows) for piece, own, rows in zip(pieces, moving, bent)]
 
@@ -48,7 +50,7 @@ def sliding(piece: Piece, over: np.ndarray) -> np.ndarray:
     if piece.blur is None:
         return np.ones(len(piece.t), dtype=bool)
     sums = (piece.qd @ over.T, piece.qdd @ over.T, np.abs(over) @ piece.noise)
-    return _apart(_may_stand(piece, *sums), piece.blur.reach).all(axis=1)
+    return _sliding(_may_stand(piece, *sums), piece.q @ over.T, piece).all(axis=1)
 
 
 def _may_stand(piece: Piece, qd, qdd, noise) -> np.ndarray:
@@ -56,6 +58,18 @@ def _may_stand(piece: Piece, qd, qdd, noise) -> np.ndarray:
     seen = (2 * piece.blur.look + 1) * piece.step
     threshold = np.maximum(piece.blur.stop * _largest_about(qdd, piece.blur.look), NOISE_TRAVEL * noise / seen)
     return turns(qd) | (np.abs(qd) < threshold)
+
+
+def _sliding(still: np.ndarray, q: np.ndarray, piece: Piece) -> np.ndarray:
+    """(n, k) bool: the rows that the filter carries none of `still` into, and by which the angle (n, k) has gone as far behind the last of
+    them as friction takes to settle."""
+    far, out = _SETTLES * np.minimum(np.ptp(q, axis=0), 1.0), _apart(still, piece.blur.reach)
+    for j, stands in enumerate(still.T):
+        cuts = np.append(np.flatnonzero(stands), len(q))
+        for first, last in zip(cuts, cuts[1:]):
+            gone = np.abs(q[first:last, j] - q[first, j]) >= far[j]
+            out[first : first + np.argmax(gone) if gone.any() else last, j] = False
+    return out
 
 
 def _without(piece: Piece, still: np.ndarray, reach: int) -> Piece:

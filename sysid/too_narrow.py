@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from .blocks import within_one_error
 from .errors import ConfigError
 from .smoother import Smoother
@@ -21,6 +23,17 @@ def wider(tried: list[dict], key: str, value: float) -> dict:
         return {}
     less = {joint: [rms, least["rms"][joint]] for joint, rms in given["rms"].items() if least["rms"][joint] < _ALSO * rms}
     return {"key": key, "given": value, "value": least[key], "rms": less} if any(wide < _LESS * rms for rms, wide in less.values()) else {}
+
+
+def by_noise(tried: list[dict], key: str, value: float, again: Callable[[float], dict | None]) -> dict:
+    """The same, where the wider one leaves less because it smooths more, and not by the rows that it leaves out, in which the model errs.
+
+    Args:
+        again: what the given one leaves, fitted to the rows of another alone.
+    """
+    found = wider(tried, key, value)
+    alike = again(found["value"]) if found else None
+    return wider([alike, *(entry for entry in tried if entry[key] == found["value"])], key, value) if alike else found
 
 
 def said(wider: dict) -> str:

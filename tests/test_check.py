@@ -379,6 +379,19 @@ def test_samples_that_were_taken_beside_their_even_stamps_are_told(made, tmp_pat
     assert not [f for f in check.check(pipeline.load(made(rate=100.0))) if f.fault == "clock_jitter"]
 
 
+def test_messages_that_did_not_arrive_are_told(made, tmp_path):
+    """All values of a log stay for 16 and for 44 ms while the arm moves."""
+    logs = shutil.copytree(made(), tmp_path / "logs")
+    table = pl.read_csv(logs / "train.csv")
+    rows = np.arange(len(table))
+    for first, count in ((2000, 8), (5100, 22)):
+        rows[first : first + count] = first - 1
+    pl.concat([table.select("t"), table.drop("t")[rows]], how="horizontal").write_csv(logs / "train.csv")
+    (found,) = check.check(pipeline.load(logs))
+    assert (found.fault, found.severity, found.log) == ("values_held", "warning", "train.csv")
+    assert "2 times, for 44 ms at most, first at 4 s: messages that did not arrive" in found.says and found.rows == 30
+
+
 def test_one_joint_s_torque_before_its_gear_is_worth_a_word(made, tmp_path):
     """A sixth of what the masses need, on one joint of two: its unit, or the URDF's masses."""
     logs = shutil.copytree(made(), tmp_path / "logs")

@@ -113,6 +113,20 @@ def test_grid_of_cogging_misses_no_line():
     assert len(k.values(k.low, k.high)) == k.grid and np.diff(k.values(k.low, k.high)).max() < 0.25
 
 
+def test_a_screw_s_ripple_is_looked_for_down_to_its_pitch():
+    """On a joint that slides k counts per metre: up to a pitch of 1 mm, or 120 periods over the travel."""
+    cogging, piece = vocabulary.find("cogging"), small_piece()
+    sliding = cogging.bound(SimpleNamespace(prismatic=np.array([True, True, False])), 1)
+    for travel in (2.0, 0.02):  # of joint 1, in m
+        seen = replace(piece, q=0.5 * travel * piece.q)
+        (k,) = sliding.sized(seen, len(piece.t), 1)
+        assert k.name == "k" and k.low == pytest.approx(4.0 * np.pi / travel)
+        assert k.high == pytest.approx(min(2000.0 * np.pi, k.low + 240.0 * np.pi / travel))
+        assert len(k.values(k.low, k.high, travel)) <= k.grid + 2
+    # of one that stands, one that turns, and one of which nobody knows how it moves: as before
+    assert sliding.sized(piece, 4, 0) is None and sliding.sized(piece, 4, 2) is None and cogging.sized(piece, 4, 1) is None
+
+
 @pytest.mark.parametrize("lines", [1, 2])
 @pytest.mark.parametrize(
     "tried", [[7.0], [1.0, 5.0, 7.0], [3.0, 2.0, 9.0, 120.0, 1.0], [9.0, 7.0, 5.0, 3.0], *(list(np.linspace(1.0, 120.0, n)) for n in (2, 4, 5, 480))]

@@ -13,6 +13,7 @@ from sysid.errors import LogError, SysidWarning
 from sysid.events import usable
 from sysid.glitches import without_glitches
 from sysid.repeats import rests
+from sysid.warned import noticed
 from tests.conftest import JOINTS, csv
 from tests.test_events import motion
 
@@ -242,6 +243,16 @@ def test_rows_in_which_nothing_came_are_left_out(tmp_path):
     assert "38 rows, 2 times, only repeat the row before while the robot moves, the first at 2 s" in str(told[0].message)
     assert [len(s.t) for s in found.segments] == [400, n - 430]  # a short one is interpolated
     assert np.abs(found.segments[1].q[:, 0] - made["q_shoulder"][430:]).max() < 1e-3
+    # two that are three rows apart, of which one sees the other
+    near = {name: values.copy() for name, values in made.items()}
+    for name in list(made)[1:]:
+        for first, count in ((900, 8), (911, 6)):
+            near[name][first : first + count] = near[name][first - 1]
+    file.write_text(csv(near))
+    with noticed() as told:
+        (segment,) = read(file).segments
+    assert "14 rows, 2 times, only repeat" in told[0]
+    assert np.abs(segment.q[:, 0] - made["q_shoulder"]).max() < 1e-3
     resting = {name: values.copy() for name, values in made.items()}
     for name in list(made)[1:]:
         resting[name][400:] = resting[name][400]

@@ -14,6 +14,7 @@ from sysid.gaussian import Gaussian
 from sysid.noise import NoiseFloor, as_of_test, floor, floors, outliers, repeats
 from sysid.noise.of_fit import _of_each, floors_of_fit
 from sysid.noise.of_pieces import filtered
+from sysid.noise.pursuit import _pursuit
 
 
 def periodic(seconds: float, step: float, frequency: float, rng) -> np.ndarray:
@@ -637,3 +638,14 @@ def test_logs_of_several_rates_have_the_noise_of_each(noise):
     assert told.rms is not None and abs(told.rms - true) < 0.1 * true and "each sampling rate by itself" in told.detail
     alike = floor(residual[:1] * 2, measured[:1] * 2, angles[:1] * 2, (0.01, 0.0101), 1)
     assert "each sampling rate" not in alike.detail
+
+
+def test_what_functions_explain_but_for_rounding_is_explained_once():
+    """A torque of one value: what is left may come out below nothing, and no function takes any of it."""
+    rng = np.random.default_rng(0)
+    for seed in range(50):
+        x = np.column_stack([np.ones(91), np.ones(91), np.zeros(91), *rng.normal(size=(2, 91))])
+        target = x @ [0.7 + 0.01 * seed, 0.0, 0.0, 0.3, 0.0]
+        chosen, weights = _pursuit(x, target, 5)
+        np.testing.assert_allclose(x[:, chosen] @ weights, target, atol=1e-9)
+        assert len(chosen) <= 4

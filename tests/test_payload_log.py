@@ -9,12 +9,13 @@ import numpy as np
 import pytest
 
 from scripts.blind_parts.robots import PLANAR
-from sysid import carriers, experiment_file, loads, loop, pipeline, regressor, results
+from sysid import carriers, experiment_file, loads, loop, pipeline, regressor, results, robot
 from sysid.candidates import Candidate, made, together
 from sysid.changes import changed
 from sysid.diagnose.diagnosis import diagnose
 from sysid.effects.payload import Payload
 from sysid.inertia.pseudo import rotational_inertia, sphere
+from sysid.robot_spec import RobotSpec
 from sysid.statement.changes import document as changes_document
 from sysid.statement.changes import named
 from sysid.statement.document import document
@@ -181,6 +182,17 @@ def two_arms(tmp_path_factory, planar):
     for seed, (log, ends) in enumerate({"one": (0.0, 0.0), "two": (0.0, 99.0), "three": (0.0, 99.0)}.items()):
         two_armed_log(planar, folder / f"{log}.csv", seed, LEFT, ends)
     return folder
+
+
+def test_a_gripper_s_load_is_asked_on_its_palm_too(tmp_path):
+    """Beside its fingers, which the palm carries; not on the links of the arm behind it."""
+    link = '<link name="{0}"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>'
+    joint = '<joint name="{1}_{2}" type="{0}"><parent link="{1}"/><child link="{2}"/><axis xyz="0 1 0"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint>'
+    links = "".join(link.format(name) for name in ("base", "arm", "palm", "left", "right"))
+    joints = [("revolute", "base", "arm"), ("revolute", "arm", "palm"), ("prismatic", "palm", "left"), ("prismatic", "palm", "right")]
+    (tmp_path / "robot.urdf").write_text(f'<robot name="hand">{links}{"".join(joint.format(*own) for own in joints)}</robot>')
+    places = find("payload").places(robot.load(RobotSpec(urdf=str(tmp_path / "robot.urdf"))))
+    assert places[0] == {} and sorted(own["link"] for own in places[1:]) == ["left", "palm"]
 
 
 def test_a_load_in_another_hand_than_the_last_is_named_with_its_link(two_arms):

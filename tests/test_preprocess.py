@@ -169,6 +169,19 @@ def test_a_stop_that_the_filter_hides_is_left_out_and_slow_motion_is_not():
     assert piece.use[:, 1].all()
 
 
+def test_behind_a_stand_rows_count_once_friction_has_settled():
+    """A joint that stops and is let creep a tenth of a milliradian back and forth, for longer than the filter sees, before it goes on."""
+    t = STEP * np.arange(6000)
+    goes = lambda x: np.where(x > 0.0, x**2, 0.0)  # noqa: E731
+    q = 0.5 - 0.3 * goes(2.0 - t) + 1e-4 * np.sin(2.0 * np.pi * np.clip(t - 2.0, 0.0, 2.0)) + 0.3 * goes(t - 4.0)
+    (piece,) = prepare([log(q)], PreprocessSpec(), ("a",)).pieces
+    stands = (piece.t > 2.0) & (piece.t < 4.0)
+    creeps = stands & (np.abs(piece.qd[:, 0]) > 3e-4)
+    assert creeps.sum() > 500 and not piece.use[stands, 0].any()
+    # on its way again, it is used from 3e-4 rad on, as soon as the filter no longer sees the stand
+    assert piece.use[piece.t > 4.1, 0].all() and piece.use[piece.t < 1.9, 0].all()
+
+
 def test_encoder_noise_is_no_motion():
     """Where an angle travels less than its noise while the filter looks, nobody can say that it moves."""
     t = STEP * np.arange(8000)

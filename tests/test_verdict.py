@@ -214,6 +214,22 @@ def test_an_effect_of_the_robot_is_missing_where_it_matters():
     assert [v.status for v in found] == ["missing", "complete"]
 
 
+def test_an_effect_of_the_robot_is_no_name_for_a_joint_whose_error_stays():
+    """A load that another joint carries: by a twentieth of a per cent the elbow's error falls in any case."""
+    load = claim("payload", "*", [0.9, 0.5], fitted(1.999, 1.0))
+    found = verdicts(fitted(2.0, 3.0), [load], [NOISE] * 2, [floor()] * 2)
+    assert [v.status for v in found] == ["missing", "unresolved"] and not found[1].claims
+
+
+def test_at_a_joint_that_is_complete_nothing_is_asked_of_the_test_logs_alone():
+    asked = []
+    few = lambda j, least: asked.append(JOINTS[j])  # noqa: E731
+    verdicts(fitted(1.05, 2.0), [], [NOISE] * 2, [floor()] * 2, few=few)
+    assert asked == ["shoulder"]
+    verdicts(fitted(1.05, 2.0), [], [NOISE, left(0.6)], [floor()] * 2, few=few)
+    assert asked == ["shoulder", "shoulder", "elbow"]
+
+
 def test_what_the_motion_predicts_and_no_effect_does_is_unknown():
     found = elbow(2.0, rest=left(0.6))
     assert found.status == "unknown" and found.left is not None

@@ -19,7 +19,7 @@ from .ask import HALF
 from .claims import Claim
 from .select import LEVEL, WORTH
 
-_LEFT, _PREDICTED = 0.25, 0.1  # of what effects took: of all else, and of what functions predict
+_LEFT, _PREDICTED, _FALLS = 0.25, 0.1, (1.0 - WORTH) ** 0.5  # of what effects took; of an error
 
 
 @dataclass(frozen=True)
@@ -89,7 +89,8 @@ def verdicts(
         pairs = [tuple(one[joint] for one in part) for part in zip(firsts, errors)]
         (first, then), both = pairs[1], [after for _, after in pairs]
         # what does not lower the joint's error on the test logs is no name for it
-        own = tuple(c for c in taking if c.head.joint in (joint, "*") and then < first)
+        least = {joint: first, "*": _FALLS * first}
+        own = tuple(c for c in taking if then < least.get(c.head.joint, 0.0))
         others = tuple(c for c in taking if c.head.joint not in (joint, "*"))
         low, noise = (floors[j].rms or v or 0.0 for v in (floors[j].low, floors[j].about))
         explained = explains(first, then, low) if claims else float("nan")
@@ -114,8 +115,7 @@ def verdicts(
         further = beyond(j, looks[0]) if looks and remains and beyond and not own else None
         further = further if further and further.predicts(among, WORTH) else None
         done = others and not own and remains and whole and little
-        above = first > (1.0 + DOUBT) * (floors[j].rms or 0.0)
-        fell = others and above and then**2 < (1.0 - WORTH) * first**2
+        fell = others and first > (1.0 + DOUBT) * (floors[j].rms or 0.0) and then < _FALLS * first
         if own and (whole or evens[j]) and little:
             told = ("missing", own, explained, remains)
         elif not done and (own or (remains and (further or not looks) and joint not in means)):

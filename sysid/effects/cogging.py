@@ -1,11 +1,14 @@
 """Torque ripple over the angle."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from ..effect import TorqueEffect
 from ..effect_options import whole
 from ..effect_parameters import Linear, Shape, called
 
+_FINEST = 1e-3  # m, the pitch of a screw: less is none that drives a joint
 _EVEN = 1e-12  # of the grid's width: as even as rounding leaves it
 
 
@@ -13,7 +16,7 @@ class Cogging(TorqueEffect):
     """Magnets prefer the iron's teeth, and gears their mesh: torque that repeats with the angle, whatever the speed.
 
     On a joint that carries weight a ripple of k = 1 is gravity itself and cannot be seen. On a prismatic joint k
-    counts per metre; give a larger `k` by hand where the pitch is below 50 mm.
+    counts per metre, and is looked for from two periods over the travel up to a pitch of 1 mm, or 120 periods.
     """
 
     name = "cogging"
@@ -27,6 +30,7 @@ class Cogging(TorqueEffect):
     options = {"lines": "how many multiples of k, from 1 (default 1)"}
 
     lines = 1
+    sliding = ()
     _most, _under = 8, 4  # lines; a part of k that may be the pitch, of which k is a multiple
     k = Shape("1/rad", 1.0, 120.0, grid=480, even=True, spacing=np.pi / 2, says="periods in 2 pi rad")
 
@@ -34,6 +38,19 @@ class Cogging(TorqueEffect):
         chosen = super().given(**options)
         whole(chosen, "lines", self._most)
         return chosen
+
+    def bound(self, robot, joint):
+        bound = self.given()
+        bound.sliding = tuple(robot.prismatic.tolist())
+        return bound
+
+    def sized(self, motion, rows, joint):
+        travel = np.ptp(motion.q[:, joint])
+        if not (self.sliding and self.sliding[joint] and travel > 0.0):
+            return None
+        low = 4.0 * np.pi / travel  # as `Shape.bounds` has it
+        high = min(2.0 * np.pi / _FINEST, low + self.k.grid * self.k.spacing / travel)
+        return (called(replace(self.k, low=low, high=max(low, high)), "k"),)
 
     def richer(self, **shapes):
         """More multiples of the same pitch, or of one of which the lines that are there are multiples: torque that repeats

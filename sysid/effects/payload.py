@@ -40,10 +40,12 @@ class Payload(LinkEffect):
         return chosen
 
     def places(self, robot):
-        """The last link, and others that carry no link: other hands, other feet."""
+        """The last link, others that carry no link, other hands and feet, and what carries two such: the palm of a gripper's fingers."""
         links = [body for body in robot.bodies if body.kind == "link"]
-        carrying = {robot.parents[body.row] for body in links} | {robot.bodies[last_link(robot)].row}
-        return [{}, *({"link": body.name} for body in links if body.row not in carrying)]
+        parents = [robot.parents[body.row] for body in links]
+        ends = [parent for body, parent in zip(links, parents) if body.row not in parents]
+        asked = [body for body in links if body.row not in parents or ends.count(body.row) > 1]
+        return [{}, *({"link": body.name} for body in asked if body.row != robot.bodies[last_link(robot)].row)]
 
     def among(self, logs):
         return subsets(logs)

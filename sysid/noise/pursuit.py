@@ -70,7 +70,7 @@ def _pursuit(x: np.ndarray, target: np.ndarray, most: int) -> tuple[list[int], n
         size = np.diag(free)
         gain = np.where(size > 1e-6 * len(x), pull**2 / np.maximum(size, _TINY), 0.0)
         k = int(np.argmax(gain))
-        if gain[k] <= _GAIN * left / len(x):
+        if gain[k] <= max(_GAIN * left / len(x), 0.0):  # what rounding leaves may be less than none
             break
         left -= gain[k]
         column = free[:, k] / math.sqrt(size[k])

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from ...held_rows import dropouts
+from ...segment import gaps
 from ..fault import WARNING, Fault
+from ..logged import Logged
 from ..look import Look
 
 AFTER, SENSELESS = 0, ()
@@ -93,6 +96,7 @@ def find(look: Look) -> Iterator[Fault]:
                 times,
                 rows,
             )
+        yield from _dropouts(log)
         again = log.tally.again
         share = again.count / max(log.samples - 1, 1)
         if log.tally.travel.any() and share > _AGAIN:
@@ -109,6 +113,29 @@ def find(look: Look) -> Iterator[Fault]:
                 again.times[:1],
                 again.count,
             )
+
+
+def _dropouts(log: Logged) -> Iterator[Fault]:
+    """Rows in which nothing came, which are no samples; of a long log in what is shown of it."""
+    parts = [(own, dropouts(own.q, own.tau, gaps(own.t))) for own in log.shown]
+    found = [(own.t[a], own.t[b]) for own, runs in parts for a, b in runs]
+    if not found:
+        return
+    longest = 1e3 * max(stop - start for start, stop in found)
+    yield Fault(
+        "values_held",
+        WARNING,
+        (
+            f"all angles and torques of {log.log.name} stay as they were while the robot moves, {len(found)} "
+            f"time{'s' * (len(found) > 1)}, for {longest + 1e3 * log.step:.3g} ms at most, first at {found[0][0]:.4g} s: "
+            "messages that did not arrive"
+        ),
+        "a fit leaves these rows out; look for what stalls the logger",
+        "",
+        log.log.name,
+        tuple(round(float(start), 6) for start, _ in found[:_SHOWN]),
+        sum(b - a + 1 for _, runs in parts for a, b in runs),
+    )
 
 
 def _throughout(event, log) -> bool:
