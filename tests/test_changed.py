@@ -3,6 +3,7 @@
 import json
 
 import numpy as np
+import polars as pl
 import pytest
 
 from scripts.blind_parts.robots import PLANAR
@@ -71,6 +72,25 @@ def test_a_base_that_tilts_far_is_a_tilt_and_nothing_else(fitted, planar, pitch)
     values = found["parameters"]
     assert values["gravity_tilt.*.pitch"]["value"] == pytest.approx(pitch, abs=3.0 * values["gravity_tilt.*.pitch"]["std"] + 1e-3)
     assert values["gravity_tilt.*.pitch"]["std"] < 5e-3 and values["gravity_tilt.*.roll"]["std"] is None
+
+
+def test_a_tilt_says_whose_encoder_may_be_it(fitted, planar):
+    """An arm in a plane: a base that is turned about y, and a first encoder whose zero is off, are one."""
+    written(planar, fitted / "tilted.csv", 7, pitch=0.05)
+    said = what_changed(fitted, "tilted.csv")
+    assert any("offset of the encoder of shoulder is the same as a tilt" in note for note in said["notices"])
+
+
+@pytest.mark.parametrize("offset", [0.03, -0.25])
+def test_an_encoder_s_zero_that_was_set_anew_is_told_with_its_size(fitted, planar, offset):
+    """However far: what it does bends with it."""
+    written(planar, fitted / "zero.csv", 8)
+    table = pl.read_csv(fitted / "zero.csv")
+    table.with_columns(pl.col("q_elbow") - offset).write_csv(fitted / "zero.csv")
+    (found,) = what_changed(fitted, "zero.csv")["findings"]
+    assert (found["effect"], found["joint"]) == ("encoder_offset", "elbow")
+    value = found["parameters"]["encoder_offset.elbow.d"]
+    assert value["value"] == pytest.approx(offset, abs=3.0 * value["std"] + 1e-4) and value["std"] < 5e-3
 
 
 def test_a_bucket_s_load_is_as_possible_as_a_finger_s():

@@ -305,6 +305,18 @@ def test_another_unit_of_one_log_is_not_set_for_all(column, factor, said, made, 
     assert all(said in f.do for f in errors)
 
 
+def test_a_log_in_degrees_beside_one_in_turns_is_told(made, tmp_path):
+    """The experiment says `position: turns`, as it should."""
+    logs = shutil.copytree(made(), tmp_path / "logs")
+    for name, factor in (("train.csv", 0.5 / np.pi), ("test.csv", 180.0 / np.pi)):
+        pl.read_csv(logs / name).with_columns(pl.col("^q_.*$") * factor).write_csv(logs / name)
+    experiment = pipeline.load(logs)
+    data = experiment.data.model_copy(update={"units": experiment.data.units.model_copy(update={"position": "turns"})})
+    errors = [f for f in check.check(experiment.model_copy(update={"data": data})) if f.severity == "error"]
+    assert {(f.fault, f.log, f.joint) for f in errors} == {("wrong_unit", "test.csv", joint) for joint in JOINTS}
+    assert all(f.do == "give the angles in test.csv in turns, as in the others" for f in errors)
+
+
 @pytest.mark.parametrize("file", ["train_2.csv", "test.csv"])
 @pytest.mark.parametrize("keys, word", [(["tau"], "the torque columns"), (["q"], "the angle columns"), (["q", "tau"], "the columns")])
 def test_columns_that_one_log_has_in_another_order_are_named_with_it(keys, word, file, made, tmp_path):

@@ -127,6 +127,16 @@ def test_the_low_pass_is_said(found):
 def test_a_region_in_words():
     words = regions.Region("qd", "rad/s", -0.1, 0.05, 0.62, 0.11).words()
     assert words == "62 % of the squared error lies in the 11 % of the rows with speed -0.1 to 0.05 rad/s"
+    words = regions.Region("q", "rad", 0.9, 1.0, 0.62, 0.11, new=0.9).words()
+    assert words.endswith("with angle 0.9 to 1 rad, where the training logs were not")
+
+
+def test_what_of_a_region_s_error_lies_where_no_training_log_was():
+    values, square = np.array([0.0, 0.5, 0.9, 1.0, 1.1]), np.array([1.0, 1.0, 1.0, 4.0, 5.0])
+    region = regions.Region("q", "rad", 0.9, 1.1, 0.8, 0.6)
+    assert regions._beyond(region, values, square, np.array([-1.0, 0.95])).new == pytest.approx(0.9)
+    assert regions._beyond(region, values, square, np.array([-1.0, 1.2])).new == 0.0
+    assert regions._beyond(region, values, square, np.zeros(0)).new == pytest.approx(1.0)
 
 
 def test_no_number_is_left_out_where_it_is_not_known(diagnosed):

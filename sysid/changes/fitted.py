@@ -3,6 +3,7 @@ block of time out, to first order."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -63,6 +64,28 @@ def together(model: Model, asked: Question, chosen) -> tuple[tuple[Change, ...],
         out.append(Change(key[0], joint, share, error, parameters))
     left = asked.squares(places, c).sum(axis=0)
     return tuple(sorted(out, key=lambda change: -change.removed)), left
+
+
+def with_fewer(asked: Question, chosen: list[Key], fewer: Sequence[Key]) -> list[Key]:
+    """Changes in which a load gives way to one of `fewer` numbers that leaves no more than a load
+    that can be: what turns a link's body about its joint, an encoder's zero, takes of ten free
+    numbers as much."""
+    load = ("payload", ROBOT)
+    if load not in chosen:
+        return chosen
+    others = [key for key in fewer if key in asked.spans and key not in chosen]
+    rest = [key for key in chosen if key != load]
+    return min([chosen, *([*rest, key] for key in others)], key=lambda keys: _left(asked, keys))
+
+
+def _left(asked: Question, keys: Sequence[Key]) -> float:
+    """What changes leave of all squares, as joints count."""
+    places, body = asked.places(keys), None
+    if ("payload", ROBOT) in keys:
+        first = len(asked.places(keys[: keys.index(("payload", ROBOT))]))
+        body = slice(first, first + 10)
+    c, _ = possible(asked.by_block.sum(axis=0), places, body)
+    return float((asked.squares(places, c) @ asked.weights**2).sum())
 
 
 def possible(products, places, own: slice | None) -> tuple[np.ndarray, np.ndarray]:

@@ -15,10 +15,10 @@ import numpy as np
 from scipy import stats
 
 from ..blocks import folds, z_score
-from ..model_parameters import ROBOT
 from ..projection import inverted
 
 BLOCKS, _MOST = 24, 12  # blocks, over the whole log; changes
+_ALIKE = 1e-3  # of a share: by less no half tells one change from another
 # of the squared residual: below it, a held model's errors on another motion look like changes
 _WORTH = 0.1
 
@@ -30,12 +30,14 @@ class Question:
     """A held model on a new log, and what each change would add to it.
 
     spans: {change: its columns}; products: (blocks, dof, k + 1, k + 1) of the columns of all
-    changes, then the residual of the held model; weights: (dof,) by which joints count.
+    changes, then the residual of the held model; weights: (dof,) by which joints count. wide:
+    {change: whether other joints than its own feel it}.
     """
 
     spans: dict[Key, slice]
     products: np.ndarray
     weights: np.ndarray
+    wide: dict[Key, bool]
     _kept: dict = field(default_factory=dict, repr=False, compare=False)
 
     def weighed(self, weights) -> Question:
@@ -78,7 +80,7 @@ class Question:
 
     def weighted_sum(self, key: Key, squares: np.ndarray) -> np.ndarray:
         """(blocks,) sums of squares (blocks, dof) over the joints of a change, as they count."""
-        joints = slice(None) if key[1] == ROBOT else [key[1]]
+        joints = slice(None) if self.wide[key] else [key[1]]
         return (squares * self.weights**2)[:, joints].sum(1)
 
     def share(self, key: Key, before, after) -> float:
@@ -112,7 +114,9 @@ class Question:
             found = {key: share for key, share in new.items() if share is not None}
             if not found:
                 break
-            chosen.append(max(found, key=found.get))
+            # of what takes as much the first that is asked
+            best = max(found.values())
+            chosen.append(next(key for key in found if found[key] > best - _ALIKE))
         # what joined first may have stood for what joined after it: a bias for a load
         for key in list(chosen):
             others = [other for other in chosen if other != key]
@@ -138,21 +142,20 @@ def question(columns: dict[Key, np.ndarray], residual, weights, blocks) -> Quest
     ends = np.cumsum([own.shape[2] for own in columns.values()]).tolist()
     spans = {key: slice(e - own.shape[2], e) for (key, own), e in zip(columns.items(), ends)}
     count, dof = int(blocks.max()) + 1, residual.shape[1]
+    wide = {
+        key: any(np.any(own[j]) for j in range(dof) if j != key[1]) for key, own in columns.items()
+    }
     products = np.zeros((count, dof, ends[-1] + 1, ends[-1] + 1))
     for j in range(dof):
-        at = [
-            k
-            for key in columns
-            if key[1] in (ROBOT, j)
-            for k in range(*spans[key].indices(ends[-1]))
-        ]
-        own = [values[j] for key, values in columns.items() if key[1] in (ROBOT, j)]
-        wide = np.column_stack([*own, residual[:, j]])
+        felt = [key for key in columns if wide[key] or key[1] == j]
+        at = [k for key in felt for k in range(spans[key].start, spans[key].stop)]
+        own = [columns[key][j] for key in felt]
+        every = np.column_stack([*own, residual[:, j]])
         at = np.array([*at, ends[-1]])
         for b in range(count):
-            part = wide[blocks == b]
+            part = every[blocks == b]
             products[b, j][np.ix_(at, at)] = part.T @ part
-    return Question(spans, products, np.asarray(weights))
+    return Question(spans, products, np.asarray(weights), wide)
 
 
 def least_squares(products, places: Sequence[int]) -> np.ndarray:

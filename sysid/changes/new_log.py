@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -14,19 +14,20 @@ from ..errors import LogError
 from ..log_spec import LogSpec
 from ..lowpass import LEAST, lowpassed, stride_of
 from ..model import Model
+from ..model_parameters import ROBOT
 from ..noise import floors_of
 from ..specs import Experiment
-from ..vocabulary import find
 from ..warned import noticed
-from .fitted import Change, together
-from .halves import BLOCKS, support
+from .fitted import Change, together, with_fewer
+from .halves import BLOCKS, Key, support
 from .halves import question as asked_of
 from .hands import PAYLOAD, hands, holding
 from .held import Held, held
-from .signatures import TILT, about
+from .signatures import OFFSET, TILT, about, bent, near
 
 RATE = 0.05
-_ROUNDS, _NEAR = 5, 1e-4  # about a tilt; rad: what rounds may still change of it
+_SAME = 1e-4  # of a column's square, a hundredth of it: what the other leaves
+_ROUNDS, _NEAR = 5, 1e-4  # about a tilt or an offset; rad: what rounds may still change of it
 
 
 @dataclass(frozen=True)
@@ -95,39 +96,30 @@ def asked(
     if hand:
         residual, tried = about(structure, x, motion, stride, data, hand=hand)
     questions = len(tried) + len(hands(robot)) - 1
-    changes, tilt = (), None
+    changes, at = (), {}
     for _ in range(_ROUNDS):  # what a tilt does bends with it
         question = asked_of(tried, residual, by_size(after), blocks)
         least = support(rate, among * questions)
-        chosen = question.supported(least)
+        chosen = with_fewer(question, question.supported(least), bent(structure))
         changes, after = together(structure, question, chosen)
         if changes:  # a joint counts by what is left of it, not by what the changes made of it
             question = question.weighed(by_size(after))
-            changes, after = together(structure, question, question.supported(least) or chosen)
-        before, tilt = tilt, _tilt(changes)
-        told = tilt is not None and before is not None
-        if np.abs(tilt - before).max() < _NEAR if told else tilt is before:
+            anew = with_fewer(question, question.supported(least), bent(structure))
+            changes, after = together(structure, question, anew or chosen)
+        before, at = at, near(structure, changes)
+        same = at.keys() == before.keys()
+        if same and all(np.abs(at[key] - before[key]).max() < _NEAR for key in at):
             break
-        residual, tried = about(structure, x, motion, stride, data, tilt, hand)
+        residual, tried = about(structure, x, motion, stride, data, at, hand)
     rms = [np.sqrt(own / counted) for own in (squares, after)]
     changes = tuple(replace(c, options=hand) if c.effect == PAYLOAD[0] else c for c in changes)
-    said = changes, _notes(experiment, changes)
+    said = changes, (*_notes(experiment, changes), *_twins(robot, tried, changes))
     if not floors:
         return Changed(robot.joints, *rms, (), *said)
     found, whole = _as_logged(structure, x, motion)
     # what is as slow as motion the low-pass leaves as it is
     left = np.sqrt(np.maximum(whole - (rms[0] ** 2 - rms[1] ** 2), 0.0))
     return Changed(robot.joints, *rms, found, *said, left)
-
-
-def _tilt(changes: Sequence[Change]) -> np.ndarray | None:
-    """The tilt (roll, pitch) [rad] among changes, within an effect's bounds; None without one."""
-    for change in changes:
-        if (change.effect, change.joint) == (TILT[0], "*"):
-            shapes = find(TILT[0]).shapes()
-            values = (change.parameters[f"{TILT[0]}.*.{one.name}"][0] for one in shapes)
-            return np.array([np.clip(v, one.low, one.high) for v, one in zip(values, shapes)])
-    return None
 
 
 def _as_logged(structure: Model, x, motion) -> tuple[tuple, np.ndarray]:
@@ -141,6 +133,19 @@ def _as_logged(structure: Model, x, motion) -> tuple[tuple, np.ndarray]:
         squares = squares + np.sum((piece.measured[piece.core] - told) ** 2 * use, axis=0)
         count = count + np.sum(np.ones(told.shape) * use, axis=0)
     return floors_of(motion.pieces, np.concatenate(predicted)), squares / np.maximum(count, 1)
+
+
+def _twins(robot, tried: Mapping[Key, np.ndarray], changes) -> Iterator[str]:
+    """Of a tilt the encoders whose offset is the same: that of a first joint whose axis is level."""
+    if not any(change.effect == TILT for change in changes):
+        return
+    tilt = tried[TILT, ROBOT].reshape(-1, tried[TILT, ROBOT].shape[2])
+    for (name, joint), columns in tried.items():
+        own = columns.reshape(len(tilt), -1)[:, 0]
+        left = own - tilt @ np.linalg.lstsq(tilt, own, rcond=None)[0] if name == OFFSET else own
+        if left @ left < _SAME * (own @ own):
+            where = robot.joints[joint]
+            yield f"here an offset of the encoder of {where} is the same as a tilt of the base"
 
 
 def _located(log: str) -> str:

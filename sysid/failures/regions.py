@@ -3,7 +3,7 @@ squared error."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -20,7 +20,7 @@ _BANDS = (0.0, 0.5, 1.0, 2.0, 4.0, 8.0, 15.0, 30.0, 60.0, 125.0, 250.0, 500.0)  
 @dataclass(frozen=True)
 class Region:
     """A stretch of one variable, from `low` to `high`, that holds `error` of the squared error in
-    `rows` of the rows."""
+    `rows` of the rows; new: the share of that error which lies where no training log was."""
 
     variable: str
     unit: str
@@ -28,13 +28,20 @@ class Region:
     high: float
     error: float
     rows: float
+    new: float = 0.0
+
+    @property
+    def unknown(self) -> bool:
+        """Whether most of it lies where nothing was fitted."""
+        return self.new > _HALF
 
     def words(self) -> str:
         """As a sentence says it."""
         what = {"q": "angle", "qd": "speed", "time": "time"}.get(self.variable, self.variable)
         where = f"{what} {self.low:.3g} to {self.high:.3g} {self.unit}"
         error, rows = f"{100 * self.error:.0f} %", f"{100 * self.rows:.0f} %"
-        return f"{error} of the squared error lies in the {rows} of the rows with {where}"
+        new = ", where the training logs were not" if self.unknown else ""
+        return f"{error} of the squared error lies in the {rows} of the rows with {where}{new}"
 
 
 @dataclass(frozen=True)
@@ -91,7 +98,9 @@ def failures(held_out: HeldOut, raw: Prediction, levels, view: View) -> list[Fai
         if square.sum() > 0:
             for name in ("q", "qd"):
                 unit, values = known[f"{name}_{joint}"]
-                regions.append(_crowded(name, unit, values[use], square))
+                region = _crowded(name, unit, values[use], square)
+                trained = view.rows.of(view.motion, name)[view.rows.use[:, j], j]
+                regions.append(region and _beyond(region, values[use], square, trained))
             regions.append(_crowded("time", "s", rows.t[use], square))
         regions = sorted(
             (r for r in regions if r is not None and r.error - r.rows > 0.1),
@@ -144,6 +153,14 @@ def _crowded(name: str, unit: str, values, square) -> Region | None:
         return None
     rows, a, b, error = best
     return Region(name, unit, float(x[cuts[a]]), float(x[cuts[b]]), float(error), float(rows))
+
+
+def _beyond(region: Region, values, square, trained) -> Region:
+    """A region with the share of its error that lies beyond values (n,) of the training logs."""
+    inside = (values >= region.low) & (values <= region.high)
+    low, high = (trained.min(), trained.max()) if len(trained) else (np.inf, -np.inf)
+    new = inside & ((values < low) | (values > high))
+    return replace(region, new=float(square[new].sum() / max(square[inside].sum(), 1e-300)))
 
 
 def _map(q, qd, residual) -> dict:

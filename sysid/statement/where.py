@@ -10,6 +10,8 @@ from ..fit_document import number
 from ..plausible import WRONG
 from .words import listed, wrapped
 
+_MOST = 0.5  # of a region's error
+
 
 def entry(found: Failure) -> dict:
     """What a document has of one joint."""
@@ -28,6 +30,7 @@ def entry(found: Failure) -> dict:
                 "high": r.high,
                 "share_of_error": r.error,
                 "share_of_rows": r.rows,
+                "not_in_training": r.new,
             }
             for r in found.regions
         ],
@@ -43,8 +46,16 @@ def touched(document: dict) -> list[str]:
     return [
         own["joint"]
         for own in document.get("fails_where", ())
-        if own.get("stretches") and status[own["joint"]] in ("unresolved", "unknown")
+        if own.get("stretches")
+        and status[own["joint"]] in ("unresolved", "unknown")
+        # where no training log was, time says no more than place
+        and not any(_beyond(region) for region in own["regions"])
     ]
+
+
+def _beyond(region: dict) -> bool:
+    """Whether most of a region's error lies at angles that no training log reaches."""
+    return region["variable"] == "q" and region.get("not_in_training", 0.0) > _MOST
 
 
 def blind(document: dict) -> list[str]:
@@ -80,14 +91,24 @@ def at_end(own: dict, asked: set[tuple[str, str]] = frozenset()) -> str:
     for r in own.get("regions", ()):
         edges = own["map"]["q"]
         ends = {"upper_stop": r["high"] == edges[-1], "lower_stop": r["low"] == edges[0]}
-        names = [name for name, there in ends.items() if there and (name, joint) not in asked]
+        names = [name for name, there in ends.items() if there]
         if r["variable"] != "q" or r["share_of_rows"] > END or not names:
             continue
         name, share = names[0], f"{100 * r['share_of_error']:.0f} %"
         span = f"{r['low']:.4g} to {r['high']:.4g} {r['unit']}"
-        return (
+        said = (
             f"{share} of the squared error of {joint} lies at the {name.partition('_')[0]} end of "
-            f"its motion, {span}: an end stop, or something that it meets there, looks like that; "
+            f"its motion, {span}"
+        )
+        if _beyond(r):
+            return (
+                f"{said}, which no training log reaches: nothing was fitted there; take a training "
+                "log that goes there, or a test log that does not"
+            )
+        if (name, joint) in asked:
+            return ""
+        return (
+            f"{said}: an end stop, or something that it meets there, looks like that; "
             f"`sysid add EXPERIMENT formula --joint {joint} --option 'formula={LAWS[name]}' "
             f"--option name={name}` fits one"
         )

@@ -15,6 +15,7 @@ from ..tally import FASTER, lag_of
 
 AFTER, SENSELESS = 1, ("wrong_unit", "joint_order")
 _COARSE = TURN / 2**12  # rad: a velocity by differences then is mostly steps
+_UNITS = 20.0  # times: degrees and radians are 57 apart, and motions of one robot less
 _STILL, _MOSTLY = 0.01, 0.6  # of a joint's top speed; of the samples
 
 
@@ -56,12 +57,18 @@ def _of_log(look: Look, log: Logged, j: int, joint: str, slides: bool) -> Iterat
     # one nobody knows
     endless = not np.isfinite(high - low) and not fast
     told = not (endless and np.isfinite(allowed))
-    if own.far.count and look.experiment.data.units.position == "rad" and told:
+    stated = look.experiment.data.units.position
+    if own.far.count and told and (stated == "rad" or _alone(look, log, j)):
+        if stated == "rad":
+            read, do = "", _degrees(look, log, joint)
+        else:
+            read = f" with `position: {stated}` under `units:`, and does not in other logs"
+            do = f"give the angles in {name} in {stated}, as in the others"
         yield Fault(
             "wrong_unit",
             WARNING if endless else ERROR,
-            (f"{joint} reaches {own.far.most:.4g} rad in {name}, {own.far.most / TURN:.2g} turns"),
-            _degrees(look, log, joint),
+            f"{joint} reaches {own.far.most:.4g} rad in {name}, {own.far.most / TURN:.2g} turns{read}",
+            do,
             joint,
             name,
             (own.far.at,),
@@ -119,6 +126,13 @@ def _of_log(look: Look, log: Logged, j: int, joint: str, slides: bool) -> Iterat
             name,
             rows=log.samples,
         )
+
+
+def _alone(look: Look, log: Logged, j: int) -> bool:
+    """Whether a joint travels in a log so many times as far as in the one where it travels least, that
+    these are two units."""
+    travel = [float(one.tally.travel[j]) for one in look.logs]
+    return float(log.tally.travel[j]) > _UNITS * min(travel) > 0.0
 
 
 def _millimetres(look: Look, joint: str) -> str:
