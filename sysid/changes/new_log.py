@@ -136,7 +136,7 @@ def _as_logged(structure: Model, x, motion) -> tuple[tuple, np.ndarray]:
 
 
 def _twins(robot, tried: Mapping[Key, np.ndarray], changes) -> Iterator[str]:
-    """Of a tilt the encoders whose offset is the same: that of a first joint whose axis is level."""
+    """Of a tilt the encoders whose offset is the same: of a first joint whose axis is level."""
     if not any(change.effect == TILT for change in changes):
         return
     tilt = tried[TILT, ROBOT].reshape(-1, tried[TILT, ROBOT].shape[2])
