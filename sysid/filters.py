@@ -92,8 +92,9 @@ def begun(
     share = mapped or (lambda work, arguments: (work(*each) for each in arguments))
     tries = share(_tried, ((experiment, candidate, model, sent, prior, edge) for candidate in candidates))
 
-    def again(rows_of: float) -> dict | None:
-        return _tried(experiment, {key: value}, model, shortened, prior, edge, {key: rows_of})
+    def made(wide: float) -> dict | None:
+        narrow, other = (spec.model_copy(update={key: each}) for each in (value, wide))
+        return too_narrow.noise_makes(experiment, narrow, other, model, [_middle(log) for log in shortened], prior, edge)
 
     def result() -> dict:
         tried: list[dict] = []
@@ -113,7 +114,7 @@ def begun(
             chosen = {name: best[name] for name in candidates[0]}
             if len(tried) > 1 and best in (tried[0], tried[-1]):
                 warn(f"preprocess.{key}: auto chose {best[key]:g}, the end of what was tried; give a number to go further")
-        elif wider := too_narrow.by_noise(tried, key, value, again):
+        elif wider := too_narrow.by_noise(tried, key, value, made):
             if key not in _given(spec):
                 asks = experiment.model_copy(update={"preprocess": spec.model_copy(update={key: "auto"})})
                 other = compare(asks, model, logs, prior, progress=progress, mapped=mapped)
@@ -152,13 +153,13 @@ def _window(spec: PreprocessSpec, cutoff: float, step: float) -> float:
     return spec.window if "window" in _given(spec) else float(max(1.0 / (_ANGLES * cutoff), 2.0 * (spec.order // 2) * step))
 
 
-def _tried(experiment: Experiment, candidate: dict, model: Model, logs: Sequence[Log], prior, edge: float, rows_of: dict | None = None) -> dict | None:
-    """What a filter leaves of the middles of logs, fitted to its own rows or to those of another; None where it is none: a window shorter
-    than its order, a cutoff above half the sampling rate."""
-    spec, other = (experiment.preprocess.model_copy(update=one) if one else None for one in (candidate, rows_of))
+def _tried(experiment: Experiment, candidate: dict, model: Model, logs: Sequence[Log], prior, edge: float) -> dict | None:
+    """What a filter leaves of the middles of logs; None where it is none: a window shorter than its order, a cutoff above half the
+    sampling rate."""
+    spec = experiment.preprocess.model_copy(update=candidate)
     try:
         with noticed():
-            return {**candidate, **held_out(experiment, spec, model, [_middle(log) for log in logs], prior, edge, other)}
+            return {**candidate, **held_out(experiment, spec, model, [_middle(log) for log in logs], prior, edge)}
     except SysidError:
         return None
 

@@ -2,15 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
 
 from .blocks import within_one_error
-from .errors import ConfigError
+from .errors import ConfigError, SysidError
+from .filter_errors import made_by_noise
+from .log import Log
+from .lowpass import again, angle_noise, band, hardly_moving, widest
+from .model import Model
 from .smoother import Smoother
-from .specs import PreprocessSpec
+from .specs import Experiment, PreprocessSpec
+from .warned import noticed
 
 # Of a joint's error: in the rest a noise floor may be in doubt (noise.DOUBT); and of the other joints, half of that
 _LESS, _ALSO = 0.9, 0.95
+_MAKES = 2.0  # times the square that noise makes: one draw of few rows tells it to less than that
 
 
 def wider(tried: list[dict], key: str, value: float) -> dict:
@@ -25,15 +34,40 @@ def wider(tried: list[dict], key: str, value: float) -> dict:
     return {"key": key, "given": value, "value": least[key], "rms": less} if any(wide < _LESS * rms for rms, wide in less.values()) else {}
 
 
-def by_noise(tried: list[dict], key: str, value: float, again: Callable[[float], dict | None]) -> dict:
-    """The same, where the wider one leaves less because it smooths more, and not by the rows that it leaves out, in which the model errs.
+def by_noise(tried: list[dict], key: str, value: float, made: Callable[[float], dict | None]) -> dict:
+    """The same, where what the wider one leaves less is no more than the noise of the angles makes: it smooths a gear's blows as well, and
+    leaves out more of the rows about a reversal, a stop, a jump, in which a model may err.
 
     Args:
-        again: what the given one leaves, fitted to the rows of another alone.
+        made: {joint: mean square} that the noise of the angles makes of the given one's error, by the parameters that another tells.
+
+    Source: Cook & Stefanski 1994 (simulation extrapolation).
     """
     found = wider(tried, key, value)
-    alike = again(found["value"]) if found else None
-    return wider([alike, *(entry for entry in tried if entry[key] == found["value"])], key, value) if alike else found
+    squares = made(found["value"]) if found else None
+    if squares is None:
+        return found
+    less = {joint: both for joint, both in found["rms"].items() if both[0] ** 2 - both[1] ** 2 <= _MAKES * squares[joint]}
+    return found | {"rms": less} if any(wide < _LESS * rms for rms, wide in less.values()) else {}
+
+
+def noise_makes(
+    experiment: Experiment, narrow: PreprocessSpec, wide: PreprocessSpec, model: Model, logs: Sequence[Log], prior, edge: float
+) -> dict | None:  # fmt: skip
+    """As of `made_by_noise`; None where logs are too short for it."""
+    try:
+        with noticed():
+            return made_by_noise(experiment, narrow, wide, model, logs, _noisier(logs), prior, edge)
+    except SysidError:
+        return None
+
+
+def _noisier(logs: Sequence[Log]) -> list[Log]:
+    """Logs with the noise of their angles once more."""
+    rng, own = np.random.default_rng(0), band(logs)
+    cutoff = widest(logs, known=own)
+    slow = hardly_moving(cutoff, own)
+    return [replace(log, segments=tuple(again(s, angle_noise(s, cutoff), slow, rng) for s in log.segments)) for log in logs]
 
 
 def said(wider: dict) -> str:

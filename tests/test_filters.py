@@ -83,20 +83,19 @@ def test_only_what_smooths_more_and_leaves_clearly_less_is_told():
     assert too_narrow.wider(cut, "cutoff", 10.0)["value"] == 5.0
 
 
-def test_a_filter_that_leaves_less_by_the_rows_that_it_leaves_out_is_not_better():
-    """Fitted to the rows of the wider one, the given one leaves as little, or still more by what angles' noise makes."""
+def test_a_filter_that_leaves_less_by_other_than_noise_of_the_angles_is_not_better():
+    """What the angles' noise makes, once more, is less than half of what goes."""
     given, wide = entry(0.1, 0.2, (1.0, 1.0)), entry(0.2, 0.15, (0.8, 1.1))
     asked = []
 
-    def of_those_rows(error, rms):
-        return lambda window: asked.append(window) or entry(0.1, error, rms)
+    def by(square):
+        return too_narrow.by_noise([given, wide], "window", 0.1, lambda value: asked.append(value) or square and dict(zip(JOINTS, (square, 0.0))))
 
-    assert too_narrow.by_noise([given, wide], "window", 0.1, of_those_rows(0.15, (0.8, 1.1))) == {}
-    assert too_narrow.by_noise([given, wide], "window", 0.1, of_those_rows(0.19, (0.95, 1.1))) == {
-        "key": "window", "given": 0.1, "value": 0.2, "rms": {JOINTS[0]: [0.95, 0.8]}
-    }  # fmt: skip
-    assert asked == [0.2, 0.2]
-    assert too_narrow.by_noise([given], "window", 0.1, of_those_rows(0.15, (0.8, 1.1))) == {} and len(asked) == 2
+    # of 0.36 in squares that go
+    assert by(0.36) == {"key": "window", "given": 0.1, "value": 0.2, "rms": {JOINTS[0]: [1.0, 0.8]}} and by(0.2)
+    assert by(0.1) == {}
+    assert by(None)["value"] == 0.2 and asked == [0.2] * 4  # where it cannot be asked
+    assert too_narrow.by_noise([given], "window", 0.1, by) == {}
 
 
 def test_noise_of_angles_is_no_law_and_asks_for_no_log():
