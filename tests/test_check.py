@@ -391,6 +391,16 @@ def test_samples_that_were_taken_beside_their_even_stamps_are_told(made, tmp_pat
     assert not [f for f in check.check(pipeline.load(made(rate=100.0))) if f.fault == "clock_jitter"]
 
 
+def test_an_angle_that_goes_farther_than_its_limits_may_be_the_motor_s(made, tmp_path):
+    """Nine times the elbow's, and a ninth of its torque."""
+    logs = shutil.copytree(made(), tmp_path / "logs")
+    for name in ("train.csv", "test.csv"):
+        table = pl.read_csv(logs / name)
+        table.with_columns(pl.col("q_elbow") * 9.0, pl.col("tau_elbow") / 9.0).write_csv(logs / name)
+    told = [f.do for f in check.check(pipeline.load(logs)) if (f.fault, f.joint) == ("limit_exceeded", "elbow") and "moves at" not in f.says]
+    assert told and all("may be the motor's, before its gear" in do for do in told)
+
+
 def test_messages_that_did_not_arrive_are_told(made, tmp_path):
     """All values of a log stay for 16 and for 44 ms while the arm moves."""
     logs = shutil.copytree(made(), tmp_path / "logs")

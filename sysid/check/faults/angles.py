@@ -16,6 +16,12 @@ from ..tally import FASTER, lag_of
 AFTER, SENSELESS = 1, ("wrong_unit", "joint_order")
 _COARSE = TURN / 2**12  # rad: a velocity by differences then is mostly steps
 _UNITS = 20.0  # times: degrees and radians are 57 apart, and motions of one robot less
+ASK = "is this the joint's column, its unit, its zero, this robot's URDF?"
+GEARED = (
+    "an angle that goes farther than its limits are apart may be the motor's, before its gear: then "
+    "divide it by the gear's ratio and multiply the torque by it; else " + ASK
+)
+_GEARED = 1.5  # times what limits allow: no joint goes so far, whatever its zero
 _STILL, _MOSTLY = 0.01, 0.6  # of a joint's top speed; of the samples
 
 
@@ -95,7 +101,7 @@ def _of_log(look: Look, log: Logged, j: int, joint: str, slides: bool) -> Iterat
                 f"{joint} is at {own.beyond.value:.4g} in {name}, beyond its limits of "
                 f"{low:.4g} to {high:.4g}"
             ),
-            "is this the joint's column, its unit, its zero, this robot's URDF?",
+            GEARED if farther(look, j) else ASK,
             joint,
             name,
             (own.beyond.at,),
@@ -126,6 +132,14 @@ def _of_log(look: Look, log: Logged, j: int, joint: str, slides: bool) -> Iterat
             name,
             rows=log.samples,
         )
+
+
+def farther(look: Look, j: int) -> float:
+    """How many times as far as its limits are apart a joint goes in some log: 0.0 where that is no
+    wonder, or there are none."""
+    low, high = look.robot.limits[j]
+    most = max(float(log.tally.travel[j]) for log in look.logs)
+    return most / (high - low) if np.isfinite(high - low) and most > _GEARED * (high - low) else 0.0
 
 
 def _alone(look: Look, log: Logged, j: int) -> bool:

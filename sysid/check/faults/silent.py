@@ -9,7 +9,9 @@ import numpy as np
 from ..equations import LIKELY, Reading
 from ..fault import ERROR, Fault
 from ..look import Look
+from .angles import GEARED, farther
 
+UNTOLD = "log its torque or current, or name the joint in data.unused"
 AFTER, SENSELESS = 3, ("wrong_unit", "angle_wrap", "joint_order", "sign_flipped")
 _FOLLOWS = 0.5  # of its square: a torque the greater half of which is friction and masses is one
 
@@ -38,6 +40,6 @@ def find(look: Look) -> Iterator[Fault]:
                     f"{100 * max(follows[j], 0.0):.0f} % of that is as bodies, motor and friction "
                     "make it"
                 ),
-                "log its torque or current, or name the joint in data.unused",
+                GEARED if farther(look, j) else UNTOLD,
                 joint,
             )
