@@ -18,7 +18,7 @@ from sysid.check.look import looked
 from sysid.cli import command_line
 from sysid.errors import meant
 from sysid.statement import faults, sizes
-from sysid.terminal import fitted
+from sysid.terminal import fitted, steps
 from tests.conftest import JOINTS, csv
 
 BOTH = ("shoulder", "elbow")
@@ -267,6 +267,16 @@ def test_what_is_held_at_zero_is_a_line_an_effect(capsys, monkeypatch):
     fitted._show_held({f"viscous.j{k}.Fv": 1.0 for k in range(7)} | {"armature.arm.left.Ia": 2.0})
     lines = capsys.readouterr().out.splitlines()
     assert len(lines) == 2 and lines[0].endswith("on j0, j1, j2, j3, j4, j5, j6") and lines[1].endswith("on arm.left")
+
+
+def test_what_an_addition_holds_is_told_apart_from_what_it_cannot_tell_alone(capsys, monkeypatch, tmp_path):
+    monkeypatch.setenv("COLUMNS", "200")
+    parameters = [{"name": f"law.j.{name}", "value": value, "std": None, "unit": "SI"} for name, value in (("a", -1152.0), ("b", 0.0))]
+    parameters.append({"name": "law.j.c", "value": 3.0, "std": None, "unit": "SI", "held": True})
+    document = {"rms_test_before": {}, "rms_test_after": {}, "differences": [], "added": "law", "parameters": parameters, "says": "", "refused": True}
+    steps.show_added(document | {"untold": "", "notices": [], "experiment": str(tmp_path)}, tmp_path, tmp_path)
+    said = capsys.readouterr().out
+    assert "held at zero or at the prior: law.j.b, law.j.c\n" in said and "only together with other parameters: law.j.a = -1152\n" in said
 
 
 def test_a_wide_table_of_sizes_is_named_and_not_printed():

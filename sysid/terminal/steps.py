@@ -35,8 +35,11 @@ def show_added(document: dict, experiment, run, before=()) -> None:
     for parameter in document["parameters"]:
         if parameter["std"] is not None:
             print(text.valued(parameter["name"], parameter))
-    if held := [parameter["name"] for parameter in document["parameters"] if parameter["std"] is None]:
+    untold = [parameter for parameter in document["parameters"] if parameter["std"] is None]
+    if held := [parameter["name"] for parameter in untold if not parameter["value"] or parameter.get("held")]:
         print("\n".join(text.wrapped(f"held at zero or at the prior: {', '.join(held)}", terminal_width(), "  ")))
+    if loose := [f"{one['name']} = {number(one['value'])}" for one in untold if one["name"] not in held]:
+        print("\n".join(text.wrapped(f"told by these logs only together with other parameters: {', '.join(loose)}", terminal_width(), "  ")))
     if document["says"]:
         Console().print(escape(document["says"]), soft_wrap=True, highlight=False)
     changes = [(d["delta_rms"], first[d["joint"]]) for d in document["differences"]]
