@@ -74,6 +74,8 @@ def finding(f: Finding, claim: Claim, found: Diagnosis) -> dict:
             name: f.candidate.effect.options.get(name, "").partition(" (default")[0]
             for name, _ in f.candidate.options
         },
+        # the link that holds it, of what a link holds
+        "link": getattr(f.candidate.effect, "link", None),
         # other options under which it does as well, for all that these logs tell
         "or_options": or_options(f.candidate, f.forms),
         # as an experiment file spells it

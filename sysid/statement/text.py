@@ -158,6 +158,9 @@ def _head(f: dict, of: Told, joint: str, width: int, said: dict[str, str]) -> li
     out = wrapped(words, width, "    ") if takes or values else []
     for name, value in f["options"].items():
         out += wrapped(f"  {name} {option(value)}: {f['options_say'][name]}", width, "    ")
+    if (link := f.get("link")) and "link" not in f["options"]:
+        words = f"  on the last link, {link}; `--option link=NAME` asks it of another"
+        out += wrapped(words, width, "    ")
     if others := other_options(f["or_options"]):
         words = f"  with {listed(others, 'or')} it does as well, for all that these logs tell"
         out += wrapped(words, width, "    ")
