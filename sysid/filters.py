@@ -94,7 +94,7 @@ def begun(
 
     def made(wide: float) -> dict | None:
         narrow, other = (spec.model_copy(update={key: each}) for each in (value, wide))
-        return too_narrow.noise_makes(experiment, narrow, other, model, [_middle(log) for log in shortened], prior, edge)
+        return too_narrow.noise_makes(experiment, narrow, other, model, shortened, prior, edge)
 
     def result() -> dict:
         tried: list[dict] = []
@@ -118,6 +118,7 @@ def begun(
             if key not in _given(spec):
                 asks = experiment.model_copy(update={"preprocess": spec.model_copy(update={key: "auto"})})
                 other = compare(asks, model, logs, prior, progress=progress, mapped=mapped)
+                other = too_narrow.as_far(other, wider, made)
                 if other[key] != value:  # which leaves rows that tell fewer coefficients
                     warn(f"preprocess.{key}: {too_narrow.said(wider)}; as none is given, it is chosen by that")
                     return other

@@ -37,7 +37,7 @@ def without_held(samples: Recording) -> Recording:
             above=2,
         )
         return without_held(_with(samples, _one_of(again, every)))
-    went_on = dropouts(q, tau, apart)
+    went_on = _went_on(q, again, apart)
     if not went_on:
         return samples
     kept = np.ones(len(q), dtype=bool)
@@ -55,8 +55,16 @@ def without_held(samples: Recording) -> Recording:
 
 def dropouts(q, tau, apart) -> list[tuple[int, int]]:
     """First and last rows of runs in which neither angles nor torques (n, dof) came while the robot
-    moved. apart: rows before which a recording breaks off or has a gap."""
+    moved; none of a log that was written faster than its values came. apart: rows before which a
+    recording breaks off or has a gap."""
+    if len(q) < SHORT:
+        return []
     again = _again(np.column_stack([q, tau]), apart)
+    return _went_on(q, again, apart) if _every(again) < 2 else []
+
+
+def _went_on(q, again, apart) -> list[tuple[int, int]]:
+    """As `dropouts`, by the rows (n - 1,) that are the one before `again`."""
     # the sample and its repeats
     found = {(a, b + 1) for a, b in runs(again) if b - a + 1 >= _FEWEST}
     if not found:

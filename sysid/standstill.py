@@ -12,7 +12,7 @@ from .specs import PreprocessSpec
 # `standstill: mask` leaves a joint's rows out below this share of its own rms speed, at most 0.03 rad/s or m/s:
 # there friction may have any value up to its greatest.
 _STANDSTILL_SHARE, STANDSTILL_MOST = 0.05, 0.03
-_SETTLES = 3e-4  # rad or m, or of a joint's way: one minute of arc, what makers of robot gears state as lost motion
+_SETTLES = 3e-4  # rad: one minute of arc, what makers of robot gears state as lost motion; m: as far at an arm's length
 
 
 def without_standstill(piece: Piece, threshold, reach: int) -> Piece:
@@ -63,12 +63,13 @@ def _may_stand(piece: Piece, qd, qdd, noise) -> np.ndarray:
 def _sliding(still: np.ndarray, q: np.ndarray, piece: Piece) -> np.ndarray:
     """(n, k) bool: the rows that the filter carries none of `still` into, and by which the angle (n, k) has gone as far behind the last of
     them as friction takes to settle."""
-    far, out = _SETTLES * np.minimum(np.ptp(q, axis=0), 1.0), _apart(still, piece.blur.reach)
+    out = _apart(still, piece.blur.reach)
     for j, stands in enumerate(still.T):
-        cuts = np.append(np.flatnonzero(stands), len(q))
-        for first, last in zip(cuts, cuts[1:]):
-            gone = np.abs(q[first:last, j] - q[first, j]) >= far[j]
-            out[first : first + np.argmax(gone) if gone.any() else last, j] = False
+        moves = np.flatnonzero(np.diff(np.concatenate([[1], stands, [1]]).astype(int)))  # first rows of runs that move, and the rows behind
+        for first, last in moves.reshape(-1, 2):
+            if first:  # whether it stood before the piece nobody knows
+                gone = np.abs(q[first:last, j] - q[first - 1, j]) >= _SETTLES
+                out[first : first + np.argmax(gone) if gone.any() else last, j] = False
     return out
 
 

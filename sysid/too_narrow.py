@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -11,7 +10,7 @@ from .blocks import within_one_error
 from .errors import ConfigError, SysidError
 from .filter_errors import made_by_noise
 from .log import Log
-from .lowpass import again, angle_noise, band, hardly_moving, widest
+from .lowpass import angle_noise, band, hardly_moving, noisier, widest
 from .model import Model
 from .smoother import Smoother
 from .specs import Experiment, PreprocessSpec
@@ -35,7 +34,7 @@ def wider(tried: list[dict], key: str, value: float) -> dict:
 
 
 def by_noise(tried: list[dict], key: str, value: float, made: Callable[[float], dict | None]) -> dict:
-    """The same, where what the wider one leaves less is no more than the noise of the angles makes: it smooths a gear's blows as well, and
+    """As `wider`, where what the wider one leaves less is no more than the noise of the angles makes: it smooths a gear's blows as well, and
     leaves out more of the rows about a reversal, a stop, a jump, in which a model may err.
 
     Args:
@@ -47,8 +46,29 @@ def by_noise(tried: list[dict], key: str, value: float, made: Callable[[float], 
     squares = made(found["value"]) if found else None
     if squares is None:
         return found
-    less = {joint: both for joint, both in found["rms"].items() if both[0] ** 2 - both[1] ** 2 <= _MAKES * squares[joint]}
-    return found | {"rms": less} if any(wide < _LESS * rms for rms, wide in less.values()) else {}
+    less = explained(found["rms"], squares)
+    return found | {"rms": less} if less else {}
+
+
+def explained(rms: dict[str, list[float]], squares: dict[str, float]) -> dict[str, list[float]]:
+    """Of {joint: [RMS, less with another filter]} those that lose no more than the noise of the angles makes; none where it is little of
+    all of them.
+
+    Args:
+        squares: {joint: mean square} that this noise makes.
+    """
+    less = {joint: both for joint, both in rms.items() if both[0] ** 2 - both[1] ** 2 <= _MAKES * squares[joint]}
+    return less if any(wide < _LESS * own for own, wide in less.values()) else {}
+
+
+def as_far(chosen: dict, wider: dict, made: Callable[[float], dict | None]) -> dict:
+    """A choice among all filters, or the one that is known to leave less by the noise of the angles where this one leaves less by more."""
+    key, left = wider["key"], {entry[wider["key"]]: entry["rms"] for entry in chosen["held_out"]}
+    given, best = left.get(wider["given"]), left.get(chosen[key])
+    squares = made(chosen[key]) if given and best and chosen[key] != wider["given"] else None
+    if squares is None or explained({joint: [rms, best[joint]] for joint, rms in given.items()}, squares):
+        return chosen
+    return chosen | {key: wider["value"]}
 
 
 def noise_makes(
@@ -66,8 +86,7 @@ def _noisier(logs: Sequence[Log]) -> list[Log]:
     """Logs with the noise of their angles once more."""
     rng, own = np.random.default_rng(0), band(logs)
     cutoff = widest(logs, known=own)
-    slow = hardly_moving(cutoff, own)
-    return [replace(log, segments=tuple(again(s, angle_noise(s, cutoff), slow, rng) for s in log.segments)) for log in logs]
+    return noisier(logs, lambda segment: angle_noise(segment, cutoff), hardly_moving(cutoff, own), rng)
 
 
 def said(wider: dict) -> str:

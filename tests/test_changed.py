@@ -81,7 +81,7 @@ def test_a_tilt_says_whose_encoder_may_be_it(fitted, planar):
     assert any("offset of the encoder of shoulder is the same as a tilt" in note for note in said["notices"])
 
 
-@pytest.mark.parametrize("offset", [0.03, -0.25])
+@pytest.mark.parametrize("offset", [0.03, -0.25, 0.8, -1.2])
 def test_an_encoder_s_zero_that_was_set_anew_is_told_with_its_size(fitted, planar, offset):
     """However far: what it does bends with it."""
     written(planar, fitted / "zero.csv", 8)

@@ -1,16 +1,22 @@
 """A filter that is too narrow for how noisy angles are: chosen where none is said, told where one is."""
 
 import json
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 import yaml
 
 from sysid import too_narrow
+from sysid.filter_errors import held_out
+from sysid.log import Log
+from sysid.specs import PreprocessSpec
 from sysid.statement import where
 from sysid.unexplained import otherwise
 
 from .conftest import JOINTS
+from .problems import arm, arm_log
 
 
 def noisy(size):
@@ -111,3 +117,24 @@ def test_noise_of_angles_is_no_law_and_asks_for_no_log():
     assert list(said) == ["elbow"] and "`window: auto` under `preprocess:`" in said["elbow"].says and not said["elbow"].settles
     verdict = [{"joint": joint, "status": "unresolved"} for joint in JOINTS]
     assert where.blind({"verdict": verdict, "too_narrow": Found.filters["too_narrow"]}) == ["shoulder"]
+
+
+def test_what_the_angles_noise_makes_of_an_error_is_what_it_made():
+    """Of exact angles nothing; of noisy ones as much as these errors have more than with exact ones, and of twice the noise four times that."""
+    experiment, model, _, _, prior = arm()
+    machine, made, errors = model.robot, [], []
+    for size in (0.0, 2e-3, 4e-3):
+        (segment,) = arm_log(machine, np.random.default_rng(3), noise=0.05).segments
+        noisy = segment.q + size * np.random.default_rng(4).standard_normal(segment.q.shape)
+        logs = [Log("made", Path("made"), "", (replace(segment, q=noisy),))]
+        narrow, wide = PreprocessSpec(window=0.1), PreprocessSpec(window=0.2)
+        squares = too_narrow.noise_makes(experiment, narrow, wide, model, logs, prior, 0.1)
+        made.append(np.array(list(squares.values())))
+        rms = held_out(experiment, narrow, model, logs, prior, 0.1)["rms"]
+        errors.append(np.array(list(rms.values())) ** 2)
+    heavy = errors[1] - errors[0] > 5.0 * errors[0]  # joints whose error is the angles' noise
+    assert heavy.sum() >= 2 and np.all(made[0] < 0.1 * errors[0])
+    ratio = made[1][heavy] / (errors[1] - errors[0])[heavy]
+    # but for the last one, whose body is bent by the noise of all others, which is in its error and not in what its own noise makes
+    assert np.sum((ratio > 0.7) & (ratio < 1.4)) >= heavy.sum() - 1
+    assert np.all((made[2] / made[1])[heavy] == pytest.approx(4.0, rel=0.3))

@@ -12,7 +12,7 @@ from scipy.stats import binom
 from sysid import blocks
 from sysid.diagnose.select import LEVEL, WORTH
 from sysid.flexible import Law, Unknown, functions, pasts, products, ridge, unknown
-from sysid.statement.document import dependences
+from sysid.statement.verdicts import dependences
 from sysid.statement.words import followed, quantity
 from sysid.view import law
 from tests.evidences import viewed

@@ -68,7 +68,7 @@ def test_half_of_an_error_at_one_end_of_a_motion_may_be_a_stop():
     assert "k*min(q - q0, 0)" in where.at_end(own("q", -1.0, -0.9, 0.05))
     # where no training log was nothing is known of a stop
     beyond = own("q", 0.9, 1.0, 0.05)
-    beyond["regions"][0]["not_in_training"] = 0.8
+    beyond["regions"][0]["not_in_training"] = True
     for asked in (set(), {("upper_stop", "elbow")}):
         assert "which no training log reaches" in (said := where.at_end(beyond, asked)) and "stop" not in said
     assert [where.at_end(own(*one)) for one in (("q", 0.2, 0.4, 0.05), ("q", 0.5, 1.0, 0.3), ("qd", 0.9, 1.0, 0.05))] == ["", "", ""]

@@ -175,6 +175,7 @@ def test_a_fit_finds_it_from_nothing(simulated, effect, hide, word, truly, near,
     folder = simulated(f"soft-{effect}", hide, seed=seed)
     plain = pipeline.fit(pipeline.load(folder))
     found = pipeline.fit(grown(pipeline.load(folder), effect, ["elbow"], {}))
+    assert plain.filters["window"] == 0.1  # which a wider one would be if it were chosen by the error alone
     at = dict(zip((v.name for v in found.model.shape_values), found.model.shapes))
     assert at[f"{effect}.elbow.{word}"] == pytest.approx(truly, rel=near)
     error, without = found.rms("test")["elbow"], pipeline.fit(pipeline.load(simulated(f"soft-nothing-{seed}", seed=seed))).rms("test")["elbow"]

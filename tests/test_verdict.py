@@ -25,8 +25,10 @@ from sysid.left_open import left_open
 from sysid.noise import NoiseFloor
 from sysid.plausible import Reason
 from sysid.simulate import simulate, write
-from sysid.statement.document import _verdict, dependences
+from sysid.statement import where
 from sysid.statement.laws import tone
+from sysid.statement.verdicts import dependences
+from sysid.statement.verdicts import verdict as entry_of
 from sysid.statement.words import elsewhere
 from sysid.transfer import Transfer
 from sysid.unexplained import Refused, changed, smeared
@@ -145,9 +147,11 @@ def test_what_does_not_carry_over_is_said_whatever_the_verdict(error):
         fitted(error, train=1.0), (), [NOISE, NOISE], [floor(), floor()],
         carried=[Transfer("shoulder", 1.2, 0.1, (3.0,)), Transfer("elbow", 1.5, 0.1, (2.0, 4.0))],
     )  # fmt: skip
-    shoulder, own = (_verdict(v) for v in found)
+    shoulder, own = (entry_of(v) for v in found)
     assert "says" not in shoulder and own["status"] == ("complete" if error == 1.0 else "unresolved")
     assert own["says"].endswith("(places, motions, forces): its error there is 1.50 +- 0.1 times as large")
+    assert "carries_over" not in shoulder and own["carries_over"] is False
+    assert where.apart({"verdict": [shoulder, own]}) == ([] if error == 1.0 else ["elbow"])
 
 
 def test_at_the_floor_it_is_complete():
@@ -170,7 +174,7 @@ def test_an_effect_on_it_is_missing():
     assert found.status == "missing" and found.claims == (bias,)
     # of 3 above the floor's square, 4 - 1.21 is taken
     assert found.explained == pytest.approx(2.79 / 3.0)
-    said = _verdict(found)
+    said = entry_of(found)
     assert said["effect"] == "torque_bias" and said["set"] == [{"effect": "torque_bias", "joint": "elbow", "probability": 1.0}]
     assert said["command"] == "sysid add x torque_bias" and said["also"] == [] and said["explained"] == found.explained
 
@@ -192,7 +196,7 @@ def test_what_friction_that_may_be_negative_takes_is_counted_where_a_fit_holds_i
 def test_two_effects_stand_in_their_order():
     first, second = claim("torque_bias", "elbow", [0.0, 0.5], fitted(1.5)), claim("spring", "elbow", [0.0, 0.3], fitted(1.0))
     found = elbow(2.0, [first, second])
-    assert found.claims == (first, second) and _verdict(found)["also"] == ["spring"] and len(_verdict(found)["commands"]) == 2
+    assert found.claims == (first, second) and entry_of(found)["also"] == ["spring"] and len(entry_of(found)["commands"]) == 2
     assert found.explained == pytest.approx(1.0)
 
 
@@ -202,7 +206,7 @@ def test_what_another_joint_s_effect_explains_is_explained():
     found = verdicts(fitted(1.5, 3.0), [other], [NOISE] * 2, [floor()] * 2)
     assert [v.status for v in found] == ["missing", "explained"]
     assert found[1].claims == (other,) and found[1].explained == pytest.approx((1.5**2 - 1.02**2) / (1.5**2 - 1.0))
-    assert _verdict(found[1])["by"] == [{"effect": "stribeck", "joint": "shoulder"}]
+    assert entry_of(found[1])["by"] == [{"effect": "stribeck", "joint": "shoulder"}]
     # one that was at its floor before is complete, whatever else joined
     found = verdicts(fitted(1.05, 3.0), [other], [NOISE] * 2, [floor()] * 2)
     assert [v.status for v in found] == ["missing", "complete"]
@@ -233,7 +237,7 @@ def test_at_a_joint_that_is_complete_nothing_is_asked_of_the_test_logs_alone():
 def test_what_the_motion_predicts_and_no_effect_does_is_unknown():
     found = elbow(2.0, rest=left(0.6))
     assert found.status == "unknown" and found.left is not None
-    said = _verdict(found)
+    said = entry_of(found)
     assert said["depends_on"] == [{"variable": "q_elbow", "share": 0.6}] and said["share_left"] == pytest.approx(0.6) and said["also"] == []
     # nothing above the floor is left: it predicts the noise's own colour at most
     assert elbow(1.01, rest=left(0.6)).status == "complete"
@@ -252,7 +256,7 @@ def test_nearly_all_gives_the_name(taken, share, status):
     law that an effect only resembles leaves more."""
     found = elbow(3.0, [claim("cogging", "elbow", [0.0, taken], fitted(1.6))], rest=left(share))
     assert found.status == status and found.left is not None
-    said = _verdict(found)
+    said = entry_of(found)
     assert (said["effect"] == "cogging") if status == "missing" else (said["also"] == ["cogging"] and "effect" not in said)
 
 
@@ -267,7 +271,7 @@ def test_nearly_all_gives_the_name(taken, share, status):
 def test_what_leaves_more_than_a_fifth_is_no_name_for_the_misfit(first, then, train, noise, status, says):
     """Four fifths of what stands above the floor, or what leaves mostly noise and no more above it than it took, or brings the training logs to it; where the floor is not known, of all."""
     found = elbow(first, [claim("presliding", "elbow", [0.0, 0.5], fitted(then, train=train))], level=floor(noise))
-    said = _verdict(found)
+    said = entry_of(found)
     assert found.status == status and says in found.says
     assert found.explained == pytest.approx((first**2 - then**2) / (first**2 - (noise or 0.0) ** 2))
     if status == "unknown":
@@ -410,7 +414,7 @@ def test_a_joint_that_anothers_effect_explains_but_for_a_little_is_explained(fir
     found = elbow(first, [claim("cogging", "shoulder", [0.5, taken], fitted(then))], rest=left(rest))
     assert found.status == status
     if status == "explained":
-        assert _verdict(found)["by"] == [{"effect": "cogging", "joint": "shoulder"}] and 0.0 < _verdict(found)["explained"] <= 1.0
+        assert entry_of(found)["by"] == [{"effect": "cogging", "joint": "shoulder"}] and 0.0 < entry_of(found)["explained"] <= 1.0
 
 
 @pytest.mark.parametrize("low", [0.5, 2.0, 3.5])
@@ -418,16 +422,16 @@ def test_a_share_that_is_told_is_one(low):
     """Where the floor is not known, or all of the error may be noise."""
     level = replace(floor(None), low=low, about=low)
     found = elbow(3.0, [claim("cogging", "shoulder", [0.5, 0.9], fitted(1.1))], rest=left(0.05), level=level)
-    assert found.status == "explained" and 0.0 < _verdict(found)["explained"] <= 1.0
+    assert found.status == "explained" and 0.0 < entry_of(found)["explained"] <= 1.0
     own = elbow(3.0, [claim("cogging", "elbow", [0.0, 0.95], fitted(1.1))], level=level)
-    assert own.status == "missing" and 0.0 < _verdict(own)["explained"] <= 1.0
+    assert own.status == "missing" and 0.0 < entry_of(own)["explained"] <= 1.0
 
 
 def test_a_tone_alone_is_unknown_and_its_share_is_said():
     hum = replace(NOISE, tone=0.4, hertz=7.3, shares={"a steady tone": 0.4})
     found = elbow(2.0, rest=hum)
     assert found.status == "unknown"
-    said = _verdict(found)
+    said = entry_of(found)
     assert said["depends_on"] == [{"variable": "a steady tone", "share": 0.4, "hertz": 7.3}] and said["share_left"] == pytest.approx(0.4)
     # and it is weighed against what effects took
     assert elbow(3.0, [claim("cogging", "elbow", [0.0, 0.1], fitted(1.6))], rest=hum).status == "unknown"
@@ -571,7 +575,7 @@ def test_a_joint_near_its_floor_whose_error_another_claim_lowers_is_explained(be
 def test_noise_that_is_louder_in_the_test_logs_is_no_misfit(louder, status):
     loud = Transfer("elbow", 3.0, 0.1, (20.0,), 15.0, louder)
     found = verdicts(fitted(3.0, train=1.0), (), [NOISE] * 2, [floor()] * 2, carried=[loud])[1]
-    assert found.status == status and "what is faster than 15 Hz" in found.carries
+    assert found.status == status and "what is faster than 15 Hz" in found.carries.says
     # nor does a claim of another joint, which takes nothing of it, explain it
     other = claim("stribeck", "shoulder", [0.9, 0.0], fitted(3.0, 1.0, train=1.0))
     found = verdicts(fitted(3.0, 3.0, train=1.0), [other], [NOISE] * 2, [floor()] * 2, carried=[loud])[1]

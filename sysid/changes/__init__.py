@@ -1,5 +1,5 @@
-"""A fitted model, held, and a new log: what is different? A payload, friction, a bias, a tilt of
-the base.
+"""A fitted model, held, and a new log: what is different? A payload, friction, a bias, an
+encoder's zero, a tilt of the base.
 
 Nothing of the fitted model moves. Each change is fitted on one half of the new log and judged on
 the other, joins where it takes a share worth having that stands out from block to block, and is

@@ -66,16 +66,24 @@ def together(model: Model, asked: Question, chosen) -> tuple[tuple[Change, ...],
     return tuple(sorted(out, key=lambda change: -change.removed)), left
 
 
-def with_fewer(asked: Question, chosen: list[Key], fewer: Sequence[Key]) -> list[Key]:
+def with_fewer(
+    asked: Question, chosen: list[Key], fewer: Sequence[Key], least: float
+) -> list[Key]:  # fmt: skip
     """Changes in which a load gives way to one of `fewer` numbers that leaves no more than a load
     that can be: what turns a link's body about its joint, an encoder's zero, takes of ten free
-    numbers as much."""
+    numbers as much.
+
+    Args:
+        least: as of `Question.supported`, for what stands then.
+    """
     load = ("payload", ROBOT)
     if load not in chosen:
         return chosen
     others = [key for key in fewer if key in asked.spans and key not in chosen]
     rest = [key for key in chosen if key != load]
-    return min([chosen, *([*rest, key] for key in others)], key=lambda keys: _left(asked, keys))
+    each = [chosen, *([*rest, key] for key in others)]
+    best = min(each, key=lambda keys: _left(asked, keys))
+    return chosen if best is chosen else asked.standing(best, least) or chosen
 
 
 def _left(asked: Question, keys: Sequence[Key]) -> float:

@@ -18,7 +18,7 @@ from ..blocks import folds, z_score
 from ..projection import inverted
 
 BLOCKS, _MOST = 24, 12  # blocks, over the whole log; changes
-_ALIKE = 1e-3  # of a share: by less no half tells one change from another
+_ALIKE = 1.01  # times what the best leaves: by less no half tells one change from another
 # of the squared residual: below it, a held model's errors on another motion look like changes
 _WORTH = 0.1
 
@@ -101,28 +101,32 @@ class Question:
             least: standard errors that each must stand from zero `evenly`.
         """
         chosen: list[Key] = []
-
-        def beside(key: Key, others: Sequence[Key]) -> float | None:
-            """What a change takes beside others; None where the halves do not support it."""
-            before, after = self.across(others), self.across([*others, key])
-            share = self.share(key, before, after)
-            clear = share >= _WORTH and self.evenly(key, before, after) >= least
-            return share if clear else None
-
         while len(chosen) < _MOST:
-            new = {key: beside(key, chosen) for key in self.spans if key not in chosen}
+            new = {k: self._beside(k, chosen, least) for k in self.spans if k not in chosen}
             found = {key: share for key, share in new.items() if share is not None}
             if not found:
                 break
             # of what takes as much the first that is asked
-            best = max(found.values())
-            chosen.append(next(key for key in found if found[key] > best - _ALIKE))
-        # what joined first may have stood for what joined after it: a bias for a load
-        for key in list(chosen):
-            others = [other for other in chosen if other != key]
-            if beside(key, others) is None:
-                chosen = others
-        return chosen
+            least_left = 1.0 - max(found.values())
+            chosen.append(next(key for key in found if 1.0 - found[key] <= _ALIKE * least_left))
+        return self.standing(chosen, least)
+
+    def standing(self, chosen: Sequence[Key], least: float) -> list[Key]:
+        """Of changes those that the halves support beside all others: what joined first may have
+        stood for what joined after it, a bias for a load."""
+        left = list(chosen)
+        for key in chosen:
+            others = [other for other in left if other != key]
+            if self._beside(key, others, least) is None:
+                left = others
+        return left
+
+    def _beside(self, key: Key, others: Sequence[Key], least: float) -> float | None:
+        """What a change takes beside others; None where the halves do not support it."""
+        before, after = self.across(others), self.across([*others, key])
+        share = self.share(key, before, after)
+        clear = share >= _WORTH and self.evenly(key, before, after) >= least
+        return share if clear else None
 
 
 def support(rate: float, questions: int) -> float:

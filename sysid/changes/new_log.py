@@ -96,15 +96,15 @@ def asked(
     if hand:
         residual, tried = about(structure, x, motion, stride, data, hand=hand)
     questions = len(tried) + len(hands(robot)) - 1
-    changes, at = (), {}
+    changes, at, few = (), {}, bent(structure)
     for _ in range(_ROUNDS):  # what a tilt does bends with it
         question = asked_of(tried, residual, by_size(after), blocks)
         least = support(rate, among * questions)
-        chosen = with_fewer(question, question.supported(least), bent(structure))
+        chosen = with_fewer(question, question.supported(least), few, least)
         changes, after = together(structure, question, chosen)
         if changes:  # a joint counts by what is left of it, not by what the changes made of it
             question = question.weighed(by_size(after))
-            anew = with_fewer(question, question.supported(least), bent(structure))
+            anew = with_fewer(question, question.supported(least), few, least)
             changes, after = together(structure, question, anew or chosen)
         before, at = at, near(structure, changes)
         same = at.keys() == before.keys()

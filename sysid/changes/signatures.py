@@ -33,14 +33,14 @@ def bent(structure: Model) -> list[Key]:
 
 
 def near(structure: Model, changes) -> dict[Key, np.ndarray]:
-    """{change: its values} of those changes that are no coefficients, within an effect's bounds."""
+    """{change: its values} of those changes that are no coefficients: an encoder's zero may be off
+    by more than a fit looks for."""
     found = {(change.effect, change.joint): change.parameters for change in changes}
     out = {}
     for name, joint in bent(structure):
         if parameters := found.get((name, where := place(joint, structure.robot.joints))):
             shapes = find(name).shapes()
-            values = (parameters[f"{name}.{where}.{one.name}"][0] for one in shapes)
-            out[name, joint] = np.array([np.clip(v, o.low, o.high) for v, o in zip(values, shapes)])
+            out[name, joint] = np.array([parameters[f"{name}.{where}.{o.name}"][0] for o in shapes])
     return out
 
 

@@ -32,7 +32,7 @@ class Verdict:
     (error stands above the floor, or the floor is not known, and nothing says why). explained:
     share of the joint's misfit on the test logs that all claims take, NaN where there is none.
     left: what functions of the motion predict of the rest, or None. says: why something is left.
-    may: the effect that may be it. even: whether weights make it. carries: why test logs err more.
+    may: the effect that may be it. even: whether weights make it. carries: how test logs err more.
     reason: what else than a law it is, of which no other log tells more.
     """
 
@@ -44,7 +44,7 @@ class Verdict:
     says: str = ""
     may: Candidate | None = None
     even: bool = False
-    carries: str = ""
+    carries: Transfer | None = None
     reason: Reason | None = None
 
 
@@ -131,13 +131,13 @@ def verdicts(
             why = mean.says if mean else cause(both, floors[j], effect, may, without, louder)
             may, remains = (None, None) if mean and mean.settles else (may, remains)
             why += "".join({r.effect: f"; {r.told}" for r in refused if r.joint == joint}.values())
-            told = ("unresolved", others, explained, remains, why, may, evens[j], "", mean)
+            told = ("unresolved", others, explained, remains, why, may, evens[j], None, mean)
         elif not claims or (floors[j].reached(first) and not (done or fell)):
             told = ("complete",)
         else:
             who = others or (max(claims, key=lambda c, j=j: c.step.shares[j]),)
             told = ("explained", who, explained)
         out.append(Verdict(joint, *told))
-    said = {found.joint: found.says for found in carried}
+    said = {found.joint: found for found in carried if found.says}
     settled = [o.reason is not None and o.reason.settles for o in out]  # it is not carried anywhere
-    return [o if s else replace(o, carries=said.get(o.joint, "")) for o, s in zip(out, settled)]
+    return [o if s else replace(o, carries=said.get(o.joint)) for o, s in zip(out, settled)]

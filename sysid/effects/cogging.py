@@ -16,7 +16,8 @@ class Cogging(TorqueEffect):
     """Magnets prefer the iron's teeth, and gears their mesh: torque that repeats with the angle, whatever the speed.
 
     On a joint that carries weight a ripple of k = 1 is gravity itself and cannot be seen. On a prismatic joint k
-    counts per metre, and is looked for from two periods over the travel up to a pitch of 1 mm, or 120 periods.
+    counts per metre, and is looked for from two periods over the travel up to a pitch of 1 mm, or 120 periods over it;
+    over a long travel up to a pitch of 52 mm.
     """
 
     name = "cogging"
@@ -49,7 +50,7 @@ class Cogging(TorqueEffect):
         if not (self.sliding and self.sliding[joint] and travel > 0.0):
             return None
         low = 4.0 * np.pi / travel  # as `Shape.bounds` has it
-        high = min(2.0 * np.pi / _FINEST, low + self.k.grid * self.k.spacing / travel)
+        high = min(2.0 * np.pi / _FINEST, max(self.k.high, low + self.k.grid * self.k.spacing / travel))
         return (called(replace(self.k, low=low, high=max(low, high)), "k"),)
 
     def richer(self, **shapes):

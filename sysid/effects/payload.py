@@ -40,7 +40,7 @@ class Payload(LinkEffect):
         return chosen
 
     def places(self, robot):
-        """The last link, others that carry no link, other hands and feet, and what carries two such: the palm of a gripper's fingers."""
+        """The last link, others that carry no link, other hands and feet, and what carries two such: the palm of fingers of one link."""
         links = [body for body in robot.bodies if body.kind == "link"]
         parents = [robot.parents[body.row] for body in links]
         ends = [parent for body, parent in zip(links, parents) if body.row not in parents]

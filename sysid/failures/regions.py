@@ -14,6 +14,7 @@ from .stretches import Stretches, stretches
 
 _CUTS, _HALF = 10, 0.5  # quantiles a region may begin or end at; of the squared error
 _MAP, _WINDOW = 12, 0.5  # cells of a map along a side; s
+_NEAR = 0.02  # of what training logs span: so near to it is no new place
 _BANDS = (0.0, 0.5, 1.0, 2.0, 4.0, 8.0, 15.0, 30.0, 60.0, 125.0, 250.0, 500.0)  # Hz
 
 
@@ -72,7 +73,7 @@ class Failure:
 
     @property
     def parts(self) -> tuple:
-        """The stretches of time that hold most of the error; none where it is spread out."""
+        """The stretches of time that hold most of it; none where it is spread out."""
         return self.stretches.parts if self.stretches else ()
 
 
@@ -99,7 +100,7 @@ def failures(held_out: HeldOut, raw: Prediction, levels, view: View) -> list[Fai
             for name in ("q", "qd"):
                 unit, values = known[f"{name}_{joint}"]
                 region = _crowded(name, unit, values[use], square)
-                trained = view.rows.of(view.motion, name)[view.rows.use[:, j], j]
+                trained = [getattr(piece, name)[:, j] for piece in view.motion.pieces]
                 regions.append(region and _beyond(region, values[use], square, trained))
             regions.append(_crowded("time", "s", rows.t[use], square))
         regions = sorted(
@@ -107,10 +108,8 @@ def failures(held_out: HeldOut, raw: Prediction, levels, view: View) -> list[Fai
             key=lambda r: r.rows - r.error,
         )
         q, qd = (known[f"{name}_{joint}"][1][use] for name in ("q", "qd"))
-        residuals, steps = (
-            [raw.residual[s, j] for s in runs],
-            [raw.t[s.start + 1] - raw.t[s.start] for s in runs],
-        )
+        residuals = [raw.residual[s, j] for s in runs]
+        steps = [raw.t[s.start + 1] - raw.t[s.start] for s in runs]
         out.append(
             Failure(
                 joint,
@@ -156,10 +155,10 @@ def _crowded(name: str, unit: str, values, square) -> Region | None:
 
 
 def _beyond(region: Region, values, square, trained) -> Region:
-    """A region with the share of its error that lies beyond values (n,) of the training logs."""
+    """A region with the share of its error beyond the values of all training logs, each (n,)."""
     inside = (values >= region.low) & (values <= region.high)
-    low, high = (trained.min(), trained.max()) if len(trained) else (np.inf, -np.inf)
-    new = inside & ((values < low) | (values > high))
+    low, high = min(own.min() for own in trained), max(own.max() for own in trained)
+    new = inside & (np.maximum(low - values, values - high) > _NEAR * (high - low))
     return replace(region, new=float(square[new].sum() / max(square[inside].sum(), 1e-300)))
 
 

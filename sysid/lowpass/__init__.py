@@ -13,11 +13,11 @@ value up to its greatest, are left out for that joint, widened by what the filte
 """
 
 from ..gaussian import Gaussian
-from .angles import MOTION, again, angle_noise, hardly_moving, on_same_rows
+from .angles import MOTION, angle_noise, hardly_moving, noisier, on_same_rows
 from .calm import KEPT, calm
 from .motion import LEAST, band, lowpassed, narrowed, stride_of, widest
 
 __all__ = [
-    "KEPT", "LEAST", "MOTION", "Gaussian", "again", "angle_noise", "band", "calm",
-    "hardly_moving", "lowpassed", "narrowed", "on_same_rows", "stride_of", "widest",
+    "KEPT", "LEAST", "MOTION", "Gaussian", "angle_noise", "band", "calm", "hardly_moving",
+    "lowpassed", "narrowed", "noisier", "on_same_rows", "stride_of", "widest",
 ]  # fmt: skip

@@ -71,6 +71,16 @@ def again(segment, noise, cutoff: float, rng: np.random.Generator):
     return replace(segment, q=q, tau=tau)
 
 
+def noisier(logs, noise, cutoff: float, rng: np.random.Generator) -> list:
+    """Logs with the noise of their angles once more.
+
+    Args:
+        noise: a segment's (dof,). cutoff: as of `rougher`.
+    """
+    drawn = lambda segment: again(segment, noise(segment), cutoff, rng)  # noqa: E731
+    return [replace(log, segments=tuple(map(drawn, log.segments))) for log in logs]
+
+
 def on_same_rows(motion, rough) -> tuple:
     """A motion and the same with the noise of its angles once more, with the rows that count in
     both: where either has a joint turn round nobody knows the sign of its speed, and a row that is

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..log import Log
-from ..lowpass import again, angle_noise, band, hardly_moving, widest
+from ..lowpass import angle_noise, band, hardly_moving, noisier, widest
 from ..motion import Motion
 from ..prediction import Prediction, predict
 from ..preprocess import prepare
@@ -61,11 +61,8 @@ def of_angles(
         nonlocal jitter
         part, plain, cutoff = logs[number], motions[number], cutoffs[number]
         slow = hardly_moving(cutoff, bands[number])
-        noisy = []
-        for log in part:
-            segments = tuple(again(s, angle_noise(s, cutoff), slow, rng) for s in log.segments)
-            jitter |= any(s.clock is not None for s in segments)
-            noisy.append(replace(log, segments=segments))
+        noisy = noisier(part, lambda s: angle_noise(s, cutoff), slow, rng)
+        jitter |= any(s.clock is not None for log in noisy for s in log.segments)
         found = predict(*of, prepare(noisy, spec, plain.joints))
         known[number] = known[number] & _use(found)
         # a clock that is late shifts the measured torque as well

@@ -1,6 +1,7 @@
 """What a diagnosis says, as others read it.
 
 document.py  the JSON document
+verdicts.py  the verdict on each joint, in the document
 text.py      the verdict on each joint, in lines
 tables.py    what it rests on, in tables
 laws.py      a law of one's own to begin with, where no effect explains what is left

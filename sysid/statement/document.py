@@ -2,23 +2,22 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+import shlex
 
-import numpy as np
-
-from ..addition import another_log, command, spelled
+from ..addition import another_log, typed
+from ..datasets import reference
 from ..diagnose.diagnosis import Diagnosis
-from ..diagnose.verdict import Verdict
 from ..filters import settled, torque_band
 from ..fit_document import number, versions
-from ..flexible import HUM, TOLD, Unknown
 from ..model_parameters import ROBOT
 from ..plausible import outdated
+from ..specs import Experiment
 from ..units import of_joint
 from . import where
 from .alike import changed_alike, read_alike
-from .claims import chances, claims, confidence_set, finding, ties
-from .laws import BODIES, TOGETHER, of_bodies, to_begin_with
+from .claims import claims, finding
+from .laws import BODIES, of_bodies, to_begin_with
+from .verdicts import verdict
 
 
 def document(found: Diagnosis, run="", *, laws: bool = True) -> dict:
@@ -28,10 +27,24 @@ def document(found: Diagnosis, run="", *, laws: bool = True) -> dict:
 
     next_log: the command that designs the log to take next, where these do not say why an error
     stands, and neither an effect that may be it nor how the fit weighs its joints does.
+    asks_tests: the command that asks what is different in the test logs, where a joint's model does
+    not carry over to them.
     """
-    out = _document(found, run, laws)
-    blind = where.blind(out)
-    return {**out, "next_log": another_log(found.fit.experiment.path) if blind else None}
+    out, spec = _document(found, run, laws), found.fit.experiment
+    next_log = another_log(spec.path) if where.blind(out) else None
+    asks = _of_tests(spec, run) if run and where.apart(out) else None
+    return {**out, "next_log": next_log, "asks_tests": asks}
+
+
+def _of_tests(spec: Experiment, run) -> str | None:
+    """What is typed to ask what is different in an experiment's test logs, with a run's model held;
+    None where these are no plain files."""
+    logs = spec.data.test
+    plain = [log.model_fields_set <= {"file"} and not reference(log.file) for log in logs]
+    if spec.data.groups or not all(plain):
+        return None
+    each = [word for log in logs for word in ("--log", str(spec.path.parent / log.file))]
+    return shlex.join(["sysid", "diagnose", str(typed(spec.path)), "--model", str(run), *each])
 
 
 def _document(found: Diagnosis, run, laws: bool) -> dict:
@@ -51,7 +64,7 @@ def _document(found: Diagnosis, run, laws: bool) -> dict:
         "findings": [finding(f, claim, found) for claim in found.claims for f in claim.findings],
         "claims": list(claims(found)),
         "verdict": [
-            _with_law(_verdict(v, fit.experiment.path, joints), found, laws) for v in found.verdict
+            _with_law(verdict(v, fit.experiment.path, joints), found, laws) for v in found.verdict
         ],
         "detectable": [
             {
@@ -94,6 +107,7 @@ def _document(found: Diagnosis, run, laws: bool) -> dict:
             "rms_test_after": dict(zip(joints, found.last.rms().tolist())),
         },
         "next_log": None,
+        "asks_tests": None,
         "too_narrow": fit.filters.get("too_narrow"),
         "unused": list(fit.unused),
         "not_claimed": [
@@ -140,58 +154,3 @@ def _with_law(entry: dict, found: Diagnosis, laws: bool) -> dict:
     there = {(e.name, joints[j]) for e, own in fit.model.terms for j in own if j != ROBOT}
     known = to_begin_with(entry, fit.experiment.path, there, found.falls_with)
     return entry | ({"law": known} if known else {})
-
-
-def _verdict(v: Verdict, path="config.yaml", joints=()) -> dict:
-    out: dict = {"joint": v.joint, "status": v.status}
-    # where all error may be noise, what falls is all that is more
-    share = number(min(v.explained, 1.0)) if np.isfinite(v.explained) else None
-    share = 1.0 if v.status in ("missing", "explained") and share is None else share
-    if v.status in ("missing", "unknown") and v.claims:
-        first = v.claims[0]
-        named = {
-            "effect": first.head.effect,
-            "tied_with": ties(first, first.head),
-            "command": first.head.command,
-            "set": chances(confidence_set(first)),
-            "explained": share,
-        }
-        also = [c.head.effect for c in v.claims[1:]]
-        part = {"also": [first.head.effect, *also], "explained": named["explained"]}
-        out |= {**named, "also": also} if v.status == "missing" else part
-        out["commands"] = [c.head.command for c in v.claims]
-    elif v.status == "unknown":
-        out["also"] = []
-    if v.status == "explained":
-        by = [{"effect": c.head.effect, "joint": c.head.joint} for c in v.claims]
-        out |= {"by": by, "explained": share}
-    if v.says or v.carries:
-        out["says"] = "; ".join(words for words in (v.says, v.carries) if words)
-    if v.may is not None:
-        where = v.may.where(joints) if joints else v.joint
-        name, own, options = spelled(v.may, where)
-        adds = command(Path(path), name, own, options)
-        told = {"effect": name, "joint": where, "options": options}
-        out["may_be"] = {**told, "command": adds}
-    if v.even:
-        out["weighting"] = "noise"
-    if v.reason is not None:
-        out["needs_no_log"] = True
-    if v.left is not None:
-        out |= {"depends_on": dependences(v.left), "share_left": v.left.share}
-    elif v.status == "unknown":
-        out["depends_on"] = []
-    return out
-
-
-def dependences(found: Unknown) -> list[dict]:
-    """What a residual follows: variables with the share of its square that functions of each alone
-    predict, largest first; where none does, all of them together."""
-    alone = sorted((share, name) for name, share in found.shares.items() if share > TOLD)[::-1]
-    out = [
-        {"variable": name, **({"with": other} if other else {}), "share": float(share)}
-        | ({"hertz": found.hertz} if name == HUM else {})
-        for share, words in alone[:4]
-        for name, _, other in [words.partition(" and ")]
-    ]
-    return out or [{"variable": TOGETHER, "share": found.share}]

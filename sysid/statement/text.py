@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from ..diagnose.diagnosis import Diagnosis
 
 ANOTHER = "a motion that tells most of what these logs leave open"
+ASKED = "whether a load, a zero or friction changed before the test logs were taken is asked by"
 TRIED = "to try it, and see the held-out error before and after"
 NO_MORE = "no further effect is supported by these logs"
 OWN = "a law of your own can be tried: `sysid effects formula`"
@@ -73,6 +74,8 @@ def verdict(of: Told, width: int) -> list[tuple[str, list[str]]]:
     if of.document.get("next_log"):
         words = f"{where.needing(of.document)}; {ANOTHER} is designed by"
         out.append(("", [*wrapped(words, width, "  "), of.document["next_log"]]))
+    if asks := of.document.get("asks_tests"):
+        out.append(("", [*wrapped(ASKED, width, "  "), asks]))
     return out
 
 

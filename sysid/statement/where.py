@@ -10,8 +10,6 @@ from ..fit_document import number
 from ..plausible import WRONG
 from .words import listed, wrapped
 
-_MOST = 0.5  # of a region's error
-
 
 def entry(found: Failure) -> dict:
     """What a document has of one joint."""
@@ -30,7 +28,7 @@ def entry(found: Failure) -> dict:
                 "high": r.high,
                 "share_of_error": r.error,
                 "share_of_rows": r.rows,
-                "not_in_training": r.new,
+                "not_in_training": r.unknown,
             }
             for r in found.regions
         ],
@@ -55,7 +53,7 @@ def touched(document: dict) -> list[str]:
 
 def _beyond(region: dict) -> bool:
     """Whether most of a region's error lies at angles that no training log reaches."""
-    return region["variable"] == "q" and region.get("not_in_training", 0.0) > _MOST
+    return region["variable"] == "q" and region.get("not_in_training", False)
 
 
 def blind(document: dict) -> list[str]:
@@ -72,6 +70,13 @@ def blind(document: dict) -> list[str]:
         and v["joint"] not in known
         and not v.get("needs_no_log")  # no other log tells more
     ]
+
+
+def apart(document: dict) -> list[str]:
+    """The joints that err more on the test logs than on the training logs, and nobody knows why."""
+    status = ("unresolved", "unknown")
+    own = (v for v in document["verdict"] if not v.get("carries_over", True))
+    return [v["joint"] for v in own if v["status"] in status]
 
 
 def needing(document: dict) -> str:

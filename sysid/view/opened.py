@@ -4,8 +4,6 @@ leaves, and of other logs.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from .. import experiment_logs
@@ -14,11 +12,11 @@ from ..errors import LogError
 from ..estimate import Fit
 from ..lowpass import (
     MOTION,
-    again,
     band,
     hardly_moving,
     lowpassed,
     narrowed,
+    noisier,
     on_same_rows,
     stride_of,
     widest,
@@ -101,8 +99,7 @@ def _motions(logs, joints, cutoff: float, own: float, seed: int = 0):
     rng = np.random.default_rng(seed)
     slow = hardly_moving(cutoff, own)
     noise = np.max([piece.noise for piece in motion.pieces], axis=0)
-    drawn = lambda s: again(s, noise, slow, rng)  # noqa: E731
-    noisy = [replace(log, segments=tuple(map(drawn, log.segments))) for log in logs]
+    noisy = noisier(logs, lambda _: noise, slow, rng)
     return on_same_rows(motion, lowpassed(noisy, joints, cutoff, known=own))
 
 

@@ -21,7 +21,7 @@ GEARED = (
     "an angle that goes farther than its limits are apart may be the motor's, before its gear: then "
     "divide it by the gear's ratio and multiply the torque by it; else " + ASK
 )
-_GEARED = 1.5  # times what limits allow: no joint goes so far, whatever its zero
+_BEYOND = 1.5  # times what limits allow: no joint goes so far, whatever its zero
 _STILL, _MOSTLY = 0.01, 0.6  # of a joint's top speed; of the samples
 
 
@@ -134,12 +134,11 @@ def _of_log(look: Look, log: Logged, j: int, joint: str, slides: bool) -> Iterat
         )
 
 
-def farther(look: Look, j: int) -> float:
-    """How many times as far as its limits are apart a joint goes in some log: 0.0 where that is no
-    wonder, or there are none."""
+def farther(look: Look, j: int) -> bool:
+    """Whether a joint goes clearly farther in some log than its limits are apart, where it has any."""
     low, high = look.robot.limits[j]
     most = max(float(log.tally.travel[j]) for log in look.logs)
-    return most / (high - low) if np.isfinite(high - low) and most > _GEARED * (high - low) else 0.0
+    return bool(0.0 < high - low < np.inf and most > _BEYOND * (high - low))
 
 
 def _alone(look: Look, log: Logged, j: int) -> bool:

@@ -40,6 +40,6 @@ def find(look: Look) -> Iterator[Fault]:
                     f"{100 * max(follows[j], 0.0):.0f} % of that is as bodies, motor and friction "
                     "make it"
                 ),
-                GEARED if farther(look, j) else UNTOLD,
+                f"{UNTOLD}; {GEARED}" if farther(look, j) else UNTOLD,
                 joint,
             )
