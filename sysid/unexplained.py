@@ -109,6 +109,15 @@ def raw(fit: Fit) -> bool:
     return spec.torque == "raw" and spec.filter != "none"
 
 
+def may_be(candidate: Candidate, *, in_vain: bool) -> str:
+    """What may be left of a joint, in words. in_vain: no fit with it bore that out."""
+    tried = ", though no fit with it bore that out," if in_vain else ""
+    return (
+        f"what is left may be {candidate.name}{tried} or a law that the catalogue does not have: "
+        "these logs do not tell"
+    )
+
+
 def cause(
     errors: tuple[float, float],
     floor,
@@ -132,11 +141,7 @@ def cause(
             "stands still, or it is disturbed"
         )
     if looks:
-        tried = "" if may else ", though no fit with it bore that out,"
-        return (
-            f"what is left may be {looks.name}{tried} or a law that the catalogue does not have: "
-            "these logs do not tell"
-        )
+        return may_be(looks, in_vain=not may)
     if floor.rms is None:
         return (
             f"its noise floor is not known ({floor.detail}), so nobody can say what error is left "

@@ -667,18 +667,31 @@ def test_of_those_that_test_logs_alone_can_ask_the_one_that_takes_most(monkeypat
 def test_what_may_come_of_another_joints_effect_is_left_open():
     """Bodies bent by what one joint lacks leave error on others, which is no law that the catalogue lacks."""
     stribeck = Candidate(find("stribeck"), 1, ())
-    some = left(0.4)
+    some, takes = left(0.4), lambda j, candidate: 0.5
     joint = lambda name, status, may=None, claims=(): Verdict(name, status, claims, says="was", may=may, left=some)  # noqa: E731
     said = [joint("a", "unknown"), joint("b", "unresolved", stribeck), joint("c", "unknown"), joint("d", "unknown", claims=(1,)), joint("e", "unknown")]
     laws = {0: Law(1.0, "", 0.0), 2: Law(1e-9, "q_c", 0.3), 3: Law(1.0, "", 0.0), 4: None}
-    found = left_open(said, lambda j, candidate: laws[j], WORTH)
+    found = left_open(said, lambda j, candidate: laws[j], takes, WORTH)
     assert [one.status for one in found] == ["unresolved", "unresolved", "unknown", "unknown", "unknown"]
     assert "may come of stribeck on b" in found[0].says and found[0].may is stribeck and found[0].left is None
     assert found[1:] == said[1:]
-    assert left_open(said[2:], lambda j, candidate: laws[0], WORTH) == said[2:]  # nothing may be there
+    assert left_open(said[2:], lambda j, candidate: laws[0], takes, WORTH) == said[2:]  # nothing may be there
     tilt = Candidate(find("gravity_tilt"), -1, ())
-    (found, _) = left_open([said[0], joint("b", "unresolved", tilt)], lambda j, candidate: laws[0], WORTH)
+    (found, _) = left_open([said[0], joint("b", "unresolved", tilt)], lambda j, candidate: laws[0], takes, WORTH)
     assert "gravity_tilt of the whole robot" in found.says
+
+
+def test_what_may_be_there_and_takes_nothing_of_a_fit_is_not_to_be_tried():
+    """A delay of a joint under a low-pass, of which the fit that would be added makes none."""
+    delay = Candidate(find("delay"), 1, ())
+    says = unexplained.may_be(delay, in_vain=False) + "; its neighbour is louder"
+    said = [Verdict("a", "unknown", left=left(0.4)), Verdict("b", "unresolved", says=says, may=delay)]
+    asked = []
+    for share, stays in ((0.5, True), (0.0, False)):
+        found = left_open(said, lambda j, candidate: None, lambda j, one: asked.append((j, one)) or share, WORTH)  # noqa: B023
+        assert found[0] == said[0] and (found[1] == said[1]) is stays
+    assert asked == [(1, delay)] * 2 and found[1].may is None
+    assert found[1].says.startswith("what is left may be delay, though no fit with it bore that out") and found[1].says.endswith("its neighbour is louder")
 
 
 def test_a_law_stands_beside_what_is_claimed():

@@ -103,14 +103,14 @@ def diagnose(
             return with_it and law(with_it.view, j, elsewhere(with_it.view, measured.test))
 
         def few(j: int, least: float):
-            fitted = partial(borne_out.misfit_taken, last, j, found[j], known)
             own = then_asked.by_joint.get(j, [()])[0]
-            return of_few_blocks(own, partial(refitted, after), then, j, least, fitted)
+            return of_few_blocks(own, partial(refitted, after), then, j, least, partial(fitted, j))
 
+        fitted = lambda j, one: borne_out.misfit_taken(last, j, found[j], known, one)  # noqa: E731
         more = refused, transfers(last, view.cutoff), weighed, lambda j: law(after, j, again())
         rest = then_asked.near, few, beyond, fallen(first, then), otherwise(last, found, test.still)
         named = verdicts(fit, claims, after.unknown, found, *more, *rest)
-        said = unasked(named) if wrong else left_open(named, beyond, select.WORTH)
+        said = unasked(named) if wrong else left_open(named, beyond, fitted, select.WORTH)
         levels = np.array([f.rms or e for f, e in zip(found, last.rms("test").values())])
         where = failures(first, fit.predictions["test"].thinned(thinning.MOST), levels, view)
         could = detectable(view, asked, candidates(view.model, extra))
