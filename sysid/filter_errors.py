@@ -12,6 +12,7 @@ from .log import Log
 from .model import Model, moving_coefficients
 from .multistart import finite
 from .posed_problem import pose
+from .prediction import predict
 from .preprocess import prepare
 from .specs import Experiment, PreprocessSpec
 from .triangles import Compressed
@@ -62,8 +63,8 @@ def held_out(experiment: Experiment, spec: PreprocessSpec, model: Model, logs: S
 def made_by_noise(
     experiment: Experiment, spec: PreprocessSpec, wide: PreprocessSpec, model: Model, logs: Sequence[Log], noisy: Sequence[Log], prior, edge: float
 ) -> dict:  # fmt: skip
-    """{joint: mean square [(N m)² or N²]} by which a filter's error rises with the noise of the angles once more, at the parameters that
-    logs tell behind a wider one: noise that comes through bends those behind the filter itself.
+    """{joint: mean square [(N m)² or N²]} of what the noise of the angles, once more, adds to the torque that is predicted behind a filter,
+    by the parameters that logs tell behind a wider one: noise that comes through bends those behind the filter itself.
 
     Args:
         logs, prior, edge: as of `held_out`. noisy: logs with the noise of their angles once more.
@@ -73,11 +74,8 @@ def made_by_noise(
     """
     seen, motion, data, *_ = _seen(wide, model, logs, edge)
     x = pose(experiment, seen, data, moving_coefficients(seen, motion), prior).minimum(experiment.solver.tolerance)
-    errors = []
-    for each in (logs, noisy):
-        *_, target, _ = _seen(spec, model, each, edge)
-        errors.append(target.squares(x) / np.maximum(target.rows, 1))
-    return dict(zip(model.robot.joints, np.maximum(errors[1] - errors[0], 0.0).tolist()))
+    told = [predict(model, x, motion).predicted for model, motion, *_ in (_seen(spec, model, each, edge) for each in (logs, noisy))]
+    return dict(zip(model.robot.joints, np.mean((told[1] - told[0]) ** 2, axis=0).tolist()))
 
 
 def _seen(spec: PreprocessSpec, model: Model, logs: Sequence[Log], edge: float):

@@ -17,7 +17,7 @@ from .resampling import moved
 from .segment import gaps
 from .warned import warn
 
-_FEWEST = 4  # rows: fewer may be alike by chance
+_OFTEN = 0.25  # of the rows: what comes so often is how a log was written
 _GRAINS = 2.5  # of a torque's grain: two and the rounding; less is how coarse values move
 _REGULAR = 0.8  # of the new values: coarse ones alike by chance come after any number of rows
 
@@ -36,7 +36,7 @@ def without_held(samples: Recording) -> Recording:
             "only repeat them, and are left out",
             above=2,
         )
-        return without_held(_with(samples, _one_of(again, every)))
+        return without_held(_with(samples, _one_of(again, every, every + 1)))
     went_on = _went_on(q, again, apart)
     if not went_on:
         return samples
@@ -44,6 +44,15 @@ def without_held(samples: Recording) -> Recording:
     for a, b in went_on:
         kept[a : b + 1] = False
     count = len(q) - int(kept.sum())
+    if count > _OFTEN * len(q):
+        every = max(round(len(q) / np.sum(~again)), 2)
+        longest = max(b - a + 1 for a, b in went_on)
+        warn(
+            f"{samples.where}: new values come every {every} rows on average, {longest + 1} at most: the "
+            "rows between only repeat them, and are left out",
+            above=2,
+        )
+        return _with(samples, _one_of(again, every, longest))
     warn(
         f"{samples.where}: {count} rows, {len(went_on)} times, only repeat the row before while the "
         f"robot moves, the first at {samples.t[went_on[0][0]]:.4g} s: messages that did not arrive, "
@@ -55,18 +64,19 @@ def without_held(samples: Recording) -> Recording:
 
 def dropouts(q, tau, apart) -> list[tuple[int, int]]:
     """First and last rows of runs in which neither angles nor torques (n, dof) came while the robot
-    moved; none of a log that was written faster than its values came. apart: rows before which a
-    recording breaks off or has a gap."""
+    moved; none of a log that was written faster than its values came, however regularly. apart: rows
+    before which a recording breaks off or has a gap."""
     if len(q) < SHORT:
         return []
     again = _again(np.column_stack([q, tau]), apart)
-    return _went_on(q, again, apart) if _every(again) < 2 else []
+    found = _went_on(q, again, apart) if _every(again) < 2 else []
+    return found if sum(b - a + 1 for a, b in found) <= _OFTEN * len(q) else []
 
 
 def _went_on(q, again, apart) -> list[tuple[int, int]]:
     """As `dropouts`, by the rows (n - 1,) that are the one before `again`."""
-    # the sample and its repeats
-    found = {(a, b + 1) for a, b in runs(again) if b - a + 1 >= _FEWEST}
+    # the sample and its repeats; of numbers that nothing rounds next to none comes again
+    found = {(a, b + 1) for a, b in runs(again)}
     if not found:
         return []
     # a joint at least went on as it came, and made up for it at once
@@ -151,12 +161,12 @@ def _every(again) -> int:
     return usual if np.mean(np.abs(steps - usual) <= late) > _REGULAR else 1
 
 
-def _one_of(again, every: int) -> np.ndarray:
-    """One of each `every` rows (n,): the new ones, and where none came for longer, as at rest, those
-    that would have been."""
+def _one_of(again, every: int, longest: int) -> np.ndarray:
+    """One of each `every` rows (n,): the new ones, and where none came for longer than so many rows,
+    as at rest, those that would have been."""
     kept = np.append(True, ~again)
     for a, b in runs(again):
-        if b - a + 1 > every + 1:
+        if b - a + 1 > longest:
             kept[a + every : b + 2 : every] = True
     return kept
 

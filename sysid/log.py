@@ -214,7 +214,8 @@ def _segments(t, signals, where: str, breaks: Iterable[int] = (), *, linear: boo
             continue
         own = np.diff(clock)
         # as many samples as were measured: the mean step, without the samples that are missing
-        own = float(np.mean(own[own < MISSING * step]))
+        usual = own[own < MISSING * step]
+        own = float(np.mean(usual if len(usual) else own))
         if told:
             clock, off = true.t, max(off, true.off)
         clock, part = resampled(clock, part, own, linear=linear)

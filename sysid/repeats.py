@@ -13,6 +13,7 @@ _ABOUT = 4  # samples to either side whose speed is what the joint had
 # samples and s of torque: a shorter repeat costs less than the rows that a filter's reach would
 _FEWEST, _SHORTEST = 4, 0.02
 _FEW = 10  # repeats, of which nobody knows how many go on: some, as if it were the share of all
+_TWICE = 1.5  # times the speed: half between a step and two
 _HELD = 10  # samples at least of an angle that froze and never caught up
 _OFTEN = 0.25  # of the rows: what comes more often is the logger's way, not an event
 
@@ -84,7 +85,8 @@ def held_angle(q, but=None) -> list[tuple[int, int]]:
     is held to the end.
 
     Args:
-        but: (n - 1,) bool, steps that say nothing of how the joint moves about a run.
+        but: (n - 1,) bool, steps of which all else says that nothing came: they say nothing of how
+            the joint moves about a run, one alone may be a run, and many runs may come.
     """
     n = len(q)
     step = np.diff(q)
@@ -92,21 +94,24 @@ def held_angle(q, but=None) -> list[tuple[int, int]]:
     size = np.abs(step)
     if n < SHORT or not size.any():
         return []
+    rate = size[moves] / np.diff(moves, prepend=-1)  # what came late moved all the while
     grain, usual = quantum(q), np.sqrt(np.mean(step**2))
     found = []
     for a, b in runs(size == 0.0):  # steps; the samples are a to b + 1
         first, last = np.searchsorted(moves, [a, b + 2])
         before, after = (
-            size[own] for own in (moves[max(first - _ABOUT, 0) : first], moves[last : last + _ABOUT])
+            rate[own] for own in (slice(max(first - _ABOUT, 0), first), slice(last, last + _ABOUT))
         )
-        if not len(before) or not before.all() or not after.all():
+        held = b - a + 1
+        if not len(before) or not before.all() or not after.all() or held >= _OFTEN * n:
             continue
-        held, speed = b - a + 1, np.median(before)
+        speed = np.median(before)
         if len(after):
             speed = min(speed, np.median(after))
-            caught = size[b + 1] > 0.5 * (held + 1) * speed
-            if held > 1 and speed > max(_MOVING * grain, RESTING * usual) and caught:
+            caught = size[b + 1] > (0.5 * (held + 1) if held > 1 else _TWICE) * speed
+            if (held > 1 or but is not None) and speed > max(_MOVING * grain, RESTING * usual) and caught:
                 found.append((a, b + 1))
         elif held >= _HELD and speed > max(_MOVING * grain, 0.5 * usual):
             found.append((a, b + 1))
-    return found if sum(b - a + 1 for a, b in found) < _OFTEN * n else []
+    often = but is None and sum(b - a + 1 for a, b in found) >= _OFTEN * n
+    return [] if often else found

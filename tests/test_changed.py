@@ -81,6 +81,19 @@ def test_a_tilt_says_whose_encoder_may_be_it(fitted, planar):
     assert any("offset of the encoder of shoulder is the same as a tilt" in note for note in said["notices"])
 
 
+def test_what_is_left_beside_a_change_and_what_may_be_it_are_said(fitted, planar):
+    """A load, and an elbow's torque that has another sine of time: the load is told, and what is left; its link may be turned as well."""
+    written(planar, fitted / "both.csv", 9, load=LOAD)
+    table = pl.read_csv(fitted / "both.csv")
+    table.with_columns(pl.col("tau_elbow") + 1.5 * (2.2 * pl.col("t")).sin()).write_csv(fitted / "both.csv")
+    said = what_changed(fitted, "both.csv")
+    assert [f["effect"] for f in said["findings"]] == ["payload"]
+    own = verdict(said, "elbow")
+    assert own["status"] == "missing" and own["times_noise"] > 2.0 and "something else did too" in own["says"]
+    assert any("an offset of the encoder of elbow is the same as a load on its link" in note for note in said["notices"])
+    assert "says" not in verdict(what_changed(fitted, "loaded.csv"), "elbow")
+
+
 @pytest.mark.parametrize("offset", [0.03, -0.25, 0.8, -1.2])
 def test_an_encoder_s_zero_that_was_set_anew_is_told_with_its_size(fitted, planar, offset):
     """However far: what it does bends with it."""

@@ -135,6 +135,7 @@ def test_what_the_angles_noise_makes_of_an_error_is_what_it_made():
     heavy = errors[1] - errors[0] > 5.0 * errors[0]  # joints whose error is the angles' noise
     assert heavy.sum() >= 2 and np.all(made[0] < 0.1 * errors[0])
     ratio = made[1][heavy] / (errors[1] - errors[0])[heavy]
-    # but for the last one, whose body is bent by the noise of all others, which is in its error and not in what its own noise makes
+    # but for the last one, whose body is bent by the noise of all others, which its own noise does not make
     assert np.sum((ratio > 0.7) & (ratio < 1.4)) >= heavy.sum() - 1
-    assert np.all((made[2] / made[1])[heavy] == pytest.approx(4.0, rel=0.3))
+    # nor does friction's sign where it nearly stands, which noise turns but once
+    assert np.sum(np.abs(np.log((made[2] / made[1])[heavy] / 4.0)) < 0.2) >= heavy.sum() - 1

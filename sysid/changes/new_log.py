@@ -136,16 +136,21 @@ def _as_logged(structure: Model, x, motion) -> tuple[tuple, np.ndarray]:
 
 
 def _twins(robot, tried: Mapping[Key, np.ndarray], changes) -> Iterator[str]:
-    """Of a tilt the encoders whose offset is the same: of a first joint whose axis is level."""
-    if not any(change.effect == TILT for change in changes):
-        return
-    tilt = tried[TILT, ROBOT].reshape(-1, tried[TILT, ROBOT].shape[2])
-    for (name, joint), columns in tried.items():
-        own = columns.reshape(len(tilt), -1)[:, 0]
-        left = own - tilt @ np.linalg.lstsq(tilt, own, rcond=None)[0] if name == OFFSET else own
-        if left @ left < _SAME * (own @ own):
-            where = robot.joints[joint]
-            yield f"here an offset of the encoder of {where} is the same as a tilt of the base"
+    """The encoders whose offset is the same as a change: as a tilt, of a first joint whose axis is
+    level; as a load, of the joint of its link."""
+    found, told = {c.effect for c in changes}, {(c.effect, c.joint) for c in changes}
+    for key, what in ((TILT, ROBOT), "a tilt of the base"), (PAYLOAD, "a load on its link"):
+        if key[0] not in found:
+            continue
+        wide = tried[key].reshape(-1, tried[key].shape[2])
+        for (name, joint), columns in tried.items():
+            own = columns.reshape(len(wide), -1)[:, 0]
+            if name != OFFSET or (name, robot.joints[joint]) in told:
+                continue
+            left = own - wide @ np.linalg.lstsq(wide, own, rcond=None)[0]
+            if left @ left < _SAME * (own @ own):
+                where = robot.joints[joint]
+                yield f"here an offset of the encoder of {where} is the same as {what}"
 
 
 def _located(log: str) -> str:

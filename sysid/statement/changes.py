@@ -6,7 +6,8 @@ from ..changes import Change, Changed
 from ..fit_document import number
 from .words import option
 
-_ABOVE = 2.0  # times what looks like noise, where that is not known well: then it is no noise
+# times what looks like noise, where that is not known well, or beside what changed: it is no noise
+_ABOVE = 2.0
 
 
 def document(found: Changed, run="") -> dict:
@@ -36,12 +37,21 @@ def document(found: Changed, run="") -> dict:
 
 def _verdict(found: Changed, j: int) -> dict:
     joint, floor, error = found.joints[j], found.floors[j], float(found.left[j])
+    noise = floor.rms or floor.about or 0.0
     if effects := [c.effect for c in found.changes if c.joint in (joint, "*")]:
         first, *also = effects
-        return {"joint": joint, "status": "missing", "effect": first, "tied_with": [], "also": also}
+        named = {"effect": first, "tied_with": [], "also": also}
+        # under the low-pass, which lets little noise through: no row about a reversal is in it
+        rest = float(found.rms_after[j]) / noise if noise else 0.0
+        about = "" if floor.rms else "about "
+        says = (
+            f"with what changed its error is still {about}{rest:.2g} times the noise: something "
+            "else did too, or it is more than small changes tell of"
+        )
+        more = {"says": says, "times_noise": rest} if rest > _ABOVE else {}
+        return {"joint": joint, "status": "missing", **named, **more}
     if error == 0.0 or floor.reached(error):  # of a torque that is not used nothing is left
         return {"joint": joint, "status": "complete"}
-    noise = floor.rms or floor.about or 0.0
     if not (floor.rms or error > _ABOVE * noise > 0.0):
         why = "so nobody can say what error is left above it"
         says = f"its noise floor is not known ({floor.detail}), {why}"

@@ -102,7 +102,7 @@ def show_changed(document: dict) -> None:
             print("nothing has changed, for all that is known of the noise")
         else:
             print("nothing has changed: all joints are at their noise floor")
-    for v in open_yet:
+    for v in (v for v in document["verdict"] if "says" in v):
         for line in text.wrapped(f"{v['joint']}: {v['says']}", terminal_width(), "  "):
             print(line)
     if above:
