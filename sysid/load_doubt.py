@@ -69,7 +69,7 @@ def _answers(fit: Fit, motion: Motion, joints: set[int]) -> np.ndarray:
     free = np.append(np.isfinite(fit.uncertainty.std), np.ones(more, dtype=bool))
     hessian = 2.0 * np.einsum("jnk,jnl->kl", slopes, slopes) + np.pad(prior_hessian(known), (0, more))
     out = np.zeros((len(free), len(pull)))
-    out[free] = -inverted(hessian[np.ix_(free, free)]) @ np.array(pull).T[free]
+    out[free] = -inverted(hessian[np.ix_(free, free)]) @ np.reshape(pull, (len(pull), len(free))).T[free]
     return out
 
 
