@@ -30,11 +30,15 @@ def affine_metric(inverse) -> np.ndarray:
 def _inverse(pseudo) -> np.ndarray:
     """Inverses of pseudo-inertias (..., 4, 4); of one that rounding has left at the edge of the possible ones that of its nearest inside."""
     try:
-        return np.linalg.inv(pseudo)
+        inverse = np.linalg.inv(pseudo)
+        if np.all(np.diagonal(inverse, axis1=-2, axis2=-1) > 0.0):
+            return inverse
     except np.linalg.LinAlgError:
-        values, vectors = np.linalg.eigh(pseudo)
-        inside = np.maximum(values, np.finfo(float).eps * values[..., -1:])
-        return (vectors / inside[..., None, :]) @ np.swapaxes(vectors, -1, -2)
+        pass
+    # at the edge, or a rounding beyond it, where an inverse would point outwards
+    values, vectors = np.linalg.eigh(pseudo)
+    inside = np.maximum(values, np.finfo(float).eps * values[..., -1:])
+    return (vectors / inside[..., None, :]) @ np.swapaxes(vectors, -1, -2)
 
 
 class Divergence(ABC):
