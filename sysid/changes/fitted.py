@@ -13,12 +13,13 @@ from ..carried import BALL, WEAK
 from ..inertia import DIVERGENCES, PARAMETERIZATIONS
 from ..inertia.pseudo import from_pseudo, to_pseudo
 from ..model import Model
-from ..model_parameters import ROBOT, place
+from ..model_parameters import place
 from ..objective import Objective
 from ..projection import inverted, of_data, root
 from ..solve import Coordinates, solve
 from ..vocabulary import find
 from .halves import Key, Question, least_squares
+from .hands import PAYLOAD
 
 _ROUNDS = 3  # of what is believed of a body's size
 
@@ -45,7 +46,7 @@ def together(model: Model, asked: Question, chosen) -> tuple[tuple[Change, ...],
         return (), asked.squares(places, np.zeros(0)).sum(axis=0)
     ends = np.cumsum([asked.spans[key].stop - asked.spans[key].start for key in chosen]).tolist()
     spans = dict(zip(chosen, (slice(a, b) for a, b in zip([0, *ends], ends))))
-    body = spans.get(("payload", ROBOT))
+    body = spans.get(PAYLOAD)
     whole = asked.by_block.sum(axis=0)
     c, around = possible(whole, places, body)
     data = whole[np.ix_(places, places)]
@@ -76,11 +77,10 @@ def with_fewer(
     Args:
         least: as of `Question.supported`, for what stands then.
     """
-    load = ("payload", ROBOT)
-    if load not in chosen:
+    if PAYLOAD not in chosen:
         return chosen
     others = [key for key in fewer if key in asked.spans and key not in chosen]
-    rest = [key for key in chosen if key != load]
+    rest = [key for key in chosen if key != PAYLOAD]
     each = [chosen, *([*rest, key] for key in others)]
     best = min(each, key=lambda keys: _left(asked, keys))
     return chosen if best is chosen else asked.standing(best, least) or chosen
@@ -89,8 +89,8 @@ def with_fewer(
 def _left(asked: Question, keys: Sequence[Key]) -> float:
     """What changes leave of all squares, as joints count."""
     places, body = asked.places(keys), None
-    if ("payload", ROBOT) in keys:
-        first = len(asked.places(keys[: keys.index(("payload", ROBOT))]))
+    if PAYLOAD in keys:
+        first = len(asked.places(keys[: keys.index(PAYLOAD)]))
         body = slice(first, first + 10)
     c, _ = possible(asked.by_block.sum(axis=0), places, body)
     return float((asked.squares(places, c) @ asked.weights**2).sum())

@@ -144,9 +144,9 @@ def _twins(robot, tried: Mapping[Key, np.ndarray], changes) -> Iterator[str]:
             continue
         wide = tried[key].reshape(-1, tried[key].shape[2])
         for (name, joint), columns in tried.items():
-            own = columns.reshape(len(wide), -1)[:, 0]
             if name != OFFSET or (name, robot.joints[joint]) in told:
                 continue
+            own = columns.reshape(len(wide), -1)[:, 0]
             left = own - wide @ np.linalg.lstsq(wide, own, rcond=None)[0]
             if left @ left < _SAME * (own @ own):
                 where = robot.joints[joint]
