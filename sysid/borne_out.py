@@ -14,7 +14,8 @@ from .estimate import Fit
 from .model_parameters import ROBOT
 from .plain_model import PLAIN
 from .plausible import centred
-from .unexplained import Refused, changed, explains
+from .refused import Refused
+from .unexplained import changed, explains
 
 CLEAR = 2.0  # standard deviations
 _LIKELY = 0.05  # less is not listed

@@ -86,6 +86,30 @@ def at_start(candidate: Candidate, shapes: dict[str, float]) -> bool:
     return all(shapes[s.name] == s.start for s in candidate.effect.shapes() if s.start is not None)
 
 
+def stepped(
+    model: Model, candidate: Candidate, shapes: dict[str, float], steps
+) -> dict[str, float]:
+    """Shape values of an effect without columns, moved by `steps` of those by which it does something,
+    within their bounds."""
+    bounds = bounds_of(model, candidate)
+    free = [(shape.name, low, high) for shape, low, high, _ in bounds if shape.start is not None]
+    moved = {
+        name: float(np.clip(shapes[name] + step, low, high))
+        for (name, low, high), step in zip(free, steps)
+    }
+    return {**shapes, **moved}
+
+
+def signs_allow(candidate: Candidate, coefficients) -> bool:
+    """Whether coefficients (k0,) have the signs that an effect allows."""
+    effect = candidate.effect
+    if candidate.nonlinear:
+        free = [s for s in effect.shapes() if s.start is not None]
+        return all(not (s.low == 0.0 and c < 0) for s, c in zip(free, coefficients))
+    signs = list(zip(effect.coefficients(), coefficients))
+    return len(signs) > 1 or all(one.lower != 0 or c >= 0 for one, c in signs)
+
+
 def grown(source, candidate: Candidate, shapes: dict[str, float]) -> Model:
     """A source's model with a candidate at shape values, in the place of what it has of the same
     effect on that joint."""

@@ -5,6 +5,7 @@ squared residuals are summed block by block over the same blocks, and the standa
 difference of their RMS is that of leaving one block out (jackknife).
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -72,6 +73,13 @@ def compare(first: Fit, second: Fit, names: tuple[str, str] | None = None) -> Di
         Difference(*names, joint, *_jackknife(*((s[both[:, k], k], n[both[:, k], k]) for s, n in sums)))
         for k, joint in enumerate(joints)
     )
+
+
+def over(first: Fit, second: Fit, joints: Sequence[str]) -> tuple[float, float, float]:
+    """RMS of both over joints on their test logs, and the standard error of what changes."""
+    errors = [math.sqrt(np.mean([fit.rms("test")[j] ** 2 for j in joints])) for fit in (first, second)]
+    changes = [d.se for d in compare(first, second) if d.joint in joints]
+    return *errors, float(np.sqrt(np.nansum(np.square(changes)) / len(joints)))
 
 
 def of_joint(first: Fit, second: Fit, joint: str) -> Difference:

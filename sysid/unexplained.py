@@ -4,7 +4,6 @@ words."""
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -14,60 +13,13 @@ from .estimate import Fit
 from .failures import HeldOut, fallen
 from .given_shapes import at_edges
 from .mean_by_log import MOST, by_log
-from .model_parameters import ROBOT
 from .one_clock import clocks_anew
 from .plausible import AT_REST, Reason, stands
+from .refused import Refused
 from .too_narrow import noise_as_law
 
 _FITTED = 0.1  # of what is left on test logs: a fit is made to see whether it takes more there
 WEIGHED = "`weighting: noise` under `solver:` in the experiment file"
-LOW_PASS = "`torque: low-pass` under `preprocess:` in the experiment file"
-
-
-@dataclass(frozen=True)
-class Refused:
-    """An effect that was looked at and is not claimed, and why, in words.
-
-    candidate, p, shares: of one that the training logs told: what joined, its family-wise p-value,
-    and of each joint's squared residual on the test logs, under the low-pass, what it takes (dof,).
-    raw: whether the fit's torque is as logged.
-    """
-
-    effect: str
-    joint: str
-    why: str
-    candidate: Candidate | None = None
-    p: float = 1.0
-    shares: Sequence[float] = ()
-    raw: bool = False
-
-    @property
-    def told(self) -> str:
-        """In words."""
-        said = not_claimed(self.effect, self.why)
-        if self.candidate is None or self.candidate.joint == ROBOT:
-            return said
-        share = self.shares[self.candidate.joint]  # another joint's may be all that falls
-        taken = f"{100 * share:.0f} % of that error's square"
-        low = f"; under the low-pass of a diagnosis it takes {taken}"
-        low += f"; with {LOW_PASS} a fit may bear it out" * self.raw
-        return said + low * bool(share >= MOST)
-
-
-def not_claimed(effect: str, why: str) -> str:
-    """Of an effect that was looked at, in words."""
-    return f"{effect} was looked at and is not claimed: {why}"
-
-
-def in_vain(refused: Sequence[Refused], joints, j: int, least: float):
-    """The Candidate on joint j, with its p-value, that takes at least such a share of its squared
-    residual on the test logs, under the low-pass, and which no fit bore out; None where there is
-    none."""
-    own = [
-        r for r in refused if r.candidate and r.joint in (joints[j], "*") and r.shares[j] >= least
-    ]
-    best = max(own, key=lambda r: r.shares[j], default=None)
-    return best and (best.candidate, best.p)
 
 
 def of_few_blocks(
@@ -101,12 +53,6 @@ def of_few_blocks(
     if best and shares[best] > _FITTED and (shares[best] >= least or fitted(best) >= MOST):
         return best, 1.0
     return None
-
-
-def raw(fit: Fit) -> bool:
-    """Whether a fit's torque is as logged: a low-pass goes with a filter."""
-    spec = fit.experiment.preprocess
-    return spec.torque == "raw" and spec.filter != "none"
 
 
 def may_be(candidate: Candidate, *, in_vain: bool) -> str:
@@ -235,6 +181,18 @@ def may_be_noise(before: float, after: Sequence[float], floor) -> bool:
     if floor.rms is None or MOST * after[1] ** 2 > floor.rms**2:
         return False
     return explains(before, after[1], floor.rms) >= MOST or floor.reached(after[1])
+
+
+def a_part(train: Sequence[float], test: Sequence[float], floor) -> bool:
+    """Whether an effect takes less than half of what stands above a NoiseFloor, on the training logs
+    and, beyond its standard error, on the test logs: what it resembles may be there in its place.
+
+    Args:
+        train, test: errors (without it, with it).
+    """
+    if floor.rms is None or not explains(*train, floor.rms) < MOST:
+        return False
+    return explains(*test, floor.rms + floor.std) < MOST
 
 
 def by_weights(fit, joint: str, floor: float | None, weighed: dict[str, float]) -> bool:

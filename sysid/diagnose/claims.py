@@ -15,10 +15,9 @@ from .. import pipeline
 from ..borne_out import beaten, beside, first_borne_out, size_told, tried
 from ..carriers import with_tests
 from ..estimate import Fit
-from ..failures import taken
 from ..motion import Motion
+from ..refused import Refused, no_claim
 from ..simpler import with_simpler
-from ..unexplained import Refused, raw
 from .findings import Finding, finding
 from .refits import Member
 from .steps import Step, rejoined
@@ -75,14 +74,12 @@ def claimed(
         most = 1 if beside(last, step.candidate) else _FITTED
         head, fits, whys = first_borne_out([m for m, _ in near[:most]], last, with_)
         why = whys.get(id(first[0]))
-        own = *step.candidate.named(fit.joints), why
         refused.pop(number, None)
         if head is None:
-            shares = taken(step.before.settled, step.after.settled, test)
-            refused[number] = last, Refused(*own, step.candidate, step.p, shares, raw(fit))
+            refused[number] = last, no_claim(step, why, fit, test)
             continue
         if why:
-            refused[~number] = last, Refused(*own)
+            refused[~number] = last, Refused(*step.candidate.named(fit.joints), why)
         no_rivals = beaten([m for m, _ in near], head, fits, whys)
         choice = step.choice.headed(head).without(no_rivals)
         may = lambda m: most > 1 and id(m) not in whys and free(m.candidate)  # noqa: B023, E731

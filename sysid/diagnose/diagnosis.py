@@ -17,7 +17,8 @@ from functools import cache, partial
 
 import numpy as np
 
-from .. import borne_out, loads, pipeline, thinning
+from .. import loads, pipeline, thinning
+from ..borne_out import misfit_taken, undecided
 from ..candidates import Candidate, candidates
 from ..estimate import Fit
 from ..failures import Failure, HeldOut, failures, fallen
@@ -25,6 +26,7 @@ from ..left_open import left_open
 from ..lowpass import lowpassed
 from ..misread import misread, unasked
 from ..noise import NoiseFloor, floors_of_fit
+from ..refused import PART, Refused, no_claim
 from ..shown import ShownDiagnosis
 from ..specs import Experiment
 from ..suspected import suspected
@@ -33,10 +35,11 @@ from ..unexplained import notices, of_few_blocks, otherwise
 from ..view import View, elsewhere, first_view, law, too_short
 from ..warned import noticed
 from . import select
-from .claims import Claim, Refused, claimed
+from .claims import Claim, claimed
 from .detectable import Detectable, detectable
 from .findings import Finding
 from .refits import refitted
+from .steps import rejoined
 from .verdict import Verdict, verdicts
 
 
@@ -86,31 +89,43 @@ def diagnose(
         view = first_view(fit.experiment, fit, *measured.parts)
         extra = suspected(fit.experiment, view)
         how = {"level": level, "tell": tell, "most": 0 if (wrong := misread(fit)) else select.STEPS}
-        steps, asked, then_asked, undecided = select.search(view, extra, **how)
+        steps, asked, then_asked, open_ = select.search(view, extra, **how)
         if (test := lowpassed(measured.test, fit.joints, view.cutoff)) is None:
             raise too_short()
         known = {"filters": fit.filters, "progress": tell, "measured": whole}
-        claims, refused = claimed(steps, fit, test, **known)
-        refused += [borne_out.undecided(choice, fit) for choice in undecided[-1:]]
-        after, last = (claims[-1].step.after, claims[-1].after) if claims else (view, fit)
-        first, then = (HeldOut(one.settled, test) for one in (view, after))
-        found, weighed = floors_of_fit(experiment, last, after.model, after.x, measured.parts)
-        again = cache(lambda: elsewhere(after, measured.test, measured.train))
+        first = HeldOut(view.settled, test)
 
-        def beyond(j: int, candidate: Candidate):
-            group = then_asked.of(candidate) or asked.of(candidate)
-            with_it = group and again() and refitted(after, group)
-            return with_it and law(with_it.view, j, elsewhere(with_it.view, measured.test))
+        def judged(steps, refused):
+            claims, more = claimed(steps, fit, test, **known)
+            refused += more
+            after, last = (claims[-1].step.after, claims[-1].after) if claims else (view, fit)
+            then = HeldOut(after.settled, test)
+            found, weighed = floors_of_fit(experiment, last, after.model, after.x, measured.parts)
+            again = cache(lambda: elsewhere(after, measured.test, measured.train))
 
-        def few(j: int, least: float):
-            own = then_asked.by_joint.get(j, [()])[0]
-            return of_few_blocks(own, partial(refitted, after), then, j, least, partial(fitted, j))
+            def beyond(j: int, candidate: Candidate):
+                group = then_asked.of(candidate) or asked.of(candidate)
+                with_it = group and again() and refitted(after, group)
+                return with_it and law(with_it.view, j, elsewhere(with_it.view, measured.test))
 
-        fitted = lambda j, one: borne_out.misfit_taken(last, j, found[j], known, one)  # noqa: E731
-        more = refused, transfers(last, view.cutoff), weighed, lambda j: law(after, j, again())
-        rest = then_asked.near, few, beyond, fallen(first, then), otherwise(last, found, test.still)
-        named = verdicts(fit, claims, after.unknown, found, *more, *rest)
-        said = unasked(named) if wrong else left_open(named, beyond, fitted, select.WORTH)
+            def few(j: int, least: float):
+                own, fits = then_asked.by_joint.get(j, [()])[0], partial(fitted, j)
+                return of_few_blocks(own, partial(refitted, after), then, j, least, fits)
+
+            fitted = lambda j, one: misfit_taken(last, j, found[j], known, one)  # noqa: E731
+            more = refused, transfers(last, view.cutoff), weighed, lambda j: law(after, j, again())
+            rest = fallen(first, then), otherwise(last, found, test.still)
+            asks = then_asked.near, few, beyond
+            named = verdicts(fit, claims, after.unknown, found, *more, *asks, *rest)
+            little = [one.joint for one in named if one.status == "part"]
+            if parts := [c for c in claims if c.head.joint in little]:
+                kept = rejoined(view, [c.step for c in claims if c not in parts])
+                return judged(kept, refused + [no_claim(c.step, PART, fit, test) for c in parts])
+            said = unasked(named) if wrong else left_open(named, beyond, fitted, select.WORTH)
+            return claims, refused, said, after, last, then, found
+
+        undone = [undecided(choice, fit) for choice in open_[-1:]]
+        claims, refused, said, after, last, then, found = judged(steps, undone)
         levels = np.array([f.rms or e for f, e in zip(found, last.rms("test").values())])
         where = failures(first, fit.predictions["test"].thinned(thinning.MOST), levels, view)
         could = detectable(view, asked, candidates(view.model, extra))

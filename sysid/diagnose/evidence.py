@@ -26,6 +26,7 @@ from functools import cached_property
 import numpy as np
 
 from .. import blocks, eigen
+from ..candidate_columns import signs_allow
 from ..candidates import Candidate
 
 
@@ -139,12 +140,7 @@ class Group:
     @property
     def signed(self) -> bool:
         """Whether the coefficients have the signs that the effect allows."""
-        effect = self.candidate.effect
-        if self.candidate.nonlinear:
-            free = [s for s in effect.shapes() if s.start is not None]
-            return all(not (s.low == 0.0 and c < 0) for s, c in zip(free, self.coefficients))
-        signs = list(zip(effect.coefficients(), self.coefficients))
-        return len(signs) > 1 or all(one.lower != 0 or c >= 0 for one, c in signs)
+        return signs_allow(self.candidate, self.coefficients)
 
     @property
     def numbers(self) -> int:

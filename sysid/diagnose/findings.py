@@ -5,8 +5,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from .. import comparison
 from ..addition import command, spelled
 from ..borne_out import size_told
@@ -53,19 +51,12 @@ class Finding:
 def finding(
     before: Fit, after: Fit, member: Member, chance: float, step: Step, number: int
 ) -> Finding:
-    """A member of a step's set, from the fits without it and with it.
-
-    Args:
-        number: of the step among those that stand.
-    """
+    """A member of a set, from the fits without it and with it; number: of its step."""
     candidate = member.candidate
     own, joint = candidate.judged_by(before.joints), candidate.where(before.joints)
-    square = lambda fit: np.mean([fit.rms("test")[j] ** 2 for j in own])  # noqa: E731
-    errors = [float(np.sqrt(square(fit))) for fit in (before, after)]
-    differences = {d.joint: d.se for d in comparison.compare(before, after, ("before", "after"))}
-    se = float(np.sqrt(np.nansum([differences[j] ** 2 for j in own]) / len(own)))
+    errors = comparison.over(before, after, own)
     heads = number if member is step.choice.head else None
     added = command(before.experiment.path, *spelled(candidate, joint))
     numbers = after.parameters_of(*candidate.key), size_told(after, *candidate.key)
     forms = step.choice.forms if heads is not None else ()
-    return Finding(member, joint, step.p, chance, *errors, se, *numbers, heads, added, forms)
+    return Finding(member, joint, step.p, chance, *errors, *numbers, heads, added, forms)

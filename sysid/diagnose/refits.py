@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..candidate_columns import at_start, bounds_of
+from ..candidate_columns import at_start, stepped
 from ..candidates import Candidate
 from ..view import View, allowed, around, joined, losses, shapes_of, weighed
 from .evidence import Group
@@ -45,10 +45,7 @@ def refitted(view: View, group: Group, found: View | None = None) -> Member | No
     forbid it, or where it leaves more than the model without it. found: where it is at hand."""
     candidate, shapes = group.candidate, dict(group.shapes)
     if found is None and candidate.nonlinear and at_start(candidate, shapes):
-        free = [s for s, *_ in bounds_of(view.model, candidate) if s.start is not None]
-        limits = {s.name: (low, high) for s, low, high, _ in bounds_of(view.model, candidate)}
-        for shape, step in zip(free, group.coefficients):
-            shapes[shape.name] = float(np.clip(shapes[shape.name] + step, *limits[shape.name]))
+        shapes = stepped(view.model, candidate, shapes, group.coefficients)
     strikes = candidate.blows and candidate.swings  # from hollow to hollow no slope leads
     found = found or joined(view, (candidate, shapes), strikes=strikes)
     left = [np.sum(one.design.residual**2) for one in (view, found)]

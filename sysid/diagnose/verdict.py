@@ -12,8 +12,9 @@ from ..estimate import Fit
 from ..flexible import Law, Unknown
 from ..noise import DOUBT, as_of_test
 from ..plausible import Reason
+from ..refused import in_vain
 from ..transfer import Transfer, quieter
-from ..unexplained import by_weights, cause, explains, in_vain, loudest, may_be_noise, not_all
+from ..unexplained import a_part, by_weights, cause, explains, loudest, may_be_noise, not_all
 from ..view import taken_where_held
 from .ask import HALF
 from .claims import Claim
@@ -29,11 +30,12 @@ class Verdict:
     status: complete (nothing is left above the noise), missing (`claims`: what is claimed, first
     the first), explained (by the claims of other joints' equations), unknown (of what is left the
     motion predicts a tenth of what claims took, or these take less than 80 % of all), unresolved
-    (error stands above the floor, or the floor is not known, and nothing says why). explained:
-    share of the joint's misfit on the test logs that all claims take, NaN where there is none.
-    left: what functions of the motion predict of the rest, or None. says: why something is left.
-    may: the effect that may be it. even: whether weights make it. carries: how test logs err more.
-    reason: what else than a law it is, of which no other log tells more.
+    (error stands above the floor, or the floor is not known, and nothing says why), part (what is
+    claimed takes too little, and is no claim: it is asked without). explained: share of the joint's
+    misfit on the test logs that all claims take, or NaN. left: what functions of the motion predict
+    of the rest, or None. says: why something is left. may: the effect that may be it. even: whether
+    weights make it. carries: how test logs err more. reason: what else than a law it is, of which
+    no other log tells more.
     """
 
     joint: str
@@ -117,7 +119,8 @@ def verdicts(
         done = others and not own and remains and whole and little
         fell = others and first > (1.0 + DOUBT) * (floors[j].rms or 0.0) and then < _FALLS * first
         if own and (whole or evens[j]) and little:
-            told = ("missing", own, explained, remains)
+            few_of_it = a_part(*pairs, floors[j]) and not evens[j]
+            told = ("part" if few_of_it else "missing", own, explained, remains)
         elif not done and (own or (remains and (further or not looks) and joint not in means)):
             why = not_all(looks[0].name, further.share) if further else ""
             why = why if remains else cause(both, floors[j])

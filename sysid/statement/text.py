@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from ..addition import LIKELY, designs, likely
-from ..unexplained import LOW_PASS
+from ..refused import LOW_PASS
 from . import where
 from .laws import predicted, tone
 from .rivals import as_little, other_options, rivals

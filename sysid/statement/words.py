@@ -7,7 +7,7 @@ import textwrap
 from collections.abc import Callable, Sequence
 
 from ..flexible import DIRECTION
-from ..unexplained import not_claimed
+from ..refused import not_claimed
 from ..units import behind
 
 Members = Sequence[tuple[str, str, float]]  # (effect, joint, probability) of a set
