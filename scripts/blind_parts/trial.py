@@ -168,8 +168,11 @@ def _one(case: Case, folder: Path, found: dict, stage: list[str]) -> None:
 
 
 def simulated(machine, hidden, options: dict, plain=None):
-    """The simulation, and what its sizes had to be multiplied by until the robot followed its reference."""
-    from sysid.simulate import Hidden, simulate
+    """The simulation, and what its sizes had to be multiplied by until the robot followed its reference.
+
+    Where nothing is hidden its speed is lowered in `options`, for what comes after it as well.
+    """
+    from sysid.simulate import Hidden, motion, simulate
 
     for attempt in range(6):
         softer = 0.7**attempt
@@ -183,8 +186,11 @@ def simulated(machine, hidden, options: dict, plain=None):
         try:
             return simulate(machine, hide=hide, **options), softer
         except SysidError:
-            if attempt == 5 or not hide:
+            if attempt == 5:
                 raise
+            if not hide:
+                usual = options["speed"] or float(motion.top_speeds(machine).max())
+                options["speed"] = 0.8 * usual
 
 
 def _custom(machine, entry: dict, size: float, plain) -> Callable:
