@@ -8,25 +8,28 @@ from dataclasses import replace
 from .model_parameters import ROBOT
 from .unexplained import may_be
 
+_CLEAR = (
+    1e-5  # slow noise of 20 s has few turns, by which the tail of its strength is told too thin
+)
 
-def left_open(verdicts: Sequence, beyond: Callable, fitted: Callable, worth: float) -> list:
+
+def left_open(verdicts: Sequence, left, worth: float) -> list:
     """Verdicts, of which one that says what may be there is told where a fit with it takes nothing
     of the misfit, and one that says `unknown` is `unresolved` where the rest is nothing that the
     motion predicts once what may be another joint's effect is in the model: it bends bodies that
-    both share, or acts on both.
+    both share, or acts on both. And one that is `unresolved` is `unknown` where the strength of the
+    rest follows the motion.
 
     Args:
-        beyond: the Law that stands out of what is left of a joint's number with a Candidate in the
-            model, or None. fitted: the share of a joint's misfit on the test logs that goes where a
-            Candidate is in a fit. worth: of a square, what a law must predict, and a fit take.
+        left: what is Left of joints. worth: of a square, what a law must predict, and a fit take.
     """
-    verdicts = [_in_a_fit(j, one, fitted, worth) for j, one in enumerate(verdicts)]
+    verdicts = [_in_a_fit(j, one, left.fitted, worth) for j, one in enumerate(verdicts)]
     asked = sum(one.status not in ("complete", "explained") for one in verdicts)
     mays = {one.may: one.joint for one in verdicts if one.may is not None}
 
     def again(j: int, one):
         for may, joint in mays.items():
-            law = beyond(j, may)
+            law = left.beyond(j, may)
             if law is not None and not law.predicts(asked, worth):
                 where = "of the whole robot" if may.joint == ROBOT else f"on {joint}"
                 why = (
@@ -37,7 +40,27 @@ def left_open(verdicts: Sequence, beyond: Callable, fitted: Callable, worth: flo
         return one
 
     unknown = [one.status == "unknown" and not one.claims for one in verdicts]
-    return [again(j, one) if unknown[j] else one for j, one in enumerate(verdicts)]
+    out = [again(j, one) if unknown[j] else one for j, one in enumerate(verdicts)]
+    return _by_strength(out, left.strength, worth)
+
+
+def _by_strength(verdicts: Sequence, strength: Callable, worth: float) -> list:
+    """Verdicts, of which one that says `unresolved` is `unknown` where the strength of what is left
+    follows the motion, as that of noise does not: a law is missing that has a memory, or is as slow
+    as a drift."""
+    laws = [
+        strength(j)
+        if one.status == "unresolved" and not (one.may or one.even or one.reason)
+        else None
+        for j, one in enumerate(verdicts)
+    ]
+    # accelerations are what filters smear
+    found = [law and not law.inertial and law.chance < _CLEAR and law.share > worth for law in laws]
+    told = {"status": "unknown", "says": ""}
+    return [
+        replace(one, **told, follows=law) if there else one
+        for one, law, there in zip(verdicts, laws, found)
+    ]
 
 
 def _in_a_fit(j: int, one, fitted: Callable, worth: float):

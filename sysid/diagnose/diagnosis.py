@@ -13,13 +13,12 @@ The whole loop on one page:
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache, partial
 
 import numpy as np
 
 from .. import loads, pipeline, thinning
-from ..borne_out import misfit_taken, undecided
-from ..candidates import Candidate, candidates
+from ..borne_out import undecided
+from ..candidates import candidates
 from ..estimate import Fit
 from ..failures import Failure, HeldOut, failures, fallen
 from ..left_open import left_open
@@ -31,9 +30,10 @@ from ..shown import ShownDiagnosis
 from ..specs import Experiment
 from ..suspected import suspected
 from ..transfer import transfers
-from ..unexplained import notices, of_few_blocks, otherwise
-from ..view import View, elsewhere, first_view, law, too_short
+from ..unexplained import notices, otherwise
+from ..view import View, first_view, too_short
 from ..warned import noticed
+from ..what_is_left import Left
 from . import select
 from .claims import Claim, claimed
 from .detectable import Detectable, detectable
@@ -101,27 +101,16 @@ def diagnose(
             after, last = (claims[-1].step.after, claims[-1].after) if claims else (view, fit)
             then = HeldOut(after.settled, test)
             found, weighed = floors_of_fit(experiment, last, after.model, after.x, measured.parts)
-            again = cache(lambda: elsewhere(after, measured.test, measured.train))
-
-            def beyond(j: int, candidate: Candidate):
-                group = then_asked.of(candidate) or asked.of(candidate)
-                with_it = group and again() and refitted(after, group)
-                return with_it and law(with_it.view, j, elsewhere(with_it.view, measured.test))
-
-            def few(j: int, least: float):
-                own, fits = then_asked.by_joint.get(j, [()])[0], partial(fitted, j)
-                return of_few_blocks(own, partial(refitted, after), then, j, least, fits)
-
-            fitted = lambda j, one: misfit_taken(last, j, found[j], known, one)  # noqa: E731
-            more = refused, transfers(last, view.cutoff), weighed, lambda j: law(after, j, again())
-            rest = fallen(first, then), otherwise(last, found, test.still)
-            asks = then_asked.near, few, beyond
-            named = verdicts(fit, claims, after.unknown, found, *more, *asks, *rest)
+            answers = (then_asked, asked), measured, refitted, known
+            left = Left(after, last, then, found, *answers)
+            more = refused, transfers(last, view.cutoff), weighed, left.law, then_asked.near
+            rest = left.few, left.beyond, fallen(first, then), otherwise(last, found, test.still)
+            named = verdicts(fit, claims, after.unknown, found, *more, *rest)
             little = [one.joint for one in named if one.status == "part"]
             if parts := [c for c in claims if c.head.joint in little]:
                 kept = rejoined(view, [c.step for c in claims if c not in parts])
                 return judged(kept, refused + [no_claim(c.step, PART, fit, test) for c in parts])
-            said = unasked(named) if wrong else left_open(named, beyond, fitted, select.WORTH)
+            said = unasked(named) if wrong else left_open(named, left, select.WORTH)
             return claims, refused, said, after, last, then, found
 
         undone = [undecided(choice, fit) for choice in open_[-1:]]

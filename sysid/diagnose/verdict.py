@@ -35,7 +35,7 @@ class Verdict:
     misfit on the test logs that all claims take, or NaN. left: what functions of the motion predict
     of the rest, or None. says: why something is left. may: the effect that may be it. even: whether
     weights make it. carries: how test logs err more. reason: what else than a law it is, of which
-    no other log tells more.
+    no other log tells more. follows: what the strength of the rest does.
     """
 
     joint: str
@@ -48,6 +48,7 @@ class Verdict:
     even: bool = False
     carries: Transfer | None = None
     reason: Reason | None = None
+    follows: Law | None = None
 
 
 def verdicts(

@@ -11,7 +11,7 @@ from ..diagnose.verdict import Verdict
 from ..fit_document import number
 from ..flexible import HUM, TOLD, Unknown
 from .claims import chances, confidence_set, ties
-from .laws import TOGETHER
+from .laws import STRENGTH, TOGETHER
 
 
 def verdict(v: Verdict, path="config.yaml", joints=()) -> dict:
@@ -58,6 +58,9 @@ def verdict(v: Verdict, path="config.yaml", joints=()) -> dict:
         out["needs_no_log"] = True
     if v.left is not None:
         out |= {"depends_on": dependences(v.left), "share_left": v.left.share}
+    elif v.follows is not None:
+        told = {"variable": v.follows.variables, "share": float(v.follows.share)}
+        out["depends_on"] = [told | {"of": STRENGTH}]
     elif v.status == "unknown":
         out["depends_on"] = []
     return out

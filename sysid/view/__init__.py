@@ -9,6 +9,7 @@ from .losses import losses, slow_losses, taken, taken_where_held, took
 from .opened import elsewhere, first_view, too_short
 from .overlap import alike, holds, slow_part
 from .singles import greatest
+from .strength import strength
 from .view import View, looked_at
 
 __all__ = [
@@ -36,6 +37,7 @@ __all__ = [
     "shapes_of",
     "slow_losses",
     "slow_part",
+    "strength",
     "summed",
     "taken",
     "taken_where_held",

@@ -9,7 +9,7 @@ fitted by the same model, and asked by the same columns, it has both.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import islice
 
@@ -84,7 +84,7 @@ def _greatest(views, j: int, asked: Columns, rng, draws: int) -> Single | None:
     part, k = places[here[best]]
     # made again, not kept: those of a long log fill the memory
     words, values = next(islice(asked(), part, None))
-    column, chance = values[:, k].copy(), _beyond(scores[0, best], scores[1:].max(axis=1))
+    column, chance = values[:, k].copy(), beyond(scores[0, best], scores[1:].max(axis=1))
     parts = zip(views, askers, _parted(column[:, None], ends))
     told = [asker.apart(*(view.weights[j] * one for one in own)) for view, asker, own in parts]
     share = _share(told)
@@ -122,7 +122,7 @@ def _sized(score):
     return -ndtri(0.5 * np.exp(np.maximum(log_ndtr(-score), -700.0)))
 
 
-def _beyond(value: float, maxima: np.ndarray) -> float:
+def beyond(value: float, maxima: np.ndarray) -> float:
     """Probability that the greatest of many is more than a value, by maxima (draws,) of noise: that
     of as many independent normal variables of such a size as have the quartiles of these."""
     low, middle, high = np.quantile(maxima, [0.25, 0.5, 0.75])
@@ -167,23 +167,29 @@ def _resting(squares: np.ndarray, size: np.ndarray):
     return whole**2 / square, share.max(axis=0) / np.where(whole > 0.0, whole, 1.0)
 
 
+def noises(view, j: int, rng: np.random.Generator, draws: int, spans: Sequence[slice]):
+    """Noise (n, draws) of the spectrum that a view's model left of joint j, once the same model is
+    fitted to such noise of all joints; and what the model's columns said of it over spans of rows
+    (spans, p, draws)."""
+    design = view.design
+    told = np.zeros((len(spans), design.columns.shape[2], draws))
+    for k, columns in enumerate(design.columns):
+        noise = drawn(view.spectra[k], len(columns), draws, rng) * view.rows.use[:, [k]]
+        for b, rows in enumerate(spans):
+            told[b] += columns[rows].T @ noise[rows]
+        if k == j:
+            own = noise
+    return own - design.columns[j] @ told.sum(0), told
+
+
 class _Asker:
     """The residual of joint j, and draws of noise that the same model was fitted to, both with what
     each block tells of the model's own parameters."""
 
     def __init__(self, view, j: int, rng: np.random.Generator, draws: int):
         design, sums, self.spans = view.design, view.sums, blocks.by_block(view.blocks)
-        size = len(design.residual)
-        told = np.zeros((len(self.spans), design.columns.shape[2], draws))
-        for k, columns in enumerate(design.columns):
-            noise = drawn(view.spectra[k], size, draws, rng) * view.rows.use[:, [k]]
-            for b, rows in enumerate(self.spans):
-                told[b] += columns[rows].T @ noise[rows]
-            if k == j:
-                own = noise
-        change = told.sum(0)
-        fitted = own - design.columns[j] @ change
-        told = told - sums.squares[:-1] @ change
+        fitted, told = noises(view, j, rng, draws, self.spans)
+        told = told - sums.squares[:-1] @ told.sum(0)
         told = np.concatenate([told, -told.sum(0, keepdims=True)])
         self.columns, self.squares, self.freed = design.columns[j], sums.squares, sums.freed
         self.rough_columns, self.rough_squares = design.rough_columns[j], sums.rough_squares

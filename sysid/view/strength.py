@@ -1,0 +1,91 @@
+"""Does the strength of what a model leaves follow the motion? That of noise does not.
+
+A law with a memory leaves torque that no function of the motion predicts at any one time, and that
+may be as slow as the motion, as a drift is. But it is strong where it acts, or changes quickly where
+the joint goes quickly. So the logarithms of squares of what is left, and of its changes from row to
+row, are asked by functions of the motion, beside those of noise that has one spectrum all the time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from .. import blocks, flexible
+from ..projection import NOISE
+from .singles import beyond, noises
+from .view import View
+
+_DRAWS = 200  # as of `singles`
+_WAVES = 4  # half waves over an angle's travel
+_LEAST = 0.1  # of the mean square: what is less is as good as nothing
+
+
+def strength(view: View, j: int, more: View | None = None) -> flexible.Law:
+    """The function of the motion that the strength of what a view's model leaves of joint j follows
+    most, on its logs or on these and `more`'s, where the same model is settled on others: two
+    questions. Nothing, of logs in which the noise of the angles makes much of what is left: its
+    strength does follow the motion.
+    """
+    quiet = [one for one in (view, more) if one is not None and _quiet(one, j)]
+    asked = [[view], [view, more]][: len(quiet)] if view in quiet else []
+    found = [_greatest(views, j) for views in asked]
+    best = min(found, key=lambda law: law.chance, default=flexible.Law(1.0, "", 0.0))
+    return replace(best, chance=min(len(asked) * best.chance, 1.0) if asked else 1.0)
+
+
+def _quiet(view: View, j: int) -> bool:
+    left, rough = view.design.residual[:, j], view.design.rough_residual[:, j]
+    return bool(np.sum(rough**2) < NOISE * np.sum(left**2))
+
+
+def _greatest(views: Sequence[View], j: int) -> flexible.Law:
+    told, words, rng = 0.0, [], np.random.default_rng(j)
+    for view in views:
+        use = view.rows.use[:, j].astype(bool)
+        left = np.column_stack([view.design.residual[:, j], _noise(view, j, rng)])[use]
+        words, columns = zip(*_functions(view, use))
+        columns, goes_on = np.stack(columns, axis=1), np.diff(view.rows.piece[use]) == 0
+        steps = np.diff(left, axis=0)[goes_on]
+        both = [_follow(left**2, columns), _follow(steps**2, columns[1:][goes_on])]
+        told = told + len(left) * np.concatenate(both)
+    told = told / sum(view.rows.use[:, j].sum() for view in views)
+    usual, scatter = (f(told[:, 1:], axis=1, keepdims=True) for f in (np.mean, np.std))
+    out = np.abs(told - usual) / np.maximum(scatter, 1e-12)
+    best = int(np.argmax(out[:, 0]))
+    chance = beyond(out[best, 0], out[:, 1:].max(axis=0))
+    return flexible.Law(chance, words[best % len(words)], float((told - usual)[best, 0] ** 2))
+
+
+def _noise(view: View, j: int, rng: np.random.Generator) -> np.ndarray:
+    """(n, draws) of one spectrum all the time but for the part that the angles' noise makes, which is
+    as strong as it is: once more drawn, with another sign in each block."""
+    spans = blocks.by_block(view.blocks)
+    noise, _ = noises(view, j, rng, _DRAWS, spans)
+    rough, left = view.design.rough_residual[:, j], view.design.residual[:, j]
+    share = np.sum(rough**2) / max(np.sum(left**2), 1e-300)
+    signs = rng.choice([-1.0, 1.0], (len(spans), _DRAWS)).repeat(
+        [s.stop - s.start for s in spans], 0
+    )
+    return np.sqrt(1.0 - share) * noise + rough[:, None] * signs
+
+
+def _follow(squares: np.ndarray, columns: np.ndarray) -> np.ndarray:
+    """(k, 1 + draws) correlations of columns (n, k) with how strong squares (n, 1 + draws) are."""
+    strong = np.log(squares + _LEAST * np.maximum(squares.mean(0), 1e-300))
+    units = [(a - a.mean(0)) / np.maximum(a.std(0), 1e-300) for a in (columns, strong)]
+    return units[0].T @ units[1] / max(len(squares), 1)
+
+
+def _functions(view: View, use: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
+    """Variables and functions (n,) of each: speed and acceleration by size and by direction, and
+    waves over an angle's travel."""
+    for joint in view.model.robot.joints:
+        for name in (f"qd_{joint}", f"qdd_{joint}"):
+            own = view.variables[name][use]
+            yield from ((name, np.abs(own)), (name, np.sign(own)))
+        own = view.variables[f"q_{joint}"][use]
+        phase = np.pi * (own - own.min()) / max(np.ptp(own), 1e-12)
+        yield from ((f"q_{joint}", np.cos(m * phase)) for m in range(1, _WAVES + 1))
