@@ -17,8 +17,7 @@ def left_open(verdicts: Sequence, left, worth: float) -> list:
     """Verdicts, of which one that says what may be there is told where a fit with it takes nothing
     of the misfit, and one that says `unknown` is `unresolved` where the rest is nothing that the
     motion predicts once what may be another joint's effect is in the model: it bends bodies that
-    both share, or acts on both. And one that is `unresolved` is `unknown` where the strength of the
-    rest follows the motion.
+    both share, or acts on both.
 
     Args:
         left: what is Left of joints. worth: of a square, what a law must predict, and a fit take.
@@ -41,26 +40,18 @@ def left_open(verdicts: Sequence, left, worth: float) -> list:
 
     unknown = [one.status == "unknown" and not one.claims for one in verdicts]
     out = [again(j, one) if unknown[j] else one for j, one in enumerate(verdicts)]
-    return _by_strength(out, left.strength, worth)
+    return [_with_strength(j, one, left, worth) for j, one in enumerate(out)]
 
 
-def _by_strength(verdicts: Sequence, strength: Callable, worth: float) -> list:
-    """Verdicts, of which one that says `unresolved` is `unknown` where the strength of what is left
-    follows the motion, as that of noise does not: a law is missing that has a memory, or is as slow
-    as a drift."""
-    laws = [
-        strength(j)
-        if one.status == "unresolved" and not (one.may or one.even or one.reason)
-        else None
-        for j, one in enumerate(verdicts)
-    ]
+def _with_strength(j: int, one, left, worth: float):
+    """The verdict on a joint's number, with what the strength of the rest follows where nobody can
+    say what it is: what most laws do, and noise may."""
+    if one.status != "unresolved" or one.may or one.even or one.reason:
+        return one
+    law = left.strength(j)
+    clear = law is not None and law.chance < _CLEAR and law.share > worth
     # accelerations are what filters smear
-    found = [law and not law.inertial and law.chance < _CLEAR and law.share > worth for law in laws]
-    told = {"status": "unknown", "says": ""}
-    return [
-        replace(one, **told, follows=law) if there else one
-        for one, law, there in zip(verdicts, laws, found)
-    ]
+    return replace(one, follows=law) if clear and not law.inertial else one
 
 
 def _in_a_fit(j: int, one, fitted: Callable, worth: float):

@@ -32,14 +32,16 @@ def of_few_blocks(
 ):
     """The Candidate that takes most of joint j's squared residual on the test logs, under the
     low-pass, a tenth at least and at least such a share, of those that training logs show in too few
-    places to ask them; with a p-value of one, as test logs may not choose. None where there is none.
+    places to ask them, or of which slopes say little, as a link stands apart from its motor by them;
+    with a p-value of one, as test logs may not choose. None where there is none.
 
     Args:
         groups: of the joint. refitted: makes a Member, or None, of one. without: the model without
             them. fitted: the share of the joint's misfit that goes as a fit has it, about reversals
             too, where a low-pass shows none: half of it is enough.
     """
-    few = sorted((g for g in groups if g.signed and not g.testable), key=lambda g: g.taken)
+    few = [g for g in groups if g.signed and (g.candidate.swings or not g.testable)]
+    few = sorted(few, key=lambda g: g.taken)
     shares = {}
     for group in {g.candidate.kind: g for g in few}.values():
         try:
@@ -100,14 +102,6 @@ def cause(
             f"alike, and {whose} bends the bodies that they share; with {WEIGHED}, it would be "
             f"{_times(weighed, floor)}"
         )
-    if smeared(errors, floor):
-        half, *left = floor.halved
-        worst = int(np.argmax(errors))
-        return (
-            f"its error is {_times(errors[worst], floor)}, and that angles are smoothed over "
-            f"{2.0 * half:g} s makes most of that; with `window: {half:g}` under `preprocess:` in "
-            f"the experiment file it would be {_times(left[worst], floor)}"
-        )
     if floor.reached(errors[0]):
         return (
             "the training logs are explained and the test logs are not: the model does not carry "
@@ -145,6 +139,20 @@ def smeared(errors: Sequence[float], floor) -> bool:
     parts = [both for both in zip(errors, floor.halved[1:]) if not floor.reached(both[0])]
     gone = (e**2 - half**2 > MOST * (e**2 - floor.rms**2) for e, half in parts)
     return bool(parts) and all(gone)
+
+
+def by_filter(errors: Sequence[float], floor, but=()) -> Reason | None:
+    """What is said of a joint whose error is `smeared`, unless there is more to say; None of any
+    other. No other log is a cure."""
+    if any(one is not None for one in but) or not smeared(errors, floor):
+        return None
+    half, *left = floor.halved
+    worst = int(np.argmax(errors))
+    return Reason(
+        f"its error is {_times(errors[worst], floor)}, and that angles are smoothed over "
+        f"{2.0 * half:g} s makes most of that; with `window: {half:g}` under `preprocess:` in "
+        f"the experiment file it would be {_times(left[worst], floor)}"
+    )
 
 
 def not_all(effect: str, share: float) -> str:

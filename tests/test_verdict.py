@@ -638,8 +638,8 @@ def test_friction_that_is_another_in_each_log_may_be_warmth_over_one_clock(effec
 
 
 def test_of_those_that_test_logs_alone_can_ask_the_one_that_takes_most(monkeypatch):
-    groups = [SimpleNamespace(candidate=SimpleNamespace(kind=kind), signed=signed, testable=testable, taken=taken) for kind, signed, testable, taken in (
-        ("a", True, False, 1.0), ("a", True, False, 2.0), ("b", True, False, -3.0), ("c", True, True, 9.0), ("d", False, False, 9.0), ("e", True, False, 0.0)
+    groups = [SimpleNamespace(candidate=SimpleNamespace(kind=kind, swings=kind == "s"), signed=signed, testable=testable, taken=taken) for kind, signed, testable, taken in (
+        ("a", True, False, 1.0), ("a", True, False, 2.0), ("b", True, False, -3.0), ("c", True, True, 9.0), ("d", False, False, 9.0), ("e", True, False, 0.0), ("s", True, True, 1.0)
     )]  # fmt: skip
     shares = {"a": 0.2, "b": 0.6}
     monkeypatch.setattr(unexplained, "HeldOut", lambda settled, test: settled)
@@ -653,7 +653,7 @@ def test_of_those_that_test_logs_alone_can_ask_the_one_that_takes_most(monkeypat
 
     without = SimpleNamespace(test="test")
     assert unexplained.of_few_blocks(groups, refitted, without, 1, 0.5) == ("b", 1.0)
-    assert sorted(seen) == [("a", 2.0), ("b", -3.0), ("e", 0.0)]
+    assert sorted(seen) == [("a", 2.0), ("b", -3.0), ("e", 0.0), ("s", 1.0)]  # slopes say little of what swings
     assert unexplained.of_few_blocks(groups, refitted, without, 1, 0.7) is None
     assert unexplained.of_few_blocks([], refitted, without, 1, 0.0) is None
     # about reversals, which a low-pass shows none of, a fit may say more
@@ -697,16 +697,17 @@ def test_what_may_be_there_and_takes_nothing_of_a_fit_is_not_to_be_tried():
     assert found[1].says.startswith("what is left may be delay, though no fit with it bore that out") and found[1].says.endswith("its neighbour is louder")
 
 
-def test_what_is_louder_in_some_of_the_motion_is_no_noise():
+def test_what_is_louder_in_some_of_the_motion_is_told():
     """Of joints that are unresolved for no other reason; accelerations are what filters smear."""
     stribeck = Candidate(find("stribeck"), 3, ())
     said = [Verdict(name, "unresolved", says="nobody can say") for name in "abc"]
     said += [Verdict("d", "unresolved", says="may be", may=stribeck), Verdict("e", "complete"), Verdict("f", "unresolved", even=True)]
     laws = {0: Law(1e-9, "qd_a", 0.3), 1: Law(1e-9, "qdd_b", 0.3), 2: Law(1e-4, "q_c", 0.3)}
     found = left_open(said, SimpleNamespace(beyond=lambda j, one: None, fitted=lambda j, one: 0.5, strength=laws.__getitem__), WORTH)
-    assert [one.status for one in found] == ["unknown", *(one.status for one in said[1:])] and found[1:] == said[1:]
+    assert [one.status for one in found] == [one.status for one in said] and found[1:] == said[1:]
     entry = entry_of(found[0])
-    assert entry["depends_on"] == [{"variable": "qd_a", "share": 0.3, "of": "strength"}] and "share_left" not in entry and "says" not in entry
+    assert entry["strength"] == {"follows": "qd_a", "share": 0.3} and "depends_on" not in entry
+    assert entry["says"].startswith("nobody can say; how strong what is left is") and "the speed of a" in entry["says"]
 
 
 def test_a_law_stands_beside_what_is_claimed():

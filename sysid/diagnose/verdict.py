@@ -14,7 +14,16 @@ from ..noise import DOUBT, as_of_test
 from ..plausible import Reason
 from ..refused import in_vain
 from ..transfer import Transfer, quieter
-from ..unexplained import a_part, by_weights, cause, explains, loudest, may_be_noise, not_all
+from ..unexplained import (
+    a_part,
+    by_filter,
+    by_weights,
+    cause,
+    explains,
+    loudest,
+    may_be_noise,
+    not_all,
+)
 from ..view import taken_where_held
 from .ask import HALF
 from .claims import Claim
@@ -132,6 +141,7 @@ def verdicts(
             may = effect if p > LEVEL else None  # what stands above the level was fitted, in vain
             mean = dict(means).get(joint) if then > 0.0 and not evens[j] else None
             mean = mean if mean and (mean.settles or (remains and not looks)) else None
+            mean = mean or by_filter(both, floors[j], (effect, without))
             why = mean.says if mean else cause(both, floors[j], effect, may, without, louder)
             may, remains = (None, None) if mean and mean.settles else (may, remains)
             why += "".join({r.effect: f"; {r.told}" for r in refused if r.joint == joint}.values())

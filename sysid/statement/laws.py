@@ -15,7 +15,7 @@ from ..flexible.functions import DIRECTION
 from ..formula.text import OTHER
 from .words import followed, percent
 
-TOGETHER, STRENGTH = "several variables together", "strength"
+TOGETHER = "several variables together"
 _MOST = 0.5  # of what functions of the motion predict: less, and another variable has more
 _NEARLY = 0.8  # of what most predict: one variable that does says it more simply than two
 _TRIED = 2  # of these: each is a fit
@@ -58,9 +58,7 @@ def to_begin_with(
             and options of a formula, whether a fit with it has less error on the test logs.
     """
     joint, told = entry["joint"], entry.get("depends_on", ())
-    if not told or "of" in told[0] or of_bodies(entry):
-        return None
-    if told[0]["share"] < _MOST * entry["share_left"]:
+    if not told or told[0]["share"] < _MOST * entry["share_left"] or of_bodies(entry):
         return None
     near = [one for one in told if one["share"] >= _NEARLY * told[0]["share"]]
     every = (_options(one, joint) for one in sorted(near, key=lambda one: "with" in one))
@@ -105,10 +103,6 @@ def predicted(entry: dict, word: Callable[[str], str], share: Callable[[float], 
     Args:
         entry: as a document has it. word, share: how a variable and a share are written.
     """
-    most = next(iter(entry.get("depends_on", ())), {})
-    if most.get("of") == STRENGTH:
-        follows = f"follows {word(most['variable'])}"
-        return f"what is left is no noise: how strong it is, or how quickly it changes, {follows}"
     if "share_left" not in entry:
         return ""
     if told := tone(entry):

@@ -9,9 +9,10 @@ import numpy as np
 from ..addition import command, spelled
 from ..diagnose.verdict import Verdict
 from ..fit_document import number
-from ..flexible import HUM, TOLD, Unknown
+from ..flexible import HUM, TOLD, Law, Unknown
 from .claims import chances, confidence_set, ties
-from .laws import STRENGTH, TOGETHER
+from .laws import TOGETHER
+from .words import quantity
 
 
 def verdict(v: Verdict, path="config.yaml", joints=()) -> dict:
@@ -43,7 +44,10 @@ def verdict(v: Verdict, path="config.yaml", joints=()) -> dict:
         by = [{"effect": c.head.effect, "joint": c.head.joint} for c in v.claims]
         out |= {"by": by, "explained": share}
     if v.says or v.carries:
-        out["says"] = "; ".join(words for words in (v.says, v.carries and v.carries.says) if words)
+        all_ = v.says, v.follows and _strength(v.follows), v.carries and v.carries.says
+        out["says"] = "; ".join(words for words in all_ if words)
+    if v.follows is not None:
+        out["strength"] = {"follows": v.follows.variables, "share": float(v.follows.share)}
     if v.carries and v.carries.fails:
         out["carries_over"] = False
     if v.may is not None:
@@ -58,12 +62,17 @@ def verdict(v: Verdict, path="config.yaml", joints=()) -> dict:
         out["needs_no_log"] = True
     if v.left is not None:
         out |= {"depends_on": dependences(v.left), "share_left": v.left.share}
-    elif v.follows is not None:
-        told = {"variable": v.follows.variables, "share": float(v.follows.share)}
-        out["depends_on"] = [told | {"of": STRENGTH}]
     elif v.status == "unknown":
         out["depends_on"] = []
     return out
+
+
+def _strength(law: Law) -> str:
+    return (
+        "how strong what is left is, or how quickly it changes, follows "
+        f"{quantity(law.variables)}: a law that these logs do not name, or noise that is louder "
+        "there"
+    )
 
 
 def dependences(found: Unknown) -> list[dict]:

@@ -1,9 +1,10 @@
-"""Does the strength of what a model leaves follow the motion? That of noise does not.
+"""Does the strength of what a model leaves follow the motion? That of even noise does not.
 
 A law with a memory leaves torque that no function of the motion predicts at any one time, and that
 may be as slow as the motion, as a drift is. But it is strong where it acts, or changes quickly where
 the joint goes quickly. So the logarithms of squares of what is left, and of its changes from row to
 row, are asked by functions of the motion, beside those of noise that has one spectrum all the time.
+Drives and gears may be louder in motion than at rest: it tells where to look, and not what is there.
 """
 
 from __future__ import annotations
