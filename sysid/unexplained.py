@@ -203,6 +203,19 @@ def a_part(train: Sequence[float], test: Sequence[float], floor) -> bool:
     return explains(*test, floor.rms + floor.std) < MOST
 
 
+def no_names(claims: Sequence, verdicts: Sequence) -> list:
+    """Claims that are `a_part` of all that they are claimed of: one joint, or, of the whole robot,
+    every joint that they would be a name for."""
+    little = {one.joint for one in verdicts if one.status == "part"}
+    stand = [id(claim) for one in verdicts if one.status == "missing" for claim in one.claims]
+    return [
+        claim
+        for claim in claims
+        if claim.head.joint in little
+        or (claim.head.joint == "*" and little and id(claim) not in stand)
+    ]
+
+
 def by_weights(fit, joint: str, floor: float | None, weighed: dict[str, float]) -> bool:
     """Whether most of what stands above a joint's floor is how a fit weighs its joints.
 

@@ -12,7 +12,7 @@ The whole loop on one page:
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -30,7 +30,7 @@ from ..shown import ShownDiagnosis
 from ..specs import Experiment
 from ..suspected import suspected
 from ..transfer import transfers
-from ..unexplained import notices, otherwise
+from ..unexplained import no_names, notices, otherwise
 from ..view import View, first_view, too_short
 from ..warned import noticed
 from ..what_is_left import Left
@@ -106,10 +106,12 @@ def diagnose(
             more = refused, transfers(last, view.cutoff), weighed, left.law, then_asked.near
             rest = left.few, left.beyond, fallen(first, then), otherwise(last, found, test.still)
             named = verdicts(fit, claims, after.unknown, found, *more, *rest)
-            little = [one.joint for one in named if one.status == "part"]
-            if parts := [c for c in claims if c.head.joint in little]:
+            if parts := no_names(claims, named):
                 kept = rejoined(view, [c.step for c in claims if c not in parts])
                 return judged(kept, refused + [no_claim(c.step, PART, fit, test) for c in parts])
+            named = [
+                replace(one, status="missing") if one.status == "part" else one for one in named
+            ]
             said = unasked(named) if wrong else left_open(named, left, select.WORTH)
             return claims, refused, said, after, last, then, found
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from .. import unexplained
 from ..candidates import Candidate
 from ..estimate import Fit
 from ..flexible import Law, Unknown
@@ -14,16 +15,7 @@ from ..noise import DOUBT, as_of_test
 from ..plausible import Reason
 from ..refused import in_vain
 from ..transfer import Transfer, quieter
-from ..unexplained import (
-    a_part,
-    by_filter,
-    by_weights,
-    cause,
-    explains,
-    loudest,
-    may_be_noise,
-    not_all,
-)
+from ..unexplained import by_weights, cause, explains, loudest, may_be_noise, not_all
 from ..view import taken_where_held
 from .ask import HALF
 from .claims import Claim
@@ -129,7 +121,7 @@ def verdicts(
         done = others and not own and remains and whole and little
         fell = others and first > (1.0 + DOUBT) * (floors[j].rms or 0.0) and then < _FALLS * first
         if own and (whole or evens[j]) and little:
-            few_of_it = a_part(*pairs, floors[j]) and not evens[j]
+            few_of_it = unexplained.a_part(*pairs, floors[j]) and not evens[j]
             told = ("part" if few_of_it else "missing", own, explained, remains)
         elif not done and (own or (remains and (further or not looks) and joint not in means)):
             why = not_all(looks[0].name, further.share) if further else ""
@@ -141,7 +133,7 @@ def verdicts(
             may = effect if p > LEVEL else None  # what stands above the level was fitted, in vain
             mean = dict(means).get(joint) if then > 0.0 and not evens[j] else None
             mean = mean if mean and (mean.settles or (remains and not looks)) else None
-            mean = mean or by_filter(both, floors[j], (effect, without))
+            mean = mean or unexplained.by_filter(both, floors[j], (effect, without))
             why = mean.says if mean else cause(both, floors[j], effect, may, without, louder)
             may, remains = (None, None) if mean and mean.settles else (may, remains)
             why += "".join({r.effect: f"; {r.told}" for r in refused if r.joint == joint}.values())
