@@ -233,8 +233,9 @@ def again(struck: Sequence[str], joints: int) -> str:
         return ""
     who = [joint for joint, count in each.items() if count == most]
     where = " and ".join([", ".join(who[:-1]), who[-1]] if len(who) > 1 else who)
-    why = "where nobody pushed, its own play or an end stop strikes, and a diagnosis with"
-    return f"{most} knocks are on {where}: {why} `events: keep` under `preprocess:` can name it"
+    why = "where nobody pushed, its own play or an end stop strikes, or its gear is soft and rings"
+    keep = "a diagnosis with `events: keep` under `preprocess:` can name it"
+    return f"{most} knocks are on {where}: {why}; {keep}"
 
 
 def _summary(events: Sequence[Event]) -> str:

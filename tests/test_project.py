@@ -27,7 +27,7 @@ ORDER = [
     "reduction", "triangles", "linearised", "compress", "symmetric_matrices", "central_path", "interior", "nearby", "certificate", "trust_region", "solve", "prior_weight", "uncertainty", "differences", "prediction", "carried", "posed_problem", "given_shapes", "estimate",
     "long_prediction", "base_parameters", "held_apart", "masses", "plausible", "blows", "settled", "deflection_starts", "shape_search", "shape", "bumps", "filter_errors", "too_narrow", "filters", "fit_document", "results", "earlier_fit", "shape_refinement", "notices", "experiment_logs", "locked_joints", "thinning",
     "experiment_file", "yaml_edit", "effect_entry", "urdf_export", "gains", "late", "load_doubt", "simulate", "rollout", "pipeline", "run", "export", "inertials", "beyond", "check", "init", "comparison",
-    "transfer", "noise", "candidates", "candidate_columns", "for_a_while", "picks", "loads", "carriers", "end_stops", "suspected", "design", "view", "failures", "mean_by_log", "one_clock", "refused", "unexplained", "left_open", "misread", "borne_out", "what_is_left", "simpler", "tried_formula", "shown", "diagnose", "changes", "online", "fleet", "statement", "loop", "report",
+    "transfer", "noise", "candidates", "candidate_columns", "for_a_while", "picks", "loads", "carriers", "end_stops", "suspected", "design", "view", "failures", "mean_by_log", "one_clock", "refused", "unexplained", "left_open", "misread", "borne_out", "held_bodies", "what_is_left", "simpler", "tried_formula", "shown", "diagnose", "changes", "online", "fleet", "statement", "loop", "report",
     "studies", "studio", "terminal", "cli", "__main__",
 ]  # fmt: skip
 # Late imports that close a loop on purpose: a path that names a data set, a prior that is a previous run, the effects

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .. import loads, pipeline, thinning
+from .. import held_bodies, loads, pipeline, thinning
 from ..borne_out import undecided
 from ..candidates import candidates
 from ..estimate import Fit
@@ -122,5 +122,7 @@ def diagnose(
         could = detectable(view, asked, candidates(view.model, extra))
         events, part = (*view.motion.events, *test.events), () if whole else measured.notices
         told = tuple(claims), tuple(said), tuple(could), tuple(where), events, view, first, then
-        say = tuple(refused), (*wrong, *part, *notices(claims, refused), *loads.told(after))
+        own = {claim.head.joint for claim in claims}
+        held = held_bodies.told(fit, last, found, own, known)
+        say = tuple(refused), (*wrong, *part, *held, *notices(claims, refused), *loads.told(after))
         return Diagnosis(fit, dict(zip(fit.joints, found)), *told, *say)
