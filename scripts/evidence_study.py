@@ -166,13 +166,14 @@ def soft(case: dict, level: float, worth: float) -> dict:
         experiment, machine = experiment_of(case["robot"], folder)
         options = {"seed": case["seed"], "duration": SECONDS[case["robot"]], "rate": RATE[case["robot"]], "colour": case["colour"], "encoder": case["encoder"]}
         options["speed"] = None if case["pace"] is None else case["pace"] * float(motion.top_speeds(machine).max())
+        (hidden,) = case["hidden"] or [None]
+        asked = hidden is None or hidden["effect"] not in SOFT
+        without = None if asked else simulated(machine, [], options)[0]
         simulation, softer = simulated(machine, case["hidden"], options)
         fit = fitted(simulation, "case")
         case = {**case, "softer": softer, "error": fit.rms("test")}
-        (hidden,) = case["hidden"] or [None]
-        asked = hidden is None or hidden["effect"] not in SOFT
         if not asked:
-            plain = fitted(simulated(machine, [], options)[0], "plain")
+            plain = fitted(without, "plain")
             falls = lambda part: any(plain.rms(part)[joint] <= _MATTERS * error for joint, error in fit.rms(part).items())
             case |= {"plain": plain.rms("test"), "matters": falls("test"), "shown": falls("train")}
         if asked or case["matters"]:

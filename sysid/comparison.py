@@ -76,7 +76,8 @@ def compare(first: Fit, second: Fit, names: tuple[str, str] | None = None) -> Di
 
 
 def over(first: Fit, second: Fit, joints: Sequence[str]) -> tuple[float, float, float]:
-    """RMS of both over joints on their test logs, and the standard error of what changes."""
+    """RMS [N m or N] of both fits over joints on their test logs, the root of the mean square, and the
+    standard error of its change, as if joints were independent; one that is not known counts as zero."""
     errors = [math.sqrt(np.mean([fit.rms("test")[j] ** 2 for j in joints])) for fit in (first, second)]
     changes = [d.se for d in compare(first, second) if d.joint in joints]
     return *errors, float(np.sqrt(np.nansum(np.square(changes)) / len(joints)))

@@ -1,4 +1,4 @@
-"""Joints of which what is left may come of an effect that another joint may have."""
+"""Joints of which nobody can say what is left: what it may come of, or what its strength follows."""
 
 from __future__ import annotations
 
@@ -17,7 +17,8 @@ def left_open(verdicts: Sequence, left, worth: float) -> list:
     """Verdicts, of which one that says what may be there is told where a fit with it takes nothing
     of the misfit, and one that says `unknown` is `unresolved` where the rest is nothing that the
     motion predicts once what may be another joint's effect is in the model: it bends bodies that
-    both share, or acts on both.
+    both share, or acts on both. Of one that stays `unresolved` it is told what the strength of the
+    rest follows.
 
     Args:
         left: what is Left of joints. worth: of a square, what a law must predict, and a fit take.

@@ -15,7 +15,7 @@ from .given_shapes import at_edges
 from .mean_by_log import MOST, by_log
 from .one_clock import clocks_anew
 from .plausible import AT_REST, Reason, stands
-from .refused import Refused
+from .refused import PART, Refused
 from .too_narrow import noise_as_law
 
 _FITTED = 0.1  # of what is left on test logs: a fit is made to see whether it takes more there
@@ -200,20 +200,24 @@ def a_part(train: Sequence[float], test: Sequence[float], floor) -> bool:
     """
     if floor.rms is None or not explains(*train, floor.rms) < MOST:
         return False
+    if smeared((train[1], test[1]), floor):  # the rest is the filter's
+        return False
     return explains(*test, floor.rms + floor.std) < MOST
 
 
-def no_names(claims: Sequence, verdicts: Sequence) -> list:
-    """Claims that are `a_part` of all that they are claimed of: one joint, or, of the whole robot,
-    every joint that they would be a name for."""
-    little = {one.joint for one in verdicts if one.status == "part"}
-    stand = [id(claim) for one in verdicts if one.status == "missing" for claim in one.claims]
-    return [
-        claim
-        for claim in claims
-        if claim.head.joint in little
-        or (claim.head.joint == "*" and little and id(claim) not in stand)
-    ]
+def no_names(claims: Sequence, verdicts: Sequence) -> dict[int, Refused]:
+    """By the numbers of their steps, claims that are `a_part` of all that they are claimed of: of one
+    joint, or, of the whole robot, of every joint that they are a name, or a part of one, for."""
+    small = {one.joint for one in verdicts if one.small}
+    others = (one for one in verdicts if not one.small and one.status in ("missing", "unknown"))
+    stand = [id(claim) for one in others for claim in one.claims]
+    goes = lambda c: (
+        c.head.joint in small
+        or (  # noqa: E731
+            c.head.joint == "*" and small and id(c) not in stand
+        )
+    )
+    return {c.number: Refused(c.head.effect, c.head.joint, PART) for c in claims if goes(c)}
 
 
 def by_weights(fit, joint: str, floor: float | None, weighed: dict[str, float]) -> bool:

@@ -18,10 +18,11 @@ from .view import View, elsewhere, law, strength
 
 @dataclass(frozen=True)
 class Left:
-    """The view and the fit with all claims, what they leave of the low-passed test logs, each joint's
-    floor, and what was asked: answers of all candidates under the last model, and under the first.
+    """The view and the fit with all claims, what they leave of the low-passed test logs, and each
+    joint's floor.
 
-    logs: of both parts. refitted: everything settled anew with a group's candidate in a view. known:
+    answers: of all candidates under the last model that was searched, which has what was refused
+    since, and under the first. logs: those of both parts, as read. refitted: everything settled anew with a group's candidate in a view. known:
     as of `pipeline.fit_grown`.
     """
 
@@ -56,8 +57,7 @@ class Left:
         return with_it and law(with_it.view, j, elsewhere(with_it.view, self.logs.test))
 
     def few(self, j: int, least: float):
-        """Who takes at least such a share of joint j on the test logs, of those that the training
-        logs show in too few places to ask them."""
+        """As of `of_few_blocks`: (Candidate, p) or None."""
         own, fits = self.answers[0].by_joint.get(j, [()])[0], partial(self.fitted, j)
         return of_few_blocks(own, partial(self.refitted, self.view), self.held_out, j, least, fits)
 

@@ -46,7 +46,7 @@ LAWS = {
 
 
 @pytest.mark.parametrize("law", LAWS)
-def test_the_strength_of_noise_follows_nothing(with_torque, law):
+def test_the_strength_of_a_law_follows_the_motion_and_that_of_noise_nothing(with_torque, law):
     found = diagnose(pipeline.load(with_torque(law, LAWS[law])))
     elbow = found.verdict[1]
     read, _ = thinning.read(found.fit.experiment)
@@ -57,11 +57,20 @@ def test_the_strength_of_noise_follows_nothing(with_torque, law):
         return
     assert laws[1].chance < 1e-5 and laws[1].variables in ("qd_elbow", "q_elbow")
     assert elbow.status in ("unresolved", "unknown")
-    assert elbow.status == "unknown" or elbow.follows.variables in ("qd_elbow", "q_elbow")
+    if law == "a roller that creeps":  # of which nothing else is said
+        assert elbow.status == "unresolved" and elbow.follows.variables == "qd_elbow"
 
 
 def test_noise_of_coarse_angles_is_as_loud_as_the_inertia_that_it_moves(simulated):
     """It does follow the motion: beside more of it, drawn where it is, nothing stands out."""
-    found = diagnose(pipeline.load(simulated("coarse, for strength", seed=6, duration=20.0, encoder=13)))
+    found = diagnose(pipeline.load(simulated("coarse, for strength", seed=6, duration=20.0, encoder=16)))
     chances = [strength(found.view, j).chance for j in range(2)]
-    assert min(chances) > 1e-3
+    assert 1e-3 < min(chances) < 1.0  # it was asked
+
+
+def test_where_angles_make_most_of_the_rest_nothing_is_asked(simulated):
+    """Of training logs; test logs that are quieter are no reason."""
+    found = diagnose(pipeline.load(simulated("coarser, for strength", seed=6, duration=12.0, encoder=10)))
+    read, _ = thinning.read(found.fit.experiment)
+    more = elsewhere(found.view, read.test, read.train)
+    assert [strength(found.view, j, more).chance for j in range(2)] == [1.0, 1.0]

@@ -265,15 +265,15 @@ def test_nearly_all_gives_the_name(taken, share, status):
     ("first", "then", "train", "noise", "status", "says"),
     [
         (3.0, 2.5, 2.5, 1.0, "unknown", "its error is 2.5 times the noise floor"), (3.0, 1.7, 1.7, 1.0, "unknown", ""), (3.0, 1.6, 1.6, 1.0, "missing", ""), (1.6, 1.4, 1.4, 1.0, "unknown", "its error is 1.4 times the noise floor"),
-        (1.6, 1.25, 1.25, 1.0, "missing", ""), (1.2, 1.12, 1.12, 1.0, "part", ""), (1.2, 1.1, 1.1, 1.0, "missing", ""), (1.4, 1.39, 1.39, 1.0, "unknown", ""),
+        (1.6, 1.25, 1.25, 1.0, "missing", ""), (1.2, 1.12, 1.12, 1.0, "missing", ""), (1.2, 1.1, 1.1, 1.0, "missing", ""), (1.4, 1.39, 1.39, 1.0, "unknown", ""),
         (3.0, 2.5, 1.1, 1.0, "missing", ""), (3.0, 2.5, 1.2, 1.0, "unknown", ""), (3.0, 2.5, 2.5, None, "unknown", "its noise floor is not known (the band is narrow)"), (3.0, 1.3, 1.3, None, "missing", ""),
     ],
 )  # fmt: skip
 def test_what_leaves_more_than_a_fifth_is_no_name_for_the_misfit(first, then, train, noise, status, says):
-    """Four fifths of what stands above the floor, or what leaves mostly noise and no more above it than it took, or brings the training logs to it; where the floor is not known, of all. What takes less than half of it in both is asked no more."""
+    """Four fifths of what stands above the floor, or what leaves mostly noise and no more above it than it took, or brings the training logs to it; where the floor is not known, of all. What takes less than half of it in both is small."""
     found = elbow(first, [claim("presliding", "elbow", [0.0, 0.5], fitted(then, train=train))], level=floor(noise))
     said = entry_of(found)
-    assert found.status == status and says in found.says
+    assert found.status == status and says in found.says and found.small is (then == 1.12)
     assert found.explained == pytest.approx((first**2 - then**2) / (first**2 - (noise or 0.0) ** 2))
     if status == "unknown":
         assert said["also"] == ["presliding"] and said["depends_on"] == [] and said["commands"] == ["sysid add x presliding"]
@@ -695,6 +695,19 @@ def test_what_may_be_there_and_takes_nothing_of_a_fit_is_not_to_be_tried():
         assert found[0] == said[0] and (found[1] == said[1]) is stays
     assert asked == [(1, delay)] * 2 and found[1].may is None
     assert found[1].says.startswith("what is left may be delay, though no fit with it bore that out") and found[1].says.endswith("its neighbour is louder")
+
+
+def test_what_is_a_small_part_of_all_that_it_is_claimed_of_is_no_name():
+    """An effect of the whole robot is asked on every joint that it is a name for, or a part of one."""
+    own, wide = (SimpleNamespace(head=SimpleNamespace(effect=e, joint=j), number=k) for k, (e, j) in enumerate((("cable", "a"), ("gravity_tilt", "*"))))
+    on = lambda joint, small, *claims, status="missing": Verdict(joint, status, claims, small=small)  # noqa: E731
+    gone = lambda *verdicts: {k: (r.effect, r.joint) for k, r in unexplained.no_names((own, wide), verdicts).items()}  # noqa: E731
+    assert gone(on("a", False, own), on("b", False, wide)) == {}
+    assert gone(on("a", True, own), on("b", False, wide)) == {0: ("cable", "a")}
+    assert gone(on("a", False, own), on("b", True, wide)) == {1: ("gravity_tilt", "*")}
+    assert gone(on("a", False, own), on("b", True, wide), on("c", False, wide, status="unknown")) == {}
+    smear = NoiseFloor(1.0, 0.02, "spectral", "", 0.9, 1.1, halved=(0.05, 1.05, 1.05))
+    assert unexplained.a_part((2.0, 1.7), (2.0, 1.7), replace(smear, halved=None)) and not unexplained.a_part((2.0, 1.7), (2.0, 1.7), smear)
 
 
 def test_what_is_louder_in_some_of_the_motion_is_told():

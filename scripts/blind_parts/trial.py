@@ -184,7 +184,7 @@ def simulated(machine, hidden, options: dict, plain=None):
             else:
                 hide.append(Hidden(entry["effect"], entry["joint"], {"size": size}))
         try:
-            return simulate(machine, hide=hide, **options), softer
+            return simulate(machine, hide=hide, **options), softer if hide else 1.0
         except SysidError:
             if attempt == 5:
                 raise

@@ -28,13 +28,15 @@ _FITTED, _LIKELY = 3, 0.1  # members of a set that are fitted, and how likely; t
 @dataclass(frozen=True)
 class Claim:
     """A step that stands: its findings, the head first; the fits before and after the head joined;
-    what may stand in its place with probabilities: [(effect, joint, probability)]."""
+    what may stand in its place with probabilities: [(effect, joint, probability)]; the number of
+    the step among all that were searched."""
 
     step: Step
     findings: tuple[Finding, ...]
     before: Fit
     after: Fit
     set: tuple[tuple[str, str, float], ...]
+    number: int = 0
 
     @property
     def head(self) -> Finding:
@@ -90,7 +92,7 @@ def claimed(
         fits = [fits[id(m)] if id(m) in fits else with_(pipeline.fit_grown, m) for m, _ in near]
         found = [finding(last, a, m, p, step, len(stands)) for a, (m, p) in zip(fits, near)]
         set_ = tuple((*m.candidate.named(fit.joints), p) for m, p in step.choice.members)
-        stands[number] = Claim(step, tuple(found), last, fits[0], set_)
+        stands[number] = Claim(step, tuple(found), last, fits[0], set_, number)
         last = fits[0]
     claims, own = list(stands.values()), [claim.step for claim in stands.values()]
     if any(one.choice.head is not other.choice.head for one, other in zip(own, steps)):

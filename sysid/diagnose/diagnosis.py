@@ -7,12 +7,13 @@ The whole loop on one page:
     view -> steps: every candidate asked at once, what is there and worth having joins, and again
     steps -> claims: each fitted as `sysid add` fits it, whose parameters and command are told
     test logs, opened once -> errors, where the model fails, laws of no catalogue that hold there
-    claims + noise floors + what the motion still predicts -> the verdict on each joint
+    claims + noise floors + what the motion still predicts -> the verdict on each joint,
+        again without claims that take less than half of all that they are claimed of
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -25,7 +26,7 @@ from ..left_open import left_open
 from ..lowpass import lowpassed
 from ..misread import misread, unasked
 from ..noise import NoiseFloor, floors_of_fit
-from ..refused import PART, Refused, no_claim
+from ..refused import Refused
 from ..shown import ShownDiagnosis
 from ..specs import Experiment
 from ..suspected import suspected
@@ -95,9 +96,10 @@ def diagnose(
         known = {"filters": fit.filters, "progress": tell, "measured": whole}
         first = HeldOut(view.settled, test)
 
-        def judged(steps, refused):
+        def judged(steps, before):
             claims, more = claimed(steps, fit, test, **known)
-            refused += more
+            there = {(claim.head.effect, claim.head.joint) for claim in claims}
+            refused = [r for r in [*before, *more] if (r.effect, r.joint) not in there]
             after, last = (claims[-1].step.after, claims[-1].after) if claims else (view, fit)
             then = HeldOut(after.settled, test)
             found, weighed = floors_of_fit(experiment, last, after.model, after.x, measured.parts)
@@ -106,12 +108,9 @@ def diagnose(
             more = refused, transfers(last, view.cutoff), weighed, left.law, then_asked.near
             rest = left.few, left.beyond, fallen(first, then), otherwise(last, found, test.still)
             named = verdicts(fit, claims, after.unknown, found, *more, *rest)
-            if parts := no_names(claims, named):
-                kept = rejoined(view, [c.step for c in claims if c not in parts])
-                return judged(kept, refused + [no_claim(c.step, PART, fit, test) for c in parts])
-            named = [
-                replace(one, status="missing") if one.status == "part" else one for one in named
-            ]
+            if small := no_names(claims, named):
+                kept = rejoined(view, [s for k, s in enumerate(steps) if k not in small])
+                return judged(kept, [*before, *small.values()])
             said = unasked(named) if wrong else left_open(named, left, select.WORTH)
             return claims, refused, said, after, last, then, found
 

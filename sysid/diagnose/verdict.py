@@ -31,12 +31,12 @@ class Verdict:
     status: complete (nothing is left above the noise), missing (`claims`: what is claimed, first
     the first), explained (by the claims of other joints' equations), unknown (of what is left the
     motion predicts a tenth of what claims took, or these take less than 80 % of all), unresolved
-    (error stands above the floor, or the floor is not known, and nothing says why), part (what is
-    claimed takes too little, and is no claim: it is asked without). explained: share of the joint's
-    misfit on the test logs that all claims take, or NaN. left: what functions of the motion predict
-    of the rest, or None. says: why something is left. may: the effect that may be it. even: whether
-    weights make it. carries: how test logs err more. reason: what else than a law it is, of which
-    no other log tells more. follows: what the strength of the rest does.
+    (error stands above the floor, or the floor is not known, and nothing says why). explained: what
+    claims take of the joint's misfit on the test logs, or NaN. left: what functions of the motion
+    predict of the rest, or None. says: why something is left. may: the effect that may be it. even:
+    whether weights make it. carries: how test logs err more. reason: what else than a law it is.
+    follows: the Law that the strength of the rest follows. small: whether claims take less than
+    half of the error above the noise.
     """
 
     joint: str
@@ -50,6 +50,7 @@ class Verdict:
     carries: Transfer | None = None
     reason: Reason | None = None
     follows: Law | None = None
+    small: bool = False
 
 
 def verdicts(
@@ -120,9 +121,10 @@ def verdicts(
         further = further if further and further.predicts(among, WORTH) else None
         done = others and not own and remains and whole and little
         fell = others and first > (1.0 + DOUBT) * (floors[j].rms or 0.0) and then < _FALLS * first
+        small = False
         if own and (whole or evens[j]) and little:
-            few_of_it = unexplained.a_part(*pairs, floors[j]) and not evens[j]
-            told = ("part" if few_of_it else "missing", own, explained, remains)
+            told = ("missing", own, explained, remains)
+            small = unexplained.a_part(*pairs, floors[j]) and not evens[j]
         elif not done and (own or (remains and (further or not looks) and joint not in means)):
             why = not_all(looks[0].name, further.share) if further else ""
             why = why if remains else cause(both, floors[j])
@@ -133,7 +135,8 @@ def verdicts(
             may = effect if p > LEVEL else None  # what stands above the level was fitted, in vain
             mean = dict(means).get(joint) if then > 0.0 and not evens[j] else None
             mean = mean if mean and (mean.settles or (remains and not looks)) else None
-            mean = mean or unexplained.by_filter(both, floors[j], (effect, without))
+            if then > 0.0:
+                mean = mean or unexplained.by_filter(both, floors[j], (effect, without))
             why = mean.says if mean else cause(both, floors[j], effect, may, without, louder)
             may, remains = (None, None) if mean and mean.settles else (may, remains)
             why += "".join({r.effect: f"; {r.told}" for r in refused if r.joint == joint}.values())
@@ -143,7 +146,7 @@ def verdicts(
         else:
             who = others or (max(claims, key=lambda c, j=j: c.step.shares[j]),)
             told = ("explained", who, explained)
-        out.append(Verdict(joint, *told))
+        out.append(Verdict(joint, *told, small=small))
     said = {found.joint: found for found in carried if found.says}
     settled = [o.reason is not None and o.reason.settles for o in out]  # it is not carried anywhere
     return [o if s else replace(o, carries=said.get(o.joint)) for o, s in zip(out, settled)]

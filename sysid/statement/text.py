@@ -181,11 +181,12 @@ def _head(f: dict, of: Told, joint: str, width: int, said: dict[str, str]) -> li
     if few := [placed(e, j, f["joint"]) for e, j, p in others if p < LIKELY]:
         words = f"  not ruled out, though less than 1 % likely: {listed(few, 'and')}"
         out += wrapped(words, width, "    ")
+    printed = {line for v in of.document["verdict"] for line in v.get("commands", ())}
     first = [
         placed(one["effect"], one["joint"])
         for one in of.document["findings"]
         if 0 < (one["joins_as_step"] or 0) < (f["joins_as_step"] or 0)
-        if one["command"] not in said
+        if one["command"] in printed and one["command"] not in said
     ]  # what is told further down
     after = f", after {listed(first, 'and')}," if first else ""
     return [*out, *wrapped(f"  add it{after} with", width, "    "), f["command"]]

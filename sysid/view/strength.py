@@ -29,12 +29,17 @@ def strength(view: View, j: int, more: View | None = None) -> flexible.Law:
     most, on its logs or on these and `more`'s, where the same model is settled on others: two
     questions. Nothing, of logs in which the noise of the angles makes much of what is left: its
     strength does follow the motion.
+
+    Its `share` is the square of its correlation with the logarithm of the strength, less what noise
+    has of that.
     """
-    quiet = [one for one in (view, more) if one is not None and _quiet(one, j)]
-    asked = [[view], [view, more]][: len(quiet)] if view in quiet else []
-    found = [_greatest(views, j) for views in asked]
-    best = min(found, key=lambda law: law.chance, default=flexible.Law(1.0, "", 0.0))
-    return replace(best, chance=min(len(asked) * best.chance, 1.0) if asked else 1.0)
+    if not _quiet(view, j):
+        return flexible.Law(1.0, "", 0.0)
+    found = [_greatest([view], j)]
+    if more is not None and _quiet(more, j):
+        found.append(_greatest([view, more], j))
+    best = min(found, key=lambda law: law.chance)
+    return replace(best, chance=min(len(found) * best.chance, 1.0))
 
 
 def _quiet(view: View, j: int) -> bool:
@@ -48,9 +53,13 @@ def _greatest(views: Sequence[View], j: int) -> flexible.Law:
         use = view.rows.use[:, j].astype(bool)
         left = np.column_stack([view.design.residual[:, j], _noise(view, j, rng)])[use]
         words, columns = zip(*_functions(view, use))
-        columns, goes_on = np.stack(columns, axis=1), np.diff(view.rows.piece[use]) == 0
+        columns, log, piece = np.stack(columns, axis=1), _logs(view)[use], view.rows.piece[use]
+        goes_on = (np.diff(np.flatnonzero(use)) == 1) & (np.diff(piece) == 0)
         steps = np.diff(left, axis=0)[goes_on]
-        both = [_follow(left**2, columns), _follow(steps**2, columns[1:][goes_on])]
+        both = [
+            _follow(left**2, columns, log),
+            _follow(steps**2, columns[1:][goes_on], log[1:][goes_on]),
+        ]
         told = told + len(left) * np.concatenate(both)
     told = told / sum(view.rows.use[:, j].sum() for view in views)
     usual, scatter = (f(told[:, 1:], axis=1, keepdims=True) for f in (np.mean, np.std))
@@ -73,10 +82,21 @@ def _noise(view: View, j: int, rng: np.random.Generator) -> np.ndarray:
     return np.sqrt(1.0 - share) * noise + rough[:, None] * signs
 
 
-def _follow(squares: np.ndarray, columns: np.ndarray) -> np.ndarray:
-    """(k, 1 + draws) correlations of columns (n, k) with how strong squares (n, 1 + draws) are."""
+def _logs(view: View) -> np.ndarray:
+    """(n,) the number of each row's log."""
+    names = [piece.source for piece in view.motion.pieces]
+    return np.unique(names, return_inverse=True)[1][view.rows.piece]
+
+
+def _follow(squares: np.ndarray, columns: np.ndarray, log: np.ndarray) -> np.ndarray:
+    """(k, 1 + draws) correlations of columns (n, k) with how strong squares (n, 1 + draws) are, in each
+    log (n,) about its mean: one may be louder than another, and elsewhere."""
     strong = np.log(squares + _LEAST * np.maximum(squares.mean(0), 1e-300))
-    units = [(a - a.mean(0)) / np.maximum(a.std(0), 1e-300) for a in (columns, strong)]
+    units = []
+    for values in (columns.copy(), strong):
+        for number in np.unique(log):
+            values[log == number] -= values[log == number].mean(0)
+        units.append(values / np.maximum(values.std(0), 1e-300))
     return units[0].T @ units[1] / max(len(squares), 1)
 
 
