@@ -10,7 +10,7 @@ from scipy.signal import lfilter
 from sysid import pipeline, thinning
 from sysid.diagnose.diagnosis import diagnose
 from sysid.view import elsewhere
-from sysid.view.strength import strength
+from sysid.view.strength import _quiet, strength
 
 
 def slow(n: int, step: float, memory: float, seed: int) -> np.ndarray:
@@ -39,6 +39,7 @@ def with_torque(simulated, tmp_path_factory):
 
 LAWS = {
     "the same all the time": lambda t, q, qd, noise: 0.3 * noise,
+    "louder for a while": lambda t, q, qd, noise: 0.3 * noise * np.exp(slow(len(t), t[1] - t[0], 1.0, 7)),
     "stronger in quick motion": lambda t, q, qd, noise: 0.45 * noise * (np.abs(qd) > np.median(np.abs(qd))),
     "at some angles": lambda t, q, qd, noise: 0.45 * noise * (q > np.median(q)),
     "a roller that creeps": lambda t, q, qd, noise: 0.4 * np.sin(8.0 * q + 6.0 * np.cumsum(np.abs(qd)) * (t[1] - t[0]) + noise),
@@ -52,7 +53,7 @@ def test_the_strength_of_a_law_follows_the_motion_and_that_of_noise_nothing(with
     read, _ = thinning.read(found.fit.experiment)
     laws = [strength(found.view, j, elsewhere(found.view, read.test, read.train)) for j in range(2)]
     assert laws[0].chance > 1e-3  # of the other joint
-    if law == "the same all the time":
+    if law in ("the same all the time", "louder for a while"):
         assert laws[1].chance > 1e-3 and elbow.follows is None
         return
     assert laws[1].chance < 1e-5 and laws[1].variables in ("qd_elbow", "q_elbow")
@@ -65,7 +66,7 @@ def test_noise_of_coarse_angles_is_as_loud_as_the_inertia_that_it_moves(simulate
     """It does follow the motion: beside more of it, drawn where it is, nothing stands out."""
     found = diagnose(pipeline.load(simulated("coarse, for strength", seed=6, duration=20.0, encoder=16)))
     chances = [strength(found.view, j).chance for j in range(2)]
-    assert 1e-3 < min(chances) < 1.0  # it was asked
+    assert _quiet(found.view, 0) and min(chances) > 1e-3
 
 
 def test_where_angles_make_most_of_the_rest_nothing_is_asked(simulated):

@@ -3,7 +3,8 @@
 A law with a memory leaves torque that no function of the motion predicts at any one time, and that
 may be as slow as the motion, as a drift is. But it is strong where it acts, or changes quickly where
 the joint goes quickly. So the logarithms of squares of what is left, and of its changes from row to
-row, are asked by functions of the motion, beside those of noise that has one spectrum all the time.
+row, are asked by functions of the motion, beside those of noise that has one spectrum all the time,
+and beside themselves at other times, as noise may be stronger for a while.
 Drives and gears may be louder in motion than at rest: it tells where to look, and not what is there.
 """
 
@@ -20,6 +21,7 @@ from .singles import beyond, noises
 from .view import View
 
 _DRAWS = 200  # as of `singles`
+_SHIFTS = 99  # in time: the greatest of as many is passed by chance once in a hundred times
 _WAVES = 4  # half waves over an angle's travel
 _LEAST = 0.1  # of the mean square: what is less is as good as nothing
 
@@ -54,6 +56,7 @@ def _greatest(views: Sequence[View], j: int) -> flexible.Law:
         left = np.column_stack([view.design.residual[:, j], _noise(view, j, rng)])[use]
         words, columns = zip(*_functions(view, use))
         columns, log, piece = np.stack(columns, axis=1), _logs(view)[use], view.rows.piece[use]
+        left = np.column_stack([left[:, :1], _elsewhen(left[:, 0], log, rng), left[:, 1:]])
         goes_on = (np.diff(np.flatnonzero(use)) == 1) & (np.diff(piece) == 0)
         steps = np.diff(left, axis=0)[goes_on]
         both = [
@@ -62,10 +65,13 @@ def _greatest(views: Sequence[View], j: int) -> flexible.Law:
         ]
         told = told + len(left) * np.concatenate(both)
     told = told / sum(view.rows.use[:, j].sum() for view in views)
-    usual, scatter = (f(told[:, 1:], axis=1, keepdims=True) for f in (np.mean, np.std))
+    even = told[:, 1 + _SHIFTS :]
+    usual, scatter = (f(even, axis=1, keepdims=True) for f in (np.mean, np.std))
     out = np.abs(told - usual) / np.maximum(scatter, 1e-12)
     best = int(np.argmax(out[:, 0]))
-    chance = beyond(out[best, 0], out[:, 1:].max(axis=0))
+    chance = beyond(out[best, 0], out[:, 1 + _SHIFTS :].max(axis=0))
+    if out[:, 1 : 1 + _SHIFTS].max() >= out[best, 0]:
+        chance = 1.0  # it wanders, whatever the motion does
     return flexible.Law(chance, words[best % len(words)], float((told - usual)[best, 0] ** 2))
 
 
@@ -86,6 +92,17 @@ def _logs(view: View) -> np.ndarray:
     """(n,) the number of each row's log."""
     names = [piece.source for piece in view.motion.pieces]
     return np.unique(names, return_inverse=True)[1][view.rows.piece]
+
+
+def _elsewhen(left: np.ndarray, log: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """(n, shifts) what is left (n,) at other times of each log (n,), a tenth of it away at least: as
+    strong, and as long, and no law of this motion."""
+    out = np.empty((len(left), _SHIFTS))
+    for number in np.unique(log):
+        (rows,) = np.nonzero(log == number)
+        for k, share in enumerate(rng.uniform(0.1, 0.9, _SHIFTS)):
+            out[rows, k] = np.roll(left[rows], round(share * len(rows)))
+    return out
 
 
 def _follow(squares: np.ndarray, columns: np.ndarray, log: np.ndarray) -> np.ndarray:
