@@ -316,3 +316,13 @@ def test_a_brake_that_never_opens_leaves_a_truth_that_json_can_hold(leg):
         json.dumps(told, allow_nan=False)
         silent += sum(0.0 in log["noise_rms"].values() for log in told["logs"].values())
     assert silent
+
+
+def test_a_robot_of_one_joint_is_knocked_too(tmp_path):
+    """And pushed: Pinocchio gives the Jacobian of its one joint without a second axis."""
+    first, _, rest = URDF.partition('  <link name="lower">')
+    (tmp_path / "one.urdf").write_text(first + rest[rest.index("  <joint") : rest.index("</joint>") + len("</joint>")] + "\n</robot>\n")
+    one = robot.load(robot_spec.RobotSpec(urdf=str(tmp_path / "one.urdf")))
+    assert one.dof == 1
+    found = simulate(one, hide=[hidden("external_force:*")], seed=1, duration=4.0, rate=200.0, knocks=2)
+    assert [event["kind"] for event in found.truth["logs"]["test"]["events"]].count("knock") == 2

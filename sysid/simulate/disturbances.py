@@ -69,7 +69,8 @@ class Knocks(Part):
 
 def torque_of(model, data, q, pulse: Pulse) -> np.ndarray:
     """Torque (joints,) to overcome under a pulse's full force: J' f at its point."""
-    jacobian = pin.computeJointJacobian(model, data, q, pulse.row + 1)
+    # of a robot of one joint it comes without its second axis
+    jacobian = pin.computeJointJacobian(model, data, q, pulse.row + 1).reshape(6, -1)
     pin.forwardKinematics(model, data, q)
     local = data.oMi[pulse.row + 1].rotation.T @ pulse.force
     return jacobian[:3].T @ local + jacobian[3:].T @ np.cross(pulse.point, local)

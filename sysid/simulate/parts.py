@@ -96,6 +96,7 @@ class ExternalForce(Part):
             if inside > 0.0:
                 joint, edge = self.row + 1, min(_EDGE, 0.25 * (stop - start))
                 jacobian = pin.computeJointJacobian(plant.model, plant.data, plant.tree, joint)
+                jacobian = jacobian.reshape(6, -1)  # of one joint it comes flat
                 pin.forwardKinematics(plant.model, plant.data, plant.tree)
                 share = 0.5 - 0.5 * math.cos(math.pi * min(inside / edge, 1.0))
                 plant.g += share * (plant.G.T @ jacobian[:3].T @ (plant.data.oMi[joint].rotation.T @ force))
