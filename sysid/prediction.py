@@ -41,7 +41,7 @@ class Prediction:
 
     log (n,) number of the log; t (n,) [s]; measured (n, dof) as logged, filtered where the fit filtered torque;
     predicted (n, dof); use (n, dof) bool, None where every row counts; joints: names, units: N m or N, of each;
-    states: of at most `_STATES` rows, None where nobody kept them.
+    states: of at most `_STATES` rows, None where nobody kept them; still: joints that stand in all of it.
     """
 
     log: np.ndarray
@@ -52,6 +52,7 @@ class Prediction:
     joints: tuple[str, ...] = ()
     units: tuple[str, ...] = ()
     states: States | None = None
+    still: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         errors = ", ".join(f"{joint} {rms:.4g}" for joint, rms in zip(self.joints, self.told()) if rms is not None)
@@ -181,7 +182,7 @@ def predict(model: Model, x, motion: Motion) -> Prediction:
         measured=joined([piece.tau[piece.core] for piece in pieces]),
         predicted=joined([model.torque(piece, pi, c) for piece in pieces]),
         use=None if pieces[0].use is None else joined([piece.use[piece.core] for piece in pieces]),
-        joints=model.robot.joints, units=units(model.robot), states=_states(motion),
+        joints=model.robot.joints, units=units(model.robot), states=_states(motion), still=tuple(motion.still),
     )
 
 

@@ -119,6 +119,8 @@ def cause(
 def otherwise(fit: Fit, floors, still: Sequence[str] = ()) -> dict[str, Reason]:
     """{joint: why} of joints of which something else than a law may be what the motion predicts: a
     filter that is too narrow for the angles, what `by_log` says, and rest."""
+    # a low-pass spreads the little that a joint creeps, as a controller holds it
+    still = list(dict.fromkeys([*still, *fit.predictions["test"].still]))
     hold_out = f"{AT_REST}; hold out a log in which it moves, or leave it out with robot.lock"
     trained = lambda joint: floors[fit.joints.index(joint)].reached(fit.rms("train")[joint])  # noqa: E731
     rests = {

@@ -9,7 +9,9 @@ import polars as pl
 import pytest
 
 from sysid import pipeline, plausible
+from sysid.noise import NoiseFloor
 from sysid.plausible import implausible, outdated
+from sysid.unexplained import otherwise
 
 
 @pytest.fixture
@@ -45,6 +47,10 @@ def test_a_joint_that_stands_in_the_test_log_is_not_called_wrong(folder):
     texts = said(folder)
     assert any(text.startswith("the test logs do not show elbow in motion") for text in texts)
     assert not any("worse than none" in text and "elbow" in text for text in texts)
+    found = pipeline.fit(pipeline.load(folder))
+    assert {part: told.still for part, told in found.predictions.items()} == {"train": (), "test": ("elbow",)}
+    floors = [NoiseFloor(1.0, 0.01, "spectral", "")] * 2
+    assert otherwise(found, floors)["elbow"].settles  # whatever a low-pass makes of how it creeps
 
 
 @pytest.mark.parametrize(("train", "r2", "test", "said"), [(0.17, 0.9, 0.175, False), (0.17, 0.9, 0.3, True), (0.17, -0.1, 0.17, True)])
