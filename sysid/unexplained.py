@@ -29,18 +29,20 @@ def of_few_blocks(
     j: int,
     least: float,
     fitted: Callable[[Candidate], float] = lambda _: 0.0,
+    *,
+    soft: bool = True,
 ):
     """The Candidate that takes most of joint j's squared residual on the test logs, under the
     low-pass, a tenth at least and at least such a share, of those that training logs show in too few
-    places to ask them, or of which slopes say little, as a link stands apart from its motor by them;
-    with a p-value of one, as test logs may not choose. None where there is none.
+    places to ask them, or, where `soft`, of which slopes say little, as a link stands apart from its
+    motor by them; with a p-value of one, as test logs may not choose. None where there is none.
 
     Args:
         groups: of the joint. refitted: makes a Member, or None, of one. without: the model without
             them. fitted: the share of the joint's misfit that goes as a fit has it, about reversals
             too, where a low-pass shows none: half of it is enough.
     """
-    few = [g for g in groups if g.signed and (g.candidate.swings or not g.testable)]
+    few = [g for g in groups if g.signed and (not g.testable or (soft and g.candidate.swings))]
     few = sorted(few, key=lambda g: g.taken)
     shares = {}
     for group in {g.candidate.kind: g for g in few}.values():

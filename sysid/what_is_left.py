@@ -56,10 +56,12 @@ class Left:
         with_it = group and self.elsewhere and self.refitted(self.view, group)
         return with_it and law(with_it.view, j, elsewhere(with_it.view, self.logs.test))
 
-    def few(self, j: int, least: float):
+    def few(self, j: int, least: float, soft: bool):
         """As of `of_few_blocks`: (Candidate, p) or None."""
         own, fits = self.answers[0].by_joint.get(j, [()])[0], partial(self.fitted, j)
-        return of_few_blocks(own, partial(self.refitted, self.view), self.held_out, j, least, fits)
+        return of_few_blocks(
+            own, partial(self.refitted, self.view), self.held_out, j, least, fits, soft=soft
+        )
 
     def fitted(self, j: int, candidate: Candidate) -> float:
         """The share of joint j's misfit on the test logs that goes where it is in a fit."""

@@ -228,7 +228,7 @@ def test_an_effect_of_the_robot_is_no_name_for_a_joint_whose_error_stays():
 
 def test_at_a_joint_that_is_complete_nothing_is_asked_of_the_test_logs_alone():
     asked = []
-    few = lambda j, least: asked.append(JOINTS[j])  # noqa: E731
+    few = lambda j, least, soft: asked.append(JOINTS[j])  # noqa: E731
     verdicts(fitted(1.05, 2.0), [], [NOISE] * 2, [floor()] * 2, few=few)
     assert asked == ["shoulder"]
     verdicts(fitted(1.05, 2.0), [], [NOISE, left(0.6)], [floor()] * 2, few=few)
@@ -551,7 +551,8 @@ def test_what_training_logs_show_in_too_few_places_is_asked_of_the_test_logs():
     """A law stands out on both, and no effect of the training logs' blocks: what takes half as much on the test logs may be it."""
     stribeck, asked = Candidate(find("stribeck"), 1, ()), []
 
-    def few(j: int, least: float):
+    def few(j: int, least: float, soft: bool):
+        assert not soft  # where the motion predicts the rest, it is no joint that swings unseen
         asked.append((j, least))
         return (stribeck, 1.0) if least <= 0.15 else None
 
@@ -655,6 +656,9 @@ def test_of_those_that_test_logs_alone_can_ask_the_one_that_takes_most(monkeypat
     assert unexplained.of_few_blocks(groups, refitted, without, 1, 0.5) == ("b", 1.0)
     assert sorted(seen) == [("a", 2.0), ("b", -3.0), ("e", 0.0), ("s", 1.0)]  # slopes say little of what swings
     assert unexplained.of_few_blocks(groups, refitted, without, 1, 0.7) is None
+    seen.clear()
+    assert unexplained.of_few_blocks(groups, refitted, without, 1, 0.5, soft=False) == ("b", 1.0)
+    assert sorted(seen) == [("a", 2.0), ("b", -3.0), ("e", 0.0)]
     assert unexplained.of_few_blocks([], refitted, without, 1, 0.0) is None
     # about reversals, which a low-pass shows none of, a fit may say more
     assert unexplained.of_few_blocks(groups, refitted, without, 1, 0.7, {"b": 0.8}.get) == ("b", 1.0)

@@ -63,7 +63,7 @@ def verdicts(
     weighed: dict[str, float] | None = None,
     law: Callable[[int], Law] | None = None,
     near: Callable[[int, float, bool], tuple[Candidate, float] | None] = lambda *_: None,
-    few: Callable[[int, float], tuple[Candidate, float] | None] = lambda *_: None,
+    few: Callable[[int, float, bool], tuple[Candidate, float] | None] = lambda *_: None,
     beyond: Callable[[int, Candidate], Law | None] | None = None,
     took: Sequence[float] | None = None,
     means: Mapping[str, Reason] | tuple = (),
@@ -112,7 +112,8 @@ def verdicts(
         looks = near(j, part * seen.total, bool(remains))
         looks = looks or in_vain(refused, fit.joints, j, HALF * part)
         stays = bool(remains or not (reaches[j] and first > 0.0))  # else nothing asks what it is
-        looks = looks or (stays and asked[j] and not own and few(j, HALF * part)) or None
+        stays_open = stays and asked[j] and not own
+        looks = looks or (stays_open and few(j, HALF * part, not remains)) or None
         # of whichever logs they explain less of: where these do not carry over, another law may
         held = taken_where_held(own[0].step.before, own[-1].step.after)[j] if own else 0.0
         taken = max(min(max(sum(c.step.shares[j] for c in own or others), held), explained), 0.0)
