@@ -8,7 +8,7 @@ from scipy.stats import norm
 
 from sysid import blocks
 from sysid.view import greatest
-from sysid.view.singles import _Asker, _beyond, _draws, _share
+from sysid.view.singles import _Asker, _draws, _share, beyond
 from tests.evidences import grouped, posed, roughened, viewed
 
 N, BLOCKS = 400, 20
@@ -202,13 +202,13 @@ def test_beyond_the_draws_it_is_the_law_of_the_greatest(count, size):
     maxima = size * rng.normal(size=(4000, count)).max(axis=1)
     for share in (0.1, 0.01, 1e-4):
         at = size * norm.isf(-np.expm1(np.log1p(-share) / count))
-        assert 0.3 < _beyond(at, maxima) / share < 3.0, share
+        assert 0.3 < beyond(at, maxima) / share < 3.0, share
 
 
 @pytest.mark.parametrize("value", [-1e3, -40.0, 0.0, 3.0, 40.0])
 def test_how_far_out_a_value_stands_is_told_of_any(value):
     """One below all that noise makes stands out no less than noise does; one above stands out the more, the higher."""
     maxima = np.abs(np.random.default_rng(4).normal(size=(500, 50))).max(axis=1)
-    seen = _beyond(value, maxima)
+    seen = beyond(value, maxima)
     assert 0.0 <= seen <= 1.0
     assert seen == pytest.approx(np.mean(maxima > value), abs=0.05)
