@@ -8,9 +8,7 @@ from dataclasses import replace
 from .model_parameters import ROBOT
 from .unexplained import may_be
 
-_CLEAR = (
-    1e-5  # slow noise of 20 s has few turns, by which the tail of its strength is told too thin
-)
+_CLEAR = 1e-5  # slow noise of 20 s has few turns: the tail of its strength is told too thin
 
 
 def left_open(verdicts: Sequence, left, worth: float) -> list:

@@ -215,12 +215,11 @@ def no_names(claims: Sequence, verdicts: Sequence) -> dict[int, Refused]:
     small = {one.joint for one in verdicts if one.small}
     others = (one for one in verdicts if not one.small and one.status in ("missing", "unknown"))
     stand = [id(claim) for one in others for claim in one.claims]
-    goes = lambda c: (
-        c.head.joint in small
-        or (  # noqa: E731
-            c.head.joint == "*" and small and id(c) not in stand
-        )
-    )
+
+    def goes(claim) -> bool:
+        wide = claim.head.joint == "*" and small and id(claim) not in stand
+        return claim.head.joint in small or bool(wide)
+
     return {c.number: Refused(c.head.effect, c.head.joint, PART) for c in claims if goes(c)}
 
 

@@ -22,8 +22,8 @@ class Left:
     joint's floor.
 
     answers: of all candidates under the last model that was searched, which has what was refused
-    since, and under the first. logs: those of both parts, as read. refitted: everything settled anew with a group's candidate in a view. known:
-    as of `pipeline.fit_grown`.
+    since, and under the first. logs: those of both parts, as read. refitted: everything settled anew
+    with a group's candidate in a view. known: as of `pipeline.fit_grown`.
     """
 
     view: View
