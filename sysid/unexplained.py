@@ -217,8 +217,8 @@ def no_names(claims: Sequence, verdicts: Sequence) -> dict[int, Refused]:
     stand = [id(claim) for one in others for claim in one.claims]
 
     def goes(claim) -> bool:
-        wide = claim.head.joint == "*" and small and id(claim) not in stand
-        return claim.head.joint in small or bool(wide)
+        joint = claim.head.joint
+        return bool(small) and (joint in small or (joint == "*" and id(claim) not in stand))
 
     return {c.number: Refused(c.head.effect, c.head.joint, PART) for c in claims if goes(c)}
 

@@ -53,10 +53,10 @@ def _greatest(views: Sequence[View], j: int) -> flexible.Law:
     told, words, rng = 0.0, [], np.random.default_rng(j)
     for view in views:
         use = view.rows.use[:, j].astype(bool)
-        left = np.column_stack([view.design.residual[:, j], _noise(view, j, rng)])[use]
+        own, noise = view.design.residual[use, j], _noise(view, j, rng)[use]
         words, columns = zip(*_functions(view, use))
         columns, log, piece = np.stack(columns, axis=1), _logs(view)[use], view.rows.piece[use]
-        left = np.column_stack([left[:, :1], _elsewhen(left[:, 0], log, rng), left[:, 1:]])
+        left = np.column_stack([own, _elsewhen(own, log, rng), noise])
         goes_on = (np.diff(np.flatnonzero(use)) == 1) & (np.diff(piece) == 0)
         steps = np.diff(left, axis=0)[goes_on]
         both = [
