@@ -43,13 +43,18 @@ def of_few_blocks(
             too, where a low-pass shows none: half of it is enough.
     """
     few = [g for g in groups if g.signed and (not g.testable or (soft and g.candidate.swings))]
-    few = sorted(few, key=lambda g: g.taken)
-    shares = {}
-    for group in {g.candidate.kind: g for g in few}.values():
+    few = {g.candidate.kind: g for g in sorted(few, key=lambda g: g.taken)}.values()
+    shares, swing = {}, 0.0
+    for group in sorted(few, key=lambda g: g.testable and g.candidate.blows):
+        # play lets a link lag as a soft gear does, and is sought for ten times as long
+        if group.testable and group.candidate.blows and not swing > _FITTED:
+            continue
         try:
             if member := refitted(group):
                 then = HeldOut(member.view.settled, without.test)
                 shares[member.candidate] = fallen(without, then)[j]
+                if group.candidate.swings:
+                    swing = max(swing, shares[member.candidate])
         except NotFinite:  # on the test motion
             continue
     best = max(shares, key=shares.get, default=None)

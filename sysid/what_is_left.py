@@ -46,9 +46,7 @@ class Left:
 
     def strength(self, j: int) -> Law | None:
         """The one that its strength follows; None where its training logs are at the floor."""
-        trained = as_of_test(self.fit.rms("train"), self.floors)[self.fit.joints[j]]
-        at_floor = self.floors[j].reached(trained)
-        return None if at_floor else strength(self.view, j, self.elsewhere)
+        return None if self._trained(j) else strength(self.view, j, self.elsewhere)
 
     def beyond(self, j: int, candidate: Candidate) -> Law | None:
         """The law of joint j with a candidate in the model; None where nobody can tell."""
@@ -57,11 +55,17 @@ class Left:
         return with_it and law(with_it.view, j, elsewhere(with_it.view, self.logs.test))
 
     def few(self, j: int, least: float, soft: bool):
-        """As of `of_few_blocks`: (Candidate, p) or None."""
+        """As of `of_few_blocks`: (Candidate, p) or None. Training logs would show a soft gear."""
+        soft = soft and not self._trained(j)
         own, fits = self.answers[0].by_joint.get(j, [()])[0], partial(self.fitted, j)
         return of_few_blocks(
             own, partial(self.refitted, self.view), self.held_out, j, least, fits, soft=soft
         )
+
+    def _trained(self, j: int) -> bool:
+        """Whether joint j's training logs are at its floor."""
+        trained = as_of_test(self.fit.rms("train"), self.floors)[self.fit.joints[j]]
+        return self.floors[j].reached(trained)
 
     def fitted(self, j: int, candidate: Candidate) -> float:
         """The share of joint j's misfit on the test logs that goes where it is in a fit."""

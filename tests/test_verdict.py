@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from scripts.blind_parts import cases, robots
-from sysid import borne_out, config, mean_by_log, pipeline, unexplained
+from sysid import borne_out, config, mean_by_log, pipeline, unexplained, what_is_left
 from sysid.blocks import Belief
 from sysid.candidates import Candidate, candidates
 from sysid.comparison import Difference
@@ -639,8 +639,8 @@ def test_friction_that_is_another_in_each_log_may_be_warmth_over_one_clock(effec
 
 
 def test_of_those_that_test_logs_alone_can_ask_the_one_that_takes_most(monkeypatch):
-    groups = [SimpleNamespace(candidate=SimpleNamespace(kind=kind, swings=kind == "s"), signed=signed, testable=testable, taken=taken) for kind, signed, testable, taken in (
-        ("a", True, False, 1.0), ("a", True, False, 2.0), ("b", True, False, -3.0), ("c", True, True, 9.0), ("d", False, False, 9.0), ("e", True, False, 0.0), ("s", True, True, 1.0)
+    groups = [SimpleNamespace(candidate=SimpleNamespace(kind=kind, swings=kind in "sx", blows=kind == "x"), signed=signed, testable=testable, taken=taken) for kind, signed, testable, taken in (
+        ("a", True, False, 1.0), ("a", True, False, 2.0), ("b", True, False, -3.0), ("c", True, True, 9.0), ("d", False, False, 9.0), ("e", True, False, 0.0), ("x", True, True, 1.0), ("s", True, True, 1.0)
     )]  # fmt: skip
     shares = {"a": 0.2, "b": 0.6}
     monkeypatch.setattr(unexplained, "HeldOut", lambda settled, test: settled)
@@ -663,10 +663,26 @@ def test_of_those_that_test_logs_alone_can_ask_the_one_that_takes_most(monkeypat
     # about reversals, which a low-pass shows none of, a fit may say more
     assert unexplained.of_few_blocks(groups, refitted, without, 1, 0.7, {"b": 0.8}.get) == ("b", 1.0)
     assert unexplained.of_few_blocks(groups, refitted, without, 1, 0.7, {"b": 0.4}.get) is None
+    seen.clear()
+    shares["s"], shares["x"] = 0.2, 0.9  # play is asked where a soft gear takes some
+    assert unexplained.of_few_blocks(groups, refitted, without, 1, 0.5) == ("x", 1.0) and seen[-1] == ("x", 1.0)
+    del shares["s"], shares["x"]
     shares["b"] = 0.05
     assert unexplained.of_few_blocks(groups, refitted, without, 1, 0.7, {"a": 0.9}.get) == ("a", 1.0)
     shares["a"] = 0.05
     assert unexplained.of_few_blocks(groups, refitted, without, 1, 0.7, {"a": 0.9}.get) is None
+
+
+def test_a_soft_gear_is_asked_for_where_the_training_logs_would_show_it(monkeypatch):
+    """Of seven joints at their noise each would take as long as all else."""
+    seen = []
+    monkeypatch.setattr(what_is_left, "of_few_blocks", lambda *_, soft: seen.append(soft))
+    floors = [NoiseFloor(1.0, 0.02, "spectral", "", 0.9, 1.1)] * 2
+    fit = SimpleNamespace(joints=("quiet", "loud"), rms=lambda part: {"quiet": 1.05, "loud": 1.5})
+    left = what_is_left.Left(None, fit, None, floors, [SimpleNamespace(by_joint={})], None, max, {})
+    for j, soft in ((0, True), (1, True), (1, False)):
+        left.few(j, 0.5, soft)
+    assert seen == [False, True, False]
 
 
 def test_what_may_come_of_another_joints_effect_is_left_open():
