@@ -174,7 +174,12 @@ def left_by(values, *, columns=None, seconds: float = 0.5):
     p = SimpleNamespace(a=a, weights=np.ones(2), root=1e-3 * np.eye(size), target=np.zeros(size), tau=torque, number=np.arange(N) // round(seconds / STEP))
     rows = SimpleNamespace(use=np.ones((N, 2), bool), piece=np.zeros(N, int))
     robot = SimpleNamespace(joints=("shoulder", "elbow"))
-    return SimpleNamespace(**{**vars(viewed(p)), "rows": rows, "step": STEP}, variables=KNOWN, rough_variables=KNOWN, model=SimpleNamespace(robot=robot))
+    return SimpleNamespace(
+        **{**vars(viewed(p)), "rows": rows, "step": STEP},
+        variables=KNOWN,
+        rough_variables=KNOWN,
+        model=SimpleNamespace(robot=robot, shape_values=(), shapes=()),
+    )
 
 
 def coloured(seed: int, memory: float = 0.04):
@@ -189,6 +194,19 @@ def test_products_are_functions_of_unit_size_on_rows_that_count():
     np.testing.assert_allclose(np.mean(values**2, axis=0), 1.0, rtol=1e-9)
     variables = {"time", "its past", "direction", *(f"{kind}_{joint}" for kind in ("q", "qd", "qdd", "load") for joint in ("shoulder", "elbow"))}
     assert {one for word in words for one in word.split(" and ")} == variables - {"load_shoulder"}
+
+
+def test_ripples_of_a_model_are_asked_where_they_are_stronger():
+    """At the periods that it has, and at no others."""
+    truth = np.abs(KNOWN["qd_elbow"]) * np.sin(16.0 * KNOWN["q_elbow"])
+
+    def nearest(ripples):
+        words, columns = zip(*products(KNOWN, "elbow", ALL, np.zeros(N, int), STEP, ripples))
+        values = np.concatenate(columns, axis=1)
+        alike = np.abs(values.T @ truth) / np.linalg.norm(values, axis=0) / np.linalg.norm(truth)
+        return float(alike.max()), sum(words, [])[int(np.argmax(alike))]
+
+    assert nearest(()) < (0.8, "") and nearest((16.0,)) == (pytest.approx(1.0), "q_elbow and qd_elbow")
 
 
 # ---- what the motion was

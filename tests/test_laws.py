@@ -1,5 +1,6 @@
 """A law that nobody thought of is to hold on the test logs as well: the same model, settled on these, is asked too."""
 
+import json
 from dataclasses import replace
 from unittest import mock
 
@@ -10,6 +11,7 @@ from sysid import experiment_logs, flexible, pipeline
 from sysid.effect import NotFinite
 from sysid.lowpass import widest
 from sysid.view import elsewhere, first_view, law, opened
+from sysid.view.laws import ripples
 
 
 def settling_contact(size: float):
@@ -107,9 +109,9 @@ def test_a_piece_of_a_few_samples_is_passed_over(quiet, logs, short):
     seen = []
     plain = flexible.products
 
-    def asked(known, joint, use, piece, step):
+    def asked(known, joint, use, piece, *rest):
         seen.append(piece)
-        return plain(known, joint, use, piece, step)
+        return plain(known, joint, use, piece, *rest)
 
     with mock.patch.object(flexible, "products", asked):
         assert law(view, 1, more).chance > 0.01
@@ -136,3 +138,20 @@ def test_a_law_with_a_past_stands_out_more_where_it_holds_on_test_logs_as_well(s
     alone, both = law(view, 1), law(view, 1, more)
     assert both.chance < 0.1 * alone.chance and both.chance < 1e-3 and "qd_elbow" in both.variables
     assert 0.0 < both.share < 1.0
+
+
+def growing_ripple(size: float, k: float):
+    """The elbow's ripple, stronger the faster it turns."""
+    return lambda q, qd, qdd, t, load, memory: np.array([0.0, size * abs(qd[1]) * np.sin(k * q[1])])
+
+
+def test_of_a_ripple_that_grows_with_the_speed_cogging_is_a_part(diagnosed):
+    """What cogging leaves of it follows the same periods, and is neither noise nor nothing."""
+    found = diagnosed("laws-ripple", growing_ripple(0.12, 16.0), seed=4, duration=20.0)
+    (claim,) = found.claims
+    assert (claim.head.effect, claim.head.joint) == ("cogging", "elbow")
+    assert ripples(claim.step.after.model, 1) == [pytest.approx(16.0, abs=0.5)] and ripples(claim.step.after.model, 0) == []
+    elbow = found.verdict[1]
+    assert elbow.status == "unknown" and elbow.left.share > 0.8 and max(elbow.left.shares, key=elbow.left.shares.get) == "q_elbow and qd_elbow"
+    noise = json.loads((found.fit.experiment.path.parent / "truth.json").read_text())["logs"]["test"]["noise_rms"]["elbow"]
+    assert found.floors["elbow"].rms is None or found.floors["elbow"].rms == pytest.approx(noise, rel=0.25)

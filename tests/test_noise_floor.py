@@ -334,6 +334,17 @@ def test_spikes_that_nobody_masked_do_not_raise_it(share):
         assert result.rms == pytest.approx(e[:, j].std(), rel=0.06)
 
 
+@pytest.mark.parametrize("k", [16.0, 40.0])
+def test_a_ripple_that_grows_with_the_speed_is_no_noise(k):
+    """One that is always the same is in the model: nothing is left of the mean at any position."""
+    rng, step = np.random.default_rng(1), 0.004
+    q = wandering(30.0, step, rng)
+    speed = np.abs(np.gradient(q[:, 1], step))
+    e = rng.normal(size=len(q))
+    result = found(q, step, e, (speed / speed.mean() - 1.0) * np.sin(k * q[:, 1]))
+    assert result.rms == pytest.approx(e.std(), rel=0.1)
+
+
 @pytest.mark.parametrize("missing", [nothing, load_friction])
 @pytest.mark.parametrize("seed", [1, 2, 3, 4])
 def test_noise_that_grows_with_the_speed_is_noise(seed, missing):

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from itertools import islice
+from collections.abc import Iterator, Sequence
+from itertools import chain, islice
 
 import numpy as np
 
@@ -18,20 +18,22 @@ Factor = tuple[str, np.ndarray]  # the variables that it is of; (n,)
 
 
 def products(
-    known: dict[str, np.ndarray], joint: str, use, piece, step: float
+    known: dict[str, np.ndarray], joint: str, use, piece, step: float, ripples: Sequence[float] = ()
 ) -> Iterator[tuple[list[str], np.ndarray]]:
     """Functions (n, k) of the motion with a mean square of one on a joint's rows that count, and
     the variables that each is of, in words; some at a time, as all of a long log fill the memory.
 
     Each is the product of two: waves, sizes, signs and squares of the joint's own angle, speed,
     acceleration and load; the same of another joint; time; or one. All stand there once more times
-    the direction of motion, as friction does, and with them what the speed was a while ago.
+    the direction of motion, as friction does, and with them what the speed was a while ago, and
+    ripples that are stronger where something else is.
 
     Args:
-        known, piece, step: as of `functions.groups`. use: (n,) bool.
+        known, piece, step: as of `functions.groups`. use: (n,) bool. ripples: periods of the joint's
+            own angle in 2 pi rad or m that a model has [1/rad or 1/m].
     """
     direction = np.sign(known[f"qd_{joint}"])[:, None]
-    found = _all(known, joint, piece, step)
+    found = chain(_all(known, joint, piece, step), _modulated(known, joint, ripples))
     while part := list(islice(found, _PART)):
         words, values = zip(*part)
         own = np.stack(values).T  # each function's rows side by side in memory
@@ -57,6 +59,12 @@ def _all(known, joint: str, piece, step: float) -> Iterator[Factor]:
             yield second
             yield from (_product(first, second) for first in few)
     yield from pasts(known, joint, piece, step)
+
+
+def _modulated(known, joint: str, ripples) -> Iterator[Factor]:
+    angle, few = f"q_{joint}", [*_factors(known, joint, _OTHER), ("time", known["time"])]
+    waves = [(angle, turn(k * known[angle])) for k in ripples for turn in (np.sin, np.cos)]
+    yield from (_product(wave, strength) for wave in waves for strength in few)
 
 
 def _product(first: Factor, second: Factor) -> Factor:

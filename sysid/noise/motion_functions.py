@@ -103,7 +103,9 @@ def functions(motion: Motion, joint: int, waves: np.ndarray) -> list[Callable[[]
     out += [lambda k=k: torque**k for k in (1, 2, 3)]
     out += [lambda x=x: x for x in motion.late]
     out += [lambda k=k, f=f: f(k * place) for k in range(1, 9) for f in trig]
+    size = np.abs(fast)
     out += [lambda k=k, f=f: f(k * own) for k in waves for f in trig]
+    out += [lambda k=k, f=f: size * f(k * own) for k in waves for f in trig]
     # the bodies
     for k in range(q.shape[1]):
         out += [lambda x=x: x for x in (a[:, k], v[:, k])]
@@ -114,9 +116,14 @@ def functions(motion: Motion, joint: int, waves: np.ndarray) -> list[Callable[[]
     return out
 
 
-def ripples(q: np.ndarray, residual: np.ndarray) -> np.ndarray:
+def ripples(q: np.ndarray, speed: np.ndarray, residual: np.ndarray) -> np.ndarray:
     """Wave numbers [1/rad or 1/m] of the strongest ripples over position (cogging, gear teeth) in a
-    residual (n,)."""
+    residual (n,), and of those that grow with the speed: less one that is always the same, they have
+    no mean left at any position."""
+    return np.unique([*_ripples(q, residual), *_ripples(q, np.abs(speed) * residual)])
+
+
+def _ripples(q: np.ndarray, residual: np.ndarray) -> np.ndarray:
     span = np.ptp(q)
     if span == 0.0:
         return np.zeros(0)

@@ -46,7 +46,8 @@ class Functions:
         weight = np.concatenate([block(k.astype(float), m) for k, m in zip(kept, self.thin)])
         target = np.concatenate([block(v * k, m) for v, k, m in zip(y, kept, self.thin)])
         target /= np.maximum(weight, _TINY)
-        waves = ripples(self.coarse.q[:, self.joint], target * weight)
+        own = (x[:, self.joint] for x in (self.coarse.q, self.coarse.v))
+        waves = ripples(*own, target * weight)
         root = np.sqrt(weight)
         x = root * [f() for f in functions(self.coarse, self.joint, waves)]
         norm = np.sqrt(np.mean(x**2, axis=1)) + _TINY

@@ -6,8 +6,19 @@ from __future__ import annotations
 import numpy as np
 
 from .. import flexible
+from ..model import Model
 from .singles import greatest
 from .view import View
+
+
+def ripples(model: Model, j: int) -> list[float]:
+    """Periods of joint j's own angle in 2 pi rad or m that a model's effects have [1/rad or 1/m]."""
+    own = [
+        (model.terms[v.term][0], at)
+        for v, at in zip(model.shape_values, model.shapes)
+        if v.joint == j and v.shape.spacing
+    ]
+    return [line * k for effect, k in own for line in range(1, effect.lines + 1)]
 
 
 def law(view: View, j: int, more: View | None = None) -> flexible.Law:
@@ -24,7 +35,13 @@ def law(view: View, j: int, more: View | None = None) -> flexible.Law:
     pieces = [own + k * last for k, own in enumerate(each(lambda one: one.rows.piece))]
     use = np.concatenate(each(lambda one: one.rows.use[:, j].astype(bool)))
     known = {name: np.concatenate([own[name] for own in motions]) for name in view.variables}
-    rest = view.model.robot.joints[j], use, np.concatenate(pieces), view.step
+    rest = (
+        view.model.robot.joints[j],
+        use,
+        np.concatenate(pieces),
+        view.step,
+        ripples(view.model, j),
+    )
     asked = lambda: flexible.products(known, *rest)  # noqa: E731
     found = greatest(views, j, asked, j)
     if found is None:
