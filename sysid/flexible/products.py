@@ -29,8 +29,8 @@ def products(
     ripples that are stronger where something else is.
 
     Args:
-        known, piece, step: as of `functions.groups`. use: (n,) bool. ripples: periods of the joint's
-            own angle in 2 pi rad or m that a model has [1/rad or 1/m].
+        known, piece, step: as of `functions.groups`. use: (n,) bool. ripples: periods of the
+            joint's own angle in 2 pi rad or m that a model has [1/rad or 1/m].
     """
     direction = np.sign(known[f"qd_{joint}"])[:, None]
     found = chain(_all(known, joint, piece, step), _modulated(known, joint, ripples))

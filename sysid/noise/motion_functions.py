@@ -118,8 +118,8 @@ def functions(motion: Motion, joint: int, waves: np.ndarray) -> list[Callable[[]
 
 def ripples(q: np.ndarray, speed: np.ndarray, residual: np.ndarray) -> np.ndarray:
     """Wave numbers [1/rad or 1/m] of the strongest ripples over position (cogging, gear teeth) in a
-    residual (n,), and of those that grow with the speed: less one that is always the same, they have
-    no mean left at any position."""
+    residual (n,), and of those that grow with the speed: less one that is always the same, they
+    have no mean left at any position."""
     return np.unique([*_ripples(q, residual), *_ripples(q, np.abs(speed) * residual)])
 
 
