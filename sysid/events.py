@@ -226,16 +226,23 @@ def told(events: Sequence[Event], left_out: float, part: str, joints: int) -> li
 def again(struck: Sequence[str], joints: int) -> str:
     """What may strike where few joints are knocked time and again: `struck` has all joints of every
     knock; empty where none is, or where most of the robot's are, as by somebody who pushes it."""
-    most = max(map(struck.count, struck), default=0)
-    each = {joint: struck.count(joint) for joint in struck}
-    near = [joint for joint, count in each.items() if 4 * count > 3 * most]
-    if most < _AGAIN or 2 * len(near) > max(joints, 2):
+    if not (who := most_struck(struck, joints)):
         return ""
-    who = [joint for joint, count in each.items() if count == most]
+    most = struck.count(who[0])
     where = " and ".join([", ".join(who[:-1]), who[-1]] if len(who) > 1 else who)
     why = "where nobody pushed, its own play or an end stop strikes, or its gear is soft and rings"
     keep = "a diagnosis with `events: keep` under `preprocess:` can name it"
     return f"{most} knocks are on {where}: {why}; {keep}"
+
+
+def most_struck(struck: Sequence[str], joints: int) -> list[str]:
+    """The joints that are knocked most, where few are time and again; as of `again`."""
+    each = {joint: struck.count(joint) for joint in struck}
+    most = max(each.values(), default=0)
+    near = [joint for joint, count in each.items() if 4 * count > 3 * most]
+    if most < _AGAIN or 2 * len(near) > max(joints, 2):
+        return []
+    return [joint for joint, count in each.items() if count == most]
 
 
 def _summary(events: Sequence[Event]) -> str:

@@ -19,6 +19,7 @@ from sysid.outliers import quantum
 from sysid.preprocess import prepare
 from sysid.repeats import held_angle, held_torque
 from sysid.specs import PreprocessSpec
+from sysid.statement import where
 from sysid.unwritten import extent, unlogged
 
 STEP = 1e-3
@@ -489,6 +490,10 @@ def test_what_strikes_one_joint_again_and_again_may_be_its_own_play(struck, who)
     notices = told(knocks_, 0.01, "training", 4)
     assert any(who and notice.startswith(who) and notice.endswith("(training logs)") for notice in notices) is bool(who)
     assert again(["a"] * 5, 1).startswith("5 knocks are on a:")
+    document = {"joints": dict.fromkeys("abcd"), "events": [{"kind": "knock", "joints": list("ab"[: 1 + (k < 2)])} for k in range(6)]}
+    first = {j: {s: where.struck({"joint": j, "status": s}, document) for s in ("unknown", "unresolved", "missing", "complete")} for j in "ab"}
+    assert {(j, s) for j, by in first.items() for s, words in by.items() if words} == {("a", "unknown"), ("a", "unresolved")}
+    assert first["a"]["unknown"].startswith("6 knocks on it are left out: where nobody pushed, ask with `events: keep`")
 
 
 def test_a_knock_is_as_long_as_the_clock_is_not_told_about_it():

@@ -115,6 +115,8 @@ def _joint(v: dict, of: Told, width: int, said: dict[str, str]) -> list[str]:
         lines += wrapped(f"  {v['says']}", width, "    ")
     if "may_be" in v and said.setdefault(v["may_be"]["command"], joint) == joint:
         lines += [f"  {TRIED}", v["may_be"]["command"]]
+    if words := where.struck(v, of.document):
+        lines += wrapped(f"  {words}", width, "    ")
     if status == "unknown":
         law = v.get("law")
         own = FILTERED if tone(v) else f"{OWN}{f'; {BEGIN}' if law else ''}"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..end_stops import END, LAWS
+from ..events import most_struck
 from ..failures import Failure
 from ..fit_document import number
 from ..plausible import WRONG
@@ -172,4 +173,18 @@ def plain(values):
         [[number(v) for v in row] for row in array.tolist()]
         if array.ndim == 2
         else [number(v) for v in array.tolist()]
+    )
+
+
+def struck(v: dict, document: dict) -> str:
+    """What to do first about a joint that is not understood and of which knocks are left out time
+    and again, in words; empty where it is not so."""
+    knocked = [j for e in document["events"] if e["kind"] == "knock" for j in e["joints"]]
+    often = v["joint"] in most_struck(knocked, len(document["joints"]))
+    if v["status"] not in ("unknown", "unresolved") or not often:
+        return ""
+    count = knocked.count(v["joint"])
+    return (
+        f"{count} knocks on it are left out: where nobody pushed, ask with `events: keep` under "
+        "`preprocess:` first, as what strikes or rings there is the joint's own"
     )
