@@ -8,7 +8,10 @@ import numpy as np
 
 from .stretches import Run
 
-_RIPPLES = 4
+_RIPPLES, _WAVES = 4, 256  # of most waves over the span
+# times the median of a power: of noise, whose power scatters as an exponential variable, the
+# greatest of all waves is as much once in a hundred times
+_CLEAR = math.log(100.0 * _WAVES) / math.log(2.0)
 _DELAYS = (0.003, 0.006, 0.01, 0.02, 0.04)  # s
 
 
@@ -82,8 +85,11 @@ def motion_of(
     )  # fmt: skip
 
 
-def functions(motion: Motion, joint: int, waves: np.ndarray) -> list[Callable[[], np.ndarray]]:
-    """Functions of the motion of which missing effects are made, each computed (n,) when called."""
+def functions(
+    motion: Motion, joint: int, waves: np.ndarray, growing: np.ndarray
+) -> list[Callable[[], np.ndarray]]:
+    """Functions of the motion of which missing effects are made, each computed (n,) when called.
+    waves, growing: as of `ripples`."""
     least, span, typical = motion.scale
     q, v, a, torque = motion.q, motion.v, motion.a, motion.torque
     own, speed = q[:, joint], v[:, joint]
@@ -104,8 +110,8 @@ def functions(motion: Motion, joint: int, waves: np.ndarray) -> list[Callable[[]
     out += [lambda x=x: x for x in motion.late]
     out += [lambda k=k, f=f: f(k * place) for k in range(1, 9) for f in trig]
     size = np.abs(fast)
-    out += [lambda k=k, f=f: f(k * own) for k in waves for f in trig]
-    out += [lambda k=k, f=f: size * f(k * own) for k in waves for f in trig]
+    out += [lambda k=k, f=f: f(k * own) for k in (*waves, *growing) for f in trig]
+    out += [lambda k=k, f=f: size * f(k * own) for k in growing for f in trig]
     # the bodies
     for k in range(q.shape[1]):
         out += [lambda x=x: x for x in (a[:, k], v[:, k])]
@@ -116,22 +122,25 @@ def functions(motion: Motion, joint: int, waves: np.ndarray) -> list[Callable[[]
     return out
 
 
-def ripples(q: np.ndarray, speed: np.ndarray, residual: np.ndarray) -> np.ndarray:
+def ripples(
+    q: np.ndarray, speed: np.ndarray, residual: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Wave numbers [1/rad or 1/m] of the strongest ripples over position (cogging, gear teeth) in a
-    residual (n,), and of those that grow with the speed: less one that is always the same, they
-    have no mean left at any position."""
-    return np.unique([*_ripples(q, residual), *_ripples(q, np.abs(speed) * residual)])
+    residual (n,), and of those that clearly grow with the speed: less one that is always the same,
+    they have no mean left at any position."""
+    return _ripples(q, residual), _ripples(q, np.abs(speed) * residual, _CLEAR)
 
 
-def _ripples(q: np.ndarray, residual: np.ndarray) -> np.ndarray:
+def _ripples(q: np.ndarray, residual: np.ndarray, clear: float = 0.0) -> np.ndarray:
     span = np.ptp(q)
     if span == 0.0:
         return np.zeros(0)
     sums, _ = np.histogram(q, 1024, weights=residual - residual.mean())
     # in eighths of a wave over the span; a wave is four bins at least
-    power = np.abs(np.fft.rfft(sums, 8192)[:2048]) ** 2
+    power = np.abs(np.fft.rfft(sums, 8 * _WAVES * 4)[: 8 * _WAVES]) ** 2
     peaks = 1 + np.flatnonzero((power[1:-1] > power[:-2]) & (power[1:-1] >= power[2:]))
-    peaks = peaks[peaks > 32]  # slower ones are among the functions anyway
+    # slower ones are among the functions anyway
+    peaks = peaks[(peaks > 32) & (power[peaks] >= clear * np.median(power))]
     return 2.0 * math.pi / (8.0 * span) * peaks[np.argsort(-power[peaks])[:_RIPPLES]]
 
 

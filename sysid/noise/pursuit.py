@@ -49,12 +49,12 @@ class Functions:
         own = (x[:, self.joint] for x in (self.coarse.q, self.coarse.v))
         waves = ripples(*own, target * weight)
         root = np.sqrt(weight)
-        x = root * [f() for f in functions(self.coarse, self.joint, waves)]
+        x = root * [f() for f in functions(self.coarse, self.joint, *waves)]
         norm = np.sqrt(np.mean(x**2, axis=1)) + _TINY
         chosen, weights = _pursuit((x / norm[:, None]).T, root * target, self.most)
         if not chosen:
             return y, 0, 0.0
-        every = functions(self.motion, self.joint, waves)
+        every = functions(self.motion, self.joint, *waves)
         taken = sum(w / norm[k] * every[k]() for k, w in zip(chosen, weights))
         power = float(np.var(taken[np.concatenate(kept)]))
         return [v - taken[rows] for v, rows in zip(y, self.rows)], len(chosen), power
