@@ -15,6 +15,7 @@ from .given_shapes import at_edges
 from .mean_by_log import MOST, by_log
 from .one_clock import clocks_anew
 from .plausible import AT_REST, Reason, stands
+from .pressed import pressed
 from .refused import PART, Refused
 from .too_narrow import noise_as_law
 
@@ -125,7 +126,7 @@ def cause(
 
 def otherwise(fit: Fit, floors, still: Sequence[str] = ()) -> dict[str, Reason]:
     """{joint: why} of joints of which something else than a law may be what the motion predicts: a
-    filter that is too narrow for the angles, what `by_log` says, and rest."""
+    filter that is too narrow for the angles, what `by_log` says, rest, and what holds them there."""
     # a low-pass spreads the little that a joint creeps, as a controller holds it
     still = list(dict.fromkeys([*still, *fit.predictions["test"].still]))
     hold_out = f"{AT_REST}; hold out a log in which it moves, or leave it out with robot.lock"
@@ -136,7 +137,7 @@ def otherwise(fit: Fit, floors, still: Sequence[str] = ()) -> dict[str, Reason]:
         if joint in stands(fit) or trained(joint)
     }
     narrow = {joint: Reason(why) for joint, why in noise_as_law(fit.filters).items()}
-    return rests | narrow | by_log(fit, floors, still)
+    return rests | narrow | by_log(fit, floors, still) | pressed(fit)
 
 
 def smeared(errors: Sequence[float], floor) -> bool:

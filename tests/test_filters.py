@@ -108,7 +108,7 @@ def test_a_filter_that_leaves_less_by_other_than_noise_of_the_angles_is_not_bett
 def test_noise_of_angles_is_no_law_and_asks_for_no_log():
     class Found:
         filters = {"too_narrow": {"key": "window", "given": 0.1, "value": 0.2, "rms": {"elbow": [1.0, 0.8]}}}
-        predictions = {"test": SimpleNamespace(still=())}
+        predictions = {"test": SimpleNamespace(still=(), thinned=lambda most: SimpleNamespace(states=None))}
         joints = JOINTS
         logs = ()
 

@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,6 +12,8 @@ import pytest
 from sysid import pipeline, plausible
 from sysid.noise import NoiseFloor
 from sysid.plausible import implausible, outdated
+from sysid.prediction import Prediction, States
+from sysid.pressed import pressed
 from sysid.unexplained import otherwise
 
 
@@ -51,6 +54,23 @@ def test_a_joint_that_stands_in_the_test_log_is_not_called_wrong(folder):
     assert {part: told.still for part, told in found.predictions.items()} == {"train": (), "test": ("elbow",)}
     floors = [NoiseFloor(1.0, 0.01, "spectral", "")] * 2
     assert otherwise(found, floors)["elbow"].settles  # whatever a low-pass makes of how it creeps
+
+
+@pytest.mark.parametrize(("missing", "noise", "held"), [(5.0, 0.05, True), (0.5, 0.05, False), (0.0, 1.0, False), (0.0, 0.05, False)])
+def test_a_joint_that_presses_on_a_stop_as_it_stands_is_held_by_it(missing, noise, held):
+    """By more than its friction of 0.3; friction at rest, which is less than twice that of motion, and noise alone hold nothing."""
+    t = np.arange(4000) * 0.005
+    q = np.minimum(1.5 * np.sin(2.0 * t), 1.2)[:, None]  # it goes no farther
+    qd = np.gradient(q, 0.005, axis=0)
+    measured = np.where(q >= 1.2, missing, 0.0) + noise * np.random.default_rng(1).normal(size=q.shape)
+    use = np.ones(q.shape, bool)
+    whole = Prediction(np.zeros(len(t)), t, measured, np.zeros(q.shape), use, ("elbow",), ("N m",), States(np.arange(len(t)), q, qd))
+    quiet = replace(whole, measured=0.0 * measured + 0.01)
+    fit = SimpleNamespace(joints=("elbow",), predictions={"train": whole, "test": quiet}, parameters_of=lambda *_: {"Fc": (0.3, 0.01, "N m")})
+    found = pressed(fit)
+    assert bool(found) is held
+    if held:
+        assert found["elbow"].settles and "on the training logs" in found["elbow"].says and "about 1.2 rad: 5 N m is missing there" in found["elbow"].says
 
 
 @pytest.mark.parametrize(("train", "r2", "test", "said"), [(0.17, 0.9, 0.175, False), (0.17, 0.9, 0.3, True), (0.17, -0.1, 0.17, True)])
