@@ -11,7 +11,7 @@ from scipy.stats import binom
 
 from sysid import blocks
 from sysid.diagnose.select import LEVEL, WORTH
-from sysid.flexible import Law, Unknown, functions, pasts, products, ridge, unknown
+from sysid.flexible import Law, Unknown, functions, pasts, products, ridge, tone, unknown
 from sysid.statement.verdicts import dependences
 from sysid.statement.words import followed, quantity
 from sysid.view import law
@@ -371,6 +371,15 @@ def test_ridges_are_solved_in_single_precision_where_that_is_enough(least, close
     for own, strength in zip(found.T, ridges):
         told = rows @ np.linalg.solve(system + strength * np.eye(120), right)
         assert np.max(np.abs(rows @ own - told)) < close * np.std(told)
+
+
+@pytest.mark.parametrize(("lasts", "steady"), [(1.0, False), (1e3, True)])
+def test_what_rings_down_is_no_steady_tone(lasts, steady):
+    """A link on a soft gear that was loaded as the log began; a filter of what is faster takes none of it."""
+    t = STEP * np.arange(N)
+    ringing = 3.0 * np.exp(-t / lasts) * np.sin(2.0 * np.pi * 4.02 * t)
+    share, chance, hertz = tone.steady(ringing + 0.05 * np.random.default_rng(3).normal(size=N), np.zeros(N), STEP)
+    assert (chance < tone.TONE) is steady and share > 0.2 and hertz == pytest.approx(4.0, abs=0.2)
 
 
 def test_a_tone_that_the_angles_noise_has_as_well_is_none_of_the_torque():
