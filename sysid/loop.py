@@ -92,6 +92,8 @@ def add(
     # a prior that was chosen without it may hold bodies against it: under its own, and as the user sees it, the error falls
     if rises and compared is not after_fit and not any(comparison.rises(one, after_fit, joints) for one in (before_fit, without())):
         rises = ()
+    # what is written, and seen, is the fit under its own prior
+    rises = rises or comparison.rises(before_fit, after_fit, joints)
     rises = rises or comparison.spoiled(before_fit, (compared, after_fit), joints)
     if rises and not force:
         return Added(after, before_fit, after_fit, differences, rises, refused=True)
