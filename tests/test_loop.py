@@ -1,6 +1,7 @@
 """The loop: an effect goes into the file, the fit is repeated, the history tells; discover never keeps what held-out data refuse."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -66,7 +67,13 @@ def test_one_line_of_the_file_changes(effect, joints, options, entry):
     (changed,) = [k for k, (a, b) in enumerate(zip(before, after)) if a != b and "effects:" in a]
     # the list in flow style may be written without its braces, which YAML allows
     assert after[changed].split("#")[1] == before[changed].split("#")[1]
-    assert after[changed].split("]   #")[0].replace("{", "").replace("}", "").startswith("  effects: [viscous, coulomb, " + entry.replace("{", "").replace("}", "").split("]")[0])
+    assert (
+        after[changed]
+        .split("]   #")[0]
+        .replace("{", "")
+        .replace("}", "")
+        .startswith("  effects: [viscous, coulomb, " + entry.replace("{", "").replace("}", "").split("]")[0])
+    )
     bare = lambda line: line.strip().replace('"', "").replace("'", "")  # noqa: E731
     assert [bare(line) for k, line in enumerate(after) if k != changed] == [bare(line) for k, line in enumerate(before) if k != changed]
     assert effects_of(text) == [("viscous", None, {}), ("coulomb", None, {}), (effect, joints, options)]
@@ -305,6 +312,21 @@ def test_another_joint_s_error_does_not_refuse(experiment, cli):
     assert said.status == 0 and document["refused"] is False and document["says"] == ""
     (elbow,) = [d for d in document["differences"] if d["joint"] == "elbow"]
     assert elbow["delta_rms"] < -3 * elbow["se"] and document["untold"] == ""
+
+
+def test_what_is_written_is_what_may_not_make_the_error_rise(experiment, cli, monkeypatch):
+    """Under the prior of the fit before it falls, and under its own, which the user will see, it rises."""
+    folder, refit = experiment(train=reading(0.5), test=reading(0.5)), pipeline.refit
+
+    def worse(*given, **how):
+        after, alike, _ = refit(*given, **how)
+        test = after.predictions["test"]
+        seen = replace(after, predictions={**after.predictions, "test": replace(test, predicted=test.predicted + 2.0)})
+        return seen, alike, lambda: given[1]
+
+    monkeypatch.setattr(pipeline, "refit", worse)
+    said = cli("add", folder, "torque_bias", "--joint", "elbow", "--json")
+    assert said.status == 1 and json.loads(said.out)["says"].startswith("not added: it makes the held-out error rise on elbow by ")
 
 
 def test_an_effect_that_no_log_speaks_for_is_written_and_said_to_be_so(experiment, cli):
