@@ -36,6 +36,8 @@ def test_a_formula_in_what_a_residual_follows(follows, linear, has):
 def test_one_variable_that_says_nearly_as_much_comes_before_two():
     found = to_begin_with(entry(("qd_wrist", 0.6, "time"), ("time", 0.55)), "arm", ())
     assert found["options"]["formula"] == "a*t + b*t**2 + c*t**3"
+    # not where it leaves twelve times as much
+    assert "load*t" in to_begin_with(entry(("load_wrist", 0.99, "time"), ("time", 0.88)), "arm", ())["options"]["formula"]
     assert "qd" in to_begin_with(entry(("qd_wrist", 0.6, "time"), ("time", 0.3)), "arm", ())["options"]["formula"]
 
 

@@ -17,7 +17,8 @@ from .words import followed, percent
 
 TOGETHER = "several variables together"
 _MOST = 0.5  # of what functions of the motion predict: less, and another variable has more
-_NEARLY = 0.8  # of what most predict: one variable that does says it more simply than two
+# Of what most predict, and times what that leaves: one variable says it more simply than two.
+_NEARLY, _LEAVES = 0.8, 1.5
 _TRIED = 2  # of these: each is a fit
 # without what nearly every model has, a constant, Coulomb and viscous friction
 _TERMS = {
@@ -60,7 +61,10 @@ def to_begin_with(
     joint, told = entry["joint"], entry.get("depends_on", ())
     if not told or told[0]["share"] < _MOST * entry["share_left"] or of_bodies(entry):
         return None
-    near = [one for one in told if one["share"] >= _NEARLY * told[0]["share"]]
+    most = told[0]["share"]
+    near = [
+        one for one in told if one["share"] >= max(_NEARLY * most, 1.0 - _LEAVES * (1.0 - most))
+    ]
     every = (_options(one, joint) for one in sorted(near, key=lambda one: "with" in one))
     new = [own for own in every if own and (own["name"], joint) not in there]
     for options in new[:_TRIED]:
