@@ -51,6 +51,13 @@ def fitted(tmp_path_factory, planar):
     return folder
 
 
+def test_what_is_left_as_logged_is_what_the_fit_says(fitted):
+    """Its own test log through its own filter: under another, the noise of the angles makes another error."""
+    run = json.loads((fitted / "run" / "fit.json").read_text())["rms"]["test"]
+    found = changed(pipeline.load(fitted), fitted / "run", [str(fitted / "test.csv")])
+    assert found.changes == () and dict(zip(found.joints, found.left)) == pytest.approx(run, rel=1e-3)
+
+
 def what_changed(folder, log: str) -> dict:
     said = changes_document(changed(pipeline.load(folder), folder / "run", [str(folder / log)]))
     json.dumps(said, allow_nan=False)

@@ -23,7 +23,9 @@ def entry(*follows, left: float = 0.6) -> dict:
         (("load_wrist", 0.6, "direction"), 4, "a*s*load"),
         (("qd_wrist", 0.6), 3, "a*qd*abs(qd)"),
         (("qd_wrist", 0.6, "direction"), 3, "a*s*qd**2"),
-        (("qd_wrist", 0.6, "time"), 5, "a*qd*t"),
+        (("qd_wrist", 0.6, "time"), 5, "a*s*t"),
+        (("q_elbow", 0.6, "qd_wrist"), 5, "a*s*q_elbow + b*s*q_elbow**2 + c*qd*q_elbow"),
+        (("q_wrist", 0.6, "time"), 5, "a*q*t"),
     ],
 )
 def test_a_formula_in_what_a_residual_follows(follows, linear, has):

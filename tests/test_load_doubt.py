@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from sysid import config, load_doubt, pipeline
+from sysid.shape import settle
+from sysid.view import as_fitted, first_view
 
 
 @pytest.fixture(scope="module")
@@ -97,3 +99,17 @@ def test_friction_that_goes_with_two_loads_is_as_doubtful_as_each(simulated):
     assert np.all(after.uncertainty.std[told] >= fit.uncertainty.std[told]) and np.isfinite(after.uncertainty.std[told]).all()
     rest = np.setdiff1d(np.arange(fit.model.size), told)
     np.testing.assert_array_equal(after.uncertainty.std[rest], fit.uncertainty.std[rest])
+
+
+def test_what_is_held_in_a_hollow_is_settled_from_where_a_fit_has_it(soft):
+    """Ten times as soft, under the load of bodies that have nothing of it: from there no step leads on."""
+    fit = fitted(soft)
+    view = first_view(fit.experiment, fit)
+    far = view.model.with_shapes([10.0 * fit.model.shapes[0], *fit.model.shapes[1:]])
+    held = replace(view, settled=settle(view.experiment, far, view.motion, view.prior, weights=view.weights, stride=view.stride, hold=True))
+    found = as_fitted(held, fit)
+    assert found.settled.objective < 0.5 * held.settled.objective
+    assert found.model.shapes[0] == pytest.approx(fit.model.shapes[0], rel=0.1)
+    assert as_fitted(found, fit) is found  # no lower
+    rigid = first_view(*(lambda plain: (plain.experiment, plain))(pipeline.fit(pipeline.load(soft[0]))))
+    assert as_fitted(rigid, fit) is rigid

@@ -312,6 +312,7 @@ def test_another_variant_of_what_joined_later_may_stand_for_a_head_that_is_refus
     monkeypatch.setattr(claims, "first_borne_out", borne_out)
     monkeypatch.setattr("sysid.refused.taken", lambda *views: np.zeros(2))
     monkeypatch.setattr(claims, "rejoined", lambda first, own: own)
+    monkeypatch.setattr(claims, "as_fitted", lambda view, fit: view)
     monkeypatch.setattr(claims.pipeline, "fit_grown", lambda *given, **how: SimpleNamespace())
     monkeypatch.setattr(claims, "tried", lambda *given, **how: SimpleNamespace())
     monkeypatch.setattr(claims, "finding", lambda before, after, member, *rest: SimpleNamespace(effect=member.candidate.name, joint="elbow"))

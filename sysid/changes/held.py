@@ -11,16 +11,18 @@ import numpy as np
 from .. import pipeline, run
 from ..errors import ConfigError
 from ..model import Model
-from ..specs import Experiment
+from ..specs import Experiment, PreprocessSpec
 
 
 @dataclass(frozen=True)
 class Held:
-    """A model and its parameters x (size,), and the experiment that says how logs are read."""
+    """A model and its parameters x (size,), and the experiment that says how logs are read.
+    preprocess: how the run's own fit saw them."""
 
     experiment: Experiment
     model: Model
     x: np.ndarray
+    preprocess: PreprocessSpec
 
 
 def held(
@@ -47,4 +49,5 @@ def held(
                 allowed=", ".join(own.robot.joints),
                 do="give the experiment that was fitted",
             )
-    return Held(experiment, *found.model.at(levels or {}, found.x))
+    own = found.model.at(levels or {}, found.x)
+    return Held(experiment, *own, found.experiment.preprocess)

@@ -8,7 +8,6 @@ and of a law with an idle number they may say that a simpler one is as good.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from .. import pipeline
@@ -18,8 +17,8 @@ from ..estimate import Fit
 from ..motion import Motion
 from ..refused import Refused, no_claim
 from ..simpler import with_simpler
+from ..view import as_fitted
 from .findings import Finding, finding
-from .refits import Member
 from .steps import Step, rejoined
 
 _FITTED, _LIKELY = 3, 0.1  # members of a set that are fitted, and how likely; the rest is named
@@ -59,10 +58,7 @@ def claimed(
         fit: of the experiment as it is. test: logs, low-passed. known: as of `pipeline.refit`.
     """
     stands, refused, last = dict[int, Claim](), dict[int, tuple[Fit, Refused]](), fit
-
-    def with_(how: Callable, member: Member):
-        return tried(how, member.candidate, last, **known)
-
+    with_ = lambda how, member: tried(how, member.candidate, last, **known)  # noqa: E731
     heads = [step.candidate.kind for step in steps]
     # what was refused is asked once more with all that stand: the search found it beside them
     for number, step in [*enumerate(steps), *enumerate(steps)]:
@@ -97,6 +93,7 @@ def claimed(
     claims, own = list(stands.values()), [claim.step for claim in stands.values()]
     if any(one.choice.head is not other.choice.head for one, other in zip(own, steps)):
         own = rejoined(steps[0].before, own)  # without what is refused
+    own[-1:] = [replace(step, after=as_fitted(step.after, last)) for step in own[-1:]]
     claims = [claim.beside_all(step, last) for claim, step in zip(claims, own)]
     there = {(claim.head.effect, claim.head.joint) for claim in claims}
     return claims, [own for _, own in refused.values() if (own.effect, own.joint) not in there]

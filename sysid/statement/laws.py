@@ -26,7 +26,12 @@ _TERMS = {
     DIRECTION: "a*s*{0} + b*s*{0}**2 + c*{0} + d*{0}**2",
     "other": "a*{0}*{1} + b*{0}**2*{1} + c*{0}*{1}**2 + d*{0}**2 + e*{1}**2",
 }
-_OF_SPEED = {"": "a*qd*abs(qd) + b*qd**2 + c*qd**3", DIRECTION: "a*s*qd**2 + b*qd**2 + c*qd**3"}
+_OF_SPEED = {
+    "": "a*qd*abs(qd) + b*qd**2 + c*qd**3",
+    DIRECTION: "a*s*qd**2 + b*qd**2 + c*qd**3",
+    # friction, dry and viscous, that changes with something else
+    "other": "a*s*{1} + b*s*{1}**2 + c*qd*{1} + d*qd*{1}**2 + e*qd**2*{1}",
+}
 
 
 BODIES = (
@@ -81,6 +86,8 @@ def _options(told: dict, joint: str) -> dict | None:
         other = _in_formula(other, joint)
     if variable is None or other is None:
         return None
+    if other == "qd":
+        variable, other = other, variable
     form, terms = other if other in _TERMS else "other", _TERMS
     if variable == "qd" and form in _OF_SPEED:
         terms = _OF_SPEED

@@ -3,7 +3,17 @@
 from ..blocks import by_block
 from .design import Design, Sums, designed, instrumented, summed
 from .falls import falls
-from .joining import COMPARED, allowed, around, even, joined, shapes_in, shapes_of, weighed
+from .joining import (
+    COMPARED,
+    allowed,
+    around,
+    as_fitted,
+    even,
+    joined,
+    shapes_in,
+    shapes_of,
+    weighed,
+)
 from .laws import law
 from .losses import losses, slow_losses, taken, taken_where_held, took
 from .opened import elsewhere, first_view, too_short
@@ -20,6 +30,7 @@ __all__ = [
     "alike",
     "allowed",
     "around",
+    "as_fitted",
     "by_block",
     "designed",
     "elsewhere",

@@ -11,6 +11,7 @@ import numpy as np
 from ..blows import least_of
 from ..candidate_columns import columns_of, grown
 from ..candidates import Candidate
+from ..estimate import Fit
 from ..inertia import PARAMETERS
 from ..model import Model
 from ..posed_problem import inverse
@@ -44,6 +45,20 @@ def joined(
     starts = [source.model, *([_next_to_none(source.model)] if strikes else [])]
     found = [_again(view, model, (like or view).weights, **how) for model in starts]
     return min(found, key=lambda one: one.settled.objective)
+
+
+def as_fitted(view: View, fit: Fit) -> View:
+    """A view settled anew from the shape values and the bodies that a fit of its model has, where it
+    leaves less: a link that stands apart from its motor, and joined beside bodies that were bent for
+    want of it, may be held in a hollow far from where it swings."""
+    model, found = view.model, fit.model
+    names = ([value.name for value in one.shape_values] for one in (model, found))
+    if not model.deflects or next(names) != next(names) or model.size != found.size:
+        return view
+    own = model.with_shapes(list(found.shapes)).referring_to(fit.x)
+    again = _again(view, own, view.weights, tolerance=COMPARED)
+    lower = again.settled.objective < (1.0 - COMPARED) * view.settled.objective
+    return weighed(again) if lower else view
 
 
 def _next_to_none(model: Model) -> Model:
