@@ -78,8 +78,22 @@ def command(path, effect: str, joints: list[str] | None, options: dict) -> str:
 def apart(head: tuple[str, str], others) -> list[str]:
     """An effect and what it is not told from, as `sysid design --separate` names them; nothing where no motion can tell them."""
     told = likely(others) or others[:1]
-    suspects = [f"{e}:{j}" for e, j in (head, *(m[:2] for m in told)) if moved(e)]
-    return suspects if len(suspects) > 1 else []
+    return told_by_motion([head, *(m[:2] for m in told)])
+
+
+def told_by_motion(suspects: Sequence[tuple[str, str]]) -> list[str]:
+    """Of (effect, joint) those that a motion may tell from each other, as `sysid design --separate` names them: of some that are one
+    while a joint moves the first; nothing of one alone."""
+    each: dict[tuple, str] = {}
+    for effect, joint in suspects:
+        if moved(effect):
+            each.setdefault((frozenset((effect, *same_in_motion(effect))), joint), f"{effect}:{joint}")
+    return list(each.values()) if len(each) > 1 else []
+
+
+def same_in_motion(effect: str) -> tuple[str, ...]:
+    """The effects of which one of that name cannot be told while its joint moves."""
+    return find(effect).same_in_motion if effect in vocabulary() else ()
 
 
 def likely(others) -> list:
@@ -90,6 +104,19 @@ def likely(others) -> list:
 def moved(effect: str) -> bool:
     """Whether a motion can show an effect of that name: not what is there in some logs and not in others, whatever moves."""
     return not (effect in vocabulary() and find(effect).needs_logs)
+
+
+def one_in_motion(fit) -> list[str]:
+    """Effects in the model of a fit that may be others, which no motion tells from them."""
+    own = [(effect, j) for effect, joints in fit.model.terms for j in joints]
+    there = {(effect.name, j) for effect, j in own}
+    return [
+        f"{effect.name} on {fit.joints[j]}, which is in the model, may be {other} as well: while the "
+        f"joint moves they are one. What tells them: {effect.separate_by}"
+        for effect, j in own
+        for other in effect.same_in_motion
+        if (other, j) not in there
+    ]
 
 
 def designs(added: str, head: tuple[str, str], others) -> str:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from . import blocks, comparison, pipeline
-from .addition import grown, moved, separating, spelled, typed
+from .addition import grown, separating, spelled, told_by_motion, typed
 from .candidates import Candidate
 from .effect import NotFinite, SensorEffect
 from .estimate import Fit
@@ -226,9 +226,9 @@ def undecided(choice, fit: Fit) -> Refused:
     names = [
         f"{one} on {at} ({100 * chance:.0f} %)" for one, at, chance in likely if chance >= _LIKELY
     ]
-    told = [f"{one}:{at}" for one, at, chance in likely if chance >= _LIKELY and moved(one)]
+    told = told_by_motion([(one, at) for one, at, chance in likely if chance >= _LIKELY])
     why = f"something is there, and these logs cannot tell which: {', '.join(names)}"
-    if len(told) > 1:
+    if told:
         line = separating(str(typed(fit.experiment.path)), told)
         why += f"; a motion that tells is designed by `{line}`"
     return Refused(*likely[0][:2], why)

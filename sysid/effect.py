@@ -39,7 +39,8 @@ class Effect(ABC):
     options: {name: what it says} of the keys beside `joints` that an experiment file may give.
     nested: options that say how many terms of the same sum there are.
     tied_with: words of the vocabulary that look alike; `separate_by`: the experiment that tells them apart; maneuvers: the kinds
-        of `design.maneuvers` that show it, of those that the harmonics of a designed motion do badly.
+        of `design.maneuvers` that show it, of those that the harmonics of a designed motion do badly; same_in_motion: those that
+        are the same column while the joint moves.
     reach: samples on either side of a row that its columns look at; memory: they look back to the start of the log.
     mimics_mass: bodies take its place where a model lacks it, and their masses are off.
     uses_load: they need `motion.load` (n, dof), the torque that the bodies alone are predicted to need; uses_needed: and
@@ -63,6 +64,7 @@ class Effect(ABC):
     tied_with: ClassVar[tuple[str, ...]] = ()
     separate_by: ClassVar[str]
     maneuvers: ClassVar[tuple[str, ...]] = ()
+    same_in_motion: ClassVar[tuple[str, ...]] = ()
     source: ClassVar[str]
     scope: ClassVar[str] = "joint"
     options: ClassVar[dict[str, str]] = {}

@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from .addition import one_in_motion
 from .candidates import Candidate
 from .effect import NotFinite
 from .estimate import Fit
@@ -262,12 +263,13 @@ def changed(share: float) -> str:
     return f"{percent:+.0f} %" if abs(percent) > 99.5 else f"{percent:+.2g} %"
 
 
-def notices(claims, refused: Sequence[Refused]) -> list[str]:
-    """What to know beside claims, and of what is not claimed."""
+def notices(claims, refused: Sequence[Refused], fit: Fit) -> list[str]:
+    """What to know beside claims, of what is not claimed, and of what is in the model of a fit."""
     heads = [c.head for c in claims if c.after.weights is None and not c.head.size_told]
     told = [f"{r.effect} on {r.joint} is not claimed: {r.why}" for r in refused]
     told += [*at_edges(claims[-1].after), *clocks_anew(claims)] if claims else []
-    return told + [hidden_by_weights(head.effect, head.joint) for head in heads]
+    told += [hidden_by_weights(head.effect, head.joint) for head in heads]
+    return told + one_in_motion(fit)
 
 
 def hidden_by_weights(effect: str, joint: str) -> str:

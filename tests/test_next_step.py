@@ -9,11 +9,13 @@ import numpy as np
 import pytest
 
 from sysid import urdf
+from sysid.addition import designs, one_in_motion, told_by_motion
 from sysid.statement import where
 from sysid.statement.words import all_of, either, named
 from sysid.terminal.designed import show_design
 from sysid.terminal.diagnosis import _after_diagnosis
 from sysid.terminal.next_steps import mended_first
+from sysid.vocabulary import find
 
 from .conftest import JOINTS, RATE, URDF
 
@@ -222,7 +224,10 @@ def test_where_another_log_is_needed_its_design_is_typed_next(capsys):
 @pytest.mark.parametrize("steps", [(1, 2), (2, 1)])
 def test_what_is_promised_one_after_another_is_printed_in_that_order(steps, capsys):
     """A verdict stands by joint; the order is printed where the second joint's effect came first."""
-    found, experiment = SimpleNamespace(fit=SimpleNamespace(masses={}, filters={}, joints=("a", "b"))), SimpleNamespace(path=Path("arm/config.yaml"), name="arm")
+    found, experiment = (
+        SimpleNamespace(fit=SimpleNamespace(masses={}, filters={}, joints=("a", "b"))),
+        SimpleNamespace(path=Path("arm/config.yaml"), name="arm"),
+    )
     on = {"a": "sysid add arm spring --joint a", "b": "sysid add arm spring --joint b"}
     verdict = [{"joint": joint, "status": "missing", "commands": [command]} for joint, command in on.items()]
     findings = [{"command": command, "joins_as_step": step} for command, step in zip(on.values(), steps)]
@@ -232,3 +237,19 @@ def test_what_is_promised_one_after_another_is_printed_in_that_order(steps, caps
         assert not said and last == f"next: {on['a']}"
     else:
         assert "add them in this order" in " ".join(" ".join(said).split()) and said[-2:] == [on["b"], on["a"]] and last == f"next: {on['b']}"
+
+
+def test_what_is_one_in_motion_is_not_sent_to_a_motion():
+    """A bias and asymmetric Coulomb friction of one joint; of others a motion tells one of them."""
+    bias, friction = ("torque_bias", "hip"), ("asymmetric_coulomb", "hip")
+    assert told_by_motion([bias, friction]) == told_by_motion([bias]) == []
+    assert told_by_motion([friction, bias, ("spring", "hip")]) == ["asymmetric_coulomb:hip", "spring:hip"]
+    assert told_by_motion([bias, ("asymmetric_coulomb", "knee")]) == ["torque_bias:hip", "asymmetric_coulomb:knee"]
+    assert designs("sysid add leg torque_bias --joint hip", bias, [(*friction, 0.5)]) == ""
+
+
+def test_what_is_in_the_model_may_be_what_is_the_same_in_motion():
+    fit = lambda *terms: SimpleNamespace(joints=("hip", "knee"), model=SimpleNamespace(terms=[(find(name), (j,)) for name, j in terms]))  # noqa: E731
+    (said,) = one_in_motion(fit(("torque_bias", 1), ("coulomb", 1)))
+    assert said.startswith("torque_bias on knee, which is in the model, may be asymmetric_coulomb as well") and "torque at rest" in said
+    assert one_in_motion(fit(("torque_bias", 1), ("asymmetric_coulomb", 1))) == []

@@ -123,5 +123,6 @@ def diagnose(
         told = tuple(claims), tuple(said), tuple(could), tuple(where), events, view, first, then
         own = {claim.head.joint for claim in claims}
         held = held_bodies.told(fit, last, found, own, known)
-        say = tuple(refused), (*wrong, *part, *held, *notices(claims, refused), *loads.told(after))
+        beside = (*notices(claims, refused, fit), *loads.told(after))
+        say = tuple(refused), (*wrong, *part, *held, *beside)
         return Diagnosis(fit, dict(zip(fit.joints, found)), *told, *say)

@@ -12,6 +12,7 @@ class AsymmetricCoulomb(TorqueEffect):
     looks_like = "a step of unequal height wherever the speed changes sign: a constant while the joint moves, nothing while it stands"
     tied_with = ("torque_bias",)
     separate_by = "torque at rest: a bias stays, friction goes"
+    same_in_motion = ("torque_bias",)
     maneuvers = ("poses",)
     source = "Elhami & Brookfield 1996"
     elementwise = True

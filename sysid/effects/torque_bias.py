@@ -13,7 +13,8 @@ class TorqueBias(TorqueEffect):
     equation = "tau = b"
     looks_like = "a constant residual"
     tied_with = ("asymmetric_coulomb", "gravity on a joint that always holds the same load")
-    separate_by = "torque at rest, and slow sweeps both ways"
+    separate_by = "torque at rest: a bias stays, friction goes"
+    same_in_motion = ("asymmetric_coulomb",)
     maneuvers = ("poses",)
     source = "Janot, Gautier & Brunot 2019 (the offset of EMPS)"
     mimics_mass = True
