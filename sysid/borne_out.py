@@ -127,6 +127,8 @@ def in_doubt(before: Fit, after: Fit, told: Fit, candidate: Candidate) -> str | 
         after = min((after, told), key=lambda one: comparison.together(before, one).delta_rms)
     if "logs" in dict(candidate.options) and _is_zero(before, after, own, whole):
         return "another zero of each log's torque leaves less"
+    if none := at_zero(told, *candidate.key):
+        return f"its {none} is at its bound of zero, and what is left of it is another effect"
     fell = any(after.rms("train")[joint] < before.rms("train")[joint] for joint in own)
     if whole:
         change, unit, still = comparison.together(before, after), 1.0, True
@@ -217,6 +219,19 @@ def size_told(fit: Fit, effect: str, joint: int) -> bool:
     away = np.array([model.shapes[k] - v.shape.start for k, v in values])
     known = fit.shape_covariance[np.ix_(at := [k for k, _ in values], at)]
     return blocks.clear(away, known, count)
+
+
+def at_zero(fit: Fit, effect: str, joint: int) -> str:
+    """The coefficients, in words, of an effect on a joint's number that say how large it is and may
+    not be negative, where all of them are held at zero in a fit: a spring without stiffness."""
+    model, held = fit.model, fit.certificate.at_zero
+    own = [
+        k
+        for k, c in enumerate(model.coefficients)
+        if (c.effect, c.joint) == (effect, joint) and c.positive
+    ]
+    names = [model.coefficients[k].name.rpartition(".")[2] for k in own if k in held]
+    return " and ".join(names) if own and len(names) == len(own) else ""
 
 
 def undecided(choice, fit: Fit) -> Refused:

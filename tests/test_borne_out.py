@@ -7,7 +7,7 @@ import pytest
 
 from sysid import blocks, borne_out, comparison, vocabulary
 from sysid.blocks import parameters
-from sysid.borne_out import doubted, first_borne_out, in_doubt, size_told
+from sysid.borne_out import at_zero, doubted, first_borne_out, in_doubt, size_told
 from sysid.candidates import Candidate
 from sysid.comparison import Difference
 from sysid.effect import NotFinite
@@ -17,7 +17,8 @@ class Told(SimpleNamespace):
     """A fit as far as `in_doubt` looks at it: the error of its joint."""
 
     joints, weights = ("shoulder", "elbow"), None
-    model = SimpleNamespace(terms=())
+    model = SimpleNamespace(terms=(), coefficients=())
+    certificate = SimpleNamespace(at_zero={})
 
     def rms(self, part):
         return {"shoulder": 1.0, "elbow": self.error}
@@ -299,3 +300,12 @@ def test_one_whose_size_is_told_comes_before_one_whose_is_not(members, head, ref
     assert (found and found.candidate.name) == head
     assert "".join(one.candidate.name for one in made if id(one) in whys) == refused
     assert found is None or fits[id(found)] == head
+
+
+@pytest.mark.parametrize(("held", "said"), [({1: 3.0}, "k"), ({}, ""), ({0: 3.0, 2: 1.0}, "")])
+def test_a_spring_without_stiffness_is_none(held, said):
+    """Its torque at angle zero alone is left, a bias."""
+    named = lambda effect, name, positive: SimpleNamespace(effect=effect, joint=1, name=f"{effect}.elbow.{name}", positive=positive)  # noqa: E731
+    own = (named("coulomb", "Fc", True), named("spring", "k", True), named("spring", "c", False))
+    fit = SimpleNamespace(model=SimpleNamespace(coefficients=own), certificate=SimpleNamespace(at_zero=held))
+    assert at_zero(fit, "spring", 1) == said and at_zero(fit, "cogging", 1) == ""
