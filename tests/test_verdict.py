@@ -51,7 +51,7 @@ def left(share: float) -> Unknown:
 def fitted(elbow: float, shoulder: float = 1.0, train: float | None = None):
     rms = {"test": {"shoulder": shoulder, "elbow": elbow}}
     rms["train"] = rms["test"] if train is None else {"shoulder": shoulder, "elbow": train}
-    return SimpleNamespace(joints=JOINTS, rms=rms.get, weights=None, model=SimpleNamespace(terms=()))
+    return SimpleNamespace(joints=JOINTS, rms=rms.get, weights=None, model=SimpleNamespace(terms=(), coefficients=()), certificate=SimpleNamespace(at_zero={}))
 
 
 def looked(elbow: float, at_zero=()):
