@@ -121,8 +121,7 @@ def diagnose(
         could = detectable(view, asked, candidates(view.model, extra))
         events, part = (*view.motion.events, *test.events), () if whole else measured.notices
         told = tuple(claims), tuple(said), tuple(could), tuple(where), events, view, first, then
-        own = {claim.head.joint for claim in claims}
-        held = held_bodies.told(fit, last, found, own, known)
+        held = held_bodies.told(fit, last, found, {c.head.joint for c in claims}, known)
         beside = (*notices(claims, refused, fit), *loads.told(after))
         say = tuple(refused), (*wrong, *part, *held, *beside)
         return Diagnosis(fit, dict(zip(fit.joints, found)), *told, *say)

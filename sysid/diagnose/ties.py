@@ -119,9 +119,12 @@ def chosen(view: View, groups: list[Group], rng, known: Mapping = {}) -> Choice 
     best = [k for k in inside if lost[k] <= lost[inside].min() + same]
     head = min(best, key=lambda k: members[k].candidate.simplicity)
     # no log tells that a sign was free to choose: it halves the odds
-    odds, lost = np.exp2([-members[k].group.either for k in inside]), free.sum(0)
-    odds = odds * blocks.chances(free[:, inside], rng, group.variance)
-    chance = dict(zip(inside, odds / odds.sum()))
+    odds, lost = np.exp2([-m.group.either for m in members]), free.sum(0)
+    # nor is ruled out, as no head, whom the likelihood does not, however steadily little is lost
+    likely = blocks.chances(free, np.random.default_rng(1), group.variance) >= _OUTSIDE
+    named = [*inside, *(k for k in np.flatnonzero(likely) if k not in inside)]
+    odds = odds[named] * blocks.chances(free[:, named], rng, group.variance)
+    chance = dict(zip(named, odds / odds.sum()))
     # whom only its fewer signs made the head may be less likely than another
     wide = lambda k: k != head and holds(view, members[k], members[head])  # noqa: E731
     less = [k for k in inside if lost[k] < lost[head] - same and not wide(k)]
@@ -129,7 +132,7 @@ def chosen(view: View, groups: list[Group], rng, known: Mapping = {}) -> Choice 
     # a refit of what is mostly noise is bent by it: whoever is bent least goes on
     bent = [m for m in late[members[head].candidate.joint] if members[head].group.slow]
     head = next((k for k in map(members.index, bent) if k in inside), head)
-    for k in sorted(inside, key=lambda k: (k != head, -chance[k])):
+    for k in sorted(chance, key=lambda k: (k != head, -chance[k])):
         # what only adds freedom predicts as well: it counts by how likely it is
         order += [] if told > 1.0 - _OUTSIDE and wide(k) else [k]
         told += chance[k]
