@@ -50,7 +50,10 @@ class Added:
             else f"on {d.joint} by {d.delta_rms:.3g} (standard error {d.se:.2g})" for d in self.rises
         )  # fmt: skip
         done = "not added" if self.refused else "added all the same"
-        return f"{done}: it makes the held-out error rise {risen}" + ("; --force adds it all the same" if self.refused else "")
+        fell = {d.joint for d in self.differences if d.delta_rms < 0.0} & {d.joint for d in self.rises}
+        under = "under the prior as it was, with which the fit before is told, " if fell else ""
+        rest = "; what falls above falls by another weight of the prior" if fell else ""
+        return f"{done}: {under}it makes the held-out error rise {risen}{rest}" + ("; --force adds it all the same" if self.refused else "")
 
 
 # ---- the experiment file

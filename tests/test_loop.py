@@ -10,6 +10,7 @@ import pytest
 from sysid import config, effect_entry, loop, pipeline
 from sysid.addition import grown, spelled
 from sysid.candidates import candidates
+from sysid.comparison import Difference
 from sysid.effect_entry import with_effect
 from sysid.errors import ConfigError, LogError
 from sysid.statement import kept
@@ -327,6 +328,17 @@ def test_what_is_written_is_what_may_not_make_the_error_rise(experiment, cli, mo
     monkeypatch.setattr(pipeline, "refit", worse)
     said = cli("add", folder, "torque_bias", "--joint", "elbow", "--json")
     assert said.status == 1 and json.loads(said.out)["says"].startswith("not added: it makes the held-out error rise on elbow by ")
+
+
+def test_a_fall_that_is_the_prior_s_is_said_to_be():
+    """Of two fits the one that is shown has less error, by another weight of the prior, and the one under the same has more."""
+    fell, rose = (Difference("before", "after", "elbow", by, 0.01) for by in (-0.05, 0.3))
+    said = loop.Added(None, None, None, (fell,), (rose,), refused=True).says
+    assert (
+        said.startswith("not added: under the prior as it was")
+        and "rise on elbow by 0.3 (standard error 0.01); what falls above falls by another weight" in said
+    )
+    assert "prior" not in loop.Added(None, None, None, (rose,), (rose,), refused=True).says
 
 
 def test_an_effect_that_no_log_speaks_for_is_written_and_said_to_be_so(experiment, cli):

@@ -221,6 +221,19 @@ def test_where_another_log_is_needed_its_design_is_typed_next(capsys):
     assert capsys.readouterr().out.splitlines()[-1] == "next: sysid report arm --open"
 
 
+def test_a_push_is_left_out_before_what_it_bends_is_asked(capsys):
+    """Of two seconds on one joint, beside which another one's rest looks like an effect, and a third one's like nothing that is known."""
+    found = SimpleNamespace(fit=SimpleNamespace(masses={}, filters={}, joints=("a", "b", "c")))
+    verdict = [{"joint": joint, "status": "unresolved", "says": ""} for joint in "abc"]
+    verdict[1]["may_be"] = {"command": "sysid add arm torque_gain --joint b"}
+    stretch = {"joint": "a", "stretches": [{"log": "train.csv", "start": 10.6, "stop": 13.4}], "regions": []}
+    document = {"verdict": verdict, "findings": [], "notices": [], "run": "runs/arm"}
+    assert where.blind(document) == ["a", "c"] and where.blind({**document, "fails_where": [stretch]}) == []
+    for fails, last in (([], "next: sysid add arm torque_gain --joint b"), ([stretch], "next: sysid diagnose arm")):
+        _after_diagnosis(found, {**document, "fails_where": fails}, SimpleNamespace(path=Path("arm/config.yaml"), name="arm"))
+        assert capsys.readouterr().out.splitlines()[-1] == last
+
+
 @pytest.mark.parametrize("steps", [(1, 2), (2, 1)])
 def test_what_is_promised_one_after_another_is_printed_in_that_order(steps, capsys):
     """A verdict stands by joint; the order is printed where the second joint's effect came first."""

@@ -61,9 +61,9 @@ def blind(document: dict) -> list[str]:
     """The joints whose error another log may explain, and nothing that is known now."""
     own = (v for v in document["verdict"] if v["joint"] not in document.get("unused", ()))
     open_ = (v for v in own if v["status"] == "unresolved")
-    known = {*touched(document), *(document.get("too_narrow") or {"rms": ()})["rms"]}
-    if any(WRONG in notice for notice in document.get("notices", ())):
-        return []  # no log tells anything while its columns are wrong
+    known = set((document.get("too_narrow") or {"rms": ()})["rms"])
+    if touched(document) or any(WRONG in notice for notice in document.get("notices", ())):
+        return []  # no log tells anything while its columns are wrong, or a push bends the others
     return [
         v["joint"]
         for v in open_

@@ -60,10 +60,12 @@ def _after_diagnosis(found, document: dict, experiment) -> None:
     # what the evidence names comes first: it is told with the masses as they are, and may be what bends them
     if first is None and mended_first(document, experiment, found.fit):
         return
-    if first is not None or may:
-        next_line(first["command"] if first else may[0], out=out)
-    elif where.touched(document):
+    if first is not None:
+        next_line(first["command"], out=out)
+    elif where.touched(document):  # it bends what is left of the others
         next_step("diagnose", target, first="leave out what is no motion of the robot, if it is none", out=out)
+    elif may:
+        next_line(may[0], out=out)
     elif even:
         next_step("diagnose", target, first=f"write {WEIGHED} for {text.listed(even, 'and')}", out=out)
     elif laws := [v["law"]["command"] for v in document["verdict"] if "law" in v]:
