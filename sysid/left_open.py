@@ -39,13 +39,25 @@ def left_open(verdicts: Sequence, left, worth: float) -> list:
 
     unknown = [one.status == "unknown" and not one.claims for one in verdicts]
     out = [again(j, one) if unknown[j] else one for j, one in enumerate(verdicts)]
+    out = [_but_for_a_moment(one, left) if _open(one) else one for one in out]
     return [_with_strength(j, one, left, worth) for j, one in enumerate(out)]
+
+
+def _open(one) -> bool:
+    """Whether nobody can say what a joint's rest is."""
+    return one.status == "unresolved" and not (one.may or one.even or one.reason)
+
+
+def _but_for_a_moment(one, left):
+    """The verdict on a joint, with where it is not at its noise, if that is a moment alone."""
+    said = None if one.left else left.moments.get(one.joint)
+    return replace(one, says=said.says, reason=said) if said else one
 
 
 def _with_strength(j: int, one, left, worth: float):
     """The verdict on a joint's number, with what the strength of the rest follows where nobody can
     say what it is: what most laws do, and noise may."""
-    if one.status != "unresolved" or one.may or one.even or one.reason:
+    if not _open(one):
         return one
     law = left.strength(j)
     clear = law is not None and law.chance < _CLEAR and law.share > worth

@@ -20,7 +20,8 @@ def pressed(fit: Fit) -> dict[str, Reason]:
     At rest friction may be anything up to that which it has in motion, and no more: what holds a
     joint beyond it is no law of the joint.
     """
-    out = {}
+    out: dict[str, Reason] = {}
+    most_missing: dict[str, float] = {}
     for part, whole in fit.predictions.items():
         told = whole.thinned(_ROWS)
         if told.states is None:
@@ -43,6 +44,9 @@ def pressed(fit: Fit) -> dict[str, Reason]:
                 continue
             at, unit = float(np.median(told.states.q[use, j][there])), told.units[j]
             size, name = np.sqrt(np.mean(square[there])), "training" if part == "train" else part
+            if size <= most_missing.get(joint, 0.0):
+                continue
+            most_missing[joint] = size
             out[joint] = Reason(
                 f"most of its error on the {name} logs is where it hardly moves, about {at:.3g} "
                 f"{'rad' if unit == 'N m' else 'm'}: {size:.3g} {unit} is missing there, more than "

@@ -7,11 +7,13 @@ from dataclasses import dataclass
 from functools import cached_property, partial
 
 from .borne_out import misfit_taken
+from .brief import brief
 from .candidates import Candidate
 from .estimate import Fit
 from .failures import HeldOut
 from .flexible import Law
 from .noise import NoiseFloor, as_of_test
+from .plausible import Reason
 from .unexplained import of_few_blocks
 from .view import View, elsewhere, law, strength
 
@@ -39,6 +41,11 @@ class Left:
     def elsewhere(self) -> View | None:
         """The same model settled on the test logs."""
         return elsewhere(self.view, self.logs.test, self.logs.train)
+
+    @cached_property
+    def moments(self) -> dict[str, Reason]:
+        """Joints that are at their noise but for a moment, and why."""
+        return brief(self.fit, self.floors)
 
     def law(self, j: int) -> Law:
         """The function of the motion that stands out most of what is left of joint j."""

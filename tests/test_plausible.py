@@ -10,6 +10,7 @@ import polars as pl
 import pytest
 
 from sysid import pipeline, plausible
+from sysid.brief import brief
 from sysid.noise import NoiseFloor
 from sysid.plausible import implausible, outdated
 from sysid.prediction import Prediction, States
@@ -71,6 +72,24 @@ def test_a_joint_that_presses_on_a_stop_as_it_stands_is_held_by_it(missing, nois
     assert bool(found) is held
     if held:
         assert found["elbow"].settles and "on the training logs" in found["elbow"].says and "about 1.2 rad: 5 N m is missing there" in found["elbow"].says
+
+
+@pytest.mark.parametrize(
+    ("at", "told"),
+    [((24.8,), "test.csv, 24.75 to 25.00 s"), ((3.3, 12.05), "test.csv, 3.25 to 3.50 s and test.csv, 12.00 to 12.25 s"), ((3.0, 9.0, 15.0), ""), ((), "")],
+)
+def test_what_comes_once_is_no_law(at, told):
+    """A joint that is at its noise but for the end of a log, or two moments of it; of three something may do it time and again."""
+    t = np.arange(5000) * 0.005
+    left = np.random.default_rng(1).normal(size=(5000, 1))
+    quiet = Prediction(np.zeros(len(t)), t, left, np.zeros(left.shape), None, ("elbow",), ("N m",))
+    loud = left + 20.0 * sum(((t >= own) & (t < own + 0.1) for own in at), np.zeros(len(t)) > 1.0)[:, None]
+    rms = {part: {"elbow": float(np.sqrt(np.mean(values**2)))} for part, values in (("train", left), ("test", loud))}
+    logs = [{"part": part, "log": f"{part}.csv"} for part in ("train", "test")]
+    fit = SimpleNamespace(joints=("elbow",), predictions={"train": quiet, "test": replace(quiet, measured=loud)}, rms=rms.get, logs=logs)
+    found = brief(fit, [NoiseFloor(1.0, 0.02, "spectral", "")])
+    assert ([told] if told else []) == [one.says.partition(" but for ")[2].partition(": what comes once")[0] for one in found.values()]
+    assert brief(fit, [NoiseFloor(None, None, "none", "")]) == {}
 
 
 @pytest.mark.parametrize(("train", "r2", "test", "said"), [(0.17, 0.9, 0.175, False), (0.17, 0.9, 0.3, True), (0.17, -0.1, 0.17, True)])

@@ -689,7 +689,7 @@ def test_what_may_come_of_another_joints_effect_is_left_open():
     """Bodies bent by what one joint lacks leave error on others, which is no law that the catalogue lacks."""
     stribeck = Candidate(find("stribeck"), 1, ())
     some, takes = left(0.4), lambda j, candidate: 0.5
-    open_ = lambda laws: SimpleNamespace(beyond=laws, fitted=takes, strength=lambda j: None)  # noqa: E731
+    open_ = lambda laws: SimpleNamespace(beyond=laws, fitted=takes, strength=lambda j: None, moments={})  # noqa: E731
     joint = lambda name, status, may=None, claims=(): Verdict(name, status, claims, says="was", may=may, left=some)  # noqa: E731
     said = [joint("a", "unknown"), joint("b", "unresolved", stribeck), joint("c", "unknown"), joint("d", "unknown", claims=(1,)), joint("e", "unknown")]
     laws = {0: Law(1.0, "", 0.0), 2: Law(1e-9, "q_c", 0.3), 3: Law(1.0, "", 0.0), 4: None}
@@ -711,7 +711,7 @@ def test_what_may_be_there_and_takes_nothing_of_a_fit_is_not_to_be_tried():
     asked = []
     for share, stays in ((0.5, True), (0.0, False)):
         takes = lambda j, one: asked.append((j, one)) or share  # noqa: B023, E731
-        found = left_open(said, SimpleNamespace(beyond=lambda j, one: None, fitted=takes, strength=lambda j: None), WORTH)
+        found = left_open(said, SimpleNamespace(beyond=lambda j, one: None, fitted=takes, strength=lambda j: None, moments={}), WORTH)
         assert found[0] == said[0] and (found[1] == said[1]) is stays
     assert asked == [(1, delay)] * 2 and found[1].may is None
     assert found[1].says.startswith("what is left may be delay, though no fit with it bore that out") and found[1].says.endswith("its neighbour is louder")
@@ -736,7 +736,7 @@ def test_what_is_louder_in_some_of_the_motion_is_told():
     said = [Verdict(name, "unresolved", says="nobody can say") for name in "abc"]
     said += [Verdict("d", "unresolved", says="may be", may=stribeck), Verdict("e", "complete"), Verdict("f", "unresolved", even=True)]
     laws = {0: Law(1e-9, "qd_a", 0.3), 1: Law(1e-9, "qdd_b", 0.3), 2: Law(1e-4, "q_c", 0.3)}
-    found = left_open(said, SimpleNamespace(beyond=lambda j, one: None, fitted=lambda j, one: 0.5, strength=laws.__getitem__), WORTH)
+    found = left_open(said, SimpleNamespace(beyond=lambda j, one: None, fitted=lambda j, one: 0.5, strength=laws.__getitem__, moments={}), WORTH)
     assert [one.status for one in found] == [one.status for one in said] and found[1:] == said[1:]
     entry = entry_of(found[0])
     assert entry["strength"] == {"follows": "qd_a", "share": 0.3} and "depends_on" not in entry
