@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from .addition import one_in_motion
+from .cancelling import cancelling
 from .candidates import Candidate
 from .effect import NotFinite
 from .estimate import Fit
@@ -269,7 +270,7 @@ def notices(claims, refused: Sequence[Refused], fit: Fit) -> list[str]:
     told = [f"{r.effect} on {r.joint} is not claimed: {r.why}" for r in refused]
     told += [*at_edges(claims[-1].after), *clocks_anew(claims)] if claims else []
     told += [hidden_by_weights(head.effect, head.joint) for head in heads]
-    return told + one_in_motion(fit)
+    return told + cancelling(claims) + one_in_motion(fit)
 
 
 def hidden_by_weights(effect: str, joint: str) -> str:

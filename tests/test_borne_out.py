@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from sysid import blocks, borne_out, comparison, vocabulary
+from sysid import blocks, borne_out, cancelling, comparison, vocabulary
 from sysid.blocks import parameters
 from sysid.borne_out import at_zero, doubted, first_borne_out, in_doubt, size_told
 from sysid.candidates import Candidate
@@ -309,3 +309,17 @@ def test_a_spring_without_stiffness_is_none(held, said):
     own = (named("coulomb", "Fc", True), named("spring", "k", True), named("spring", "c", False))
     fit = SimpleNamespace(model=SimpleNamespace(coefficients=own), certificate=SimpleNamespace(at_zero=held))
     assert at_zero(fit, "spring", 1) == said and at_zero(fit, "cogging", 1) == ""
+
+
+@pytest.mark.parametrize(("numbers", "says"), [((-201.0, 171.0, -47.0), True), ((1.0, 0.5, -0.3), False), ((3.0,), False)])
+def test_terms_that_cancel_are_told(monkeypatch, numbers, says):
+    """Three harmonics over a part of a turn, 100 times what they sum to; and three that are a law's own numbers."""
+    q = np.linspace(-0.66, 0.66, 200)
+    columns = np.stack([np.sin(k * q) for k in range(1, len(numbers) + 1)], axis=1)
+    monkeypatch.setattr(cancelling, "columns_of", lambda source, candidate, shapes: columns[None, None])
+    candidate = SimpleNamespace(nonlinear=False, key=("position_friction", 1))
+    after = SimpleNamespace(parameters_of=lambda *_: {str(k): (at, 0.1, "N m") for k, at in enumerate(numbers)})
+    step = SimpleNamespace(after=SimpleNamespace(source=None), choice=SimpleNamespace(head=SimpleNamespace(shapes={})))
+    claim = SimpleNamespace(head=SimpleNamespace(effect="position_friction", joint="elbow", candidate=candidate), step=step, after=after)
+    said = cancelling.cancelling([claim])
+    assert bool(said) is says and all("terms of position_friction on elbow cancel each other" in one for one in said)
