@@ -18,6 +18,7 @@ from ..model_parameters import ROBOT
 from ..motion import Motion
 from ..noise import floors_of
 from ..preprocess import prepare
+from ..spans import Spans
 from ..specs import Experiment
 from ..warned import noticed
 from .fitted import Change, together, with_fewer
@@ -127,7 +128,10 @@ def asked(
 
 def _as_fitted(model: Held, read) -> Motion | None:
     """Logs with torque as logged, seen as the run's own fit saw them: under another filter the
-    noise of the angles makes another error. None where they are too short for that."""
+    noise of the angles makes another error. None where they are too short for that, or fill the
+    memory."""
+    if any(isinstance(log.segments, Spans) for log in read):
+        return None
     raw = model.preprocess.model_copy(update={"torque": "raw"})
     try:
         with noticed():
