@@ -128,7 +128,10 @@ def in_doubt(before: Fit, after: Fit, told: Fit, candidate: Candidate) -> str | 
     if "logs" in dict(candidate.options) and _is_zero(before, after, own, whole):
         return "another zero of each log's torque leaves less"
     if none := at_zero(told, *candidate.key):
-        return f"its {none} is at its bound of zero, and what is left of it is another effect"
+        more = ", and what is left of it is another effect" * (
+            len(candidate.effect.coefficients()) > 1
+        )
+        return f"its {none} is at its bound of zero{more}"
     fell = any(after.rms("train")[joint] < before.rms("train")[joint] for joint in own)
     if whole:
         change, unit, still = comparison.together(before, after), 1.0, True
