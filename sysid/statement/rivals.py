@@ -12,10 +12,13 @@ if TYPE_CHECKING:
 
 
 def as_little(found: Diagnosis) -> dict[str, set[tuple[str, str]]]:
-    """Of each claim's command the (effect, joint) of its set that leave as little as its head."""
+    """Of each claim's command the (effect, joint) of its set that leave as little as its head, by
+    more numbers."""
     return {
         claim.head.command: {
-            m.candidate.named(found.fit.joints) for m in claim.step.choice.as_little
+            m.candidate.named(found.fit.joints)
+            for m in claim.step.choice.as_little
+            if m.candidate.parameters > claim.head.candidate.parameters
         }
         for claim in found.claims
     }
