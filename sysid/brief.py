@@ -8,10 +8,9 @@ import numpy as np
 
 from .estimate import Fit
 from .noise import NoiseFloor, as_of_test
-from .plausible import Reason
+from .plausible import ROWS, Reason
 
 _WINDOW, _FEW, _MOST = 0.25, 0.02, 2  # s; of a part's rows; stretches
-_ROWS = 200_000  # that tell it
 
 
 def brief(fit: Fit, floors: Sequence[NoiseFloor]) -> dict[str, Reason]:
@@ -21,7 +20,7 @@ def brief(fit: Fit, floors: Sequence[NoiseFloor]) -> dict[str, Reason]:
     out = {}
     trained = as_of_test(fit.rms("train"), floors)
     for j, joint in enumerate(fit.joints):
-        both = {"training": trained[joint], "test": fit.rms("test")[joint]}
+        both = {"train": trained[joint], "test": fit.rms("test")[joint]}
         loud = [part for part, error in both.items() if not floors[j].reached(error)]
         if floors[j].rms is None or not loud:
             continue
@@ -37,9 +36,8 @@ def brief(fit: Fit, floors: Sequence[NoiseFloor]) -> dict[str, Reason]:
 
 def _moments(fit: Fit, j: int, floor: NoiseFloor, part: str) -> str:
     """The moments of a part without which joint j is at its floor, in words; empty where more."""
-    key = "train" if part == "training" else part
-    told, times = fit.predictions[key].thinned(_ROWS), 1.0
-    if key == "train" and floor.train:
+    told, times = fit.predictions[part].thinned(ROWS), 1.0
+    if part == "train" and floor.train:
         times = floor.rms / floor.train
     use = np.ones(len(told.t), bool) if told.use is None else told.use[:, j]
     square, window = (times * told.residual[use, j]) ** 2, np.floor(told.t[use] / _WINDOW)
@@ -63,6 +61,6 @@ def _moments(fit: Fit, j: int, floor: NoiseFloor, part: str) -> str:
             spans.append([log, number, number + 1])
     if len(spans) > _MOST:
         return ""
-    logs = [own["log"] for own in fit.logs if own["part"] == key]
+    logs = [own["log"] for own in fit.logs if own["part"] == part]
     words = [f"{logs[int(k)]}, {a * _WINDOW:.2f} to {b * _WINDOW:.2f} s" for k, a, b in spans]
     return " and ".join(words)

@@ -23,7 +23,7 @@ _ALIKE = 1.1  # times an error: two that differ by less are alike
 _BLOCKS = 10  # of a log, whose means say how far its own may be off
 _CHANCE = 1e-3  # of a log that stands apart from the others, were there nothing
 _SHARE = 0.1  # of a joint's squared error that its logs' means must make
-_MOST = 200_000  # rows that tell a mean
+ROWS = 200_000  # that tell a mean, or an error
 
 
 @dataclass(frozen=True)
@@ -92,7 +92,7 @@ def outdated(fit: Fit, last: Fit) -> list[str]:
 def centred(fit: Fit) -> Fit:
     """A fit with what it leaves of each log about its mean there, of every joint: as with a torque's zero that was set anew in each.
     Of logs that do not stand in memory, of a part."""
-    return replace(fit, predictions={part: _centred(told.thinned(_MOST)) for part, told in fit.predictions.items()})
+    return replace(fit, predictions={part: _centred(told.thinned(ROWS)) for part, told in fit.predictions.items()})
 
 
 def _centred(told: Prediction) -> Prediction:
@@ -116,7 +116,7 @@ def other_means(fit: Fit, logs: Sequence[dict], still: Sequence[str] = ()) -> di
     named = [(part, k, own["log"]) for part in ("train", "test") for k, own in enumerate(o for o in logs if o["part"] == part)]
     if len(named) < 2:
         return {}
-    parts, out = {part: told.thinned(_MOST) for part, told in fit.predictions.items()}, {}
+    parts, out = {part: told.thinned(ROWS) for part, told in fit.predictions.items()}, {}
     for j, joint in enumerate(fit.joints):
         if joint in still:
             continue

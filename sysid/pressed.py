@@ -5,12 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from .estimate import Fit
-from .plausible import Reason
+from .plausible import ROWS, Reason
 
 _SLOW = 0.05  # of a joint's usual speed: as good as standing
 _MORE = 2.0  # times its Coulomb friction, which a rough bearing at rest may have
 _HALF, _FEWEST = 0.5, 20  # of a joint's squared error; rows
-_ROWS = 200_000  # that tell it
 
 
 def pressed(fit: Fit) -> dict[str, Reason]:
@@ -23,7 +22,7 @@ def pressed(fit: Fit) -> dict[str, Reason]:
     out: dict[str, Reason] = {}
     most_missing: dict[str, float] = {}
     for part, whole in fit.predictions.items():
-        told = whole.thinned(_ROWS)
+        told = whole.thinned(ROWS)
         if told.states is None:
             continue
         rows, speeds = told.states.index, np.abs(told.states.qd)

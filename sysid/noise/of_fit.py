@@ -12,6 +12,7 @@ from ..filters import settled
 from ..log import Log
 from ..model import Model
 from ..motion import Motion
+from ..plausible import ROWS
 from ..prediction import Prediction, predict
 from ..preprocess import on_both_sides, prepare
 from ..projection import NOISE
@@ -21,7 +22,6 @@ from .of_angles import of_angles
 from .of_pieces import filtered, floors_of
 from .repeats import MADE, block_rms
 
-_MOST = 200_000  # rows that tell an error
 # a polynomial of order n over a window is -3 dB at n + 1 times this of one over it (Schafer 2011)
 _AS_FAR = 1 / 3.2
 _ALL = "what the noise of the angles, drawn again, makes: all that is left"
@@ -136,7 +136,7 @@ def _in_both(found: NoiseFloor, fit: Fit, joint: int) -> NoiseFloor:
     if found.rms is None:
         return found
     for part, told in fit.predictions.items():
-        left = told.thinned(_MOST).of_joint(joint)[2]
+        left = told.thinned(ROWS).of_joint(joint)[2]
         squares = left[np.isfinite(left)] ** 2
         if not len(squares):
             continue
